@@ -1,0 +1,31 @@
+#![cfg_attr(docsrs, feature(doc_cfg))]
+//! Cracks that grow over sprites and walls, frame by frame, from the points where they are hit.
+//!
+//! The rooms, in reading order:
+//!
+//! - [`math`], [`grid`](Grid): portable arithmetic, seeded random streams, the one 2D buffer.
+//! - [`pattern`]: networks and frames, the words everything else speaks.
+//! - [`growth`]: cracks by space colonization, step by step.
+//! - [`raster`]: networks to a depth field.
+//! - [`paint`]: a base picture and a depth field to diffuse, normal and depth textures.
+//! - `plugin` (feature `bevy`): components, hits, systems, upload.
+
+mod grid;
+pub mod growth;
+pub mod math;
+pub mod paint;
+pub mod pattern;
+pub mod preset;
+pub mod raster;
+
+#[cfg(feature = "bevy")]
+pub mod plugin;
+
+pub use grid::Grid;
+pub use preset::CrackPreset;
+
+/// What a game needs.
+pub mod prelude {
+    #[cfg(feature = "bevy")]
+    pub use crate::plugin::prelude::*;
+}

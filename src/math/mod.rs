@@ -1,0 +1,10 @@
+//! Portable arithmetic: the same values give the same bits on every machine.
+//!
+//! `sqrt` and the four operations are exact everywhere; everything else that a pattern needs goes through [`ops`].
+//! Random numbers come from [`Rng`], whose stream never changes between versions.
+
+pub mod ops;
+mod rng;
+
+pub use rng::Rng;
+pub(crate) use rng::{hash_unit, mix};

@@ -1,0 +1,41 @@
+//! Transcendental functions with the same bits on every platform (by the `libm` crate).
+//!
+//! The standard library leaves `sin`, `exp` and their kin to the platform, whose last bits differ.
+
+use glam::Vec2;
+
+/// Sine of an angle in radians.
+#[must_use]
+pub fn sin(x: f32) -> f32 {
+    libm::sinf(x)
+}
+
+/// Cosine of an angle in radians.
+#[must_use]
+pub fn cos(x: f32) -> f32 {
+    libm::cosf(x)
+}
+
+/// Angle of the vector `(x, y)` in radians, `-π..=π`.
+#[must_use]
+pub fn atan2(y: f32, x: f32) -> f32 {
+    libm::atan2f(y, x)
+}
+
+/// `e` to the power `x`.
+#[must_use]
+pub fn exp(x: f32) -> f32 {
+    libm::expf(x)
+}
+
+/// `x` to the power `y`.
+#[must_use]
+pub fn powf(x: f32, y: f32) -> f32 {
+    libm::powf(x, y)
+}
+
+/// The unit vector at `angle` radians from the x axis.
+#[must_use]
+pub fn unit(angle: f32) -> Vec2 {
+    Vec2::new(cos(angle), sin(angle))
+}

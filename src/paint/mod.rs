@@ -1,0 +1,11 @@
+//! A base picture and a depth field to diffuse, normal and depth texels.
+//!
+//! Every painted texel is a function of the base picture and of the depth field in the 3 x 3 texels around it, so a
+//! dirty rectangle painted alone equals the whole painted anew, bit for bit. Where the field is untouched, the
+//! painted texel is the base texel.
+
+mod look;
+mod texel;
+
+pub use look::{ColorStop, Look, LookError, LookTable};
+pub use texel::{BaseTexels, PaintTargets, paint_into};

@@ -1,0 +1,13 @@
+//! The words that generators and painters share.
+//!
+//! *Pattern space*: positions and lengths are in units of the surface's shorter side; (0, 0) is the top left, x runs
+//! right, y runs down. Texels exist only in [`raster`](crate::raster) and [`paint`](crate::paint); [`SurfaceFrame`]
+//! converts.
+
+mod frame;
+mod network;
+mod path;
+
+pub use frame::{FrameError, MAX_ASPECT, MAX_SIDE, SurfaceFrame};
+pub use network::{Link, LinkKind, NO_PARENT, Network, Node, SegmentId};
+pub use path::{MAX_PATH_POINTS, PathPoint, SegmentPath};

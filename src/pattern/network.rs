@@ -1,0 +1,135 @@
+//! [`Network`]: the graph of a crack pattern.
+
+use super::path::{SegmentPath, rough_path};
+use glam::Vec2;
+
+/// The [`Node::parent`] of a node at which a crack starts.
+pub const NO_PARENT: u32 = u32::MAX;
+
+/// A point of a crack.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Node {
+    /// Position, pattern units.
+    pub pos: Vec2,
+    /// Width of the crack here, pattern units. Only ever grows.
+    pub width: f32,
+    /// Index of the node it grew from, always below its own, or [`NO_PARENT`].
+    pub parent: u32,
+    /// Number of segments between it and its start.
+    pub generation: u32,
+    /// Step at which it was born.
+    pub birth: u32,
+    /// Index of the impact it belongs to.
+    pub impact: u32,
+}
+
+/// What a [`Link`] stands for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LinkKind {
+    /// Between nodes born of the same parent generation: `draw_connections` of Couto et al., the rings of glass.
+    Connection,
+    /// Between close nodes of different branches: `draw_islands` of Couto et al., the cells of clay.
+    Island,
+}
+
+/// A segment between two nodes neither of which is the other's parent.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Link {
+    /// Index of one end.
+    pub a: u32,
+    /// Index of the other end.
+    pub b: u32,
+    /// Width, pattern units. Only ever grows.
+    pub width: f32,
+    /// Step at which it was born.
+    pub birth: u32,
+    /// Why it is there.
+    pub kind: LinkKind,
+}
+
+/// Names one segment of a [`Network`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum SegmentId {
+    /// From the parent of this node to this node.
+    Branch(u32),
+    /// The link with this index.
+    Link(u32),
+}
+
+/// Nodes and segments of a crack pattern, in order of birth.
+///
+/// Invariants: a parent's index is below its child's; every position lies in `0..=extent`; widths are finite and above
+/// zero.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Network {
+    extent: Vec2,
+    roughness: f32,
+    seed: u64,
+    pub(crate) nodes: Vec<Node>,
+    pub(crate) links: Vec<Link>,
+}
+
+impl Network {
+    /// A network without nodes on a surface of `extent` pattern units.
+    ///
+    /// `roughness` is how far a segment's path strays from the straight line, as a share of its length (0 = straight);
+    /// `seed` fixes the paths.
+    #[must_use]
+    pub const fn new(extent: Vec2, roughness: f32, seed: u64) -> Self {
+        Self { extent, roughness, seed, nodes: Vec::new(), links: Vec::new() }
+    }
+
+    /// Size of the surface, pattern units.
+    #[must_use]
+    pub const fn extent(&self) -> Vec2 {
+        self.extent
+    }
+
+    /// All nodes, in order of birth.
+    #[must_use]
+    pub fn nodes(&self) -> &[Node] {
+        &self.nodes
+    }
+
+    /// All links, in order of birth.
+    #[must_use]
+    pub fn links(&self) -> &[Link] {
+        &self.links
+    }
+
+    /// All segments: branches in order of birth, then links.
+    pub fn segments(&self) -> impl Iterator<Item = SegmentId> + '_ {
+        let branches = (0u32..).zip(&self.nodes).filter(|(_, node)| node.parent != NO_PARENT);
+        let links = (0u32..).zip(&self.links);
+        branches.map(|(i, _)| SegmentId::Branch(i)).chain(links.map(|(i, _)| SegmentId::Link(i)))
+    }
+
+    /// Indices of the two end nodes of a segment; `None` if there is no such segment.
+    #[must_use]
+    pub fn ends(&self, segment: SegmentId) -> Option<(u32, u32)> {
+        match segment {
+            SegmentId::Branch(child) => {
+                let parent = self.nodes.get(child as usize)?.parent;
+                (parent != NO_PARENT).then_some((parent, child))
+            }
+            SegmentId::Link(link) => self.links.get(link as usize).map(|link| (link.a, link.b)),
+        }
+    }
+
+    /// The rough line that stands for a segment, with its width at each point; `None` if there is no such segment.
+    ///
+    /// Frozen at birth: the points of a segment never move, only its widths grow.
+    #[must_use]
+    pub fn path(&self, segment: SegmentId) -> Option<SegmentPath> {
+        let (a, b) = self.ends(segment)?;
+        let (from, to) = (self.nodes[a as usize], self.nodes[b as usize]);
+        let (widths, salt) = match segment {
+            SegmentId::Branch(child) => ((from.width, to.width), u64::from(child)),
+            SegmentId::Link(i) => {
+                let width = self.links[i as usize].width;
+                ((width, width), u64::from(i) | 1 << 32)
+            }
+        };
+        Some(rough_path((from.pos, to.pos), widths, self.roughness, self.extent, self.seed, salt))
+    }
+}

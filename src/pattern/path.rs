@@ -1,0 +1,88 @@
+//! The rough line of one segment.
+
+use crate::math::{Rng, hash_unit};
+use glam::Vec2;
+
+/// The most points that a [`SegmentPath`] has.
+pub const MAX_PATH_POINTS: usize = 17;
+
+/// A point of a rough line.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PathPoint {
+    /// Position, pattern units.
+    pub pos: Vec2,
+    /// Width of the crack here, pattern units.
+    pub width: f32,
+}
+
+/// The line that stands for one segment of a network: 2 to [`MAX_PATH_POINTS`] points, the first and last being its nodes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SegmentPath {
+    points: [PathPoint; MAX_PATH_POINTS],
+    len: usize,
+}
+
+impl SegmentPath {
+    /// A straight line.
+    #[must_use]
+    pub fn straight(from: PathPoint, to: PathPoint) -> Self {
+        let mut points = [PathPoint::default(); MAX_PATH_POINTS];
+        points[0] = from;
+        points[1] = to;
+        Self { points, len: 2 }
+    }
+
+    /// The points, at least two.
+    #[must_use]
+    pub fn points(&self) -> &[PathPoint] {
+        &self.points[..self.len]
+    }
+}
+
+/// Pieces of a rough line are about this long (pattern units): 8 texels of a 512-texel surface, the length at which
+/// the roughness of real cracks is measured.
+const PIECE: f32 = 1.0 / 72.0;
+
+/// A line from one point to the other by midpoint displacement, kept inside `0..=extent`.
+///
+/// Each level halves the pieces and moves the new points across the line by up to `roughness` of the piece's length.
+/// Widths vary by up to a third on the way.
+pub(super) fn rough_path(
+    (from, to): (Vec2, Vec2),
+    (w0, w1): (f32, f32),
+    roughness: f32,
+    extent: Vec2,
+    seed: u64,
+    salt: u64,
+) -> SegmentPath {
+    let length = from.distance(to);
+    let mut levels = 0;
+    while levels < 4 && length > PIECE * (1 << levels) as f32 {
+        levels += 1;
+    }
+    let mut path = SegmentPath::straight(PathPoint { pos: from, width: w0 }, PathPoint { pos: to, width: w1 });
+    if roughness <= 0.0 || levels == 0 {
+        return path;
+    }
+    let mut rng = Rng::new(seed).nth(salt);
+    let n = 1usize << levels;
+    path.points[n] = path.points[1];
+    path.len = n + 1;
+    let mut span = n;
+    while span > 1 {
+        let half = span / 2;
+        for left in (0..n).step_by(span) {
+            let (a, b) = (path.points[left], path.points[left + span]);
+            let across = (b.pos - a.pos).perp() * (roughness * rng.signed());
+            let pos = ((a.pos + b.pos) * 0.5 + across).clamp(Vec2::ZERO, extent);
+            path.points[left + half] = PathPoint { pos, width: 0.0 };
+        }
+        span = half;
+    }
+    for i in 1..n {
+        let t = i as f32 / n as f32;
+        let vary = 1.0 + 0.66 * (hash_unit(seed ^ salt, i as u64) - 0.5);
+        path.points[i].width = (w0 + (w1 - w0) * t) * vary;
+    }
+    path
+}

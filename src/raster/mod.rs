@@ -1,0 +1,59 @@
+//! Networks to a depth field, anti-aliased, combined by max.
+//!
+//! Depth is 16 bits a texel: 0 = untouched, 65535 = the deepest. Because stamps combine by max, painting is order-free
+//! and a segment can be stamped again, wider, without its neighbours.
+
+mod dirty;
+mod rect;
+mod stamp;
+
+pub use dirty::DirtyTiles;
+pub use rect::TexelRect;
+pub use stamp::{stamp_dot, stamp_path};
+
+use crate::{Grid, pattern::SurfaceFrame};
+
+/// How deep the crack is at each texel: 0 = untouched, 65535 = the deepest; row-major from the top left.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DepthField {
+    /// Where the field lies in pattern space.
+    pub frame: SurfaceFrame,
+    /// One value per texel of the frame.
+    pub depth: Grid<u16>,
+}
+
+impl DepthField {
+    /// An untouched field.
+    #[must_use]
+    pub fn new(frame: SurfaceFrame) -> Self {
+        Self { frame, depth: Grid::new(frame.size(), 0) }
+    }
+}
+
+/// The cross-section of a crack.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
+pub struct Profile {
+    /// Depth in the middle of a crack of [`full_width`](Self::full_width) or more. Range 0..=1; default 1.
+    pub depth: f32,
+    /// Width at which a crack reaches full depth; thinner ones are shallower, down to 40 %. Pattern units, > 0; default 0.02.
+    pub full_width: f32,
+    /// How much of the half width is wall: 0 = a slot with upright walls, 1 = a V. Range 0..=1; default 0.6.
+    pub wall: f32,
+    /// Width of the chipped rim on either side. Pattern units, 0..=0.2; default 0.
+    pub rim_width: f32,
+    /// Depth of the rim where it meets the crack, falling to 0 outward. Range 0..=1; default 0.
+    pub rim_depth: f32,
+}
+
+impl Profile {
+    /// The default: a groove with sloping walls and no rim.
+    pub const DEFAULT: Self = Self { depth: 1.0, full_width: 0.02, wall: 0.6, rim_width: 0.0, rim_depth: 0.0 };
+}
+
+impl Default for Profile {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
+}
