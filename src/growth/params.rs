@@ -116,7 +116,6 @@ pub struct GrowthParams {
 impl GrowthParams {
     /// The default: loose cracks as in concrete.
     pub const DEFAULT: Self = Self {
-    Self {
         kill_distance: 0.03,
         step_length: 0.02,
         crack_radius: 0.2,
