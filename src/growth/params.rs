@@ -65,7 +65,7 @@ pub enum StartLayout {
 #[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct GrowthParams {
-    /// Distance at which a marker counts as reached and dies. Pattern units, 0.0005..=4.
+    /// Distance at which a marker counts as reached and dies. Pattern units, 0.0005..=4, at most [`crack_radius`](Self::crack_radius).
     pub kill_distance: f32,
     /// Length of a segment: the distance `D` from a node to the node that grows from it. Pattern units, 0.001..=4.
     pub step_length: f32,
@@ -73,9 +73,9 @@ pub struct GrowthParams {
     pub crack_radius: f32,
     /// Steps of growth after each hit, 1..=100000.
     pub num_iterations: u32,
-    /// Lines of the marker grid, 1..=1024.
+    /// Lines of the marker grid, 1..=512.
     pub num_lines_grid: u32,
-    /// Columns of the marker grid, 1..=1024.
+    /// Columns of the marker grid, 1..=512.
     pub num_columns_grid: u32,
     /// How markers are laid out.
     pub markers: MarkerLayout,
@@ -178,4 +178,171 @@ pub enum ParamError {
         /// The text given.
         text: String,
     },
+}
+
+/// The most markers that a surface gets; a layout that asks for more is cut short.
+pub const MAX_MARKERS: usize = 262_144;
+
+/// Share of `D²` by which the squared distance to a marker must fall for a node to have served it.
+pub(super) const PROGRESS: f32 = 0.25;
+
+macro_rules! fields {
+    ($($name:ident: $kind:ty = $min:expr, $max:expr;)*) => {
+        /// Every plain number of the parameters with its range.
+        fn ranges(&self) -> impl Iterator<Item = (&'static str, f64, f64, f64)> {
+            [$((stringify!($name), f64::from(self.$name), $min, $max)),*].into_iter()
+        }
+
+        fn set_number(&mut self, name: &str, text: &str) -> Option<Result<(), ParamError>> {
+            match name {
+                $(stringify!($name) => Some(parse(name, text).map(|value: $kind| self.$name = value)),)*
+                _ => None,
+            }
+        }
+    };
+}
+
+fn parse<T: std::str::FromStr>(name: &str, text: &str) -> Result<T, ParamError> {
+    text.trim().parse().map_err(|_| ParamError::Unreadable { name: name.to_owned(), text: text.to_owned() })
+}
+
+impl GrowthParams {
+    fields! {
+        kill_distance: f32 = 0.0005, 4.0;
+        step_length: f32 = 0.001, 4.0;
+        crack_radius: f32 = 0.001, 32.0;
+        num_iterations: u32 = 1.0, 100_000.0;
+        num_lines_grid: u32 = 1.0, 512.0;
+        num_columns_grid: u32 = 1.0, 512.0;
+        focus: f32 = 0.0, 4.0;
+        reach: f32 = 0.01, 64.0;
+        line_width: f32 = 0.0005, 0.2;
+        line_growth: f32 = 0.0, 16.0;
+        murray: f32 = 1.0, 8.0;
+        max_width: f32 = 0.0005, 0.4;
+        wander: f32 = 0.0, 1.0;
+        roughness: f32 = 0.0, 0.5;
+        connection_gaps: f32 = 0.0, 1.0;
+        connection_every: u32 = 1.0, 1000.0;
+        island_distance: f32 = 0.0, 1.0;
+        max_nodes: u32 = 1.0, 1_000_000.0;
+    }
+
+    /// Checks every parameter against its range.
+    ///
+    /// # Errors
+    /// Names the first parameter that is out of its range or not finite.
+    pub fn validate(&self) -> Result<(), ParamError> {
+        let markers: &[_] = match self.markers {
+            MarkerLayout::PseudoGrid { occupancy, jitter } => {
+                &[("occupancy", f64::from(occupancy), 0.0, 1.0), ("jitter", f64::from(jitter), 0.0, 1.0)]
+            }
+            MarkerLayout::DartThrowing { spacing } => &[("spacing", f64::from(spacing), 0.002, 1.0)],
+            MarkerLayout::Polar { sectors, rings, ring_growth, jitter, occupancy } => &[
+                ("sectors", f64::from(sectors), 1.0, 360.0),
+                ("rings", f64::from(rings), 1.0, 256.0),
+                ("ring_growth", f64::from(ring_growth), 0.5, 2.0),
+                ("jitter", f64::from(jitter), 0.0, 1.0),
+                ("occupancy", f64::from(occupancy), 0.0, 1.0),
+            ],
+        };
+        let starts: &[_] = match self.starts {
+            StartLayout::Point => &[],
+            StartLayout::Points { count } => &[("start_count", f64::from(count), 1.0, 1024.0)],
+            StartLayout::Ring { count, radius } | StartLayout::Disc { count, radius } => {
+                &[("start_count", f64::from(count), 1.0, 1024.0), ("start_radius", f64::from(radius), 0.0, 1.0)]
+            }
+        };
+        let related = [
+            ("kill_distance", f64::from(self.kill_distance), 0.0005, f64::from(self.crack_radius)),
+            ("crack_radius", f64::from(self.crack_radius), 0.0, 256.0 * f64::from(self.step_length)),
+            ("max_width", f64::from(self.max_width), f64::from(self.line_width), 0.4),
+        ];
+        let all = self.ranges().chain(markers.iter().copied()).chain(starts.iter().copied()).chain(related);
+        for (name, value, min, max) in all {
+            if !(min..=max).contains(&value) {
+                return Err(ParamError::OutOfRange { name, value, min, max });
+            }
+        }
+        Ok(())
+    }
+
+    /// Sets one parameter from text, by the name of its field or by the paper's own (`D`).
+    ///
+    /// Besides the fields: `markers` (`grid`, `darts`, `polar`), `occupancy`, `jitter`, `spacing`, `sectors`, `rings`,
+    /// `ring_growth` of the present layout; `starts` (`point`, `points`, `ring`, `disc`), `start_count`, `start_radius`.
+    ///
+    /// ```
+    /// use bevy_crack::growth::GrowthParams;
+    ///
+    /// let mut params = GrowthParams::default();
+    /// params.set("D", "0.05")?;
+    /// assert_eq!(params.step_length, 0.05);
+    /// assert!(params.set("colour", "red").is_err());
+    /// # Ok::<(), bevy_crack::growth::ParamError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// If there is no such parameter or the text is no value of it. Ranges are checked by [`validate`](Self::validate).
+    pub fn set(&mut self, name: &str, text: &str) -> Result<(), ParamError> {
+        let unreadable = || ParamError::Unreadable { name: name.to_owned(), text: text.to_owned() };
+        if let Some(done) = self.set_number(name, text) {
+            return done;
+        }
+        match (name, &mut self.markers, &mut self.starts) {
+            ("D", ..) => self.step_length = parse(name, text)?,
+            ("draw_connections", ..) => self.draw_connections = parse(name, text)?,
+            ("draw_islands", ..) => self.draw_islands = parse(name, text)?,
+            ("draw_markers", ..) => self.draw_markers = parse(name, text)?,
+            ("markers", ..) => {
+                self.markers = match text {
+                    "grid" => MarkerLayout::PseudoGrid { occupancy: 0.7, jitter: 0.8 },
+                    "darts" => MarkerLayout::DartThrowing { spacing: 0.04 },
+                    "polar" => {
+                        MarkerLayout::Polar { sectors: 16, rings: 16, ring_growth: 1.1, jitter: 0.5, occupancy: 0.8 }
+                    }
+                    _ => return Err(unreadable()),
+                }
+            }
+            ("starts", ..) => {
+                self.starts = match text {
+                    "point" => StartLayout::Point,
+                    "points" => StartLayout::Points { count: 8 },
+                    "ring" => StartLayout::Ring { count: 12, radius: 0.02 },
+                    "disc" => StartLayout::Disc { count: 12, radius: 0.03 },
+                    _ => return Err(unreadable()),
+                }
+            }
+            ("occupancy", MarkerLayout::PseudoGrid { occupancy, .. } | MarkerLayout::Polar { occupancy, .. }, _) => {
+                *occupancy = parse(name, text)?
+            }
+            ("jitter", MarkerLayout::PseudoGrid { jitter, .. } | MarkerLayout::Polar { jitter, .. }, _) => {
+                *jitter = parse(name, text)?;
+            }
+            ("spacing", MarkerLayout::DartThrowing { spacing }, _) => *spacing = parse(name, text)?,
+            ("sectors", MarkerLayout::Polar { sectors, .. }, _) => *sectors = parse(name, text)?,
+            ("rings", MarkerLayout::Polar { rings, .. }, _) => *rings = parse(name, text)?,
+            ("ring_growth", MarkerLayout::Polar { ring_growth, .. }, _) => *ring_growth = parse(name, text)?,
+            (
+                "start_count",
+                _,
+                StartLayout::Points { count } | StartLayout::Ring { count, .. } | StartLayout::Disc { count, .. },
+            ) => *count = parse(name, text)?,
+            ("start_radius", _, StartLayout::Ring { radius, .. } | StartLayout::Disc { radius, .. }) => {
+                *radius = parse(name, text)?;
+            }
+            _ => return Err(ParamError::Unknown { name: name.to_owned() }),
+        }
+        Ok(())
+    }
+
+    /// The most nodes that `markers` markers and `starts` starts can make: growth ends by itself within as many steps.
+    ///
+    /// Each new node either kills a marker or brings one closer by at least `D²/4` of squared distance, and no marker
+    /// begins further than [`crack_radius`](Self::crack_radius) from the node that it attracts.
+    #[must_use]
+    pub fn most_nodes(&self, markers: u64, starts: u64) -> u64 {
+        let approaches = (self.crack_radius / self.step_length).powi(2) / PROGRESS;
+        starts + markers * (2 + approaches.ceil() as u64)
+    }
 }

@@ -1,15 +1,31 @@
-//! The growth itself.
+//! The growth itself: hits, steps, and what they leave behind.
 
-use super::{GrowthParams, ParamError};
-use crate::{Grid, pattern::{Network, SegmentId}};
+use super::{
+    GrowthParams, MarkerLayout, ParamError,
+    field::{MarkerField, NO_NODE},
+    links::Linker,
+    markers::{self, Region},
+    nodes::NodeGrid,
+    params::{MAX_MARKERS, PROGRESS},
+    width::Widths,
+};
+use crate::{
+    Grid,
+    math::{hash_unit, mix},
+    pattern::{NO_PARENT, Network, Node, SegmentId},
+};
 use glam::Vec2;
+use std::ops::Range;
+
+/// The most energy that an impact gathers.
+pub const MAX_ENERGY: f32 = 16.0;
 
 /// One impact on a growth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Impact {
     /// Where, pattern units.
     pub pos: Vec2,
-    /// Sum of the energies of all hits merged into it, capped at 16.
+    /// Sum of the energies of all hits merged into it, at most [`MAX_ENERGY`].
     pub energy: f32,
 }
 
@@ -59,7 +75,7 @@ impl StepReport {
     }
 }
 
-/// Where all markers are: the numbers add up to `total`.
+/// Where all markers are: the other numbers add up to `total`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct Census {
     /// Markers ever made.
@@ -72,93 +88,449 @@ pub struct Census {
     pub waiting: u32,
 }
 
+/// The markers that attract one node: `S(c)` of Couto et al.
+#[derive(Clone, Copy, Debug)]
+struct Pull {
+    node: u32,
+    /// Sum of the unit vectors to the markers, in units of 2⁻²⁴: whole numbers, so that the order does not matter.
+    sum: [i64; 2],
+    closest: u32,
+    closest_sq: f32,
+    closest_id: u32,
+    child: Vec2,
+    serves: bool,
+}
+
+const FIXED: f32 = 16_777_216.0;
+const NO_PULL: u32 = u32::MAX;
+
 /// A growing crack pattern on one surface.
+///
+/// ```
+/// use bevy_crack::growth::{CrackGrowth, GrowthParams};
+///
+/// let mut growth = CrackGrowth::new(GrowthParams::default(), [1.0, 1.0].into(), 7)?;
+/// growth.hit([0.5, 0.5].into(), 1.0);
+/// while growth.step().grew() {}
+/// assert!(growth.network().nodes().len() > 100);
+/// assert_eq!(growth.census().attracting, 0);
+/// # Ok::<(), bevy_crack::growth::ParamError>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct CrackGrowth {
+    params: GrowthParams,
+    seed: u64,
     network: Network,
+    pub(super) field: MarkerField,
+    nodes: NodeGrid,
+    widths: Widths,
+    linker: Linker,
+    impacts: Vec<Impact>,
+    density: Option<Grid<f32>>,
+    steps: u32,
+    steps_left: u32,
+    newborn: Range<u32>,
+    /// Places of markers made since they were last asked for.
+    shown_markers: Vec<Vec2>,
+    changes: Changes,
+    pulls: Vec<Pull>,
+    /// Per node: its entry in `pulls` during a step.
+    pull_of: Vec<u32>,
+}
+
+/// Segments that are new or wider, each once.
+#[derive(Clone, Debug, Default)]
+struct Changes {
+    list: Vec<SegmentId>,
+    /// Per node: whether its branch is on the list.
+    listed: Vec<bool>,
+    /// First child and next sibling of each node: a branch tapers between two widths, so it changes with either.
+    child: Vec<u32>,
+    sibling: Vec<u32>,
+}
+
+impl Changes {
+    fn push_node(&mut self, parent: u32) {
+        let node = self.listed.len() as u32;
+        self.listed.push(false);
+        self.child.push(NO_PARENT);
+        let sibling = match self.child.get_mut(parent as usize) {
+            Some(child) => std::mem::replace(child, node),
+            None => NO_PARENT,
+        };
+        self.sibling.push(sibling);
+        if parent != NO_PARENT {
+            self.list_branch(node);
+        }
+    }
+
+    fn list_branch(&mut self, node: u32) {
+        if !std::mem::replace(&mut self.listed[node as usize], true) {
+            self.list.push(SegmentId::Branch(node));
+        }
+    }
+
+    fn widened(&mut self, node: u32, has_parent: bool) {
+        if has_parent {
+            self.list_branch(node);
+        }
+        let mut child = self.child[node as usize];
+        while child != NO_PARENT {
+            self.list_branch(child);
+            child = self.sibling[child as usize];
+        }
+    }
 }
 
 impl CrackGrowth {
-    /// A pattern without cracks on a surface of `extent` pattern units.
+    /// A pattern without cracks on a surface of `extent` pattern units (see
+    /// [`SurfaceFrame::extent`](crate::pattern::SurfaceFrame::extent)).
     ///
     /// # Errors
-    /// If a parameter is out of its range.
+    /// If a parameter is out of its range, or `extent` (named so) is not within 0.0001..=64.
     pub fn new(params: GrowthParams, extent: Vec2, seed: u64) -> Result<Self, ParamError> {
-        todo!("{params:?} {extent} {seed}")
+        params.validate()?;
+        for value in extent.to_array() {
+            if !(1e-4..=64.0).contains(&value) {
+                return Err(ParamError::OutOfRange { name: "extent", value: f64::from(value), min: 1e-4, max: 64.0 });
+            }
+        }
+        Ok(Self {
+            network: Network::new(extent, params.roughness, seed),
+            field: MarkerField::new(extent, params.crack_radius, params.kill_distance),
+            nodes: NodeGrid::new(extent, 2.0 * params.step_length.max(params.kill_distance)),
+            widths: Widths::new(&params),
+            linker: Linker::default(),
+            impacts: Vec::new(),
+            density: None,
+            steps: 0,
+            steps_left: 0,
+            newborn: 0..0,
+            shown_markers: Vec::new(),
+            changes: Changes::default(),
+            pulls: Vec::new(),
+            pull_of: Vec::new(),
+            params,
+            seed,
+        })
     }
 
-    /// Where markers may be: the probability over the whole surface (any resolution); `None` = everywhere.
-    pub fn set_density(&mut self, _density: Option<Grid<f32>>) {
-        todo!()
+    /// Where markers of later hits may be: a probability 0..=1 over the whole surface, at any resolution, sampled at the
+    /// nearest cell; `None` = everywhere. Values that are not finite count as 0.
+    pub fn set_density(&mut self, density: Option<Grid<f32>>) {
+        self.density = density.filter(|grid| grid.size().min_element() > 0);
     }
 
-    /// Hits the surface at `pos` (pattern units). Never grows by itself: call [`step`](Self::step).
-    pub fn hit(&mut self, _pos: Vec2, _energy: f32) -> HitOutcome {
-        todo!()
+    /// Hits the surface at `pos` (pattern units) with `energy` (1 = an ordinary hit; 4 reaches twice as far).
+    ///
+    /// Lays out starts and markers; growth happens in [`step`](Self::step). A hit as good as on top of an earlier one adds
+    /// its energy to that one, so hammering on one spot costs no more than one hard hit.
+    pub fn hit(&mut self, pos: Vec2, energy: f32) -> HitOutcome {
+        if !pos.is_finite() || !energy.is_finite() {
+            return HitOutcome::Rejected(Rejected::NotFinite);
+        }
+        if energy < 0.0 {
+            return HitOutcome::Rejected(Rejected::NegativeEnergy);
+        }
+        let extent = self.network.extent();
+        if pos.cmplt(Vec2::ZERO).any() || pos.cmpgt(extent).any() {
+            return HitOutcome::Rejected(Rejected::OffSurface);
+        }
+        if energy == 0.0 {
+            return HitOutcome::Nothing;
+        }
+        if self.network.nodes.len() >= self.params.max_nodes as usize {
+            return HitOutcome::Rejected(Rejected::Full);
+        }
+        let merge = self.params.step_length.max(self.params.kill_distance).min(0.05);
+        let nearest = (0u32..)
+            .zip(&self.impacts)
+            .map(|(i, impact)| (impact.pos.distance_squared(pos), i))
+            .min_by(|a, b| a.0.total_cmp(&b.0));
+        if let Some((distance_sq, index)) = nearest
+            && distance_sq <= merge * merge
+        {
+            let impact = &mut self.impacts[index as usize];
+            let before = impact.energy;
+            impact.energy = (before + energy).min(MAX_ENERGY);
+            let (center, after) = (impact.pos, impact.energy);
+            if after > before {
+                self.populate(index, center, self.reach(before), self.reach(after));
+                self.steps_left = self.params.num_iterations;
+            }
+            return HitOutcome::Merged(index);
+        }
+        let index = self.impacts.len() as u32;
+        let energy = energy.min(MAX_ENERGY);
+        self.impacts.push(Impact { pos, energy });
+        let reach = self.reach(energy);
+        let first = self.network.nodes.len() as u32;
+        let seed = mix(self.seed ^ mix(u64::from(index)));
+        for place in markers::starts(self.params.starts, pos, reach, extent, seed) {
+            if !self.nodes.any_within(place, 1e-4) {
+                self.bear(place, NO_PARENT, 0, index);
+            }
+        }
+        for node in first..self.network.nodes.len() as u32 {
+            self.field.visit(node, self.network.nodes[node as usize].pos);
+        }
+        self.newborn = first..self.network.nodes.len() as u32;
+        self.join_newborn();
+        self.populate(index, pos, 0.0, reach);
+        self.steps_left = self.params.num_iterations;
+        HitOutcome::Started(index)
     }
 
-    /// One step of growth.
+    fn reach(&self, energy: f32) -> f32 {
+        self.params.reach * energy.sqrt()
+    }
+
+    fn populate(&mut self, impact: u32, center: Vec2, inner: f32, outer: f32) {
+        let extent = self.network.extent();
+        let region = Region { center, inner, outer, extent };
+        let seed = mix(self.seed ^ mix(u64::from(impact) | 1 << 40));
+        if matches!(self.params.markers, MarkerLayout::DartThrowing { .. }) {
+            // Darts keep their distance from the markers of hits that no step has taken up yet.
+            self.field.settle(&self.nodes);
+        }
+        let mut placed = NodeGrid::new(extent, self.params.kill_distance.max(0.01));
+        let (field, nodes, shown) = (&mut self.field, &self.nodes, &mut self.shown_markers);
+        let show = self.params.draw_markers;
+        markers::lay_out(&self.params, region, self.density.as_ref(), seed, |pos, spacing| {
+            if field.living_at_most() >= MAX_MARKERS {
+                return;
+            }
+            if let Some(spacing) = spacing {
+                if placed.any_within(pos, spacing) || field.any_within(pos, spacing) || nodes.any_within(pos, spacing) {
+                    return;
+                }
+                placed.push(pos);
+            }
+            field.add(pos);
+            if show {
+                shown.push(pos);
+            }
+        });
+    }
+
+    /// Adds a node; the caller lets it visit the markers.
+    fn bear(&mut self, pos: Vec2, parent: u32, generation: u32, impact: u32) {
+        let width = self.widths.tip();
+        self.network.nodes.push(Node { pos, width, parent, generation, birth: self.steps, impact });
+        self.nodes.push(pos);
+        self.pull_of.push(NO_PULL);
+        self.changes.push_node(parent);
+        let (changes, network) = (&mut self.changes, &mut self.network);
+        let mut widened = [NO_PARENT; 64];
+        let mut n = 0;
+        self.widths.push(&mut network.nodes, |node| {
+            // Each node on the way up is wider than the one before, so there are no more than notches.
+            if let Some(slot) = widened.get_mut(n) {
+                *slot = node;
+                n += 1;
+            }
+        });
+        for &node in &widened[..n] {
+            changes.widened(node, network.nodes[node as usize].parent != NO_PARENT);
+        }
+    }
+
+    /// One step of growth (Couto et al., eq. 2): every node that attracts markers grows one node at
+    /// `c' = c + D n̂`, `n = Σ (m - c) / ‖m - c‖`, then markers within the kill distance of a node die.
+    ///
+    /// Differs from the paper where the paper would never end: a node at `c + D n̂` that neither reaches a marker nor brings
+    /// one closer (by `D²/4` of squared distance) is not born; the node that is born instead lies straight towards
+    /// the closest marker, on it if that is nearer than `D`. So every birth serves a marker, and growth ends within
+    /// [`GrowthParams::most_nodes`]. Nodes beyond the border are moved back to it.
     pub fn step(&mut self) -> StepReport {
-        todo!()
+        self.newborn = 0..0;
+        if self.steps_left == 0 {
+            return StepReport { born: 0 };
+        }
+        self.steps_left -= 1;
+        self.field.settle(&self.nodes);
+        self.gather_pulls();
+        self.aim();
+        let first = self.network.nodes.len() as u32;
+        let room = (self.params.max_nodes as usize).saturating_sub(self.network.nodes.len());
+        let mut pulls = std::mem::take(&mut self.pulls);
+        if !pulls.is_empty() {
+            self.steps = self.steps.saturating_add(1);
+        }
+        for pull in &pulls {
+            self.pull_of[pull.node as usize] = NO_PULL;
+        }
+        for pull in pulls.drain(..).take(room) {
+            let parent = self.network.nodes[pull.node as usize];
+            self.bear(pull.child, pull.node, parent.generation.saturating_add(1), parent.impact);
+        }
+        self.pulls = pulls;
+        let last = self.network.nodes.len() as u32;
+        self.newborn = first..last;
+        for node in first..last {
+            self.field.visit(node, self.network.nodes[node as usize].pos);
+        }
+        self.join_newborn();
+        if first == last {
+            self.steps_left = 0;
+        }
+        StepReport { born: last - first }
+    }
+
+    /// Collects `S(c)` of every node, in order of the nodes.
+    fn gather_pulls(&mut self) {
+        self.field.sweep();
+        for i in 0..self.field.active.len() {
+            let index = self.field.active[i];
+            let marker = self.field.marker(index);
+            debug_assert_ne!(marker.node, NO_NODE, "an active marker attracts a node");
+            let slot = &mut self.pull_of[marker.node as usize];
+            if *slot == NO_PULL {
+                *slot = self.pulls.len() as u32;
+                self.pulls.push(Pull {
+                    node: marker.node,
+                    sum: [0, 0],
+                    closest: index,
+                    closest_sq: f32::INFINITY,
+                    closest_id: u32::MAX,
+                    child: Vec2::ZERO,
+                    serves: false,
+                });
+            }
+            let pull = &mut self.pulls[*slot as usize];
+            let towards = (marker.pos - self.network.nodes[marker.node as usize].pos) * (FIXED / marker.near_sq.sqrt());
+            pull.sum[0] += i64::from(towards.x as i32);
+            pull.sum[1] += i64::from(towards.y as i32);
+            if (marker.near_sq, marker.id) < (pull.closest_sq, pull.closest_id) {
+                (pull.closest, pull.closest_sq, pull.closest_id) = (index, marker.near_sq, marker.id);
+            }
+        }
+        self.pulls.sort_unstable_by_key(|pull| pull.node);
+        for (slot, pull) in (0u32..).zip(&self.pulls) {
+            self.pull_of[pull.node as usize] = slot;
+        }
+    }
+
+    /// Finds the place of every child.
+    fn aim(&mut self) {
+        let extent = self.network.extent();
+        let (length, kill) = (self.params.step_length, self.params.kill_distance);
+        let next = self.network.nodes.len() as u64;
+        for (child, pull) in (next..).zip(&mut self.pulls) {
+            let from = self.network.nodes[pull.node as usize].pos;
+            let mut direction = Vec2::new(pull.sum[0] as f32, pull.sum[1] as f32).normalize_or_zero();
+            if self.params.wander > 0.0 {
+                // A draw per child, frozen by its index.
+                let stray = self.params.wander * (2.0 * hash_unit(self.seed ^ 0x57A6, child) - 1.0);
+                direction = (direction + direction.perp() * stray).normalize_or_zero();
+            }
+            pull.child = within_border(from, from + direction * length, extent);
+        }
+        for &index in &self.field.active {
+            let marker = self.field.marker(index);
+            let pull = &mut self.pulls[self.pull_of[marker.node as usize] as usize];
+            if !pull.serves {
+                let distance_sq = marker.pos.distance_squared(pull.child);
+                pull.serves = distance_sq <= kill * kill || distance_sq <= marker.near_sq - PROGRESS * length * length;
+            }
+        }
+        for pull in &mut self.pulls {
+            if !pull.serves {
+                let (from, to) = (self.network.nodes[pull.node as usize].pos, self.field.marker(pull.closest).pos);
+                let distance = pull.closest_sq.sqrt();
+                pull.child = if distance <= length { to } else { from + (to - from) * (length / distance) };
+            }
+        }
+    }
+
+    fn join_newborn(&mut self) {
+        let links = self.network.links.len();
+        self.linker.join(&self.params, &mut self.network, &self.nodes, &self.impacts, self.newborn.clone(), self.seed);
+        let all = self.network.links.len() as u32;
+        self.changes.list.extend((links as u32..all).map(SegmentId::Link));
     }
 
     /// Whether another step may grow something.
     #[must_use]
-    pub fn is_growing(&self) -> bool {
-        todo!()
+    pub const fn is_growing(&self) -> bool {
+        self.steps_left > 0
     }
 
     /// Nodes and segments so far.
     #[must_use]
-    pub fn network(&self) -> &Network {
+    pub const fn network(&self) -> &Network {
         &self.network
     }
 
     /// The impacts so far.
     #[must_use]
     pub fn impacts(&self) -> &[Impact] {
-        todo!()
+        &self.impacts
     }
 
-    /// Number of steps made.
+    /// Number of steps in which something grew.
     #[must_use]
-    pub fn steps(&self) -> u32 {
-        todo!()
+    pub const fn steps(&self) -> u32 {
+        self.steps
     }
 
-    /// Indices of the nodes born in the last step.
+    /// Indices of the nodes born in the last step or hit.
     #[must_use]
-    pub fn newborn(&self) -> std::ops::Range<u32> {
-        todo!()
+    pub fn newborn(&self) -> Range<u32> {
+        self.newborn.clone()
     }
 
-    /// Appends the segments that are new or wider since the last call (each at most once per call), and forgets them.
-    pub fn take_changed(&mut self, _changed: &mut Vec<SegmentId>) {
-        todo!()
+    /// Appends the segments that are new or wider since the last call, each once, and forgets them.
+    pub fn take_changed(&mut self, changed: &mut Vec<SegmentId>) {
+        for segment in self.changes.list.drain(..) {
+            if let SegmentId::Branch(node) = segment {
+                self.changes.listed[node as usize] = false;
+            }
+            changed.push(segment);
+        }
     }
 
-    /// Appends the positions of markers made since the last call, if `draw_markers` is set.
-    pub fn take_markers(&mut self, _markers: &mut Vec<Vec2>) {
-        todo!()
+    /// Appends the places of markers made since the last call, if `draw_markers` is set.
+    pub fn take_markers(&mut self, markers: &mut Vec<Vec2>) {
+        markers.append(&mut self.shown_markers);
     }
 
     /// Where all markers are.
     #[must_use]
     pub fn census(&self) -> Census {
-        todo!()
+        let (living, attracting) = self.field.living();
+        Census { total: self.field.made, killed: self.field.killed, attracting, waiting: living - attracting }
     }
 
     /// The parameters.
     #[must_use]
-    pub fn params(&self) -> &GrowthParams {
-        todo!()
+    pub const fn params(&self) -> &GrowthParams {
+        &self.params
     }
 
-    /// Takes up other parameters; what is grown stays.
+    /// Takes up other parameters; what is grown stays, `roughness` included.
     ///
     /// # Errors
     /// If a parameter is out of its range; nothing changes then.
-    pub fn set_params(&mut self, _params: GrowthParams) -> Result<(), ParamError> {
-        todo!()
+    pub fn set_params(&mut self, params: GrowthParams) -> Result<(), ParamError> {
+        params.validate()?;
+        self.field.set_distances(params.crack_radius, params.kill_distance);
+        self.widths.set_params(&params);
+        self.params = params;
+        Ok(())
     }
+}
+
+/// `to`, moved back along the line from `from` to where it leaves the surface.
+fn within_border(from: Vec2, to: Vec2, extent: Vec2) -> Vec2 {
+    let mut share = 1.0f32;
+    for axis in 0..2 {
+        let way = to[axis] - from[axis];
+        if to[axis] < 0.0 {
+            share = share.min(-from[axis] / way);
+        } else if to[axis] > extent[axis] {
+            share = share.min((extent[axis] - from[axis]) / way);
+        }
+    }
+    if share < 1.0 { (from + (to - from) * share).clamp(Vec2::ZERO, extent) } else { to }
 }

@@ -1,0 +1,148 @@
+//! Where markers and starts come to lie.
+
+use super::params::{GrowthParams, MarkerLayout, StartLayout};
+use crate::{
+    Grid,
+    math::{Rng, hash_unit, mix, ops},
+};
+use glam::Vec2;
+use std::f32::consts::TAU;
+
+/// The ring-shaped part of a surface that one hit populates.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Region {
+    pub(super) center: Vec2,
+    /// What lies closer was populated before.
+    pub(super) inner: f32,
+    pub(super) outer: f32,
+    pub(super) extent: Vec2,
+}
+
+impl Region {
+    /// Share of the way from the centre to the rim; `None` outside of the region or the surface.
+    fn share(&self, pos: Vec2) -> Option<f32> {
+        let distance = pos.distance(self.center);
+        let inside = pos.cmpge(Vec2::ZERO).all() && pos.cmple(self.extent).all();
+        (inside && distance >= self.inner && distance < self.outer).then_some(distance / self.outer)
+    }
+}
+
+/// A probability over the surface, at any resolution.
+fn density_at(density: Option<&Grid<f32>>, pos: Vec2, extent: Vec2) -> f32 {
+    let Some(grid) = density else { return 1.0 };
+    let size = grid.size();
+    let texel = (pos / extent * size.as_vec2()).as_uvec2();
+    let value = grid.get(texel.x.min(size.x.saturating_sub(1)), texel.y.min(size.y.saturating_sub(1)));
+    value.filter(|p| p.is_finite()).unwrap_or(0.0)
+}
+
+/// Calls `keep` with every marker that `params` lay out in `region`, in a fixed order.
+///
+/// For dart throwing it also gets the distance that the marker must keep from others. Each draw depends on the place alone, so that a hit that grows by energy only adds a ring.
+pub(super) fn lay_out(
+    params: &GrowthParams,
+    region: Region,
+    density: Option<&Grid<f32>>,
+    seed: u64,
+    mut keep: impl FnMut(Vec2, Option<f32>),
+) {
+    let mut offer = |pos: Vec2, chance: f32, probability: f32, spacing: Option<f32>| {
+        let Some(share) = region.share(pos) else { return };
+        let thinned = if params.focus > 0.0 { ops::powf(1.0 - share, params.focus) } else { 1.0 };
+        if chance < probability * thinned * density_at(density, pos, region.extent) {
+            keep(pos, spacing);
+        }
+    };
+    match params.markers {
+        MarkerLayout::PseudoGrid { occupancy, jitter } => {
+            let (columns, lines) = (params.num_columns_grid, params.num_lines_grid);
+            let cell = region.extent / Vec2::new(columns as f32, lines as f32);
+            let (x0, x1) = span(region.center.x, region.outer, cell.x, columns);
+            let (y0, y1) = span(region.center.y, region.outer, cell.y, lines);
+            for y in y0..y1 {
+                for x in x0..x1 {
+                    let vertex = mix(seed ^ (u64::from(y) << 32 | u64::from(x)));
+                    let stray = Vec2::new(hash_unit(vertex, 1), hash_unit(vertex, 2)) - 0.5;
+                    let pos = (Vec2::new(x as f32, y as f32) + 0.5 + stray * jitter) * cell;
+                    offer(pos, hash_unit(vertex, 0), occupancy, None);
+                }
+            }
+        }
+        MarkerLayout::DartThrowing { spacing } => {
+            // One dart per cell and round; the cells are small enough that each holds at most one marker.
+            let cell = spacing * std::f32::consts::FRAC_1_SQRT_2;
+            let cells = (region.extent / cell).ceil().as_uvec2();
+            let (x0, x1) = span(region.center.x, region.outer, cell, cells.x);
+            let (y0, y1) = span(region.center.y, region.outer, cell, cells.y);
+            for round in 0..6u64 {
+                for y in y0..y1 {
+                    for x in x0..x1 {
+                        let dart = mix(seed ^ (u64::from(y) << 32 | u64::from(x))).wrapping_add(round);
+                        let stray = Vec2::new(hash_unit(dart, 1), hash_unit(dart, 2));
+                        let pos = (Vec2::new(x as f32, y as f32) + stray) * cell;
+                        offer(pos, hash_unit(dart, 0), 1.0, Some(spacing));
+                    }
+                }
+            }
+        }
+        MarkerLayout::Polar { sectors, rings, ring_growth, jitter, occupancy } => {
+            let turn = TAU * hash_unit(seed, 0);
+            for ray in 0..sectors {
+                let mut rng = Rng::new(mix(seed ^ u64::from(ray)));
+                let mut angle = turn + TAU * (ray as f32 + 1.5 * jitter * (rng.unit() - 0.5)) / sectors as f32;
+                // Rays end early, most of them: few of the radials of a pane reach its edge.
+                let length = region.outer * (1.0 - jitter * ops::powf(rng.unit(), 1.3));
+                let first = params.reach * ring_share(1, rings, ring_growth);
+                let mut radius = 0.0;
+                for ring in 1..=4 * rings {
+                    let gap = params.reach * ring_share(ring, rings, ring_growth) - radius;
+                    radius += gap;
+                    if radius >= length || gap <= 0.0 {
+                        break;
+                    }
+                    // A ray bends a little from ring to ring.
+                    angle += 0.12 * jitter * rng.signed() * (first / radius.max(first)).max(0.25);
+                    let along = radius + 0.5 * jitter * gap * rng.signed();
+                    offer(region.center + ops::unit(angle) * along, rng.unit(), occupancy, None);
+                }
+            }
+        }
+    }
+}
+
+/// Radius of ring `ring` of `rings`, as a share of the reach; each gap is `growth` times the one before.
+fn ring_share(ring: u32, rings: u32, growth: f32) -> f32 {
+    if (growth - 1.0).abs() < 1e-3 {
+        ring as f32 / rings as f32
+    } else {
+        (ops::powf(growth, ring as f32) - 1.0) / (ops::powf(growth, rings as f32) - 1.0)
+    }
+}
+
+/// The cells of `0..count` that a circle of `radius` around `center` may touch.
+fn span(center: f32, radius: f32, cell: f32, count: u32) -> (u32, u32) {
+    let low = ((center - radius) / cell - 1.0).max(0.0) as u32;
+    let high = ((center + radius) / cell + 2.0).max(0.0) as u32;
+    (low.min(count), high.min(count))
+}
+
+/// The places of the first nodes of a hit.
+pub(super) fn starts(layout: StartLayout, center: Vec2, reach: f32, extent: Vec2, seed: u64) -> Vec<Vec2> {
+    let mut rng = Rng::new(seed).stream("starts");
+    let mut scatter = |count: u32, radius: f32| {
+        (0..count).map(|_| center + ops::unit(TAU * rng.unit()) * (radius * rng.unit().sqrt())).collect::<Vec<_>>()
+    };
+    let mut places = match layout {
+        StartLayout::Point => vec![center],
+        StartLayout::Points { count } => scatter(count, reach),
+        StartLayout::Disc { count, radius } => scatter(count, radius),
+        StartLayout::Ring { count, radius } => {
+            let turn = rng.unit();
+            (0..count).map(|i| center + ops::unit(TAU * (i as f32 + turn) / count as f32) * radius).collect()
+        }
+    };
+    for place in &mut places {
+        *place = place.clamp(Vec2::ZERO, extent);
+    }
+    places
+}

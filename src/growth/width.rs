@@ -1,0 +1,85 @@
+//! Widths by hierarchy: a pipe model that only ever widens.
+
+use super::params::GrowthParams;
+use crate::{
+    math::ops,
+    pattern::{NO_PARENT, Node},
+};
+
+/// How many times more nodes must hang on a node for its width to grow by one notch.
+const NOTCH: f32 = 1.5;
+
+/// Widths of nodes by the number of nodes behind them (`lw = line_growth * n_c'` of Couto et al., with the exponent of
+/// Murray's pipe model: `n` nodes are as wide as `n^(1/murray)` tips).
+///
+/// A node tells its parent of its growth only when it has become wider itself, so a birth costs a few steps up its branch
+/// and not the whole way to the start, and a segment is repainted about a dozen times in its life.
+#[derive(Clone, Debug)]
+pub(super) struct Widths {
+    /// Nodes behind from which each notch holds, with its width.
+    notches: Vec<(u32, f32)>,
+    pipes: Vec<Pipe>,
+}
+
+/// What a node knows of what hangs on it, itself included.
+#[derive(Clone, Copy, Debug)]
+struct Pipe {
+    behind: u32,
+    /// How much of that its parent has been told.
+    told: u32,
+    notch: u8,
+}
+
+impl Widths {
+    pub(super) fn new(params: &GrowthParams) -> Self {
+        let mut notches = vec![(1u32, params.line_width)];
+        while let Some(&(count, width)) = notches.last() {
+            if width >= params.max_width || params.line_growth <= 0.0 || notches.len() >= 40 {
+                break;
+            }
+            let count = (count + 1).max((count as f32 * NOTCH) as u32);
+            let pipes = ops::powf(count as f32, 1.0 / params.murray) - 1.0;
+            let width = (params.line_width * (1.0 + params.line_growth * pipes)).min(params.max_width);
+            notches.push((count, width));
+        }
+        Self { notches, pipes: Vec::new() }
+    }
+
+    /// Other notches for the nodes to come; those that are there never become thinner.
+    pub(super) fn set_params(&mut self, params: &GrowthParams) {
+        self.notches = Self::new(params).notches;
+        let last = (self.notches.len() - 1) as u8;
+        for pipe in &mut self.pipes {
+            pipe.notch = pipe.notch.min(last);
+        }
+    }
+
+    /// Width of a tip.
+    pub(super) fn tip(&self) -> f32 {
+        self.notches[0].1
+    }
+
+    /// Takes up the newest node and widens what it hangs on; calls `widened` with each node that became wider.
+    pub(super) fn push(&mut self, nodes: &mut [Node], mut widened: impl FnMut(u32)) {
+        self.pipes.push(Pipe { behind: 1, told: 1, notch: 0 });
+        let Some(newest) = nodes.last() else { return };
+        let (mut node, mut more) = (newest.parent, 1);
+        while node != NO_PARENT {
+            let pipe = &mut self.pipes[node as usize];
+            pipe.behind += more;
+            let before = pipe.notch;
+            while self.notches.get(usize::from(pipe.notch) + 1).is_some_and(|&(count, _)| pipe.behind >= count) {
+                pipe.notch += 1;
+            }
+            if pipe.notch == before {
+                return;
+            }
+            more = pipe.behind - pipe.told;
+            pipe.told = pipe.behind;
+            let this = &mut nodes[node as usize];
+            this.width = this.width.max(self.notches[usize::from(pipe.notch)].1);
+            widened(node);
+            node = this.parent;
+        }
+    }
+}
