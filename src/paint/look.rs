@@ -1,6 +1,7 @@
 //! [`Look`]: what a crack does to the picture, as data.
 
-use std::borrow::Cow;
+use crate::pattern::MAX_SIDE;
+use std::{borrow::Cow, ops::RangeInclusive};
 
 /// A point of a [`Look`]'s ramp.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,16 +22,20 @@ pub struct ColorStop {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct Look {
     /// Colour over depth, in order of depth, at most 16 stops; linear between, nothing at depth 0.
+    ///
+    /// Below the first stop its cover falls to zero; beyond the last one nothing changes.
     pub ramp: Cow<'static, [ColorStop]>,
-    /// How much walls that face the light (from the upper left) brighten and the others darken. 0..=4.
+    /// How much walls that face the light (from the upper left) brighten and the others darken, by their slope. 0..=4.
     pub glint: f32,
-    /// How uneven the cover is from texel to texel (frosted glass). 0..=1.
+    /// How uneven the cover is from texel to texel (frosted glass): up to this share of it is taken away. 0..=1.
     pub grain: f32,
     /// Shift of the picture where the surface is tilted by the crack (refraction), texels at the steepest. 0..=16.
     pub shift: f32,
-    /// Height of the walls in the normal map: depth 1 is this many pattern units deep. 0..=1.
+    /// Height of the walls: depth 1 is this many pattern units deep. 0..=1.
+    ///
+    /// Makes the slopes of the normal map, and those that [`glint`](Self::glint) and [`shift`](Self::shift) go by.
     pub relief: f32,
-    /// Whether cracks make a translucent picture opaque (glass panes). Fully transparent texels stay so.
+    /// Whether cracks make a translucent picture opaque by their cover (glass panes). Fully transparent texels stay so.
     pub opaque: bool,
 }
 
@@ -38,16 +43,53 @@ impl Look {
     /// A dark groove: concrete, clay, plaster.
     pub const GROOVE: Self = Self {
         ramp: Cow::Borrowed(&[
-            ColorStop { depth: 0.15, color: [0.1, 0.09, 0.08], cover: 0.2 },
-            ColorStop { depth: 0.6, color: [0.05, 0.045, 0.04], cover: 0.9 },
-            ColorStop { depth: 1.0, color: [0.02, 0.02, 0.02], cover: 1.0 },
+            stop(0.12, [0.30, 0.27, 0.24], 0.15),
+            stop(0.45, [0.13, 0.115, 0.10], 0.75),
+            stop(0.8, [0.05, 0.045, 0.04], 0.95),
+            stop(1.0, [0.025, 0.022, 0.02], 1.0),
         ]),
-        glint: 0.5,
-        grain: 0.2,
+        glint: 0.6,
+        grain: 0.15,
         shift: 0.0,
         relief: 0.02,
         opaque: false,
     };
+
+    /// Cracked glass, ice: a frosted rim, a bright edge, a thin darker core, and the picture behind shifted by the walls.
+    pub const FROSTED: Self = Self {
+        ramp: Cow::Borrowed(&[
+            stop(0.1, [0.82, 0.86, 0.87], 0.12),
+            stop(0.35, [0.9, 0.94, 0.94], 0.5),
+            stop(0.6, [0.97, 0.99, 0.98], 0.9),
+            stop(0.82, [0.8, 0.88, 0.85], 0.85),
+            stop(1.0, [0.3, 0.42, 0.38], 0.8),
+        ]),
+        glint: 1.0,
+        grain: 0.35,
+        shift: 2.0,
+        relief: 0.012,
+        opaque: true,
+    };
+
+    /// A drawn crack: a hard black outline with one lighter colour inside.
+    pub const TOON: Self = Self {
+        ramp: Cow::Borrowed(&[
+            stop(0.05, [0.0; 3], 0.0),
+            stop(0.2, [0.0; 3], 1.0),
+            stop(0.6, [0.0; 3], 1.0),
+            stop(0.7, [0.45, 0.42, 0.4], 1.0),
+        ]),
+        glint: 0.0,
+        grain: 0.0,
+        shift: 0.0,
+        relief: 0.02,
+        opaque: true,
+    };
+}
+
+/// Shortens the tables above.
+const fn stop(depth: f32, color: [f32; 3], cover: f32) -> ColorStop {
+    ColorStop { depth, color, cover }
 }
 
 impl Default for Look {
@@ -72,16 +114,100 @@ pub enum LookError {
     },
 }
 
+/// The most stops that a [`Look::ramp`] has.
+const MAX_STOPS: usize = 16;
+
+/// Steps of the baked ramp: one for each value of the high byte of a depth.
+const STEPS: usize = 256;
+
+/// What a depth puts over the picture: colour times cover in 0..=255 (sRGB), and cover 0..=1.
+pub(super) type Layer = [f32; 4];
+
 /// A [`Look`] made ready to paint with.
 #[derive(Clone, Debug, PartialEq)]
-pub struct LookTable {}
+pub struct LookTable {
+    /// The ramp at depths 0, 256, .. 65536; linear between, so that slow gradients have no steps.
+    ramp: Box<[Layer; STEPS + 1]>,
+    pub(super) glint: f32,
+    pub(super) grain: f32,
+    pub(super) shift: f32,
+    /// From the Sobel sum of `u16` depths to the slope of the surface.
+    pub(super) slope: f32,
+    pub(super) opaque: bool,
+}
+
+impl Look {
+    /// Checks every field.
+    ///
+    /// # Errors
+    /// The first field that is out of its range or not finite.
+    pub fn validate(&self) -> Result<(), LookError> {
+        let unit = "0..=1";
+        within("ramp.len()", self.ramp.len() as f32, 0.0..=MAX_STOPS as f32, "0..=16")?;
+        let mut above = 0.0;
+        for stop in self.ramp.iter() {
+            within("ramp.depth", stop.depth, above..=1.0, "0..=1, not below the stop before")?;
+            above = stop.depth;
+            for channel in stop.color {
+                within("ramp.color", channel, 0.0..=1.0, unit)?;
+            }
+            within("ramp.cover", stop.cover, 0.0..=1.0, unit)?;
+        }
+        within("glint", self.glint, 0.0..=4.0, "0..=4")?;
+        within("grain", self.grain, 0.0..=1.0, unit)?;
+        within("shift", self.shift, 0.0..=16.0, "0..=16")?;
+        within("relief", self.relief, 0.0..=1.0, unit)
+    }
+
+    /// Colour and cover at `depth` (0..=1); before the first stop the cover rises from zero, after the last nothing changes.
+    fn at(&self, depth: f32) -> ([f32; 3], f32) {
+        let Some(first) = self.ramp.first() else { return ([0.0; 3], 0.0) };
+        let mut low =
+            ColorStop { depth: 0.0, color: first.color, cover: if first.depth > 0.0 { 0.0 } else { first.cover } };
+        for &high in self.ramp.iter() {
+            if depth < high.depth {
+                let t = (depth - low.depth) / (high.depth - low.depth);
+                let mix = |a: f32, b: f32| a + (b - a) * t;
+                let color = std::array::from_fn(|i| mix(low.color[i], high.color[i]));
+                return (color, mix(low.cover, high.cover));
+            }
+            low = high;
+        }
+        (low.color, low.cover)
+    }
+}
+
+fn within(field: &'static str, value: f32, allowed: RangeInclusive<f32>, range: &'static str) -> Result<(), LookError> {
+    if allowed.contains(&value) { Ok(()) } else { Err(LookError::OutOfRange { field, value, range }) }
+}
 
 impl LookTable {
     /// Tables for `look`; `texels_per_unit` as in [`SurfaceFrame`](crate::pattern::SurfaceFrame).
     ///
     /// # Errors
     /// If a field is out of its range or not finite.
-    pub fn new(_look: &Look, _texels_per_unit: f32) -> Result<Self, LookError> {
-        todo!()
+    pub fn new(look: &Look, texels_per_unit: f32) -> Result<Self, LookError> {
+        look.validate()?;
+        within("texels_per_unit", texels_per_unit, f32::MIN_POSITIVE..=MAX_SIDE as f32, "above 0, up to 16384")?;
+        let ramp = Box::new(std::array::from_fn(|i| {
+            let (color, cover) = look.at(i as f32 / STEPS as f32);
+            let [r, g, b] = color.map(|channel| 255.0 * channel * cover);
+            [r, g, b, cover]
+        }));
+        // Sobel's kernel weighs a slope of one depth step per texel with 8.
+        let slope = look.relief * texels_per_unit / (8.0 * 65535.0);
+        let Look { glint, grain, shift, opaque, .. } = *look;
+        Ok(Self { ramp, glint, grain, shift, slope, opaque })
+    }
+
+    /// What the ramp puts over the picture at `depth`; nothing at zero.
+    #[inline(always)]
+    pub(super) fn layer(&self, depth: u16) -> Layer {
+        if depth == 0 {
+            return [0.0; 4];
+        }
+        let (step, t) = (usize::from(depth >> 8), f32::from(depth & 255) / 256.0);
+        let (low, high) = (self.ramp[step], self.ramp[step + 1]);
+        std::array::from_fn(|i| low[i] + (high[i] - low[i]) * t)
     }
 }
