@@ -5,7 +5,7 @@ use crate::{
     math::{hash_unit, ops},
     pattern::{Link, LinkKind, NO_PARENT, Network},
 };
-use std::ops::Range;
+use std::{collections::VecDeque, ops::Range};
 
 /// Joins newborn nodes to others.
 #[derive(Clone, Debug, Default)]
@@ -14,10 +14,14 @@ pub(super) struct Linker {
     ring: Vec<(f32, u32)>,
     /// Per node: whether it has an island link.
     islanded: Vec<bool>,
+    /// Per node: whether another grew from it.
+    parents: Vec<bool>,
+    /// Nodes of the last steps, which may turn out to be tips.
+    waiting: VecDeque<Range<u32>>,
 }
 
 /// Nodes that meet within so many generations are of the same branch.
-const KIN: usize = 12;
+const KIN: usize = 8;
 
 impl Linker {
     pub(super) fn join(
@@ -51,7 +55,7 @@ impl Linker {
             self.ring.clear();
             for node in newborn.clone() {
                 let born = network.nodes()[node as usize];
-                if born.impact == index && born.generation % params.connection_every == 0 {
+                if born.impact == index {
                     let arm = born.pos - impact.pos;
                     self.ring.push((ops::atan2(arm.y, arm.x), node));
                 }
@@ -66,7 +70,20 @@ impl Linker {
                 let (a, mut b) = (self.ring[i].1, self.ring[(i + 1) % n].1);
                 let draw = |what| hash_unit(seed ^ what, u64::from(a));
                 let generation = network.nodes()[a as usize].generation;
-                if generation != network.nodes()[b as usize].generation || draw(0xC0) < params.connection_gaps {
+                // Each sector has its rings a little further in or out, so that none closes evenly.
+                let sector = (self.ring[i].0 * 1.6 + 16.0) as u64;
+                let shifted = generation + (3.0 * hash_unit(seed ^ 0xC2 ^ u64::from(index) << 8, sector)) as u32;
+                if !is_ring(shifted, params.connection_every) {
+                    continue;
+                }
+                let (from, beside) = (network.nodes()[a as usize].pos, network.nodes()[b as usize].pos);
+                let radius = from.distance(impact.pos).max(params.step_length);
+                // Rings thin out on the way to the rim, and none spans a wide gap between radials.
+                let out = (radius / (params.reach * impact.energy.sqrt())).min(1.0);
+                let gaps = params.connection_gaps + (1.0 - params.connection_gaps) * out * (2.0 - out);
+                let apart =
+                    generation != network.nodes()[b as usize].generation || from.distance(beside) > 0.75 * radius;
+                if apart || draw(0xC0) < gaps {
                     continue;
                 }
                 // Real rings step from radial to radial instead of closing evenly.
@@ -74,43 +91,67 @@ impl Linker {
                 if parent != NO_PARENT && draw(0xC1) < 0.4 {
                     b = parent;
                 }
-                let (from, to) = (network.nodes()[a as usize].pos, network.nodes()[b as usize].pos);
-                let radius = from.distance(impact.pos).max(params.step_length);
-                if a != b && from.distance(to) < 1.2 * radius {
-                    let width = 0.8 * params.line_width;
-                    let birth = network.nodes()[first as usize].birth;
-                    network.links.push(Link { a, b, width, birth, kind: LinkKind::Connection });
+                let width = 0.8 * params.line_width;
+                let birth = network.nodes()[first as usize].birth;
+                network.links.push(Link { a, b, width, birth, kind: LinkKind::Connection });
+            }
+        }
+    }
+
+    /// Joins each tip that has come to rest to the nearest node of another branch ahead of it.
+    ///
+    /// A node that has no child two steps after its birth is such a tip; when growth has ended, all the others are.
+    fn join_islands(&mut self, params: &GrowthParams, network: &mut Network, nodes: &NodeGrid, newborn: Range<u32>) {
+        self.islanded.resize(network.nodes().len(), false);
+        self.parents.resize(network.nodes().len(), false);
+        for node in newborn.clone() {
+            if let Some(is_parent) = self.parents.get_mut(network.nodes()[node as usize].parent as usize) {
+                *is_parent = true;
+            }
+        }
+        self.waiting.push_back(newborn.clone());
+        while self.waiting.len() > 2 || (newborn.is_empty() && !self.waiting.is_empty()) {
+            for node in self.waiting.pop_front().into_iter().flatten() {
+                if !self.parents[node as usize] {
+                    self.join_island(params, network, nodes, node);
                 }
             }
         }
     }
 
-    /// Joins each newborn node to the nearest one of another branch.
-    fn join_islands(&mut self, params: &GrowthParams, network: &mut Network, nodes: &NodeGrid, newborn: Range<u32>) {
-        self.islanded.resize(network.nodes().len(), false);
-        for node in newborn {
-            let born = network.nodes()[node as usize];
-            let kin = ancestors(network, node);
-            let mut best = (f32::INFINITY, u32::MAX);
-            nodes.within(born.pos, params.island_distance, |other, distance_sq| {
-                let candidate = (distance_sq, other);
-                if candidate < best
-                    && other < node
-                    && !self.islanded[other as usize]
-                    && !ancestors(network, other).iter().any(|a| *a != NO_PARENT && kin.contains(a))
-                {
-                    best = candidate;
-                }
-            });
-            if best.1 != u32::MAX {
-                self.islanded[best.1 as usize] = true;
-                self.islanded[node as usize] = true;
-                let width = network.nodes()[best.1 as usize].width.max(params.line_width);
-                let link = Link { a: best.1, b: node, width, birth: born.birth, kind: LinkKind::Island };
-                network.links.push(link);
+    fn join_island(&mut self, params: &GrowthParams, network: &mut Network, nodes: &NodeGrid, tip: u32) {
+        let born = network.nodes()[tip as usize];
+        let Some(parent) = network.nodes().get(born.parent as usize) else { return };
+        let ahead = (born.pos - parent.pos).normalize_or_zero();
+        let kin = ancestors(network, tip);
+        let mut best = (f32::INFINITY, u32::MAX);
+        nodes.within(born.pos, params.island_distance, |other, distance_sq| {
+            let way = network.nodes()[other as usize].pos - born.pos;
+            if (distance_sq, other) < best
+                && !self.islanded[other as usize]
+                && way.dot(ahead) > 0.3 * distance_sq.sqrt()
+                && !ancestors(network, other).iter().any(|a| *a != NO_PARENT && kin.contains(a))
+            {
+                best = (distance_sq, other);
             }
+        });
+        if best.1 != u32::MAX {
+            self.islanded[best.1 as usize] = true;
+            self.islanded[tip as usize] = true;
+            let link = Link { a: best.1, b: tip, width: born.width, birth: born.birth, kind: LinkKind::Island };
+            network.links.push(link);
         }
     }
+}
+
+/// Whether generation `generation` carries a ring: the rings lie at `every` times 1, 3, 6, 10 ..., wider apart further out.
+const fn is_ring(generation: u32, every: u32) -> bool {
+    let (mut ring, mut gap) = (0, every);
+    while ring < generation {
+        ring += gap;
+        gap += every;
+    }
+    ring == generation
 }
 
 /// A node and those it grew from, the nearest first.

@@ -89,9 +89,11 @@ pub(super) fn lay_out(
             let turn = TAU * hash_unit(seed, 0);
             for ray in 0..sectors {
                 let mut rng = Rng::new(mix(seed ^ u64::from(ray)));
-                let mut angle = turn + TAU * (ray as f32 + 1.5 * jitter * (rng.unit() - 0.5)) / sectors as f32;
-                // Rays end early, most of them: few of the radials of a pane reach its edge.
-                let length = region.outer * (1.0 - jitter * ops::powf(rng.unit(), 1.3));
+                let mut angle = turn + TAU * (ray as f32 + jitter * (rng.unit() - 0.5)) / sectors as f32;
+                // Half of the rays end early: few of the radials of a pane reach its edge.
+                let (draw, early) = (rng.unit(), rng.unit() < 0.5);
+                let cut = if early { 0.55 + 0.4 * draw } else { 0.5 * draw };
+                let length = region.outer * (1.0 - jitter * cut);
                 let first = params.reach * ring_share(1, rings, ring_growth);
                 let mut radius = 0.0;
                 for ring in 1..=4 * rings {
@@ -103,7 +105,23 @@ pub(super) fn lay_out(
                     // A ray bends a little from ring to ring.
                     angle += 0.12 * jitter * rng.signed() * (first / radius.max(first)).max(0.25);
                     let along = radius + 0.5 * jitter * gap * rng.signed();
-                    offer(region.center + ops::unit(angle) * along, rng.unit(), occupancy, None);
+                    let (pos, chance) = (region.center + ops::unit(angle) * along, rng.unit());
+                    offer(pos, chance, occupancy, None);
+                    if pos.clamp(Vec2::ZERO, region.extent) != pos {
+                        // A ray that leaves the surface runs up to its border.
+                        let arm = pos - region.center;
+                        let to_border = |center: f32, arm: f32, extent: f32| {
+                            if arm > 0.0 { (extent - center) / arm } else { -center / arm }
+                        };
+                        let share = to_border(region.center.x, arm.x, region.extent.x).min(to_border(
+                            region.center.y,
+                            arm.y,
+                            region.extent.y,
+                        ));
+                        let border = (region.center + arm * share).clamp(Vec2::ZERO, region.extent);
+                        offer(border, 0.0, occupancy, None);
+                        break;
+                    }
                 }
             }
         }

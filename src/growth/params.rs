@@ -101,7 +101,7 @@ pub struct GrowthParams {
     pub draw_connections: bool,
     /// Share of possible connections that are left out, 0..=1.
     pub connection_gaps: f32,
-    /// Every how many generations a ring of connections is drawn, 1..=1000.
+    /// Generations to the first ring of connections; the next ones lie 2, 3, 4 ... times as far apart. 1..=1000.
     pub connection_every: u32,
     /// Whether close nodes of different branches are joined (the cells of clay).
     pub draw_islands: bool,

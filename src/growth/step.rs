@@ -341,7 +341,7 @@ impl CrackGrowth {
     /// Differs from the paper where the paper would never end: a node at `c + D n̂` that neither reaches a marker nor brings
     /// one closer (by `D²/4` of squared distance) is not born; the node that is born instead lies straight towards
     /// the closest marker, on it if that is nearer than `D`. So every birth serves a marker, and growth ends within
-    /// [`GrowthParams::most_nodes`]. Nodes beyond the border are moved back to it.
+    /// [`GrowthParams::most_nodes`]. A node beyond the border, or closer to it than the kill distance on its way, lies on it.
     pub fn step(&mut self) -> StepReport {
         self.newborn = 0..0;
         if self.steps_left == 0 {
@@ -424,7 +424,7 @@ impl CrackGrowth {
                 let stray = self.params.wander * (2.0 * hash_unit(self.seed ^ 0x57A6, child) - 1.0);
                 direction = (direction + direction.perp() * stray).normalize_or_zero();
             }
-            pull.child = within_border(from, from + direction * length, extent);
+            pull.child = up_to_border(from, direction, length, kill, extent);
         }
         for &index in &self.field.active {
             let marker = self.field.marker(index);
@@ -521,16 +521,19 @@ impl CrackGrowth {
     }
 }
 
-/// `to`, moved back along the line from `from` to where it leaves the surface.
-fn within_border(from: Vec2, to: Vec2, extent: Vec2) -> Vec2 {
+/// The end of a segment of `length`; where the border of the surface is no further than `margin` beyond, the border.
+///
+/// So cracks run into the border instead of ending just before it, and never leave the surface.
+fn up_to_border(from: Vec2, direction: Vec2, length: f32, margin: f32, extent: Vec2) -> Vec2 {
+    let far = from + direction * (length + margin);
     let mut share = 1.0f32;
     for axis in 0..2 {
-        let way = to[axis] - from[axis];
-        if to[axis] < 0.0 {
+        let way = far[axis] - from[axis];
+        if far[axis] < 0.0 {
             share = share.min(-from[axis] / way);
-        } else if to[axis] > extent[axis] {
+        } else if far[axis] > extent[axis] {
             share = share.min((extent[axis] - from[axis]) / way);
         }
     }
-    if share < 1.0 { (from + (to - from) * share).clamp(Vec2::ZERO, extent) } else { to }
+    if share < 1.0 { (from + (far - from) * share).clamp(Vec2::ZERO, extent) } else { from + direction * length }
 }

@@ -12,7 +12,8 @@ use glam::Vec2;
 fn random_params(rng: &mut Rng, small: bool) -> GrowthParams {
     let log = |rng: &mut Rng, low: f32, high: f32| low * (high / low).powf(rng.unit());
     let step_length = if small { log(rng, 0.01, 0.6) } else { log(rng, 0.001, 4.0) };
-    let crack_radius = log(rng, 0.3 * step_length, if small { 2.0 } else { 32.0 }).clamp(0.001, (256.0 * step_length).min(32.0));
+    let crack_radius =
+        log(rng, 0.3 * step_length, if small { 2.0 } else { 32.0 }).clamp(0.001, (256.0 * step_length).min(32.0));
     let grid = if small { 12.0 } else { 24.0 };
     let line_width = log(rng, 0.0005, 0.02);
     let count = 1 + (rng.unit() * 9.0) as u32;
@@ -114,16 +115,17 @@ impl Reference {
                 direction = (direction + direction.perp() * stray).normalize_or_zero();
             }
             let mut to = from + direction * p.step_length;
+            let far = from + direction * (p.step_length + p.kill_distance);
             let mut share = 1.0f32;
             for axis in 0..2 {
-                if to[axis] < 0.0 {
-                    share = share.min(-from[axis] / (to[axis] - from[axis]));
-                } else if to[axis] > self.extent[axis] {
-                    share = share.min((self.extent[axis] - from[axis]) / (to[axis] - from[axis]));
+                if far[axis] < 0.0 {
+                    share = share.min(-from[axis] / (far[axis] - from[axis]));
+                } else if far[axis] > self.extent[axis] {
+                    share = share.min((self.extent[axis] - from[axis]) / (far[axis] - from[axis]));
                 }
             }
             if share < 1.0 {
-                to = (from + (to - from) * share).clamp(Vec2::ZERO, self.extent);
+                to = (from + (far - from) * share).clamp(Vec2::ZERO, self.extent);
             }
             let serves = set.iter().any(|&(distance_sq, id)| {
                 let after = self.markers[id].0.distance_squared(to);
@@ -312,7 +314,10 @@ fn invariants_of_the_network() {
             if node.parent != NO_PARENT {
                 let parent = growth.network().nodes()[node.parent as usize];
                 assert_eq!(node.generation, parent.generation + 1);
-                assert!(node.pos.distance(parent.pos) <= params.step_length * 1.001, "case {case}: a long segment");
+                assert!(
+                    node.pos.distance(parent.pos) <= (params.step_length + params.kill_distance) * 1.001,
+                    "case {case}: a long segment"
+                );
                 assert!(parent.width >= node.width, "case {case}: no branch is wider than its trunk");
             }
         }
@@ -442,7 +447,10 @@ fn parameters_out_of_range_are_named() {
         assert_eq!(params.validate(), Ok(()));
         let bits = f32::from_bits(rng.next_u32());
         let broken = GrowthParams { crack_radius: bits, ..params };
-        assert_eq!(broken.validate().is_ok(), (0.001f32.max(broken.kill_distance)..=(256.0 * broken.step_length).min(32.0)).contains(&bits));
+        assert_eq!(
+            broken.validate().is_ok(),
+            (0.001f32.max(broken.kill_distance)..=(256.0 * broken.step_length).min(32.0)).contains(&bits)
+        );
     }
 }
 

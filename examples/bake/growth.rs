@@ -1,0 +1,209 @@
+//! `bake growth`: hits in, textures and the network out.
+
+use bevy_crack::{
+    CrackPreset,
+    growth::{CrackGrowth, HitOutcome},
+    paint::{BaseTexels, LookTable, PaintTargets, paint_into},
+    pattern::{LinkKind, NO_PARENT, Network, SurfaceFrame},
+    raster::{DepthField, TexelRect, stamp_dot, stamp_path},
+};
+use clap::Args;
+use glam::{UVec2, Vec2};
+use image::{ImageBuffer, ImageReader, Limits, Luma, Rgba, RgbaImage, imageops::FilterType};
+use serde_json::json;
+use std::{
+    error::Error,
+    fs,
+    path::{Path, PathBuf},
+    time::Instant,
+};
+
+#[derive(Args)]
+pub struct Options {
+    /// glass, concrete or clay
+    #[arg(long, default_value = "concrete")]
+    preset: String,
+    /// Width and height in texels; by default those of the base picture, or 512x512
+    #[arg(long, value_parser = size)]
+    size: Option<UVec2>,
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Where and how hard: u,v or u,v,energy; may be given many times
+    #[arg(long, value_parser = hit, default_value = "0.5,0.5")]
+    hit: Vec<(Vec2, f32)>,
+    /// The picture to crack; by default one that suits the preset
+    #[arg(long)]
+    base: Option<PathBuf>,
+    /// A growth parameter, as in `kill_distance=0.02`; may be given many times
+    #[arg(long, value_parser = setting)]
+    set: Vec<(String, String)>,
+    /// Stop after so many steps
+    #[arg(long)]
+    steps: Option<u32>,
+    /// Folder to write to; made if it is not there
+    #[arg(long, default_value = "out")]
+    out: PathBuf,
+}
+
+fn size(text: &str) -> Result<UVec2, String> {
+    let (width, height) = text.split_once('x').ok_or("a size is WIDTHxHEIGHT")?;
+    let side = |text: &str| text.parse::<u32>().map_err(|error| format!("{text}: {error}"));
+    let size = UVec2::new(side(width)?, side(height)?);
+    SurfaceFrame::new(size).map_err(|error| error.to_string())?;
+    Ok(size)
+}
+
+fn hit(text: &str) -> Result<(Vec2, f32), String> {
+    let numbers: Result<Vec<f32>, _> = text.split(',').map(|number| number.trim().parse::<f32>()).collect();
+    match numbers.map_err(|error| format!("{text}: {error}"))?[..] {
+        [u, v] => Ok((Vec2::new(u, v), 1.0)),
+        [u, v, energy] => Ok((Vec2::new(u, v), energy)),
+        _ => Err("a hit is U,V or U,V,ENERGY".into()),
+    }
+}
+
+fn setting(text: &str) -> Result<(String, String), String> {
+    let (name, value) = text.split_once('=').ok_or("a setting is NAME=VALUE")?;
+    Ok((name.into(), value.into()))
+}
+
+/// The pictures that ship with the crate.
+fn own_picture(preset: &str) -> PathBuf {
+    let file = match preset {
+        "glass" => "glass_pane.png",
+        "clay" => "clay.png",
+        _ => "concrete_fine.png",
+    };
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/textures").join(file)
+}
+
+/// A picture of at most 8192 texels a side and 256 MiB; the header is checked before memory is taken.
+fn read_picture(path: &Path) -> Result<RgbaImage, Box<dyn Error>> {
+    let mut reader = ImageReader::open(path).map_err(|error| format!("{}: {error}", path.display()))?;
+    let mut limits = Limits::default();
+    limits.max_image_width = Some(8192);
+    limits.max_image_height = Some(8192);
+    limits.max_alloc = Some(256 << 20);
+    reader.limits(limits);
+    let picture = reader.with_guessed_format()?.decode().map_err(|error| format!("{}: {error}", path.display()))?;
+    Ok(picture.to_rgba8())
+}
+
+pub fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
+    let mut preset = CrackPreset::named(&options.preset)
+        .ok_or_else(|| format!("no preset `{}`; there are {}", options.preset, CrackPreset::NAMES.join(", ")))?;
+    for (name, value) in &options.set {
+        preset.growth.set(name, value)?;
+    }
+    let own = own_picture(&options.preset);
+    let picture = match &options.base {
+        Some(path) => Some(read_picture(path)?),
+        None => own.exists().then(|| read_picture(&own)).transpose()?,
+    };
+    let size = options.size.or(picture.as_ref().map(|p| p.dimensions().into())).unwrap_or(UVec2::splat(512));
+    let base = match picture {
+        Some(picture) if UVec2::from(picture.dimensions()) == size => picture,
+        Some(picture) => image::imageops::resize(&picture, size.x, size.y, FilterType::CatmullRom),
+        None => RgbaImage::from_pixel(size.x, size.y, Rgba([150, 150, 146, 255])),
+    };
+
+    let frame = SurfaceFrame::new(size)?;
+    let mut growth = CrackGrowth::new(preset.growth.clone(), frame.extent(), options.seed)?;
+    for &(uv, energy) in &options.hit {
+        if let HitOutcome::Rejected(reason) = growth.hit(frame.uv_to_pos(uv), energy) {
+            return Err(format!("the hit at {uv}: {reason}").into());
+        }
+    }
+    let clock = Instant::now();
+    while options.steps.is_none_or(|steps| growth.steps() < steps) && growth.step().grew() {}
+    let grown = clock.elapsed();
+
+    let clock = Instant::now();
+    let mut field = DepthField::new(frame);
+    let mut changed = Vec::new();
+    growth.take_changed(&mut changed);
+    for segment in changed {
+        if let Some(path) = growth.network().path(segment) {
+            stamp_path(&mut field, &preset.profile, &path);
+        }
+    }
+    let mut markers = Vec::new();
+    growth.take_markers(&mut markers);
+    for marker in markers {
+        stamp_dot(&mut field, marker, 2.0 / frame.texels_per_unit(), 0.6);
+    }
+    let stamped = clock.elapsed();
+
+    let clock = Instant::now();
+    let table = LookTable::new(&preset.look, frame.texels_per_unit())?;
+    let (mut diffuse, mut normal) = (RgbaImage::new(size.x, size.y), RgbaImage::new(size.x, size.y));
+    paint_into(
+        BaseTexels { size, diffuse: base.as_raw(), normal: None, depth: None },
+        &field,
+        &table,
+        TexelRect::whole(size),
+        UVec2::ZERO,
+        &mut PaintTargets { diffuse: Some(&mut diffuse), normal: Some(&mut normal), depth: None },
+    );
+    let painted = clock.elapsed();
+
+    fs::create_dir_all(&options.out)?;
+    let texels = field.depth.as_slice();
+    diffuse.save(options.out.join("diffuse.png"))?;
+    normal.save(options.out.join("normal.png"))?;
+    let depth = ImageBuffer::<Luma<u16>, _>::from_raw(size.x, size.y, texels.to_vec()).ok_or("depth size")?;
+    depth.save(options.out.join("depth.png"))?;
+    // What a person would mark as crack: not the chipped rim.
+    let mask = texels.iter().map(|&depth| if depth > u16::MAX / 3 { 255 } else { 0 }).collect();
+    let mask = ImageBuffer::<Luma<u8>, Vec<u8>>::from_raw(size.x, size.y, mask).ok_or("mask size")?;
+    mask.save(options.out.join("mask.png"))?;
+    let network = growth.network();
+    fs::write(options.out.join("network.json"), serde_json::to_string(&describe(network, options))?)?;
+
+    println!(
+        "{} nodes, {} segments, {} steps; grown in {:.2} ms, stamped in {:.2} ms, painted in {:.2} ms; written to {}",
+        network.nodes().len(),
+        network.segments().count(),
+        growth.steps(),
+        grown.as_secs_f64() * 1e3,
+        stamped.as_secs_f64() * 1e3,
+        painted.as_secs_f64() * 1e3,
+        options.out.display()
+    );
+    Ok(())
+}
+
+/// The network in pattern units (the shorter side is 1), with the rough line of each segment.
+fn describe(network: &Network, options: &Options) -> serde_json::Value {
+    let nodes: Vec<_> = network
+        .nodes()
+        .iter()
+        .map(|node| {
+            let parent = (node.parent != NO_PARENT).then_some(node.parent);
+            json!({ "pos": node.pos.to_array(), "width": node.width, "parent": parent, "generation": node.generation,
+                    "birth": node.birth, "impact": node.impact })
+        })
+        .collect();
+    let links: Vec<_> = network
+        .links()
+        .iter()
+        .map(|link| {
+            let kind = match link.kind {
+                LinkKind::Connection => "connection",
+                LinkKind::Island => "island",
+            };
+            json!({ "a": link.a, "b": link.b, "width": link.width, "birth": link.birth, "kind": kind })
+        })
+        .collect();
+    let segments: Vec<_> = network
+        .segments()
+        .filter_map(|segment| {
+            let (a, b) = network.ends(segment)?;
+            let path = network.path(segment)?;
+            let path: Vec<_> = path.points().iter().map(|p| [p.pos.x, p.pos.y, p.width]).collect();
+            Some(json!({ "a": a, "b": b, "path": path }))
+        })
+        .collect();
+    json!({ "preset": options.preset, "seed": options.seed, "extent": network.extent().to_array(),
+            "nodes": nodes, "links": links, "segments": segments })
+}

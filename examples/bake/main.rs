@@ -1,0 +1,38 @@
+//! Makes crack textures without an engine.
+//!
+//! ```text
+//! cargo run --no-default-features --example bake -- growth --preset glass --size 512x512 --seed 1 --hit 0.5,0.5 --out out
+//! ```
+//!
+//! Try `--preset concrete --hit 0.3,0.4,2 --hit 0.7,0.6`, `--set line_growth=1.5`, `--base wall.png`.
+
+mod growth;
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+#[derive(Parser)]
+#[command(about = "Makes crack textures without an engine")]
+struct Arguments {
+    #[command(subcommand)]
+    method: Method,
+}
+
+#[derive(Subcommand)]
+enum Method {
+    /// Cracks that grow from hits, by space colonization.
+    Growth(growth::Options),
+}
+
+fn main() -> ExitCode {
+    let done = match Arguments::parse().method {
+        Method::Growth(options) => growth::bake(&options),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("bake: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
