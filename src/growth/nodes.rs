@@ -32,6 +32,11 @@ impl NodeGrid {
         (pos / self.cell).max(Vec2::ZERO).as_uvec2().min(self.cells - UVec2::ONE)
     }
 
+    /// The places of all nodes, by index.
+    pub(super) fn places(&self) -> &[Vec2] {
+        &self.places
+    }
+
     /// Adds the node with the next index.
     pub(super) fn push(&mut self, pos: Vec2) {
         let cell = self.cell_at(pos);
@@ -41,52 +46,11 @@ impl NodeGrid {
     }
 
     /// Calls `visit` with each node of the cell and its squared distance.
-    fn for_cell(&self, x: u32, y: u32, pos: Vec2, visit: &mut impl FnMut(u32, f32)) {
+    fn for_cell(&self, x: u32, y: u32, pos: Vec2, mut visit: impl FnMut(u32, f32)) {
         let mut node = self.head[y as usize * self.cells.x as usize + x as usize];
         while node != NONE {
             visit(node, self.places[node as usize].distance_squared(pos));
             node = self.next[node as usize];
-        }
-    }
-
-    /// The nearest node closer than `radius`, and its squared distance; at equal distance the lower index.
-    pub(super) fn nearest(&self, pos: Vec2, radius: f32) -> Option<(u32, f32)> {
-        if self.places.is_empty() {
-            return None;
-        }
-        let (mut best, mut best_sq) = (NONE, radius * radius);
-        let home = self.cell_at(pos);
-        let side = self.cell.min_element();
-        let rings = self.cells.max_element();
-        for ring in 0..=rings {
-            // Everything further out is at least `ring - 1` cells away.
-            let gap = (ring as f32 - 1.0).max(0.0) * side;
-            if gap * gap > best_sq {
-                break;
-            }
-            self.for_ring(home, ring, pos, &mut |node, distance_sq| {
-                if distance_sq < best_sq || (distance_sq == best_sq && node < best) {
-                    (best, best_sq) = (node, distance_sq);
-                }
-            });
-        }
-        (best != NONE && best_sq < radius * radius).then_some((best, best_sq))
-    }
-
-    /// Visits the cells whose larger offset from `home` is exactly `ring`.
-    fn for_ring(&self, home: UVec2, ring: u32, pos: Vec2, visit: &mut impl FnMut(u32, f32)) {
-        let (x0, x1) = (home.x.saturating_sub(ring), (home.x + ring).min(self.cells.x - 1));
-        let (y0, y1) = (home.y.saturating_sub(ring), (home.y + ring).min(self.cells.y - 1));
-        for y in y0..=y1 {
-            if y.abs_diff(home.y) == ring {
-                (x0..=x1).for_each(|x| self.for_cell(x, y, pos, visit));
-            } else {
-                for x in [home.x.wrapping_sub(ring), home.x + ring] {
-                    if (x0..=x1).contains(&x) {
-                        self.for_cell(x, y, pos, visit);
-                    }
-                }
-            }
         }
     }
 
@@ -95,7 +59,7 @@ impl NodeGrid {
         let (low, high) = (self.cell_at(pos - radius), self.cell_at(pos + radius));
         for y in low.y..=high.y {
             for x in low.x..=high.x {
-                self.for_cell(x, y, pos, &mut |node, distance_sq| {
+                self.for_cell(x, y, pos, |node, distance_sq| {
                     if distance_sq <= radius * radius {
                         visit(node, distance_sq);
                     }

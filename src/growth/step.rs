@@ -134,6 +134,8 @@ pub struct CrackGrowth {
     shown_markers: Vec<Vec2>,
     changes: Changes,
     pulls: Vec<Pull>,
+    /// Node and entry in `pulls`, in order of the nodes.
+    order: Vec<(u32, u32)>,
     /// Per node: its entry in `pulls` during a step.
     pull_of: Vec<u32>,
 }
@@ -209,6 +211,7 @@ impl CrackGrowth {
             shown_markers: Vec::new(),
             changes: Changes::default(),
             pulls: Vec::new(),
+            order: Vec::new(),
             pull_of: Vec::new(),
             params,
             seed,
@@ -291,7 +294,7 @@ impl CrackGrowth {
         let seed = mix(self.seed ^ mix(u64::from(impact) | 1 << 40));
         if matches!(self.params.markers, MarkerLayout::DartThrowing { .. }) {
             // Darts keep their distance from the markers of hits that no step has taken up yet.
-            self.field.settle(&self.nodes);
+            self.field.settle(self.nodes.places().iter().copied());
         }
         let mut placed = NodeGrid::new(extent, self.params.kill_distance.max(0.01));
         let (field, nodes, shown) = (&mut self.field, &self.nodes, &mut self.shown_markers);
@@ -348,23 +351,23 @@ impl CrackGrowth {
             return StepReport { born: 0 };
         }
         self.steps_left -= 1;
-        self.field.settle(&self.nodes);
+        self.field.settle(self.nodes.places().iter().copied());
         self.gather_pulls();
         self.aim();
         let first = self.network.nodes.len() as u32;
         let room = (self.params.max_nodes as usize).saturating_sub(self.network.nodes.len());
-        let mut pulls = std::mem::take(&mut self.pulls);
-        if !pulls.is_empty() {
+        if !self.pulls.is_empty() {
             self.steps = self.steps.saturating_add(1);
         }
-        for pull in &pulls {
-            self.pull_of[pull.node as usize] = NO_PULL;
+        for i in 0..self.order.len() {
+            let (node, slot) = self.order[i];
+            self.pull_of[node as usize] = NO_PULL;
+            if i < room {
+                let (parent, child) = (self.network.nodes[node as usize], self.pulls[slot as usize].child);
+                self.bear(child, node, parent.generation.saturating_add(1), parent.impact);
+            }
         }
-        for pull in pulls.drain(..).take(room) {
-            let parent = self.network.nodes[pull.node as usize];
-            self.bear(pull.child, pull.node, parent.generation.saturating_add(1), parent.impact);
-        }
-        self.pulls = pulls;
+        self.pulls.clear();
         let last = self.network.nodes.len() as u32;
         self.newborn = first..last;
         for node in first..last {
@@ -377,7 +380,7 @@ impl CrackGrowth {
         StepReport { born: last - first }
     }
 
-    /// Collects `S(c)` of every node, in order of the nodes.
+    /// Collects `S(c)` of every node, and the order of the nodes.
     fn gather_pulls(&mut self) {
         self.field.sweep();
         for i in 0..self.field.active.len() {
@@ -405,10 +408,9 @@ impl CrackGrowth {
                 (pull.closest, pull.closest_sq, pull.closest_id) = (index, marker.near_sq, marker.id);
             }
         }
-        self.pulls.sort_unstable_by_key(|pull| pull.node);
-        for (slot, pull) in (0u32..).zip(&self.pulls) {
-            self.pull_of[pull.node as usize] = slot;
-        }
+        self.order.clear();
+        self.order.extend((0u32..).zip(&self.pulls).map(|(slot, pull)| (pull.node, slot)));
+        self.order.sort_unstable();
     }
 
     /// Finds the place of every child.
@@ -416,7 +418,8 @@ impl CrackGrowth {
         let extent = self.network.extent();
         let (length, kill) = (self.params.step_length, self.params.kill_distance);
         let next = self.network.nodes.len() as u64;
-        for (child, pull) in (next..).zip(&mut self.pulls) {
+        for (child, &(_, slot)) in (next..).zip(&self.order) {
+            let pull = &mut self.pulls[slot as usize];
             let from = self.network.nodes[pull.node as usize].pos;
             let mut direction = Vec2::new(pull.sum[0] as f32, pull.sum[1] as f32).normalize_or_zero();
             if self.params.wander > 0.0 {

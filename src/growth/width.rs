@@ -37,7 +37,7 @@ impl Widths {
             if width >= params.max_width || params.line_growth <= 0.0 || notches.len() >= 40 {
                 break;
             }
-            let count = (count + 1).max((count as f32 * NOTCH) as u32);
+            let count = (count + 2).max((count as f32 * NOTCH) as u32);
             let pipes = ops::powf(count as f32, 1.0 / params.murray) - 1.0;
             let width = (params.line_width * (1.0 + params.line_growth * pipes)).min(params.max_width);
             notches.push((count, width));
