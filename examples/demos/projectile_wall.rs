@@ -6,11 +6,7 @@
 //! Without a display (or with `--headless`) a script plays a minute, and pictures and a GIF are written to `--out`.
 //! Without any GPU adapter the same happens on the CPU. Try `--frames 300 --out film`.
 
-use bevy::{
-    math::ops,
-    prelude::*,
-    window::PrimaryWindow,
-};
+use bevy::{math::ops, prelude::*, window::PrimaryWindow};
 use bevy_crack::prelude::*;
 use bevy_crack_demos::{DemoArguments, Film, FilmPlugin, OnCanvas, Output, demo_app};
 use clap::Parser;
@@ -122,7 +118,12 @@ fn setup(
     // The pane stands before a picture, so that one sees it is glass.
     let behind = assets.load("textures/clay.png");
     commands.spawn((
-        Sprite { image: behind.clone(), custom_size: Some(Vec2::splat(SIDE)), color: Color::srgb(0.5, 0.55, 0.6), ..default() },
+        Sprite {
+            image: behind.clone(),
+            custom_size: Some(Vec2::splat(SIDE)),
+            color: Color::srgb(0.5, 0.55, 0.6),
+            ..default()
+        },
         Transform::from_xyz(430.0, 60.0, -1.0),
         OnCanvas { picture: behind, size: Vec2::splat(SIDE) },
     ));
@@ -157,10 +158,8 @@ fn setup(
         TextColor(Color::srgb(0.6, 0.63, 0.67)),
         Transform::from_xyz(0.0, 325.0, 3.0),
     ));
-    commands.insert_resource(Shapes {
-        ball: meshes.add(Circle::new(9.0)),
-        hot: colors.add(Color::srgb(1.0, 0.75, 0.35)),
-    });
+    commands
+        .insert_resource(Shapes { ball: meshes.add(Circle::new(9.0)), hot: colors.add(Color::srgb(1.0, 0.75, 0.35)) });
 }
 
 /// The pointer aims; the button charges while it is down and fires when it is let go.
