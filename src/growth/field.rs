@@ -40,7 +40,8 @@ pub(super) struct MarkerField {
     /// Places and numbers of the markers that lie in no cell yet.
     newborn: Vec<(Vec2, u32)>,
     cells: UVec2,
-    cell: Vec2,
+    /// Cells per pattern unit.
+    per_unit: Vec2,
     /// First marker of each cell, and the end.
     first: Vec<u32>,
     /// Markers that attract a node; may hold dead ones until the next sweep.
@@ -62,7 +63,7 @@ impl MarkerField {
             id: Vec::new(),
             newborn: Vec::new(),
             cells: UVec2::ONE,
-            cell: extent,
+            per_unit: extent.recip(),
             first: vec![0, 0],
             active: Vec::new(),
             made: 0,
@@ -116,14 +117,14 @@ impl MarkerField {
         let per_cell = (self.extent.x * self.extent.y * 3.0 / all.len() as f32).sqrt();
         let side = (0.5 * self.radius).max(per_cell).max(self.extent.max_element() / 1024.0);
         self.cells = (self.extent / side).ceil().as_uvec2().max(UVec2::ONE);
-        self.cell = self.extent / self.cells.as_vec2();
+        self.per_unit = self.cells.as_vec2() / self.extent;
         // Counting sort; stable, so the markers of a cell stay in order.
         let n_cells = self.cells.x as usize * self.cells.y as usize;
         self.first.clear();
         self.first.resize(n_cells + 1, 0);
-        for &(pos, _) in &all {
-            let cell = self.cell_of(pos);
-            self.first[cell + 1] += 1;
+        let homes: Vec<u32> = all.iter().map(|&(pos, _)| self.cell_of(pos) as u32).collect();
+        for &home in &homes {
+            self.first[home as usize + 1] += 1;
         }
         for cell in 0..n_cells {
             self.first[cell + 1] += self.first[cell];
@@ -136,8 +137,8 @@ impl MarkerField {
         self.node.resize(padded, NO_NODE);
         self.near_sq.resize(all.len(), self.radius * self.radius);
         self.near_sq.resize(padded, DEAD);
-        for (pos, id) in all {
-            let slot = &mut next[self.cell_of(pos)];
+        for ((pos, id), home) in all.into_iter().zip(homes) {
+            let slot = &mut next[home as usize];
             let i = *slot as usize;
             *slot += 1;
             (self.x[i], self.y[i], self.id[i]) = (pos.x, pos.y, id);
@@ -148,7 +149,7 @@ impl MarkerField {
     }
 
     fn cell_at(&self, pos: Vec2) -> UVec2 {
-        (pos / self.cell).max(Vec2::ZERO).as_uvec2().min(self.cells - UVec2::ONE)
+        (pos * self.per_unit).max(Vec2::ZERO).as_uvec2().min(self.cells - UVec2::ONE)
     }
 
     fn cell_of(&self, pos: Vec2) -> usize {

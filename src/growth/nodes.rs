@@ -8,7 +8,8 @@ const NONE: u32 = u32::MAX;
 #[derive(Clone, Debug)]
 pub(super) struct NodeGrid {
     cells: UVec2,
-    cell: Vec2,
+    /// Cells per pattern unit.
+    per_unit: Vec2,
     head: Vec<u32>,
     next: Vec<u32>,
     places: Vec<Vec2>,
@@ -21,7 +22,7 @@ impl NodeGrid {
         let cells = (extent / side).ceil().as_uvec2().max(UVec2::ONE);
         Self {
             cells,
-            cell: extent / cells.as_vec2(),
+            per_unit: cells.as_vec2() / extent,
             head: vec![NONE; cells.x as usize * cells.y as usize],
             next: Vec::new(),
             places: Vec::new(),
@@ -29,7 +30,12 @@ impl NodeGrid {
     }
 
     fn cell_at(&self, pos: Vec2) -> UVec2 {
-        (pos / self.cell).max(Vec2::ZERO).as_uvec2().min(self.cells - UVec2::ONE)
+        (pos * self.per_unit).max(Vec2::ZERO).as_uvec2().min(self.cells - UVec2::ONE)
+    }
+
+    pub(super) fn reserve(&mut self, nodes: usize) {
+        self.next.reserve(nodes);
+        self.places.reserve(nodes);
     }
 
     /// The places of all nodes, by index.

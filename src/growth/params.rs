@@ -314,7 +314,7 @@ impl GrowthParams {
                 }
             }
             ("occupancy", MarkerLayout::PseudoGrid { occupancy, .. } | MarkerLayout::Polar { occupancy, .. }, _) => {
-                *occupancy = parse(name, text)?
+                *occupancy = parse(name, text)?;
             }
             ("jitter", MarkerLayout::PseudoGrid { jitter, .. } | MarkerLayout::Polar { jitter, .. }, _) => {
                 *jitter = parse(name, text)?;

@@ -152,6 +152,13 @@ struct Changes {
 }
 
 impl Changes {
+    fn reserve(&mut self, nodes: usize) {
+        self.list.reserve(nodes);
+        self.listed.reserve(nodes);
+        self.child.reserve(nodes);
+        self.sibling.reserve(nodes);
+    }
+
     fn push_node(&mut self, parent: u32) {
         let node = self.listed.len() as u32;
         self.listed.push(false);
@@ -314,6 +321,15 @@ impl CrackGrowth {
                 shown.push(pos);
             }
         });
+        // A large growth makes about two nodes a marker: room for them now, so that no step pauses to move them all.
+        let expected = (2 * self.field.living_at_most()).min(self.params.max_nodes as usize);
+        if expected > 4096 {
+            self.network.nodes.reserve(expected);
+            self.nodes.reserve(expected);
+            self.widths.reserve(expected);
+            self.pull_of.reserve(expected);
+            self.changes.reserve(expected);
+        }
     }
 
     /// Adds a node; the caller lets it visit the markers.

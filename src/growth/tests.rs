@@ -10,7 +10,7 @@ use glam::Vec2;
 
 /// Random parameters that validate; `small` keeps the numbers of markers and nodes low.
 fn random_params(rng: &mut Rng, small: bool) -> GrowthParams {
-    let log = |rng: &mut Rng, low: f32, high: f32| low * (high / low).powf(rng.unit());
+    let log = |rng: &mut Rng, low: f32, high: f32| low * crate::math::ops::powf(high / low, rng.unit());
     let step_length = if small { log(rng, 0.01, 0.6) } else { log(rng, 0.001, 4.0) };
     let crack_radius =
         log(rng, 0.3 * step_length, if small { 2.0 } else { 32.0 }).clamp(0.001, (256.0 * step_length).min(32.0));

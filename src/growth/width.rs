@@ -54,6 +54,10 @@ impl Widths {
         }
     }
 
+    pub(super) fn reserve(&mut self, nodes: usize) {
+        self.pipes.reserve(nodes);
+    }
+
     /// Width of a tip.
     pub(super) fn tip(&self) -> f32 {
         self.notches[0].1

@@ -211,3 +211,61 @@ impl LookTable {
         std::array::from_fn(|i| low[i] + (high[i] - low[i]) * t)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refused(look: &Look) -> Option<&'static str> {
+        match LookTable::new(look, 512.0) {
+            Ok(_) => None,
+            Err(LookError::OutOfRange { field, .. }) => Some(field),
+        }
+    }
+
+    #[test]
+    fn the_constants_are_valid() {
+        for look in [Look::GROOVE, Look::FROSTED, Look::TOON] {
+            assert_eq!(refused(&look), None);
+        }
+        assert_eq!(refused(&Look { ramp: vec![].into(), ..Look::GROOVE }), None);
+    }
+
+    #[test]
+    fn numbers_out_of_range_are_named() {
+        for bad in [-0.1, 17.0, f32::NAN, f32::INFINITY] {
+            assert_eq!(refused(&Look { glint: bad, ..Look::GROOVE }), Some("glint"));
+            assert_eq!(refused(&Look { grain: bad, ..Look::GROOVE }), Some("grain"));
+            assert_eq!(refused(&Look { shift: bad, ..Look::GROOVE }), Some("shift"));
+            assert_eq!(refused(&Look { relief: bad, ..Look::GROOVE }), Some("relief"));
+            let ramp = |stops: &[ColorStop]| refused(&Look { ramp: stops.to_vec().into(), ..Look::GROOVE });
+            assert_eq!(ramp(&[stop(bad, [0.0; 3], 0.0)]), Some("ramp.depth"));
+            assert_eq!(ramp(&[stop(0.5, [0.0, bad, 0.0], 0.0)]), Some("ramp.color"));
+            assert_eq!(ramp(&[stop(0.5, [0.0; 3], bad)]), Some("ramp.cover"));
+            assert!(LookTable::new(&Look::GROOVE, bad.min(0.0)).is_err(), "texels per unit {bad}");
+        }
+        let unordered = vec![stop(0.5, [0.0; 3], 0.0), stop(0.4, [0.0; 3], 0.0)];
+        assert_eq!(refused(&Look { ramp: unordered.into(), ..Look::GROOVE }), Some("ramp.depth"));
+        assert_eq!(
+            refused(&Look { ramp: vec![stop(0.5, [0.0; 3], 0.0); 17].into(), ..Look::GROOVE }),
+            Some("ramp.len()")
+        );
+    }
+
+    #[test]
+    fn the_ramp_is_linear_between_its_stops() {
+        let ramp = vec![stop(0.25, [1.0, 0.0, 0.0], 0.5), stop(0.75, [0.0, 0.0, 1.0], 1.0)];
+        let look = Look { ramp: ramp.into(), ..Look::GROOVE };
+        assert_eq!(look.at(0.125), ([1.0, 0.0, 0.0], 0.25));
+        assert_eq!(look.at(0.5), ([0.5, 0.0, 0.5], 0.75));
+        assert_eq!(look.at(1.0), ([0.0, 0.0, 1.0], 1.0));
+        let table = LookTable::new(&look, 512.0).unwrap();
+        assert_eq!(table.layer(0), [0.0; 4]);
+        assert_eq!(table.layer(0x8000), [0.5 * 0.75 * 255.0, 0.0, 0.5 * 0.75 * 255.0, 0.75]);
+        // Two stops at one depth are a step, and a first stop at zero covers all but depth zero itself.
+        let step = vec![stop(0.0, [1.0; 3], 1.0), stop(0.5, [1.0; 3], 1.0), stop(0.5, [0.0; 3], 1.0)];
+        let table = LookTable::new(&Look { ramp: step.into(), ..Look::GROOVE }, 512.0).unwrap();
+        assert_eq!(table.layer(1)[3], 1.0);
+        assert_eq!((table.layer(0), table.layer(0x8000)[0], table.layer(0x7F00)[0]), ([0.0; 4], 0.0, 255.0));
+    }
+}

@@ -101,7 +101,7 @@ impl DirtyTiles {
         let mut tiles = Vec::new();
         self.drain(|x, y| tiles.push(UVec2::new(x, y)));
         let first = rects.len();
-        cover(&mut tiles, 0, &mut Vec::new(), rects);
+        cover(&mut tiles, 0, rects);
         for rect in &mut rects[first..] {
             rect.min *= Self::TILE;
             rect.max = (rect.max * Self::TILE).min(self.size);
@@ -148,14 +148,14 @@ fn bounds(tiles: &[UVec2]) -> TileRect {
 
 /// Appends disjoint rectangles that cover `tiles`: cuts their bounds in two, covers both sides, and takes one
 /// rectangle for both where that is not dearer. Sides of a cut never overlap, so neither do the rectangles.
-fn cover(tiles: &mut [UVec2], level: u32, spans: &mut Vec<(u32, u32)>, out: &mut Vec<TileRect>) {
+fn cover(tiles: &mut [UVec2], level: u32, out: &mut Vec<TileRect>) {
     let whole = bounds(tiles);
     // A second rectangle can save at most the unmarked tiles.
     if whole.area() - tiles.len() as u64 <= CALL {
         out.push(whole);
         return;
     }
-    let (axis, line) = if level < MAX_BEST_SPLITS { best_cut(tiles, whole, spans) } else { middle_cut(whole) };
+    let (axis, line) = if level < MAX_BEST_SPLITS { best_cut(tiles, whole) } else { middle_cut(whole) };
     let mut n_low = 0;
     for i in 0..tiles.len() {
         if tiles[i][axis] < line {
@@ -169,8 +169,8 @@ fn cover(tiles: &mut [UVec2], level: u32, spans: &mut Vec<(u32, u32)>, out: &mut
         return;
     }
     let first = out.len();
-    cover(low, level + 1, spans, out);
-    cover(high, level + 1, spans, out);
+    cover(low, level + 1, out);
+    cover(high, level + 1, out);
     if out[first..].iter().map(cost).sum::<u64>() >= cost(&whole) {
         out.truncate(first);
         out.push(whole);
@@ -184,42 +184,181 @@ fn middle_cut(whole: TileRect) -> (usize, u32) {
     (axis, whole.min[axis] + size[axis] / 2)
 }
 
-/// The axis and line that leave the smallest bounds on both sides; of equals the one nearest the middle, then the first.
-fn best_cut(tiles: &[UVec2], whole: TileRect, spans: &mut Vec<(u32, u32)>) -> (usize, u32) {
-    let mut best = ((u64::MAX, u32::MAX), middle_cut(whole));
+/// The axis and line that leave the smallest bounds on both sides; of equals one across the longer side, then the one
+/// nearest the middle, then the first.
+fn best_cut(tiles: &[UVec2], whole: TileRect) -> (usize, u32) {
+    let size = whole.size();
+    let mut best = ((u64::MAX, true, u32::MAX), middle_cut(whole));
     for axis in 0..2 {
-        let (start, n) = (whole.min[axis], whole.size()[axis] as usize);
-        // For each line of tiles across the axis: the first and one past the last marked tile in it.
-        spans.clear();
-        spans.resize(n, (u32::MAX, 0));
+        let n = size[axis];
+        // The bounds of each line of tiles across the axis, then of all from that line on.
+        let mut lines = vec![Bounds::EMPTY; n as usize];
         for tile in tiles {
-            let span = &mut spans[(tile[axis] - start) as usize];
-            *span = (span.0.min(tile[1 - axis]), span.1.max(tile[1 - axis] + 1));
+            let line = tile[axis] - whole.min[axis];
+            lines[line as usize].add(Bounds { first: line, last: line, low: tile[1 - axis], high: tile[1 - axis] });
         }
-        let join = |a: (u32, u32), b: (u32, u32)| (a.0.min(b.0), a.1.max(b.1));
-        // The bounds of the high side shrink to the first marked line; those of the low side end at the last one.
-        let area = |lines: usize, span: (u32, u32)| lines as u64 * u64::from(span.1 - span.0);
-        // spans[i] becomes the span of all lines from i on, high_start the first marked of them.
-        let lines: Vec<(u32, u32)> = spans.clone();
-        for i in (0..n - 1).rev() {
-            spans[i] = join(spans[i], spans[i + 1]);
+        let mut onward = lines.clone();
+        for i in (1..onward.len()).rev() {
+            let next = onward[i];
+            onward[i - 1].add(next);
         }
-        let mut high_start = vec![0; n];
-        for i in (0..n).rev() {
-            high_start[i] = if lines[i].1 > 0 { i } else { high_start[i + 1] };
-        }
-        let (mut low, mut low_end) = ((u32::MAX, 0), 0);
-        for i in 1..n {
-            if lines[i - 1].1 > 0 {
-                low = join(low, lines[i - 1]);
-                low_end = i;
-            }
-            let sum = area(low_end, low) + area(n - high_start[i], spans[i]);
-            let off_middle = (2 * i as u32).abs_diff(n as u32);
-            if (sum, off_middle) < best.0 {
-                best = ((sum, off_middle), (axis, start + i as u32));
+        let mut before = Bounds::EMPTY;
+        for line in 1..n {
+            before.add(lines[line as usize - 1]);
+            let area = before.area() + onward[line as usize].area();
+            let key = (area, n < size[1 - axis], (2 * line).abs_diff(n));
+            if key < best.0 {
+                best = (key, (axis, whole.min[axis] + line));
             }
         }
     }
     best.1
+}
+
+/// The bounds of some tiles: along an axis `first..=last`, across it `low..=high`.
+#[derive(Clone, Copy)]
+struct Bounds {
+    first: u32,
+    last: u32,
+    low: u32,
+    high: u32,
+}
+
+impl Bounds {
+    const EMPTY: Self = Self { first: u32::MAX, last: 0, low: u32::MAX, high: 0 };
+
+    fn add(&mut self, other: Self) {
+        self.first = self.first.min(other.first);
+        self.last = self.last.max(other.last);
+        self.low = self.low.min(other.low);
+        self.high = self.high.max(other.high);
+    }
+
+    /// Zero if empty.
+    fn area(&self) -> u64 {
+        let side = |from: u32, to: u32| u64::from((to + 1).saturating_sub(from));
+        side(self.first, self.last) * side(self.low, self.high)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Grid, math::Rng};
+
+    fn below(rng: &mut Rng, n: u32) -> u32 {
+        rng.next_u32() % n
+    }
+
+    /// A rectangle of up to `most` texels a side, anywhere, also outside.
+    fn random_rect(rng: &mut Rng, size: UVec2, most: u32) -> TexelRect {
+        let min = UVec2::new(below(rng, size.x + 20), below(rng, size.y + 20));
+        TexelRect { min, max: min + UVec2::new(below(rng, most), below(rng, most)) }
+    }
+
+    #[test]
+    fn rectangles_cover_what_was_marked_without_overlap() {
+        let mut rng = Rng::new(5);
+        for round in 0..400 {
+            let size = UVec2::new(1 + below(&mut rng, 700), 1 + below(&mut rng, if round % 3 == 0 { 40 } else { 900 }));
+            let mut dirty = DirtyTiles::new(size);
+            let mut marked = Grid::new(size, 0u8);
+            for _ in 0..below(&mut rng, 60) {
+                let rect = random_rect(&mut rng, size, if round % 2 == 0 { 30 } else { 200 });
+                dirty.mark(rect);
+                let rect = rect.intersect(TexelRect::whole(size));
+                for y in rect.min.y..rect.max.y {
+                    for x in rect.min.x..rect.max.x {
+                        marked.row_mut(y as usize)[x as usize] = 1;
+                    }
+                }
+            }
+            let empty = marked.as_slice().iter().all(|&texel| texel == 0);
+            assert_eq!(dirty.is_empty(), empty);
+            let mut again = dirty.clone();
+            let (mut rects, mut repeated) = (Vec::new(), Vec::new());
+            dirty.take_rects(&mut rects);
+            again.take_rects(&mut repeated);
+            assert_eq!(rects, repeated);
+            assert!(dirty.is_empty() && dirty.tiles.iter().all(|&word| word == 0), "tiles left");
+            for rect in &rects {
+                assert!(!rect.is_empty() && rect.min % DirtyTiles::TILE == UVec2::ZERO, "{rect:?}");
+                assert!(rect.max.cmple(size).all(), "{rect:?} sticks out of {size}");
+                let whole = |max: u32, size: u32| max == size || max.is_multiple_of(DirtyTiles::TILE);
+                assert!(whole(rect.max.x, size.x) && whole(rect.max.y, size.y), "{rect:?}");
+                for y in rect.min.y..rect.max.y {
+                    for texel in &mut marked.row_mut(y as usize)[rect.min.x as usize..rect.max.x as usize] {
+                        assert!(*texel < 2, "two rectangles overlap");
+                        *texel = 2;
+                    }
+                }
+            }
+            assert!(!marked.as_slice().contains(&1), "a marked texel is not covered");
+        }
+    }
+
+    #[test]
+    fn simple_shapes_take_few_rectangles() {
+        let take = |marks: &[[u32; 4]]| {
+            let mut dirty = DirtyTiles::new(UVec2::splat(1024));
+            for &[x0, y0, x1, y1] in marks {
+                dirty.mark(TexelRect { min: UVec2::new(x0, y0), max: UVec2::new(x1, y1) });
+            }
+            let mut rects = Vec::new();
+            dirty.take_rects(&mut rects);
+            rects
+        };
+        assert_eq!(take(&[]).len(), 0);
+        assert_eq!(take(&[[0, 0, 1024, 1024]]), [TexelRect::whole(UVec2::splat(1024))]);
+        assert_eq!(take(&[[100, 100, 200, 200]]).len(), 1);
+        assert_eq!(take(&[[0, 0, 1, 1], [1023, 1023, 1024, 1024]]).len(), 2);
+        // Two tiles with one between them: a call costs more than the tile.
+        assert_eq!(take(&[[0, 0, 1, 1], [40, 0, 41, 1]]).len(), 1);
+        // The arms of an L, and a frame around a hole.
+        assert_eq!(take(&[[0, 0, 16, 1024], [0, 1008, 1024, 1024]]).len(), 2);
+        assert!(take(&[[0, 0, 1024, 16], [0, 1008, 1024, 1024], [0, 0, 16, 1024], [1008, 0, 1024, 1024]]).len() <= 8);
+    }
+
+    #[test]
+    fn a_fresh_set_owns_nothing_and_clear_empties() {
+        let mut dirty = DirtyTiles::new(UVec2::splat(16_384));
+        assert_eq!(dirty.tiles.capacity(), 0);
+        dirty.mark(TexelRect { min: UVec2::splat(20_000), max: UVec2::splat(30_000) });
+        dirty.mark(TexelRect { min: UVec2::splat(5), max: UVec2::splat(5) });
+        assert!(dirty.is_empty(), "nothing was marked");
+        dirty.mark(TexelRect { min: UVec2::splat(16_383), max: UVec2::splat(u32::MAX) });
+        assert!(!dirty.is_empty(), "the last tile was marked");
+        dirty.clear();
+        let mut rects = Vec::new();
+        dirty.take_rects(&mut rects);
+        assert!(dirty.is_empty() && rects.is_empty(), "{rects:?}");
+        let mut none = DirtyTiles::default();
+        none.mark(TexelRect::whole(UVec2::splat(10)));
+        assert!(none.is_empty(), "a surface without texels has no tiles");
+    }
+
+    /// Takes seconds if a set of tiles can make the tree deep.
+    #[test]
+    fn a_chequered_giant_and_a_staircase_end_soon() {
+        let size = UVec2::splat(4096);
+        for kind in 0..3 {
+            let mut dirty = DirtyTiles::new(size);
+            for y in 0..256 {
+                for x in 0..256 {
+                    let mark = match kind {
+                        0 => (x + y) % 2 == 0,
+                        1 => x == y,
+                        _ => x % 9 == 0 && y % 9 == 0,
+                    };
+                    if mark {
+                        let min = UVec2::new(x, y) * DirtyTiles::TILE;
+                        dirty.mark(TexelRect { min, max: min + 1 });
+                    }
+                }
+            }
+            let mut rects = Vec::new();
+            dirty.take_rects(&mut rects);
+            assert!(!rects.is_empty(), "kind {kind}");
+        }
+    }
 }
