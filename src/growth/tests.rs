@@ -410,6 +410,18 @@ fn more_energy_cracks_further() {
 }
 
 #[test]
+fn every_hit_shows() {
+    for preset in [CrackPreset::GLASS, CrackPreset::CONCRETE, CrackPreset::CLAY] {
+        for seed in 0..200 {
+            let mut growth = CrackGrowth::new(preset.growth.clone(), Vec2::ONE, seed).unwrap();
+            growth.hit(Vec2::new(0.3, 0.6), 0.02);
+            while growth.step().grew() {}
+            assert!(growth.network().segments().count() > 0, "seed {seed} shows nothing");
+        }
+    }
+}
+
+#[test]
 fn layouts_do_what_they_say() {
     let count = |params: GrowthParams, density| {
         let mut growth = CrackGrowth::new(params, Vec2::ONE, 2).unwrap();
