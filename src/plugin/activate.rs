@@ -1,0 +1,348 @@
+//! From hits to cracks: a surface gets its growth and textures at its first hit.
+
+use super::{
+    CrackBudget, CrackError, CrackFailed, CrackResolution, CrackState, CrackStats, CrackStatus, CrackSurface,
+    CrackTextures, HitPoint,
+    budget::FrameClock,
+    carrier::{self, Carrier, Found, Shown},
+    picture::{self, BasePicture, Space},
+    queue::{HitQueue, QueuedHit},
+    surfaces::{Active, Surfaces, Touched},
+    textures,
+};
+use crate::{
+    Grid,
+    growth::{CrackGrowth, HitOutcome},
+    paint::LookTable,
+    pattern::SurfaceFrame,
+    raster::{DepthField, TexelRect},
+};
+use bevy::{image::ImageSampler, prelude::*, render::renderer::RenderDevice};
+
+/// Share of the frame's budget after which no further hit is applied.
+const SHARE: f32 = 0.4;
+
+/// Longer side of the textures of a surface without a picture, texels.
+const DEFAULT_SIDE: f32 = 512.0;
+
+/// Textures are not made coarser than this to fit the budget, texels.
+const MIN_SIDE: u32 = 64;
+
+/// Longer side of the mask that keeps cracks off transparent texels: a tenth of the distance between markers.
+const MASK_SIDE: u32 = 256;
+
+/// The largest depth of parallax that still looks like depth, in units of the texture.
+const MAX_PARALLAX: f32 = 0.1;
+
+/// Applies the hits that wait, in turns, as many as the budget allows.
+pub(super) fn apply_hits(world: &mut World) {
+    let timer = world.resource::<FrameClock>().start(world.resource::<CrackBudget>(), SHARE);
+    world.resource_mut::<HitQueue>().unpark();
+    while let Some(entity) = world.resource::<HitQueue>().next() {
+        match make_ready(world, entity) {
+            Ok(true) => apply_next(world, entity),
+            Ok(false) => {
+                set_status(world, entity, CrackStatus::Waiting);
+                world.resource_mut::<HitQueue>().park();
+            }
+            Err(error) => fail(world, entity, error),
+        }
+        if timer.is_over() {
+            break;
+        }
+    }
+    world.resource_mut::<FrameClock>().stop(&timer);
+}
+
+/// Applies the first hit of the surface in turn, which is ready.
+fn apply_next(world: &mut World, entity: Entity) {
+    world.resource_scope(|world, mut queue: Mut<HitQueue>| {
+        let mut stats = *world.resource::<CrackStats>();
+        if let Some(hit) = queue.take(&mut stats) {
+            match apply(world, entity, hit) {
+                Ok(HitOutcome::Started(_)) => stats.applied += 1,
+                Ok(HitOutcome::Merged(_)) => stats.merged += 1,
+                Ok(HitOutcome::Nothing) => stats.ignored += 1,
+                Ok(HitOutcome::Rejected(reason)) => queue.reject(entity, &reason.to_string(), &mut stats),
+                Err(reason) => queue.reject(entity, reason, &mut stats),
+            }
+        }
+        *world.resource_mut::<CrackStats>() = stats;
+    });
+}
+
+fn apply(world: &mut World, entity: Entity, hit: QueuedHit) -> Result<HitOutcome, &'static str> {
+    const GONE: &str = "the surface is gone";
+    let kind = world.resource::<Surfaces>().active.get(&entity).ok_or(GONE)?.carrier.kind;
+    let uv = match hit.at {
+        HitPoint::Uv(uv) => uv,
+        HitPoint::Local(point) | HitPoint::World(point) => (kind.locate)(world, entity, point)?,
+    };
+    let mut surfaces = world.resource_mut::<Surfaces>();
+    let active = surfaces.active.get_mut(&entity).ok_or(GONE)?;
+    if active.surface.alpha_mask
+        && let Some(view) = active.views.get(active.view)
+        // What lies off the surface is the growth's to refuse.
+        && uv.cmpge(Vec2::ZERO).all()
+        && uv.cmple(Vec2::ONE).all()
+        && active.base.is_hole(view.rect.min + (uv * view.rect.size().as_vec2()).as_uvec2().min(view.rect.size() - 1))
+    {
+        return Err("the surface is transparent there");
+    }
+    let outcome = active.growth.hit(uv * active.growth.network().extent(), hit.energy);
+    if matches!(outcome, HitOutcome::Started(_) | HitOutcome::Merged(_)) {
+        active.hits += 1;
+        surfaces.start_growing(entity);
+        // The nodes it starts with show at once.
+        surfaces.soil(entity);
+        set_status(world, entity, CrackStatus::Growing);
+    }
+    Ok(outcome)
+}
+
+pub(super) fn set_status(world: &mut World, entity: Entity, status: CrackStatus) {
+    if let Some(mut state) = world.get_mut::<CrackState>(entity)
+        && state.status != status
+    {
+        state.status = status;
+    }
+}
+
+/// Gives up a surface: refuses its hits and says why, once for each cause.
+pub(super) fn fail(world: &mut World, entity: Entity, error: CrackError) {
+    world.resource_scope(|world, mut queue: Mut<HitQueue>| {
+        queue.purge(entity, &mut world.resource_mut::<CrackStats>());
+    });
+    let status = CrackStatus::Failed(error.clone());
+    let Some(mut state) = world.get_mut::<CrackState>(entity) else { return };
+    if state.status != status {
+        state.status = status;
+        warn!("{entity} cannot crack: {error}");
+        world.trigger(CrackFailed { entity, error });
+    }
+}
+
+/// Makes growth and textures for a surface that has none; `false` if its pictures are not there yet.
+fn make_ready(world: &mut World, entity: Entity) -> Result<bool, CrackError> {
+    if world.resource::<Surfaces>().active.contains_key(&entity) {
+        return Ok(true);
+    }
+    // Removed since the hit: the hook has dropped its hits, unless they came in between.
+    let Some(surface) = world.get::<CrackSurface>(entity).cloned() else { return Err(CrackError::NothingToCrack) };
+    let (kind, found) = carrier::inspect(world, entity);
+    let (kind, shown) = match (kind, found) {
+        (Some(kind), Found::Shown(shown)) => (kind, *shown),
+        (_, Found::Waiting) => return Ok(false),
+        (_, Found::Unusable(error)) => return Err(error),
+        _ => return Err(CrackError::NothingToCrack),
+    };
+    let Some(draft) = draft(world, &surface, &shown, 0)? else { return Ok(false) };
+    let frame = frame(draft.rect)?;
+    let mut growth = CrackGrowth::new(surface.preset.growth.clone(), frame.extent(), surface.seed)
+        .map_err(|error| CrackError::Preset { reason: error.to_string() })?;
+    let look = look(&surface, frame)?;
+    if surface.alpha_mask {
+        growth.set_density(mask(&draft.base, draft.rect));
+    }
+
+    let carrier = Carrier { kind, shown, own: None, mesh: None, is_sized: false };
+    let mut active = Active {
+        growth,
+        field: DepthField::new(frame),
+        profile: surface.preset.profile,
+        look,
+        textures: make_textures(world, &draft, None)?,
+        base: draft.base,
+        carrier,
+        bytes: draft.bytes,
+        views: Vec::new(),
+        view: 0,
+        rate: surface.preset.steps_per_second,
+        due: 0.0,
+        hits: 0,
+        touched: Touched::new(frame.size()),
+        is_growing: false,
+        is_dirty: false,
+        is_open: false,
+        is_outdated: false,
+        tips_from: 0,
+        surface,
+    };
+    active.show(draft.rect);
+    // The textures begin as the base: nothing is dirty.
+    active.views[0].dirty.clear();
+    attach(world, entity, &mut active);
+    let mut surfaces = world.resource_mut::<Surfaces>();
+    surfaces.bytes += active.bytes;
+    surfaces.own(entity, &active);
+    surfaces.active.insert(entity, active);
+    Ok(true)
+}
+
+/// Makes the entity show the surface's textures.
+pub(super) fn attach(world: &mut World, entity: Entity, active: &mut Active) {
+    let relief = (active.surface.preset.look.relief / active.field.frame.extent().max_element()).min(MAX_PARALLAX);
+    (active.carrier.kind.attach)(world, entity, &mut active.carrier, &active.textures, relief);
+    if let Ok(mut entity) = world.get_entity_mut(entity) {
+        entity.insert(active.textures.clone());
+    }
+}
+
+/// The pictures of a surface, ready to be cracked.
+pub(super) struct Draft {
+    pub(super) base: BasePicture,
+    /// The part of the image that is shown.
+    pub(super) rect: TexelRect,
+    /// Bytes of the textures and of what belongs to them.
+    pub(super) bytes: u64,
+    sampler: ImageSampler,
+    maps: super::CrackMaps,
+}
+
+/// Reads the pictures of a surface; `None` if they are not there yet. `owned` bytes of the budget are its own already.
+pub(super) fn draft(
+    world: &World,
+    surface: &CrackSurface,
+    shown: &Shown,
+    owned: u64,
+) -> Result<Option<Draft>, CrackError> {
+    let images = world.get_resource::<Assets<Image>>().ok_or(CrackError::NoImages)?;
+    for picture in shown.pictures() {
+        if !picture::is_loaded(world, picture)? {
+            return Ok(None);
+        }
+    }
+    let maps = super::CrackMaps {
+        diffuse: surface.write.diffuse && shown.maps.diffuse,
+        normal: surface.write.normal && shown.maps.normal,
+        depth: surface.write.depth && shown.maps.depth,
+    };
+    let image = shown.diffuse.as_ref().and_then(|picture| images.get(picture));
+    let size = size(world, surface, shown, image, maps, owned)?;
+    let read = |picture: &Option<Handle<Image>>, space| -> Result<Option<Vec<u8>>, CrackError> {
+        let image = picture.as_ref().and_then(|picture| images.get(picture));
+        image.map(|image| picture::read(image, space, size)).transpose()
+    };
+    let n = size.x as usize * size.y as usize;
+    let base = BasePicture {
+        size,
+        diffuse: read(&shown.diffuse, Space::Srgb)?.unwrap_or_else(|| vec![255; n * 4]),
+        normal: if maps.normal { read(&shown.normal, Space::Linear)? } else { None },
+        depth: if maps.depth { read(&shown.depth, Space::Linear)?.map(|rgba| picture::red(&rgba)) } else { None },
+    };
+    let whole = TexelRect::whole(size);
+    let rect = shown.rect.map_or(whole, |rect| TexelRect { min: rect.min, max: rect.max }.intersect(whole));
+    let sampler = image.map_or(ImageSampler::Default, |image| image.sampler.clone());
+    Ok(Some(Draft { base, rect, bytes: bytes(size, maps), sampler, maps }))
+}
+
+/// Bytes of the textures on the CPU and the GPU, the base picture and the depth field.
+fn bytes(size: UVec2, maps: super::CrackMaps) -> u64 {
+    let texel = 4 + 2 + 8 * u64::from(maps.diffuse) + 8 * u64::from(maps.normal) + 2 * u64::from(maps.depth);
+    u64::from(size.x) * u64::from(size.y) * texel
+}
+
+/// Size of the textures: what is asked for, made smaller until it fits device and budget.
+fn size(
+    world: &World,
+    surface: &CrackSurface,
+    shown: &Shown,
+    image: Option<&Image>,
+    maps: super::CrackMaps,
+    owned: u64,
+) -> Result<UVec2, CrackError> {
+    let own_size = match image {
+        Some(image) => picture::readable_size(image)?,
+        None => {
+            let proportions = shown.proportions.abs();
+            let size = proportions * (DEFAULT_SIDE / proportions.max_element());
+            if size.is_finite() { size.as_uvec2().max(UVec2::ONE) } else { UVec2::splat(512) }
+        }
+    };
+    let mut size = match surface.resolution {
+        CrackResolution::Fixed(size) if shown.rect.is_none() => size,
+        _ => own_size,
+    };
+    if size.min_element() == 0 {
+        return Err(CrackError::Size { width: size.x, height: size.y });
+    }
+    let budget = world.resource::<CrackBudget>();
+    let device = world.get_resource::<RenderDevice>().map_or(u32::MAX, |d| d.limits().max_texture_dimension_2d);
+    let max_side = budget.max_side.min(device).min(crate::pattern::MAX_SIDE).max(1);
+    if size.max_element() > max_side {
+        if shown.rect.is_some() {
+            return Err(CrackError::Size { width: size.x, height: size.y });
+        }
+        let scale = f64::from(max_side) / f64::from(size.max_element());
+        size = (size.as_dvec2() * scale).as_uvec2().clamp(UVec2::ONE, UVec2::splat(max_side));
+    }
+    let left = budget.max_texture_bytes.saturating_sub(world.resource::<Surfaces>().bytes.saturating_sub(owned));
+    while bytes(size, maps) > left {
+        if shown.rect.is_some() || size.max_element() <= MIN_SIDE {
+            return Err(CrackError::TextureBudget { needed: bytes(size, maps), left });
+        }
+        size = (size / 2).max(UVec2::ONE);
+    }
+    Ok(size)
+}
+
+/// Where the cracks of a surface lie that shows `rect`.
+pub(super) fn frame(rect: TexelRect) -> Result<SurfaceFrame, CrackError> {
+    SurfaceFrame::new(rect.size()).map_err(|error| CrackError::Size { width: error.width, height: error.height })
+}
+
+/// The look of a surface, ready to paint with.
+pub(super) fn look(surface: &CrackSurface, frame: SurfaceFrame) -> Result<LookTable, CrackError> {
+    LookTable::new(&surface.preset.look, frame.texels_per_unit())
+        .map_err(|error| CrackError::Preset { reason: error.to_string() })
+}
+
+/// Makes the textures of a surface, into the images of `reuse` if given.
+pub(super) fn make_textures(
+    world: &mut World,
+    draft: &Draft,
+    reuse: Option<&CrackTextures>,
+) -> Result<CrackTextures, CrackError> {
+    let mut images = world.get_resource_mut::<Assets<Image>>().ok_or(CrackError::NoImages)?;
+    let mut add = |wanted: bool,
+                   make: fn(&BasePicture, &ImageSampler) -> Option<Image>,
+                   old: Option<&Option<Handle<Image>>>|
+     -> Result<Option<Handle<Image>>, CrackError> {
+        if !wanted {
+            return Ok(None);
+        }
+        let UVec2 { x: width, y: height } = draft.base.size;
+        let image = make(&draft.base, &draft.sampler).ok_or(CrackError::Size { width, height })?;
+        if let Some(Some(old)) = old
+            && let Some(mut place) = images.get_mut(old)
+        {
+            *place = image;
+            return Ok(Some(old.clone()));
+        }
+        Ok(Some(images.add(image)))
+    };
+    Ok(CrackTextures {
+        diffuse: add(draft.maps.diffuse, textures::diffuse, reuse.map(|t| &t.diffuse))?,
+        normal: add(draft.maps.normal, textures::normal, reuse.map(|t| &t.normal))?,
+        depth: add(draft.maps.depth, textures::depth, reuse.map(|t| &t.depth))?,
+    })
+}
+
+/// Where cracks may go: not over holes. `None` if there are none.
+fn mask(base: &BasePicture, rect: TexelRect) -> Option<Grid<f32>> {
+    let size = rect.size();
+    let is_hole = |x, y| base.is_hole(rect.min + UVec2::new(x, y));
+    if !(0..size.y).any(|y| (0..size.x).any(|x| is_hole(x, y))) {
+        return None;
+    }
+    let side = size.max_element().max(MASK_SIDE);
+    let mask_size = UVec2::new((size.x * MASK_SIDE).div_ceil(side), (size.y * MASK_SIDE).div_ceil(side));
+    let mut mask = Grid::new(mask_size, 0.0);
+    for y in 0..mask_size.y {
+        for (x, value) in (0..mask_size.x).zip(mask.row_mut(y as usize)) {
+            let texel = (UVec2::new(2 * x + 1, 2 * y + 1) * size) / (2 * mask_size);
+            *value = if is_hole(texel.x, texel.y) { 0.0 } else { 1.0 };
+        }
+    }
+    Some(mask)
+}

@@ -1,0 +1,103 @@
+//! [`Carrier`]: what shows a surface's pictures, a sprite or a material.
+
+use super::{CrackError, CrackMaps, CrackTextures};
+use bevy::{
+    asset::{UntypedAssetId, UntypedHandle},
+    prelude::*,
+};
+
+/// What an entity shows.
+#[derive(Clone, Debug)]
+pub(super) struct Shown {
+    /// The sprite's image, or the material.
+    pub(super) asset: UntypedHandle,
+    pub(super) diffuse: Option<Handle<Image>>,
+    pub(super) normal: Option<Handle<Image>>,
+    pub(super) depth: Option<Handle<Image>>,
+    /// The part of the image that is shown; `None` = all of it. Its size cannot change then.
+    pub(super) rect: Option<URect>,
+    /// Proportions, where there is no picture.
+    pub(super) proportions: Vec2,
+    /// Maps that it can make use of.
+    pub(super) maps: CrackMaps,
+}
+
+impl Shown {
+    pub(super) fn pictures(&self) -> impl Iterator<Item = &Handle<Image>> {
+        [&self.diffuse, &self.normal, &self.depth].into_iter().flatten()
+    }
+}
+
+/// What a look at an entity finds.
+pub(super) enum Found {
+    /// Something of another kind.
+    Other,
+    /// Something whose assets are not there yet.
+    Waiting,
+    Shown(Box<Shown>),
+    Unusable(CrackError),
+}
+
+/// How to deal with one kind of carrier.
+pub(super) struct Kind {
+    pub(super) inspect: fn(&World, Entity) -> Found,
+    /// Makes the entity show `textures`; called again when they have changed.
+    pub(super) attach: fn(&mut World, Entity, &mut Carrier, &CrackTextures, relief: f32),
+    /// Gives back what the entity showed before.
+    pub(super) detach: fn(&mut World, Entity, &Carrier),
+    /// Texture coordinates in the shown part of a point in the entity's own space.
+    pub(super) locate: fn(&World, Entity, Vec3) -> Result<Vec2, &'static str>,
+}
+
+/// All kinds, the first that fits is taken.
+pub(super) const KINDS: &[Kind] = &[
+    #[cfg(feature = "2d")]
+    super::sprite::KIND,
+    #[cfg(feature = "2d")]
+    super::material::kind::<MeshMaterial2d<ColorMaterial>>(),
+    #[cfg(feature = "2d")]
+    super::material::kind::<MeshMaterial2d<super::CrackLitMaterial>>(),
+    #[cfg(feature = "3d")]
+    super::material::kind::<MeshMaterial3d<StandardMaterial>>(),
+];
+
+/// What shows the pictures of a surface, and what it showed before.
+pub(super) struct Carrier {
+    pub(super) kind: &'static Kind,
+    /// What it showed before.
+    pub(super) shown: Shown,
+    /// The sprite's image or the material that it shows now; `None` = as before.
+    pub(super) own: Option<UntypedHandle>,
+    /// The mesh before, and the mesh with tangents.
+    pub(super) mesh: Option<(Handle<Mesh>, Handle<Mesh>)>,
+    /// Whether the sprite's size was set by us.
+    pub(super) is_sized: bool,
+}
+
+impl Carrier {
+    /// Ids of the pictures it was made from.
+    pub(super) fn sources(&self) -> impl Iterator<Item = AssetId<Image>> + '_ {
+        self.shown.pictures().map(Handle::id)
+    }
+
+    /// Ids of the assets made for it, besides textures.
+    pub(super) fn owned(&self) -> impl Iterator<Item = UntypedAssetId> + '_ {
+        self.own.iter().map(UntypedHandle::id).chain(self.mesh.iter().map(|(_, own)| own.id().untyped()))
+    }
+
+    /// Whether `asset` is what the entity should show.
+    pub(super) fn is_showing(&self, asset: &UntypedHandle) -> bool {
+        asset.id() == self.own.as_ref().unwrap_or(&self.shown.asset).id()
+    }
+}
+
+/// What the entity shows, and how to deal with it.
+pub(super) fn inspect(world: &World, entity: Entity) -> (Option<&'static Kind>, Found) {
+    for kind in KINDS {
+        match (kind.inspect)(world, entity) {
+            Found::Other => {}
+            found => return (Some(kind), found),
+        }
+    }
+    (None, Found::Unusable(CrackError::NothingToCrack))
+}

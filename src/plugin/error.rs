@@ -1,0 +1,69 @@
+//! [`CrackError`]: why a surface cannot crack.
+
+use bevy::prelude::*;
+
+/// Why a surface cannot crack.
+#[derive(Clone, Debug, PartialEq, Reflect, thiserror::Error)]
+#[non_exhaustive]
+pub enum CrackError {
+    /// It has neither a sprite nor a material that the crate knows.
+    #[error(
+        "it has no `Sprite`, `MeshMaterial2d<ColorMaterial>`, `MeshMaterial2d<CrackLitMaterial>` or \
+         `MeshMaterial3d<StandardMaterial>` (or the feature `2d` or `3d` is off)"
+    )]
+    NothingToCrack,
+    /// There is no place for images.
+    #[error("there are no image assets: add `AssetPlugin` and `ImagePlugin`")]
+    NoImages,
+    /// The picture failed to load.
+    #[error("its picture failed to load: {reason}")]
+    LoadFailed {
+        /// What the asset server said.
+        reason: String,
+    },
+    /// The picture is in GPU memory only.
+    #[error("its picture has no data on the CPU: load it with `RenderAssetUsages::MAIN_WORLD`")]
+    NoCpuData,
+    /// The picture's format cannot be read.
+    #[error("its picture has the format {format}: load it uncompressed, two-dimensional, with one layer")]
+    UnsupportedFormat {
+        /// Name of the format.
+        format: String,
+    },
+    /// The picture's data is not as long as its size and format say.
+    #[error("its picture has {actual} bytes of data, its size and format need {expected}")]
+    DataLength {
+        /// Bytes needed.
+        expected: u64,
+        /// Bytes there.
+        actual: u64,
+    },
+    /// The picture or the frame of the sprite has no texels, or too many.
+    #[error("a surface of {width} x {height} texels cannot crack")]
+    Size {
+        /// Width, texels.
+        width: u32,
+        /// Height, texels.
+        height: u32,
+    },
+    /// The sprite is sliced, tiled or scaled into its size.
+    #[error("`SpriteImageMode` {mode} is not supported: use `Auto`")]
+    SpriteMode {
+        /// Name of the mode.
+        mode: String,
+    },
+    /// Not enough of [`CrackBudget::max_texture_bytes`](super::CrackBudget::max_texture_bytes) is left.
+    #[error("its textures need {needed} bytes, the budget has {left} left")]
+    TextureBudget {
+        /// Bytes needed at the least resolution.
+        needed: u64,
+        /// Bytes left.
+        left: u64,
+    },
+    /// A parameter of the preset is out of its range.
+    #[error("{reason}")]
+    Preset {
+        /// Which one and why.
+        reason: String,
+    },
+}

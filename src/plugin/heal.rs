@@ -1,0 +1,82 @@
+//! Healing, and what happens when a surface goes.
+
+use super::{
+    CrackState, CrackStats, CrackTextures,
+    carrier::{self, Found},
+    queue::HitQueue,
+    surfaces::Surfaces,
+};
+use bevy::{
+    ecs::{system::EntityCommands, world::DeferredWorld},
+    prelude::*,
+};
+
+/// Commands for surfaces.
+pub trait CrackCommandsExt {
+    /// Takes all cracks away: the surface shows its own pictures again, its textures and its growth are dropped, hits
+    /// that wait on it are refused. Does nothing on entities without cracks.
+    fn heal_cracks(&mut self) -> &mut Self;
+}
+
+impl CrackCommandsExt for EntityCommands<'_> {
+    fn heal_cracks(&mut self) -> &mut Self {
+        let entity = self.id();
+        self.commands().queue(move |world: &mut World| heal(world, entity));
+        self
+    }
+}
+
+fn heal(world: &mut World, entity: Entity) {
+    purge(world, entity);
+    forget(world, entity);
+    if let Some(mut state) = world.get_mut::<CrackState>(entity) {
+        state.set_if_neq(CrackState::default());
+    }
+}
+
+fn purge(world: &mut World, entity: Entity) {
+    if !world.contains_resource::<HitQueue>() {
+        return;
+    }
+    world.resource_scope(|world, mut queue: Mut<HitQueue>| {
+        if let Some(mut stats) = world.get_resource_mut::<CrackStats>() {
+            queue.purge(entity, &mut stats);
+        }
+    });
+}
+
+/// Drops growth and textures and gives the entity back what it showed before.
+fn forget(world: &mut World, entity: Entity) {
+    let Some(mut surfaces) = world.get_resource_mut::<Surfaces>() else { return };
+    let Some(active) = surfaces.remove(entity) else { return };
+    (active.carrier.kind.detach)(world, entity, &active.carrier);
+    if let Ok(mut entity) = world.get_entity_mut(entity) {
+        entity.remove::<CrackTextures>();
+    }
+}
+
+/// From the hook of a component that goes: its hits are refused now, the rest follows when commands are applied.
+pub(super) fn forget_later(world: &mut DeferredWorld, entity: Entity) {
+    world.commands().queue(move |world: &mut World| {
+        purge(world, entity);
+        forget(world, entity);
+    });
+}
+
+/// From the hook of a new component: if the entity is a clone and shows private textures of another, it gets the
+/// original pictures.
+pub(super) fn disown_clone(world: &mut DeferredWorld, entity: Entity) {
+    if world.get_resource::<Surfaces>().is_some_and(|surfaces| !surfaces.owners.is_empty()) {
+        world.commands().queue(move |world: &mut World| disown(world, entity));
+    }
+}
+
+fn disown(world: &mut World, entity: Entity) {
+    let (_, Found::Shown(shown)) = carrier::inspect(world, entity) else { return };
+    world.resource_scope(|world, surfaces: Mut<Surfaces>| {
+        let owner = surfaces.owners.get(&shown.asset.id()).filter(|owner| **owner != entity);
+        if let Some(active) = owner.and_then(|owner| surfaces.active.get(owner)) {
+            (active.carrier.kind.detach)(world, entity, &active.carrier);
+        }
+    });
+}

@@ -1,0 +1,136 @@
+//! [`CrackHit`]: something strikes a surface.
+
+use super::{CrackBudget, CrackStats, CrackSurface, queue::HitQueue};
+use bevy::prelude::*;
+
+/// One hit on a [`CrackSurface`]: trigger it as an entity event, or write it as a message when there are many.
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_crack::prelude::*;
+///
+/// fn on_press(press: On<Pointer<Press>>, mut commands: Commands) {
+///     let Some(point) = press.hit.position else { return };
+///     commands.trigger(CrackHit::world(press.entity, point).with_energy(1.5));
+/// }
+/// ```
+#[derive(EntityEvent, Message, Reflect, Clone, Copy, Debug, PartialEq)]
+#[reflect(Event, Message)]
+pub struct CrackHit {
+    /// The surface.
+    pub entity: Entity,
+    /// Where.
+    pub at: HitPoint,
+    /// How hard: 0 = nothing happens, 1 = as the preset says, 4 = twice as far; capped at 16.
+    pub energy: f32,
+    /// Direction of the blow in the world; zero = straight. Kept for those who read hits; cracks do not depend on it.
+    pub direction: Vec3,
+}
+
+/// Where a hit lands.
+#[derive(Reflect, Clone, Copy, Debug, PartialEq)]
+pub enum HitPoint {
+    /// A point of the world, as it is when the frame's transforms are propagated. Sprites ignore the depth along their
+    /// own z; meshes take the closest point of their triangles.
+    World(Vec3),
+    /// Texture coordinates in the surface's picture or sprite frame, 0..=1, v down.
+    Uv(Vec2),
+    /// A point in the entity's own space.
+    Local(Vec3),
+}
+
+impl CrackHit {
+    /// A hit of energy 1 at a point of the world.
+    #[must_use]
+    pub const fn world(entity: Entity, point: Vec3) -> Self {
+        Self::new(entity, HitPoint::World(point))
+    }
+
+    /// A hit of energy 1 at texture coordinates, 0..=1, v down.
+    #[must_use]
+    pub const fn uv(entity: Entity, uv: Vec2) -> Self {
+        Self::new(entity, HitPoint::Uv(uv))
+    }
+
+    /// A hit of energy 1 at a point of the entity's own space.
+    #[must_use]
+    pub const fn local(entity: Entity, point: Vec3) -> Self {
+        Self::new(entity, HitPoint::Local(point))
+    }
+
+    const fn new(entity: Entity, at: HitPoint) -> Self {
+        Self { entity, at, energy: 1.0, direction: Vec3::ZERO }
+    }
+
+    /// The same with another energy.
+    #[must_use]
+    pub const fn with_energy(mut self, energy: f32) -> Self {
+        self.energy = energy;
+        self
+    }
+
+    /// The same with a direction.
+    #[must_use]
+    pub const fn with_direction(mut self, direction: Vec3) -> Self {
+        self.direction = direction;
+        self
+    }
+
+    fn is_finite(&self) -> bool {
+        let at = match self.at {
+            HitPoint::World(point) | HitPoint::Local(point) => point.is_finite(),
+            HitPoint::Uv(uv) => uv.is_finite(),
+        };
+        at && self.energy.is_finite() && self.direction.is_finite()
+    }
+}
+
+/// Keeps a hit sent as an event for [`collect_hits`].
+pub(super) fn receive_hit(hit: On<CrackHit>, mut queue: ResMut<HitQueue>) {
+    queue.inbox.push(*hit);
+}
+
+/// Takes all hits of the frame, events first, and queues them with their surfaces.
+pub(super) fn collect_hits(
+    mut messages: MessageReader<CrackHit>,
+    mut queue: ResMut<HitQueue>,
+    mut stats: ResMut<CrackStats>,
+    budget: Res<CrackBudget>,
+    surfaces: Query<Option<&GlobalTransform>, With<CrackSurface>>,
+) {
+    if queue.inbox.is_empty() && messages.is_empty() {
+        return;
+    }
+    let mut inbox = core::mem::take(&mut queue.inbox);
+    for hit in inbox.iter().chain(messages.read()) {
+        stats.sent += 1;
+        match localize(hit, &surfaces) {
+            Err(reason) => queue.reject(hit.entity, reason, &mut stats),
+            Ok(_) if hit.energy == 0.0 => stats.ignored += 1,
+            Ok(at) => queue.push(hit.entity, at, hit.energy, budget.max_queued_per_surface, &mut stats),
+        }
+    }
+    inbox.clear();
+    queue.inbox = inbox;
+}
+
+/// World points become local ones at once: the surface may move before the hit's turn comes.
+fn localize(
+    hit: &CrackHit,
+    surfaces: &Query<Option<&GlobalTransform>, With<CrackSurface>>,
+) -> Result<HitPoint, &'static str> {
+    let transform = surfaces.get(hit.entity).map_err(|_| "the entity is gone or has no `CrackSurface`")?;
+    if !hit.is_finite() {
+        return Err("a coordinate, the energy or the direction is not finite");
+    }
+    if hit.energy < 0.0 {
+        return Err("the energy is negative");
+    }
+    let HitPoint::World(point) = hit.at else { return Ok(hit.at) };
+    let affine = transform.ok_or("the surface has no `GlobalTransform`")?.affine();
+    if affine.matrix3.determinant() == 0.0 {
+        return Err("the surface's transform has a scale of zero");
+    }
+    let local = affine.inverse().transform_point3(point);
+    if local.is_finite() { Ok(HitPoint::Local(local)) } else { Err("the surface's transform cannot be inverted") }
+}

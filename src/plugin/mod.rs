@@ -1,0 +1,163 @@
+//! The Bevy glue: put [`CrackSurface`] on a sprite or a mesh, send a [`CrackHit`], and a crack grows into its textures.
+//!
+//! Per frame, in `PostUpdate`, in the sets of [`CrackSystems`]: hits are queued and applied, networks grow, the changed
+//! texels are painted into private copies of the surface's pictures, and only those texels go to the GPU. Nothing is
+//! made for a surface, and nothing looks at it, before its first hit.
+//!
+//! ```no_run
+//! use bevy::prelude::*;
+//! use bevy_crack::prelude::*;
+//!
+//! fn crack(mut commands: Commands, surface: Single<Entity, With<CrackSurface>>) {
+//!     commands.trigger(CrackHit::uv(*surface, Vec2::splat(0.5)).with_energy(2.0));
+//! }
+//!
+//! let mut app = App::new();
+//! app.add_plugins(CrackPlugins).add_systems(Update, crack);
+//! ```
+
+mod activate;
+mod budget;
+mod carrier;
+mod error;
+mod grow;
+mod heal;
+mod hit;
+#[cfg(feature = "2d")]
+mod lit;
+mod material;
+mod mesh;
+mod paint;
+mod picture;
+mod queue;
+#[cfg(feature = "2d")]
+mod sprite;
+mod state;
+mod surface;
+mod surfaces;
+mod textures;
+mod upload;
+mod watch;
+
+pub use budget::{CrackBudget, CrackStats};
+pub use error::CrackError;
+pub use heal::CrackCommandsExt;
+pub use hit::{CrackHit, HitPoint};
+#[cfg(feature = "2d")]
+pub use lit::{CrackLight2d, CrackLitMaterial, CrackLitUniform, MAX_LIGHTS};
+pub use state::{CrackFailed, CrackFinished, CrackState, CrackStatus, CrackTip};
+pub use surface::{CrackMaps, CrackResolution, CrackSurface};
+pub use textures::CrackTextures;
+pub use upload::CrackUploadStats;
+
+use bevy::{
+    app::{PluginGroup, PluginGroupBuilder, PostUpdate},
+    asset::AssetEventSystems,
+    prelude::*,
+    transform::TransformSystems,
+};
+
+/// What a game names.
+pub mod prelude {
+    pub use super::{
+        CrackBudget, CrackCommandsExt, CrackError, CrackFailed, CrackFinished, CrackHit, CrackMaps, CrackPlugin,
+        CrackPlugins, CrackResolution, CrackState, CrackStats, CrackStatus, CrackSurface, CrackSystems, CrackTextures,
+        CrackTip, HitPoint,
+    };
+    #[cfg(feature = "2d")]
+    pub use super::{CrackLight2d, CrackLitMaterial};
+    pub use crate::preset::CrackPreset;
+}
+
+/// The stages of a frame, in order, in `PostUpdate`, after transforms are propagated and before asset events.
+#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum CrackSystems {
+    /// After this set, every hit of this frame is queued, and as many as the budget allows are in their growths.
+    Hit,
+    /// After this set, networks have made the steps that are due, as many as the budget allows.
+    Grow,
+    /// After this set, changed texels are painted on the CPU, as many surfaces as the budget allows.
+    Paint,
+    /// After this set, the rectangles to upload are handed to the render world.
+    Upload,
+}
+
+/// Everything that the crate brings into an app: [`CrackPlugin`].
+#[derive(Clone, Copy, Debug, Default)]
+pub struct CrackPlugins;
+
+impl PluginGroup for CrackPlugins {
+    fn build(self) -> PluginGroupBuilder {
+        PluginGroupBuilder::start::<Self>().add(CrackPlugin)
+    }
+}
+
+/// Cracks on sprites and meshes. May be added before or after `DefaultPlugins`; works without a renderer.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct CrackPlugin;
+
+impl Plugin for CrackPlugin {
+    fn build(&self, app: &mut App) {
+        use CrackSystems::{Grow, Hit, Paint, Upload};
+        app.register_type::<CrackSurface>()
+            .register_type::<CrackState>()
+            .register_type::<CrackTextures>()
+            .register_type::<CrackHit>()
+            .register_type::<CrackFinished>()
+            .register_type::<CrackFailed>()
+            .register_type::<CrackBudget>()
+            .register_type::<CrackStats>()
+            .register_type::<CrackUploadStats>()
+            .init_resource::<CrackBudget>()
+            .init_resource::<CrackStats>()
+            .init_resource::<CrackUploadStats>()
+            .init_resource::<upload::Uploads>()
+            .init_resource::<budget::FrameClock>()
+            .init_resource::<queue::HitQueue>()
+            .init_resource::<surfaces::Surfaces>()
+            .add_message::<CrackHit>()
+            .add_observer(hit::receive_hit)
+            .configure_sets(
+                PostUpdate,
+                (Hit, Grow, Paint, Upload).chain().after(TransformSystems::Propagate).before(AssetEventSystems),
+            )
+            .add_systems(
+                PostUpdate,
+                (
+                    (
+                        (budget::start_frame, watch::watch_surfaces, watch::watch_pictures),
+                        watch::update_changed.run_if(watch::any_changed),
+                        hit::collect_hits,
+                        activate::apply_hits.run_if(queue::any_queued),
+                    )
+                        .chain()
+                        .in_set(Hit),
+                    grow::grow_surfaces.in_set(Grow),
+                    paint::paint_surfaces.in_set(Paint),
+                    upload::drop_unwanted.in_set(Upload),
+                ),
+            );
+        #[cfg(feature = "2d")]
+        app.add_systems(
+            PostUpdate,
+            (
+                watch::watch::<Sprite>,
+                watch::watch::<MeshMaterial2d<ColorMaterial>>,
+                watch::watch::<MeshMaterial2d<CrackLitMaterial>>,
+            )
+                .in_set(Hit)
+                .before(watch::update_changed),
+        );
+        #[cfg(feature = "3d")]
+        app.add_systems(
+            PostUpdate,
+            watch::watch::<MeshMaterial3d<StandardMaterial>>.in_set(Hit).before(watch::update_changed),
+        );
+    }
+
+    fn finish(&self, app: &mut App) {
+        upload::connect(app);
+        #[cfg(feature = "2d")]
+        lit::add_material(app);
+    }
+}

@@ -1,0 +1,155 @@
+//! Reading pictures: [`BasePicture`].
+
+use super::CrackError;
+use bevy::{
+    asset::{AssetServer, LoadState},
+    prelude::*,
+    render::render_resource::{TextureDimension, TextureFormat},
+};
+
+/// The untouched pictures of a surface, all of one size.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct BasePicture {
+    pub(super) size: UVec2,
+    /// RGBA8, sRGB.
+    pub(super) diffuse: Vec<u8>,
+    /// RGBA8, linear; `None` = flat.
+    pub(super) normal: Option<Vec<u8>>,
+    /// R8; `None` = 0.
+    pub(super) depth: Option<Vec<u8>>,
+}
+
+/// Alpha below this is a hole: hits are refused and no crack goes there.
+const OPAQUE: u8 = 8;
+
+impl BasePicture {
+    /// Whether the texel is a hole.
+    pub(super) fn is_hole(&self, texel: UVec2) -> bool {
+        let texel = texel.min(self.size.saturating_sub(UVec2::ONE));
+        let i = (texel.y as usize * self.size.x as usize + texel.x as usize) * 4 + 3;
+        self.diffuse.get(i).is_some_and(|alpha| *alpha < OPAQUE)
+    }
+}
+
+/// How the numbers of a picture are meant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Space {
+    Srgb,
+    Linear,
+}
+
+/// Whether a picture is there; an error if it never will be.
+pub(super) fn is_loaded(world: &World, picture: &Handle<Image>) -> Result<bool, CrackError> {
+    let images = world.get_resource::<Assets<Image>>().ok_or(CrackError::NoImages)?;
+    if images.contains(picture) {
+        return Ok(true);
+    }
+    match world.get_resource::<AssetServer>().and_then(|server| server.get_load_state(picture)) {
+        Some(LoadState::Failed(error)) => {
+            // With backtraces on, the text goes on for pages.
+            let reason = error.to_string().lines().next().unwrap_or_default().to_owned();
+            Err(CrackError::LoadFailed { reason })
+        }
+        _ => Ok(false),
+    }
+}
+
+/// The size of a picture whose data can be read.
+pub(super) fn readable_size(image: &Image) -> Result<UVec2, CrackError> {
+    let (size, format) = (image.size(), image.texture_descriptor.format);
+    if size.min_element() == 0 {
+        return Err(CrackError::Size { width: size.x, height: size.y });
+    }
+    let unsupported = || CrackError::UnsupportedFormat { format: format!("{format:?}") };
+    let layers = image.texture_descriptor.size.depth_or_array_layers;
+    if image.texture_descriptor.dimension != TextureDimension::D2 || layers != 1 || image.is_compressed() {
+        return Err(unsupported());
+    }
+    let data = image.data.as_ref().ok_or(CrackError::NoCpuData)?;
+    let texel = u64::from(format.block_copy_size(None).ok_or_else(unsupported)?);
+    let expected = u64::from(size.x) * u64::from(size.y) * texel;
+    let actual = data.len() as u64;
+    let has_mips = image.texture_descriptor.mip_level_count > 1;
+    if actual < expected || (actual > expected && !has_mips) {
+        return Err(CrackError::DataLength { expected, actual });
+    }
+    Ok(size)
+}
+
+/// The texels of a picture, RGBA8 in `space`, resampled to `size`.
+pub(super) fn read(image: &Image, space: Space, size: UVec2) -> Result<Vec<u8>, CrackError> {
+    use TextureFormat::{Bgra8Unorm, Bgra8UnormSrgb, Rgba8Unorm, Rgba8UnormSrgb};
+    let own_size = readable_size(image)?;
+    let n = own_size.x as usize * own_size.y as usize;
+    let data = image.data.as_ref().ok_or(CrackError::NoCpuData)?;
+    let format = image.texture_descriptor.format;
+    let texels = match (format, space) {
+        (Rgba8UnormSrgb, Space::Srgb) | (Rgba8Unorm, Space::Linear) => data[..n * 4].to_vec(),
+        (Bgra8UnormSrgb, Space::Srgb) | (Bgra8Unorm, Space::Linear) => {
+            data[..n * 4].as_chunks().0.iter().flat_map(|&[b, g, r, a]| [r, g, b, a]).collect()
+        }
+        _ => {
+            let mut texels = Vec::with_capacity(n * 4);
+            for y in 0..own_size.y {
+                for x in 0..own_size.x {
+                    let color = image
+                        .get_color_at(x, y)
+                        .map_err(|_| CrackError::UnsupportedFormat { format: format!("{format:?}") })?;
+                    let rgba = match space {
+                        Space::Srgb => color.to_srgba().to_f32_array(),
+                        Space::Linear => color.to_linear().to_f32_array(),
+                    };
+                    texels.extend(rgba.map(to_byte));
+                }
+            }
+            texels
+        }
+    };
+    Ok(if size == own_size { texels } else { resample(&texels, own_size, size) })
+}
+
+/// The red channel alone.
+pub(super) fn red(rgba: &[u8]) -> Vec<u8> {
+    rgba.iter().step_by(4).copied().collect()
+}
+
+/// NaN becomes 0.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
+fn to_byte(value: f32) -> u8 {
+    (value.clamp(0.0, 1.0) * 255.0 + 0.5) as u8
+}
+
+/// Bilinear resampling, texel centres at half-integers, edges held.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "coordinates lie inside the picture")]
+fn resample(texels: &[u8], from: UVec2, to: UVec2) -> Vec<u8> {
+    let scale = from.as_vec2() / to.as_vec2();
+    let last = from - UVec2::ONE;
+    let mut out = Vec::with_capacity(to.x as usize * to.y as usize * 4);
+    for y in 0..to.y {
+        for x in 0..to.x {
+            let at = ((UVec2::new(x, y).as_vec2() + 0.5) * scale - 0.5).clamp(Vec2::ZERO, last.as_vec2());
+            let (low, part) = (at.as_uvec2(), at.fract());
+            let high = (low + UVec2::ONE).min(last);
+            let texel =
+                |x: u32, y: u32, c: usize| f32::from(texels[(y as usize * from.x as usize + x as usize) * 4 + c]);
+            for c in 0..4 {
+                let top = texel(low.x, low.y, c).lerp(texel(high.x, low.y, c), part.x);
+                let bottom = texel(low.x, high.y, c).lerp(texel(high.x, high.y, c), part.x);
+                out.push((top.lerp(bottom, part.y) + 0.5) as u8);
+            }
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn resampling_keeps_even_pictures_and_halves_steps() {
+        assert_eq!(resample(&[7; 3 * 2 * 4], UVec2::new(3, 2), UVec2::new(5, 4)), [7; 5 * 4 * 4]);
+        let step = resample(&[0, 0, 0, 0, 100, 100, 100, 100], UVec2::new(2, 1), UVec2::new(4, 1));
+        assert_eq!(red(&step), [0, 25, 75, 100]);
+    }
+}

@@ -1,0 +1,137 @@
+//! [`HitQueue`]: hits that wait for their turn.
+
+use super::{CrackHit, CrackStats, HitPoint};
+use bevy::{
+    ecs::entity::{EntityHashMap, EntityHashSet},
+    prelude::*,
+};
+use std::collections::VecDeque;
+
+/// A full queue looks at this many waiting hits, spread over all of it, for the one to merge with.
+const MERGE_CANDIDATES: usize = 64;
+
+/// No more than this many surfaces are warned about.
+const MAX_WARNED: usize = 1024;
+
+/// A hit that waits. The point is never [`HitPoint::World`].
+#[derive(Clone, Copy, Debug)]
+pub(super) struct QueuedHit {
+    pub(super) at: HitPoint,
+    pub(super) energy: f32,
+}
+
+/// Hits that wait, first come first served within a surface, in turns between surfaces.
+#[derive(Resource, Default)]
+pub(super) struct HitQueue {
+    /// Hits sent as events since the last frame.
+    pub(super) inbox: Vec<CrackHit>,
+    hits: EntityHashMap<VecDeque<QueuedHit>>,
+    /// Surfaces with hits that can be worked on, each once.
+    turns: VecDeque<Entity>,
+    /// Surfaces with hits whose pictures are loading, each once.
+    parked: Vec<Entity>,
+    warned: EntityHashSet,
+}
+
+impl HitQueue {
+    pub(super) fn push(&mut self, entity: Entity, at: HitPoint, energy: f32, cap: usize, stats: &mut CrackStats) {
+        let hits = self.hits.entry(entity).or_insert_with(|| {
+            self.turns.push_back(entity);
+            VecDeque::new()
+        });
+        if hits.len() < cap.max(1) {
+            hits.push_back(QueuedHit { at, energy });
+            stats.queued += 1;
+            return;
+        }
+        let stride = hits.len().div_ceil(MERGE_CANDIDATES);
+        let nearest = hits.iter_mut().step_by(stride).min_by(|a, b| distance(a.at, at).total_cmp(&distance(b.at, at)));
+        if let Some(nearest) = nearest {
+            nearest.energy = (nearest.energy + energy).min(f32::MAX);
+            stats.merged += 1;
+        }
+    }
+
+    /// Counts a hit as refused and says why, once for each surface.
+    pub(super) fn reject(&mut self, entity: Entity, reason: &str, stats: &mut CrackStats) {
+        stats.rejected += 1;
+        if self.warned.len() < MAX_WARNED && self.warned.insert(entity) {
+            warn!("a hit on {entity} is refused: {reason} (further ones will only be counted)");
+        }
+    }
+
+    /// Drops all hits that wait on a surface; they count as refused.
+    pub(super) fn purge(&mut self, entity: Entity, stats: &mut CrackStats) {
+        if let Some(hits) = self.hits.remove(&entity) {
+            stats.queued -= hits.len() as u64;
+            stats.rejected += hits.len() as u64;
+            self.turns.retain(|e| *e != entity);
+            self.parked.retain(|e| *e != entity);
+        }
+    }
+
+    /// The next surface in turn.
+    pub(super) fn next(&self) -> Option<Entity> {
+        self.turns.front().copied()
+    }
+
+    /// Takes the first hit of the surface in turn, which goes to the end of the line.
+    pub(super) fn take(&mut self, stats: &mut CrackStats) -> Option<QueuedHit> {
+        let entity = self.turns.pop_front()?;
+        let hits = self.hits.get_mut(&entity)?;
+        let hit = hits.pop_front();
+        if hits.is_empty() {
+            self.hits.remove(&entity);
+        } else {
+            self.turns.push_back(entity);
+        }
+        stats.queued -= u64::from(hit.is_some());
+        hit
+    }
+
+    /// Takes the surface in turn out of the line until [`unpark`](Self::unpark).
+    pub(super) fn park(&mut self) {
+        self.parked.extend(self.turns.pop_front());
+    }
+
+    /// Puts all parked surfaces back in the line.
+    pub(super) fn unpark(&mut self) {
+        self.turns.extend(self.parked.drain(..));
+    }
+}
+
+/// Whether any hit waits.
+pub(super) fn any_queued(queue: Res<HitQueue>) -> bool {
+    !queue.hits.is_empty()
+}
+
+/// Distance in whatever space both points are; infinite between different ones.
+fn distance(a: HitPoint, b: HitPoint) -> f32 {
+    match (a, b) {
+        (HitPoint::Uv(a), HitPoint::Uv(b)) => a.distance_squared(b),
+        (HitPoint::Local(a), HitPoint::Local(b)) => a.distance_squared(b),
+        _ => f32::INFINITY,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn turns_are_fair_and_counts_add_up() {
+        let (mut queue, mut stats) = (HitQueue::default(), CrackStats::default());
+        let surfaces = [Entity::from_bits(1), Entity::from_bits(2)];
+        for i in 0..10 {
+            queue.push(surfaces[usize::from(i > 6)], HitPoint::Uv(Vec2::splat(i as f32)), 1.0, 5, &mut stats);
+        }
+        assert_eq!((stats.queued, stats.merged), (8, 2), "two of seven hits do not fit");
+        let mut turns = Vec::new();
+        while let Some(entity) = queue.next() {
+            assert!(queue.take(&mut stats).is_some(), "a surface in line has a hit");
+            turns.push(entity == surfaces[0]);
+        }
+        assert_eq!(turns, [true, false, true, false, true, false, true, true]);
+        assert_eq!(stats.queued, 0);
+    }
+}

@@ -1,0 +1,90 @@
+//! Sprites as carriers.
+
+use super::{
+    CrackError, CrackMaps, CrackTextures,
+    carrier::{Carrier, Found, Kind, Shown},
+};
+use bevy::{prelude::*, sprite::Anchor};
+
+pub(super) const KIND: Kind = Kind { inspect, attach, detach, locate };
+
+fn inspect(world: &World, entity: Entity) -> Found {
+    let Some(sprite) = world.get::<Sprite>(entity) else { return Found::Other };
+    if !matches!(sprite.image_mode, SpriteImageMode::Auto) {
+        let mode = match sprite.image_mode {
+            SpriteImageMode::Sliced(_) => "Sliced",
+            SpriteImageMode::Tiled { .. } => "Tiled",
+            _ => "Scale",
+        };
+        return Found::Unusable(CrackError::SpriteMode { mode: mode.to_owned() });
+    }
+    let layouts = world.get_resource::<Assets<TextureAtlasLayout>>();
+    let frame = match &sprite.texture_atlas {
+        Some(atlas) => {
+            let Some(layout) = layouts.and_then(|layouts| layouts.get(&atlas.layout)) else { return Found::Waiting };
+            layout.textures.get(atlas.index).map(|rect| rect.as_rect())
+        }
+        None => None,
+    };
+    let rect = match (frame, sprite.rect) {
+        (Some(frame), Some(rect)) => Some(Rect { min: rect.min + frame.min, max: rect.max + frame.min }),
+        (frame, rect) => frame.or(rect),
+    };
+    // A sprite of one colour shows Bevy's white picture of one texel.
+    let is_blank = sprite.image == Handle::default() && sprite.custom_size.is_some() && rect.is_none();
+    Found::Shown(Box::new(Shown {
+        asset: sprite.image.clone().untyped(),
+        diffuse: (!is_blank).then(|| sprite.image.clone()),
+        normal: None,
+        depth: None,
+        // Texels that a border between two pixels cuts belong to the frame.
+        rect: rect.map(|rect| URect { min: rect.min.floor().as_uvec2(), max: rect.max.ceil().as_uvec2() }),
+        proportions: sprite.custom_size.unwrap_or(Vec2::ONE),
+        maps: CrackMaps { diffuse: true, normal: true, depth: false },
+    }))
+}
+
+fn attach(world: &mut World, entity: Entity, carrier: &mut Carrier, textures: &CrackTextures, _relief: f32) {
+    let Some(own) = &textures.diffuse else { return };
+    carrier.own = Some(own.clone().untyped());
+    let images = world.get_resource::<Assets<Image>>();
+    let size = |handle: &Handle<Image>| images.and_then(|images| images.get(handle)).map(Image::size_f32);
+    let (before, now) = (carrier.shown.diffuse.as_ref().and_then(size), size(own));
+    let Some(mut sprite) = world.get_mut::<Sprite>(entity) else { return };
+    sprite.image = own.clone();
+    if core::mem::take(&mut carrier.is_sized) {
+        sprite.custom_size = None;
+    }
+    // Textures of another size must not change the size of the sprite.
+    if sprite.custom_size.is_none() && before != now {
+        sprite.custom_size = before;
+        carrier.is_sized = true;
+    }
+}
+
+fn detach(world: &mut World, entity: Entity, carrier: &Carrier) {
+    let Some(mut sprite) = world.get_mut::<Sprite>(entity) else { return };
+    if carrier.is_showing(&sprite.image.clone().untyped()) {
+        sprite.image = carrier.shown.asset.clone().typed();
+    }
+    if carrier.is_sized {
+        sprite.custom_size = None;
+    }
+}
+
+fn locate(world: &World, entity: Entity, local: Vec3) -> Result<Vec2, &'static str> {
+    let sprite = world.get::<Sprite>(entity).ok_or("the sprite is gone")?;
+    let images = world.get_resource::<Assets<Image>>().ok_or("there are no images")?;
+    let anchor = world.get::<Anchor>(entity).copied().unwrap_or_default();
+    let none = Assets::default();
+    let layouts = world.get_resource::<Assets<TextureAtlasLayout>>().unwrap_or(&none);
+    let texel = sprite
+        .compute_pixel_space_point(local.truncate(), anchor, images, layouts)
+        .map_err(|_| "the point lies off the sprite")?;
+    let Found::Shown(shown) = inspect(world, entity) else { return Err("the sprite cannot be read") };
+    let rect = match shown.rect {
+        Some(rect) => rect.as_rect(),
+        None => Rect { min: Vec2::ZERO, max: images.get(&sprite.image).ok_or("the picture is gone")?.size_f32() },
+    };
+    Ok((texel - rect.min) / rect.size())
+}

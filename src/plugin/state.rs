@@ -1,0 +1,70 @@
+//! [`CrackState`]: how a surface is doing.
+
+use super::CrackError;
+use bevy::prelude::*;
+
+/// How a surface is doing. Written by the crate, read by games.
+#[derive(Component, Reflect, Clone, Debug, Default, PartialEq)]
+#[reflect(Component, Default)]
+#[component(clone_behavior = Ignore)]
+pub struct CrackState {
+    /// What it is at.
+    pub status: CrackStatus,
+    /// Share of the surface's tiles of 16 x 16 texels that a crack has touched, 0..=1.
+    pub damage: f32,
+    /// Nodes of the crack network.
+    pub nodes: u32,
+    /// Hits that started or fed a crack.
+    pub hits: u32,
+    /// Where cracks grew in the last frame they grew in (for sound and dust); empty when done. At most
+    /// [`MAX_TIPS`](Self::MAX_TIPS).
+    pub tips: Vec<CrackTip>,
+}
+
+impl CrackState {
+    /// The most tips that are listed.
+    pub const MAX_TIPS: usize = 256;
+}
+
+/// What a surface is at.
+#[derive(Reflect, Clone, Debug, Default, PartialEq)]
+pub enum CrackStatus {
+    /// Not hit yet, or healed.
+    #[default]
+    Untouched,
+    /// Hit, but its picture is still loading. The hits wait.
+    Waiting,
+    /// Cracks are growing.
+    Growing,
+    /// Cracks have come to an end, until the next hit.
+    Done,
+    /// It cannot crack.
+    Failed(CrackError),
+}
+
+/// The end of a growing crack.
+#[derive(Reflect, Clone, Copy, Debug, Default, PartialEq)]
+pub struct CrackTip {
+    /// Texture coordinates in the surface's picture or sprite frame, 0..=1, v down.
+    pub uv: Vec2,
+    /// Direction of growth in the same axes, a unit vector in pattern space.
+    pub direction: Vec2,
+}
+
+/// The cracks of a surface have come to an end.
+#[derive(EntityEvent, Reflect, Clone, Copy, Debug, PartialEq)]
+#[reflect(Event)]
+pub struct CrackFinished {
+    /// The surface.
+    pub entity: Entity,
+}
+
+/// A surface cannot crack; the hits that waited on it are rejected.
+#[derive(EntityEvent, Reflect, Clone, Debug, PartialEq)]
+#[reflect(Event)]
+pub struct CrackFailed {
+    /// The surface.
+    pub entity: Entity,
+    /// Why.
+    pub error: CrackError,
+}

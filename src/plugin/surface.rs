@@ -1,0 +1,93 @@
+//! [`CrackSurface`]: this sprite or mesh can crack.
+
+use super::{CrackState, heal};
+use crate::preset::CrackPreset;
+use bevy::{
+    ecs::{lifecycle::HookContext, world::DeferredWorld},
+    prelude::*,
+};
+
+/// This sprite, 2D mesh or 3D mesh can crack.
+///
+/// Costs nothing until the first hit. Then the surface gets textures of its own, which start as copies of its pictures;
+/// everybody else who shows those pictures keeps the originals. Removing the component gives the originals back.
+#[derive(Component, Reflect, Clone, Debug, PartialEq)]
+#[reflect(Component, Default)]
+#[require(CrackState)]
+#[component(on_add = added, on_remove = removed)]
+pub struct CrackSurface {
+    /// How cracks grow and look. Changes hold for what grows from then on; invalid ones are refused with one warning.
+    pub preset: CrackPreset,
+    /// Seed of the pattern. A change takes effect after healing.
+    pub seed: u64,
+    /// Size of the textures.
+    pub resolution: CrackResolution,
+    /// Which maps are written.
+    pub write: CrackMaps,
+    /// Whether transparent texels refuse hits and attract no cracks; default true.
+    pub alpha_mask: bool,
+}
+
+impl CrackSurface {
+    /// A surface of the given material, with seed 0, everything else by default.
+    #[must_use]
+    pub fn new(preset: CrackPreset) -> Self {
+        Self {
+            preset,
+            seed: 0,
+            resolution: CrackResolution::Picture,
+            write: CrackMaps { diffuse: true, normal: true, depth: true },
+            alpha_mask: true,
+        }
+    }
+
+    /// The same with another seed.
+    #[must_use]
+    pub fn with_seed(mut self, seed: u64) -> Self {
+        self.seed = seed;
+        self
+    }
+}
+
+impl Default for CrackSurface {
+    fn default() -> Self {
+        Self::new(CrackPreset::default())
+    }
+}
+
+/// Size of a surface's textures.
+#[derive(Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum CrackResolution {
+    /// As its picture; 512 texels along the longer side where there is none.
+    #[default]
+    Picture,
+    /// This size, the picture being resampled. Sprites with a `rect` or an atlas keep the size of their picture.
+    Fixed(UVec2),
+}
+
+/// Which maps of a surface are written.
+#[derive(Reflect, Clone, Copy, Debug, PartialEq, Eq)]
+#[reflect(Default)]
+pub struct CrackMaps {
+    /// The picture itself.
+    pub diffuse: bool,
+    /// Normals, tangent space.
+    pub normal: bool,
+    /// Depth for parallax mapping: 3D meshes only.
+    pub depth: bool,
+}
+
+impl Default for CrackMaps {
+    fn default() -> Self {
+        Self { diffuse: true, normal: true, depth: true }
+    }
+}
+
+/// A clone of a cracked entity shows its original's private textures: it is given the original pictures.
+fn added(mut world: DeferredWorld, context: HookContext) {
+    heal::disown_clone(&mut world, context.entity);
+}
+
+fn removed(mut world: DeferredWorld, context: HookContext) {
+    heal::forget_later(&mut world, context.entity);
+}

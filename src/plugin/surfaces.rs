@@ -1,0 +1,194 @@
+//! [`Surfaces`]: the surfaces that have been hit.
+
+use super::{CrackSurface, CrackTextures, carrier::Carrier, picture::BasePicture};
+use crate::{
+    growth::CrackGrowth,
+    paint::LookTable,
+    raster::{DepthField, DirtyTiles, Profile, TexelRect},
+};
+use bevy::{asset::UntypedAssetId, ecs::entity::EntityHashMap, platform::collections::HashMap, prelude::*};
+use std::collections::VecDeque;
+
+/// A part of the image that shows the cracks: the whole image, or a frame of an atlas.
+pub(super) struct View {
+    pub(super) rect: TexelRect,
+    /// What is stamped into the field but not painted here yet, in texels of the field.
+    pub(super) dirty: DirtyTiles,
+}
+
+/// A surface that has been hit.
+pub(super) struct Active {
+    /// The component as it was when it was last looked at.
+    pub(super) surface: CrackSurface,
+    pub(super) growth: CrackGrowth,
+    pub(super) field: DepthField,
+    pub(super) profile: Profile,
+    pub(super) look: LookTable,
+    pub(super) base: BasePicture,
+    pub(super) textures: CrackTextures,
+    pub(super) carrier: Carrier,
+    /// Bytes counted against the budget.
+    pub(super) bytes: u64,
+    pub(super) views: Vec<View>,
+    /// Index of the view that is shown.
+    pub(super) view: usize,
+    /// Steps of growth a second.
+    pub(super) rate: f32,
+    /// Steps of growth that are due, with their fraction.
+    pub(super) due: f32,
+    pub(super) hits: u32,
+    /// Tiles that a crack has touched.
+    pub(super) touched: Touched,
+    /// Whether it is in a growing list.
+    pub(super) is_growing: bool,
+    /// Whether it is in the dirty list.
+    pub(super) is_dirty: bool,
+    /// Whether its end has not been told yet.
+    pub(super) is_open: bool,
+    /// Whether its pictures have changed since they were read.
+    pub(super) is_outdated: bool,
+    /// Nodes that were there when tips were last listed.
+    pub(super) tips_from: usize,
+}
+
+impl Active {
+    /// Marks texels of the field as changed, in all views.
+    pub(super) fn mark(&mut self, rect: TexelRect) {
+        // A normal depends on the texels around it.
+        let rect = rect.grow(1, self.field.frame.size());
+        for view in &mut self.views {
+            view.dirty.mark(rect);
+        }
+    }
+
+    /// Shows the cracks in `rect` of the image from now on.
+    pub(super) fn show(&mut self, rect: TexelRect) {
+        let known = self.views.iter().position(|view| view.rect == rect);
+        self.view = known.unwrap_or_else(|| {
+            let mut dirty = DirtyTiles::new(self.field.frame.size());
+            dirty.mark(TexelRect::whole(self.field.frame.size()));
+            self.views.push(View { rect, dirty });
+            self.views.len() - 1
+        });
+    }
+}
+
+/// A set of tiles that only grows.
+#[derive(Default)]
+pub(super) struct Touched {
+    columns: u32,
+    tiles: Vec<bool>,
+    count: u32,
+}
+
+impl Touched {
+    pub(super) fn new(size: UVec2) -> Self {
+        let tiles = UVec2::new(size.x.div_ceil(DirtyTiles::TILE), size.y.div_ceil(DirtyTiles::TILE));
+        Self { columns: tiles.x, tiles: vec![false; tiles.x as usize * tiles.y as usize], count: 0 }
+    }
+
+    pub(super) fn mark(&mut self, rect: TexelRect) {
+        if rect.is_empty() {
+            return;
+        }
+        let (min, max) = (rect.min / DirtyTiles::TILE, (rect.max - UVec2::ONE) / DirtyTiles::TILE);
+        for y in min.y..=max.y {
+            for x in min.x..=max.x {
+                if let Some(tile) = self.tiles.get_mut((y * self.columns + x) as usize)
+                    && !core::mem::replace(tile, true)
+                {
+                    self.count += 1;
+                }
+            }
+        }
+    }
+
+    /// Share of tiles in the set, 0..=1.
+    pub(super) fn share(&self) -> f32 {
+        self.count as f32 / self.tiles.len().max(1) as f32
+    }
+}
+
+/// The surfaces that have been hit. Systems visit the lists, never the map.
+#[derive(Resource, Default)]
+pub(super) struct Surfaces {
+    pub(super) active: EntityHashMap<Active>,
+    /// Surfaces that grow, each once, in turns.
+    pub(super) growing: VecDeque<Entity>,
+    /// Surfaces that will grow when others have ended.
+    pub(super) held: VecDeque<Entity>,
+    /// Surfaces to paint, each once, in turns.
+    pub(super) dirty: VecDeque<Entity>,
+    /// Surfaces whose components or pictures have changed.
+    pub(super) changed: Vec<Entity>,
+    /// Who owns a private image, material or mesh.
+    pub(super) owners: HashMap<UntypedAssetId, Entity>,
+    /// Which surfaces were made from a picture.
+    pub(super) sources: HashMap<AssetId<Image>, Vec<Entity>>,
+    /// Bytes of all textures.
+    pub(super) bytes: u64,
+}
+
+impl Surfaces {
+    /// Puts a surface that was hit in the line to grow.
+    pub(super) fn start_growing(&mut self, entity: Entity) {
+        if let Some(active) = self.active.get_mut(&entity) {
+            active.is_open = true;
+            if !active.is_growing {
+                active.is_growing = true;
+                self.held.push_back(entity);
+            }
+        }
+    }
+
+    /// Puts a surface in the line to be painted.
+    pub(super) fn soil(&mut self, entity: Entity) {
+        if let Some(active) = self.active.get_mut(&entity)
+            && !active.is_dirty
+        {
+            active.is_dirty = true;
+            self.dirty.push_back(entity);
+        }
+    }
+
+    /// Forgets everything about a surface.
+    pub(super) fn remove(&mut self, entity: Entity) -> Option<Active> {
+        let active = self.active.remove(&entity)?;
+        // It stays in the lists until its turn: who works on a list skips what is not there any more.
+        self.disown(entity, &active);
+        self.bytes -= active.bytes;
+        Some(active)
+    }
+
+    /// Notes which assets the surface owns and which it was made from.
+    pub(super) fn own(&mut self, entity: Entity, active: &Active) {
+        self.owners.extend(active.owned().map(|id| (id, entity)));
+        for source in active.carrier.sources() {
+            let users = self.sources.entry(source).or_default();
+            if !users.contains(&entity) {
+                users.push(entity);
+            }
+        }
+    }
+
+    /// Takes back what [`own`](Self::own) has noted.
+    pub(super) fn disown(&mut self, entity: Entity, active: &Active) {
+        for id in active.owned() {
+            self.owners.remove(&id);
+        }
+        for source in active.carrier.sources() {
+            if let Some(users) = self.sources.get_mut(&source) {
+                users.retain(|e| *e != entity);
+                if users.is_empty() {
+                    self.sources.remove(&source);
+                }
+            }
+        }
+    }
+}
+
+impl Active {
+    fn owned(&self) -> impl Iterator<Item = UntypedAssetId> + '_ {
+        self.textures.handles().map(|handle| handle.id().untyped()).chain(self.carrier.owned())
+    }
+}

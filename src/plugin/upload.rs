@@ -1,0 +1,246 @@
+//! Upload of rectangles into GPU textures that exist. Only this file knows the render world.
+//!
+//! The texels on the CPU (`Image::data`) are the truth. Painting changes them without an asset event and notes the
+//! rectangle here; the extraction, which sees both worlds, copies it into the texture. Whatever else makes the renderer
+//! prepare an image again uploads all of `data`, cracks included.
+
+use crate::raster::TexelRect;
+use bevy::{
+    platform::collections::HashMap,
+    prelude::*,
+    render::{
+        ExtractSchedule, MainWorld, RenderApp,
+        render_asset::RenderAssets,
+        render_resource::{
+            Buffer, BufferDescriptor, BufferUsages, CommandEncoderDescriptor, Extent3d, Origin3d, TexelCopyBufferInfo,
+            TexelCopyBufferLayout, TexelCopyTextureInfo, TextureAspect,
+        },
+        renderer::{RenderDevice, RenderQueue},
+        texture::GpuImage,
+    },
+};
+
+/// What went to the GPU in the last frame that was rendered.
+#[derive(Resource, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[reflect(Resource, Default)]
+pub struct CrackUploadStats {
+    /// Bytes of texels.
+    pub bytes: u64,
+    /// Rectangles.
+    pub rects: u32,
+}
+
+/// Copies between buffers and textures want rows that begin at multiples of this, bytes.
+const ROW_ALIGNMENT: usize = 256;
+
+/// Above this many rectangles of one image the one around them all is uploaded: nobody fetches them.
+const MAX_RECTS_PER_IMAGE: usize = 1024;
+
+/// Up to this many rectangles are written one by one, more go through one buffer.
+const FEW: usize = 4;
+
+/// Rectangles to upload.
+#[derive(Resource, Default)]
+pub(super) struct Uploads {
+    /// Whether there is a renderer that fetches them.
+    is_wanted: bool,
+    rects: Vec<(AssetId<Image>, TexelRect)>,
+    /// Number of rectangles of each image since they were last thinned out.
+    limit: usize,
+}
+
+impl Uploads {
+    /// Notes that texels of an image have changed.
+    pub(super) fn push(&mut self, image: AssetId<Image>, rect: TexelRect) {
+        if self.is_wanted && !rect.is_empty() {
+            self.rects.push((image, rect));
+        }
+    }
+
+    /// Replaces the rectangles of each image by the one around them.
+    fn thin_out(&mut self) {
+        let mut places = HashMap::<AssetId<Image>, usize>::default();
+        let mut thin = Vec::<(AssetId<Image>, TexelRect)>::new();
+        for (image, rect) in self.rects.drain(..) {
+            match places.get(&image) {
+                Some(place) => thin[*place].1 = thin[*place].1.union(rect),
+                None => {
+                    places.insert(image, thin.len());
+                    thin.push((image, rect));
+                }
+            }
+        }
+        self.rects = thin;
+    }
+}
+
+/// Keeps the list short when the renderer does not fetch it (a minimised window).
+pub(super) fn drop_unwanted(mut uploads: ResMut<Uploads>) {
+    if uploads.rects.len() > uploads.limit.max(MAX_RECTS_PER_IMAGE) {
+        uploads.thin_out();
+        uploads.limit = 2 * uploads.rects.len();
+    }
+}
+
+/// Lets the render world fetch rectangles, if there is one.
+pub(super) fn connect(app: &mut App) {
+    let Some(render_app) = app.get_sub_app_mut(RenderApp) else { return };
+    render_app.init_resource::<Staging>().add_systems(ExtractSchedule, upload_rects);
+    app.world_mut().resource_mut::<Uploads>().is_wanted = true;
+}
+
+/// A rectangle that fits, with the place of its rows in the staging buffer.
+struct Copy {
+    image: AssetId<Image>,
+    rect: TexelRect,
+    texel: usize,
+    offset: usize,
+    row: usize,
+}
+
+/// Memory that is kept from frame to frame.
+#[derive(Resource, Default)]
+struct Staging {
+    rects: Vec<(AssetId<Image>, TexelRect)>,
+    copies: Vec<Copy>,
+    rows: Vec<u8>,
+    buffer: Option<Buffer>,
+}
+
+fn upload_rects(
+    mut main: ResMut<MainWorld>,
+    mut staging: ResMut<Staging>,
+    gpu_images: Res<RenderAssets<GpuImage>>,
+    device: Res<RenderDevice>,
+    queue: Res<RenderQueue>,
+) {
+    let Staging { rects, copies, rows, buffer } = &mut *staging;
+    core::mem::swap(rects, &mut main.resource_mut::<Uploads>().rects);
+    let mut stats = CrackUploadStats::default();
+    if !rects.is_empty()
+        && let Some(images) = main.get_resource::<Assets<Image>>()
+    {
+        // What is not on the GPU yet stays in the list.
+        rects.retain(|(id, rect)| match plan(*id, *rect, images, &gpu_images, rows.len()) {
+            Plan::Copy(copy) => {
+                pack(&copy, images, rows);
+                stats.rects += 1;
+                stats.bytes += copy.rect.area() * copy.texel as u64;
+                copies.push(copy);
+                false
+            }
+            Plan::Wait => true,
+            Plan::Drop => false,
+        });
+        if copies.len() <= FEW {
+            write(copies, rows, &gpu_images, &queue);
+        } else {
+            copy(copies, rows, buffer, &gpu_images, &device, &queue);
+        }
+        copies.clear();
+        rows.clear();
+    }
+    if !rects.is_empty() {
+        main.resource_mut::<Uploads>().rects.append(rects);
+    }
+    *main.resource_mut::<CrackUploadStats>() = stats;
+}
+
+enum Plan {
+    Copy(Copy),
+    Wait,
+    Drop,
+}
+
+/// A copy out of bounds is a validation error, which ends the app: everything is compared first.
+fn plan(
+    id: AssetId<Image>,
+    rect: TexelRect,
+    images: &Assets<Image>,
+    gpu_images: &RenderAssets<GpuImage>,
+    offset: usize,
+) -> Plan {
+    let Some(image) = images.get(id) else { return Plan::Drop };
+    let Some(gpu) = gpu_images.get(id) else { return Plan::Wait };
+    let (cpu_texture, gpu_texture) = (&image.texture_descriptor, &gpu.texture_descriptor);
+    if cpu_texture.size != gpu_texture.size || cpu_texture.format != gpu_texture.format {
+        // The asset was replaced in this frame: all of it is on its way.
+        return Plan::Wait;
+    }
+    let Some(texel) = gpu_texture.format.block_copy_size(None) else { return Plan::Drop };
+    let size = image.size();
+    let rect = rect.intersect(TexelRect::whole(size));
+    let needed = size.x as usize * size.y as usize * texel as usize;
+    if rect.is_empty() || image.data.as_ref().is_none_or(|data| data.len() < needed) {
+        return Plan::Drop;
+    }
+    let row = (rect.size().x * texel) as usize;
+    Plan::Copy(Copy { image: id, rect, texel: texel as usize, offset, row: row.next_multiple_of(ROW_ALIGNMENT) })
+}
+
+/// Appends the texels of a rectangle, each row padded.
+fn pack(copy: &Copy, images: &Assets<Image>, rows: &mut Vec<u8>) {
+    let Some((image, data)) = images.get(copy.image).and_then(|image| Some((image, image.data.as_ref()?))) else {
+        return;
+    };
+    let stride = image.width() as usize * copy.texel;
+    let length = copy.rect.size().x as usize * copy.texel;
+    for y in copy.rect.min.y..copy.rect.max.y {
+        let start = y as usize * stride + copy.rect.min.x as usize * copy.texel;
+        rows.extend_from_slice(&data[start..start + length]);
+        rows.resize(rows.len() + copy.row - length, 0);
+    }
+}
+
+fn destination<'a>(gpu: &'a GpuImage, copy: &Copy) -> (TexelCopyTextureInfo<'a>, Extent3d) {
+    let (min, size) = (copy.rect.min, copy.rect.size());
+    let origin = Origin3d { x: min.x, y: min.y, z: 0 };
+    (
+        TexelCopyTextureInfo { texture: &gpu.texture, mip_level: 0, origin, aspect: TextureAspect::All },
+        Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 },
+    )
+}
+
+fn layout(copy: &Copy, offset: u64) -> TexelCopyBufferLayout {
+    let bytes_per_row = u32::try_from(copy.row).ok();
+    TexelCopyBufferLayout { offset, bytes_per_row, rows_per_image: None }
+}
+
+/// Writes rectangles one by one.
+fn write(copies: &[Copy], rows: &[u8], gpu_images: &RenderAssets<GpuImage>, queue: &RenderQueue) {
+    for copy in copies {
+        let Some(gpu) = gpu_images.get(copy.image) else { continue };
+        let (to, size) = destination(gpu, copy);
+        queue.write_texture(to, &rows[copy.offset..], layout(copy, 0), size);
+    }
+}
+
+/// Copies all rectangles from one buffer in one submission: a write of its own costs more than its texels.
+fn copy(
+    copies: &[Copy],
+    rows: &[u8],
+    buffer: &mut Option<Buffer>,
+    gpu_images: &RenderAssets<GpuImage>,
+    device: &RenderDevice,
+    queue: &RenderQueue,
+) {
+    let size = rows.len() as u64;
+    let buffer = match buffer {
+        Some(buffer) if buffer.size() >= size => buffer,
+        _ => buffer.insert(device.create_buffer(&BufferDescriptor {
+            label: Some("crack_texels"),
+            size: size.next_power_of_two(),
+            usage: BufferUsages::COPY_SRC | BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        })),
+    };
+    queue.write_buffer(buffer, 0, rows);
+    let mut encoder = device.create_command_encoder(&CommandEncoderDescriptor { label: Some("crack_texels") });
+    for copy in copies {
+        let Some(gpu) = gpu_images.get(copy.image) else { continue };
+        let (to, size) = destination(gpu, copy);
+        let from = TexelCopyBufferInfo { buffer, layout: layout(copy, copy.offset as u64) };
+        encoder.copy_buffer_to_texture(from, to, size);
+    }
+    queue.submit([encoder.finish()]);
+}

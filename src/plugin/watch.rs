@@ -1,0 +1,162 @@
+//! Changes from outside: other presets, other pictures, another frame of an animation.
+
+use super::{
+    CrackError, CrackSurface, CrackTextures,
+    activate::{attach, draft, fail, frame, look, make_textures},
+    carrier::{self, Carrier, Found, Shown},
+    paint::stamp_all,
+    surfaces::{Active, Surfaces, Touched},
+};
+use crate::raster::{DepthField, TexelRect};
+use bevy::prelude::*;
+
+/// Notes the cracked surfaces whose settings have changed.
+pub(super) fn watch_surfaces(
+    changed: Query<Entity, (Changed<CrackSurface>, With<CrackTextures>)>,
+    mut surfaces: ResMut<Surfaces>,
+) {
+    surfaces.changed.extend(&changed);
+}
+
+/// Notes the cracked surfaces whose sprite or material slot has changed.
+pub(super) fn watch<C: Component>(
+    changed: Query<Entity, (Changed<C>, With<CrackTextures>)>,
+    mut surfaces: ResMut<Surfaces>,
+) {
+    surfaces.changed.extend(&changed);
+}
+
+/// Notes the cracked surfaces whose original pictures have changed.
+pub(super) fn watch_pictures(events: Option<MessageReader<AssetEvent<Image>>>, mut surfaces: ResMut<Surfaces>) {
+    let Some(mut events) = events else { return };
+    let Surfaces { active, changed, sources, .. } = &mut *surfaces;
+    for event in events.read() {
+        if let AssetEvent::Modified { id } | AssetEvent::Added { id } = event {
+            for entity in sources.get(id).into_iter().flatten() {
+                changed.push(*entity);
+                if let Some(active) = active.get_mut(entity) {
+                    active.is_outdated = true;
+                }
+            }
+        }
+    }
+}
+
+/// Whether anything has changed.
+pub(super) fn any_changed(surfaces: Res<Surfaces>) -> bool {
+    !surfaces.changed.is_empty()
+}
+
+/// Takes up what has changed. What is not loaded yet is looked at again in the next frame.
+pub(super) fn update_changed(world: &mut World) {
+    let mut changed = core::mem::take(&mut world.resource_mut::<Surfaces>().changed);
+    changed.sort_unstable();
+    changed.dedup();
+    changed.retain(|entity| {
+        let Some(mut active) = take(world, *entity) else { return false };
+        let outcome = update(world, *entity, &mut active);
+        let mut surfaces = world.resource_mut::<Surfaces>();
+        surfaces.own(*entity, &active);
+        surfaces.active.insert(*entity, active);
+        surfaces.soil(*entity);
+        match outcome {
+            Ok(is_done) => !is_done,
+            Err(error) => {
+                fail(world, *entity, error);
+                false
+            }
+        }
+    });
+    world.resource_mut::<Surfaces>().changed.append(&mut changed);
+}
+
+fn take(world: &mut World, entity: Entity) -> Option<Active> {
+    let mut surfaces = world.resource_mut::<Surfaces>();
+    let active = surfaces.active.remove(&entity)?;
+    surfaces.disown(entity, &active);
+    Some(active)
+}
+
+/// `false` if the new picture is not there yet. On an error the cracks stay as they are.
+fn update(world: &mut World, entity: Entity, active: &mut Active) -> Result<bool, CrackError> {
+    if let Some(surface) = world.get::<CrackSurface>(entity)
+        && *surface != active.surface
+    {
+        let surface = surface.clone();
+        update_settings(entity, active, surface);
+    }
+    let (kind, found) = carrier::inspect(world, entity);
+    let shown = match found {
+        Found::Shown(shown) => *shown,
+        Found::Waiting => return Ok(false),
+        Found::Unusable(error) => return Err(error),
+        Found::Other => return Ok(true),
+    };
+    if active.carrier.is_showing(&shown.asset) {
+        if active.is_outdated {
+            // What it shows now are our textures; the pictures are those it was made from.
+            let original = Shown { rect: shown.rect, ..active.carrier.shown.clone() };
+            return update_picture(world, entity, active, original);
+        }
+        let whole = TexelRect::whole(active.base.size);
+        let rect = shown.rect.map_or(whole, |rect| TexelRect { min: rect.min, max: rect.max }.intersect(whole));
+        if !rect.is_empty() {
+            active.show(rect);
+        }
+        return Ok(true);
+    }
+    // Somebody gave it another picture.
+    let Some(kind) = kind else { return Ok(true) };
+    let is_sized = active.carrier.is_sized;
+    active.carrier = Carrier { kind, shown: shown.clone(), own: None, mesh: active.carrier.mesh.take(), is_sized };
+    update_picture(world, entity, active, shown)
+}
+
+/// Takes up another preset; an invalid one is refused and the old one stays.
+fn update_settings(entity: Entity, active: &mut Active, surface: CrackSurface) {
+    let look = look(&surface, active.field.frame).map_err(|error| error.to_string());
+    let outcome = look.and_then(|look| {
+        if surface.preset.growth != active.surface.preset.growth {
+            active.growth.set_params(surface.preset.growth.clone()).map_err(|error| error.to_string())?;
+        }
+        Ok(look)
+    });
+    match outcome {
+        Ok(look) => {
+            active.look = look;
+            active.profile = surface.preset.profile;
+            active.rate = surface.preset.steps_per_second;
+            let whole = TexelRect::whole(active.field.frame.size());
+            active.mark(whole);
+        }
+        Err(error) => warn!("the changed preset of {entity} is not used: {error}"),
+    }
+    // Remembered even if refused, so that it is refused once only.
+    active.surface = surface;
+}
+
+/// Reads the pictures anew and paints the cracks over them; `false` if they are not there yet.
+fn update_picture(world: &mut World, entity: Entity, active: &mut Active, shown: Shown) -> Result<bool, CrackError> {
+    active.is_outdated = true;
+    let Some(draft) = draft(world, &active.surface, &shown, active.bytes)? else { return Ok(false) };
+    let frame = frame(draft.rect)?;
+    let look = look(&active.surface, frame)?;
+    active.textures = make_textures(world, &draft, Some(&active.textures))?;
+    active.is_outdated = false;
+    world.resource_mut::<Surfaces>().bytes += draft.bytes;
+    world.resource_mut::<Surfaces>().bytes -= active.bytes;
+    active.bytes = draft.bytes;
+    active.base = draft.base;
+    if frame != active.field.frame {
+        active.look = look;
+        active.field = DepthField::new(frame);
+        active.touched = Touched::new(frame.size());
+        stamp_all(active);
+    }
+    active.views.clear();
+    active.show(draft.rect);
+    active.carrier.shown = shown;
+    // The material is made anew: one that exists keeps showing a texture of the old size.
+    attach(world, entity, active);
+    Ok(true)
+}
