@@ -3,6 +3,8 @@
 //! `cargo bench --no-default-features --bench growth`. The scene: random markers 11.76 px apart on average, reach 30 px,
 //! segments and kill distance 5 px, one start for 1500 markers.
 
+#![expect(clippy::print_stdout, clippy::expect_used, reason = "a benchmark")]
+
 use bevy_crack::growth::{CrackGrowth, GrowthParams, MarkerLayout, StartLayout};
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use kiddo::{ImmutableKdTree, SquaredEuclidean};

@@ -55,7 +55,14 @@ impl CrackPreset {
             roughness: 0.3,
             ..GrowthParams::DEFAULT
         },
-        profile: Profile { depth: 1.0, full_width: 0.014, wall: 0.35, rim_width: 0.005, rim_depth: 0.14 },
+        profile: Profile {
+            depth: 1.0,
+            full_width: 0.014,
+            wall: 0.35,
+            rim_width: 0.005,
+            rim_depth: 0.14,
+            faintest: 0.6,
+        },
         look: Look::GROOVE,
         steps_per_second: 60.0,
     };
@@ -84,7 +91,7 @@ impl CrackPreset {
             connection_every: 2,
             ..GrowthParams::DEFAULT
         },
-        profile: Profile { depth: 1.0, full_width: 0.004, wall: 0.3, rim_width: 0.006, rim_depth: 0.3 },
+        profile: Profile { depth: 1.0, full_width: 0.004, wall: 0.3, rim_width: 0.006, rim_depth: 0.3, faintest: 0.6 },
         look: Look { relief: 0.004, glint: 0.5, ..Look::FROSTED },
         steps_per_second: 90.0,
     };
@@ -111,7 +118,7 @@ impl CrackPreset {
             island_distance: 0.16,
             ..GrowthParams::DEFAULT
         },
-        profile: Profile { depth: 1.0, full_width: 0.014, wall: 0.5, rim_width: 0.012, rim_depth: 0.12 },
+        profile: Profile { depth: 1.0, full_width: 0.014, wall: 0.5, rim_width: 0.012, rim_depth: 0.12, faintest: 0.6 },
         look: Look::GROOVE,
         steps_per_second: 40.0,
     };

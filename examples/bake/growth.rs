@@ -19,7 +19,7 @@ use std::{
 };
 
 #[derive(Args)]
-pub struct Options {
+pub(crate) struct Options {
     /// glass, concrete or clay
     #[arg(long, default_value = "concrete")]
     preset: String,
@@ -89,7 +89,7 @@ fn read_picture(path: &Path) -> Result<RgbaImage, Box<dyn Error>> {
     Ok(picture.to_rgba8())
 }
 
-pub fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
+pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
     let mut preset = CrackPreset::named(&options.preset)
         .ok_or_else(|| format!("no preset `{}`; there are {}", options.preset, CrackPreset::NAMES.join(", ")))?;
     for (name, value) in &options.set {

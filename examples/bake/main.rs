@@ -6,6 +6,8 @@
 //!
 //! Try `--preset concrete --hit 0.3,0.4,2 --hit 0.7,0.6`, `--set line_growth=1.5`, `--base wall.png`.
 
+#![expect(clippy::print_stdout, clippy::print_stderr, reason = "a command-line tool")]
+
 mod growth;
 
 use clap::{Parser, Subcommand};

@@ -12,8 +12,6 @@ use std::{collections::VecDeque, ops::Range};
 pub(super) struct Linker {
     /// Newborn nodes of one ring with their angle around the impact.
     ring: Vec<(f32, u32)>,
-    /// Per node: whether it has an island link.
-    islanded: Vec<bool>,
     /// Per node: whether another grew from it.
     parents: Vec<bool>,
     /// Nodes of the last steps, which may turn out to be tips.
@@ -102,7 +100,6 @@ impl Linker {
     ///
     /// A node that has no child two steps after its birth is such a tip; when growth has ended, all the others are.
     fn join_islands(&mut self, params: &GrowthParams, network: &mut Network, nodes: &NodeGrid, newborn: Range<u32>) {
-        self.islanded.resize(network.nodes().len(), false);
         self.parents.resize(network.nodes().len(), false);
         for node in newborn.clone() {
             if let Some(is_parent) = self.parents.get_mut(network.nodes()[node as usize].parent as usize) {
@@ -119,7 +116,7 @@ impl Linker {
         }
     }
 
-    fn join_island(&mut self, params: &GrowthParams, network: &mut Network, nodes: &NodeGrid, tip: u32) {
+    fn join_island(&self, params: &GrowthParams, network: &mut Network, nodes: &NodeGrid, tip: u32) {
         let born = network.nodes()[tip as usize];
         let Some(parent) = network.nodes().get(born.parent as usize) else { return };
         let ahead = (born.pos - parent.pos).normalize_or_zero();
@@ -128,7 +125,6 @@ impl Linker {
         nodes.within(born.pos, params.island_distance, |other, distance_sq| {
             let way = network.nodes()[other as usize].pos - born.pos;
             if (distance_sq, other) < best
-                && !self.islanded[other as usize]
                 && way.dot(ahead) > 0.3 * distance_sq.sqrt()
                 && !ancestors(network, other).iter().any(|a| *a != NO_PARENT && kin.contains(a))
             {
@@ -136,8 +132,6 @@ impl Linker {
             }
         });
         if best.1 != u32::MAX {
-            self.islanded[best.1 as usize] = true;
-            self.islanded[tip as usize] = true;
             let link = Link { a: best.1, b: tip, width: born.width, birth: born.birth, kind: LinkKind::Island };
             network.links.push(link);
         }

@@ -39,9 +39,9 @@ pub enum MarkerLayout {
 pub enum StartLayout {
     /// One node at the hit.
     Point,
-    /// `count` nodes scattered over the reach of the hit.
+    /// One node at the hit and others scattered over its reach, in proportion to its energy.
     Points {
-        /// 1..=1024.
+        /// Nodes at energy 1, 1..=1024.
         count: u32,
     },
     /// `count` nodes evenly on a circle around the hit.
@@ -314,7 +314,7 @@ impl GrowthParams {
                 }
             }
             ("occupancy", MarkerLayout::PseudoGrid { occupancy, .. } | MarkerLayout::Polar { occupancy, .. }, _) => {
-                *occupancy = parse(name, text)?
+                *occupancy = parse(name, text)?;
             }
             ("jitter", MarkerLayout::PseudoGrid { jitter, .. } | MarkerLayout::Polar { jitter, .. }, _) => {
                 *jitter = parse(name, text)?;

@@ -276,7 +276,7 @@ impl CrackGrowth {
         let reach = self.reach(energy);
         let first = self.network.nodes.len() as u32;
         let seed = mix(self.seed ^ mix(u64::from(index)));
-        for place in markers::starts(self.params.starts, pos, reach, extent, seed) {
+        for place in markers::starts(self.params.starts, (pos, energy), reach, extent, seed) {
             if !self.nodes.any_within(place, 1e-4) {
                 self.bear(place, NO_PARENT, 0, index);
             }

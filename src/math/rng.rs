@@ -1,6 +1,6 @@
 //! A small random generator with a frozen stream.
 
-/// PCG-XSH-RR 64/32 (O'Neill 2014), seeded through SplitMix64.
+/// PCG-XSH-RR 64/32 (O'Neill 2014), seeded through `SplitMix64`.
 ///
 /// The stream is part of the crate's contract: a seed gives the same numbers in every version and on every machine.
 /// Each consumer draws from a stream of its own, so that a new consumer does not shift the others.
@@ -20,7 +20,7 @@ pub struct Rng {
     increment: u64,
 }
 
-/// One round of SplitMix64: a good 64-bit hash of `x`.
+/// One round of `SplitMix64`: a good 64-bit hash of `x`.
 #[must_use]
 pub(crate) const fn mix(x: u64) -> u64 {
     let x = x.wrapping_add(0x9E37_79B9_7F4A_7C15);

@@ -45,11 +45,16 @@ pub struct Profile {
     pub rim_width: f32,
     /// Depth of the rim where it meets the crack, falling to 0 outward. Range 0..=1; default 0.
     pub rim_depth: f32,
+    /// How far lines thinner than a texel fade: 0 = by their width, 1 = not at all. Range 0..=1; default 0.
+    ///
+    /// Keeps fine cracks visible on small pictures.
+    pub faintest: f32,
 }
 
 impl Profile {
     /// The default: a groove with sloping walls and no rim.
-    pub const DEFAULT: Self = Self { depth: 1.0, full_width: 0.02, wall: 0.6, rim_width: 0.0, rim_depth: 0.0 };
+    pub const DEFAULT: Self =
+        Self { depth: 1.0, full_width: 0.02, wall: 0.6, rim_width: 0.0, rim_depth: 0.0, faintest: 0.0 };
 }
 
 impl Default for Profile {

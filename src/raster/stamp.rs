@@ -6,7 +6,7 @@
 //! ```text
 //! core = peak(r) * clamp((r + 1/2 - d) / (1 + wall * r), 0, 1)
 //! rim  = rim_depth * clamp((r + rim - d) / max(rim, 1), 0, 1)
-//! depth = max(core, rim) * min(1, 2 r)
+//! depth = max(core, rim) * clamp(2 r, faintest, 1)
 //! ```
 //!
 //! The core is a slot whose edge is one texel soft (`wall` 0) up to a V (`wall` 1). Lines thinner than a texel keep the
@@ -91,6 +91,8 @@ struct Section {
     rim: f32,
     rim_depth: f32,
     inv_rim: f32,
+    /// The least share of its depth that a thin line keeps.
+    faintest: f32,
 }
 
 /// The cross-section where the half width is known.
@@ -117,11 +119,20 @@ impl Section {
             rim,
             rim_depth: if rim > 0.0 { at_door(profile.rim_depth, 1.0) } else { 0.0 },
             inv_rim: 1.0 / max(rim, 1.0),
+            faintest: at_door(profile.faintest, 1.0),
         }
     }
 
     fn upright(depth: f32) -> Self {
-        Self { depth: at_door(depth, 1.0), gain: MAX_RADIUS, wall: 0.0, rim: 0.0, rim_depth: 0.0, inv_rim: 1.0 }
+        Self {
+            depth: at_door(depth, 1.0),
+            gain: MAX_RADIUS,
+            wall: 0.0,
+            rim: 0.0,
+            rim_depth: 0.0,
+            inv_rim: 1.0,
+            faintest: 0.0,
+        }
     }
 
     /// The cut at half width `r`. Each of the stamping loops calls it, so that both give the same bits.
@@ -133,7 +144,7 @@ impl Section {
             reach: core + 0.5,
             inv_wall: 1.0 / (1.0 + self.wall * core),
             rim_reach: r + self.rim,
-            scale: 65535.0 * min(2.0 * r, 1.0),
+            scale: 65535.0 * min(max(2.0 * r, self.faintest), 1.0),
         }
     }
 
@@ -334,6 +345,7 @@ mod tests {
             wall: rng.unit(),
             rim_width: if below(rng, 2) == 0 { 0.0 } else { 0.05 * rng.unit() },
             rim_depth: rng.unit(),
+            faintest: if below(rng, 2) == 0 { 0.0 } else { rng.unit() },
         }
     }
 
@@ -361,7 +373,7 @@ mod tests {
         let core = peak * ((shown + 0.5 - d) / (1.0 + f64::from(profile.wall) * shown)).clamp(0.0, 1.0);
         let rim = f64::from(profile.rim_width) * unit;
         let edge = if rim > 0.0 { ((r + rim - d) / rim.max(1.0)).clamp(0.0, 1.0) } else { 0.0 };
-        65535.0 * core.max(f64::from(profile.rim_depth) * edge) * (2.0 * r).min(1.0)
+        65535.0 * core.max(f64::from(profile.rim_depth) * edge) * (2.0 * r).clamp(f64::from(profile.faintest), 1.0)
     }
 
     #[test]
@@ -473,8 +485,8 @@ mod tests {
             let mut field = field([33, 17]);
             let mut point = || PathPoint { pos: Vec2::new(pick(), pick()), width: pick() };
             let path = SegmentPath::straight(point(), point());
-            let [depth, full_width, wall, rim_width, rim_depth] = std::array::from_fn(|_| pick());
-            stamp_path(&mut field, &Profile { depth, full_width, wall, rim_width, rim_depth }, &path);
+            let [depth, full_width, wall, rim_width, rim_depth, faintest] = std::array::from_fn(|_| pick());
+            stamp_path(&mut field, &Profile { depth, full_width, wall, rim_width, rim_depth, faintest }, &path);
             stamp_dot(&mut field, Vec2::new(pick(), pick()), pick(), pick());
         }
     }

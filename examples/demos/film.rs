@@ -1,0 +1,184 @@
+//! Pictures and a GIF of a run without a window.
+
+use crate::machine::{DemoArguments, Output};
+use bevy::{
+    camera::RenderTarget,
+    prelude::*,
+    render::{
+        render_resource::TextureFormat,
+        view::screenshot::{Screenshot, ScreenshotCaptured},
+    },
+};
+use bevy_crack::prelude::CrackTextures;
+use image::{
+    Delay, Frame, RgbaImage,
+    codecs::gif::{GifEncoder, Repeat},
+    imageops::{self, FilterType},
+};
+use std::{fs, fs::File, path::Path};
+
+/// Size of the drawn pictures.
+const SIZE: UVec2 = UVec2::new(1280, 720);
+
+/// Width of the GIF.
+const GIF_WIDTH: u32 = 480;
+
+/// Takes pictures where there is no window, writes them, and ends the app.
+pub struct FilmPlugin;
+
+/// The pictures of a run without a window.
+#[derive(Resource, Default)]
+pub struct Film {
+    /// Where the camera draws to.
+    target: Option<Handle<Image>>,
+    frame: u32,
+    /// Pictures asked of the renderer that have not come yet.
+    awaited: u32,
+    strip: Vec<RgbaImage>,
+    stills: u32,
+}
+
+impl Film {
+    /// What the camera of the demo needs so that it draws into the film; nothing where there is a window.
+    pub fn camera_target(&self) -> Option<RenderTarget> {
+        self.target.clone().map(|target| RenderTarget::Image(target.into()))
+    }
+}
+
+/// The untouched picture of a surface: what is shown of it where nothing can be drawn.
+#[derive(Component, Clone, Debug)]
+pub struct OnCanvas {
+    /// The picture.
+    pub picture: Handle<Image>,
+    /// Its size in the world.
+    pub size: Vec2,
+}
+
+impl Plugin for FilmPlugin {
+    fn build(&self, app: &mut App) {
+        app.init_resource::<Film>().add_systems(PreStartup, open_film).add_systems(Last, (take_picture, end).chain());
+    }
+}
+
+fn open_film(mut film: ResMut<Film>, output: Res<Output>, mut images: ResMut<Assets<Image>>) {
+    if *output == Output::Offscreen {
+        let target = Image::new_target_texture(SIZE.x, SIZE.y, TextureFormat::Rgba8UnormSrgb, None);
+        film.target = Some(images.add(target));
+    }
+}
+
+fn take_picture(
+    mut film: ResMut<Film>,
+    output: Res<Output>,
+    arguments: Res<DemoArguments>,
+    images: Res<Assets<Image>>,
+    shown: Query<(&GlobalTransform, &OnCanvas, Option<&CrackTextures>)>,
+    mut commands: Commands,
+) {
+    film.frame += 1;
+    // About 60 pictures, and the last frame for sure.
+    let every = (arguments.frames / 60).max(1);
+    if *output == Output::Window || film.frame > arguments.frames {
+        return;
+    }
+    if film.frame % every != 0 && film.frame != arguments.frames {
+        return;
+    }
+    match film.target.clone() {
+        Some(target) => {
+            film.awaited += 1;
+            commands.spawn(Screenshot::image(target)).observe(
+                |captured: On<ScreenshotCaptured>, mut film: ResMut<Film>, arguments: Res<DemoArguments>| {
+                    film.awaited = film.awaited.saturating_sub(1);
+                    if let Ok(picture) = captured.image.clone().try_into_dynamic() {
+                        film.add(picture.to_rgba8(), &arguments);
+                    }
+                },
+            );
+        }
+        None => {
+            let picture = composite(&images, shown.iter());
+            film.add(picture, &arguments);
+        }
+    }
+}
+
+impl Film {
+    #[expect(clippy::print_stderr, reason = "a demo says what went wrong")]
+    fn add(&mut self, picture: RgbaImage, arguments: &DemoArguments) {
+        let last = arguments.frames / (arguments.frames / 60).max(1);
+        // Six stills over the run; the last picture among them.
+        let step = (last / 6).max(1) as usize;
+        if self.strip.len() % step == step - 1 {
+            self.stills += 1;
+            if let Err(error) = write_still(&picture, &arguments.out, self.stills) {
+                eprintln!("{}: {error}", arguments.out.display());
+            }
+        }
+        let height = GIF_WIDTH * picture.height() / picture.width().max(1);
+        self.strip.push(imageops::resize(&picture, GIF_WIDTH, height.max(1), FilterType::Triangle));
+    }
+}
+
+fn write_still(picture: &RgbaImage, out: &Path, number: u32) -> image::ImageResult<()> {
+    fs::create_dir_all(out)?;
+    picture.save(out.join(format!("still_{number}.png")))
+}
+
+fn write_gif(strip: Vec<RgbaImage>, path: &Path) -> image::ImageResult<()> {
+    let mut encoder = GifEncoder::new_with_speed(File::create(path)?, 20);
+    encoder.set_repeat(Repeat::Infinite)?;
+    for picture in strip {
+        encoder.encode_frame(Frame::from_parts(picture, 0, 0, Delay::from_numer_denom_ms(100, 1)))?;
+    }
+    Ok(())
+}
+
+#[expect(clippy::print_stdout, clippy::print_stderr, reason = "a demo says what it wrote")]
+fn end(mut film: ResMut<Film>, output: Res<Output>, arguments: Res<DemoArguments>, mut exit: MessageWriter<AppExit>) {
+    if *output == Output::Window {
+        if arguments.exit_after.is_some_and(|frames| film.frame >= frames) {
+            exit.write(AppExit::Success);
+        }
+        return;
+    }
+    // Pictures come a few frames after they were asked for.
+    let late = film.awaited > 0 && film.frame < arguments.frames + 60;
+    if film.frame < arguments.frames || late {
+        return;
+    }
+    let path = arguments.out.join("film.gif");
+    let written = fs::create_dir_all(&arguments.out)
+        .map_err(image::ImageError::from)
+        .and_then(|()| write_gif(std::mem::take(&mut film.strip), &path));
+    match written {
+        Ok(()) => {
+            println!("Wrote {} pictures and {}.", film.stills, path.display());
+            exit.write(AppExit::Success);
+        }
+        Err(error) => {
+            eprintln!("{}: {error}", path.display());
+            exit.write(AppExit::error());
+        }
+    }
+}
+
+/// Lays the CPU copies of the surfaces' pictures out as they stand in the world, seen from the front.
+pub fn composite<'a>(
+    images: &Assets<Image>,
+    shown: impl Iterator<Item = (&'a GlobalTransform, &'a OnCanvas, Option<&'a CrackTextures>)>,
+) -> RgbaImage {
+    let mut canvas = RgbaImage::from_pixel(SIZE.x, SIZE.y, image::Rgba([38, 42, 48, 255]));
+    let mut layers: Vec<_> = shown.collect();
+    layers.sort_by(|a, b| a.0.translation().z.total_cmp(&b.0.translation().z));
+    for (transform, surface, cracked) in layers {
+        let handle = cracked.and_then(|textures| textures.diffuse.clone()).unwrap_or_else(|| surface.picture.clone());
+        let Some(Ok(picture)) = images.get(&handle).map(|image| image.clone().try_into_dynamic()) else { continue };
+        let size = (surface.size * transform.scale().truncate()).abs().as_uvec2().max(UVec2::ONE);
+        let picture = imageops::resize(&picture.to_rgba8(), size.x, size.y, FilterType::Triangle);
+        let middle = SIZE.as_vec2() / 2.0 + transform.translation().truncate() * Vec2::new(1.0, -1.0);
+        let corner = (middle - size.as_vec2() / 2.0).as_ivec2();
+        imageops::overlay(&mut canvas, &picture, i64::from(corner.x), i64::from(corner.y));
+    }
+    canvas
+}
