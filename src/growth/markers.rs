@@ -46,11 +46,14 @@ pub(super) fn lay_out(
     seed: u64,
     mut keep: impl FnMut(Vec2, Option<f32>),
 ) {
+    let mut kept = 0;
     let mut offer = |pos: Vec2, chance: f32, probability: f32, spacing: Option<f32>| {
         let Some(share) = region.share(pos) else { return };
         let thinned = if params.focus > 0.0 { ops::powf(1.0 - share, params.focus) } else { 1.0 };
         if chance < probability * thinned * density_at(density, pos, region.extent) {
             keep(pos, spacing);
+            // A closer one dies at once.
+            kept += u32::from(pos.distance(region.center) > 1.5 * params.kill_distance);
         }
     };
     match params.markers {
@@ -126,7 +129,23 @@ pub(super) fn lay_out(
             }
         }
     }
+    if region.inner == 0.0 && kept < FEWEST {
+        let mut rng = Rng::new(seed).stream("fewest");
+        let turn = rng.unit();
+        for i in 0..FEWEST {
+            let angle = TAU * (turn + (i as f32 + 0.6 * rng.unit()) / FEWEST as f32);
+            let arm = (region.outer * rng.range(0.5, 0.95)).max(2.0 * params.kill_distance);
+            let pos = region.center + ops::unit(angle) * arm.min(0.95 * params.crack_radius);
+            let inside = pos.cmpge(Vec2::ZERO).all() && pos.cmple(region.extent).all();
+            if inside && density_at(density, pos, region.extent) > 0.0 {
+                keep(pos, None);
+            }
+        }
+    }
 }
+
+/// Markers that even the weakest hit lays out, so that it shows.
+const FEWEST: u32 = 3;
 
 /// Radius of ring `ring` of `rings`, as a share of the reach; each gap is `growth` times the one before.
 fn ring_share(ring: u32, rings: u32, growth: f32) -> f32 {
@@ -145,14 +164,24 @@ fn span(center: f32, radius: f32, cell: f32, count: u32) -> (u32, u32) {
 }
 
 /// The places of the first nodes of a hit.
-pub(super) fn starts(layout: StartLayout, center: Vec2, reach: f32, extent: Vec2, seed: u64) -> Vec<Vec2> {
+pub(super) fn starts(
+    layout: StartLayout,
+    (center, energy): (Vec2, f32),
+    reach: f32,
+    extent: Vec2,
+    seed: u64,
+) -> Vec<Vec2> {
     let mut rng = Rng::new(seed).stream("starts");
     let mut scatter = |count: u32, radius: f32| {
         (0..count).map(|_| center + ops::unit(TAU * rng.unit()) * (radius * rng.unit().sqrt())).collect::<Vec<_>>()
     };
     let mut places = match layout {
         StartLayout::Point => vec![center],
-        StartLayout::Points { count } => scatter(count, reach),
+        StartLayout::Points { count } => {
+            let mut places = scatter(((count as f32 * energy).ceil() as u32).clamp(1, 1024), reach);
+            places[0] = center;
+            places
+        }
         StartLayout::Disc { count, radius } => scatter(count, radius),
         StartLayout::Ring { count, radius } => {
             let turn = rng.unit();

@@ -17,7 +17,7 @@ pub enum MarkerLayout {
         /// Least distance between markers, pattern units, 0.002..=1.
         spacing: f32,
     },
-    /// Rays around the hit, with rings of markers on them (glass).
+    /// Rays around the hit, with rings of markers on them (glass). They attract the nodes of their own hit only.
     Polar {
         /// Number of rays at the centre, 1..=360.
         sectors: u32,
@@ -39,9 +39,9 @@ pub enum MarkerLayout {
 pub enum StartLayout {
     /// One node at the hit.
     Point,
-    /// `count` nodes scattered over the reach of the hit.
+    /// One node at the hit and others scattered over its reach, in proportion to its energy.
     Points {
-        /// 1..=1024.
+        /// Nodes at energy 1, 1..=1024.
         count: u32,
     },
     /// `count` nodes evenly on a circle around the hit.
