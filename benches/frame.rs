@@ -242,8 +242,8 @@ fn frame(c: &mut Criterion) {
     let (_, systems, bytes) = growing_frames();
     println!("the main world's systems: {:.2} ms a frame", systems.as_secs_f64() * 1e3);
     let whole = SURFACES as u64 * u64::from(SIDE * SIDE) * 8;
-    if bytes > 0 {
-        println!("bytes a frame: {bytes}, whole images: {whole}, {} times fewer", whole / bytes);
+    if let Some(times) = whole.checked_div(bytes) {
+        println!("bytes a frame: {bytes}, whole images: {whole}, {times} times fewer");
     }
     let mut group = c.benchmark_group("growing");
     group.sample_size(10);

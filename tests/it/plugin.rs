@@ -225,7 +225,7 @@ fn turns_are_fair() {
         (0..20).map(|_| app.world_mut().spawn((Sprite::from_image(image.clone()), surface())).id()).collect();
     for i in 0..400 {
         // The first surface is sent most of the hits.
-        let entity = surfaces[if i < 380 { 0 } else { i - 380 }];
+        let entity = surfaces[i.saturating_sub(380)];
         app.world_mut().write_message(CrackHit::uv(entity, Vec2::splat(0.5)));
     }
     for _ in 0..25 {
