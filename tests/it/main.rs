@@ -1,8 +1,7 @@
 //! What the crate promises, from the outside. One binary, one module a subject; a new test goes to the module it fits or to a
 //! new one beside them, never to a further file directly in `tests/` (each of those would link the engine again).
 
-#![expect(clippy::unwrap_used, clippy::panic, reason = "tests")]
-#![cfg_attr(all(feature = "2d", feature = "3d"), expect(clippy::print_stderr, reason = "tests"))]
+#![cfg(test)]
 
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod gpu;
