@@ -1,6 +1,6 @@
 //! What cracks cost in a frame of a game, beside painting and uploading whole images.
 //!
-//! `cargo bench --profile dev --bench frame`: the build that `cargo test` uses (algorithms at `opt-level` 2, the engine at 3).
+//! `cargo bench --profile dev --bench frame`: the build that `cargo test` uses.
 //! `growing/*`: 100 surfaces of 512 x 512 that were hit at once, one step a frame each; the time of an idle frame of the same
 //! app is taken off. `finished/*`: a frame with 10,000 cracked surfaces of 32 x 32 that have come to an end, beside one with
 //! 10,000 plain sprites. With a Vulkan driver (software will do) uploads are part of it; without, it says so.
