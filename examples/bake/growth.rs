@@ -3,7 +3,7 @@
 use bevy_crack::{
     CrackPreset,
     growth::{CrackGrowth, HitOutcome},
-    paint::{BaseTexels, LookTable, PaintTargets, paint_into},
+    paint::{BaseTexels, Look, LookTable, PaintTargets, paint_into},
     pattern::{LinkKind, NO_PARENT, Network, SurfaceFrame},
     raster::{DepthField, TexelRect, stamp_dot, stamp_path},
 };
@@ -37,6 +37,9 @@ pub(crate) struct Options {
     /// A growth parameter, as in `kill_distance=0.02`; may be given many times
     #[arg(long, value_parser = setting)]
     set: Vec<(String, String)>,
+    /// Another look than the preset's: groove, frosted or toon
+    #[arg(long)]
+    look: Option<String>,
     /// Stop after so many steps
     #[arg(long)]
     steps: Option<u32>,
@@ -94,6 +97,10 @@ pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
         .ok_or_else(|| format!("no preset `{}`; there are {}", options.preset, CrackPreset::NAMES.join(", ")))?;
     for (name, value) in &options.set {
         preset.growth.set(name, value)?;
+    }
+    if let Some(look) = &options.look {
+        preset.look =
+            Look::named(look).ok_or_else(|| format!("no look `{look}`; there are {}", Look::NAMES.join(", ")))?;
     }
     let own = own_picture(&options.preset);
     let picture = match &options.base {

@@ -40,6 +40,20 @@ pub struct Look {
 }
 
 impl Look {
+    /// The names that [`named`](Self::named) knows.
+    pub const NAMES: [&'static str; 3] = ["groove", "frosted", "toon"];
+
+    /// The look of this name (lower case), see [`NAMES`](Self::NAMES).
+    #[must_use]
+    pub fn named(name: &str) -> Option<Self> {
+        match name {
+            "groove" => Some(Self::GROOVE),
+            "frosted" => Some(Self::FROSTED),
+            "toon" => Some(Self::TOON),
+            _ => None,
+        }
+    }
+
     /// A dark groove: concrete, clay, plaster.
     pub const GROOVE: Self = Self {
         ramp: Cow::Borrowed(&[
