@@ -39,6 +39,9 @@ const MAX_RECTS_PER_IMAGE: usize = 1024;
 /// Up to this many rectangles are written one by one, more go through one buffer.
 const FEW: usize = 4;
 
+/// No more than about this many bytes go up in a frame, so that no buffer is larger than a device allows; the rest waits.
+const MAX_STAGED: usize = 64 << 20;
+
 /// Rectangles to upload.
 #[derive(Resource, Default)]
 pub(super) struct Uploads {
@@ -98,6 +101,13 @@ struct Copy {
     row: usize,
 }
 
+impl Copy {
+    /// Bytes that it takes in the staging buffer.
+    fn bytes(&self) -> usize {
+        self.row * self.rect.size().y as usize
+    }
+}
+
 /// Memory that is kept from frame to frame.
 #[derive(Resource, Default)]
 struct Staging {
@@ -122,6 +132,7 @@ fn upload_rects(
     {
         // What is not on the GPU yet stays in the list.
         rects.retain(|(id, rect)| match plan(*id, *rect, images, &gpu_images, rows.len()) {
+            Plan::Copy(copy) if copy.offset > 0 && copy.offset + copy.bytes() > MAX_STAGED => true,
             Plan::Copy(copy) => {
                 pack(&copy, images, rows);
                 stats.rects += 1;
