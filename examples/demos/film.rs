@@ -56,7 +56,10 @@ pub struct OnCanvas {
 
 impl Plugin for FilmPlugin {
     fn build(&self, app: &mut App) {
-        app.init_resource::<Film>().add_systems(PreStartup, open_film).add_systems(Last, (take_picture, end).chain());
+        app.init_resource::<Film>()
+            .add_systems(PreStartup, open_film)
+            .add_systems(First, draw_when_due)
+            .add_systems(Last, (take_picture, end).chain());
     }
 }
 
@@ -64,6 +67,21 @@ fn open_film(mut film: ResMut<Film>, output: Res<Output>, mut images: ResMut<Ass
     if *output == Output::Offscreen {
         let target = Image::new_target_texture(SIZE.x, SIZE.y, TextureFormat::Rgba8UnormSrgb, None);
         film.target = Some(images.add(target));
+    }
+}
+
+/// Whether a picture is taken of this frame: about 60 over the run, and the last frame for sure.
+fn is_due(frame: u32, frames: u32) -> bool {
+    frame <= frames && (frame.is_multiple_of((frames / 60).max(1)) || frame == frames)
+}
+
+/// Drawing is slow without a GPU: cameras rest while no picture is due. One frame more, as the first of a camera is empty.
+fn draw_when_due(film: Res<Film>, output: Res<Output>, arguments: Res<DemoArguments>, mut cameras: Query<&mut Camera>) {
+    if *output == Output::Offscreen {
+        let due = (film.frame + 1..=film.frame + 2).any(|frame| is_due(frame, arguments.frames));
+        for mut camera in &mut cameras {
+            camera.is_active = due;
+        }
     }
 }
 
@@ -76,12 +94,7 @@ fn take_picture(
     mut commands: Commands,
 ) {
     film.frame += 1;
-    // About 60 pictures, and the last frame for sure.
-    let every = (arguments.frames / 60).max(1);
-    if *output == Output::Window || film.frame > arguments.frames {
-        return;
-    }
-    if !film.frame.is_multiple_of(every) && film.frame != arguments.frames {
+    if *output == Output::Window || !is_due(film.frame, arguments.frames) {
         return;
     }
     match film.target.clone() {
