@@ -98,10 +98,10 @@ fn paints(c: &mut Criterion) {
     let base = BaseTexels { size, diffuse: &diffuse, normal: None, depth: None };
     let tilted = BaseTexels { normal: Some(&diffuse), ..base };
     let whole = TexelRect::whole(size);
-    let tile = TexelRect { min: UVec2::splat(1000), max: UVec2::splat(1064) };
+    let square = |side: u32| TexelRect { min: UVec2::splat(1000), max: UVec2::splat(1000 + side) };
     let Ok(look) = LookTable::new(&Look::GROOVE, 2048.0) else { return };
     let Ok(glass) = LookTable::new(&Look::FROSTED, 2048.0) else { return };
-    for (area, rect) in [("2048^2", whole), ("64^2", tile)] {
+    for (area, rect) in [("2048^2", whole), ("64^2", square(64)), ("16^2", square(16))] {
         group.throughput(Throughput::Elements(rect.area()));
         for (kind, field, base) in [
             ("normal, all touched", &relief, base),

@@ -105,11 +105,12 @@ fn setup(
         commands.spawn((
             Exhibit,
             Mesh2d(quad.clone()),
-            MeshMaterial2d(lit.add(CrackLitMaterial {
-                diffuse: Some(picture.clone()),
-                normal: Some(normal),
-                ..default()
-            })),
+            MeshMaterial2d(
+                lit.add(
+                    CrackLitMaterial { normal: Some(normal), ..CrackLitMaterial::new(picture.clone()) }
+                        .with_ambient(LinearRgba::gray(0.55)),
+                ),
+            ),
             Transform::from_xyz(x, 60.0, 0.0),
             CrackSurface::new(preset).with_seed(seed),
             OnCanvas { picture, size: Vec2::splat(SIDE) },
@@ -137,7 +138,7 @@ fn setup(
     ));
     commands.spawn((
         Lamp,
-        CrackLight2d { color: Color::srgb(1.0, 0.93, 0.8), intensity: 1.6, range: 900.0, height: 170.0 },
+        CrackLight2d { color: Color::srgb(1.0, 0.93, 0.8), intensity: 2.6, range: 1100.0, height: 170.0 },
         Transform::default(),
     ));
     let steel = colors.add(Color::srgb(0.35, 0.38, 0.42));

@@ -55,7 +55,7 @@ fn setup(
         Hdr,
         // Needs no lookup table.
         Tonemapping::AcesFitted,
-        AmbientLight { brightness: 120.0, ..default() },
+        AmbientLight { brightness: 420.0, ..default() },
         Transform::default(),
     ));
     if let Some(target) = film.camera_target() {
@@ -101,7 +101,7 @@ fn setup(
     }
     commands.spawn((
         Lamp,
-        PointLight { intensity: 260_000.0, range: 12.0, shadow_maps_enabled: false, ..default() },
+        PointLight { intensity: 420_000.0, range: 12.0, shadow_maps_enabled: false, ..default() },
         Transform::default(),
     ));
 }

@@ -4,6 +4,7 @@
 //! markers lie still, sorted by the cells of a uniform grid, and remember their nearest node; a newborn node looks once at
 //! the markers within its reach and wins those that it is nearest to.
 
+use crate::pattern::Node;
 use glam::{UVec2, Vec2};
 
 /// Squared distance of a dead marker to its node: no distance is below it.
@@ -11,6 +12,9 @@ const DEAD: f32 = -1.0;
 
 /// No node attracts the marker.
 pub(super) const NO_NODE: u32 = u32::MAX;
+
+/// [`MarkerField::loyal`] of a marker that every node may win.
+pub(super) const ANY_IMPACT: u32 = u32::MAX;
 
 /// Markers that are compared at once; compilers turn the comparison into vector instructions.
 const LANES: usize = 8;
@@ -25,6 +29,14 @@ pub(super) struct Marker {
     pub(super) id: u32,
 }
 
+/// A marker that has not settled.
+#[derive(Clone, Copy, Debug)]
+struct Newborn {
+    pos: Vec2,
+    id: u32,
+    loyal: u32,
+}
+
 #[derive(Clone, Debug)]
 pub(super) struct MarkerField {
     extent: Vec2,
@@ -37,8 +49,10 @@ pub(super) struct MarkerField {
     near_sq: Vec<f32>,
     node: Vec<u32>,
     id: Vec<u32>,
-    /// Places and numbers of the markers that lie in no cell yet.
-    newborn: Vec<(Vec2, u32)>,
+    /// The impact whose nodes alone may win the marker, or [`ANY_IMPACT`]. Every node that reaches it kills it.
+    loyal: Vec<u32>,
+    /// Markers that lie in no cell yet.
+    newborn: Vec<Newborn>,
     cells: UVec2,
     /// Cells per pattern unit.
     per_unit: Vec2,
@@ -61,6 +75,7 @@ impl MarkerField {
             near_sq: Vec::new(),
             node: Vec::new(),
             id: Vec::new(),
+            loyal: Vec::new(),
             newborn: Vec::new(),
             cells: UVec2::ONE,
             per_unit: extent.recip(),
@@ -81,21 +96,23 @@ impl MarkerField {
     }
 
     /// Empties the field of its settled markers and returns the living.
-    fn take_living(&mut self) -> Vec<(Vec2, u32)> {
+    fn take_living(&mut self) -> Vec<Newborn> {
         let living = (0..self.x.len()).filter(|&i| self.near_sq[i] > DEAD);
-        let living = living.map(|i| (Vec2::new(self.x[i], self.y[i]), self.id[i])).collect();
+        let marker = |i: usize| Newborn { pos: Vec2::new(self.x[i], self.y[i]), id: self.id[i], loyal: self.loyal[i] };
+        let living = living.map(marker).collect();
         for plane in [&mut self.x, &mut self.y, &mut self.near_sq] {
             plane.clear();
         }
         self.node.clear();
         self.id.clear();
+        self.loyal.clear();
         self.active.clear();
         self.first.fill(0);
         living
     }
 
-    pub(super) fn add(&mut self, pos: Vec2) {
-        self.newborn.push((pos, self.made));
+    pub(super) fn add(&mut self, pos: Vec2, loyal: u32) {
+        self.newborn.push(Newborn { pos, id: self.made, loyal });
         self.made += 1;
     }
 
@@ -107,7 +124,7 @@ impl MarkerField {
     }
 
     /// Takes up the newborn markers: forgets the dead, sorts all into cells, and lets every node win what it is nearest to.
-    pub(super) fn settle(&mut self, nodes: impl Iterator<Item = Vec2>) {
+    pub(super) fn settle(&mut self, nodes: &[Node]) {
         if self.newborn.is_empty() {
             return;
         }
@@ -122,7 +139,7 @@ impl MarkerField {
         let n_cells = self.cells.x as usize * self.cells.y as usize;
         self.first.clear();
         self.first.resize(n_cells + 1, 0);
-        let homes: Vec<u32> = all.iter().map(|&(pos, _)| self.cell_of(pos) as u32).collect();
+        let homes: Vec<u32> = all.iter().map(|marker| self.cell_of(marker.pos) as u32).collect();
         for &home in &homes {
             self.first[home as usize + 1] += 1;
         }
@@ -134,17 +151,18 @@ impl MarkerField {
         self.x.resize(padded, 0.0);
         self.y.resize(padded, 0.0);
         self.id.resize(padded, 0);
+        self.loyal.resize(padded, ANY_IMPACT);
         self.node.resize(padded, NO_NODE);
         self.near_sq.resize(all.len(), self.radius * self.radius);
         self.near_sq.resize(padded, DEAD);
-        for ((pos, id), home) in all.into_iter().zip(homes) {
+        for (Newborn { pos, id, loyal }, home) in all.into_iter().zip(homes) {
             let slot = &mut next[home as usize];
             let i = *slot as usize;
             *slot += 1;
-            (self.x[i], self.y[i], self.id[i]) = (pos.x, pos.y, id);
+            (self.x[i], self.y[i], self.id[i], self.loyal[i]) = (pos.x, pos.y, id, loyal);
         }
-        for (node, pos) in (0u32..).zip(nodes) {
-            self.visit(node, pos);
+        for (index, node) in (0u32..).zip(nodes) {
+            self.visit(index, node);
         }
     }
 
@@ -167,13 +185,13 @@ impl MarkerField {
     /// Lets a newborn node win the markers that it is nearest to, and kills those that it reaches.
     ///
     /// Must be called in order of the nodes' indices: at equal distance the lower index keeps the marker.
-    pub(super) fn visit(&mut self, node: u32, pos: Vec2) {
-        for (from, to) in self.rows(pos, self.radius) {
+    pub(super) fn visit(&mut self, index: u32, node: &Node) {
+        for (from, to) in self.rows(node.pos, self.radius) {
             let (from, to) = (self.first[from] as usize, self.first[to] as usize);
             // Whole lanes, even beyond the cells: a marker that is not won is left as it is, and there is padding.
             for i in (from..to).step_by(LANES) {
-                if self.any_won(i, pos) {
-                    (i..i + LANES).for_each(|marker| self.offer(marker, node, pos));
+                if self.any_won(i, node.pos) {
+                    (i..i + LANES).for_each(|marker| self.offer(marker, index, node));
                 }
             }
         }
@@ -192,8 +210,8 @@ impl MarkerField {
     }
 
     #[inline]
-    fn offer(&mut self, marker: usize, node: u32, pos: Vec2) {
-        let distance_sq = distance_sq(self.x[marker], self.y[marker], pos);
+    fn offer(&mut self, marker: usize, index: u32, node: &Node) {
+        let distance_sq = distance_sq(self.x[marker], self.y[marker], node.pos);
         if distance_sq >= self.near_sq[marker] {
             return;
         }
@@ -202,11 +220,14 @@ impl MarkerField {
             self.killed += 1;
             return;
         }
+        if self.loyal[marker] != ANY_IMPACT && self.loyal[marker] != node.impact {
+            return;
+        }
         if self.node[marker] == NO_NODE {
             self.active.push(marker as u32);
         }
         self.near_sq[marker] = distance_sq;
-        self.node[marker] = node;
+        self.node[marker] = index;
     }
 
     /// Drops the dead from the active markers.
@@ -226,10 +247,10 @@ impl MarkerField {
         (living, attracting)
     }
 
-    /// Places of the markers that no step has taken up yet.
+    /// Places of the markers that no step has taken up yet, and whose they are.
     #[cfg(test)]
-    pub(super) fn unsettled(&self) -> impl Iterator<Item = Vec2> {
-        self.newborn.iter().map(|(pos, _)| *pos)
+    pub(super) fn unsettled(&self) -> impl Iterator<Item = (Vec2, u32)> {
+        self.newborn.iter().map(|marker| (marker.pos, marker.loyal))
     }
 
     /// Markers alive, counting those that died since the last [`settle`](Self::settle).

@@ -38,11 +38,6 @@ impl NodeGrid {
         self.places.reserve(nodes);
     }
 
-    /// The places of all nodes, by index.
-    pub(super) fn places(&self) -> &[Vec2] {
-        &self.places
-    }
-
     /// Adds the node with the next index.
     pub(super) fn push(&mut self, pos: Vec2) {
         let cell = self.cell_at(pos);

@@ -17,7 +17,7 @@ pub enum MarkerLayout {
         /// Least distance between markers, pattern units, 0.002..=1.
         spacing: f32,
     },
-    /// Rays around the hit, with rings of markers on them (glass).
+    /// Rays around the hit, with rings of markers on them (glass). They attract the nodes of their own hit only.
     Polar {
         /// Number of rays at the centre, 1..=360.
         sectors: u32,

@@ -2,7 +2,7 @@
 
 use super::{
     GrowthParams, MarkerLayout, ParamError,
-    field::{MarkerField, NO_NODE},
+    field::{ANY_IMPACT, MarkerField, NO_NODE},
     links::Linker,
     markers::{self, Region},
     nodes::NodeGrid,
@@ -282,7 +282,7 @@ impl CrackGrowth {
             }
         }
         for node in first..self.network.nodes.len() as u32 {
-            self.field.visit(node, self.network.nodes[node as usize].pos);
+            self.field.visit(node, &self.network.nodes[node as usize]);
         }
         self.newborn = first..self.network.nodes.len() as u32;
         self.join_newborn();
@@ -301,11 +301,13 @@ impl CrackGrowth {
         let seed = mix(self.seed ^ mix(u64::from(impact) | 1 << 40));
         if matches!(self.params.markers, MarkerLayout::DartThrowing { .. }) {
             // Darts keep their distance from the markers of hits that no step has taken up yet.
-            self.field.settle(self.nodes.places().iter().copied());
+            self.field.settle(&self.network.nodes);
         }
         let mut placed = NodeGrid::new(extent, self.params.kill_distance.max(0.01));
         let (field, nodes, shown) = (&mut self.field, &self.nodes, &mut self.shown_markers);
         let show = self.params.draw_markers;
+        // The rays of a hit are its own: older cracks do not sprout towards them.
+        let loyal = if matches!(self.params.markers, MarkerLayout::Polar { .. }) { impact } else { ANY_IMPACT };
         markers::lay_out(&self.params, region, self.density.as_ref(), seed, |pos, spacing| {
             if field.living_at_most() >= MAX_MARKERS {
                 return;
@@ -316,7 +318,7 @@ impl CrackGrowth {
                 }
                 placed.push(pos);
             }
-            field.add(pos);
+            field.add(pos, loyal);
             if show {
                 shown.push(pos);
             }
@@ -367,7 +369,7 @@ impl CrackGrowth {
             return StepReport { born: 0 };
         }
         self.steps_left -= 1;
-        self.field.settle(self.nodes.places().iter().copied());
+        self.field.settle(&self.network.nodes);
         self.gather_pulls();
         self.aim();
         let first = self.network.nodes.len() as u32;
@@ -387,7 +389,7 @@ impl CrackGrowth {
         let last = self.network.nodes.len() as u32;
         self.newborn = first..last;
         for node in first..last {
-            self.field.visit(node, self.network.nodes[node as usize].pos);
+            self.field.visit(node, &self.network.nodes[node as usize]);
         }
         self.join_newborn();
         if first == last {

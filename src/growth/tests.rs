@@ -76,21 +76,23 @@ struct Reference {
     extent: Vec2,
     seed: u64,
     nodes: Vec<(Vec2, u32)>,
-    markers: Vec<(Vec2, bool)>,
+    /// Per node: the impact it belongs to.
+    impacts: Vec<u32>,
+    markers: Vec<(Vec2, u32, bool)>,
 }
 
 impl Reference {
     fn step(&mut self) -> usize {
         let p = &self.params;
         let mut attracted: Vec<Vec<(f32, usize)>> = vec![Vec::new(); self.nodes.len()];
-        for (id, (marker, alive)) in self.markers.iter_mut().enumerate() {
+        for (id, (marker, loyal, alive)) in self.markers.iter_mut().enumerate() {
             if !*alive {
                 continue;
             }
             let (mut best, mut best_sq) = (usize::MAX, p.crack_radius * p.crack_radius);
             for (node, (pos, _)) in self.nodes.iter().enumerate() {
                 let distance_sq = marker.distance_squared(*pos);
-                if distance_sq < best_sq {
+                if distance_sq < best_sq && (*loyal == u32::MAX || *loyal == self.impacts[node]) {
                     (best, best_sq) = (node, distance_sq);
                 }
                 *alive &=
@@ -142,6 +144,7 @@ impl Reference {
                 };
             }
             self.nodes.push((to, node as u32));
+            self.impacts.push(self.impacts[node]);
         }
         self.nodes.len() - before
     }
@@ -155,13 +158,15 @@ fn equals_brute_force_node_for_node() {
         let params = random_params(&mut rng, true);
         let extent = random_extent(&mut rng);
         let mut growth = CrackGrowth::new(params.clone(), extent, case).unwrap();
-        let mut reference = Reference { params, extent, seed: case, nodes: Vec::new(), markers: Vec::new() };
+        let mut reference =
+            Reference { params, extent, seed: case, nodes: Vec::new(), impacts: Vec::new(), markers: Vec::new() };
         for hit in 0..3 {
             let pos = Vec2::new(rng.unit(), rng.unit()) * extent;
             growth.hit(pos, 0.2 + 2.0 * rng.unit());
-            reference.markers.extend(growth.field.unsettled().map(|pos| (pos, true)));
+            reference.markers.extend(growth.field.unsettled().map(|(pos, loyal)| (pos, loyal, true)));
             let known = reference.nodes.len();
             reference.nodes.extend(growth.network().nodes()[known..].iter().map(|node| (node.pos, node.parent)));
+            reference.impacts.extend(growth.network().nodes()[known..].iter().map(|node| node.impact));
             let steps = if hit == 2 { 400 } else { 1 + rng.next_u32() % 30 };
             for step in 0..steps {
                 let born = growth.step().born as usize;
@@ -173,7 +178,7 @@ fn equals_brute_force_node_for_node() {
                 }
             }
             if !growth.is_growing() {
-                let alive = reference.markers.iter().filter(|(_, alive)| *alive).count() as u32;
+                let alive = reference.markers.iter().filter(|(.., alive)| *alive).count() as u32;
                 let census = growth.census();
                 assert_eq!((census.attracting, census.waiting), (0, alive), "case {case}: a marker is lost");
                 ended += 1;
@@ -427,7 +432,7 @@ fn layouts_do_what_they_say() {
         let mut growth = CrackGrowth::new(params, Vec2::ONE, 2).unwrap();
         growth.set_density(density);
         growth.hit(Vec2::splat(0.5), 4.0);
-        growth.field.unsettled().collect::<Vec<_>>()
+        growth.field.unsettled().map(|(pos, _)| pos).collect::<Vec<_>>()
     };
     let grid = GrowthParams {
         reach: 4.0,

@@ -1,6 +1,6 @@
 //! The texel loops.
 //!
-//! A row is painted in pieces of [`PIECE`] texels. A piece looks at its [`Window`] of the depth field; if that is
+//! A row is painted in pieces of up to `N` texels. A piece looks at its [`Window`] of the depth field; if that is
 //! untouched, the base is copied, else the slopes are computed for the whole piece at once and used by diffuse and
 //! normal. Pieces are a matter of speed alone: every texel depends on its own 3 x 3 depths and on the base.
 
@@ -10,7 +10,6 @@ use crate::{
     raster::{DepthField, TexelRect},
 };
 use glam::UVec2;
-use std::ops::Range;
 
 /// The untouched picture. All slices are row-major over the whole image of `size` texels.
 #[derive(Clone, Copy, Debug)]
@@ -42,8 +41,12 @@ type Rgba = [u8; 4];
 /// The normal of an even surface.
 const FLAT: Rgba = [128, 128, 255, 255];
 
-/// Texels painted at once. Longer pieces are copied untouched less often, shorter ones overlap their neighbours more.
-const PIECE: usize = 64;
+/// Texels of a piece: in wide rectangles many, in narrow ones (dirty tiles) few, as a piece is computed as a whole.
+const WIDE: usize = 64;
+const NARROW: usize = 16;
+
+/// Texels whose colours are computed at once, or copied if all are untouched. Divides the pieces.
+const BLOCK: usize = 16;
 
 /// How much brighter a wall gets that faces the light squarely, for a glint of 1: a highlight of the crack's own, sRGB
 /// levels, and a share of what is there. Found by eye on glass (the first) and concrete (the second).
@@ -69,9 +72,7 @@ pub fn paint_into(
     if rect.is_empty() {
         return;
     }
-    let stride = base.size.x as usize;
     let diffuse = base.diffuse.as_chunks().0;
-    let frame = Frame { base: diffuse, stride, origin, size: visible };
     let mut diffuse_out = targets.diffuse.as_deref_mut().map(|out| out.as_chunks_mut().0);
     diffuse_out.take_if(|out| out.len() < texels || diffuse.len() < texels);
 
@@ -82,65 +83,111 @@ pub fn paint_into(
     let mut depth_out = targets.depth.as_deref_mut();
     depth_out.take_if(|out| out.len() < texels || base.depth.is_some_and(|base| base.len() < texels));
 
-    let mut slopes = Slopes::default();
-    for y in rect.min.y..rect.max.y {
-        let mut x = rect.min.x as usize;
-        while x < rect.max.x as usize {
-            let n = PIECE.min(rect.max.x as usize - x);
-            let first = (origin.y + y) as usize * stride + origin.x as usize + x;
-            let at = first..first + n;
-            let window = Window::new(&field.depth, x, y as usize, n);
-            let touched = window.is_touched();
-            if touched && (diffuse_out.is_some() || normal_out.is_some()) {
-                slopes.measure(&window, look.slope);
+    let mut job = Job {
+        frame: Frame { base: diffuse, stride: base.size.x as usize, origin, size: visible },
+        field,
+        look,
+        normal,
+        depth: base.depth,
+        diffuse_out,
+        normal_out,
+        depth_out,
+    };
+    if rect.size().x as usize > 2 * NARROW {
+        job.paint::<WIDE>(rect);
+    } else {
+        job.paint::<NARROW>(rect);
+    }
+}
+
+/// The checked arguments of [`paint_into`].
+struct Job<'a> {
+    frame: Frame<'a>,
+    field: &'a DepthField,
+    look: &'a LookTable,
+    normal: Option<&'a [Rgba]>,
+    depth: Option<&'a [u8]>,
+    diffuse_out: Option<&'a mut [Rgba]>,
+    normal_out: Option<&'a mut [Rgba]>,
+    depth_out: Option<&'a mut [u8]>,
+}
+
+impl Job<'_> {
+    fn paint<const N: usize>(&mut self, rect: TexelRect) {
+        let (mut window, mut slopes) = (Window::EMPTY, Slopes::LEVEL);
+        for y in rect.min.y..rect.max.y {
+            for x in (rect.min.x..rect.max.x).step_by(N) {
+                let n = N.min((rect.max.x - x) as usize);
+                window.load::<N>(&self.field.depth, x as usize, y as usize, n);
+                self.paint_piece::<N>(&window, &mut slopes, UVec2::new(x, y));
             }
-            if let Some(out) = &mut diffuse_out {
-                let out = &mut out[at.clone()];
-                if touched {
-                    diffuse_piece(out, &frame, &window, &slopes, look, UVec2::new(x as u32, y));
-                } else {
-                    out.copy_from_slice(&diffuse[at.clone()]);
-                }
+        }
+    }
+
+    /// Paints the piece of the window, whose first texel is `at` of the field.
+    #[inline]
+    fn paint_piece<const N: usize>(&mut self, window: &Window, slopes: &mut Slopes, at: UVec2) {
+        let first = self.frame.index(at.x, at.y);
+        let range = first..first + window.n;
+        let touched = window.is_touched::<N>();
+        if touched && (self.diffuse_out.is_some() || self.normal_out.is_some()) {
+            slopes.measure::<N>(window, self.look.slope);
+        }
+        if let Some(out) = &mut self.diffuse_out {
+            let (out, base) = (&mut out[range.clone()], &self.frame.base[range.clone()]);
+            if touched {
+                diffuse_piece(out, base, &self.frame, window, slopes, self.look, at);
+            } else {
+                out.copy_from_slice(base);
             }
-            if let Some(out) = &mut normal_out {
-                let out = &mut out[at.clone()];
-                match (normal, touched) {
-                    (Some(base), true) => tilted_piece(out, &base[at.clone()], &slopes),
-                    (Some(base), false) => out.copy_from_slice(&base[at.clone()]),
-                    (None, true) => flat_piece(out, &slopes),
-                    (None, false) => out.fill(FLAT),
-                }
+        }
+        if let Some(out) = &mut self.normal_out {
+            let out = &mut out[range.clone()];
+            match (self.normal, touched) {
+                (Some(base), true) => tilted_piece(out, &base[range.clone()], slopes),
+                (Some(base), false) => out.copy_from_slice(&base[range.clone()]),
+                (None, true) => flat_piece(out, slopes),
+                (None, false) => out.fill(FLAT),
             }
-            if let Some(out) = &mut depth_out {
-                depth_piece(&mut out[at.clone()], base.depth, at, window.middle());
-            }
-            x += n;
+        }
+        if let Some(out) = &mut self.depth_out {
+            depth_piece(&mut out[range.clone()], self.depth.map(|base| &base[range]), window.middle());
         }
     }
 }
 
 /// The depths of a piece and of the texels around it, repeated at the border of the field.
+///
+/// Used again for every piece: what lies beyond `n` is of an earlier one.
 struct Window {
-    rows: [[u16; PIECE + 2]; 3],
+    rows: [[u16; WIDE + 2]; 3],
     n: usize,
 }
 
 impl Window {
-    /// The window of the `n` texels from column `x` of row `y`.
-    #[inline]
-    fn new(depth: &Grid<u16>, x: usize, y: usize, n: usize) -> Self {
-        let mut rows = [[0; PIECE + 2]; 3];
-        for (row, y) in rows.iter_mut().zip([y.saturating_sub(1), y, (y + 1).min(depth.height() - 1)]) {
+    const EMPTY: Self = Self { rows: [[0; WIDE + 2]; 3], n: 0 };
+
+    /// The window of the `n <= N` texels from column `x` of row `y`.
+    #[inline(always)]
+    fn load<const N: usize>(&mut self, depth: &Grid<u16>, x: usize, y: usize, n: usize) {
+        self.n = n;
+        for (row, y) in self.rows.iter_mut().zip([y.saturating_sub(1), y, (y + 1).min(depth.height() - 1)]) {
             let from = depth.row(y);
-            row[1..=n].copy_from_slice(&from[x..x + n]);
+            if n == N {
+                // A copy of fixed length is a few moves in place of a call.
+                row[1..=N].copy_from_slice(&from[x..x + N]);
+            } else {
+                row[1..=n].copy_from_slice(&from[x..x + n]);
+            }
             row[0] = from[x.saturating_sub(1)];
             row[n + 1] = from[(x + n).min(from.len() - 1)];
         }
-        Self { rows, n }
     }
 
-    fn is_touched(&self) -> bool {
-        self.rows.as_flattened().iter().fold(0, |any, &depth| any | depth) != 0
+    #[inline(always)]
+    fn is_touched<const N: usize>(&self) -> bool {
+        // All N, as that is faster: an earlier piece can only make this one be computed without need.
+        self.rows.iter().flat_map(|row| &row[..N + 2]).fold(0, |any, &depth| any | depth) != 0
     }
 
     fn middle(&self) -> &[u16] {
@@ -150,31 +197,27 @@ impl Window {
 
 /// Slopes of a piece of the surface, as the normal before normalizing: `(x, y, 1)`, x right, y **down** the picture.
 struct Slopes {
-    x: [f32; PIECE],
-    y: [f32; PIECE],
+    x: [f32; WIDE],
+    y: [f32; WIDE],
     /// One over the length of `(x, y, 1)`.
-    inv_len: [f32; PIECE],
-}
-
-impl Default for Slopes {
-    fn default() -> Self {
-        Self { x: [0.0; PIECE], y: [0.0; PIECE], inv_len: [1.0; PIECE] }
-    }
+    inv_len: [f32; WIDE],
 }
 
 impl Slopes {
+    const LEVEL: Self = Self { x: [0.0; WIDE], y: [0.0; WIDE], inv_len: [1.0; WIDE] };
+
     /// Sobel's operator on the depths; a wall that goes down to the right leans to the right.
-    #[inline]
-    fn measure(&mut self, window: &Window, scale: f32) {
+    #[inline(always)]
+    fn measure<const N: usize>(&mut self, window: &Window, scale: f32) {
         let [up, middle, down] = &window.rows;
-        let mut sum = [0i32; PIECE + 2];
-        let mut gain = [0i32; PIECE + 2];
-        for i in 0..PIECE + 2 {
+        let mut sum = [0i32; WIDE + 2];
+        let mut gain = [0i32; WIDE + 2];
+        for i in 0..N + 2 {
             let [u, m, d] = [up[i], middle[i], down[i]].map(i32::from);
             sum[i] = u + 2 * m + d;
             gain[i] = d - u;
         }
-        for i in 0..PIECE {
+        for i in 0..N {
             let x = (sum[i + 2] - sum[i]) as f32 * scale;
             let y = (gain[i] + 2 * gain[i + 1] + gain[i + 2]) as f32 * scale;
             self.x[i] = x;
@@ -219,11 +262,11 @@ fn tilted_piece(out: &mut [Rgba], base: &[Rgba], slopes: &Slopes) {
     }
 }
 
-fn depth_piece(out: &mut [u8], base: Option<&[u8]>, at: Range<usize>, depths: &[u16]) {
+fn depth_piece(out: &mut [u8], base: Option<&[u8]>, depths: &[u16]) {
     let byte = |depth: u16| ((u32::from(depth) * 255 + 32_895) >> 16) as u8;
     match base {
         Some(base) => {
-            for ((out, &base), &depth) in out.iter_mut().zip(&base[at]).zip(depths) {
+            for ((out, &base), &depth) in out.iter_mut().zip(base).zip(depths) {
                 *out = base.max(byte(depth));
             }
         }
@@ -244,9 +287,15 @@ struct Frame<'a> {
 }
 
 impl Frame<'_> {
+    /// Where texel `(x, y)` of the field lies in the slices.
+    #[inline(always)]
+    fn index(&self, x: u32, y: u32) -> usize {
+        (self.origin.y + y) as usize * self.stride + (self.origin.x + x) as usize
+    }
+
     #[inline(always)]
     fn texel(&self, x: u32, y: u32) -> Rgba {
-        self.base[(self.origin.y + y) as usize * self.stride + (self.origin.x + x) as usize]
+        self.base[self.index(x, y)]
     }
 
     /// The colour at texel `at` + `offset`, bilinear, weighted by alpha so that the hidden colour of transparent
@@ -278,59 +327,135 @@ impl Frame<'_> {
 }
 
 /// 0..1, different for every texel.
-fn noise(at: UVec2) -> f32 {
-    let mut h = at.x.wrapping_mul(0x9E37_79B1) ^ at.y.wrapping_mul(0x85EB_CA77);
+#[inline(always)]
+fn noise(x: u32, y: u32) -> f32 {
+    let mut h = x.wrapping_mul(0x9E37_79B1) ^ y.wrapping_mul(0x85EB_CA77);
     h = (h ^ (h >> 15)).wrapping_mul(0x2C1B_3C6D);
     h = (h ^ (h >> 12)).wrapping_mul(0x297A_2D39);
-    ((h ^ (h >> 15)) >> 8) as f32 * (1.0 / 16_777_216.0)
+    // Through i32, for which the conversion is one instruction on every machine.
+    ((h ^ (h >> 15)) >> 8) as i32 as f32 * (1.0 / 16_777_216.0)
+}
+
+/// Byte `i` of a texel.
+#[inline(always)]
+fn channel(texel: u32, i: u32) -> f32 {
+    (texel >> (8 * i) & 255) as i32 as f32
 }
 
 /// Colours of a piece whose first texel is `at` of the field.
+#[inline]
 fn diffuse_piece(
     out: &mut [Rgba],
+    base: &[Rgba],
     frame: &Frame<'_>,
     window: &Window,
     slopes: &Slopes,
     look: &LookTable,
     mut at: UVec2,
 ) {
-    for (i, (out, &depth)) in out.iter_mut().zip(window.middle()).enumerate() {
-        let base = frame.texel(at.x, at.y);
-        let (x, y) = (slopes.x[i] * slopes.inv_len[i], slopes.y[i] * slopes.inv_len[i]);
-        let untouched = depth == 0 && x == 0.0 && y == 0.0;
-        *out = if untouched || base[3] == 0 { base } else { diffuse_texel(base, depth, [x, y], frame, look, at) };
-        at.x += 1;
+    let (slopes_x, slopes_y) = (slopes.x.as_chunks::<BLOCK>().0, slopes.y.as_chunks::<BLOCK>().0);
+    let lengths = slopes.inv_len.as_chunks::<BLOCK>().0;
+    let inputs = base.chunks(BLOCK).zip(window.middle().chunks(BLOCK)).zip(slopes_x).zip(slopes_y).zip(lengths);
+    for (out, ((((base, depths), x), y), inv_len)) in out.chunks_mut(BLOCK).zip(inputs) {
+        let level = |slopes: &[f32; BLOCK]| slopes.iter().all(|&slope| slope == 0.0);
+        if depths.iter().all(|&depth| depth == 0) && level(x) && level(y) {
+            out.copy_from_slice(base);
+        } else {
+            let mut block = Block { base: [0; BLOCK], depth: [0; BLOCK], x, y, inv_len };
+            block.depth[..depths.len()].copy_from_slice(depths);
+            for (to, from) in block.base.iter_mut().zip(base) {
+                *to = u32::from_le_bytes(*from);
+            }
+            for (out, painted) in out.iter_mut().zip(block.paint(frame, look, at)) {
+                *out = painted.to_le_bytes();
+            }
+        }
+        at.x += BLOCK as u32;
     }
 }
 
-#[inline(always)]
-fn diffuse_texel(base: Rgba, depth: u16, tilt: [f32; 2], frame: &Frame<'_>, look: &LookTable, at: UVec2) -> Rgba {
-    let mut layer = look.layer(depth);
-    if look.grain > 0.0 {
-        let share = 1.0 - look.grain * noise(at);
-        layer = layer.map(|channel| channel * share);
+/// What the colours of a block are made of.
+struct Block<'a> {
+    base: [u32; BLOCK],
+    depth: [u16; BLOCK],
+    x: &'a [f32; BLOCK],
+    y: &'a [f32; BLOCK],
+    inv_len: &'a [f32; BLOCK],
+}
+
+impl Block<'_> {
+    #[inline(always)]
+    fn paint(&self, frame: &Frame<'_>, look: &LookTable, at: UVec2) -> [u32; BLOCK] {
+        // Channel by channel, so that each loop works on many texels at once.
+        let mut over = [[0.0; BLOCK]; 4];
+        for (i, &depth) in self.depth.iter().enumerate() {
+            for (over, value) in over.iter_mut().zip(look.layer(depth)) {
+                over[i] = value;
+            }
+        }
+        if look.grain > 0.0 {
+            for i in 0..BLOCK {
+                let share = 1.0 - look.grain * noise(at.x + i as u32, at.y);
+                over.iter_mut().for_each(|over| over[i] *= share);
+            }
+        }
+        let under = self.picture(frame, look, at);
+        let opaque = if look.opaque { 1.0 } else { 0.0 };
+        let mut painted = [0; BLOCK];
+        let (mut under_share, mut over_share, mut facing) = ([0.0; BLOCK], [0.0; BLOCK], [0.0; BLOCK]);
+        for i in 0..BLOCK {
+            let (alpha, cover) = (channel(self.base[i], 3) * (1.0 / 255.0), over[3][i]);
+            // An opaque crack lies over the picture as another pane would; else it is as translucent as the picture,
+            // which is the same with an alpha of one.
+            let pane = 1.0 - opaque * (1.0 - alpha);
+            let pane_out = pane * (1.0 - cover) + cover;
+            over_share[i] = 1.0 / pane_out;
+            under_share[i] = pane * (1.0 - cover) * over_share[i];
+            painted[i] = round(255.0 * (alpha + opaque * (pane_out - alpha))) << 24;
+            // Light from the upper left, on a normal whose y runs down.
+            facing[i] = (self.x[i] + self.y[i]) * self.inv_len[i] * (-std::f32::consts::FRAC_1_SQRT_2 * look.glint);
+        }
+        for (c, (under, over)) in under.iter().zip(&over).enumerate() {
+            for i in 0..BLOCK {
+                let mixed = under[i] * under_share[i] + over[i] * over_share[i];
+                let lit = mixed + facing[i] * (HIGHLIGHT + SHADING * mixed);
+                let lit = if lit > 0.0 { lit } else { 0.0 };
+                painted[i] |= round(if lit < 255.0 { lit } else { 255.0 }) << (8 * c);
+            }
+        }
+        for (i, painted) in painted.iter_mut().enumerate() {
+            let untouched = (self.depth[i] == 0) & (self.x[i] == 0.0) & (self.y[i] == 0.0);
+            if untouched | (self.base[i] >> 24 == 0) {
+                *painted = self.base[i];
+            }
+        }
+        painted
     }
-    let cover = layer[3];
-    let mut under = [base[0], base[1], base[2]].map(f32::from);
-    if look.shift > 0.0 {
-        under = frame.shifted(at, tilt.map(|t| t * look.shift)).unwrap_or(under);
+
+    /// The colours of the picture, shifted where the surface is tilted.
+    #[inline(always)]
+    fn picture(&self, frame: &Frame<'_>, look: &LookTable, at: UVec2) -> [[f32; BLOCK]; 3] {
+        let mut under = [[0.0; BLOCK]; 3];
+        for (c, under) in (0..).zip(&mut under) {
+            for (under, &base) in under.iter_mut().zip(&self.base) {
+                *under = channel(base, c);
+            }
+        }
+        if look.shift > 0.0 {
+            for i in 0..BLOCK {
+                let scale = self.inv_len[i] * look.shift;
+                let offset = [self.x[i] * scale, self.y[i] * scale];
+                let hidden = self.base[i] >> 24 == 0;
+                if hidden || offset == [0.0; 2] {
+                    continue;
+                }
+                if let Some(color) = frame.shifted(at + UVec2::new(i as u32, 0), offset) {
+                    under.iter_mut().zip(color).for_each(|(under, value)| under[i] = value);
+                }
+            }
+        }
+        under
     }
-    let alpha = f32::from(base[3]) * (1.0 / 255.0);
-    // What the picture and the crack contribute; an opaque crack lies over the picture as another pane would.
-    let (under_share, over_share, alpha_out) = if look.opaque && base[3] < 255 {
-        let alpha_out = alpha * (1.0 - cover) + cover;
-        (alpha * (1.0 - cover) / alpha_out, 1.0 / alpha_out, round(alpha_out * 255.0) as u8)
-    } else {
-        (1.0 - cover, 1.0, base[3])
-    };
-    // Light from the upper left, on a normal whose y runs down.
-    let facing = -std::f32::consts::FRAC_1_SQRT_2 * (tilt[0] + tilt[1]) * look.glint;
-    let [r, g, b] = std::array::from_fn(|i| {
-        let mixed = under[i] * under_share + layer[i] * over_share;
-        let lit = mixed + facing * (HIGHLIGHT + SHADING * mixed);
-        round(lit.clamp(0.0, 255.0)) as u8
-    });
-    [r, g, b, alpha_out]
 }
 
 #[cfg(test)]

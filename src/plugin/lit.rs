@@ -7,9 +7,12 @@ use super::{
 use bevy::{
     asset::{AssetServer, embedded_asset},
     prelude::*,
-    render::render_resource::{AsBindGroup, ShaderType},
+    render::{
+        RenderApp,
+        render_resource::{AsBindGroup, ShaderType},
+    },
     shader::ShaderRef,
-    sprite_render::{AlphaMode2d, Material2d, Material2dPlugin},
+    sprite_render::{AlphaMode2d, Material2d, Material2dPlugin, SpriteRenderPlugin},
     transform::TransformSystems,
 };
 
@@ -132,6 +135,11 @@ impl Default for CrackLight2d {
 pub(super) fn add_material(app: &mut App) {
     app.register_type::<CrackLight2d>().register_type::<CrackLitMaterial>();
     if !app.world().contains_resource::<AssetServer>() {
+        return;
+    }
+    // A renderer without the 2D one cannot draw it, but surfaces with it crack all the same.
+    if app.get_sub_app(RenderApp).is_some() && !app.is_plugin_added::<SpriteRenderPlugin>() {
+        app.init_asset::<CrackLitMaterial>();
         return;
     }
     embedded_asset!(app, "lit.wgsl");

@@ -183,7 +183,8 @@ mod standard {
             }
             let Some(depth) = &textures.depth else { return };
             if self.depth_map.is_none() {
-                self.parallax_depth_scale = relief;
+                // Half of what the normals say: seen from the side, deeper cracks swim.
+                self.parallax_depth_scale = 0.5 * relief;
                 self.parallax_mapping_method = ParallaxMappingMethod::Relief { max_steps: 5 };
                 self.max_parallax_layer_count = 32.0;
             }

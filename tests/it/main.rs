@@ -2,11 +2,15 @@
 //! new one beside them, never to a further file directly in `tests/` (each of those would link the engine again).
 
 #[cfg(all(feature = "2d", feature = "3d"))]
+mod gpu;
+#[cfg(all(feature = "2d", feature = "3d"))]
 mod hits;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod images;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod lifecycle;
 mod pictures;
+#[cfg(all(feature = "2d", feature = "3d"))]
+mod plugin;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod support;
