@@ -70,6 +70,16 @@ fn random_extent(rng: &mut Rng) -> Vec2 {
     }
 }
 
+/// The documented limits themselves are allowed, though 0.01 and 0.4 are not what they seem in single precision.
+#[test]
+fn limits_of_ranges_are_allowed() {
+    let least = GrowthParams { reach: 0.01, step_length: 0.001, ..GrowthParams::DEFAULT };
+    assert_eq!(least.validate(), Ok(()));
+    let most = GrowthParams { line_width: 0.2, max_width: 0.4, reach: 64.0, ..GrowthParams::DEFAULT };
+    assert_eq!(most.validate(), Ok(()));
+    assert!(GrowthParams { reach: 0.00999, ..GrowthParams::DEFAULT }.validate().is_err());
+}
+
 /// All markers against all nodes, every step.
 struct Reference {
     params: GrowthParams,
