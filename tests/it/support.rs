@@ -6,13 +6,11 @@ use bevy::{
     core_pipeline::CorePipelinePlugin,
     ecs::schedule::SingleThreadedExecutor,
     image::{ImageSampler, TextureAtlasLayout},
-    light::LightPlugin,
     log::{
         tracing::{self, Subscriber, field},
         tracing_subscriber::{self, layer::SubscriberExt},
     },
     mesh::MeshPlugin,
-    pbr::PbrPlugin,
     prelude::*,
     render::{
         RenderPlugin,
@@ -22,7 +20,6 @@ use bevy::{
         settings::{RenderCreation, RenderResources, WgpuSettings},
         view::screenshot::{Screenshot, ScreenshotCaptured},
     },
-    sprite::SpritePlugin,
     sprite_render::SpriteRenderPlugin,
     time::TimeUpdateStrategy,
     window::ExitCondition,
@@ -89,12 +86,12 @@ pub(crate) fn gpu_app() -> Option<(MutexGuard<'static, ()>, App)> {
     };
     let mut app = App::new();
     app.add_plugins((render_plugins(RenderCreation::Manual(renderer)), CrackPlugins));
-    finish(&mut app);
-    app.update();
+    start(&mut app);
     Some((guard, app))
 }
 
-/// All that it takes to draw sprites and meshes into images.
+/// All that it takes to draw sprites into images. Not `SpritePlugin`: with the feature for picking, which other crates of a
+/// build may ask for, it wants the plugins for picking.
 pub(crate) fn render_plugins(render_creation: RenderCreation) -> impl PluginGroup {
     bevy::app::PluginGroupBuilder::start::<MinimalPlugins>()
         .add_group(MinimalPlugins)
@@ -105,11 +102,8 @@ pub(crate) fn render_plugins(render_creation: RenderCreation) -> impl PluginGrou
         .add(ImagePlugin::default_nearest())
         .add(MeshPlugin)
         .add(CameraPlugin)
-        .add(LightPlugin)
         .add(CorePipelinePlugin)
-        .add(SpritePlugin)
         .add(SpriteRenderPlugin)
-        .add(PbrPlugin { gltf_enable_standard_materials: false, ..default() })
 }
 
 /// A picture of this format whose texels differ from their neighbours, alpha 255.
@@ -222,6 +216,7 @@ pub(crate) fn wait_for(app: &mut App, what: &str, mut is_done: impl FnMut(&App) 
 
 /// Frames until the cracks of `entity` have ended; its textures are sound then.
 pub(crate) fn settle(app: &mut App, entity: Entity) {
+    step(app);
     wait_for(app, "the end of the cracks", |app| {
         let state = state(app, entity);
         assert!(!matches!(state.status, CrackStatus::Failed(_) | CrackStatus::Untouched), "{state:?} {:?}", counts(app));
