@@ -13,12 +13,6 @@ fn spawn_small(app: &mut App, image: &Handle<Image>, seed: u64) -> Entity {
     app.world_mut().spawn((Sprite::from_image(image.clone()), surface)).id()
 }
 
-/// Times of frames, shortest first.
-fn sorted(mut times: Vec<Duration>) -> Vec<Duration> {
-    times.sort();
-    times
-}
-
 fn timed_step(app: &mut App) -> Duration {
     let start = Instant::now();
     step(app);
@@ -247,9 +241,9 @@ fn i6_ten_thousand_hits_in_one_frame_stay_in_the_budget() {
         settle(&mut app, entity);
         times
     };
-    // Without a budget there is one hit, one step and one surface in a frame: its dearest frame is one step.
-    let one = *sorted(run(0.0)[1..].to_vec()).last().unwrap();
-    // The best of five: other programs run on the machine.
+    // Without a budget there is one hit, one step and one surface in a frame: the dearest frame is one step. Of both, the
+    // best of several runs, as other programs run on the machine.
+    let one = (0..3).map(|_| run(0.0)[1..].iter().max().copied().unwrap()).min().unwrap();
     let (longest, n_frames) = (0..5)
         .map(|_| {
             let times = run(BUDGET);
@@ -289,9 +283,8 @@ fn i7_hits_on_a_thousand_surfaces_take_turns() {
     let n_frames = hit_many(&mut app, &surfaces);
     let stats = counts(&app);
     assert_eq!((stats.sent, stats.rejected), (10_000, 0));
-    // By then nobody has had its last turn while others wait for their first.
-    let hits: Vec<_> = surfaces.iter().map(|entity| state(&app, *entity).hits).collect();
-    println!("each of 1000 surfaces shows a crack after {n_frames} frames, hits done {:?}", hits.iter().max());
+    println!("each of 1000 surfaces shows a crack after {n_frames} frames");
+    assert!(n_frames <= 250, "{n_frames} frames");
     wait_for(&mut app, "all hits", |app| counts(app).queued == 0);
     for entity in surfaces {
         settle(&mut app, entity);
@@ -379,7 +372,10 @@ fn i8_idle_surfaces_cost_nothing() {
                     times.push(timed_step(app));
                 }
             }
-            let [with, without] = times.map(|times| sorted(times)[100].as_secs_f64());
+            let [with, without] = times.map(|mut times| {
+                times.sort();
+                times[100].as_secs_f64()
+            });
             println!("10,000 idle surfaces: {:.3} ms, without: {:.3} ms", with * 1e3, without * 1e3);
             with / without
         })
