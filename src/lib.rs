@@ -29,3 +29,8 @@ pub mod prelude {
     #[cfg(feature = "bevy")]
     pub use crate::plugin::prelude::*;
 }
+
+/// The examples of the README, compiled.
+#[cfg(all(doctest, feature = "2d"))]
+#[doc = include_str!("../README.md")]
+pub struct ReadmeExamples;

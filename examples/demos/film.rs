@@ -81,7 +81,7 @@ fn take_picture(
     if *output == Output::Window || film.frame > arguments.frames {
         return;
     }
-    if film.frame % every != 0 && film.frame != arguments.frames {
+    if !film.frame.is_multiple_of(every) && film.frame != arguments.frames {
         return;
     }
     match film.target.clone() {

@@ -1,4 +1,35 @@
-//! Cracks by space colonization (Couto et al.; Runions et al. 2005): SPEC.
+//! Cracks that grow by space colonization, step by step.
+//!
+//! The method is that of Runions et al. 2005 (leaf venation), as Couto et al. turned it to cracks: *markers* are laid out
+//! around a hit; at each step every marker attracts its nearest crack node within the *crack radius*, and every node that
+//! is attracted grows a segment of length `D` in the mean direction of its markers (Couto et al., eq. 2); markers
+//! within the *kill distance* of a node die. Growth ends when no marker attracts a node any more.
+//!
+//! [`GrowthParams`] is what is asked, [`CrackGrowth`] what runs; [`CrackGrowth::step`] tells where it differs from the
+//! paper. All lengths are in pattern units: the surface's shorter side is 1.
+//!
+//! ```
+//! use bevy_crack::growth::{CrackGrowth, GrowthParams, MarkerLayout};
+//!
+//! // Six markers in a row, and a hit at their left end: the crack runs to the right.
+//! let params = GrowthParams {
+//!     num_lines_grid: 1,
+//!     num_columns_grid: 6,
+//!     markers: MarkerLayout::PseudoGrid { occupancy: 1.0, jitter: 0.0 },
+//!     reach: 8.0,
+//!     crack_radius: 1.5,
+//!     step_length: 0.5,
+//!     wander: 0.0,
+//!     ..GrowthParams::DEFAULT
+//! };
+//! let mut growth = CrackGrowth::new(params, [6.0, 1.0].into(), 1)?;
+//! growth.hit([0.5, 0.5].into(), 1.0);
+//! while growth.step().grew() {}
+//! let places: Vec<f32> = growth.network().nodes().iter().map(|node| node.pos.x).collect();
+//! assert_eq!(places, [0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0, 5.5]);
+//! assert!(growth.network().nodes().iter().all(|node| node.pos.y == 0.5));
+//! # Ok::<(), bevy_crack::growth::ParamError>(())
+//! ```
 
 mod field;
 mod links;

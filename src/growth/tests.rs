@@ -366,7 +366,7 @@ fn widening_a_branch_lists_its_children() {
     }
 }
 
-/// RELIABILITY I1 and I4: all bit patterns of position and energy.
+/// Faults I1 and I4: all bit patterns of position and energy.
 #[test]
 fn i1_i4_any_bits_as_a_hit() {
     let mut rng = Rng::new(11);
@@ -395,7 +395,7 @@ fn i1_i4_any_bits_as_a_hit() {
     assert!(growth.impacts().iter().all(|impact| impact.energy <= MAX_ENERGY));
 }
 
-/// RELIABILITY I5: 10,000 hits on one point cost no more at the end than at the beginning.
+/// Fault I5: 10,000 hits on one point cost no more at the end than at the beginning.
 #[test]
 fn i5_same_point_hit_ten_thousand_times() {
     let mut growth = CrackGrowth::new(GrowthParams::default(), Vec2::ONE, 1).unwrap();

@@ -46,7 +46,7 @@ const WIDE: usize = 64;
 const NARROW: usize = 16;
 
 /// Texels whose colours are computed at once, or copied if all are untouched. Divides the pieces.
-const BLOCK: usize = 16;
+const BLOCK: usize = 8;
 
 /// How much brighter a wall gets that faces the light squarely, for a glint of 1: a highlight of the crack's own, sRGB
 /// levels, and a share of what is there. Found by eye on glass (the first) and concrete (the second).
@@ -93,7 +93,7 @@ pub fn paint_into(
         normal_out,
         depth_out,
     };
-    if rect.size().x as usize > 2 * NARROW {
+    if rect.size().x as usize > WIDE {
         job.paint::<WIDE>(rect);
     } else {
         job.paint::<NARROW>(rect);

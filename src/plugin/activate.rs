@@ -271,7 +271,7 @@ fn size(
     }
     let budget = world.resource::<CrackBudget>();
     let device = world.get_resource::<RenderDevice>().map_or(u32::MAX, |d| d.limits().max_texture_dimension_2d);
-    let max_side = budget.max_side.min(device).min(crate::pattern::MAX_SIDE).max(1);
+    let max_side = budget.max_side.clamp(1, device.clamp(1, crate::pattern::MAX_SIDE));
     if size.max_element() > max_side {
         if shown.rect.is_some() {
             return Err(CrackError::Size { width: size.x, height: size.y });

@@ -29,6 +29,7 @@ impl Shown {
 }
 
 /// What a look at an entity finds.
+#[cfg_attr(not(any(feature = "2d", feature = "3d")), expect(dead_code, reason = "there are no kinds then"))]
 pub(super) enum Found {
     /// Something of another kind.
     Other,

@@ -9,9 +9,10 @@ use bevy::prelude::*;
 /// use bevy::prelude::*;
 /// use bevy_crack::prelude::*;
 ///
-/// fn on_press(press: On<Pointer<Press>>, mut commands: Commands) {
-///     let Some(point) = press.hit.position else { return };
-///     commands.trigger(CrackHit::world(press.entity, point).with_energy(1.5));
+/// fn hammer(walls: Query<Entity, With<CrackSurface>>, mut hits: MessageWriter<CrackHit>) {
+///     for wall in &walls {
+///         hits.write(CrackHit::uv(wall, Vec2::splat(0.5)).with_energy(1.5));
+///     }
 /// }
 /// ```
 #[derive(EntityEvent, Message, Reflect, Clone, Copy, Debug, PartialEq)]

@@ -74,12 +74,14 @@ fn attach<S: MaterialSlot>(
     if let Some(mut slot) = world.get_mut::<S>(entity) {
         slot.set_material(own);
     }
+    #[cfg(feature = "3d")]
     if S::Material::MAPS.depth && carrier.mesh.is_none() {
         carrier.mesh = give_tangents(world, entity);
     }
 }
 
 /// Normal and depth maps show nothing on a mesh without tangents: such a mesh is replaced by one that has them.
+#[cfg(feature = "3d")]
 fn give_tangents(world: &mut World, entity: Entity) -> Option<(Handle<Mesh>, Handle<Mesh>)> {
     let before = world.get::<Mesh3d>(entity)?.0.clone();
     let mut meshes = world.get_resource_mut::<Assets<Mesh>>()?;

@@ -25,7 +25,9 @@ mod heal;
 mod hit;
 #[cfg(feature = "2d")]
 mod lit;
+#[cfg(any(feature = "2d", feature = "3d"))]
 mod material;
+#[cfg(any(feature = "2d", feature = "3d"))]
 mod mesh;
 mod paint;
 mod picture;

@@ -10,7 +10,7 @@ use bevy::prelude::*;
 pub struct CrackState {
     /// What it is at.
     pub status: CrackStatus,
-    /// Share of the surface's tiles of 16 x 16 texels that a crack has touched, 0..=1.
+    /// Share of the surface's tiles of 8 x 8 texels that a crack has touched, 0..=1.
     pub damage: f32,
     /// Nodes of the crack network.
     pub nodes: u32,

@@ -23,6 +23,7 @@ pub(super) fn watch_surfaces(
 }
 
 /// Notes the cracked surfaces whose sprite or material slot has changed.
+#[cfg(any(feature = "2d", feature = "3d"))]
 pub(super) fn watch<C: Component>(
     changed: Query<Entity, (Changed<C>, With<CrackTextures>)>,
     mut surfaces: ResMut<Surfaces>,

@@ -6,7 +6,7 @@ use glam::UVec2;
 /// Bits of a word of the tile set.
 const WORD: usize = u64::BITS as usize;
 
-/// What one rectangle costs beside its texels, in tiles: an upload call is about as dear as 1,024 texels.
+/// What one rectangle costs beside its texels, in tiles: a copy in a batch is about as dear as 256 texels.
 const CALL: u64 = 4;
 
 /// Below this depth of the splitting tree the best line is cut, further down the one in the middle, so that no set of
@@ -24,7 +24,7 @@ const MAX_BEST_SPLITS: u32 = 16;
 /// dirty.mark(TexelRect { min: [90, 40].into(), max: [91, 41].into() });
 /// let mut rects = Vec::new();
 /// dirty.take_rects(&mut rects);
-/// assert_eq!(rects, [TexelRect { min: [80, 32].into(), max: [96, 48].into() }]);
+/// assert_eq!(rects, [TexelRect { min: [88, 40].into(), max: [96, 48].into() }]);
 /// assert!(dirty.is_empty());
 /// ```
 #[derive(Clone, Debug, Default)]
@@ -42,7 +42,7 @@ type TileRect = TexelRect;
 
 impl DirtyTiles {
     /// Side of a tile, texels.
-    pub const TILE: u32 = 16;
+    pub const TILE: u32 = 8;
 
     /// Nothing changed on a surface of `size` texels.
     #[must_use]

@@ -1,6 +1,8 @@
 //! What the crate promises, from the outside. One binary, one module a subject; a new test goes to the module it fits or to a
 //! new one beside them, never to a further file directly in `tests/` (each of those would link the engine again).
 
+#![cfg(test)]
+
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod gpu;
 #[cfg(all(feature = "2d", feature = "3d"))]

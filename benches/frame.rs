@@ -1,0 +1,264 @@
+//! What cracks cost in a frame of a game, beside painting and uploading whole images.
+//!
+//! `cargo bench --profile dev --bench frame`: the build that `cargo test` uses.
+//! `growing/*`: 100 surfaces of 512 x 512 that were hit at once, one step a frame each; the time of an idle frame of the same
+//! app is taken off. `finished/*`: a frame with 10,000 cracked surfaces of 32 x 32 that have come to an end, beside one with
+//! 10,000 plain sprites. With a Vulkan driver (software will do) uploads are part of it; without, it says so.
+
+#![expect(clippy::print_stdout, clippy::expect_used, reason = "a benchmark")]
+
+use bevy::{
+    app::{App, PluginsState},
+    asset::RenderAssetUsages,
+    prelude::*,
+    render::render_resource::{Extent3d, TextureDimension, TextureFormat},
+    time::TimeUpdateStrategy,
+};
+use bevy_crack::{
+    growth::CrackGrowth,
+    paint::{BaseTexels, LookTable, PaintTargets, paint_into},
+    pattern::SurfaceFrame,
+    plugin::CrackUploadStats,
+    prelude::*,
+    raster::{DepthField, TexelRect, stamp_path},
+};
+use criterion::{Criterion, criterion_group, criterion_main};
+use std::time::{Duration, Instant};
+
+const SURFACES: usize = 100;
+const SIDE: u32 = 512;
+/// Growing frames that are measured, after the one in which the textures are made.
+const FRAMES: u32 = 12;
+
+fn picture(side: u32) -> Image {
+    let size = Extent3d { width: side, height: side, depth_or_array_layers: 1 };
+    let texel = [150, 148, 140, 255];
+    Image::new_fill(size, TextureDimension::D2, &texel, TextureFormat::Rgba8UnormSrgb, RenderAssetUsages::default())
+}
+
+/// An app without a window, stepped by hand.
+fn app() -> App {
+    let mut app = App::new();
+    app.add_plugins(support::headless())
+        .add_plugins(CrackPlugins)
+        .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs(1) / 60))
+        .insert_resource(CrackBudget { milliseconds: 1e6, max_texture_bytes: 1 << 34, ..default() });
+    while app.plugins_state() == PluginsState::Adding {
+        bevy::tasks::tick_global_task_pools_on_main_thread();
+    }
+    app.finish();
+    app.cleanup();
+    app
+}
+
+/// Time that the crate's systems of the main world took, all frames together.
+#[derive(Resource, Default)]
+struct OurSystems(Option<Instant>, Duration);
+
+fn measure_systems(app: &mut App) {
+    app.init_resource::<OurSystems>().add_systems(
+        PostUpdate,
+        (
+            (|mut time: ResMut<OurSystems>| time.0 = Some(Instant::now()))
+                .after(TransformSystems::Propagate)
+                .before(CrackSystems::Hit),
+            (|mut time: ResMut<OurSystems>| {
+                let elapsed = time.0.take().map_or(Duration::ZERO, |start| start.elapsed());
+                time.1 += elapsed;
+            })
+            .after(CrackSystems::Upload)
+            .before(bevy::asset::AssetEventSystems),
+        ),
+    );
+}
+
+/// The engine without a window: with a renderer where there is an adapter.
+mod support {
+    use bevy::{
+        app::{PluginGroup, PluginGroupBuilder},
+        prelude::*,
+        render::{
+            RenderPlugin,
+            pipelined_rendering::PipelinedRenderingPlugin,
+            renderer::initialize_renderer,
+            settings::{RenderCreation, WgpuSettings},
+        },
+        window::ExitCondition,
+    };
+    use std::panic;
+
+    pub(super) fn headless() -> PluginGroupBuilder {
+        let settings = WgpuSettings::default();
+        let hook = panic::take_hook();
+        panic::set_hook(Box::new(|_| {}));
+        let found = settings.backends.and_then(|backends| {
+            panic::catch_unwind(|| bevy::tasks::block_on(initialize_renderer(backends, None, &settings))).ok()
+        });
+        panic::set_hook(hook);
+        if found.is_none() {
+            println!("NO GPU ADAPTER: uploads are not part of the numbers");
+        }
+        let render_creation = match found {
+            Some(resources) => RenderCreation::Manual(resources),
+            None => WgpuSettings { backends: None, ..default() }.into(),
+        };
+        DefaultPlugins
+            .set(WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() })
+            .set(RenderPlugin { render_creation, synchronous_pipeline_compilation: true, ..default() })
+            .disable::<bevy::winit::WinitPlugin>()
+            .disable::<bevy::log::LogPlugin>()
+            .disable::<PipelinedRenderingPlugin>()
+    }
+}
+
+/// Sprites with pictures of their own, shown for a while so that everything is loaded.
+fn with_sprites(app: &mut App, count: usize, side: u32, surfaces: bool) -> Vec<Entity> {
+    let entities = (0..count)
+        .map(|i| {
+            let image = app.world_mut().resource_mut::<Assets<Image>>().add(picture(side));
+            let mut entity = app.world_mut().spawn(Sprite::from_image(image));
+            if surfaces {
+                entity.insert(CrackSurface::new(CrackPreset::CONCRETE).with_seed(i as u64));
+            }
+            entity.id()
+        })
+        .collect();
+    (0..3).for_each(|_| app.update());
+    entities
+}
+
+fn time_of(mut work: impl FnMut()) -> Duration {
+    let start = Instant::now();
+    work();
+    start.elapsed()
+}
+
+/// Median time of an idle frame.
+fn idle(app: &mut App) -> Duration {
+    let mut times: Vec<_> = (0..9).map(|_| time_of(|| app.update())).collect();
+    times.sort();
+    times[4]
+}
+
+/// Mean time of a growing frame over an idle one, what of it the main world's systems took, and bytes uploaded in it.
+fn growing_frames() -> (Duration, Duration, u64) {
+    let mut app = app();
+    measure_systems(&mut app);
+    let entities = with_sprites(&mut app, SURFACES, SIDE, true);
+    let idle = idle(&mut app);
+    for entity in entities {
+        app.world_mut().trigger(CrackHit::uv(entity, Vec2::splat(0.5)));
+    }
+    app.update();
+    app.update();
+    let (mut time, mut bytes) = (Duration::ZERO, 0);
+    app.insert_resource(OurSystems::default());
+    for _ in 0..FRAMES {
+        time += time_of(|| app.update());
+        bytes += app.world().resource::<CrackUploadStats>().bytes;
+    }
+    let systems = app.world().resource::<OurSystems>().1;
+    (time.saturating_sub(idle * FRAMES) / FRAMES, systems / FRAMES, bytes / u64::from(FRAMES))
+}
+
+#[derive(Resource, Default)]
+struct Naive(Vec<(CrackGrowth, DepthField, Vec<u8>, Handle<Image>, Handle<Image>)>);
+
+/// The obvious way: grow, stamp, paint the whole image, let the engine upload the whole image.
+fn paint_whole(mut naive: ResMut<Naive>, mut images: ResMut<Assets<Image>>, look: Local<Option<LookTable>>) {
+    let mut look = look;
+    let preset = CrackPreset::CONCRETE;
+    let look = look.get_or_insert_with(|| LookTable::new(&preset.look, SIDE as f32).expect("the preset is valid"));
+    for (growth, field, base, diffuse, normal) in &mut naive.0 {
+        growth.step();
+        let mut changed = Vec::new();
+        growth.take_changed(&mut changed);
+        for segment in changed {
+            if let Some(path) = growth.network().path(segment) {
+                stamp_path(field, &preset.profile, &path);
+            }
+        }
+        let mut take = |handle: &Handle<Image>| images.get_mut(handle).and_then(|image| image.into_inner().data.take());
+        let (mut diffuse_data, mut normal_data) = (take(diffuse), take(normal));
+        paint_into(
+            BaseTexels { size: UVec2::splat(SIDE), diffuse: base, normal: None, depth: None },
+            field,
+            look,
+            TexelRect::whole(UVec2::splat(SIDE)),
+            UVec2::ZERO,
+            &mut PaintTargets { diffuse: diffuse_data.as_deref_mut(), normal: normal_data.as_deref_mut(), depth: None },
+        );
+        for (handle, data) in [(diffuse, diffuse_data), (normal, normal_data)] {
+            if let Some(mut image) = images.get_mut(&*handle) {
+                image.data = data;
+            }
+        }
+    }
+}
+
+fn naive_frames() -> Duration {
+    let mut app = app();
+    let frame = SurfaceFrame::new(UVec2::splat(SIDE)).expect("the size is valid");
+    let preset = CrackPreset::CONCRETE;
+    let mut naive = Naive::default();
+    for seed in 0..SURFACES as u64 {
+        let mut growth = CrackGrowth::new(preset.growth.clone(), frame.extent(), seed).expect("the preset is valid");
+        growth.hit(Vec2::splat(0.5), 1.0);
+        let mut images = app.world_mut().resource_mut::<Assets<Image>>();
+        let (diffuse, mut normal) = (picture(SIDE), picture(SIDE));
+        normal.texture_descriptor.format = TextureFormat::Rgba8Unorm;
+        let base = diffuse.data.clone().expect("the picture has texels");
+        let (diffuse, normal) = (images.add(diffuse), images.add(normal));
+        app.world_mut().spawn(Sprite::from_image(diffuse.clone()));
+        naive.0.push((growth, DepthField::new(frame), base, diffuse, normal));
+    }
+    (0..3).for_each(|_| app.update());
+    let idle = idle(&mut app);
+    app.insert_resource(naive).add_systems(Update, paint_whole);
+    app.update();
+    let time = (0..FRAMES).map(|_| time_of(|| app.update())).sum::<Duration>();
+    time.saturating_sub(idle * FRAMES) / FRAMES
+}
+
+/// A frame with many sprites, cracked to their end or not surfaces at all.
+fn many(cracked: bool) -> App {
+    let mut app = app();
+    let entities = with_sprites(&mut app, 10_000, 32, cracked);
+    if cracked {
+        for entity in entities {
+            app.world_mut().trigger(CrackHit::uv(entity, Vec2::splat(0.5)).with_energy(0.2));
+        }
+        for _ in 0..1000 {
+            app.update();
+        }
+        let done = |state: &CrackState| state.status == CrackStatus::Done;
+        let mut states = app.world_mut().query::<&CrackState>();
+        assert!(states.iter(app.world()).all(done), "all cracks have come to an end");
+    }
+    app
+}
+
+fn frame(c: &mut Criterion) {
+    let (_, systems, bytes) = growing_frames();
+    println!("the main world's systems: {:.2} ms a frame", systems.as_secs_f64() * 1e3);
+    let whole = SURFACES as u64 * u64::from(SIDE * SIDE) * 8;
+    if let Some(times) = whole.checked_div(bytes) {
+        println!("bytes a frame: {bytes}, whole images: {whole}, {times} times fewer");
+    }
+    let mut group = c.benchmark_group("growing");
+    group.sample_size(10);
+    group.bench_function("100 surfaces", |b| b.iter_custom(|n| (0..n).map(|_| growing_frames().0).sum()));
+    group.bench_function("100 surfaces, main world", |b| b.iter_custom(|n| (0..n).map(|_| growing_frames().1).sum()));
+    group.bench_function("100 whole images", |b| b.iter_custom(|n| (0..n).map(|_| naive_frames()).sum()));
+    group.finish();
+    let mut group = c.benchmark_group("finished");
+    group.sample_size(20);
+    for (name, cracked) in [("10,000 cracked surfaces", true), ("10,000 plain sprites", false)] {
+        let mut app = many(cracked);
+        group.bench_function(name, |b| b.iter(|| app.update()));
+    }
+    group.finish();
+}
+
+criterion_group!(benches, frame);
+criterion_main!(benches);
