@@ -426,12 +426,16 @@ fn more_energy_cracks_further() {
 
 #[test]
 fn every_hit_shows() {
-    for preset in [CrackPreset::GLASS, CrackPreset::CONCRETE, CrackPreset::CLAY] {
+    let extents = [Vec2::ONE, Vec2::new(64.0, 1.0 / 64.0), Vec2::new(1.0 / 64.0, 64.0)];
+    for (preset, extent) in [CrackPreset::GLASS, CrackPreset::CONCRETE, CrackPreset::CLAY]
+        .into_iter()
+        .flat_map(|preset| extents.map(|extent| (preset.clone(), extent)))
+    {
         for seed in 0..200 {
-            let mut growth = CrackGrowth::new(preset.growth.clone(), Vec2::ONE, seed).unwrap();
-            growth.hit(Vec2::new(0.3, 0.6), 0.02);
+            let mut growth = CrackGrowth::new(preset.growth.clone(), extent, seed).unwrap();
+            growth.hit(Vec2::new(0.3, 0.6) * extent, 0.02);
             while growth.step().grew() {}
-            assert!(growth.network().segments().count() > 0, "seed {seed} shows nothing");
+            assert!(growth.network().segments().count() > 0, "seed {seed} shows nothing on {extent}");
         }
     }
 }

@@ -110,7 +110,7 @@ fn t2_odd_sizes() {
         }
         hit(&mut app, CrackHit::world(entity, Vec3::ZERO));
         settle(&mut app, entity);
-        assert!(shown(&app, entity) != before, "{size}: no crack shows");
+        assert!(shown(&app, entity) != before, "{size}: no crack shows: {:?}", state(&app, entity));
         assert_eq!(size_of(&app, &image_of(&app, entity)), size);
         assert_eq!(counts(&app).rejected, 0, "{size}");
     }
@@ -158,6 +158,8 @@ fn t3_sizes_beyond_all_limits_are_clamped_before_anything_is_allocated() {
     hit(&mut app, center(entity));
     settle(&mut app, entity);
     assert_eq!(size_of(&app, &image_of(&app, entity)), UVec2::new(256, 1));
+    // The news of the picture that was added reach everybody.
+    steps(&mut app, 2);
 
     // No memory for textures: coarser ones, then none, in words; given back when others go.
     *app.world_mut().resource_mut::<CrackBudget>() =
