@@ -135,13 +135,23 @@ pub(super) fn lay_out(
         for i in 0..FEWEST {
             let angle = TAU * (turn + (i as f32 + 0.6 * rng.unit()) / FEWEST as f32);
             let arm = (region.outer * rng.range(0.5, 0.95)).max(2.0 * params.kill_distance);
-            let pos = region.center + ops::unit(angle) * arm.min(0.95 * params.crack_radius);
+            let arm = arm.min(0.95 * params.crack_radius);
+            let pos = region.center + ops::unit(angle) * arm;
             let inside = pos.cmpge(Vec2::ZERO).all() && pos.cmple(region.extent).all();
-            if inside && density_at(density, pos, region.extent) > 0.0 {
+            let pos = if inside { pos } else { towards_room(region, arm) };
+            if density_at(density, pos, region.extent) > 0.0 {
                 keep(pos, None);
             }
         }
     }
+}
+
+/// A place `arm` away from the hit, along the longer side, where there is more room: even a surface that is hardly more than a
+/// line has one.
+fn towards_room(region: Region, arm: f32) -> Vec2 {
+    let axis = if region.extent.x >= region.extent.y { Vec2::X } else { Vec2::Y };
+    let is_in_first_half = region.center.dot(axis) < 0.5 * region.extent.dot(axis);
+    (region.center + if is_in_first_half { arm } else { -arm } * axis).clamp(Vec2::ZERO, region.extent)
 }
 
 /// Markers that even the weakest hit lays out, so that it shows.

@@ -260,7 +260,8 @@ impl GrowthParams {
         ];
         let all = self.ranges().chain(markers.iter().copied()).chain(starts.iter().copied()).chain(related);
         for (name, value, min, max) in all {
-            if !(min..=max).contains(&value) {
+            // In single precision, where 0.01 is a little below 0.01.
+            if !(min as f32..=max as f32).contains(&(value as f32)) {
                 return Err(ParamError::OutOfRange { name, value, min, max });
             }
         }

@@ -70,6 +70,16 @@ fn random_extent(rng: &mut Rng) -> Vec2 {
     }
 }
 
+/// The documented limits themselves are allowed, though 0.01 and 0.4 are not what they seem in single precision.
+#[test]
+fn limits_of_ranges_are_allowed() {
+    let least = GrowthParams { reach: 0.01, step_length: 0.001, ..GrowthParams::DEFAULT };
+    assert_eq!(least.validate(), Ok(()));
+    let most = GrowthParams { line_width: 0.2, max_width: 0.4, reach: 64.0, ..GrowthParams::DEFAULT };
+    assert_eq!(most.validate(), Ok(()));
+    assert!(GrowthParams { reach: 0.00999, ..GrowthParams::DEFAULT }.validate().is_err());
+}
+
 /// All markers against all nodes, every step.
 struct Reference {
     params: GrowthParams,
@@ -416,12 +426,16 @@ fn more_energy_cracks_further() {
 
 #[test]
 fn every_hit_shows() {
-    for preset in [CrackPreset::GLASS, CrackPreset::CONCRETE, CrackPreset::CLAY] {
+    let extents = [Vec2::ONE, Vec2::new(64.0, 1.0 / 64.0), Vec2::new(1.0 / 64.0, 64.0)];
+    for (preset, extent) in [CrackPreset::GLASS, CrackPreset::CONCRETE, CrackPreset::CLAY]
+        .into_iter()
+        .flat_map(|preset| extents.map(|extent| (preset.clone(), extent)))
+    {
         for seed in 0..200 {
-            let mut growth = CrackGrowth::new(preset.growth.clone(), Vec2::ONE, seed).unwrap();
-            growth.hit(Vec2::new(0.3, 0.6), 0.02);
+            let mut growth = CrackGrowth::new(preset.growth.clone(), extent, seed).unwrap();
+            growth.hit(Vec2::new(0.3, 0.6) * extent, 0.02);
             while growth.step().grew() {}
-            assert!(growth.network().segments().count() > 0, "seed {seed} shows nothing");
+            assert!(growth.network().segments().count() > 0, "seed {seed} shows nothing on {extent}");
         }
     }
 }

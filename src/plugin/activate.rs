@@ -129,6 +129,9 @@ fn make_ready(world: &mut World, entity: Entity) -> Result<bool, CrackError> {
     }
     // Removed since the hit: the hook has dropped its hits, unless they came in between.
     let Some(surface) = world.get::<CrackSurface>(entity).cloned() else { return Err(CrackError::NothingToCrack) };
+    if !world.contains_resource::<Assets<Image>>() {
+        return Err(CrackError::NoImages);
+    }
     let (kind, found) = carrier::inspect(world, entity);
     let (kind, shown) = match (kind, found) {
         (Some(kind), Found::Shown(shown)) => (kind, *shown),
@@ -329,7 +332,7 @@ pub(super) fn make_textures(
 }
 
 /// Where cracks may go: not over holes. `None` if there are none.
-fn mask(base: &BasePicture, rect: TexelRect) -> Option<Grid<f32>> {
+pub(super) fn mask(base: &BasePicture, rect: TexelRect) -> Option<Grid<f32>> {
     let size = rect.size();
     let is_hole = |x, y| base.is_hole(rect.min + UVec2::new(x, y));
     if !(0..size.y).any(|y| (0..size.x).any(|x| is_hole(x, y))) {

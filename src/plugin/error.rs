@@ -15,6 +15,12 @@ pub enum CrackError {
     /// There is no place for images.
     #[error("there are no image assets: add `AssetPlugin` and `ImagePlugin`")]
     NoImages,
+    /// There is no place for materials.
+    #[error("there are no assets of `{material}`: add the plugin that brings them")]
+    NoMaterials {
+        /// Name of the type.
+        material: String,
+    },
     /// The picture failed to load.
     #[error("its picture failed to load: {reason}")]
     LoadFailed {

@@ -1,7 +1,7 @@
 //! Meshes with a material as carriers.
 
 use super::{
-    CrackMaps, CrackTextures,
+    CrackError, CrackMaps, CrackTextures,
     carrier::{Carrier, Found, Kind, Shown},
     mesh::{closest_uv, wrap},
 };
@@ -35,8 +35,10 @@ pub(super) const fn kind<S: MaterialSlot>() -> Kind {
 
 fn inspect<S: MaterialSlot>(world: &World, entity: Entity) -> Found {
     let Some(slot) = world.get::<S>(entity) else { return Found::Other };
-    let materials = world.get_resource::<Assets<S::Material>>();
-    let Some(material) = materials.and_then(|materials| materials.get(slot.material())) else { return Found::Waiting };
+    let Some(materials) = world.get_resource::<Assets<S::Material>>() else {
+        return Found::Unusable(CrackError::NoMaterials { material: S::Material::short_type_path().to_owned() });
+    };
+    let Some(material) = materials.get(slot.material()) else { return Found::Waiting };
     let [diffuse, normal, depth] = material.pictures();
     Found::Shown(Box::new(Shown {
         asset: slot.material().clone().untyped(),

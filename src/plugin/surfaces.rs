@@ -154,7 +154,14 @@ impl Surfaces {
     /// Forgets everything about a surface.
     pub(super) fn remove(&mut self, entity: Entity) -> Option<Active> {
         let active = self.active.remove(&entity)?;
-        // It stays in the lists until its turn: who works on a list skips what is not there any more.
+        // Out of the lists at once: if it comes back before its turn, it must not be in them twice.
+        if active.is_growing {
+            self.growing.retain(|e| *e != entity);
+            self.held.retain(|e| *e != entity);
+        }
+        if active.is_dirty {
+            self.dirty.retain(|e| *e != entity);
+        }
         self.disown(entity, &active);
         self.bytes -= active.bytes;
         Some(active)

@@ -1,13 +1,17 @@
 //! Changes from outside: other presets, other pictures, another frame of an animation.
 
 use super::{
-    CrackError, CrackSurface, CrackTextures,
-    activate::{attach, draft, fail, frame, look, make_textures},
+    CrackError, CrackState, CrackStatus, CrackSurface, CrackTextures,
+    activate::{attach, draft, fail, frame, look, make_textures, mask, set_status},
     carrier::{self, Carrier, Found, Shown},
     paint::stamp_all,
     surfaces::{Active, Surfaces, Touched},
 };
-use crate::raster::{DepthField, TexelRect};
+use crate::{
+    growth::CrackGrowth,
+    pattern::SurfaceFrame,
+    raster::{DepthField, TexelRect},
+};
 use bevy::prelude::*;
 
 /// Notes the cracked surfaces whose settings have changed.
@@ -56,12 +60,21 @@ pub(super) fn update_changed(world: &mut World) {
     changed.retain(|entity| {
         let Some(mut active) = take(world, *entity) else { return false };
         let outcome = update(world, *entity, &mut active);
+        let is_growing = active.growth.is_growing();
         let mut surfaces = world.resource_mut::<Surfaces>();
         surfaces.own(*entity, &active);
         surfaces.active.insert(*entity, active);
         surfaces.soil(*entity);
+        if is_growing {
+            surfaces.start_growing(*entity);
+        }
         match outcome {
-            Ok(is_done) => !is_done,
+            Ok(is_done) => {
+                if is_done {
+                    recover(world, *entity);
+                }
+                !is_done
+            }
             Err(error) => {
                 fail(world, *entity, error);
                 false
@@ -69,6 +82,14 @@ pub(super) fn update_changed(world: &mut World) {
         }
     });
     world.resource_mut::<Surfaces>().changed.append(&mut changed);
+}
+
+/// A surface that failed over a picture that is whole again goes on.
+fn recover(world: &mut World, entity: Entity) {
+    let is_growing = world.resource::<Surfaces>().active.get(&entity).is_some_and(|active| active.is_growing);
+    if matches!(world.get::<CrackState>(entity).map(|state| &state.status), Some(CrackStatus::Failed(_))) {
+        set_status(world, entity, if is_growing { CrackStatus::Growing } else { CrackStatus::Done });
+    }
 }
 
 fn take(world: &mut World, entity: Entity) -> Option<Active> {
@@ -136,14 +157,39 @@ fn update_settings(entity: Entity, active: &mut Active, surface: CrackSurface) {
     active.surface = surface;
 }
 
+/// On a picture of other proportions the same hits, in the same places, make other cracks: grown as far as they were.
+/// `None` if they may stay.
+fn regrow(active: &Active, frame: SurfaceFrame) -> Result<Option<CrackGrowth>, CrackError> {
+    let (before, extent) = (active.growth.network().extent(), frame.extent());
+    if before == extent {
+        return Ok(None);
+    }
+    let mut growth = CrackGrowth::new(active.growth.params().clone(), extent, active.surface.seed)
+        .map_err(|error| CrackError::Preset { reason: error.to_string() })?;
+    for impact in active.growth.impacts() {
+        growth.hit((impact.pos / before * extent).min(extent), impact.energy);
+    }
+    for _ in 0..active.growth.steps() {
+        growth.step();
+    }
+    Ok(Some(growth))
+}
+
 /// Reads the pictures anew and paints the cracks over them; `false` if they are not there yet.
 fn update_picture(world: &mut World, entity: Entity, active: &mut Active, shown: Shown) -> Result<bool, CrackError> {
     active.is_outdated = true;
     let Some(draft) = draft(world, &active.surface, &shown, active.bytes)? else { return Ok(false) };
     let frame = frame(draft.rect)?;
     let look = look(&active.surface, frame)?;
+    let regrown = regrow(active, frame)?;
     active.textures = make_textures(world, &draft, Some(&active.textures))?;
     active.is_outdated = false;
+    if let Some(growth) = regrown {
+        active.growth = growth;
+    }
+    if active.surface.alpha_mask {
+        active.growth.set_density(mask(&draft.base, draft.rect));
+    }
     world.resource_mut::<Surfaces>().bytes += draft.bytes;
     world.resource_mut::<Surfaces>().bytes -= active.bytes;
     active.bytes = draft.bytes;

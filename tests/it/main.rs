@@ -5,6 +5,14 @@
 
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod gpu;
+#[cfg(all(feature = "2d", feature = "3d"))]
+mod hits;
+#[cfg(all(feature = "2d", feature = "3d"))]
+mod images;
+#[cfg(all(feature = "2d", feature = "3d"))]
+mod lifecycle;
 mod pictures;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod plugin;
+#[cfg(all(feature = "2d", feature = "3d"))]
+mod support;

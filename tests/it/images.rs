@@ -1,0 +1,873 @@
+//! Pictures of all sizes and formats, broken ones, late ones and changing ones: the faults T1 to T14 of the reliability list,
+//! through real apps, some with a renderer.
+
+use crate::support::*;
+use bevy::{
+    asset::{
+        AssetApp, AssetLoader, LoadContext, RenderAssetUsages,
+        io::{
+            AssetSourceBuilder, Reader,
+            memory::{Dir, MemoryAssetReader},
+        },
+    },
+    image::{TextureAtlas, TextureAtlasLayout},
+    prelude::*,
+    reflect::TypePath,
+    render::{
+        render_asset::RenderAssetBytesPerFrame,
+        render_resource::{AstcBlock, AstcChannel, Extent3d, TextureDimension, TextureFormat},
+    },
+};
+use bevy_crack::{math::Rng, plugin::CrackUploadStats, prelude::*};
+use std::{
+    future::poll_fn,
+    path::Path,
+    sync::{Arc, Mutex},
+    task::{Poll, Waker},
+};
+
+fn surface_of(resolution: CrackResolution) -> CrackSurface {
+    CrackSurface { resolution, ..CrackSurface::default() }
+}
+
+fn spawn_with(app: &mut App, image: &Handle<Image>, resolution: CrackResolution) -> Entity {
+    app.world_mut().spawn((Sprite::from_image(image.clone()), surface_of(resolution))).id()
+}
+
+fn size_of(app: &App, image: &Handle<Image>) -> UVec2 {
+    app.world().resource::<Assets<Image>>().get(image).expect("the image").size()
+}
+
+fn replace(app: &mut App, handle: &Handle<Image>, image: Image) {
+    *app.world_mut().resource_mut::<Assets<Image>>().get_mut(handle).expect("the image") = image;
+}
+
+/// Hits the surface, which fails, once, and shows what it showed; returns why. A neighbour is not concerned.
+fn assert_fails(app: &mut App, entity: Entity) -> CrackError {
+    let before = image_of(app, entity);
+    let n_images = app.world().resource::<Assets<Image>>().len();
+    hit(app, center(entity));
+    hit(app, center(entity));
+    let rejected = counts(app).rejected + 2;
+    steps(app, 3);
+    assert_eq!((counts(app).rejected, counts(app).queued), (rejected, 0));
+    assert_eq!(image_of(app, entity), before, "the picture stands");
+    assert_eq!(app.world().resource::<Assets<Image>>().len(), n_images, "nothing was made");
+    let CrackStatus::Failed(error) = state(app, entity).status else { panic!("{:?}", state(app, entity)) };
+    error
+}
+
+#[test]
+fn t1_pictures_without_texels_are_refused_before_anything_is_made() {
+    let mut app = app();
+    single_threaded(&mut app);
+    let other = spawn_picture(&mut app, UVec2::splat(48));
+    let image = add(&mut app, picture(UVec2::splat(48)));
+    for size in [UVec2::ZERO, UVec2::new(0, 8), UVec2::new(8, 0)] {
+        let heard = warnings(|| {
+            let empty = add(&mut app, picture(size));
+            let entity = spawn_sprite(&mut app, &empty);
+            assert_eq!(assert_fails(&mut app, entity), CrackError::Size { width: size.x, height: size.y });
+            assert_eq!(assert_fails(&mut app, entity), CrackError::Size { width: size.x, height: size.y });
+        });
+        assert_eq!(heard.len(), 1, "one warning: {heard:?}");
+        let entity = spawn_with(&mut app, &image, CrackResolution::Fixed(size));
+        assert_eq!(assert_fails(&mut app, entity), CrackError::Size { width: size.x, height: size.y });
+    }
+    assert_cracks(&mut app, other);
+}
+
+#[test]
+fn t1_no_picture_without_texels_reaches_the_gpu() {
+    let Some((_one, mut app)) = gpu_app() else { return };
+    let image = add(&mut app, picture(UVec2::splat(16)));
+    let empty = spawn_with(&mut app, &image, CrackResolution::Fixed(UVec2::new(0, 4)));
+    let other = spawn_sprite(&mut app, &image);
+    assert_fails(&mut app, empty);
+    assert_cracks(&mut app, other);
+    assert_on_gpu(&mut app, &[other]);
+    assert_eq!(app.should_exit(), None);
+}
+
+const ODD_SIZES: [UVec2; 7] = [
+    UVec2::ONE,
+    UVec2::new(1, 4096),
+    UVec2::new(4096, 1),
+    UVec2::new(3, 5),
+    UVec2::new(97, 61),
+    UVec2::new(2, 7),
+    UVec2::new(257, 13),
+];
+
+#[test]
+fn t2_odd_sizes() {
+    let mut app = app();
+    for size in ODD_SIZES {
+        let entity = spawn_picture(&mut app, size);
+        let before = shown(&app, entity);
+        for at in [0.0, 0.2, 0.5, 1.0] {
+            hit(&mut app, CrackHit::uv(entity, Vec2::splat(at)).with_energy(2.0));
+        }
+        hit(&mut app, CrackHit::world(entity, Vec3::ZERO));
+        settle(&mut app, entity);
+        assert!(shown(&app, entity) != before, "{size}: no crack shows: {:?}", state(&app, entity));
+        assert_eq!(size_of(&app, &image_of(&app, entity)), size);
+        assert_eq!(counts(&app).rejected, 0, "{size}");
+    }
+}
+
+#[test]
+fn t2_odd_sizes_on_the_gpu() {
+    let Some((_one, mut app)) = gpu_app() else { return };
+    let surfaces = ODD_SIZES.map(|size| spawn_picture(&mut app, size));
+    for round in 0..3 {
+        for entity in surfaces {
+            hit(&mut app, CrackHit::uv(entity, Vec2::splat(0.2 + 0.3 * round as f32)));
+        }
+        // In the middle of growth, rectangles of all sizes are on their way.
+        steps(&mut app, 3);
+        assert_on_gpu(&mut app, &surfaces);
+    }
+    assert_eq!(app.should_exit(), None);
+}
+
+#[test]
+fn t3_sizes_beyond_all_limits_are_clamped_before_anything_is_allocated() {
+    let mut app = app();
+    let image = add(&mut app, picture(UVec2::new(64, 32)));
+    let other = spawn_sprite(&mut app, &image);
+    app.world_mut().resource_mut::<CrackBudget>().max_side = 256;
+    for (asked, expected) in [
+        (UVec2::splat(16_384), UVec2::splat(256)),
+        (UVec2::splat(u32::MAX), UVec2::splat(256)),
+        (UVec2::new(u32::MAX, u32::MAX / 2), UVec2::new(256, 127)),
+        (UVec2::new(u32::MAX, 1), UVec2::new(256, 1)),
+        (UVec2::new(1, 300), UVec2::new(1, 256)),
+    ] {
+        let entity = spawn_with(&mut app, &image, CrackResolution::Fixed(asked));
+        hit(&mut app, center(entity));
+        settle(&mut app, entity);
+        assert_eq!(size_of(&app, &image_of(&app, entity)), expected, "{asked} asked for");
+        assert_eq!(get::<Sprite>(&app, entity).custom_size, Some(Vec2::new(64.0, 32.0)), "as large on the screen");
+        app.world_mut().despawn(entity);
+        step(&mut app);
+    }
+    // A picture that is larger than a texture may be.
+    let long = add(&mut app, picture(UVec2::new(20_000, 4)));
+    let entity = spawn_sprite(&mut app, &long);
+    hit(&mut app, center(entity));
+    settle(&mut app, entity);
+    assert_eq!(size_of(&app, &image_of(&app, entity)), UVec2::new(256, 1));
+    // The news of the picture that was added reach everybody.
+    steps(&mut app, 2);
+
+    // No memory for textures: coarser ones, then none, in words; given back when others go.
+    *app.world_mut().resource_mut::<CrackBudget>() =
+        CrackBudget { milliseconds: 1e6, max_texture_bytes: 200_000, ..CrackBudget::default() };
+    let fixed = CrackResolution::Fixed(UVec2::splat(4096));
+    let first = spawn_with(&mut app, &image, fixed);
+    hit(&mut app, center(first));
+    settle(&mut app, first);
+    assert_eq!(size_of(&app, &image_of(&app, first)), UVec2::splat(64));
+    let mut surfaces = vec![first];
+    loop {
+        let entity = spawn_with(&mut app, &image, fixed);
+        hit(&mut app, center(entity));
+        step(&mut app);
+        surfaces.push(entity);
+        assert!(surfaces.len() < 10, "the budget is never reached");
+        if let CrackStatus::Failed(error) = state(&app, entity).status {
+            assert!(matches!(error, CrackError::TextureBudget { needed, left } if needed > left), "{error:?}");
+            break;
+        }
+    }
+    let last = surfaces.pop().unwrap();
+    app.world_mut().despawn(first);
+    hit(&mut app, center(last));
+    settle(&mut app, last);
+    let budget = CrackBudget { milliseconds: 1e6, ..CrackBudget::default() };
+    app.insert_resource(budget);
+    assert_cracks(&mut app, other);
+}
+
+#[test]
+fn t3_the_limit_of_the_device_holds() {
+    let Some((_one, mut app)) = gpu_app() else { return };
+    let limit = app.world().resource::<bevy::render::renderer::RenderDevice>().limits().max_texture_dimension_2d;
+    app.world_mut().resource_mut::<CrackBudget>().max_side = u32::MAX;
+    // Only in main memory: the renderer would quit over it.
+    let mut long = picture(UVec2::new(20_000, 2));
+    long.asset_usage = RenderAssetUsages::MAIN_WORLD;
+    let long = add(&mut app, long);
+    let entity = spawn_sprite(&mut app, &long);
+    let image = add(&mut app, picture(UVec2::splat(8)));
+    let wide = spawn_with(&mut app, &image, CrackResolution::Fixed(UVec2::new(u32::MAX, 1)));
+    for entity in [entity, wide] {
+        hit(&mut app, center(entity));
+        settle(&mut app, entity);
+        assert!(size_of(&app, &image_of(&app, entity)).x <= limit.min(16_384));
+    }
+    assert_on_gpu(&mut app, &[entity, wide]);
+    assert_eq!(app.should_exit(), None);
+}
+
+#[test]
+fn t4_frames_flips_and_sizes_of_sprites() {
+    let Some((_one, mut app)) = gpu_app() else { return };
+    let target = spawn_camera(&mut app, UVec2::splat(64));
+    let sheet = add(&mut app, solid(UVec2::new(64, 64), [90, 120, 150, 255]));
+    let layout = TextureAtlasLayout::from_grid(UVec2::splat(32), 2, 2, None, None);
+    let layout = add(&mut app, layout);
+    let plain = Sprite::from_image(sheet.clone());
+    let atlas = Sprite::from_atlas_image(sheet.clone(), TextureAtlas { layout, index: 3 });
+    let sprites = [
+        plain.clone(),
+        Sprite { flip_x: true, ..plain.clone() },
+        Sprite { flip_y: true, ..plain.clone() },
+        // Texels that are not square.
+        Sprite { custom_size: Some(Vec2::new(60.0, 30.0)), ..plain.clone() },
+        Sprite { rect: Some(Rect::new(32.0, 0.0, 64.0, 64.0)), ..plain },
+        Sprite { flip_x: true, ..atlas },
+    ];
+    for sprite in sprites {
+        let size = match (&sprite.texture_atlas, sprite.rect, sprite.custom_size) {
+            (_, _, Some(size)) => size,
+            (Some(_), ..) => Vec2::splat(32.0),
+            (_, Some(rect), _) => rect.size(),
+            _ => Vec2::splat(64.0),
+        };
+        let mut preset = small_preset();
+        preset.growth.reach = 0.01;
+        let entity = app.world_mut().spawn((sprite.clone(), CrackSurface::new(preset))).id();
+        app.update();
+        let before = drawn(&mut app, &target);
+        // A dot where it is aimed at, in the world, as a player would.
+        let aim = size * Vec2::new(0.2, 0.3);
+        hit(&mut app, CrackHit::world(entity, aim.extend(0.0)));
+        settle(&mut app, entity);
+        let after = drawn(&mut app, &target);
+        let (mut sum, mut n) = (Vec2::ZERO, 0.0);
+        for (i, _) in after.chunks(4).zip(before.chunks(4)).enumerate().filter(|(_, (a, b))| a != b) {
+            sum += Vec2::new((i % 64) as f32 - 31.5, 31.5 - (i / 64) as f32);
+            n += 1.0;
+        }
+        assert!(n > 0.0, "no crack shows: {sprite:?}");
+        assert!((sum / n).distance(aim) < 2.5, "aimed at {aim}, drawn at {}: {sprite:?}", sum / n);
+        app.world_mut().despawn(entity);
+    }
+}
+
+#[test]
+fn t4_what_sprites_cannot_do_is_named() {
+    let mut app = app();
+    let image = add(&mut app, picture(UVec2::splat(48)));
+    let modes = [
+        (SpriteImageMode::Sliced(TextureSlicer::default()), "Sliced"),
+        (SpriteImageMode::Tiled { tile_x: true, tile_y: true, stretch_value: 1.0 }, "Tiled"),
+        (SpriteImageMode::Scale(SpriteScalingMode::FillCenter), "Scale"),
+    ];
+    for (image_mode, name) in modes {
+        let sprite = Sprite { image_mode, ..Sprite::from_image(image.clone()) };
+        let entity = app.world_mut().spawn((sprite, CrackSurface::default())).id();
+        assert_eq!(assert_fails(&mut app, entity), CrackError::SpriteMode { mode: name.to_owned() });
+    }
+    // Frames that show nothing of the picture, or cannot be.
+    let bad = f32::NAN;
+    for rect in [
+        Rect::new(100.0, 100.0, 200.0, 200.0),
+        Rect { min: Vec2::splat(30.0), max: Vec2::splat(10.0) },
+        Rect { min: Vec2::splat(bad), max: Vec2::splat(bad) },
+        Rect { min: Vec2::splat(-50.0), max: Vec2::splat(-10.0) },
+        Rect { min: Vec2::splat(5.0), max: Vec2::splat(5.0) },
+    ] {
+        let sprite = Sprite { rect: Some(rect), ..Sprite::from_image(image.clone()) };
+        let entity = app.world_mut().spawn((sprite, CrackSurface::default())).id();
+        let error = assert_fails(&mut app, entity);
+        assert!(matches!(error, CrackError::Size { .. }), "{rect:?}: {error:?}");
+    }
+    // One that is partly there cracks there.
+    let rect = Some(Rect::new(24.0, 24.0, 100.0, 100.0));
+    let sprite = Sprite { rect, ..Sprite::from_image(image.clone()) };
+    let entity = app.world_mut().spawn((sprite, CrackSurface::default())).id();
+    assert_cracks(&mut app, entity);
+    // Sizes that no point can be found in: refused, and the texture coordinates still work.
+    for size in [Vec2::ZERO, Vec2::splat(bad), Vec2::splat(f32::INFINITY), Vec2::splat(-20.0)] {
+        let sprite = Sprite { custom_size: Some(size), ..Sprite::from_image(image.clone()) };
+        let entity = app.world_mut().spawn((sprite, CrackSurface::default())).id();
+        hit(&mut app, CrackHit::world(entity, Vec3::new(1.0, 1.0, 0.0)));
+        step(&mut app);
+        assert_cracks(&mut app, entity);
+    }
+}
+
+#[test]
+fn t4_a_frame_that_wanders_over_the_picture() {
+    let mut app = app();
+    let image = add(&mut app, picture(UVec2::splat(64)));
+    let entity = app
+        .world_mut()
+        .spawn((
+            Sprite { rect: Some(Rect::new(0.0, 0.0, 32.0, 32.0)), ..Sprite::from_image(image) },
+            CrackSurface::default(),
+        ))
+        .id();
+    let mut rng = Rng::new(4);
+    for _ in 0..500 {
+        hit(&mut app, CrackHit::uv(entity, Vec2::new(rng.unit(), rng.unit())));
+        step(&mut app);
+        let min = Vec2::new(rng.range(-10.0, 60.0), rng.range(-10.0, 60.0));
+        let rect = Rect { min, max: min + Vec2::new(rng.range(0.0, 40.0), rng.range(0.0, 40.0)) };
+        app.world_mut().get_mut::<Sprite>(entity).unwrap().rect = Some(rect);
+    }
+    steps(&mut app, 50);
+    assert_sound(&app, entity);
+}
+
+/// Every format there is.
+fn formats() -> Vec<TextureFormat> {
+    use TextureFormat::*;
+    let mut formats = vec![
+        R8Unorm, R8Snorm, R8Uint, R8Sint, R16Uint, R16Sint, R16Unorm, R16Snorm, R16Float, Rg8Unorm, Rg8Snorm, Rg8Uint,
+        Rg8Sint, R32Uint, R32Sint, R32Float, Rg16Uint, Rg16Sint, Rg16Unorm, Rg16Snorm, Rg16Float, Rgba8Unorm,
+        Rgba8UnormSrgb, Rgba8Snorm, Rgba8Uint, Rgba8Sint, Bgra8Unorm, Bgra8UnormSrgb, Rgb9e5Ufloat, Rgb10a2Uint,
+        Rgb10a2Unorm, Rg11b10Ufloat, R64Uint, Rg32Uint, Rg32Sint, Rg32Float, Rgba16Uint, Rgba16Sint, Rgba16Unorm,
+        Rgba16Snorm, Rgba16Float, Rgba32Uint, Rgba32Sint, Rgba32Float, Stencil8, Depth16Unorm, Depth24Plus,
+        Depth24PlusStencil8, Depth32Float, Depth32FloatStencil8, NV12, P010, Bc1RgbaUnorm, Bc1RgbaUnormSrgb,
+        Bc2RgbaUnorm, Bc2RgbaUnormSrgb, Bc3RgbaUnorm, Bc3RgbaUnormSrgb, Bc4RUnorm, Bc4RSnorm, Bc5RgUnorm, Bc5RgSnorm,
+        Bc6hRgbUfloat, Bc6hRgbFloat, Bc7RgbaUnorm, Bc7RgbaUnormSrgb, Etc2Rgb8Unorm, Etc2Rgb8UnormSrgb,
+        Etc2Rgb8A1Unorm, Etc2Rgb8A1UnormSrgb, Etc2Rgba8Unorm, Etc2Rgba8UnormSrgb, EacR11Unorm, EacR11Snorm,
+        EacRg11Unorm, EacRg11Snorm,
+    ];
+    use AstcBlock::*;
+    for block in [B4x4, B5x4, B5x5, B6x5, B6x6, B8x5, B8x6, B8x8, B10x5, B10x6, B10x8, B10x10, B12x10, B12x12] {
+        for channel in [AstcChannel::Unorm, AstcChannel::UnormSrgb, AstcChannel::Hdr] {
+            formats.push(Astc { block, channel });
+        }
+    }
+    formats
+}
+
+#[test]
+fn t5_every_format_is_read_or_refused_by_name() {
+    let mut app = app();
+    let other = spawn_picture(&mut app, UVec2::splat(24));
+    let (mut read, mut refused) = (0, 0);
+    for format in formats() {
+        // Texels of all bits set: NaN in floats. And of none, and of different ones.
+        for fill in [Some(0xFF), Some(0), None] {
+            let mut image = picture_of(UVec2::splat(24), format);
+            if let (Some(fill), Some(data)) = (fill, &mut image.data) {
+                data.fill(fill);
+            }
+            let image = add(&mut app, image);
+            let entity = spawn_sprite(&mut app, &image);
+            app.world_mut().get_mut::<CrackSurface>(entity).unwrap().alpha_mask = false;
+            hit(&mut app, center(entity));
+            step(&mut app);
+            match state(&app, entity).status {
+                CrackStatus::Failed(CrackError::UnsupportedFormat { format: name }) => {
+                    assert_eq!(name, format!("{format:?}"));
+                    assert_eq!(image_of(&app, entity), image, "the picture stands");
+                    refused += 1;
+                }
+                CrackStatus::Failed(error) => panic!("{format:?}: {error:?}"),
+                _ => {
+                    settle(&mut app, entity);
+                    read += 1;
+                }
+            }
+            app.world_mut().despawn(entity);
+        }
+    }
+    step(&mut app);
+    println!("{} formats, {} read, {} refused", formats().len(), read / 3, refused / 3);
+    assert!(read >= 3 * 12, "{read}");
+
+    // An array, a volume, and a picture that is on the GPU only.
+    let mut array = picture(UVec2::splat(24));
+    array.texture_descriptor.size.depth_or_array_layers = 2;
+    let mut volume = picture(UVec2::splat(24));
+    volume.texture_descriptor.dimension = TextureDimension::D3;
+    let mut line = picture(UVec2::new(24, 1));
+    line.texture_descriptor.dimension = TextureDimension::D1;
+    for image in [array, volume, line] {
+        let image = add(&mut app, image);
+        let entity = spawn_sprite(&mut app, &image);
+        let error = assert_fails(&mut app, entity);
+        assert!(matches!(error, CrackError::UnsupportedFormat { .. }), "{error:?}");
+    }
+    let mut gone = picture(UVec2::splat(24));
+    gone.data = None;
+    let gone = add(&mut app, gone);
+    let entity = spawn_sprite(&mut app, &gone);
+    let error = assert_fails(&mut app, entity);
+    assert_eq!(error, CrackError::NoCpuData);
+    assert!(error.to_string().contains("MAIN_WORLD"), "advice: {error}");
+    assert_cracks(&mut app, other);
+}
+
+#[test]
+fn t6_data_of_the_wrong_length_is_refused() {
+    let mut app = app();
+    single_threaded(&mut app);
+    let heard = warnings(|| {
+        for n in [0, 1, 24 * 24 * 4 - 1, 24 * 24 * 4 + 1] {
+            let mut broken = picture(UVec2::splat(24));
+            broken.data = Some(vec![200; n]);
+            let broken = add(&mut app, broken);
+            let entity = spawn_sprite(&mut app, &broken);
+            let error = assert_fails(&mut app, entity);
+            assert_eq!(error, CrackError::DataLength { expected: 24 * 24 * 4, actual: n as u64 });
+            // Repaired, it cracks.
+            replace(&mut app, &broken, picture(UVec2::splat(24)));
+            assert_cracks(&mut app, entity);
+        }
+    });
+    assert_eq!(heard.len(), 4, "{heard:?}");
+}
+
+#[test]
+fn t6_a_picture_that_breaks_under_its_cracks_and_is_repaired() {
+    let mut app = app();
+    let image = add(&mut app, picture(UVec2::splat(48)));
+    let entity = spawn_sprite(&mut app, &image);
+    hit(&mut app, center(entity));
+    settle(&mut app, entity);
+    let cracked = shown(&app, entity);
+    let mut broken = picture(UVec2::splat(48));
+    broken.data = Some(vec![0; 7]);
+    replace(&mut app, &image, broken);
+    steps(&mut app, 3);
+    assert!(matches!(state(&app, entity).status, CrackStatus::Failed(CrackError::DataLength { .. })));
+    assert_eq!(shown(&app, entity), cracked, "the cracks stand");
+    replace(&mut app, &image, picture(UVec2::splat(48)));
+    steps(&mut app, 3);
+    assert_eq!(state(&app, entity).status, CrackStatus::Done);
+    assert_eq!(shown(&app, entity), cracked);
+}
+
+#[test]
+fn t6_textures_that_others_have_broken_never_reach_the_gpu() {
+    let Some((_one, mut app)) = gpu_app() else { return };
+    let image = add(&mut app, picture(UVec2::splat(48)));
+    let surfaces: [_; 4] = [(); 4].map(|()| spawn_sprite(&mut app, &image));
+    for entity in surfaces {
+        hit(&mut app, center(entity));
+    }
+    steps(&mut app, 2);
+    // A game that writes into what is ours, without an event.
+    for (i, entity) in surfaces.into_iter().enumerate().take(3) {
+        let texture = image_of(&app, entity);
+        let mut images = app.world_mut().resource_mut::<Assets<Image>>();
+        let image = images.get_mut_untracked(&texture).unwrap();
+        match i {
+            0 => image.data = None,
+            1 => image.data = Some(vec![0; 5]),
+            _ => image.texture_descriptor.size = Extent3d { width: 96, height: 96, depth_or_array_layers: 1 },
+        }
+    }
+    // Or takes it away.
+    let texture = image_of(&app, surfaces[3]);
+    app.world_mut().resource_mut::<Assets<Image>>().remove(&texture);
+    for _ in 0..20 {
+        for entity in surfaces {
+            hit(&mut app, CrackHit::uv(entity, Vec2::splat(0.3)));
+        }
+        step(&mut app);
+        assert_eq!(app.should_exit(), None);
+    }
+}
+
+/// Holds back the files of an app until it is opened.
+#[derive(Clone, Default)]
+struct Gate(Arc<Mutex<(bool, Vec<Waker>)>>);
+
+impl Gate {
+    fn open(&self) {
+        let mut gate = self.0.lock().unwrap();
+        gate.0 = true;
+        gate.1.drain(..).for_each(Waker::wake);
+    }
+
+    async fn pass(&self) {
+        poll_fn(|context| {
+            let mut gate = self.0.lock().unwrap();
+            if gate.0 {
+                return Poll::Ready(());
+            }
+            gate.1.push(context.waker().clone());
+            Poll::Pending
+        })
+        .await;
+    }
+}
+
+/// A picture in a file: width, height, then one byte for all texels.
+#[derive(TypePath)]
+struct FlatLoader(Gate);
+
+impl AssetLoader for FlatLoader {
+    type Asset = Image;
+    type Settings = ();
+    type Error = std::io::Error;
+
+    async fn load(&self, reader: &mut dyn Reader, (): &(), _: &mut LoadContext<'_>) -> Result<Image, std::io::Error> {
+        let mut bytes = Vec::new();
+        reader.read_to_end(&mut bytes).await?;
+        self.0.pass().await;
+        let [width, height, shade] = bytes[..] else { return Err(std::io::Error::other("no picture")) };
+        Ok(solid(UVec2::new(u32::from(width), u32::from(height)), [shade, shade, shade, 255]))
+    }
+
+    fn extensions(&self) -> &[&str] {
+        &["flat"]
+    }
+}
+
+/// An app whose files lie in memory, and come when the gate is opened.
+fn gated_app() -> (App, Dir, Gate) {
+    let (dir, gate) = (Dir::default(), Gate::default());
+    let reader = MemoryAssetReader { root: dir.clone() };
+    let mut app = App::new();
+    app.register_asset_source("gated", AssetSourceBuilder::new(move || Box::new(reader.clone())));
+    app.add_plugins((MinimalPlugins, TransformPlugin, AssetPlugin::default(), ImagePlugin::default(), CrackPlugins));
+    app.register_asset_loader(FlatLoader(gate.clone()));
+    start(&mut app);
+    single_threaded(&mut app);
+    (app, dir, gate)
+}
+
+fn load(app: &App, path: &str) -> Handle<Image> {
+    app.world().resource::<AssetServer>().load(path.to_owned())
+}
+
+#[test]
+fn t7_hits_wait_until_the_picture_is_there() {
+    let (mut app, dir, gate) = gated_app();
+    dir.insert_asset(Path::new("wall.flat"), vec![40, 30, 200]);
+    let image = load(&app, "gated://wall.flat");
+    let entity = spawn_sprite(&mut app, &image);
+    let other = spawn_picture(&mut app, UVec2::splat(24));
+    app.world_mut().resource_mut::<CrackBudget>().max_queued_per_surface = 10;
+    let heard = warnings(|| {
+        for i in 0..30 {
+            hit(&mut app, CrackHit::uv(entity, Vec2::splat(i as f32 / 30.0)));
+            let stats = step(&mut app);
+            assert_eq!((stats.queued + stats.merged, stats.rejected), (i + 1, 0), "{stats:?}");
+            assert!(stats.queued <= 10, "no more than allowed: {stats:?}");
+            assert_eq!(state(&app, entity).status, CrackStatus::Waiting);
+        }
+    });
+    assert!(heard.is_empty(), "nothing is wrong: {heard:?}");
+    // It keeps nobody else waiting.
+    assert_cracks(&mut app, other);
+    gate.open();
+    wait_for(&mut app, "the picture", |app| counts(app).queued == 0);
+    settle(&mut app, entity);
+    assert_eq!(size_of(&app, &image_of(&app, entity)), UVec2::new(40, 30));
+    assert_eq!(counts(&app).rejected, 0);
+}
+
+#[test]
+fn t8_a_picture_that_does_not_load_fails_with_its_path_and_again_has_its_chance() {
+    let (mut app, dir, gate) = gated_app();
+    let image = load(&app, "gated://missing.flat");
+    let entity = spawn_sprite(&mut app, &image);
+    let heard = warnings(|| {
+        hit(&mut app, center(entity));
+        step(&mut app);
+        assert_eq!(counts(&app).applied, 0);
+        wait_for(&mut app, "the failure", |app| matches!(state(app, entity).status, CrackStatus::Failed(_)));
+        for _ in 0..10 {
+            hit(&mut app, center(entity));
+            step(&mut app);
+        }
+    });
+    assert_eq!(heard.len(), 1, "one warning: {heard:?}");
+    assert!(heard[0].contains("missing.flat"), "it names the file: {heard:?}");
+    let stats = counts(&app);
+    assert_eq!((stats.rejected, stats.queued), (11, 0), "the queue is dropped and counted");
+
+    // The file is there after all.
+    dir.insert_asset(Path::new("missing.flat"), vec![32, 32, 180]);
+    gate.open();
+    app.world().resource::<AssetServer>().reload("gated://missing.flat");
+    wait_for(&mut app, "the picture", |app| app.world().resource::<Assets<Image>>().contains(&image));
+    assert_cracks(&mut app, entity);
+
+    // Another picture instead of one that does not load.
+    let image = load(&app, "gated://other.flat");
+    let entity = spawn_sprite(&mut app, &image);
+    hit(&mut app, center(entity));
+    wait_for(&mut app, "the failure", |app| matches!(state(app, entity).status, CrackStatus::Failed(_)));
+    let image = add(&mut app, picture(UVec2::splat(24)));
+    app.world_mut().get_mut::<Sprite>(entity).unwrap().image = image;
+    assert_cracks(&mut app, entity);
+}
+
+/// Share of texels that are as in `base`.
+fn share_untouched(now: &[u8], base: &[u8]) -> f32 {
+    let same = now.chunks(4).zip(base.chunks(4)).filter(|(a, b)| a == b).count();
+    same as f32 / (now.len() / 4) as f32
+}
+
+#[test]
+fn t9_a_changed_picture_of_the_same_size_keeps_its_cracks() {
+    let mut app = app();
+    let image = add(&mut app, solid(UVec2::splat(64), [90, 90, 90, 255]));
+    let entity = spawn_sprite(&mut app, &image);
+    hit(&mut app, center(entity));
+    settle(&mut app, entity);
+    let (damage, nodes) = (state(&app, entity).damage, state(&app, entity).nodes);
+    let new = solid(UVec2::splat(64), [20, 160, 40, 255]);
+    let base = new.data.clone().unwrap();
+    replace(&mut app, &image, new);
+    steps(&mut app, 3);
+    let now = shown(&app, entity);
+    let share = share_untouched(&now, &base);
+    assert!(share > 0.5 && share < 1.0, "cracks on the new picture: {share}");
+    assert_eq!((state(&app, entity).damage, state(&app, entity).nodes), (damage, nodes));
+    // The same as if it had been so from the beginning.
+    let image = add(&mut app, solid(UVec2::splat(64), [20, 160, 40, 255]));
+    let fresh = spawn_sprite(&mut app, &image);
+    hit(&mut app, center(fresh));
+    settle(&mut app, fresh);
+    assert!(shown(&app, fresh) == now);
+}
+
+#[test]
+fn t10_a_changed_picture_of_another_size_is_cracked_anew_in_the_same_places() {
+    let mut app = app();
+    for new_size in [UVec2::splat(128), UVec2::splat(31), UVec2::new(128, 64), UVec2::new(40, 90)] {
+        let image = add(&mut app, solid(UVec2::splat(64), [90, 90, 90, 255]));
+        let entity = spawn_sprite(&mut app, &image);
+        hit(&mut app, CrackHit::uv(entity, Vec2::new(0.75, 0.25)).with_energy(0.2));
+        settle(&mut app, entity);
+        let new = solid(new_size, [90, 90, 90, 255]);
+        let base = new.data.clone().unwrap();
+        replace(&mut app, &image, new);
+        steps(&mut app, 200);
+        settle(&mut app, entity);
+        assert_eq!(size_of(&app, &image_of(&app, entity)), new_size);
+        assert_eq!(get::<Sprite>(&app, entity).custom_size, None, "as large as its picture");
+        let place = |now: &[u8]| {
+            let (mut sum, mut n) = (Vec2::ZERO, 0.0);
+            for (i, _) in now.chunks(4).zip(base.chunks(4)).enumerate().filter(|(_, (a, b))| a != b) {
+                sum += Vec2::new(i as f32 % new_size.x as f32, (i as u32 / new_size.x) as f32) + 0.5;
+                n += 1.0;
+            }
+            sum / n / new_size.as_vec2()
+        };
+        let at = place(&shown(&app, entity));
+        assert!(at.distance(Vec2::new(0.75, 0.25)) < 0.15, "{new_size}: hit at 0.75, 0.25, cracked at {at}");
+        // A further hit lands where it is aimed at.
+        let before = shown(&app, entity);
+        hit(&mut app, CrackHit::uv(entity, Vec2::new(0.2, 0.8)).with_energy(0.1));
+        settle(&mut app, entity);
+        let changed = shown(&app, entity).chunks(4).zip(before.chunks(4)).position(|(a, b)| a != b).map(|i| i as u32);
+        let row = changed.expect("a crack") / new_size.x;
+        assert!(row > new_size.y / 2, "{new_size}: aimed low, but row {row} has changed");
+    }
+}
+
+#[test]
+fn t9_t10_reloaded_pictures_are_drawn() {
+    let Some((_one, mut app)) = gpu_app() else { return };
+    let target = spawn_camera(&mut app, UVec2::splat(64));
+    let image = add(&mut app, solid(UVec2::splat(64), [90, 90, 90, 255]));
+    let entity = spawn_sprite(&mut app, &image);
+    hit(&mut app, center(entity));
+    settle(&mut app, entity);
+    let check = |app: &mut App, what: &str| {
+        assert_on_gpu(app, &[entity]);
+        assert_eq!(app.should_exit(), None, "{what}");
+        let (now, on_screen) = (shown(app, entity), drawn(app, &target));
+        assert!(difference(&now, &on_screen) <= 1, "{what}: drawn is not what is shown");
+    };
+    check(&mut app, "before");
+    let same = solid(UVec2::splat(64), [20, 160, 40, 255]);
+    replace(&mut app, &image, same);
+    steps(&mut app, 3);
+    check(&mut app, "same size");
+    // A larger one, then the size of the camera again, with cracks growing.
+    let larger = solid(UVec2::splat(100), [60, 60, 200, 255]);
+    replace(&mut app, &image, larger);
+    hit(&mut app, CrackHit::uv(entity, Vec2::splat(0.2)));
+    steps(&mut app, 3);
+    assert_on_gpu(&mut app, &[entity]);
+    let again = solid(UVec2::splat(64), [200, 60, 60, 255]);
+    replace(&mut app, &image, again);
+    hit(&mut app, CrackHit::uv(entity, Vec2::splat(0.8)));
+    settle(&mut app, entity);
+    check(&mut app, "other sizes");
+}
+
+#[test]
+fn t11_pictures_removed_and_swapped_while_cracks_grow() {
+    let mut app = app();
+    let image = add(&mut app, solid(UVec2::splat(64), [90, 90, 90, 255]));
+    let [entity, later] = [(); 2].map(|()| spawn_sprite(&mut app, &image));
+    hit(&mut app, center(entity));
+    steps(&mut app, 3);
+    assert_eq!(state(&app, entity).status, CrackStatus::Growing);
+    let n_nodes = state(&app, entity).nodes;
+    // The picture goes: the surface has its own copy and goes on.
+    app.world_mut().resource_mut::<Assets<Image>>().remove(&image);
+    settle(&mut app, entity);
+    assert!(state(&app, entity).nodes > n_nodes);
+    // One that has not been cracked yet waits for it to come back.
+    hit(&mut app, center(later));
+    steps(&mut app, 3);
+    assert_eq!((state(&app, later).status, counts(&app).queued), (CrackStatus::Waiting, 1));
+    let again = solid(UVec2::splat(64), [90, 90, 90, 255]);
+    assert!(app.world_mut().resource_mut::<Assets<Image>>().insert(&image, again).is_ok());
+    settle(&mut app, later);
+    assert_eq!(shown(&app, later), shown(&app, entity), "the same crack");
+
+    // Swapped while growing, for one of another size, that is loaded only then.
+    let other = app.world().resource::<Assets<Image>>().reserve_handle();
+    hit(&mut app, CrackHit::uv(entity, Vec2::splat(0.2)));
+    step(&mut app);
+    app.world_mut().get_mut::<Sprite>(entity).unwrap().image = other.clone();
+    steps(&mut app, 3);
+    let new = solid(UVec2::splat(96), [20, 160, 40, 255]);
+    let base = new.data.clone().unwrap();
+    assert!(app.world_mut().resource_mut::<Assets<Image>>().insert(&other, new).is_ok());
+    steps(&mut app, 3);
+    settle(&mut app, entity);
+    let own = image_of(&app, entity);
+    assert_ne!(own, other, "its own copy");
+    assert_eq!(size_of(&app, &own), UVec2::splat(96));
+    assert!(share_untouched(&texels(&app, &own), &base) < 1.0, "the cracks are there");
+    assert_eq!(texels(&app, &other), base, "the picture itself is untouched");
+    // And given back.
+    app.world_mut().commands().entity(entity).heal_cracks();
+    step(&mut app);
+    assert_eq!(image_of(&app, entity), other);
+}
+
+#[test]
+fn t12_surfaces_that_share_a_picture_or_a_material() {
+    let Some((_one, mut app)) = gpu_app() else { return };
+    let image = add(&mut app, picture(UVec2::splat(48)));
+    let before = texels(&app, &image);
+    let [a, b, c] = [(); 3].map(|()| spawn_sprite(&mut app, &image));
+    hit(&mut app, CrackHit::uv(a, Vec2::splat(0.2)));
+    hit(&mut app, CrackHit::uv(b, Vec2::splat(0.8)));
+    settle(&mut app, a);
+    settle(&mut app, b);
+    let all = [a, b, c].map(|entity| shown(&app, entity));
+    assert!(all[0] != all[1] && all[0] != before && all[1] != before && all[2] == before);
+    assert_eq!(image_of(&app, c), image);
+    assert_on_gpu(&mut app, &[a, b]);
+    assert_eq!(gpu_texels(&mut app, std::slice::from_ref(&image))[0], before, "the original on the GPU, too");
+
+    let mesh = add(&mut app, Mesh::from(Rectangle::new(1.0, 1.0)));
+    let material = add(&mut app, ColorMaterial::from(image.clone()));
+    let [a, b] = [(); 2].map(|()| {
+        let shown = (Mesh2d(mesh.clone()), MeshMaterial2d(material.clone()));
+        app.world_mut().spawn((shown, CrackSurface::default())).id()
+    });
+    hit(&mut app, center(a));
+    settle(&mut app, a);
+    let own = get::<MeshMaterial2d<ColorMaterial>>(&app, a).0;
+    assert_ne!(own, material);
+    assert_eq!(get::<MeshMaterial2d<ColorMaterial>>(&app, b).0, material);
+    let texture = |handle: &Handle<ColorMaterial>| {
+        app.world().resource::<Assets<ColorMaterial>>().get(handle).unwrap().texture.clone()
+    };
+    assert_eq!((texture(&own), texture(&material)), (get::<CrackTextures>(&app, a).diffuse, Some(image)));
+}
+
+#[test]
+fn t13_surfaces_stay_visible_when_few_bytes_may_be_uploaded() {
+    let Some((_one, mut app)) = gpu_app() else { return };
+    let target = spawn_camera(&mut app, UVec2::splat(64));
+    let image = add(&mut app, solid(UVec2::splat(64), [90, 90, 90, 255]));
+    let entity = spawn_sprite(&mut app, &image);
+    steps(&mut app, 3);
+    app.insert_resource(RenderAssetBytesPerFrame::new(1));
+    // From the first crack on, and while it grows.
+    let mut uploaded = 0;
+    for i in 0..30 {
+        if i % 10 == 0 {
+            hit(&mut app, CrackHit::uv(entity, Vec2::splat(0.2 + 0.03 * i as f32)));
+        }
+        let on_screen = drawn(&mut app, &target);
+        uploaded += app.world().resource::<CrackUploadStats>().bytes;
+        let n_black = on_screen.chunks(4).filter(|texel| texel[..3] == [0, 0, 0]).count();
+        assert!(n_black < 64 * 64 / 2, "frame {i}: the sprite is gone");
+    }
+    settle(&mut app, entity);
+    assert!(uploaded > 0, "rectangles were uploaded");
+    assert!(difference(&shown(&app, entity), &drawn(&mut app, &target)) <= 1);
+    assert_on_gpu(&mut app, &[entity]);
+}
+
+#[test]
+fn t14_a_cracked_picture_is_as_bright_as_before() {
+    let Some((_one, mut app)) = gpu_app() else { return };
+    let target = spawn_camera(&mut app, UVec2::splat(64));
+    let size = UVec2::splat(64);
+    // sRGB, linear, of the other byte order, in floats with half brightness and beyond, half transparent.
+    let half = |x: f32| (half_bits(x)).to_le_bytes();
+    let float = [half(0.5), half(4.0), half(0.1), half(1.0)].concat();
+    for (format, texel) in [
+        (TextureFormat::Rgba8UnormSrgb, vec![128, 60, 200, 255]),
+        (TextureFormat::Rgba8Unorm, vec![128, 60, 200, 255]),
+        (TextureFormat::Bgra8UnormSrgb, vec![128, 60, 200, 255]),
+        (TextureFormat::Bgra8Unorm, vec![128, 60, 200, 255]),
+        (TextureFormat::Rgba16Float, float),
+        (TextureFormat::Rgba8UnormSrgb, vec![128, 60, 200, 120]),
+    ] {
+        let mut image = picture_of(size, format);
+        image.data = Some(texel.repeat(64 * 64));
+        let image = add(&mut app, image);
+        let entity = spawn_sprite(&mut app, &image);
+        steps(&mut app, 2);
+        let before = drawn(&mut app, &target);
+        // A dot in a corner.
+        app.world_mut().get_mut::<CrackSurface>(entity).unwrap().preset.growth.reach = 0.01;
+        hit(&mut app, CrackHit::uv(entity, Vec2::splat(0.1)));
+        settle(&mut app, entity);
+        let after = drawn(&mut app, &target);
+        // Rows far from it.
+        let far = 64 * 4 * 32;
+        let worst = difference(&before[far..], &after[far..]);
+        assert!(worst <= 2, "{format:?}: differs by {worst}: {:?} {:?}", &before[far..far + 4], &after[far..far + 4]);
+        assert!(before[..far] != after[..far], "{format:?}: no crack is drawn");
+        let textures: CrackTextures = get(&app, entity);
+        let images = app.world().resource::<Assets<Image>>();
+        let formats = [&textures.diffuse, &textures.normal].map(|handle| {
+            let descriptor = &images.get(handle.as_ref().unwrap()).unwrap().texture_descriptor;
+            assert_eq!(descriptor.mip_level_count, 1, "no mips, by choice");
+            descriptor.format
+        });
+        assert_eq!(formats, [TextureFormat::Rgba8UnormSrgb, TextureFormat::Rgba8Unorm], "normals are linear");
+        app.world_mut().despawn(entity);
+    }
+    // A picture with mips is read at its largest.
+    let mut mipped = picture(size);
+    let data = mipped.data.as_mut().unwrap();
+    data.extend(vec![7; 32 * 32 * 4]);
+    mipped.texture_descriptor.mip_level_count = 2;
+    let mipped = add(&mut app, mipped);
+    let entity = spawn_sprite(&mut app, &mipped);
+    assert_cracks_alone(&mut app, entity);
+    assert_on_gpu(&mut app, &[entity]);
+    assert_eq!(app.should_exit(), None);
+}
+
+/// A hit after which the texture is as long as its own size says, whatever the picture had besides.
+fn assert_cracks_alone(app: &mut App, entity: Entity) {
+    hit(app, center(entity));
+    settle(app, entity);
+    assert_eq!(shown(app, entity).len(), 64 * 64 * 4);
+}
+
+/// The bits of a half-precision float: normal numbers that fit only.
+fn half_bits(x: f32) -> u16 {
+    let bits = x.to_bits();
+    let exponent = ((bits >> 23) & 0xFF) as i32 - 127 + 15;
+    ((exponent as u16) << 10) | ((bits >> 13) & 0x3FF) as u16
+}
