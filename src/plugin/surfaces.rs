@@ -9,6 +9,9 @@ use crate::{
 use bevy::{asset::UntypedAssetId, ecs::entity::EntityHashMap, platform::collections::HashMap, prelude::*};
 use std::collections::VecDeque;
 
+/// The most parts of an image that are remembered; one that is forgotten is painted anew when it is shown again.
+const MAX_VIEWS: usize = 256;
+
 /// A part of the image that shows the cracks: the whole image, or a frame of an atlas.
 pub(super) struct View {
     pub(super) rect: TexelRect,
@@ -67,6 +70,9 @@ impl Active {
         self.view = known.unwrap_or_else(|| {
             let mut dirty = DirtyTiles::new(self.field.frame.size());
             dirty.mark(TexelRect::whole(self.field.frame.size()));
+            if self.views.len() >= MAX_VIEWS {
+                self.views.remove(0);
+            }
             self.views.push(View { rect, dirty });
             self.views.len() - 1
         });
