@@ -9,6 +9,7 @@ use super::{
     queue::{HitQueue, QueuedHit},
     surfaces::{Active, Surfaces, Touched},
     textures,
+    upload::Uploads,
 };
 use crate::{
     Grid,
@@ -306,6 +307,7 @@ pub(super) fn make_textures(
     draft: &Draft,
     reuse: Option<&CrackTextures>,
 ) -> Result<CrackTextures, CrackError> {
+    world.resource_mut::<Uploads>().expect_whole();
     let mut images = world.get_resource_mut::<Assets<Image>>().ok_or(CrackError::NoImages)?;
     let mut add = |wanted: bool,
                    make: fn(&BasePicture, &ImageSampler) -> Option<Image>,

@@ -10,7 +10,7 @@ use bevy::{
     prelude::*,
     render::{
         ExtractSchedule, MainWorld, RenderApp,
-        render_asset::RenderAssets,
+        render_asset::{RenderAssetBytesPerFrameLimiter, RenderAssets, extract_render_asset_bytes_per_frame},
         render_resource::{
             Buffer, BufferDescriptor, BufferUsages, CommandEncoderDescriptor, Extent3d, Origin3d, TexelCopyBufferInfo,
             TexelCopyBufferLayout, TexelCopyTextureInfo, TextureAspect,
@@ -50,9 +50,18 @@ pub(super) struct Uploads {
     rects: Vec<(AssetId<Image>, TexelRect)>,
     /// Number of rectangles of each image since they were last thinned out.
     limit: usize,
+    /// Whether whole textures are on their way.
+    has_whole: bool,
 }
 
 impl Uploads {
+    /// Notes that a surface shows a texture from this frame on that the GPU does not have yet. Were it to wait for its turn under
+    /// [`RenderAssetBytesPerFrame`](bevy::render::render_asset::RenderAssetBytesPerFrame), the surface would vanish
+    /// meanwhile: the limit does not hold in this frame.
+    pub(super) fn expect_whole(&mut self) {
+        self.has_whole = self.is_wanted;
+    }
+
     /// Notes that texels of an image have changed.
     pub(super) fn push(&mut self, image: AssetId<Image>, rect: TexelRect) {
         if self.is_wanted && !rect.is_empty() {
@@ -88,7 +97,9 @@ pub(super) fn drop_unwanted(mut uploads: ResMut<Uploads>) {
 /// Lets the render world fetch rectangles, if there is one.
 pub(super) fn connect(app: &mut App) {
     let Some(render_app) = app.get_sub_app_mut(RenderApp) else { return };
-    render_app.init_resource::<Staging>().add_systems(ExtractSchedule, upload_rects);
+    render_app
+        .init_resource::<Staging>()
+        .add_systems(ExtractSchedule, upload_rects.after(extract_render_asset_bytes_per_frame));
     app.world_mut().resource_mut::<Uploads>().is_wanted = true;
 }
 
@@ -123,7 +134,11 @@ fn upload_rects(
     gpu_images: Res<RenderAssets<GpuImage>>,
     device: Res<RenderDevice>,
     queue: Res<RenderQueue>,
+    mut limiter: ResMut<RenderAssetBytesPerFrameLimiter>,
 ) {
+    if core::mem::take(&mut main.resource_mut::<Uploads>().has_whole) {
+        limiter.max_bytes = None;
+    }
     let Staging { rects, copies, rows, buffer } = &mut *staging;
     core::mem::swap(rects, &mut main.resource_mut::<Uploads>().rects);
     let mut stats = CrackUploadStats::default();
