@@ -1,6 +1,6 @@
 //! [`CrackHit`]: something strikes a surface.
 
-use super::{CrackBudget, CrackStats, CrackSurface, queue::HitQueue};
+use super::{CrackBudget, CrackStats, CrackSurface, budget::FrameClock, queue::HitQueue};
 use bevy::prelude::*;
 
 /// One hit on a [`CrackSurface`]: trigger it as an entity event, or write it as a message when there are many.
@@ -97,11 +97,14 @@ pub(super) fn collect_hits(
     mut queue: ResMut<HitQueue>,
     mut stats: ResMut<CrackStats>,
     budget: Res<CrackBudget>,
+    mut clock: ResMut<FrameClock>,
     surfaces: Query<Option<&GlobalTransform>, With<CrackSurface>>,
 ) {
     if queue.inbox.is_empty() && messages.is_empty() {
         return;
     }
+    // All of them, whatever it takes; what it takes is not there for the others.
+    let timer = clock.start(&budget, 1.0);
     let mut inbox = core::mem::take(&mut queue.inbox);
     for hit in inbox.iter().chain(messages.read()) {
         stats.sent += 1;
@@ -113,6 +116,7 @@ pub(super) fn collect_hits(
     }
     inbox.clear();
     queue.inbox = inbox;
+    clock.stop(&timer);
 }
 
 /// World points become local ones at once: the surface may move before the hit's turn comes.

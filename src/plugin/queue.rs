@@ -45,8 +45,10 @@ impl HitQueue {
             return;
         }
         let stride = hits.len().div_ceil(MERGE_CANDIDATES);
-        let nearest = hits.iter_mut().step_by(stride).min_by(|a, b| distance(a.at, at).total_cmp(&distance(b.at, at)));
-        if let Some(nearest) = nearest {
+        let candidates = (0..hits.len()).step_by(stride).filter_map(|i| Some((distance(hits.get(i)?.at, at), i)));
+        if let Some((_, nearest)) = candidates.min_by(|a, b| a.0.total_cmp(&b.0))
+            && let Some(nearest) = hits.get_mut(nearest)
+        {
             nearest.energy = (nearest.energy + energy).min(f32::MAX);
             stats.merged += 1;
         }
