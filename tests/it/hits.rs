@@ -241,18 +241,19 @@ fn i6_ten_thousand_hits_in_one_frame_stay_in_the_budget() {
         settle(&mut app, entity);
         times
     };
-    // Without a budget there is one hit, one step and one surface in a frame: the dearest frame is one step. Of both, the
-    // best of several runs, as other programs run on the machine.
-    let one = (0..3).map(|_| run(0.0)[1..].iter().max().copied().unwrap()).min().unwrap();
-    let (longest, n_frames) = (0..5)
-        .map(|_| {
-            let times = run(BUDGET);
-            (*times.iter().max().unwrap(), times.len())
-        })
-        .min()
-        .unwrap();
+    // Other programs run on the machine, and all runs do the same: the shortest of several runs counts, for each frame of
+    // those without a budget, which show what one hit, one step and one surface cost, and for the longest frame of the others.
+    let mut ones = run(0.0);
+    for _ in 0..2 {
+        for (one, again) in ones.iter_mut().zip(run(0.0)) {
+            *one = again.min(*one);
+        }
+    }
+    let one = ones.iter().skip(1).max().copied().unwrap();
+    let times = (0..5).map(|_| run(BUDGET)).min_by_key(|times| times.iter().max().copied()).unwrap();
+    let longest = times.iter().max().copied().unwrap();
     let limit = Duration::from_secs_f32(BUDGET * 1.5 / 1000.0) + one;
-    println!("longest frame {longest:?}, limit {limit:?} (one step: {one:?}), drained in {n_frames} frames");
+    println!("frames {times:?}, {limit:?} allowed (one step: {one:?})");
     assert!(longest <= limit, "a frame of {longest:?}, {limit:?} allowed");
 }
 
@@ -336,9 +337,11 @@ fn i8_a_thousand_surfaces_grow_at_once_and_in_turns() {
     let nodes = |app: &App| surfaces.iter().map(|entity| state(app, *entity).nodes).collect::<Vec<_>>();
     let before = nodes(&app);
     wait_for(&mut app, "growth everywhere", |app| {
-        nodes(app).iter().zip(&before).zip(&surfaces).all(|((now, before), entity)| {
-            now > before || state(app, *entity).status == CrackStatus::Done
-        })
+        nodes(app)
+            .iter()
+            .zip(&before)
+            .zip(&surfaces)
+            .all(|((now, before), entity)| now > before || state(app, *entity).status == CrackStatus::Done)
     });
     for entity in surfaces {
         settle(&mut app, entity);

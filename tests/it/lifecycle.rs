@@ -25,7 +25,8 @@ fn e1_a_storm_of_despawns_leaves_nothing_behind() {
     settle(&mut app, bystander);
     let cracked = shown(&app, bystander);
     step(&mut app);
-    let (n_entities, n_images) = (app.world().entities().count_spawned(), app.world().resource::<Assets<Image>>().len());
+    let (n_entities, n_images) =
+        (app.world().entities().count_spawned(), app.world().resource::<Assets<Image>>().len());
     let mut rng = Rng::new(1);
     let mut alive = Vec::new();
     for _ in 0..10_000 {
@@ -266,7 +267,8 @@ fn e4_any_subset_of_plugins() {
         finish(&mut app);
         single_threaded(&mut app);
         let heard = warnings(|| {
-            let what = format!("time {has_time}, transforms {has_transforms}, assets {has_assets}, images {has_images}");
+            let what =
+                format!("time {has_time}, transforms {has_transforms}, assets {has_assets}, images {has_images}");
             step(&mut app);
             if has_images {
                 let entity = spawn_picture(&mut app, UVec2::splat(32));
@@ -511,4 +513,3 @@ fn e7_a_long_frame_makes_a_bounded_number_of_steps() {
         assert_eq!(state(&app, entity).nodes, before, "{rate} steps a second");
     }
 }
-

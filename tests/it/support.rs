@@ -80,7 +80,10 @@ pub(crate) fn gpu_app() -> Option<(MutexGuard<'static, ()>, App)> {
     static ONE: Mutex<()> = Mutex::new(());
     let guard = ONE.lock().unwrap_or_else(PoisonError::into_inner);
     let Some(renderer) = renderer() else {
-        assert!(std::env::var_os("CRACK_REQUIRE_ALL").is_none_or(|v| v != "1"), "no GPU adapter, and all tests must run");
+        assert!(
+            std::env::var_os("CRACK_REQUIRE_ALL").is_none_or(|v| v != "1"),
+            "no GPU adapter, and all tests must run"
+        );
         eprintln!("SKIPPED: no GPU adapter (install Mesa's software Vulkan)");
         return None;
     };
@@ -219,7 +222,11 @@ pub(crate) fn settle(app: &mut App, entity: Entity) {
     step(app);
     wait_for(app, "the end of the cracks", |app| {
         let state = state(app, entity);
-        assert!(!matches!(state.status, CrackStatus::Failed(_) | CrackStatus::Untouched), "{state:?} {:?}", counts(app));
+        assert!(
+            !matches!(state.status, CrackStatus::Failed(_) | CrackStatus::Untouched),
+            "{state:?} {:?}",
+            counts(app)
+        );
         state.status == CrackStatus::Done
     });
     assert_sound(app, entity);
@@ -326,8 +333,10 @@ pub(crate) fn gpu_texels(app: &mut App, images: &[Handle<Image>]) -> Vec<Vec<u8>
 
 /// The textures of each surface are the same on the GPU.
 pub(crate) fn assert_on_gpu(app: &mut App, surfaces: &[Entity]) {
-    let images: Vec<_> =
-        surfaces.iter().flat_map(|entity| get::<CrackTextures>(app, *entity).handles().cloned().collect::<Vec<_>>()).collect();
+    let images: Vec<_> = surfaces
+        .iter()
+        .flat_map(|entity| get::<CrackTextures>(app, *entity).handles().cloned().collect::<Vec<_>>())
+        .collect();
     for (image, on_gpu) in images.iter().zip(gpu_texels(app, &images)) {
         let descriptor = &app.world().resource::<Assets<Image>>().get(image).expect("the image").texture_descriptor;
         assert!(texels(app, image) == on_gpu, "the GPU holds something else: {descriptor:?}");
@@ -349,21 +358,34 @@ pub(crate) fn spawn_camera(app: &mut App, size: UVec2) -> Handle<Image> {
     target
 }
 
+/// What the camera draws in each of `n` frames; `before` is called before each.
+pub(crate) fn film(
+    app: &mut App,
+    target: &Handle<Image>,
+    n: usize,
+    mut before: impl FnMut(&mut App, usize),
+) -> Vec<Vec<u8>> {
+    let film = Arc::new(Mutex::new(Vec::new()));
+    for i in 0..n {
+        before(app, i);
+        let film = film.clone();
+        app.world_mut().spawn(Screenshot::image(target.clone())).observe(move |done: On<ScreenshotCaptured>| {
+            let data = done.image.data.clone().unwrap_or_default();
+            film.lock().unwrap_or_else(PoisonError::into_inner).push(data);
+        });
+        app.update();
+    }
+    let start = Instant::now();
+    while film.lock().unwrap_or_else(PoisonError::into_inner).len() < n {
+        assert!(start.elapsed() < Duration::from_secs(60), "no screenshot");
+        app.update();
+    }
+    core::mem::take(&mut *film.lock().unwrap_or_else(PoisonError::into_inner))
+}
+
 /// What the camera draws now.
 pub(crate) fn drawn(app: &mut App, target: &Handle<Image>) -> Vec<u8> {
-    let answer = Arc::new(Mutex::new(None));
-    let slot = answer.clone();
-    app.world_mut().spawn(Screenshot::image(target.clone())).observe(move |done: On<ScreenshotCaptured>| {
-        *slot.lock().unwrap_or_else(PoisonError::into_inner) = done.image.data.clone();
-    });
-    let start = Instant::now();
-    loop {
-        app.update();
-        if let Some(data) = answer.lock().unwrap_or_else(PoisonError::into_inner).take() {
-            return data;
-        }
-        assert!(start.elapsed() < Duration::from_secs(60), "no screenshot");
-    }
+    film(app, target, 1, |_, _| {}).swap_remove(0)
 }
 
 /// The largest difference of two pictures of one size.
