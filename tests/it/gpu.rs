@@ -1,6 +1,7 @@
 //! What the GPU holds equals the CPU copy. Needs an adapter (Mesa's software Vulkan will do); without one these tests say so
 //! and pass, unless `CRACK_REQUIRE_ALL=1` is set.
 
+use crate::support;
 use bevy::{
     asset::{AssetPlugin, RenderAssetUsages},
     camera::CameraPlugin,
@@ -11,8 +12,7 @@ use bevy::{
         RenderPlugin,
         gpu_readback::{Readback, ReadbackComplete},
         render_resource::{Extent3d, TextureDimension, TextureFormat},
-        renderer::initialize_renderer,
-        settings::{RenderCreation, RenderResources, WgpuSettings},
+        settings::RenderCreation,
     },
     time::TimeUpdateStrategy,
     window::{ExitCondition, WindowPlugin},
@@ -20,34 +20,13 @@ use bevy::{
 use bevy_crack::{math::Rng, plugin::CrackUploadStats, prelude::*};
 use std::{
     collections::HashMap,
-    panic,
     sync::{Arc, Mutex, MutexGuard},
     time::Duration,
 };
 
-/// The renderer, if there is an adapter: asking for one that is not there panics inside Bevy.
-fn renderer() -> Option<RenderResources> {
-    let settings = WgpuSettings::default();
-    let backends = settings.backends?;
-    let hook = panic::take_hook();
-    panic::set_hook(Box::new(|_| {}));
-    let resources = panic::catch_unwind(|| bevy::tasks::block_on(initialize_renderer(backends, None, &settings)));
-    panic::set_hook(hook);
-    resources.ok()
-}
-
 /// An app that renders without a window; one at a time.
 fn app() -> Option<(MutexGuard<'static, ()>, App)> {
-    static ONE: Mutex<()> = Mutex::new(());
-    let guard = ONE.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-    let Some(renderer) = renderer() else {
-        assert!(
-            std::env::var_os("CRACK_REQUIRE_ALL").is_none_or(|v| v != "1"),
-            "no GPU adapter, and all tests must run"
-        );
-        eprintln!("SKIPPED: no GPU adapter (install Mesa's software Vulkan)");
-        return None;
-    };
+    let (guard, renderer) = support::gpu()?;
     let mut app = App::new();
     app.add_plugins((
         // First, to show that the order does not matter.

@@ -27,6 +27,7 @@ use bevy::{
 use bevy_crack::prelude::*;
 use std::{
     collections::HashMap,
+    io::Write,
     panic,
     sync::{Arc, Mutex, MutexGuard, PoisonError},
     time::{Duration, Instant},
@@ -75,8 +76,8 @@ fn renderer() -> Option<RenderResources> {
     resources.ok()
 }
 
-/// An app that renders without a window; one at a time. `None`, said aloud, where there is no adapter.
-pub(crate) fn gpu_app() -> Option<(MutexGuard<'static, ()>, App)> {
+/// The renderer for one test at a time. `None`, said aloud, where there is no adapter.
+pub(crate) fn gpu() -> Option<(MutexGuard<'static, ()>, RenderResources)> {
     static ONE: Mutex<()> = Mutex::new(());
     let guard = ONE.lock().unwrap_or_else(PoisonError::into_inner);
     let Some(renderer) = renderer() else {
@@ -84,9 +85,17 @@ pub(crate) fn gpu_app() -> Option<(MutexGuard<'static, ()>, App)> {
             std::env::var_os("CRACK_REQUIRE_ALL").is_none_or(|v| v != "1"),
             "no GPU adapter, and all tests must run"
         );
-        eprintln!("SKIPPED: no GPU adapter (install Mesa's software Vulkan)");
+        let test = std::thread::current().name().unwrap_or("a test").to_owned();
+        // Not by `eprintln`, which the test runner keeps to itself.
+        writeln!(std::io::stderr(), "PASSED OVER: {test}: no GPU adapter (install Mesa's software Vulkan)").unwrap();
         return None;
     };
+    Some((guard, renderer))
+}
+
+/// An app that renders without a window; one at a time. `None`, said aloud, where there is no adapter.
+pub(crate) fn gpu_app() -> Option<(MutexGuard<'static, ()>, App)> {
+    let (guard, renderer) = gpu()?;
     let mut app = App::new();
     app.add_plugins((render_plugins(RenderCreation::Manual(renderer)), CrackPlugins));
     start(&mut app);
