@@ -1,80 +1,16 @@
 //! The plugin without a renderer: what games do, and the faults of `I`, `T` and `E` that need no GPU.
 
+use crate::support::*;
 use bevy::{
-    asset::{AssetPlugin, RenderAssetUsages},
-    image::{CompressedImageFormats, ImageLoader, ImagePlugin, TextureAtlas, TextureAtlasLayout},
+    asset::AssetPlugin,
+    image::{ImagePlugin, TextureAtlas, TextureAtlasLayout},
     prelude::*,
-    render::render_resource::{Extent3d, TextureDimension, TextureFormat},
+    render::render_resource::TextureFormat,
     sprite::Anchor,
     time::TimeUpdateStrategy,
 };
 use bevy_crack::{math::Rng, prelude::*};
 use std::time::Duration;
-
-/// An app with assets and time, but no renderer; 20 ms a frame, time enough for everything.
-fn app() -> App {
-    let mut app = App::new();
-    app.add_plugins((MinimalPlugins, TransformPlugin, AssetPlugin::default(), ImagePlugin::default(), CrackPlugins))
-        // The renderer does this; without a loader, pictures would load for ever.
-        .register_asset_loader(ImageLoader::new(CompressedImageFormats::NONE))
-        .init_asset::<TextureAtlasLayout>()
-        .init_asset::<Mesh>()
-        .init_asset::<ColorMaterial>()
-        .init_asset::<StandardMaterial>()
-        .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(20)))
-        .insert_resource(CrackBudget { milliseconds: 1e6, ..default() });
-    app.finish();
-    app.cleanup();
-    app.update();
-    app
-}
-
-/// A picture whose texels all differ from their neighbours.
-fn picture(size: UVec2, format: TextureFormat) -> Image {
-    let extent = Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 };
-    let texel = format.block_copy_size(None).unwrap_or(4) as usize;
-    let data = (0..size.x as usize * size.y as usize * texel)
-        .map(|i| if i % 4 == 3 { 255 } else { 150 + (i * 7 % 60) as u8 })
-        .collect();
-    let mut image = Image::new_uninit(extent, TextureDimension::D2, format, RenderAssetUsages::default());
-    image.data = Some(data);
-    image
-}
-
-fn add_picture(app: &mut App, size: UVec2) -> Handle<Image> {
-    let image = picture(size, TextureFormat::Rgba8UnormSrgb);
-    app.world_mut().resource_mut::<Assets<Image>>().add(image)
-}
-
-fn data(app: &App, image: &Handle<Image>) -> Vec<u8> {
-    app.world().resource::<Assets<Image>>().get(image).unwrap().data.clone().unwrap()
-}
-
-fn state(app: &App, entity: Entity) -> &CrackState {
-    app.world().get(entity).unwrap()
-}
-
-fn stats(app: &App) -> CrackStats {
-    let stats = *app.world().resource::<CrackStats>();
-    let sum = stats.applied + stats.merged + stats.ignored + stats.rejected + stats.queued;
-    assert_eq!(stats.sent, sum, "every hit is somewhere: {stats:?}");
-    stats
-}
-
-fn hit(app: &mut App, hit: CrackHit) {
-    app.world_mut().trigger(hit);
-}
-
-/// Updates until the surface is done.
-fn settle(app: &mut App, entity: Entity) {
-    for _ in 0..2000 {
-        app.update();
-        if state(app, entity).status == CrackStatus::Done {
-            return;
-        }
-    }
-    panic!("cracks never end: {:?}", state(app, entity));
-}
 
 fn surface() -> CrackSurface {
     CrackSurface::new(CrackPreset::CONCRETE)
@@ -98,8 +34,8 @@ fn listen(app: &mut App) {
 fn sprite_cracks_and_heals() {
     let mut app = app();
     listen(&mut app);
-    let image = add_picture(&mut app, UVec2::new(96, 64));
-    let before = data(&app, &image);
+    let image = add(&mut app, picture(UVec2::new(96, 64)));
+    let before = texels(&app, &image);
     let images = app.world().resource::<Assets<Image>>().len();
     let [cracked, other] = [0, 1].map(|_| app.world_mut().spawn((Sprite::from_image(image.clone()), surface())).id());
     app.update();
@@ -110,11 +46,11 @@ fn sprite_cracks_and_heals() {
     let textures = app.world().get::<CrackTextures>(cracked).unwrap().clone();
     let own = app.world().get::<Sprite>(cracked).unwrap().image.clone();
     assert_eq!(textures.diffuse, Some(own.clone()));
-    assert_ne!(data(&app, &own), before, "cracks show");
-    assert!(data(&app, textures.normal.as_ref().unwrap()).chunks(4).any(|n| n != [128, 128, 255, 255]), "in normals");
-    assert_eq!(data(&app, &image), before, "the picture itself is untouched");
+    assert_ne!(texels(&app, &own), before, "cracks show");
+    assert!(texels(&app, textures.normal.as_ref().unwrap()).chunks(4).any(|n| n != [128, 128, 255, 255]), "in normals");
+    assert_eq!(texels(&app, &image), before, "the picture itself is untouched");
     assert_eq!(app.world().get::<Sprite>(other).unwrap().image, image, "and so is its other user");
-    assert_eq!(*state(&app, other), CrackState::default());
+    assert_eq!(state(&app, other), CrackState::default());
     let now = state(&app, cracked);
     assert!(now.damage > 0.0 && now.damage <= 1.0 && now.nodes > 1 && now.hits == 1, "{now:?}");
     assert_eq!(app.world().resource::<Seen>().finished, [cracked]);
@@ -123,14 +59,14 @@ fn sprite_cracks_and_heals() {
     app.update();
     assert_eq!(app.world().get::<Sprite>(cracked).unwrap().image, image);
     assert!(app.world().get::<CrackTextures>(cracked).is_none());
-    assert_eq!(*state(&app, cracked), CrackState::default());
+    assert_eq!(state(&app, cracked), CrackState::default());
     drop((own, textures));
     app.update();
     app.update();
     // It cracks again, the same way.
     hit(&mut app, CrackHit::uv(cracked, Vec2::splat(0.5)));
     settle(&mut app, cracked);
-    assert!(stats(&app).applied == 2);
+    assert!(counts(&app).applied == 2);
 }
 
 /// The pattern does not depend on the frame rate (E7), on the budget or on other surfaces.
@@ -140,7 +76,7 @@ fn same_hits_same_texels() {
         let mut app = app();
         app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(milliseconds)));
         app.world_mut().resource_mut::<CrackBudget>().milliseconds = budget;
-        let image = add_picture(&mut app, UVec2::splat(128));
+        let image = add(&mut app, picture(UVec2::splat(128)));
         for _ in 0..others {
             let other = app.world_mut().spawn((Sprite::from_image(image.clone()), surface().with_seed(9))).id();
             hit(&mut app, CrackHit::uv(other, Vec2::splat(0.3)));
@@ -148,7 +84,7 @@ fn same_hits_same_texels() {
         let entity = app.world_mut().spawn((Sprite::from_image(image), surface())).id();
         hit(&mut app, CrackHit::uv(entity, Vec2::splat(0.5)));
         settle(&mut app, entity);
-        data(&app, &app.world().get::<Sprite>(entity).unwrap().image.clone())
+        texels(&app, &app.world().get::<Sprite>(entity).unwrap().image.clone())
     };
     let reference = run(20, 1e6, 0);
     assert_eq!(run(3, 1e6, 0), reference, "another frame rate");
@@ -160,7 +96,7 @@ fn same_hits_same_texels() {
 #[test]
 fn broken_hits_are_counted() {
     let mut app = app();
-    let image = add_picture(&mut app, UVec2::splat(32));
+    let image = add(&mut app, picture(UVec2::splat(32)));
     let good = app.world_mut().spawn((Sprite::from_image(image.clone()), surface())).id();
     let flat = app.world_mut().spawn((Sprite::from_image(image.clone()), surface(), Transform::from_scale(Vec3::ZERO)));
     let flat = flat.id();
@@ -188,7 +124,7 @@ fn broken_hits_are_counted() {
     app.world_mut().trigger(CrackHit::uv(good, Vec2::splat(0.5)).with_energy(0.0));
     app.update();
     app.update();
-    let stats = stats(&app);
+    let stats = counts(&app);
     assert_eq!((stats.rejected, stats.ignored, stats.queued), (hits.len() as u64, 1, 0), "{stats:?}");
 }
 
@@ -197,23 +133,23 @@ fn broken_hits_are_counted() {
 fn ten_thousand_hits_in_a_frame() {
     let mut app = app();
     app.world_mut().resource_mut::<CrackBudget>().milliseconds = 2.0;
-    let image = add_picture(&mut app, UVec2::splat(128));
+    let image = add(&mut app, picture(UVec2::splat(128)));
     let entity = app.world_mut().spawn((Sprite::from_image(image), surface())).id();
     let mut rng = Rng::new(1);
     for _ in 0..10_000 {
         app.world_mut().write_message(CrackHit::uv(entity, Vec2::new(rng.unit(), rng.unit())));
     }
     app.update();
-    let first = stats(&app);
+    let first = counts(&app);
     assert_eq!(first.sent, 10_000);
     assert!(first.merged >= 10_000 - 4096, "{first:?}");
     let mut frames = 1;
-    while stats(&app).queued > 0 {
+    while counts(&app).queued > 0 {
         app.update();
         frames += 1;
         assert!(frames < 20_000, "the queue drains");
     }
-    println!("10,000 hits: {frames} frames, {:?}", stats(&app));
+    println!("10,000 hits: {frames} frames, {:?}", counts(&app));
 }
 
 /// I7: hits on many surfaces: each shows something soon.
@@ -221,7 +157,7 @@ fn ten_thousand_hits_in_a_frame() {
 fn turns_are_fair() {
     let mut app = app();
     app.world_mut().resource_mut::<CrackBudget>().milliseconds = 0.0;
-    let image = add_picture(&mut app, UVec2::splat(32));
+    let image = add(&mut app, picture(UVec2::splat(32)));
     let surfaces: Vec<_> =
         (0..20).map(|_| app.world_mut().spawn((Sprite::from_image(image.clone()), surface())).id()).collect();
     // The first surface is sent most of the hits.
@@ -234,7 +170,7 @@ fn turns_are_fair() {
     for entity in surfaces {
         assert_ne!(state(&app, entity).status, CrackStatus::Untouched, "one hit a frame, in turns");
     }
-    stats(&app);
+    counts(&app);
 }
 
 /// World points reach the texel that Bevy says, whatever flip, anchor, rect, size and transform.
@@ -243,7 +179,7 @@ fn sprites_are_hit_where_they_are_seen() {
     let mut rng = Rng::new(7);
     for round in 0..60 {
         let mut app = app();
-        let image = add_picture(&mut app, UVec2::new(64, 48));
+        let image = add(&mut app, picture(UVec2::new(64, 48)));
         let layout = TextureAtlasLayout::from_grid(UVec2::new(32, 24), 2, 2, None, None);
         let layout = app.world_mut().resource_mut::<Assets<TextureAtlasLayout>>().add(layout);
         let mut sprite = Sprite { flip_x: rng.unit() < 0.5, flip_y: rng.unit() < 0.5, ..Sprite::from_image(image) };
@@ -285,14 +221,14 @@ fn sprites_are_hit_where_they_are_seen() {
 
         hit(&mut app, CrackHit::world(entity, world));
         app.update();
-        assert_eq!(stats(&app).applied, 1, "round {round}");
+        assert_eq!(counts(&app).applied, 1, "round {round}");
         // One node, drawn nowhere yet: let it grow a little and look where the texels change.
         app.world_mut().get_mut::<CrackSurface>(entity).unwrap().preset.steps_per_second = 50.0;
-        let before = data(&app, &app.world().get::<Sprite>(entity).unwrap().image.clone());
+        let before = texels(&app, &app.world().get::<Sprite>(entity).unwrap().image.clone());
         for _ in 0..3 {
             app.update();
         }
-        let after = data(&app, &app.world().get::<Sprite>(entity).unwrap().image.clone());
+        let after = texels(&app, &app.world().get::<Sprite>(entity).unwrap().image.clone());
         let nearest = (0..64 * 48)
             .filter(|i| before[i * 4..i * 4 + 4] != after[i * 4..i * 4 + 4])
             .map(|i| texel.distance(Vec2::new((i % 64) as f32 + 0.5, (i / 64) as f32 + 0.5)))
@@ -305,8 +241,8 @@ fn sprites_are_hit_where_they_are_seen() {
 #[test]
 fn atlas_frames_are_painted_one_by_one() {
     let mut app = app();
-    let image = add_picture(&mut app, UVec2::new(64, 32));
-    let base = data(&app, &image);
+    let image = add(&mut app, picture(UVec2::new(64, 32)));
+    let base = texels(&app, &image);
     let layout = TextureAtlasLayout::from_grid(UVec2::splat(32), 2, 1, None, None);
     let layout = app.world_mut().resource_mut::<Assets<TextureAtlasLayout>>().add(layout);
     let sprite = Sprite::from_atlas_image(image, TextureAtlas { layout, index: 0 });
@@ -314,7 +250,7 @@ fn atlas_frames_are_painted_one_by_one() {
     hit(&mut app, CrackHit::uv(entity, Vec2::splat(0.5)));
     settle(&mut app, entity);
     let changed = |app: &App, right: bool| {
-        let now = data(app, &app.world().get::<Sprite>(entity).unwrap().image.clone());
+        let now = texels(app, &app.world().get::<Sprite>(entity).unwrap().image.clone());
         (0..64 * 32).filter(|i| (i % 64 >= 32) == right && now[i * 4..i * 4 + 4] != base[i * 4..i * 4 + 4]).count()
     };
     assert!(changed(&app, false) > 0);
@@ -329,7 +265,7 @@ fn atlas_frames_are_painted_one_by_one() {
 #[test]
 fn despawn_storm() {
     let mut app = app();
-    let image = add_picture(&mut app, UVec2::splat(32));
+    let image = add(&mut app, picture(UVec2::splat(32)));
     app.update();
     let images = app.world().resource::<Assets<Image>>().len();
     let mut rng = Rng::new(3);
@@ -363,7 +299,7 @@ fn despawn_storm() {
         }
         if rng.unit() < 0.3 {
             app.update();
-            stats(&app);
+            counts(&app);
         }
     }
     for entity in alive {
@@ -373,14 +309,14 @@ fn despawn_storm() {
         app.update();
     }
     assert_eq!(app.world().resource::<Assets<Image>>().len(), images, "no texture is left");
-    assert_eq!(stats(&app).queued, 0);
+    assert_eq!(counts(&app).queued, 0);
 }
 
 /// E2: a clone of a cracked sprite owns its textures.
 #[test]
 fn clones_crack_on_their_own() {
     let mut app = app();
-    let image = add_picture(&mut app, UVec2::splat(64));
+    let image = add(&mut app, picture(UVec2::splat(64)));
     let entity = app.world_mut().spawn((Sprite::from_image(image.clone()), surface())).id();
     hit(&mut app, CrackHit::uv(entity, Vec2::splat(0.5)));
     settle(&mut app, entity);
@@ -400,13 +336,13 @@ fn clones_crack_on_their_own() {
 fn unreadable_pictures_fail() {
     let mut app = app();
     listen(&mut app);
-    let mut short = picture(UVec2::splat(8), TextureFormat::Rgba8UnormSrgb);
+    let mut short = picture_of(UVec2::splat(8), TextureFormat::Rgba8UnormSrgb);
     short.data.as_mut().unwrap().pop();
-    let mut gpu_only = picture(UVec2::splat(8), TextureFormat::Rgba8UnormSrgb);
+    let mut gpu_only = picture_of(UVec2::splat(8), TextureFormat::Rgba8UnormSrgb);
     gpu_only.data = None;
-    let mut compressed = picture(UVec2::splat(8), TextureFormat::Rgba8UnormSrgb);
+    let mut compressed = picture_of(UVec2::splat(8), TextureFormat::Rgba8UnormSrgb);
     compressed.texture_descriptor.format = TextureFormat::Bc7RgbaUnormSrgb;
-    let empty = picture(UVec2::new(0, 4), TextureFormat::Rgba8UnormSrgb);
+    let empty = picture_of(UVec2::new(0, 4), TextureFormat::Rgba8UnormSrgb);
     for image in [short, gpu_only, compressed, empty] {
         let handle = app.world_mut().resource_mut::<Assets<Image>>().add(image);
         let entity = app.world_mut().spawn((Sprite::from_image(handle), surface())).id();
@@ -419,7 +355,7 @@ fn unreadable_pictures_fail() {
         assert_eq!(app.world().resource::<Assets<Image>>().len(), images);
     }
     assert_eq!(app.world().resource::<Seen>().failed.len(), 4, "{:?}", app.world().resource::<Seen>().failed);
-    assert_eq!(stats(&app).rejected, 12);
+    assert_eq!(counts(&app).rejected, 12);
 }
 
 /// T5: every uncompressed format that has colours can be cracked, or fails cleanly.
@@ -445,14 +381,14 @@ fn formats() {
         Rgba32Float,
     ];
     for format in formats {
-        let handle = app.world_mut().resource_mut::<Assets<Image>>().add(picture(UVec2::new(17, 9), format));
+        let handle = app.world_mut().resource_mut::<Assets<Image>>().add(picture_of(UVec2::new(17, 9), format));
         let entity =
             app.world_mut().spawn((Sprite::from_image(handle), CrackSurface { alpha_mask: false, ..surface() })).id();
         hit(&mut app, CrackHit::uv(entity, Vec2::splat(0.5)));
         app.update();
         println!("{format:?}: {:?}", state(&app, entity).status);
     }
-    stats(&app);
+    counts(&app);
 }
 
 /// T7: hits wait until the picture is there.
@@ -466,11 +402,11 @@ fn hits_wait_for_the_picture() {
         app.update();
     }
     assert_eq!(state(&app, entity).status, CrackStatus::Waiting);
-    assert_eq!(stats(&app).queued, 1);
-    let image = picture(UVec2::splat(32), TextureFormat::Rgba8UnormSrgb);
+    assert_eq!(counts(&app).queued, 1);
+    let image = picture_of(UVec2::splat(32), TextureFormat::Rgba8UnormSrgb);
     app.world_mut().resource_mut::<Assets<Image>>().insert(&handle, image).unwrap();
     settle(&mut app, entity);
-    assert_eq!(stats(&app).applied, 1);
+    assert_eq!(counts(&app).applied, 1);
 }
 
 /// T8: a picture that cannot be loaded fails its surface with the reason.
@@ -485,42 +421,42 @@ fn pictures_that_do_not_load() {
         app.update();
         assert!(start.elapsed() < Duration::from_secs(20), "{:?}", state(&app, entity).status);
     }
-    assert_eq!(stats(&app).rejected, 1);
+    assert_eq!(counts(&app).rejected, 1);
 }
 
 /// T9, T10, T11: the picture changes under the cracks.
 #[test]
 fn pictures_change() {
     let mut app = app();
-    let image = add_picture(&mut app, UVec2::splat(64));
+    let image = add(&mut app, picture(UVec2::splat(64)));
     let entity = app.world_mut().spawn((Sprite::from_image(image.clone()), surface())).id();
     hit(&mut app, CrackHit::uv(entity, Vec2::splat(0.5)));
     settle(&mut app, entity);
     let nodes = state(&app, entity).nodes;
     let own = app.world().get::<Sprite>(entity).unwrap().image.clone();
     let share = |app: &App, base: u8| {
-        let now = data(app, &own);
+        let now = texels(app, &own);
         now.chunks(4).filter(|texel| texel[0] != base).count() as f32 / (now.len() / 4) as f32
     };
     for (value, side) in [(200u8, 64), (180, 128), (90, 40)] {
-        let mut even = picture(UVec2::splat(side), TextureFormat::Rgba8UnormSrgb);
+        let mut even = picture_of(UVec2::splat(side), TextureFormat::Rgba8UnormSrgb);
         even.data.as_mut().unwrap().chunks_mut(4).for_each(|texel| texel.copy_from_slice(&[value, value, value, 255]));
         app.world_mut().resource_mut::<Assets<Image>>().insert(&image, even).unwrap();
         for _ in 0..4 {
             app.update();
         }
-        assert_eq!(data(&app, &own).len() as u32, side * side * 4, "the size follows");
+        assert_eq!(texels(&app, &own).len() as u32, side * side * 4, "the size follows");
         let share = share(&app, value);
         assert!(share > 0.01 && share < 0.6, "cracks over the new picture: {share}");
         assert_eq!(state(&app, entity).nodes, nodes);
     }
     // Another picture altogether.
-    let other = add_picture(&mut app, UVec2::splat(32));
+    let other = add(&mut app, picture(UVec2::splat(32)));
     app.world_mut().get_mut::<Sprite>(entity).unwrap().image = other.clone();
     app.update();
     app.update();
     assert_eq!(app.world().get::<Sprite>(entity).unwrap().image, own);
-    assert_eq!(data(&app, &own).len(), 32 * 32 * 4);
+    assert_eq!(texels(&app, &own).len(), 32 * 32 * 4);
     app.world_mut().commands().entity(entity).heal_cracks();
     app.update();
     assert_eq!(app.world().get::<Sprite>(entity).unwrap().image, other, "healing gives the new picture");
@@ -530,7 +466,7 @@ fn pictures_change() {
 #[test]
 fn settings_change() {
     let mut app = app();
-    let image = add_picture(&mut app, UVec2::splat(64));
+    let image = add(&mut app, picture(UVec2::splat(64)));
     let entity = app.world_mut().spawn((Sprite::from_image(image), surface())).id();
     hit(&mut app, CrackHit::uv(entity, Vec2::splat(0.5)));
     let mut rng = Rng::new(5);
@@ -545,7 +481,7 @@ fn settings_change() {
             _ => surface.preset.steps_per_second = [f32::NAN, -5.0, 1e9, 60.0][i / 4 % 4],
         }
     }
-    stats(&app);
+    counts(&app);
     app.world_mut().get_mut::<CrackSurface>(entity).unwrap().preset = CrackPreset::GLASS;
     settle(&mut app, entity);
 }
@@ -554,7 +490,7 @@ fn settings_change() {
 #[test]
 fn meshes_crack_and_heal() {
     let mut app = app();
-    let image = add_picture(&mut app, UVec2::splat(64));
+    let image = add(&mut app, picture(UVec2::splat(64)));
     let mesh = app.world_mut().resource_mut::<Assets<Mesh>>().add(Mesh::from(Rectangle::new(2.0, 2.0)));
     let flat = app.world_mut().resource_mut::<Assets<ColorMaterial>>().add(ColorMaterial::from(image.clone()));
     let solid = StandardMaterial { base_color_texture: Some(image), ..default() };
@@ -568,7 +504,7 @@ fn meshes_crack_and_heal() {
     hit(&mut app, CrackHit::world(b, turned.transform_point(Vec3::new(-0.3, 0.1, 0.01))));
     settle(&mut app, b);
     settle(&mut app, a);
-    assert_eq!(stats(&app).applied, 2);
+    assert_eq!(counts(&app).applied, 2);
     let material = &app.world().get::<MeshMaterial3d<StandardMaterial>>(b).unwrap().0;
     assert_ne!(*material, solid);
     let material = app.world().resource::<Assets<StandardMaterial>>().get(material).unwrap();
@@ -592,7 +528,7 @@ fn meshes_crack_and_heal() {
 fn sizes_are_clamped() {
     let mut app = app();
     app.world_mut().resource_mut::<CrackBudget>().max_texture_bytes = 16 << 20;
-    let image = add_picture(&mut app, UVec2::new(40, 20));
+    let image = add(&mut app, picture(UVec2::new(40, 20)));
     let resolution = CrackResolution::Fixed(UVec2::new(4_000_000_000, 2_000_000_000));
     let sprite = Sprite::from_image(image);
     let entity = app.world_mut().spawn((sprite, CrackSurface { resolution, ..surface() })).id();
@@ -612,7 +548,7 @@ fn sizes_are_clamped() {
 #[test]
 fn holes_stay_holes() {
     let mut app = app();
-    let mut image = picture(UVec2::splat(64), TextureFormat::Rgba8UnormSrgb);
+    let mut image = picture_of(UVec2::splat(64), TextureFormat::Rgba8UnormSrgb);
     // The right half is transparent.
     for (i, texel) in image.data.as_mut().unwrap().chunks_mut(4).enumerate() {
         texel[3] = if i % 64 < 32 { 255 } else { 0 };
@@ -623,9 +559,9 @@ fn holes_stay_holes() {
     hit(&mut app, CrackHit::uv(entity, Vec2::new(0.8, 0.5)));
     hit(&mut app, CrackHit::uv(entity, Vec2::new(0.2, 0.5)));
     settle(&mut app, entity);
-    let stats = stats(&app);
+    let stats = counts(&app);
     assert_eq!((stats.rejected, stats.applied), (1, 1));
-    let now = data(&app, &app.world().get::<Sprite>(entity).unwrap().image.clone());
+    let now = texels(&app, &app.world().get::<Sprite>(entity).unwrap().image.clone());
     for i in (0..64 * 64).filter(|i| i % 64 >= 32) {
         assert_eq!(now[i * 4 + 3], base[i * 4 + 3], "alpha stays");
     }
@@ -660,13 +596,13 @@ fn any_subset_of_plugins() {
         }
         app.finish();
         app.cleanup();
-        let image = if has(3) && has(2) { add_picture(&mut app, UVec2::splat(32)) } else { Handle::default() };
+        let image = if has(3) && has(2) { add(&mut app, picture(UVec2::splat(32))) } else { Handle::default() };
         let entity = app.world_mut().spawn((Sprite::from_image(image), surface())).id();
         for _ in 0..5 {
             hit(&mut app, CrackHit::uv(entity, Vec2::splat(0.5)));
             app.update();
         }
-        let stats = stats(&app);
+        let stats = counts(&app);
         assert_eq!(stats.sent, 5);
         let works = has(2) && has(3);
         assert_eq!(stats.applied > 0, works, "plugins {mask:05b}: {stats:?} {:?}", state(&app, entity));
@@ -677,7 +613,7 @@ fn any_subset_of_plugins() {
 #[test]
 fn time_stands_still_and_jumps() {
     let mut app = app();
-    let image = add_picture(&mut app, UVec2::splat(64));
+    let image = add(&mut app, picture(UVec2::splat(64)));
     let entity = app.world_mut().spawn((Sprite::from_image(image), surface())).id();
     app.world_mut().resource_mut::<Time<Virtual>>().pause();
     hit(&mut app, CrackHit::uv(entity, Vec2::splat(0.5)));
