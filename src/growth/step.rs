@@ -299,11 +299,12 @@ impl CrackGrowth {
         let extent = self.network.extent();
         let region = Region { center, inner, outer, extent };
         let seed = mix(self.seed ^ mix(u64::from(impact) | 1 << 40));
-        if matches!(self.params.markers, MarkerLayout::DartThrowing { .. }) {
-            // Darts keep their distance from the markers of hits that no step has taken up yet.
+        // Darts keep their distance from each other, and from the markers of hits that no step has taken up yet.
+        let mut darts = None;
+        if let MarkerLayout::DartThrowing { spacing } = self.params.markers {
             self.field.settle(&self.network.nodes);
+            darts = Some(NodeGrid::new(extent, spacing));
         }
-        let mut placed = NodeGrid::new(extent, self.params.kill_distance.max(0.01));
         let (field, nodes, shown) = (&mut self.field, &self.nodes, &mut self.shown_markers);
         let show = self.params.draw_markers;
         // The rays of a hit are its own: older cracks do not sprout towards them.
@@ -312,11 +313,11 @@ impl CrackGrowth {
             if field.living_at_most() >= MAX_MARKERS {
                 return;
             }
-            if let Some(spacing) = spacing {
-                if placed.any_within(pos, spacing) || field.any_within(pos, spacing) || nodes.any_within(pos, spacing) {
+            if let (Some(spacing), Some(darts)) = (spacing, &mut darts) {
+                if darts.any_within(pos, spacing) || field.any_within(pos, spacing) || nodes.any_within(pos, spacing) {
                     return;
                 }
-                placed.push(pos);
+                darts.push(pos);
             }
             field.add(pos, loyal);
             if show {
