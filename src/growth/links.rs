@@ -91,7 +91,7 @@ impl Linker {
                 }
                 let width = 0.8 * params.line_width;
                 let birth = network.nodes()[first as usize].birth;
-                network.links.push(Link { a, b, width, birth, kind: LinkKind::Connection });
+                network.links.push(Link { a, b, width, birth, kind: LinkKind::Connection, bend: 1.0 });
             }
         }
     }
@@ -132,7 +132,7 @@ impl Linker {
             }
         });
         if best.1 != u32::MAX {
-            let link = Link { a: best.1, b: tip, width: born.width, birth: born.birth, kind: LinkKind::Island };
+            let link = Link { a: best.1, b: tip, width: born.width, birth: born.birth, kind: LinkKind::Island, bend: 1.0 };
             network.links.push(link);
         }
     }

@@ -338,7 +338,7 @@ impl CrackGrowth {
     /// Adds a node; the caller lets it visit the markers.
     fn bear(&mut self, pos: Vec2, parent: u32, generation: u32, impact: u32) {
         let width = self.widths.tip();
-        self.network.nodes.push(Node { pos, width, parent, generation, birth: self.steps, impact });
+        self.network.nodes.push(Node { pos, width, parent, generation, birth: self.steps, impact, bend });
         self.nodes.push(pos);
         self.pull_of.push(NO_PULL);
         self.changes.push_node(parent);
