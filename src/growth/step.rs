@@ -390,9 +390,14 @@ impl CrackGrowth {
     /// [`GrowthParams::most_nodes`]. A node beyond the border, or closer to it than the kill distance on its way, lies on it.
     pub fn step(&mut self) -> StepReport {
         self.newborn = 0..0;
-        if self.steps_left == 0 {
-            return StepReport { born: 0 };
+        // A tip that has just set out to meet a crack may be all that moves, and has no node to show for it yet.
+        while self.steps_left > 0 && self.newborn.is_empty() {
+            self.make_step();
         }
+        StepReport { born: self.newborn.len() as u32 }
+    }
+
+    fn make_step(&mut self) {
         self.steps_left -= 1;
         self.field.settle(&self.network.nodes, &self.nodes);
         self.gather_pulls();
@@ -402,8 +407,9 @@ impl CrackGrowth {
         if !self.pulls.is_empty() || self.arrest.as_ref().is_some_and(Arrest::is_running) {
             self.steps = self.steps.saturating_add(1);
         }
+        let mut any_stopped = false;
         if self.arrest.is_some() {
-            self.advance_all();
+            any_stopped = self.advance_all();
         } else {
             for i in 0..self.order.len() {
                 let (node, slot) = self.order[i];
@@ -424,14 +430,14 @@ impl CrackGrowth {
             self.field.visit(node, &self.network.nodes, &self.nodes);
         }
         self.join_newborn();
-        if first == last && !self.arrest.as_ref().is_some_and(Arrest::is_running) {
+        if first == last && !any_stopped && !self.arrest.as_ref().is_some_and(Arrest::is_running) {
             self.steps_left = 0;
         }
-        StepReport { born: last - first }
     }
 
     /// Grows from every node that is pulled, unless older cracks are in the way; then from those that are on their way to one.
-    fn advance_all(&mut self) {
+    /// Says whether a marker was given up: the others may pull elsewhere then.
+    fn advance_all(&mut self) -> bool {
         let mut any_stopped = false;
         for i in 0..self.order.len() {
             let (node, slot) = self.order[i];
@@ -471,6 +477,7 @@ impl CrackGrowth {
             self.pull_of[node as usize] = NO_PULL;
         }
         self.advance_runners();
+        any_stopped
     }
 
     /// Begins new cracks where markers are out of reach of all others.
