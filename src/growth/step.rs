@@ -12,7 +12,7 @@ use super::{
 use crate::{
     Grid,
     math::{hash_unit, mix},
-    pattern::{NO_PARENT, Network, Node, SegmentId},
+    pattern::{Dot, NO_PARENT, Network, Node, SegmentId, Timeline},
 };
 use glam::Vec2;
 use std::ops::Range;
@@ -133,6 +133,7 @@ pub struct CrackGrowth {
     /// Places of markers made since they were last asked for.
     shown_markers: Vec<Vec2>,
     changes: Changes,
+    timeline: Timeline,
     pulls: Vec<Pull>,
     /// Node and entry in `pulls`, in order of the nodes.
     order: Vec<(u32, u32)>,
@@ -217,6 +218,7 @@ impl CrackGrowth {
             newborn: 0..0,
             shown_markers: Vec::new(),
             changes: Changes::default(),
+            timeline: Timeline::default(),
             pulls: Vec::new(),
             order: Vec::new(),
             pull_of: Vec::new(),
@@ -252,6 +254,7 @@ impl CrackGrowth {
         if self.network.nodes.len() >= self.params.max_nodes as usize {
             return HitOutcome::Rejected(Rejected::Full);
         }
+        self.timeline.begin(self.steps.saturating_add(1));
         let merge = self.params.step_length.max(self.params.kill_distance).min(0.05);
         let nearest = (0u32..)
             .zip(&self.impacts)
@@ -306,6 +309,7 @@ impl CrackGrowth {
             darts = Some(NodeGrid::new(extent, spacing));
         }
         let (field, nodes, shown) = (&mut self.field, &self.nodes, &mut self.shown_markers);
+        let (timeline, radius) = (&mut self.timeline, self.params.line_width);
         let show = self.params.draw_markers;
         // The rays of a hit are its own: older cracks do not sprout towards them.
         let loyal = if matches!(self.params.markers, MarkerLayout::Polar { .. }) { impact } else { ANY_IMPACT };
@@ -322,6 +326,7 @@ impl CrackGrowth {
             field.add(pos, loyal);
             if show {
                 shown.push(pos);
+                timeline.add_dot(Dot { pos, radius });
             }
         });
         // A large growth makes about two nodes a marker: room for them now, so that no step pauses to move them all.
@@ -332,6 +337,7 @@ impl CrackGrowth {
             self.widths.reserve(expected);
             self.pull_of.reserve(expected);
             self.changes.reserve(expected);
+            self.timeline.reserve(expected);
         }
     }
 
@@ -342,6 +348,7 @@ impl CrackGrowth {
         self.nodes.push(pos);
         self.pull_of.push(NO_PULL);
         self.changes.push_node(parent);
+        self.timeline.add_node(width);
         let (changes, network) = (&mut self.changes, &mut self.network);
         let mut widened = [NO_PARENT; 64];
         let mut n = 0;
@@ -353,7 +360,9 @@ impl CrackGrowth {
             }
         });
         for &node in &widened[..n] {
-            changes.widened(node, network.nodes[node as usize].parent != NO_PARENT);
+            let widened = network.nodes[node as usize];
+            changes.widened(node, widened.parent != NO_PARENT);
+            self.timeline.widen(node, widened.width);
         }
     }
 
@@ -375,6 +384,8 @@ impl CrackGrowth {
         self.aim();
         let first = self.network.nodes.len() as u32;
         let room = (self.params.max_nodes as usize).saturating_sub(self.network.nodes.len());
+        // What comes when growth has ended takes a step of the timeline all the same.
+        self.timeline.begin(self.steps.saturating_add(1));
         if !self.pulls.is_empty() {
             self.steps = self.steps.saturating_add(1);
         }
@@ -469,6 +480,7 @@ impl CrackGrowth {
         let links = self.network.links.len();
         self.linker.join(&self.params, &mut self.network, &self.nodes, &self.impacts, self.newborn.clone(), self.seed);
         let all = self.network.links.len() as u32;
+        (links as u32..all).for_each(|_| self.timeline.add_link());
         self.changes.list.extend((links as u32..all).map(SegmentId::Link));
     }
 
@@ -482,6 +494,12 @@ impl CrackGrowth {
     #[must_use]
     pub const fn network(&self) -> &Network {
         &self.network
+    }
+
+    /// When all of it came.
+    #[must_use]
+    pub const fn timeline(&self) -> &Timeline {
+        &self.timeline
     }
 
     /// The impacts so far.

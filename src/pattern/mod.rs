@@ -7,7 +7,10 @@
 mod frame;
 mod network;
 mod path;
+mod timeline;
 
 pub use frame::{FrameError, MAX_ASPECT, MAX_SIDE, SurfaceFrame};
 pub use network::{Link, LinkKind, NO_PARENT, Network, Node, SegmentId};
 pub use path::{MAX_PATH_POINTS, PathPoint, SegmentPath};
+pub(crate) use timeline::Entries;
+pub use timeline::{Dot, Moment, Timeline};

@@ -122,14 +122,21 @@ impl Network {
     #[must_use]
     pub fn path(&self, segment: SegmentId) -> Option<SegmentPath> {
         let (a, b) = self.ends(segment)?;
-        let (from, to) = (self.nodes[a as usize], self.nodes[b as usize]);
-        let (widths, salt) = match segment {
-            SegmentId::Branch(child) => ((from.width, to.width), u64::from(child)),
-            SegmentId::Link(i) => {
-                let width = self.links[i as usize].width;
-                ((width, width), u64::from(i) | 1 << 32)
-            }
+        let widths = match segment {
+            SegmentId::Branch(_) => (self.nodes[a as usize].width, self.nodes[b as usize].width),
+            SegmentId::Link(i) => (self.links[i as usize].width, self.links[i as usize].width),
         };
-        Some(rough_path((from.pos, to.pos), widths, self.roughness, self.extent, self.seed, salt))
+        self.path_with(segment, widths)
+    }
+
+    /// The line of a segment with other widths at its ends: what it was when it was thinner.
+    pub(super) fn path_with(&self, segment: SegmentId, widths: (f32, f32)) -> Option<SegmentPath> {
+        let (a, b) = self.ends(segment)?;
+        let ends = (self.nodes[a as usize].pos, self.nodes[b as usize].pos);
+        let salt = match segment {
+            SegmentId::Branch(child) => u64::from(child),
+            SegmentId::Link(i) => u64::from(i) | 1 << 32,
+        };
+        Some(rough_path(ends, widths, self.roughness, self.extent, self.seed, salt))
     }
 }
