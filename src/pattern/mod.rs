@@ -10,8 +10,11 @@ mod network;
 mod path;
 #[cfg(test)]
 pub(crate) mod random;
+mod timeline;
 
 pub use cells::{CORNERS, Cell, CellTracker};
 pub use frame::{FrameError, MAX_ASPECT, MAX_SIDE, SurfaceFrame};
 pub use network::{Link, LinkKind, NO_PARENT, Network, Node, SegmentId};
 pub use path::{MAX_PATH_POINTS, PathPoint, SegmentPath};
+pub(crate) use timeline::Entries;
+pub use timeline::{Dot, Moment, Timeline};

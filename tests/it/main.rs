@@ -14,5 +14,6 @@ mod lifecycle;
 mod pictures;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod plugin;
+mod replay;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod support;
