@@ -5,9 +5,12 @@
 //! converts.
 
 mod frame;
+mod lines;
+mod mask;
 mod network;
 mod path;
 
 pub use frame::{FrameError, MAX_ASPECT, MAX_SIDE, SurfaceFrame};
+pub use mask::{CrackMask, MaskError};
 pub use network::{Link, LinkKind, NO_PARENT, Network, Node, SegmentId};
 pub use path::{MAX_PATH_POINTS, PathPoint, SegmentPath};

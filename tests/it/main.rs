@@ -11,6 +11,7 @@ mod hits;
 mod images;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod lifecycle;
+mod masks;
 mod pictures;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod plugin;
