@@ -1,6 +1,6 @@
 //! Growth against a brute-force reference, its end, and its frozen patterns.
 
-use super::{CrackGrowth, GrowthParams, HitOutcome, MAX_ENERGY, MarkerLayout, Rejected, StartLayout};
+use super::{CrackGrowth, GrowthParams, HitOutcome, MAX_ENERGY, MarkerLayout, Rejected, StartLayout, Venation};
 use crate::{
     CrackPreset, Grid,
     math::{Rng, hash_unit, mix},
@@ -55,6 +55,13 @@ fn random_params(rng: &mut Rng, small: bool) -> GrowthParams {
         connection_every: 1 + rng.next_u32() % 4,
         draw_islands: rng.unit() < 0.5,
         island_distance: 0.2 * rng.unit(),
+        open_ends: 0.5 * rng.unit(),
+        arrest: 0.0,
+        venation: Venation::Open,
+        nucleation: 0.0,
+        unevenness: 0.0,
+        inertia: 0.0,
+        variety: 0.0,
         draw_markers: rng.unit() < 0.2,
         max_nodes: 1_000_000,
     };
