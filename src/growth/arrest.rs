@@ -293,7 +293,8 @@ impl CrackGrowth {
 
     /// The nearest crack or border within `reach` and ahead of a node, and how far it is.
     fn goal_ahead(&self, from: u32, heading: Vec2, reach: f32, ahead: f32) -> Option<(f32, Goal)> {
-        let crack = self.foreign(from, Some(heading), reach, ahead).map(|(distance, node)| (distance, Goal::Node(node)));
+        let crack =
+            self.foreign(from, Some(heading), reach, ahead).map(|(distance, node)| (distance, Goal::Node(node)));
         let border = self.border_ahead(self.network.nodes[from as usize].pos, heading, reach, ahead);
         match (crack, border) {
             (Some(crack), Some(border)) => Some(if border.0 < crack.0 { border } else { crack }),

@@ -416,7 +416,9 @@ impl GrowthParams {
         }
         match &mut varied.starts {
             StartLayout::Point => {}
-            StartLayout::Points { count: n } | StartLayout::Ring { count: n, .. } | StartLayout::Disc { count: n, .. } => {
+            StartLayout::Points { count: n }
+            | StartLayout::Ring { count: n, .. }
+            | StartLayout::Disc { count: n, .. } => {
                 *n = count(*n, starts, 1024);
             }
         }

@@ -481,7 +481,8 @@ impl CrackGrowth {
             if self.nucleated as f32 >= due {
                 break;
             }
-            let Some((place, loyal)) = self.field.take_waiting(mix(self.seed ^ 0x0C ^ u64::from(self.tried) << 8)) else {
+            let Some((place, loyal)) = self.field.take_waiting(mix(self.seed ^ 0x0C ^ u64::from(self.tried) << 8))
+            else {
                 break;
             };
             self.tried += 1;

@@ -140,13 +140,7 @@ impl Network {
     }
 
     /// The rough line that `segment` would have between two places.
-    pub(crate) fn draft(
-        &self,
-        segment: SegmentId,
-        ends: (Vec2, Vec2),
-        widths: (f32, f32),
-        bend: f32,
-    ) -> SegmentPath {
+    pub(crate) fn draft(&self, segment: SegmentId, ends: (Vec2, Vec2), widths: (f32, f32), bend: f32) -> SegmentPath {
         let salt = match segment {
             SegmentId::Branch(child) => u64::from(child),
             SegmentId::Link(link) => u64::from(link) | 1 << 32,
