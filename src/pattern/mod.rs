@@ -6,6 +6,8 @@
 
 mod cells;
 mod frame;
+mod lines;
+mod mask;
 mod network;
 mod path;
 #[cfg(test)]
@@ -14,6 +16,7 @@ mod timeline;
 
 pub use cells::{CORNERS, Cell, CellTracker};
 pub use frame::{FrameError, MAX_ASPECT, MAX_SIDE, SurfaceFrame};
+pub use mask::{CrackMask, MaskError};
 pub use network::{Link, LinkKind, NO_PARENT, Network, Node, SegmentId};
 pub use path::{MAX_PATH_POINTS, PathPoint, SegmentPath};
 pub(crate) use timeline::Entries;
