@@ -9,6 +9,8 @@
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "a command-line tool")]
 
 mod growth;
+mod guided;
+mod text;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -24,11 +26,14 @@ struct Arguments {
 enum Method {
     /// Cracks that grow from hits, by space colonization.
     Growth(growth::Options),
+    /// Cracks that draw a picture or a word, all at once.
+    Guided(Box<guided::Options>),
 }
 
 fn main() -> ExitCode {
     let done = match Arguments::parse().method {
         Method::Growth(options) => growth::bake(&options),
+        Method::Guided(options) => guided::bake(&options),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

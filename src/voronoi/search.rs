@@ -139,10 +139,6 @@ impl<P: Packed> Search<P> {
         &self.field
     }
 
-    pub(super) fn into_field(self) -> Vec<P> {
-        self.field
-    }
-
     /// A source of paths; of two at one texel the lower index stays.
     pub(super) fn add_site(&mut self, texel: UVec2, index: u32) {
         let i = texel.y as usize * self.size.x as usize + texel.x as usize;
@@ -154,6 +150,41 @@ impl<P: Packed> Search<P> {
     fn stir(&mut self, x: usize, y: usize) {
         self.stamps[y * self.blocks + x / BLOCK] = Stamps { changed: self.clock, looked: [0; 2], stirred: true };
         self.quiet = 0;
+    }
+
+    /// Takes over changed costs of edges: the search is at rest again, after further sweeps, where a new one would be.
+    ///
+    /// `dearer` are the texels on either side of edges that have become dearer, `cheaper` those of edges that have
+    /// become cheaper. A texel whose path has become dearer is forgotten, and with it every texel that may have come by
+    /// it; the others stay. No texel holds itself up, since each step costs something.
+    pub(super) fn reconsider(&mut self, lattice: &Lattice, dearer: &[u32], cheaper: &[u32]) {
+        let (w, n) = (self.size.x as usize, self.field.len());
+        for &texel in cheaper {
+            self.stir(texel as usize % w, texel as usize / w);
+        }
+        let mut suspects = dearer.to_vec();
+        while let Some(suspect) = suspects.pop() {
+            let i = suspect as usize;
+            let here = self.field[i];
+            if here >= P::FAR || here.cost() == 0 {
+                continue;
+            }
+            let x = i % w;
+            let around = [
+                (x + 1 < w).then(|| (i + 1, lattice.edges(i).0)),
+                (x > 0).then(|| (i - 1, lattice.edges(i - 1).0)),
+                (i + w < n).then(|| (i + w, lattice.edges(i).1)),
+                (i >= w).then(|| (i - w, lattice.edges(i - w).1)),
+            ];
+            let mut neighbours = around.into_iter().flatten();
+            if neighbours.clone().any(|(from, edge)| step::<P, true>(self.field[from], edge) <= here) {
+                continue;
+            }
+            let leads_to = |&(to, edge): &(usize, u16)| step::<P, true>(here, edge) <= self.field[to];
+            suspects.extend(neighbours.by_ref().filter(leads_to).map(|(to, _)| to as u32));
+            self.field[i] = P::FAR;
+            self.stir(x, i / w);
+        }
     }
 
     /// Whether every texel has its cost.

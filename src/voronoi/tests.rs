@@ -128,7 +128,9 @@ fn speed() {
         let size = UVec2::splat(n);
         let mut rng = Rng::new(1);
         let read = |name: &str| std::fs::read(format!("/tmp/crack_anchors/{name}_{n}.raw")).ok();
-        let (Some(noise), Some(drawing), Some(sites)) = (read("noise"), read("drawing"), read("sites")) else { continue };
+        let (Some(noise), Some(drawing), Some(sites)) = (read("noise"), read("drawing"), read("sites")) else {
+            continue;
+        };
         let noise: Vec<u16> = noise.as_chunks().0.iter().map(|&b| (f32::from_le_bytes(b) * 65535.0) as u16).collect();
         let drawing: Vec<u16> = drawing.iter().map(|&b| u16::from(b) * 65535).collect();
         let sites: Vec<u32> = sites.as_chunks().0.iter().map(|&b| u32::from_le_bytes(b)).collect();
@@ -157,7 +159,13 @@ fn speed() {
             }
             search.finish::<false>(&lattice);
             let px = f64::from(n * n);
-            println!("{n}: lattice {:.2} ns/px, narrow {:.2} ns/px = {:.2} ms, wide {:.2}", built.as_nanos() as f64 / px, narrow.as_nanos() as f64 / px, narrow.as_secs_f64() * 1e3, t.elapsed().as_nanos() as f64 / px);
+            println!(
+                "{n}: lattice {:.2} ns/px, narrow {:.2} ns/px = {:.2} ms, wide {:.2}",
+                built.as_nanos() as f64 / px,
+                narrow.as_nanos() as f64 / px,
+                narrow.as_secs_f64() * 1e3,
+                t.elapsed().as_nanos() as f64 / px
+            );
         }
         let _ = rng.unit();
     }
