@@ -9,7 +9,7 @@ use bevy_crack::{
     paint::{BaseTexels, Look, LookTable, PaintTargets, paint_into},
     pattern::SurfaceFrame,
     raster::{DepthField, Profile, TexelRect},
-    voronoi::{Guide, Seams, SiteLayout, VoronoiBake, VoronoiMap, VoronoiParams},
+    voronoi::{Guide, SiteLayout, VoronoiBake, VoronoiMap, VoronoiParams},
 };
 use clap::{Args, ValueEnum};
 use glam::{UVec2, Vec2};

@@ -7,7 +7,7 @@ use super::{
     noise::Noise,
     params::MAX_LEVELS,
     resample::Resampler,
-    seams::{Seams, Tracer},
+    seams::{Seams, Steepest, Tracer},
     search::BLOCK,
     sites::{sites, texel},
     strokes::Astride,
@@ -86,6 +86,8 @@ pub struct VoronoiMap {
     /// For each row and block whether a guide has anything there.
     guided: Vec<bool>,
     strokes: Option<StrokeReport>,
+    /// Path cost at which cracks reach full width, in β: that of the dearest ones when the map was made.
+    full_cost: Option<f32>,
 }
 
 impl VoronoiBake {
@@ -122,6 +124,7 @@ impl VoronoiBake {
                 lattices: vec![Lattice::new(size)],
                 guided: Vec::new(),
                 strokes: None,
+                full_cost: None,
             },
             stage: Stage::Guides { y: 0 },
             progress: 0.0,
@@ -175,7 +178,11 @@ impl VoronoiBake {
             }
             Stage::Seams(mut tracer) => match self.map.levels.last() {
                 Some(level) if tracer.scan(level, rows) => Stage::Seams(tracer),
-                _ => Stage::Done(tracer.finish(&self.map.levels, &self.map.params, &self.map.frame)),
+                _ => {
+                    let (seams, full) = self.map.follow(tracer);
+                    self.map.full_cost = Some(full);
+                    Stage::Done(seams)
+                }
             },
             done @ Stage::Done(_) => done,
         };
@@ -350,14 +357,28 @@ impl VoronoiMap {
         Some(regions)
     }
 
+    /// The seams that a tracer has found, and the cost of full width.
+    fn follow(&self, tracer: Tracer) -> (Seams, f32) {
+        let beta = self.params.beta;
+        let steepest = Steepest { ground: self.params.alpha / beta + 1.0, guides: self.guides_weight() };
+        tracer.finish(&self.levels, &self.params, &self.frame, steepest, self.full_cost)
+    }
+
+    /// The heaviest guide, in β.
+    fn guides_weight(&self) -> f32 {
+        self.layers[1..].iter().map(Layer::weight_in_beta).fold(0.0, f32::max)
+    }
+
     /// The boundaries of the regions.
+    ///
+    /// The cost that stands for full width stays that of the map when it was made, so that widths do not jump as weights change.
     #[must_use]
     pub fn seams(&self) -> Seams {
         let mut tracer = Tracer::new(self.frame.size());
         match self.levels.last() {
             Some(level) => {
                 tracer.scan(level, self.height());
-                tracer.finish(&self.levels, &self.params, &self.frame)
+                self.follow(tracer).0
             }
             None => Seams { extent: self.frame.extent(), ..Seams::default() },
         }

@@ -22,6 +22,11 @@ pub(super) struct Layer {
 }
 
 impl Layer {
+    /// The weight in β.
+    pub(super) fn weight_in_beta(&self) -> f32 {
+        f32::from(self.weight) / f32::from(UNIT)
+    }
+
     /// A weight given in β.
     pub(super) fn set_weight(&mut self, in_beta: f32) {
         self.weight = (in_beta.clamp(0.0, MAX_WEIGHT) * f32::from(UNIT)).round() as u16;

@@ -81,9 +81,9 @@ pub struct VoronoiParams {
     pub width: f32,
     /// Width of the thinnest ones, pattern units, 0..=[`width`](Self::width); default 0.0015.
     pub least_width: f32,
-    /// Path cost at which a crack reaches full width, in those of a crack half way between two sites of a map without
-    /// guides. 0.1..=100; default 2.6. Smaller makes all cracks equally wide.
-    pub full_cost: f32,
+    /// How cracks taper: their width grows with this power of the path cost from the sites (section 3.2), up to full
+    /// width where it is dearest. 0..=8; default 2. 0 makes all cracks equally wide.
+    pub taper: f32,
 }
 
 impl VoronoiParams {
@@ -97,7 +97,7 @@ impl VoronoiParams {
         noise_scale: 0.12,
         width: 0.014,
         least_width: 0.0015,
-        full_cost: 2.6,
+        taper: 2.0,
     };
 
     /// Checks every parameter, and the weights of `guides`, against their ranges.
@@ -120,7 +120,7 @@ impl VoronoiParams {
             ("noise_scale", self.noise_scale, 0.01, 1.0),
             ("width", self.width, 0.0, 0.2),
             ("least_width", self.least_width, 0.0, self.width),
-            ("full_cost", self.full_cost, 0.1, 100.0),
+            ("taper", self.taper, 0.0, 8.0),
             ("layout.focus", focus, 1.0, 8.0),
             ("layout.at", at, 0.0, 0.0),
         ];

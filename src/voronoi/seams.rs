@@ -8,6 +8,7 @@
 
 use super::{level::Level, params::VoronoiParams};
 use crate::{
+    math::ops,
     pattern::{PathPoint, SegmentPath, SurfaceFrame},
     raster::{DepthField, Profile, stamp_path},
 };
@@ -271,92 +272,125 @@ impl Tracer {
         (joints, lines)
     }
 
-    /// The seams of the finest of `levels`, after the whole surface has been scanned.
-    pub(super) fn finish(mut self, levels: &[Level], params: &VoronoiParams, frame: &SurfaceFrame) -> Seams {
-        let Some(finest) = levels.last() else { return Seams::default() };
+    /// The seams of the finest of `levels`, after the whole surface has been scanned, and the cost that has full width:
+    /// `full`, or that of the dearest ones.
+    pub(super) fn finish(
+        mut self,
+        levels: &[Level],
+        params: &VoronoiParams,
+        frame: &SurfaceFrame,
+        steepest: Steepest,
+        full: Option<f32>,
+    ) -> (Seams, f32) {
+        let mut seams = Seams { extent: frame.extent(), ..Seams::default() };
+        let Some(finest) = levels.last() else { return (seams, 1.0) };
         let (mut joints, mut lines) = self.lines(finest);
         tauten(&mut joints, &mut lines);
-        let widths = Widths::new(params, frame);
-        let seams = lines.iter().filter_map(|line| self.seam(line, &joints, levels, &widths, frame));
-        Seams {
-            extent: frame.extent(),
-            seams: seams.collect(),
-            vertices: joints
-                .iter()
-                .map(|joint| SeamVertex { pos: frame.to_pos(joint.pos), on_border: joint.on_border })
-                .collect(),
-        }
+        let births: Vec<usize> = lines.iter().map(|line| self.birth(line, levels)).collect();
+        let costs: Vec<Vec<f32>> =
+            lines.iter().zip(&births).map(|(line, &birth)| self.costs(line, &levels[birth], steepest)).collect();
+        let full = full.unwrap_or_else(|| dearest(&costs));
+        let (least, gain) = (params.least_width, params.width - params.least_width);
+        let widths = Widths { least, gain, taper: params.taper, full };
+        let to_seam = |((line, costs), birth): ((&Line, &Vec<f32>), usize)| {
+            let first = line.crossings.first()?;
+            let places: Vec<Vec2> = std::iter::once(joints[line.ends[0]].pos)
+                .chain(line.crossings.iter().map(Crossing::pos))
+                .chain([joints[line.ends[1]].pos])
+                .collect();
+            // A vertex has the cost of the crossing beside it.
+            let cost = |i: usize| costs[i.saturating_sub(1).min(costs.len() - 1)];
+            let point = |i: usize| PathPoint { pos: frame.to_pos(places[i]), width: widths.of(cost(i)) };
+            // On which side the first crossing has its texel as one leaves the first vertex; left is where y is less
+            // for x that grows.
+            let [a, b] = self.beside(first);
+            let heading = first.pos() - joints[line.ends[0]].corner;
+            let a_is_left = heading.perp_dot(first.from - first.pos()) < 0.0;
+            let (left, right) = if a_is_left { (a, b) } else { (b, a) };
+            Some(Seam {
+                from: line.ends[0] as u32,
+                to: line.ends[1] as u32,
+                left: finest.region(left),
+                right: finest.region(right),
+                level: birth as u32,
+                points: simplify(&places).into_iter().map(point).collect(),
+            })
+        };
+        seams.seams = lines.iter().zip(&costs).zip(births).filter_map(to_seam).collect();
+        let vertex = |joint: &Joint| SeamVertex { pos: frame.to_pos(joint.pos), on_border: joint.on_border };
+        seams.vertices = joints.iter().map(vertex).collect();
+        (seams, full)
     }
 
-    fn seam(
-        &self,
-        line: &Line,
-        joints: &[Joint],
-        levels: &[Level],
-        widths: &Widths,
-        frame: &SurfaceFrame,
-    ) -> Option<Seam> {
-        let (finest, first) = (levels.last()?, line.crossings.first()?);
-        let beside = |crossing: &Crossing| {
-            let step = if crossing.bit == RIGHT { 1 } else { self.size.x as usize };
-            [crossing.texel, crossing.texel + step]
-        };
-        let [a, b] = beside(first);
-        let level = levels.iter().position(|level| level.region(a) != level.region(b))?;
-        let mut costs: Vec<f32> = line
-            .crossings
-            .iter()
-            .map(|crossing| beside(crossing).map(|texel| levels[level].cost(texel)).iter().sum::<f32>() * 0.5)
-            .collect();
-        smooth(&mut costs);
-        // The lattice may give the line a cost of its own at either end.
-        let (first_cost, last_cost) = (*costs.first()?, *costs.last()?);
-        costs.insert(0, first_cost);
-        costs.push(last_cost);
-        let [from, to] = line.ends.map(|end| joints[end].pos);
-        let places: Vec<Vec2> =
-            std::iter::once(from).chain(line.crossings.iter().map(Crossing::pos)).chain([to]).collect();
-        let point = |i: usize| PathPoint { pos: frame.to_pos(places[i]), width: widths.of(costs[i]) };
-        // On the side of the first crossing's texel as one leaves the first vertex.
-        let heading = first.pos() - joints[line.ends[0]].corner;
-        let texel_is_left = (first.from - first.pos()).perp_dot(heading) > 0.0;
-        let (left, right) = if texel_is_left { (a, b) } else { (b, a) };
-        Some(Seam {
-            from: line.ends[0] as u32,
-            to: line.ends[1] as u32,
-            left: finest.region(left),
-            right: finest.region(right),
-            level: level as u32,
-            points: simplify(&places).into_iter().map(point).collect(),
-        })
+    /// The texels on either side of a crossing.
+    fn beside(&self, crossing: &Crossing) -> [usize; 2] {
+        [crossing.texel, crossing.texel + if crossing.bit == RIGHT { 1 } else { self.size.x as usize }]
     }
+
+    /// The level at which a line appeared.
+    fn birth(&self, line: &Line, levels: &[Level]) -> usize {
+        let Some(first) = line.crossings.first() else { return 0 };
+        let [a, b] = self.beside(first);
+        levels.iter().position(|level| level.region(a) != level.region(b)).unwrap_or(0)
+    }
+
+    /// Path costs along a line, in β.
+    fn costs(&self, line: &Line, level: &Level, steepest: Steepest) -> Vec<f32> {
+        let cost = |crossing: &Crossing| self.beside(crossing).map(|texel| level.cost(texel)).iter().sum::<f32>() * 0.5;
+        let mut costs: Vec<f32> = line.crossings.iter().map(cost).collect();
+        smooth(&mut costs);
+        lower_thorns(&costs, steepest)
+    }
+}
+
+/// How steeply costs rise, in β a texel.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Steepest {
+    /// In the ground.
+    pub ground: f32,
+    /// In the strokes of the guides, beside that.
+    pub guides: f32,
+}
+
+/// Of the distance from the edge of a stroke to its middle, how much of a crack that comes in from the side stays thin.
+/// Below a half such cracks show as thorns on the letters; above one the ends of strokes get lost.
+const THORN: f32 = 0.8;
+
+/// The least cost nearby, where a guide is: what runs along the middle of a stroke stays, what runs into it from the
+/// side, with costs that rise all the way, is lowered to what it was at the edge.
+fn lower_thorns(costs: &[f32], steepest: Steepest) -> Vec<f32> {
+    let all = steepest.ground + steepest.guides;
+    let reach_per_cost = THORN * steepest.guides / (all * all);
+    let near = |i: usize, cost: f32| {
+        let reach = (cost * reach_per_cost) as usize;
+        &costs[i.saturating_sub(reach)..(i + reach + 1).min(costs.len())]
+    };
+    costs.iter().enumerate().map(|(i, &cost)| near(i, cost).iter().copied().fold(cost, f32::min)).collect()
 }
 
 /// Path cost to width (Mould 2005, section 3.2: "the further the site, the wider").
 struct Widths {
     least: f32,
     gain: f32,
+    taper: f32,
     /// Full cost, in β.
     full: f32,
 }
 
 impl Widths {
-    fn new(params: &VoronoiParams, frame: &SurfaceFrame) -> Self {
-        let area = frame.extent().x * frame.extent().y;
-        let spacing = (area / params.sites.max(1) as f32).sqrt();
-        let mean_edge = 0.5 * params.alpha / params.beta + 1.0;
-        let usual = 0.5 * spacing * frame.texels_per_unit() * mean_edge;
-        Self {
-            least: params.least_width,
-            gain: params.width - params.least_width,
-            full: (usual * params.full_cost).max(1.0e-3),
-        }
-    }
-
     fn of(&self, cost: f32) -> f32 {
-        let share = (cost / self.full).min(1.0);
-        self.least + self.gain * share * share.sqrt()
+        self.least + self.gain * ops::powf((cost / self.full).min(1.0), self.taper)
     }
+}
+
+/// The share of crossings that are less dear than the full width.
+const USUAL: f32 = 0.97;
+
+/// Cost of the dearest crossings.
+fn dearest(costs: &[Vec<f32>]) -> f32 {
+    let mut all: Vec<f32> = costs.iter().flatten().copied().collect();
+    let n = ((all.len() as f32 * USUAL) as usize).min(all.len().saturating_sub(1));
+    if all.is_empty() { 1.0 } else { all.select_nth_unstable_by(n, f32::total_cmp).1.max(1.0e-3) }
 }
 
 /// Slides crossings and joints towards the middle of their neighbours.
