@@ -48,7 +48,7 @@ pub(crate) struct Options {
     out: PathBuf,
 }
 
-fn size(text: &str) -> Result<UVec2, String> {
+pub(crate) fn size(text: &str) -> Result<UVec2, String> {
     let (width, height) = text.split_once('x').ok_or("a size is WIDTHxHEIGHT")?;
     let side = |text: &str| text.parse::<u32>().map_err(|error| format!("{text}: {error}"));
     let size = UVec2::new(side(width)?, side(height)?);
@@ -81,7 +81,7 @@ fn own_picture(preset: &str) -> PathBuf {
 }
 
 /// A picture of at most 8192 texels a side and 256 MiB; the header is checked before memory is taken.
-fn read_picture(path: &Path) -> Result<RgbaImage, Box<dyn Error>> {
+pub(crate) fn read_picture(path: &Path) -> Result<RgbaImage, Box<dyn Error>> {
     let mut reader = ImageReader::open(path).map_err(|error| format!("{}: {error}", path.display()))?;
     let mut limits = Limits::default();
     limits.max_image_width = Some(8192);
