@@ -8,6 +8,7 @@
 //! - [`growth`]: cracks by space colonization, step by step.
 //! - [`raster`]: networks to a depth field.
 //! - [`paint`]: a base picture and a depth field to diffuse, normal and depth textures.
+//! - [`shatter`]: the pieces into which cracks cut a surface, and how they fall.
 //! - `plugin` (feature `bevy`): components, hits, systems, upload.
 
 mod grid;
@@ -17,6 +18,7 @@ pub mod paint;
 pub mod pattern;
 pub mod preset;
 pub mod raster;
+pub mod shatter;
 
 #[cfg(feature = "bevy")]
 pub mod plugin;
