@@ -89,8 +89,8 @@ impl Shards {
     }
 
     fn inside(&self, shard: u32, pieces: &Self) -> Vec<bool> {
-        let inner = (0..pieces.len() as u32).map(|piece| pieces.inner_point(piece));
-        inner.map(|point| point.is_some_and(|point| self.contains(shard, point))).collect()
+        let inner = (0..pieces.len() as u32).map(|piece| pieces.inner_place(piece));
+        inner.map(|place| place.is_some_and(|place| self.contains_place(shard, place))).collect()
     }
 
     /// The angle of a shard's length: the axis of its corners.

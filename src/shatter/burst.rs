@@ -84,10 +84,12 @@ impl Default for BurstParams {
 /// cuts.add_line(&[[0.5, 0.0].into(), [0.5, 1.0].into()])?;
 /// let shards = shatter(&cuts, &ShatterParams::DEFAULT)?;
 /// let burst = Burst::new(BurstParams::DEFAULT, [0.5, 0.5].into(), Vec3::NEG_Z, 1.0, 7)?;
-/// let left = burst.flight(0, &shards.iter().as_slice()[0]);
-/// assert!(left.pose(1.0).offset.x < 0.0);
-/// // Backwards: the same place, and at last its own.
-/// assert_eq!(left.pose(0.0), Pose::AT_REST);
+/// for (number, shard) in (0u32..).zip(shards.iter()) {
+///     let flight = burst.flight(number, shard);
+///     // The left half flies to the left, the right one to the right; backwards, each comes back to its place.
+///     assert_eq!(flight.pose(1.0).offset.x < 0.0, shard.centroid.x < 0.5);
+///     assert_eq!(flight.pose(0.0), Pose::AT_REST);
+/// }
 /// # Ok::<(), bevy_crack::shatter::ShatterError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
@@ -158,9 +160,9 @@ impl Burst {
         let distance = away.length();
         let mut rng = Rng::new(self.seed).stream("burst").nth(u64::from(number));
         let mut noise = || Vec3::new(rng.signed(), rng.signed(), rng.signed());
-        // Pieces around the hit rise towards the viewer, less so further out.
-        let out = Vec3::new(away.x, -away.y, 0.35 * falloff).normalize_or(Vec3::Z);
-        let direction = out * (1.0 - along) + self.direction * along + noise() * scatter;
+        // Away from the hit; right behind it, only along its direction.
+        let out = Vec3::new(away.x, -away.y, 0.0) / (distance * distance + 0.1 * falloff * falloff).sqrt();
+        let direction = out * (1.0 - along) + self.direction * along + noise() * (0.5 * scatter);
         let unevenness = 1.0 + scatter * rng.signed();
         let strength = falloff * falloff / (falloff * falloff + distance * distance);
         let velocity = direction * (speed * self.energy.sqrt() * strength * unevenness * lightness(shard.area));
@@ -209,12 +211,14 @@ impl Flight {
         if time.is_nan() || time <= 0.0 {
             return Pose::AT_REST;
         }
-        // The integral of exp(-drag t), and the integral of that.
-        let (run, fallen) = if self.drag > 1e-3 {
-            let run = (1.0 - ops::exp(-self.drag * time)) / self.drag;
+        // The integral of exp(-drag t), and the integral of that; by their series where the formula would lose digits.
+        let x = self.drag * time;
+        let (run, fallen) = if x > 0.05 {
+            let run = (1.0 - ops::exp(-x)) / self.drag;
             (run, (time - run) / self.drag)
         } else {
-            (time, 0.5 * time * time)
+            let run = time * (1.0 - x / 2.0 * (1.0 - x / 3.0 * (1.0 - x / 4.0)));
+            (run, time * time / 2.0 * (1.0 - x / 3.0 * (1.0 - x / 4.0 * (1.0 - x / 5.0))))
         };
         let half_turn = 0.5 * self.spin * run;
         let rotation = (self.axis * ops::sin(half_turn)).extend(ops::cos(half_turn));

@@ -384,8 +384,8 @@ impl EdgeGrid {
                 // One place wider on either side, for rounding.
                 let x_at = |y: i64| f64::from(top[0]) + slope * (y as f64 - f64::from(top[1]));
                 let ends = [x_at((row << self.shift) as i64), x_at(((row + 1) << self.shift) as i64)];
-                from = from.max(ends[0].min(ends[1]).floor() as i32 - 1);
-                to = to.min(ends[0].max(ends[1]).ceil() as i32 + 1);
+                from = from.max((ends[0].min(ends[1]).floor() - 1.0) as i32);
+                to = to.min((ends[0].max(ends[1]).ceil() + 1.0) as i32);
             }
             for column in square(from)..=square(to.max(from)) {
                 visit((row * self.columns + column) as u32);

@@ -259,7 +259,7 @@ fn drop_loose_ends(drawing: &mut Drawing) {
                 degree[end as usize] -= 1;
                 edges[end as usize] ^= edge;
             }
-            end = (a ^ b) as usize ^ end;
+            end ^= (a ^ b) as usize;
             any = true;
         }
     }
@@ -338,7 +338,7 @@ impl Rows {
         for &edge in self.rows.get((at[1] >> self.shift) as usize)? {
             let [a, b] = drawing.edges[edge as usize].map(|vertex| drawing.places[vertex as usize]);
             // As if the place were a little further down.
-            if (a[1] <= at[1]) == (b[1] <= at[1]) {
+            if a == at || b == at || (a[1] <= at[1]) == (b[1] <= at[1]) {
                 continue;
             }
             let slope = f64::from(b[0] - a[0]) / f64::from(b[1] - a[1]);

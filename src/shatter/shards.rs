@@ -6,7 +6,7 @@ use super::{
     lattice::{Lattice, Place, cross, distance_sq, ring_area},
     triangulate::{Clipper, area_of, convex_pieces, simplify},
 };
-use glam::Vec2;
+use glam::{DVec2, Vec2};
 use std::ops::Range;
 
 /// A piece of the surface.
@@ -170,11 +170,15 @@ impl Shards {
         (0..self.len() as u32).find(|&shard| inside && self.contains(shard, pos))
     }
 
-    /// Whether a place lies in a shard. On an edge, it lies in one of the two.
+    /// Whether a place in pattern units lies in a shard. On an edge, it lies in one of the two.
     pub(super) fn contains(&self, shard: u32, pos: Vec2) -> bool {
-        let p = pos.as_dvec2() * self.lattice.scale;
         // The surface's own lower and right sides belong to it.
-        let p = p.min(glam::DVec2::from(self.lattice.corner.map(|side| f64::from(side) - 1e-3)));
+        let end = DVec2::from(self.lattice.corner.map(|side| f64::from(side) - 1e-3));
+        self.contains_place(shard, (pos.as_dvec2() * self.lattice.scale).min(end))
+    }
+
+    /// [`contains`](Self::contains) for a place of the lattice, or between.
+    pub(super) fn contains_place(&self, shard: u32, p: DVec2) -> bool {
         let mut inside = false;
         for ring in self.rings_of(shard) {
             let mut from = self.places[ring[ring.len() - 1] as usize];
@@ -245,10 +249,9 @@ impl Shards {
     /// Keeps some shards, and numbers them anew.
     pub(super) fn retain(&mut self, keep: &[bool]) {
         let mut new_number = vec![u32::MAX; self.len()];
-        let mut next = 0;
-        for (number, _) in new_number.iter_mut().zip(keep).filter(|(_, keep)| **keep) {
+        let kept = new_number.iter_mut().zip(keep).filter(|(_, keep)| **keep);
+        for (next, (number, _)) in (0u32..).zip(kept) {
             *number = next;
-            next += 1;
         }
         let (shards, neighbours) = (std::mem::take(&mut self.shards), std::mem::take(&mut self.neighbours));
         for (mut shard, _) in shards.into_iter().zip(keep).filter(|(_, keep)| **keep) {
@@ -266,11 +269,16 @@ impl Shards {
     /// A place well inside a shard, pattern units.
     #[must_use]
     pub fn inner_point(&self, shard: u32) -> Option<Vec2> {
+        self.inner_place(shard).map(|place| (place / self.lattice.scale).as_vec2())
+    }
+
+    /// The middle of the largest triangle of a shard, on the lattice or between.
+    pub(super) fn inner_place(&self, shard: u32) -> Option<DVec2> {
         let corners = self.corners(shard);
         let place = |corner: u32| self.places[corners[corner as usize] as usize];
         let largest =
             self.triangles(shard).iter().max_by_key(|triangle| ring_area(triangle.iter().map(|&i| place(i))))?;
-        Some(largest.map(|corner| self.positions[corners[corner as usize] as usize]).into_iter().sum::<Vec2>() / 3.0)
+        Some(largest.map(|corner| DVec2::from(place(corner).map(f64::from))).into_iter().sum::<DVec2>() / 3.0)
     }
 }
 

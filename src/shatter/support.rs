@@ -31,7 +31,8 @@ pub enum Anchor {
 /// let shards = shatter(&cuts, &ShatterParams::DEFAULT)?;
 /// let mut support = Support::new(&shards, Anchor::Sides([false, false, true, false]));
 /// let fallen = support.hit(&shards, [0.5, 0.45].into(), 0.1)?;
-/// assert_eq!((fallen.hit, fallen.loose), (vec![1], vec![2]));
+/// let number = |y: f32| shards.at([0.5, y].into()).into_iter().collect::<Vec<u32>>();
+/// assert_eq!((fallen.hit, fallen.loose), (number(0.45), number(0.8)));
 /// # Ok::<(), bevy_crack::shatter::ShatterError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -75,13 +76,13 @@ impl Support {
     #[must_use]
     pub fn renewed(&self, old: &Shards, new: &Shards, anchor: Anchor) -> Self {
         let mut support = Self::new(new, anchor);
-        let mut holes: Vec<(f32, f32, u32)> = self.gone().map(|shard| span(old, shard)).collect();
+        let mut holes: Vec<(f64, f64, u32)> = self.gone().map(|shard| span(old, shard)).collect();
         holes.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.2.cmp(&b.2)));
         for shard in 0..new.len() as u32 {
-            let Some(at) = new.inner_point(shard) else { continue };
+            let Some(at) = new.inner_place(shard) else { continue };
             let up_to = holes.partition_point(|hole| hole.0 <= at.x);
             support.gone[shard as usize] =
-                holes[..up_to].iter().any(|&(_, right, hole)| at.x <= right && old.contains(hole, at));
+                holes[..up_to].iter().any(|&(_, right, hole)| at.x <= right && old.contains_place(hole, at));
         }
         support
     }
@@ -156,9 +157,9 @@ impl Support {
     }
 }
 
-/// Left and right end of a shard, and its number.
-fn span(shards: &Shards, shard: u32) -> (f32, f32, u32) {
-    let ends = shards.outline(shard).iter().map(|&corner| shards.positions()[corner as usize].x);
-    let (left, right) = ends.fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+/// Left and right end of a shard on the lattice, and its number.
+fn span(shards: &Shards, shard: u32) -> (f64, f64, u32) {
+    let ends = shards.outline(shard).iter().map(|&corner| f64::from(shards.places[corner as usize][0]));
+    let (left, right) = ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
     (left, right, shard)
 }
