@@ -19,7 +19,7 @@ const INK: u16 = 1 << 15;
 const MOST_INK: f32 = 0.7;
 
 /// Share of the sites that is laid astride at once, and that may be after all gaps have been closed.
-const AT_ONCE: f32 = 0.25;
+const AT_ONCE: f32 = 0.2;
 const IN_ALL: f32 = 0.85;
 
 /// Distance of a site from its stroke, texels.
