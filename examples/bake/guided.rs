@@ -190,8 +190,8 @@ fn write(out: &Path, base: &RgbaImage, field: &DepthField, look: &Look) -> Resul
     Ok(())
 }
 
-/// Deeper than this are the cracks that draw: two thirds.
-pub(crate) const DEEP: u16 = 43_690;
+/// Deeper than this are the cracks that draw.
+pub(crate) const DEEP: u16 = u16::MAX / 2;
 
 /// The cracks deeper than `depth`, black on white.
 pub(crate) fn darker(field: &DepthField, depth: u16) -> Result<GrayImage, Box<dyn Error>> {

@@ -258,6 +258,11 @@ impl VoronoiBake {
 }
 
 impl VoronoiMap {
+    #[cfg(test)]
+    pub(super) fn lattice(&self, level: usize) -> &Lattice {
+        &self.lattices[level]
+    }
+
     const fn height(&self) -> usize {
         self.frame.size().y as usize
     }
