@@ -1,5 +1,11 @@
 //! [`CrackPreset`]: everything that makes glass glass.
 
+mod check;
+#[cfg(feature = "serde")]
+mod file;
+
+pub use check::PresetError;
+
 use crate::{
     growth::{GrowthParams, MarkerLayout, StartLayout},
     paint::Look,
@@ -16,7 +22,7 @@ use crate::{
 /// assert_eq!(CrackPreset::named("glass"), Some(CrackPreset::GLASS));
 /// ```
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]
+#[cfg_attr(feature = "bevy", derive(bevy::asset::Asset, bevy::reflect::Reflect))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct CrackPreset {
     /// How cracks grow.

@@ -9,7 +9,7 @@ use bevy_crack::{
 };
 use clap::Args;
 use glam::{UVec2, Vec2};
-use image::{ImageBuffer, ImageReader, Limits, Luma, Rgba, RgbaImage, imageops::FilterType};
+use image::{GrayImage, ImageBuffer, ImageReader, Limits, Luma, Rgba, RgbaImage, imageops::FilterType};
 use serde_json::json;
 use std::{
     error::Error,
@@ -65,7 +65,7 @@ fn hit(text: &str) -> Result<(Vec2, f32), String> {
     }
 }
 
-fn setting(text: &str) -> Result<(String, String), String> {
+pub(crate) fn setting(text: &str) -> Result<(String, String), String> {
     let (name, value) = text.split_once('=').ok_or("a setting is NAME=VALUE")?;
     Ok((name.into(), value.into()))
 }
@@ -155,15 +155,12 @@ pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
     let painted = clock.elapsed();
 
     fs::create_dir_all(&options.out)?;
-    let texels = field.depth.as_slice();
     diffuse.save(options.out.join("diffuse.png"))?;
     normal.save(options.out.join("normal.png"))?;
-    let depth = ImageBuffer::<Luma<u16>, _>::from_raw(size.x, size.y, texels.to_vec()).ok_or("depth size")?;
+    let texels = field.depth.as_slice().to_vec();
+    let depth = ImageBuffer::<Luma<u16>, _>::from_raw(size.x, size.y, texels).ok_or("depth size")?;
     depth.save(options.out.join("depth.png"))?;
-    // What a person would mark as crack: not the chipped rim.
-    let mask = texels.iter().map(|&depth| if depth > u16::MAX / 3 { 255 } else { 0 }).collect();
-    let mask = ImageBuffer::<Luma<u8>, Vec<u8>>::from_raw(size.x, size.y, mask).ok_or("mask size")?;
-    mask.save(options.out.join("mask.png"))?;
+    mask(&field).save(options.out.join("mask.png"))?;
     let network = growth.network();
     fs::write(options.out.join("network.json"), serde_json::to_string(&describe(network, options))?)?;
 
@@ -178,6 +175,15 @@ pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
         options.out.display()
     );
     Ok(())
+}
+
+/// White where a person would mark a crack: not on the chipped rim.
+pub(crate) fn mask(field: &DepthField) -> GrayImage {
+    let size = field.frame.size();
+    GrayImage::from_fn(size.x, size.y, |x, y| {
+        let depth = field.depth.get(x, y).unwrap_or(0);
+        Luma([if depth > u16::MAX / 3 { 255 } else { 0 }])
+    })
 }
 
 /// The network in pattern units (the shorter side is 1), with the rough line of each segment.
@@ -198,6 +204,7 @@ fn describe(network: &Network, options: &Options) -> serde_json::Value {
             let kind = match link.kind {
                 LinkKind::Connection => "connection",
                 LinkKind::Island => "island",
+                LinkKind::Junction => "junction",
             };
             json!({ "a": link.a, "b": link.b, "width": link.width, "birth": link.birth, "kind": kind })
         })

@@ -10,6 +10,7 @@
 
 mod growth;
 mod guided;
+mod realism;
 mod text;
 
 use clap::{Parser, Subcommand};
@@ -28,12 +29,15 @@ enum Method {
     Growth(growth::Options),
     /// Cracks that draw a picture or a word, all at once.
     Guided(Box<guided::Options>),
+    /// Masks of every preset with random hits, to be measured against photographs.
+    Realism(realism::Options),
 }
 
 fn main() -> ExitCode {
     let done = match Arguments::parse().method {
         Method::Growth(options) => growth::bake(&options),
         Method::Guided(options) => guided::bake(&options),
+        Method::Realism(options) => realism::bake(&options),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

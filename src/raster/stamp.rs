@@ -515,7 +515,15 @@ mod tests {
     fn rough_paths_have_no_gaps() {
         let mut field = field([256, 256]);
         let mut network = Network::new(Vec2::ONE, 0.2, 9);
-        let node = |pos, parent| crate::pattern::Node { pos, width: 0.01, parent, generation: 0, birth: 0, impact: 0 };
+        let node = |pos, parent| crate::pattern::Node {
+            pos,
+            width: 0.01,
+            parent,
+            generation: 0,
+            birth: 0,
+            impact: 0,
+            bend: 1.0,
+        };
         network.nodes.push(node(Vec2::new(0.1, 0.1), crate::pattern::NO_PARENT));
         network.nodes.push(node(Vec2::new(0.9, 0.7), 0));
         let path = network.path(crate::pattern::SegmentId::Branch(1)).unwrap();
