@@ -9,8 +9,7 @@
 use super::{lattice::Layer, level::Level, params::VoronoiParams};
 use crate::{
     math::ops,
-    pattern::{PathPoint, SegmentPath, SurfaceFrame},
-    raster::{DepthField, Profile, stamp_path},
+    pattern::{PathPoint, SurfaceFrame},
 };
 use glam::{IVec2, UVec2, Vec2};
 
@@ -58,17 +57,6 @@ pub struct Seams {
     pub vertices: Vec<SeamVertex>,
     /// The seams, in the order in which rows are read.
     pub seams: Vec<Seam>,
-}
-
-impl Seams {
-    /// Stamps all seams into `field`.
-    pub fn stamp(&self, field: &mut DepthField, profile: &Profile) {
-        for seam in &self.seams {
-            for pair in seam.points.windows(2) {
-                stamp_path(field, profile, &SegmentPath::straight(pair[0], pair[1]));
-            }
-        }
-    }
 }
 
 /// The sides of a corner of four texels, in the order north, east, south, west.

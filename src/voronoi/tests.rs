@@ -503,3 +503,62 @@ fn islands_have_rings() {
     let area = sweep(seam).abs() * 1600.0;
     assert!((150.0..300.0).contains(&area), "{area}");
 }
+
+#[test]
+fn networks_hold_every_seam_and_are_in_order_of_birth() {
+    let mut rng = Rng::new(77);
+    for seed in 0..4 {
+        let guide = Guide::new(drawing(&mut rng, UVec2::new(80, 80)));
+        let (_, seams) = made(&VoronoiParams::DEFAULT, &[guide], [160, 120], seed);
+        let network = seams.network(Vec2::new(0.4, 0.6));
+        let length: f64 = network
+            .segments()
+            .map(|segment| {
+                let (a, b) = network.ends(segment).unwrap();
+                let at = |i: u32| network.nodes()[i as usize].pos.as_dvec2();
+                assert_eq!(network.path(segment).unwrap().points().len(), 2, "the line is straight");
+                at(a).distance(at(b))
+            })
+            .sum();
+        let want: f64 = seams
+            .seams
+            .iter()
+            .flat_map(|seam| seam.points.windows(2))
+            .map(|pair| pair[0].pos.as_dvec2().distance(pair[1].pos.as_dvec2()))
+            .sum();
+        assert!((length / want - 1.0).abs() < 1.0e-6, "{length} of {want}");
+        assert!(network.nodes().is_sorted_by_key(|node| node.birth) && network.links().is_sorted_by_key(|l| l.birth));
+        for (i, node) in (0u32..).zip(network.nodes()) {
+            assert!(node.width > 0.0 && (node.parent < i || node.parent == crate::pattern::NO_PARENT));
+        }
+        let first = network.nodes()[0].pos.distance(Vec2::new(0.4, 0.6));
+        assert!(network.nodes().iter().all(|node| node.pos.distance(Vec2::new(0.4, 0.6)) >= first));
+    }
+}
+
+#[test]
+fn fronts_only_open_and_end_with_all_seams() {
+    let (map, seams) = made(&VoronoiParams::DEFAULT, &[], [200, 150], 4);
+    let profile = crate::raster::Profile::DEFAULT;
+    let empty = crate::raster::DepthField::new(*map.frame());
+    let mut full = empty.clone();
+    seams.stamp(&mut full, &profile);
+    let front = super::Front::new(&seams, Vec2::splat(0.5));
+    let mut last = empty.clone();
+    for i in 0..=10 {
+        let mut field = empty.clone();
+        seams.stamp_front(&mut field, &profile, &front, front.reach() * i as f32 / 10.0);
+        let mut pairs = last.depth.as_slice().iter().zip(field.depth.as_slice());
+        // Equal but for the last bits of the f32 arithmetic.
+        assert!(pairs.all(|(&before, &now)| now.saturating_add(64) >= before), "a crack has closed at {i}");
+        assert!(i == 10 || field != full);
+        last = field;
+    }
+    assert!(last == full);
+    let mut field = empty.clone();
+    seams.stamp_front(&mut field, &profile, &front, -1.0);
+    seams.stamp_share(&mut field, &profile, 0.0);
+    assert!(field == empty);
+    seams.stamp_share(&mut field, &profile, 7.0);
+    assert!(field == full);
+}
