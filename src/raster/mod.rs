@@ -4,11 +4,13 @@
 //! and a segment can be stamped again, wider, without its neighbours.
 
 mod dirty;
+mod distance;
 mod rect;
 mod replay;
 mod stamp;
 
 pub use dirty::DirtyTiles;
+pub use distance::{MAX_DISTANCE, crack_distance};
 pub use rect::TexelRect;
 pub use replay::{DOT_DEPTH, Redrawn, Replay};
 pub use stamp::{stamp_dot, stamp_path};
