@@ -19,6 +19,7 @@
 mod activate;
 mod budget;
 mod carrier;
+mod clock;
 mod error;
 mod grow;
 mod heal;
@@ -42,6 +43,7 @@ mod upload;
 mod watch;
 
 pub use budget::{CrackBudget, CrackStats};
+pub use clock::{CrackClock, CrackDrive};
 pub use error::CrackError;
 pub use heal::CrackCommandsExt;
 pub use hit::{CrackHit, HitPoint};
@@ -62,7 +64,7 @@ use bevy::{
 /// What a game names.
 pub mod prelude {
     pub use super::{
-        CrackBudget, CrackCommandsExt, CrackError, CrackFailed, CrackFinished, CrackHit, CrackMaps, CrackPlugin,
+        CrackBudget, CrackClock, CrackCommandsExt, CrackDrive, CrackError, CrackFailed, CrackFinished, CrackHit, CrackMaps, CrackPlugin,
         CrackPlugins, CrackResolution, CrackState, CrackStats, CrackStatus, CrackSurface, CrackSystems, CrackTextures,
         CrackTip, HitPoint,
     };
@@ -102,6 +104,7 @@ impl Plugin for CrackPlugin {
     fn build(&self, app: &mut App) {
         use CrackSystems::{Grow, Hit, Paint, Upload};
         app.register_type::<CrackSurface>()
+            .register_type::<CrackClock>()
             .register_type::<CrackState>()
             .register_type::<CrackTextures>()
             .register_type::<CrackHit>()
@@ -134,7 +137,7 @@ impl Plugin for CrackPlugin {
                     )
                         .chain()
                         .in_set(Hit),
-                    grow::grow_surfaces.in_set(Grow),
+                    (clock::follow_clocks, grow::grow_surfaces).chain().in_set(Grow),
                     paint::paint_surfaces.in_set(Paint),
                     upload::drop_unwanted.in_set(Upload),
                 ),

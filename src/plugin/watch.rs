@@ -4,8 +4,8 @@ use super::{
     CrackError, CrackState, CrackStatus, CrackSurface, CrackTextures,
     activate::{attach, draft, fail, frame, look, make_textures, mask, set_status},
     carrier::{self, Carrier, Found, Shown},
-    paint::stamp_all,
-    surfaces::{Active, Surfaces, Touched},
+    paint::stamp_anew,
+    surfaces::{Active, Surfaces},
 };
 use crate::{
     growth::CrackGrowth,
@@ -146,7 +146,10 @@ fn update_settings(entity: Entity, active: &mut Active, surface: CrackSurface) {
     match outcome {
         Ok(look) => {
             active.look = look;
-            active.profile = surface.preset.profile;
+            if active.profile != surface.preset.profile {
+                active.profile = surface.preset.profile;
+                stamp_anew(active);
+            }
             active.rate = surface.preset.steps_per_second;
             let whole = TexelRect::whole(active.field.frame.size());
             active.mark(whole);
@@ -197,8 +200,7 @@ fn update_picture(world: &mut World, entity: Entity, active: &mut Active, shown:
     if frame != active.field.frame {
         active.look = look;
         active.field = DepthField::new(frame);
-        active.touched = Touched::new(frame.size());
-        stamp_all(active);
+        stamp_anew(active);
     }
     active.views.clear();
     active.show(draft.rect);
