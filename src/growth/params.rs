@@ -130,7 +130,7 @@ pub struct GrowthParams {
     /// How close they must be. Pattern units, 0..=1.
     pub island_distance: f32,
     /// How far a tip notices an older crack or the border ahead of it, pattern units, 0..=1: it turns to meet it steeply and
-    /// stops there. No two cracks cross then. 0 = off: cracks neither see nor mind each other, as in the papers.
+    /// stops there. No less than 2.5 segment lengths, which it needs to turn. No two cracks cross then. 0 = off: cracks neither see nor mind each other, as in the papers.
     pub arrest: f32,
     /// Share of tips that stop short of the crack that they would have met, 0..=1.
     pub open_ends: f32,
@@ -428,10 +428,21 @@ impl GrowthParams {
     /// The most nodes that `markers` markers and `starts` starts can make: growth ends by itself within as many steps.
     ///
     /// Each new node either kills a marker or brings one closer by at least `D²/4` of squared distance, and no marker
-    /// begins further than [`crack_radius`](Self::crack_radius) from the node that it attracts.
+    /// begins further than [`crack_radius`](Self::crack_radius) from the node that it attracts. With closed venation a marker
+    /// attracts no more than six nodes at once, and for no longer than twice as many steps. With arrest a marker counts for each
+    /// time that it may be given up, every node may be a tip that runs on, and with nucleation every marker a start.
     #[must_use]
     pub fn most_nodes(&self, markers: u64, starts: u64) -> u64 {
-        let approaches = (self.crack_radius / self.step_length).powi(2) / PROGRESS;
-        starts + markers * (2 + approaches.ceil() as u64)
+        let approaches = ((self.crack_radius / self.step_length).powi(2) / PROGRESS).ceil() as u64;
+        let mut births = markers * (2 + approaches);
+        if self.venation == Venation::Closed {
+            births = 6 * markers * u64::from(super::closed::patience(self));
+        }
+        let starts = starts + if self.nucleation > 0.0 { markers } else { 0 };
+        if self.arrest <= 0.0 {
+            return starts + births;
+        }
+        let run = u64::from(super::arrest::steps_for(self.arrest.max(self.island_distance), self.step_length)) + 2;
+        (starts + births * u64::from(super::field::MOST_GIVEN_UP)) * (1 + run)
     }
 }

@@ -13,7 +13,7 @@ use super::{
 use crate::{
     Grid,
     math::{hash_unit, mix},
-    pattern::{Link, LinkKind, NO_PARENT, Network, Node, SegmentId},
+    pattern::{Dot, Link, LinkKind, NO_PARENT, Network, Node, SegmentId, Timeline},
 };
 use glam::Vec2;
 use std::ops::Range;
@@ -143,6 +143,7 @@ pub struct CrackGrowth {
     /// Places of markers made since they were last asked for.
     shown_markers: Vec<Vec2>,
     changes: Changes,
+    timeline: Timeline,
     pulls: Vec<Pull>,
     /// Node and entry in `pulls`, in order of the nodes.
     order: Vec<(u32, u32)>,
@@ -233,6 +234,7 @@ impl CrackGrowth {
             links_told: 0,
             shown_markers: Vec::new(),
             changes: Changes::default(),
+            timeline: Timeline::default(),
             pulls: Vec::new(),
             order: Vec::new(),
             pull_of: Vec::new(),
@@ -268,6 +270,7 @@ impl CrackGrowth {
         if self.network.nodes.len() >= self.params.max_nodes as usize {
             return HitOutcome::Rejected(Rejected::Full);
         }
+        self.timeline.begin(self.steps.saturating_add(1));
         let merge = self.params.step_length.max(self.params.kill_distance).min(0.05);
         let nearest = (0u32..)
             .zip(&self.impacts)
@@ -325,6 +328,7 @@ impl CrackGrowth {
             darts = Some(NodeGrid::new(extent, spacing));
         }
         let (field, nodes, shown) = (&mut self.field, &self.nodes, &mut self.shown_markers);
+        let (timeline, radius) = (&mut self.timeline, self.params.line_width);
         let show = self.params.draw_markers;
         // The rays of a hit are its own: older cracks do not sprout towards them.
         let is_loyal = self.params.arrest > 0.0 || matches!(self.params.markers, MarkerLayout::Polar { .. });
@@ -342,6 +346,7 @@ impl CrackGrowth {
             field.add(pos, loyal);
             if show {
                 shown.push(pos);
+                timeline.add_dot(Dot { pos, radius });
             }
         });
         // A large growth makes about two nodes a marker: room for them now, so that no step pauses to move them all.
@@ -352,6 +357,7 @@ impl CrackGrowth {
             self.widths.reserve(expected);
             self.pull_of.reserve(expected);
             self.changes.reserve(expected);
+            self.timeline.reserve(expected);
         }
     }
 
@@ -366,6 +372,7 @@ impl CrackGrowth {
         self.nodes.push(pos);
         self.pull_of.push(NO_PULL);
         self.changes.push_node(parent);
+        self.timeline.add_node(width);
         let (changes, network) = (&mut self.changes, &mut self.network);
         let mut widened = [NO_PARENT; 64];
         let mut n = 0;
@@ -377,7 +384,9 @@ impl CrackGrowth {
             }
         });
         for &node in &widened[..n] {
-            changes.widened(node, network.nodes[node as usize].parent != NO_PARENT);
+            let widened = network.nodes[node as usize];
+            changes.widened(node, widened.parent != NO_PARENT);
+            self.timeline.widen(node, widened.width);
         }
     }
 
@@ -390,20 +399,28 @@ impl CrackGrowth {
     /// [`GrowthParams::most_nodes`]. A node beyond the border, or closer to it than the kill distance on its way, lies on it.
     pub fn step(&mut self) -> StepReport {
         self.newborn = 0..0;
-        if self.steps_left == 0 {
-            return StepReport { born: 0 };
+        // A tip that has just set out to meet a crack may be all that moves, and has no node to show for it yet.
+        while self.steps_left > 0 && self.newborn.is_empty() {
+            self.make_step();
         }
+        StepReport { born: self.newborn.len() as u32 }
+    }
+
+    fn make_step(&mut self) {
         self.steps_left -= 1;
         self.field.settle(&self.network.nodes, &self.nodes);
         self.gather_pulls();
         self.aim();
         let first = self.network.nodes.len() as u32;
         let room = (self.params.max_nodes as usize).saturating_sub(self.network.nodes.len());
+        // What comes when growth has ended takes a step of the timeline all the same.
+        self.timeline.begin(self.steps.saturating_add(1));
         if !self.pulls.is_empty() || self.arrest.as_ref().is_some_and(Arrest::is_running) {
             self.steps = self.steps.saturating_add(1);
         }
+        let mut any_stopped = false;
         if self.arrest.is_some() {
-            self.advance_all();
+            any_stopped = self.advance_all();
         } else {
             for i in 0..self.order.len() {
                 let (node, slot) = self.order[i];
@@ -424,14 +441,14 @@ impl CrackGrowth {
             self.field.visit(node, &self.network.nodes, &self.nodes);
         }
         self.join_newborn();
-        if first == last && !self.arrest.as_ref().is_some_and(Arrest::is_running) {
+        if first == last && !any_stopped && !self.arrest.as_ref().is_some_and(Arrest::is_running) {
             self.steps_left = 0;
         }
-        StepReport { born: last - first }
     }
 
     /// Grows from every node that is pulled, unless older cracks are in the way; then from those that are on their way to one.
-    fn advance_all(&mut self) {
+    /// Says whether a marker was given up: the others may pull elsewhere then.
+    fn advance_all(&mut self) -> bool {
         let mut any_stopped = false;
         for i in 0..self.order.len() {
             let (node, slot) = self.order[i];
@@ -471,6 +488,7 @@ impl CrackGrowth {
             self.pull_of[node as usize] = NO_PULL;
         }
         self.advance_runners();
+        any_stopped
     }
 
     /// Begins new cracks where markers are out of reach of all others.
@@ -632,6 +650,7 @@ impl CrackGrowth {
             }
         }
         let all = self.network.links.len() as u32;
+        (self.links_told..all).for_each(|_| self.timeline.add_link());
         self.changes.list.extend((self.links_told..all).map(SegmentId::Link));
         self.links_told = all;
     }
@@ -646,6 +665,12 @@ impl CrackGrowth {
     #[must_use]
     pub const fn network(&self) -> &Network {
         &self.network
+    }
+
+    /// When all of it came.
+    #[must_use]
+    pub const fn timeline(&self) -> &Timeline {
+        &self.timeline
     }
 
     /// The impacts so far.

@@ -128,15 +128,22 @@ impl Network {
     #[must_use]
     pub fn path(&self, segment: SegmentId) -> Option<SegmentPath> {
         let (a, b) = self.ends(segment)?;
-        let (from, to) = (self.nodes[a as usize], self.nodes[b as usize]);
-        let (widths, bend) = match segment {
-            SegmentId::Branch(_) => ((from.width, to.width), to.bend),
-            SegmentId::Link(i) => {
-                let link = self.links[i as usize];
-                ((link.width, link.width), link.bend)
-            }
+        let widths = match segment {
+            SegmentId::Branch(_) => (self.nodes[a as usize].width, self.nodes[b as usize].width),
+            SegmentId::Link(i) => (self.links[i as usize].width, self.links[i as usize].width),
         };
-        Some(self.draft(segment, (from.pos, to.pos), widths, bend))
+        self.path_with(segment, widths)
+    }
+
+    /// The line of a segment with other widths at its ends: what it was when it was thinner.
+    pub(super) fn path_with(&self, segment: SegmentId, widths: (f32, f32)) -> Option<SegmentPath> {
+        let (a, b) = self.ends(segment)?;
+        let ends = (self.nodes[a as usize].pos, self.nodes[b as usize].pos);
+        let bend = match segment {
+            SegmentId::Branch(child) => self.nodes[child as usize].bend,
+            SegmentId::Link(link) => self.links[link as usize].bend,
+        };
+        Some(self.draft(segment, ends, widths, bend))
     }
 
     /// The rough line that `segment` would have between two places.

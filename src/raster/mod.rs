@@ -5,10 +5,12 @@
 
 mod dirty;
 mod rect;
+mod replay;
 mod stamp;
 
 pub use dirty::DirtyTiles;
 pub use rect::TexelRect;
+pub use replay::{DOT_DEPTH, Redrawn, Replay};
 pub use stamp::{stamp_dot, stamp_path};
 
 use crate::{Grid, pattern::SurfaceFrame};

@@ -15,6 +15,7 @@ mod masks;
 mod pictures;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod plugin;
+mod replay;
 #[cfg(feature = "serde")]
 mod presets;
 #[cfg(all(feature = "2d", feature = "3d"))]
