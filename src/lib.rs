@@ -7,6 +7,7 @@
 //! - [`pattern`]: networks and frames, the words everything else speaks.
 //! - [`growth`]: cracks by space colonization, step by step.
 //! - [`raster`]: networks to a depth field.
+//! - [`voronoi`]: cracks that draw a picture, all at once.
 //! - [`paint`]: a base picture and a depth field to diffuse, normal and depth textures.
 //! - `plugin` (feature `bevy`): components, hits, systems, upload.
 
@@ -17,6 +18,7 @@ pub mod paint;
 pub mod pattern;
 pub mod preset;
 pub mod raster;
+pub mod voronoi;
 
 #[cfg(feature = "bevy")]
 pub mod plugin;

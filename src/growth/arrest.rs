@@ -2,7 +2,7 @@
 
 use super::{CrackGrowth, StartLayout, walls::Walls};
 use crate::math::hash_unit;
-use crate::pattern::{Link, LinkKind, NO_PARENT, Network, SegmentId, SegmentPath};
+use crate::pattern::{Link, LinkKind, NO_PARENT, Network, PathPoint, SegmentId, SegmentPath};
 use glam::Vec2;
 
 /// Shares of the roughness that a line is tried with, until it touches no other.
@@ -84,6 +84,12 @@ impl CrackGrowth {
         let pos = self.network.nodes[from as usize].pos;
         let heading = (to - pos).normalize_or_zero();
         let length = self.params.step_length;
+        if self.params.arrest <= 0.0 {
+            return match self.extend(from, to, false) {
+                Some(_) => Advance::Grown,
+                None => Advance::Stopped(heading),
+            };
+        }
         let reach = self.params.arrest.max(TURN * length);
         match self.goal_ahead(from, heading, reach, AHEAD) {
             None => {}
@@ -254,6 +260,7 @@ impl CrackGrowth {
                 }
                 Some(child)
             }
+            Err(()) if self.params.arrest <= 0.0 => None,
             Err(()) => {
                 self.join_near(from, to - node.pos, LAST_REACH);
                 None
@@ -270,7 +277,11 @@ impl CrackGrowth {
     ) -> Result<(f32, SegmentPath), ()> {
         for bend in BENDS {
             let path = self.network.draft(segment, (from, to), (0.0, 0.0), bend);
-            if !self.arrest.as_ref().is_some_and(|arrest| arrest.walls.touches_any(ends, &path)) {
+            let touches = self.params.arrest > 0.0
+                && self.arrest.as_ref().is_some_and(|arrest| arrest.walls.touches_any(ends, &path));
+            let extent = self.network.extent();
+            let is_forbidden = |pair: &[PathPoint]| self.mask.blocks(pair[0].pos / extent, pair[1].pos / extent);
+            if !touches && !path.points().windows(2).any(is_forbidden) {
                 return Ok((bend, path));
             }
         }

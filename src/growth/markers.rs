@@ -4,6 +4,7 @@ use super::params::{GrowthParams, MarkerLayout, StartLayout};
 use crate::{
     Grid,
     math::{Rng, hash_unit, mix, ops},
+    pattern::CrackMask,
 };
 use glam::Vec2;
 use std::f32::consts::TAU;
@@ -42,14 +43,20 @@ fn density_at(density: Option<&Grid<f32>>, pos: Vec2, extent: Vec2) -> f32 {
 pub(super) fn lay_out(
     params: &GrowthParams,
     region: Region,
-    density: Option<&Grid<f32>>,
+    (density, mask): (Option<&Grid<f32>>, &CrackMask),
     seed: u64,
     mut keep: impl FnMut(Vec2, Option<f32>),
 ) {
     let mut kept = 0;
+    let apart = spacing(params, region.extent);
     let mut offer = |pos: Vec2, chance: f32, probability: f32, spacing: Option<f32>| {
         let Some(share) = region.share(pos) else { return };
-        let thinned = if params.focus > 0.0 { ops::powf(1.0 - share, params.focus) } else { 1.0 };
+        let mut thinned = if params.focus > 0.0 { ops::powf(1.0 - share, params.focus) } else { 1.0 };
+        let mut pos = pos;
+        if !mask.is_empty() {
+            let (place, liking) = to_weak_place(pos, apart, mask, region.extent, seed);
+            (pos, thinned) = (place, thinned * liking);
+        }
         if chance < probability * thinned * density_at(density, pos, region.extent) {
             keep(pos, spacing);
             // A closer one dies at once.
@@ -139,11 +146,45 @@ pub(super) fn lay_out(
             let pos = region.center + ops::unit(angle) * arm;
             let inside = pos.cmpge(Vec2::ZERO).all() && pos.cmple(region.extent).all();
             let pos = if inside { pos } else { towards_room(region, arm) };
-            if density_at(density, pos, region.extent) > 0.0 {
+            if density_at(density, pos, region.extent) > 0.0 && !mask.is_forbidden(pos / region.extent) {
                 keep(pos, None);
             }
         }
     }
+}
+
+/// About how far the markers of a layout lie from each other.
+fn spacing(params: &GrowthParams, extent: Vec2) -> f32 {
+    match params.markers {
+        MarkerLayout::PseudoGrid { .. } => {
+            (extent / Vec2::new(params.num_columns_grid as f32, params.num_lines_grid as f32)).max_element()
+        }
+        MarkerLayout::DartThrowing { spacing } => spacing,
+        MarkerLayout::Polar { rings, .. } => params.reach / rings as f32,
+    }
+}
+
+/// The weakest place near a marker, and how much of its chance it keeps there: none where cracks are forbidden, little where
+/// all around is strong or, if some places of the surface are weak, nothing here is.
+fn to_weak_place(pos: Vec2, apart: f32, mask: &CrackMask, extent: Vec2, seed: u64) -> (Vec2, f32) {
+    const TRIES: u32 = 24;
+    let place = mix(seed ^ u64::from(pos.x.to_bits()) << 32 ^ u64::from(pos.y.to_bits()));
+    let mut best = (pos, f32::NEG_INFINITY);
+    for i in 0..TRIES {
+        let stray = ops::unit(TAU * hash_unit(place, u64::from(2 * i))) * hash_unit(place, u64::from(2 * i + 1)).sqrt();
+        let near = if i == 0 { pos } else { (pos + stray * (0.8 * apart)).clamp(Vec2::ZERO, extent) };
+        let uv = near / extent;
+        let liking = mask.weak_at(uv) - mask.strong_at(uv);
+        if liking > best.1 && !mask.is_forbidden(uv) {
+            best = (near, liking);
+        }
+    }
+    let kept = match best.1 {
+        f32::NEG_INFINITY => 0.0,
+        liking if mask.weak.is_some() => (0.15 + 1.2 * liking).clamp(0.02, 1.0),
+        liking => (1.0 + liking).clamp(0.02, 1.0),
+    };
+    (best.0, kept)
 }
 
 /// A place `arm` away from the hit, along the longer side, where there is more room: even a surface that is hardly more than a

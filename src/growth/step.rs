@@ -13,10 +13,10 @@ use super::{
 use crate::{
     Grid,
     math::{hash_unit, mix},
-    pattern::{Dot, Link, LinkKind, NO_PARENT, Network, Node, SegmentId, Timeline},
+    pattern::{CrackMask, Dot, Link, LinkKind, NO_PARENT, Network, Node, SegmentId, Timeline},
 };
 use glam::Vec2;
-use std::ops::Range;
+use std::{ops::Range, sync::Arc};
 
 /// The most energy that an impact gathers.
 pub const MAX_ENERGY: f32 = 16.0;
@@ -43,6 +43,9 @@ pub enum Rejected {
     /// It lies off the surface.
     #[error("it lies off the surface")]
     OffSurface,
+    /// Cracks are forbidden there.
+    #[error("cracks are forbidden there")]
+    Forbidden,
     /// The surface has all the nodes it may have.
     #[error("the surface has all the nodes it may have")]
     Full,
@@ -132,6 +135,7 @@ pub struct CrackGrowth {
     linker: Linker,
     impacts: Vec<Impact>,
     density: Option<Grid<f32>>,
+    pub(super) mask: Arc<CrackMask>,
     pub(super) steps: u32,
     steps_left: u32,
     /// Cracks that began by themselves, and markers that were tried for it.
@@ -226,6 +230,7 @@ impl CrackGrowth {
             linker: Linker::default(),
             impacts: Vec::new(),
             density: None,
+            mask: Arc::default(),
             steps: 0,
             steps_left: 0,
             nucleated: 0,
@@ -249,6 +254,23 @@ impl CrackGrowth {
         self.density = density.filter(|grid| grid.size().min_element() > 0);
     }
 
+    /// Where cracks of later hits and steps like to run, avoid to, and never go; an empty mask = everywhere alike.
+    ///
+    /// Markers move to the weakest place near them, cracks steer along what is weak and around what is strong, and no line
+    /// enters a forbidden texel. A hit on one is [rejected](Rejected::Forbidden). What is grown stays.
+    pub fn set_mask(&mut self, mask: impl Into<Arc<CrackMask>>) {
+        self.mask = mask.into();
+        self.mind_others();
+    }
+
+    /// Keeps account of lines if cracks must not cross, or if there are places that they must not enter.
+    fn mind_others(&mut self) {
+        let must = self.params.arrest > 0.0 || self.mask.forbidden.is_some();
+        if must != self.arrest.is_some() {
+            self.arrest = must.then(|| Arrest::new(&self.network, self.params.step_length));
+        }
+    }
+
     /// Hits the surface at `pos` (pattern units) with `energy` (1 = an ordinary hit; 4 reaches twice as far).
     ///
     /// Lays out starts and markers; growth happens in [`step`](Self::step). A hit as good as on top of an earlier one adds
@@ -266,6 +288,9 @@ impl CrackGrowth {
         }
         if energy == 0.0 {
             return HitOutcome::Nothing;
+        }
+        if self.mask.is_forbidden(pos / extent) {
+            return HitOutcome::Rejected(Rejected::Forbidden);
         }
         if self.network.nodes.len() >= self.params.max_nodes as usize {
             return HitOutcome::Rejected(Rejected::Full);
@@ -296,7 +321,8 @@ impl CrackGrowth {
         let first = self.network.nodes.len() as u32;
         let seed = mix(self.seed ^ mix(u64::from(index)));
         for place in markers::starts(self.params.starts, (pos, energy), reach, extent, seed) {
-            if !self.nodes.any_within(place, 1e-4) && !self.is_on_crack(place) {
+            let is_free = !self.nodes.any_within(place, 1e-4) && !self.is_on_crack(place);
+            if is_free && !self.mask.is_forbidden(place / extent) {
                 self.bear(place, NO_PARENT, 0, index, 1.0);
             }
         }
@@ -333,7 +359,8 @@ impl CrackGrowth {
         // The rays of a hit are its own: older cracks do not sprout towards them.
         let is_loyal = self.params.arrest > 0.0 || matches!(self.params.markers, MarkerLayout::Polar { .. });
         let loyal = if is_loyal { impact } else { ANY_IMPACT };
-        markers::lay_out(&self.params, region, self.density.as_ref(), seed, |pos, spacing| {
+        let wishes = (self.density.as_ref(), &*self.mask);
+        markers::lay_out(&self.params, region, wishes, seed, |pos, spacing| {
             if field.living_at_most() >= MAX_MARKERS {
                 return;
             }
@@ -505,7 +532,8 @@ impl CrackGrowth {
             };
             self.tried += 1;
             let impact = if loyal == ANY_IMPACT { self.impacts.len().saturating_sub(1) as u32 } else { loyal };
-            let is_free = !self.nodes.any_within(place, 2.0 * self.params.step_length);
+            let is_free = !self.nodes.any_within(place, 2.0 * self.params.step_length)
+                && !self.mask.is_forbidden(place / self.network.extent());
             if is_free {
                 self.nucleated += 1;
                 self.bear(place, NO_PARENT, 0, impact, 1.0);
@@ -516,7 +544,8 @@ impl CrackGrowth {
     /// Whether a place lies on a crack, or as good as.
     fn is_on_crack(&self, place: Vec2) -> bool {
         let close = 0.3 * self.params.step_length;
-        self.arrest.as_ref().is_some_and(|arrest| arrest.walls.any_within(place, close))
+        self.params.arrest > 0.0
+            && self.arrest.as_ref().is_some_and(|arrest| arrest.walls.any_within(place, close))
     }
 
     /// A hit on a crack: new cracks start from it to either side.
@@ -597,6 +626,9 @@ impl CrackGrowth {
                 let stray = self.params.wander * (2.0 * hash_unit(self.seed ^ 0x57A6, child) - 1.0);
                 direction = (direction + direction.perp() * stray).normalize_or_zero();
             }
+            if !self.mask.is_empty() {
+                direction = steer(from, direction, length, &self.mask, extent);
+            }
             pull.child = up_to_border(from, direction, length, kill, extent);
         }
         let Self { field, network, pulls, pull_of, .. } = self;
@@ -607,7 +639,7 @@ impl CrackGrowth {
                 pull.serves = left_sq <= kill * kill || left_sq <= distance_sq - PROGRESS * length * length;
             }
         });
-        if self.params.arrest > 0.0 && self.params.inertia > 0.0 {
+        if (self.params.arrest > 0.0 && self.params.inertia > 0.0) || !self.mask.is_empty() && self.arrest.is_some() {
             // A crack does not turn on its heel: what it cannot serve on its way is left to others.
             return;
         }
@@ -728,12 +760,42 @@ impl CrackGrowth {
         let params = params.varied(self.seed);
         self.field.set_params(&params);
         self.widths.set_params(&params);
-        if (params.arrest > 0.0) != self.arrest.is_some() {
-            self.arrest = (params.arrest > 0.0).then(|| Arrest::new(&self.network, params.step_length));
-        }
         self.params = params;
+        self.mind_others();
         Ok(())
     }
+}
+
+/// Turns `direction` by up to 80 degrees towards what is weak and away from what is strong or forbidden.
+fn steer(from: Vec2, direction: Vec2, length: f32, mask: &CrackMask, extent: Vec2) -> Vec2 {
+    // Cosine and sine of 0, 10, ... 80 degrees.
+    const TURNS: [(f32, f32); 9] = [
+        (1.0, 0.0),
+        (0.984_807_8, 0.173_648_18),
+        (0.939_692_6, 0.342_020_15),
+        (0.866_025_4, 0.5),
+        (0.766_044_4, 0.642_787_6),
+        (0.642_787_6, 0.766_044_4),
+        (0.5, 0.866_025_4),
+        (0.342_020_15, 0.939_692_6),
+        (0.173_648_18, 0.984_807_8),
+    ];
+    let mut best = (f32::NEG_INFINITY, direction);
+    for (cos, sin) in TURNS.into_iter().flat_map(|(cos, sin)| [(cos, sin), (cos, -sin)]) {
+        let way = direction * cos + direction.perp() * sin;
+        let mut liking = 0.35 * cos;
+        for share in [0.5, 1.0, 1.5] {
+            let uv = (from + way * (share * length)) / extent;
+            liking += mask.weak_at(uv) - mask.strong_at(uv);
+        }
+        if mask.blocks(from / extent, (from + way * length) / extent) {
+            liking -= 100.0;
+        }
+        if liking > best.0 {
+            best = (liking, way);
+        }
+    }
+    best.1
 }
 
 /// The end of a segment of `length`; where the border of the surface is no further than `margin` beyond, the border.

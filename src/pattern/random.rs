@@ -25,12 +25,12 @@ pub(crate) fn touch((a, b): (Vec2, Vec2), (c, d): (Vec2, Vec2)) -> bool {
 
 /// One node more or less as a growth makes it.
 pub(crate) fn node(pos: Vec2, parent: u32, birth: u32) -> Node {
-    Node { pos, width: 0.01, parent, generation: 0, birth, impact: birth / 10 }
+    Node { pos, width: 0.01, parent, generation: 0, birth, impact: birth / 10, bend: 1.0 }
 }
 
 /// One link more or less as a growth makes it.
 pub(crate) fn link(a: u32, b: u32, birth: u32) -> Link {
-    Link { a, b, width: 0.01, birth, kind: LinkKind::Island }
+    Link { a, b, width: 0.01, birth, kind: LinkKind::Island, bend: 1.0 }
 }
 
 /// A network of about `nodes` nodes without crossings: trees with and without a foot on the border, closed by links.

@@ -47,6 +47,7 @@ pub fn stamp_path(field: &mut DepthField, profile: &Profile, path: &SegmentPath)
             changed = changed.union(capsule.stamp(field, &section));
         }
     }
+    field.spare(changed);
     changed
 }
 
@@ -57,7 +58,11 @@ pub fn stamp_dot(field: &mut DepthField, pos: Vec2, radius: f32, depth: f32) -> 
     let section = Section::upright(depth);
     let point = PathPoint { pos, width: 2.0 * radius };
     match Capsule::clipped(&field.frame, field.depth.size(), &section, point, point) {
-        Some(capsule) => capsule.stamp(field, &section),
+        Some(capsule) => {
+            let changed = capsule.stamp(field, &section);
+            field.spare(changed);
+            changed
+        }
         None => TexelRect::default(),
     }
 }
