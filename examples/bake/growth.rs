@@ -235,6 +235,7 @@ fn describe(network: &Network, options: &Options) -> serde_json::Value {
             let kind = match link.kind {
                 LinkKind::Connection => "connection",
                 LinkKind::Island => "island",
+                LinkKind::Meeting => "meeting",
                 LinkKind::Junction => "junction",
             };
             json!({ "a": link.a, "b": link.b, "width": link.width, "birth": link.birth, "kind": kind })
