@@ -245,7 +245,8 @@ impl CrackGrowth {
         let extent = self.network.extent();
         let to = to.clamp(Vec2::ZERO, extent);
         // The border is a crack too: none runs along it.
-        let (low, high) = (node.pos.cmpeq(Vec2::ZERO) & to.cmpeq(Vec2::ZERO), node.pos.cmpeq(extent) & to.cmpeq(extent));
+        let (low, high) =
+            (node.pos.cmpeq(Vec2::ZERO) & to.cmpeq(Vec2::ZERO), node.pos.cmpeq(extent) & to.cmpeq(extent));
         if (low | high).any() {
             return None;
         }

@@ -525,7 +525,8 @@ struct ClosedMarker {
 
 impl ClosedReference {
     fn is_on(&self, marker: Vec2, node: usize, child: usize) -> bool {
-        let (before, after) = (self.nodes[node].0.distance_squared(marker), self.nodes[child].0.distance_squared(marker));
+        let (before, after) =
+            (self.nodes[node].0.distance_squared(marker), self.nodes[child].0.distance_squared(marker));
         let p = &self.params;
         after <= p.kill_distance * p.kill_distance || after <= before - 0.25 * p.step_length * p.step_length
     }
@@ -671,7 +672,8 @@ fn closed_venation_equals_brute_force() {
             reference.nodes.extend(growth.network().nodes()[known..].iter().map(|node| (node.pos, node.parent)));
             // The markers that are there already see the start at once, the new ones with the first step.
             reference.look();
-            let new = growth.field.unsettled().map(|(pos, _)| ClosedMarker { pos, alive: true, reached: None, seen: 0 });
+            let new =
+                growth.field.unsettled().map(|(pos, _)| ClosedMarker { pos, alive: true, reached: None, seen: 0 });
             reference.markers.extend(new);
             reference.look();
             let steps = if hit == 1 { 400 } else { 1 + rng.next_u32() % 12 };

@@ -15,8 +15,8 @@ mod masks;
 mod pictures;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod plugin;
-mod replay;
 #[cfg(feature = "serde")]
 mod presets;
+mod replay;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod support;
