@@ -77,7 +77,7 @@ fn cut(lines: &[[Vec2; 2]]) -> Shards {
     for line in lines {
         cuts.add_line(line).expect("finite");
     }
-    shatter(&cuts, &EVERYTHING).expect("valid")
+    shatter(cuts, &EVERYTHING).expect("valid")
 }
 
 fn solid(shards: &Shards, mesh: &mut ShardMesh) -> usize {
@@ -121,7 +121,7 @@ fn grown(c: &mut Criterion) {
         let network = growth.network();
         for carry_on in [false, true] {
             let params = ShatterParams { carry_on, ..ShatterParams::DEFAULT };
-            let run = || shatter(&Cuts::from_network(network).unwrap(), &params).unwrap();
+            let run = || shatter(Cuts::from_network(network).unwrap(), &params).unwrap();
             let what = if carry_on { "carried on" } else { "as it is" };
             println!("{name}, {what}: {} nodes, {} shards", network.nodes().len(), run().len());
             group.bench_function(BenchmarkId::new(name, what), |b| b.iter(|| run().len()));
