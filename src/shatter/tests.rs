@@ -8,7 +8,7 @@ use crate::{
     CrackPreset,
     growth::CrackGrowth,
     math::Rng,
-    pattern::{Network, random::planar_network},
+    pattern::{CellTracker, Network, random::planar_network},
 };
 use glam::{Vec2, Vec3};
 use std::collections::{BTreeMap, BTreeSet};
@@ -421,6 +421,35 @@ fn the_shard_at_a_place_is_the_only_one() {
         }
         assert_eq!(shards.at(Vec2::splat(-0.1)), None);
         assert!(shards.at(shards.extent()).is_some() && shards.at(Vec2::NAN).is_none());
+    }
+}
+
+/// Two ways to the same cells: found one by one as they close, and all at once.
+#[test]
+fn shards_are_the_closed_cells() {
+    let mut rng = Rng::new(27);
+    for _ in 0..300 {
+        let network = planar_network(60, Vec2::new(2.0, 1.0), &mut rng);
+        let mut tracker = CellTracker::new(network.extent());
+        tracker.update(&network);
+        let mut cuts = Cuts::new(network.extent()).unwrap();
+        for segment in network.segments() {
+            let (a, b) = network.ends(segment).unwrap();
+            cuts.add_line(&[a, b].map(|node| network.nodes()[node as usize].pos)).unwrap();
+        }
+        let shards = shatter(cuts, &EVERYTHING).unwrap();
+        assert_eq!(shards.len(), tracker.cells().len());
+        let mut areas = [
+            tracker.cells().iter().map(|cell| cell.area).collect::<Vec<f32>>(),
+            shards.iter().map(|shard| shard.area).collect(),
+        ];
+        areas.iter_mut().for_each(|areas| areas.sort_by(f32::total_cmp));
+        assert!(areas[0].iter().zip(&areas[1]).all(|(a, b)| (a - b).abs() < 1e-6));
+        for number in 0..shards.len() as u32 {
+            let cell = tracker.cell_at(shards.inner_point(number).unwrap()).unwrap();
+            let centre = tracker.cells()[cell as usize].centroid;
+            assert!(centre.distance(shards.get(number).unwrap().centroid) < 1e-4);
+        }
     }
 }
 
