@@ -28,10 +28,10 @@ pub(crate) struct Options {
     #[arg(long, value_parser = size)]
     size: Option<UVec2>,
     #[arg(long, default_value_t = 1)]
-    seed: u64,
+    pub(crate) seed: u64,
     /// Where and how hard: u,v or u,v,energy; may be given many times
     #[arg(long, value_parser = hit, default_value = "0.5,0.5")]
-    hit: Vec<(Vec2, f32)>,
+    pub(crate) hit: Vec<(Vec2, f32)>,
     /// The picture to crack; by default one that suits the preset
     #[arg(long)]
     base: Option<PathBuf>,
@@ -58,7 +58,7 @@ pub(crate) struct Options {
     steps: Option<u32>,
     /// Folder to write to; made if it is not there
     #[arg(long, default_value = "out")]
-    out: PathBuf,
+    pub(crate) out: PathBuf,
 }
 
 pub(crate) fn size(text: &str) -> Result<UVec2, String> {
@@ -105,7 +105,8 @@ pub(crate) fn read_picture(path: &Path) -> Result<RgbaImage, Box<dyn Error>> {
     Ok(picture.to_rgba8())
 }
 
-pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
+/// Writes the textures, and returns the network and the cracked picture.
+pub(crate) fn bake(options: &Options) -> Result<(Network, RgbaImage), Box<dyn Error>> {
     let mut preset = CrackPreset::named(&options.preset)
         .ok_or_else(|| format!("no preset `{}`; there are {}", options.preset, CrackPreset::NAMES.join(", ")))?;
     for (name, value) in &options.set {
@@ -205,7 +206,7 @@ pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
         painted.as_secs_f64() * 1e3,
         options.out.display()
     );
-    Ok(())
+    Ok((network.clone(), diffuse))
 }
 
 /// White where a person would mark a crack: not on the chipped rim.

@@ -11,6 +11,7 @@
 mod growth;
 mod guided;
 mod realism;
+mod shatter;
 mod text;
 
 use clap::{Parser, Subcommand};
@@ -31,13 +32,16 @@ enum Method {
     Guided(Box<guided::Options>),
     /// Masks of every preset with random hits, to be measured against photographs.
     Realism(realism::Options),
+    /// Shards: the pieces into which the cracks cut the picture.
+    Shatter(Box<shatter::Options>),
 }
 
 fn main() -> ExitCode {
     let done = match Arguments::parse().method {
-        Method::Growth(options) => growth::bake(&options),
+        Method::Growth(options) => growth::bake(&options).map(drop),
         Method::Guided(options) => guided::bake(&options),
         Method::Realism(options) => realism::bake(&options),
+        Method::Shatter(options) => shatter::bake(&options),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
