@@ -169,6 +169,11 @@ pub(crate) fn bake(options: &Options) -> Done<()> {
     // 9 and 10: words emerge as their weight rises; one word turns into another.
     let emerge = |guides: &[Guide], weights: &[Vec<f32>]| -> Done<RgbaImage> {
         let (mut map, _) = square.map(astride.clone(), guides)?;
+        if let [_, others @ ..] = guides {
+            let alone: Vec<f32> = std::iter::once(28.0).chain(others.iter().map(|_| 0.0)).collect();
+            map.set_gammas(&alone)?;
+            map.rescale_widths();
+        }
         let frame = |gammas: &Vec<f32>| {
             map.set_gammas(gammas)?;
             let seams = map.seams();

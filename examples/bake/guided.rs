@@ -195,6 +195,10 @@ pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
 
     if let Some(animation) = options.animate {
         let front = Front::new(&seams, at);
+        if animation == Animation::Morph {
+            map.set_gammas(&[GAMMA, 0.0])?;
+            map.rescale_widths();
+        }
         animate(options, &base, &paint, |t, field| {
             let weights: Vec<f32> = match animation {
                 Animation::Gamma => gammas.iter().map(|gamma| gamma * t).collect(),

@@ -400,6 +400,16 @@ impl VoronoiMap {
         tracer.finish(&self.levels, &self.params, &self.frame, &guides, self.full_cost)
     }
 
+    /// Makes the cracks that are now the dearest the widest, as they were when the map was made.
+    pub fn rescale_widths(&mut self) {
+        self.full_cost = None;
+        if let Some(level) = self.levels.last() {
+            let mut tracer = Tracer::new(self.frame.size());
+            tracer.scan(level, self.height());
+            self.full_cost = Some(self.follow(tracer).1);
+        }
+    }
+
     /// The boundaries of the regions.
     ///
     /// The cost that stands for full width stays that of the map when it was made, so that widths do not jump as weights change.
