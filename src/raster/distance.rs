@@ -33,7 +33,7 @@ pub fn crack_distance(field: &DepthField, depth: u16, reach: u8) -> Grid<f32> {
     let (mut columns, mut near) = (vec![reach + 1; w], vec![false; h]);
     // How far the nearest crack is in each column, 0..=reach + 1: first from above, then from below too.
     let mut vertical = Grid::new(field.depth.size(), reach + 1);
-    for y in 0..h {
+    for (y, near) in near.iter_mut().enumerate() {
         // Three loops, each of one width of numbers.
         let out = vertical.row_mut(y);
         for (out, &texel) in out.iter_mut().zip(field.depth.row(y)) {
@@ -43,7 +43,7 @@ pub fn crack_distance(field: &DepthField, depth: u16, reach: u8) -> Grid<f32> {
             *out = (*column + 1).min(*out);
             *column = *out;
         }
-        near[y] = out.iter().fold(u8::MAX, |least, &value| least.min(value)) <= reach;
+        *near = out.iter().fold(u8::MAX, |least, &value| least.min(value)) <= reach;
     }
     columns.fill(reach + 1);
     let mut distance = Grid::new(field.depth.size(), f32::INFINITY);
