@@ -1,5 +1,6 @@
 //! `bake growth`: hits in, textures and the network out.
 
+use crate::picture::read_picture;
 use bevy_crack::{
     CrackPreset,
     growth::{CrackGrowth, HitOutcome},
@@ -9,7 +10,7 @@ use bevy_crack::{
 };
 use clap::Args;
 use glam::{UVec2, Vec2};
-use image::{GrayImage, ImageBuffer, ImageReader, Limits, Luma, Rgba, RgbaImage, imageops::FilterType};
+use image::{GrayImage, ImageBuffer, Luma, Rgba, RgbaImage, imageops::FilterType};
 use serde_json::json;
 use std::{
     error::Error,
@@ -91,18 +92,6 @@ fn own_picture(preset: &str) -> PathBuf {
         _ => "concrete_fine.png",
     };
     Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/textures").join(file)
-}
-
-/// A picture of at most 8192 texels a side and 256 MiB; the header is checked before memory is taken.
-pub(crate) fn read_picture(path: &Path) -> Result<RgbaImage, Box<dyn Error>> {
-    let mut reader = ImageReader::open(path).map_err(|error| format!("{}: {error}", path.display()))?;
-    let mut limits = Limits::default();
-    limits.max_image_width = Some(8192);
-    limits.max_image_height = Some(8192);
-    limits.max_alloc = Some(256 << 20);
-    reader.limits(limits);
-    let picture = reader.with_guessed_format()?.decode().map_err(|error| format!("{}: {error}", path.display()))?;
-    Ok(picture.to_rgba8())
 }
 
 /// Writes the textures, and returns the network and the cracked picture.

@@ -8,8 +8,10 @@
 
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "a command-line tool")]
 
+mod figures;
 mod growth;
 mod guided;
+mod picture;
 mod realism;
 mod shatter;
 mod text;
@@ -30,6 +32,8 @@ enum Method {
     Growth(growth::Options),
     /// Cracks that draw a picture or a word, all at once.
     Guided(Box<guided::Options>),
+    /// The figures of the paper on image-guided fracture, made again.
+    FiguresMould(figures::Options),
     /// Masks of every preset with random hits, to be measured against photographs.
     Realism(realism::Options),
     /// Shards: the pieces into which the cracks cut the picture.
@@ -40,6 +44,7 @@ fn main() -> ExitCode {
     let done = match Arguments::parse().method {
         Method::Growth(options) => growth::bake(&options).map(drop),
         Method::Guided(options) => guided::bake(&options),
+        Method::FiguresMould(options) => figures::bake(&options),
         Method::Realism(options) => realism::bake(&options),
         Method::Shatter(options) => shatter::bake(&options),
     };

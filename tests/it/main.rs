@@ -20,3 +20,4 @@ mod presets;
 mod replay;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod support;
+mod voronoi;
