@@ -64,9 +64,9 @@ use bevy::{
 /// What a game names.
 pub mod prelude {
     pub use super::{
-        CrackBudget, CrackClock, CrackCommandsExt, CrackDrive, CrackError, CrackFailed, CrackFinished, CrackHit, CrackMaps, CrackPlugin,
-        CrackPlugins, CrackResolution, CrackState, CrackStats, CrackStatus, CrackSurface, CrackSystems, CrackTextures,
-        CrackTip, HitPoint,
+        CrackBudget, CrackClock, CrackCommandsExt, CrackDrive, CrackError, CrackFailed, CrackFinished, CrackHit,
+        CrackMaps, CrackPlugin, CrackPlugins, CrackResolution, CrackState, CrackStats, CrackStatus, CrackSurface,
+        CrackSystems, CrackTextures, CrackTip, HitPoint,
     };
     #[cfg(feature = "2d")]
     pub use super::{CrackLight2d, CrackLitMaterial};
