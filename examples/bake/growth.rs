@@ -4,7 +4,7 @@ use bevy_crack::{
     CrackPreset,
     growth::{CrackGrowth, HitOutcome},
     paint::{BaseTexels, Look, LookTable, PaintTargets, paint_into},
-    pattern::{LinkKind, NO_PARENT, Network, SurfaceFrame},
+    pattern::{CrackMask, LinkKind, NO_PARENT, Network, SurfaceFrame},
     raster::{DepthField, TexelRect, stamp_dot, stamp_path},
 };
 use clap::Args;
@@ -15,6 +15,7 @@ use std::{
     error::Error,
     fs,
     path::{Path, PathBuf},
+    sync::Arc,
     time::Instant,
 };
 
@@ -37,6 +38,18 @@ pub(crate) struct Options {
     /// A growth parameter, as in `kill_distance=0.02`; may be given many times
     #[arg(long, value_parser = setting)]
     set: Vec<(String, String)>,
+    /// Where cracks like to run: light texels of this picture
+    #[arg(long)]
+    weak: Option<PathBuf>,
+    /// Where they do not
+    #[arg(long)]
+    strong: Option<PathBuf>,
+    /// Where they never go
+    #[arg(long)]
+    forbidden: Option<PathBuf>,
+    /// Cracks like to run in the lines of the base picture (mortar, joints) and never where it is transparent
+    #[arg(long)]
+    mask_from_picture: bool,
     /// Another look than the preset's: groove, frosted or toon
     #[arg(long)]
     look: Option<String>,
@@ -48,7 +61,7 @@ pub(crate) struct Options {
     out: PathBuf,
 }
 
-fn size(text: &str) -> Result<UVec2, String> {
+pub(crate) fn size(text: &str) -> Result<UVec2, String> {
     let (width, height) = text.split_once('x').ok_or("a size is WIDTHxHEIGHT")?;
     let side = |text: &str| text.parse::<u32>().map_err(|error| format!("{text}: {error}"));
     let size = UVec2::new(side(width)?, side(height)?);
@@ -81,7 +94,7 @@ fn own_picture(preset: &str) -> PathBuf {
 }
 
 /// A picture of at most 8192 texels a side and 256 MiB; the header is checked before memory is taken.
-fn read_picture(path: &Path) -> Result<RgbaImage, Box<dyn Error>> {
+pub(crate) fn read_picture(path: &Path) -> Result<RgbaImage, Box<dyn Error>> {
     let mut reader = ImageReader::open(path).map_err(|error| format!("{}: {error}", path.display()))?;
     let mut limits = Limits::default();
     limits.max_image_width = Some(8192);
@@ -116,6 +129,20 @@ pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
 
     let frame = SurfaceFrame::new(size)?;
     let mut growth = CrackGrowth::new(preset.growth.clone(), frame.extent(), options.seed)?;
+    let mut layers =
+        if options.mask_from_picture { CrackMask::from_picture(size, base.as_raw())? } else { CrackMask::default() };
+    for (layer, path) in [
+        (&mut layers.weak, &options.weak),
+        (&mut layers.strong, &options.strong),
+        (&mut layers.forbidden, &options.forbidden),
+    ] {
+        if let Some(path) = path {
+            let picture = read_picture(path)?;
+            *layer = Some(CrackMask::layer(picture.dimensions().into(), picture.as_raw())?);
+        }
+    }
+    let layers = Arc::new(layers);
+    growth.set_mask(layers.clone());
     for &(uv, energy) in &options.hit {
         if let HitOutcome::Rejected(reason) = growth.hit(frame.uv_to_pos(uv), energy) {
             return Err(format!("the hit at {uv}: {reason}").into());
@@ -127,6 +154,7 @@ pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
 
     let clock = Instant::now();
     let mut field = DepthField::new(frame);
+    field.forbid(&layers);
     let mut changed = Vec::new();
     growth.take_changed(&mut changed);
     for segment in changed {

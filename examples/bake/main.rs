@@ -9,7 +9,9 @@
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "a command-line tool")]
 
 mod growth;
+mod guided;
 mod realism;
+mod text;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -25,6 +27,8 @@ struct Arguments {
 enum Method {
     /// Cracks that grow from hits, by space colonization.
     Growth(growth::Options),
+    /// Cracks that draw a picture or a word, all at once.
+    Guided(Box<guided::Options>),
     /// Masks of every preset with random hits, to be measured against photographs.
     Realism(realism::Options),
 }
@@ -32,6 +36,7 @@ enum Method {
 fn main() -> ExitCode {
     let done = match Arguments::parse().method {
         Method::Growth(options) => growth::bake(&options),
+        Method::Guided(options) => guided::bake(&options),
         Method::Realism(options) => realism::bake(&options),
     };
     match done {

@@ -1,8 +1,8 @@
 //! Cracks that know older cracks: a tip that comes near one turns to meet it steeply and stops there.
 
-use super::{CrackGrowth, StartLayout, walls::Walls};
+use super::{CrackGrowth, MarkerLayout, StartLayout, walls::Walls};
 use crate::math::hash_unit;
-use crate::pattern::{Link, LinkKind, NO_PARENT, Network, SegmentId, SegmentPath};
+use crate::pattern::{Link, LinkKind, NO_PARENT, Network, PathPoint, SegmentId, SegmentPath};
 use glam::Vec2;
 
 /// Shares of the roughness that a line is tried with, until it touches no other.
@@ -13,6 +13,12 @@ const AHEAD: f32 = 0.5;
 
 /// A crack this many segment lengths away is met by the next segment.
 const LAST: f32 = 1.35;
+
+/// Segment lengths that a tip needs to turn.
+const TURN: f32 = 2.5;
+
+/// The node of a crack that is met lies no more than so many segment lengths away.
+const LAST_REACH: f32 = 1.8;
 
 /// A node this many segment lengths from another crack beside it would run along it.
 const BESIDE: f32 = 0.7;
@@ -77,7 +83,14 @@ impl CrackGrowth {
     pub(super) fn advance(&mut self, from: u32, to: Vec2) -> Advance {
         let pos = self.network.nodes[from as usize].pos;
         let heading = (to - pos).normalize_or_zero();
-        let (length, reach) = (self.params.step_length, self.params.arrest);
+        let length = self.params.step_length;
+        if self.params.arrest <= 0.0 {
+            return match self.extend(from, to, false) {
+                Some(_) => Advance::Grown,
+                None => Advance::Stopped(heading),
+            };
+        }
+        let reach = self.params.arrest.max(TURN * length);
         match self.goal_ahead(from, heading, reach, AHEAD) {
             None => {}
             Some(_) if self.stays_open(from) => {
@@ -98,7 +111,8 @@ impl CrackGrowth {
         let Some(node) = self.extend(from, to, false) else { return Advance::Stopped(heading) };
         // It may have come to lie close beside a crack that was not ahead.
         if let Some((_, beside)) = self.foreign(node, None, BESIDE * length, AHEAD) {
-            self.join(beside, node);
+            let way = self.network.nodes[beside as usize].pos - self.network.nodes[node as usize].pos;
+            self.join_near(node, way, LAST_REACH);
             self.seal(node);
         }
         Advance::Grown
@@ -191,29 +205,34 @@ impl CrackGrowth {
     /// The last segment: onto the crack or the border.
     fn meet(&mut self, tip: u32, goal: Goal) {
         match goal {
-            Goal::Node(other) => {
-                if self.join(other, tip) {
-                    return;
-                }
-                // Something is in between; it may do as well.
-                let heading = (self.place_of(goal) - self.network.nodes[tip as usize].pos).normalize_or_zero();
-                let mut nearby = Vec::new();
-                self.each_foreign(tip, 1.6 * self.params.step_length, |node, distance_sq, way| {
-                    if node != other && way.dot(heading) > 0.0 {
-                        nearby.push((distance_sq, node));
-                    }
-                });
-                nearby.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-                for (_, node) in nearby.into_iter().take(4) {
-                    if self.join(node, tip) {
-                        return;
-                    }
-                }
+            Goal::Node(_) => {
+                let way = self.place_of(goal) - self.network.nodes[tip as usize].pos;
+                self.join_near(tip, way, LAST_REACH);
             }
             Goal::Border(place) => {
                 self.extend(tip, place, true);
             }
         }
+    }
+
+    /// Links a tip to the node of another crack that lies best: near, and so that the two meet steeply. Says whether it did.
+    fn join_near(&mut self, tip: u32, heading: Vec2, reach: f32) -> bool {
+        let length = self.params.step_length;
+        let mut nearby = Vec::new();
+        self.each_foreign(tip, reach * length, |node, distance_sq, way| {
+            if way.dot(heading) > 0.0 {
+                let end = self.network.nodes[node as usize];
+                let along = match self.network.nodes.get(end.parent as usize) {
+                    Some(before) => (end.pos - before.pos).normalize_or_zero(),
+                    None => Vec2::ZERO,
+                };
+                let distance = distance_sq.sqrt();
+                let slant = along.dot(way / distance).abs();
+                nearby.push((distance / length + 2.0 * slant, node));
+            }
+        });
+        nearby.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        nearby.into_iter().take(5).any(|(_, node)| self.join(node, tip))
     }
 
     /// Bears a node at `to` if its line touches no other; if it does, joins the crack that is in the way.
@@ -223,10 +242,17 @@ impl CrackGrowth {
         if child >= self.params.max_nodes {
             return None;
         }
-        let to = to.clamp(Vec2::ZERO, self.network.extent());
+        let extent = self.network.extent();
+        let to = to.clamp(Vec2::ZERO, extent);
+        // The border is a crack too: none runs along it.
+        let (low, high) =
+            (node.pos.cmpeq(Vec2::ZERO) & to.cmpeq(Vec2::ZERO), node.pos.cmpeq(extent) & to.cmpeq(extent));
+        if (low | high).any() {
+            return None;
+        }
         match self.free_line(SegmentId::Branch(child), (from, u32::MAX), (node.pos, to)) {
             Ok((bend, path)) => {
-                let on_border = to.cmpeq(Vec2::ZERO).any() || to.cmpeq(self.network.extent()).any();
+                let on_border = (to.cmpeq(Vec2::ZERO) | to.cmpeq(extent)).any();
                 self.bear(to, from, node.generation.saturating_add(1), node.impact, bend);
                 if let Some(arrest) = &mut self.arrest {
                     arrest.walls.add((from, child), &path);
@@ -234,36 +260,32 @@ impl CrackGrowth {
                 }
                 Some(child)
             }
-            Err((a, b)) => {
-                let far = |node: u32| self.network.nodes[node as usize].pos.distance_squared(to);
-                let (near, other) = if far(a) <= far(b) { (a, b) } else { (b, a) };
-                for node in [near, other] {
-                    let apart = self.network.nodes[node as usize].pos.distance(self.network.nodes[from as usize].pos);
-                    if apart <= 2.0 * self.params.step_length && !self.is_kin(from, node) && self.join(node, from) {
-                        break;
-                    }
-                }
+            Err(()) if self.params.arrest <= 0.0 => None,
+            Err(()) => {
+                self.join_near(from, to - node.pos, LAST_REACH);
                 None
             }
         }
     }
 
-    /// The roughest line between two places that touches no other, or the ends of a line that even the straight one touches.
+    /// The roughest line between two places that touches no other; an error if even the straight one does.
     fn free_line(
         &self,
         segment: SegmentId,
         ends: (u32, u32),
         (from, to): (Vec2, Vec2),
-    ) -> Result<(f32, SegmentPath), (u32, u32)> {
-        let mut touched = ends;
+    ) -> Result<(f32, SegmentPath), ()> {
         for bend in BENDS {
             let path = self.network.draft(segment, (from, to), (0.0, 0.0), bend);
-            match self.arrest.as_ref().and_then(|arrest| arrest.walls.touched(ends, &path)) {
-                None => return Ok((bend, path)),
-                Some(other) => touched = other,
+            let touches = self.params.arrest > 0.0
+                && self.arrest.as_ref().is_some_and(|arrest| arrest.walls.touches_any(ends, &path));
+            let extent = self.network.extent();
+            let is_forbidden = |pair: &[PathPoint]| self.mask.blocks(pair[0].pos / extent, pair[1].pos / extent);
+            if !touches && !path.points().windows(2).any(is_forbidden) {
+                return Ok((bend, path));
             }
         }
-        Err(touched)
+        Err(())
     }
 
     /// Links a tip to a node of another crack, unless a third is in the way; says whether it did.
@@ -314,7 +336,14 @@ impl CrackGrowth {
             .into_iter()
             .filter(|&(distance, out, _)| distance > 0.0 && distance <= reach && heading.dot(out) >= ahead)
             .min_by(|a, b| a.0.total_cmp(&b.0))
-            .map(|(distance, _, foot)| (distance, Goal::Border(foot)))
+            .map(|(distance, out, foot)| {
+                // Half way between where it would get to and the nearest place: a crack does not hook round.
+                let straight = pos + heading * (distance / heading.dot(out));
+                let place = (0.5 * (foot + straight)).clamp(Vec2::ZERO, extent);
+                // Exactly on the border, whatever rounding has made of it.
+                let place = Vec2::select(out.abs().cmpgt(Vec2::splat(0.5)), foot, place);
+                (distance, Goal::Border(place))
+            })
     }
 
     /// The nearest node of another crack within `reach` of a node, ahead of it if it has a heading.
@@ -345,6 +374,10 @@ impl CrackGrowth {
         if a.impact != b.impact {
             return false;
         }
+        // The rays of a hit keep their distance by themselves.
+        if matches!(self.params.markers, MarkerLayout::Polar { .. }) {
+            return true;
+        }
         let apart = (3.0 * self.params.arrest.max(self.params.island_distance) / self.params.step_length) as u32 + 2;
         // Up from both to the node where they meet; a parent is always older than its child.
         let (mut a, mut b, mut steps) = (one, other, 0);
@@ -368,6 +401,6 @@ impl CrackGrowth {
 }
 
 /// Steps that a tip may take to a goal at `distance`.
-fn steps_for(distance: f32, length: f32) -> u32 {
+pub(super) fn steps_for(distance: f32, length: f32) -> u32 {
     (1.5 * distance / length) as u32 + 2
 }

@@ -100,7 +100,7 @@ impl Relations {
             relation.reached_by = Some(index);
         } else if is_own
             && !grid.any(place, distance_sq.sqrt(), |node, from_place_sq| {
-                node != index && from_place_sq < distance_sq && apart_sq(node) < distance_sq
+                node < index && from_place_sq < distance_sq && apart_sq(node) < distance_sq
             })
         {
             relation.neighbours.push(index);

@@ -42,7 +42,7 @@ struct Newborn {
 }
 
 /// A marker that was given up so often dies.
-const MOST_GIVEN_UP: u8 = 4;
+pub(super) const MOST_GIVEN_UP: u8 = 4;
 
 #[derive(Clone, Debug)]
 pub(super) struct MarkerField {
@@ -306,6 +306,9 @@ impl MarkerField {
         for i in 0..self.active.len() {
             let marker = self.active[i] as usize;
             let id = self.id[marker];
+            if self.near_sq[marker] <= DEAD {
+                continue;
+            }
             match self.relations.as_mut().map(|relations| relations.grow_older(id)) {
                 Some(Bond::Waits) => self.node[marker] = NO_NODE,
                 Some(bond) => self.bind(marker, bond),
@@ -347,10 +350,11 @@ impl MarkerField {
             match relations.give_up(self.id[i], node) {
                 Bond::Attracts(other) => self.node[i] = other,
                 Bond::Waits => self.node[i] = NO_NODE,
-                Bond::Dead => {
+                Bond::Dead if self.near_sq[i] > DEAD => {
                     self.near_sq[i] = DEAD;
                     self.killed += 1;
                 }
+                Bond::Dead => {}
             }
             return;
         }

@@ -69,25 +69,28 @@ impl Walls {
         self.points.extend(path.points().iter().map(|point| point.pos));
     }
 
-    /// The nodes at the ends of a line that the line `path` between the nodes `ends` would touch elsewhere than at a shared
-    /// node, or run along; a node that is not born yet is `u32::MAX`.
-    pub(super) fn touched(&self, ends: (u32, u32), path: &SegmentPath) -> Option<(u32, u32)> {
+    /// Whether the line `path` between the nodes `ends` would touch another elsewhere than at a shared node, or run along
+    /// it; a node that is not born yet is `u32::MAX`.
+    pub(super) fn touches_any(&self, ends: (u32, u32), path: &SegmentPath) -> bool {
         let (low, high) = bounds(path.points());
         let margin = CLEARANCE as f32;
-        for slot in self.slots(low - margin, high + margin) {
+        self.slots(low - margin, high + margin).any(|slot| {
             let mut entry = self.head[slot];
             while entry != NONE {
                 let (wall, next) = self.entries[entry as usize];
                 if self.touches(self.walls[wall as usize], ends, path.points()) {
-                    return Some(self.walls[wall as usize].ends);
+                    return true;
                 }
                 entry = next;
             }
-        }
-        None
+            false
+        })
     }
 
     fn touches(&self, wall: Wall, ends: (u32, u32), path: &[PathPoint]) -> bool {
+        if wall.ends == ends || wall.ends == (ends.1, ends.0) {
+            return true;
+        }
         let line = &self.points[wall.first as usize..(wall.first + wall.len) as usize];
         let last = (path.len() - 2, line.len() - 2);
         for (i, piece) in path.windows(2).enumerate() {

@@ -26,12 +26,14 @@ mod heal;
 mod hit;
 #[cfg(feature = "2d")]
 mod lit;
+mod mask;
 #[cfg(any(feature = "2d", feature = "3d"))]
 mod material;
 #[cfg(any(feature = "2d", feature = "3d"))]
 mod mesh;
 mod paint;
 mod picture;
+mod preset;
 mod queue;
 #[cfg(feature = "2d")]
 mod sprite;
@@ -49,6 +51,8 @@ pub use heal::CrackCommandsExt;
 pub use hit::{CrackHit, HitPoint};
 #[cfg(feature = "2d")]
 pub use lit::{CrackLight2d, CrackLitMaterial, CrackLitUniform, MAX_LIGHTS};
+pub use mask::CrackMaskSource;
+pub use preset::PresetSource;
 pub use state::{CrackFailed, CrackFinished, CrackState, CrackStatus, CrackTip};
 pub use surface::{CrackMaps, CrackResolution, CrackSurface};
 pub use textures::CrackTextures;
@@ -65,8 +69,8 @@ use bevy::{
 pub mod prelude {
     pub use super::{
         CrackBudget, CrackClock, CrackCommandsExt, CrackDrive, CrackError, CrackFailed, CrackFinished, CrackHit,
-        CrackMaps, CrackPlugin, CrackPlugins, CrackResolution, CrackState, CrackStats, CrackStatus, CrackSurface,
-        CrackSystems, CrackTextures, CrackTip, HitPoint,
+        CrackMaps, CrackMaskSource, CrackPlugin, CrackPlugins, CrackResolution, CrackState, CrackStats, CrackStatus,
+        CrackSurface, CrackSystems, CrackTextures, CrackTip, HitPoint, PresetSource,
     };
     #[cfg(feature = "2d")]
     pub use super::{CrackLight2d, CrackLitMaterial};
@@ -119,6 +123,7 @@ impl Plugin for CrackPlugin {
             .init_resource::<upload::Uploads>()
             .init_resource::<budget::FrameClock>()
             .init_resource::<queue::HitQueue>()
+            .init_resource::<mask::PictureMasks>()
             .init_resource::<surfaces::Surfaces>()
             .add_message::<CrackHit>()
             .add_observer(hit::receive_hit)
@@ -130,7 +135,7 @@ impl Plugin for CrackPlugin {
                 PostUpdate,
                 (
                     (
-                        (budget::start_frame, watch::watch_surfaces, watch::watch_pictures),
+                        (budget::start_frame, watch::watch_surfaces, watch::watch_pictures, preset::watch_presets),
                         watch::update_changed.run_if(watch::any_changed),
                         hit::collect_hits,
                         activate::apply_hits.run_if(queue::any_queued),
@@ -161,6 +166,7 @@ impl Plugin for CrackPlugin {
     }
 
     fn finish(&self, app: &mut App) {
+        preset::add_assets(app);
         upload::connect(app);
         #[cfg(feature = "2d")]
         lit::add_material(app);

@@ -2,6 +2,7 @@
 
 use super::{CrackClock, CrackSurface, CrackTextures, carrier::Carrier, clock::Playback, picture::BasePicture};
 use crate::{
+    CrackPreset,
     growth::CrackGrowth,
     paint::LookTable,
     raster::{DepthField, DirtyTiles, Profile, TexelRect},
@@ -23,6 +24,10 @@ pub(super) struct View {
 pub(super) struct Active {
     /// The component as it was when it was last looked at.
     pub(super) surface: CrackSurface,
+    /// The preset in use; that of the component unless it was refused.
+    pub(super) preset: CrackPreset,
+    /// Whether the component or the preset has changed and was not taken up yet.
+    pub(super) has_new_settings: bool,
     pub(super) growth: CrackGrowth,
     pub(super) field: DepthField,
     pub(super) profile: Profile,
