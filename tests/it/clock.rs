@@ -471,3 +471,23 @@ fn resting_clocks_cost_nothing() {
     let last = app.world().entity(entity).get_ref::<CrackState>().unwrap().last_changed();
     assert_eq!(tick, last, "nothing is written");
 }
+
+/// What is taken back on the CPU is taken back on the GPU.
+#[test]
+fn scrubbed_textures_reach_the_gpu() {
+    let Some((_guard, mut app)) = gpu_app() else { return };
+    let entity = spawn_hit(&mut app, CrackClock::value(0.0));
+    grow_out(&mut app, entity);
+    let mut rng = Rng::new(8);
+    for _ in 0..4 {
+        for _ in 0..10 {
+            set(&mut app, entity, CrackClock::value(rng.unit()));
+            step(&mut app);
+        }
+        assert_on_gpu(&mut app, &[entity]);
+    }
+    set(&mut app, entity, CrackClock::value(0.0));
+    step(&mut app);
+    assert!(shown(&app, entity) == shown_picture());
+    assert_on_gpu(&mut app, &[entity]);
+}
