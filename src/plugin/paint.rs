@@ -9,7 +9,7 @@ use super::{
 use crate::{
     paint::{BaseTexels, PaintTargets, paint_into},
     pattern::{Moment, NO_PARENT, SegmentId},
-    raster::{DOT_DEPTH, DepthField, Redrawn, TexelRect, stamp_dot, stamp_path},
+    raster::{DOT_DEPTH, Redrawn, TexelRect, stamp_dot, stamp_path},
 };
 use bevy::prelude::*;
 
@@ -89,11 +89,11 @@ fn stamp(active: &mut Active, scratch: &mut Scratch) {
     }
 }
 
-/// Stamps the whole network anew into a field of the same frame; at another time than the end that is left to the next
+/// Clears the field and stamps the whole network anew; at another time than the end that is left to the next
 /// [`paint_surfaces`].
 pub(super) fn stamp_anew(active: &mut Active) {
     let frame = active.field.frame;
-    active.field = DepthField::new(frame);
+    active.field.depth.as_mut_slice().fill(0);
     active.touched = Touched::new(frame.size());
     if let Some(playback) = &mut active.playback {
         playback.start_over(frame, active.profile);
