@@ -152,12 +152,14 @@ fn make_ready(world: &mut World, entity: Entity) -> Result<bool, CrackError> {
     if surface.alpha_mask {
         growth.set_density(density(&draft.base, draft.rect));
     }
+    let mut field = DepthField::new(frame);
+    field.forbid(&mask);
     growth.set_mask(mask);
 
     let carrier = Carrier { kind, shown, own: None, mesh: None, is_sized: false };
     let mut active = Active {
         growth,
-        field: DepthField::new(frame),
+        field,
         profile: preset.profile,
         look,
         textures: make_textures(world, &draft, None)?,

@@ -214,14 +214,16 @@ fn update_picture(world: &mut World, entity: Entity, active: &mut Active, shown:
     if active.surface.alpha_mask {
         active.growth.set_density(density(&draft.base, draft.rect));
     }
-    active.growth.set_mask(mask);
+    active.growth.set_mask(mask.clone());
     world.resource_mut::<Surfaces>().bytes += draft.bytes;
     world.resource_mut::<Surfaces>().bytes -= active.bytes;
     active.bytes = draft.bytes;
     active.base = draft.base;
-    if frame != active.field.frame {
+    // What the mask forbids may be elsewhere now.
+    if frame != active.field.frame || !mask.is_empty() {
         active.look = look;
         active.field = DepthField::new(frame);
+        active.field.forbid(&mask);
         active.touched = Touched::new(frame.size());
         stamp_all(active);
     }
