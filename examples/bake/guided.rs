@@ -184,14 +184,19 @@ fn write(out: &Path, base: &RgbaImage, field: &DepthField, look: &Look) -> Resul
     let texels = field.depth.as_slice();
     let depth = ImageBuffer::<Luma<u16>, _>::from_raw(size.x, size.y, texels.to_vec()).ok_or("depth size")?;
     depth.save(out.join("depth.png"))?;
-    deep(field)?.save(out.join("mask.png"))?;
+    // What a person would mark as crack, and the cracks that draw.
+    darker(field, u16::MAX / 3)?.save(out.join("mask.png"))?;
+    darker(field, DEEP)?.save(out.join("deep.png"))?;
     Ok(())
 }
 
-/// The deep cracks alone, black on white.
-pub(crate) fn deep(field: &DepthField) -> Result<GrayImage, Box<dyn Error>> {
+/// Deeper than this are the cracks that draw.
+pub(crate) const DEEP: u16 = u16::MAX / 2;
+
+/// The cracks deeper than `depth`, black on white.
+pub(crate) fn darker(field: &DepthField, depth: u16) -> Result<GrayImage, Box<dyn Error>> {
     let size = field.depth.size();
-    let mask = field.depth.as_slice().iter().map(|&depth| if depth > 45_000 { 0 } else { 255 }).collect();
+    let mask = field.depth.as_slice().iter().map(|&texel| if texel > depth { 0 } else { 255 }).collect();
     Ok(GrayImage::from_raw(size.x, size.y, mask).ok_or("mask size")?)
 }
 

@@ -1,6 +1,6 @@
 //! Cracks that know older cracks: a tip that comes near one turns to meet it steeply and stops there.
 
-use super::{CrackGrowth, StartLayout, walls::Walls};
+use super::{CrackGrowth, MarkerLayout, StartLayout, walls::Walls};
 use crate::math::hash_unit;
 use crate::pattern::{Link, LinkKind, NO_PARENT, Network, PathPoint, SegmentId, SegmentPath};
 use glam::Vec2;
@@ -336,7 +336,14 @@ impl CrackGrowth {
             .into_iter()
             .filter(|&(distance, out, _)| distance > 0.0 && distance <= reach && heading.dot(out) >= ahead)
             .min_by(|a, b| a.0.total_cmp(&b.0))
-            .map(|(distance, _, foot)| (distance, Goal::Border(foot)))
+            .map(|(distance, out, foot)| {
+                // Half way between where it would get to and the nearest place: a crack does not hook round.
+                let straight = pos + heading * (distance / heading.dot(out));
+                let place = (0.5 * (foot + straight)).clamp(Vec2::ZERO, extent);
+                // Exactly on the border, whatever rounding has made of it.
+                let place = Vec2::select(out.abs().cmpgt(Vec2::splat(0.5)), foot, place);
+                (distance, Goal::Border(place))
+            })
     }
 
     /// The nearest node of another crack within `reach` of a node, ahead of it if it has a heading.
@@ -366,6 +373,10 @@ impl CrackGrowth {
         let (a, b) = (&self.network.nodes[one as usize], &self.network.nodes[other as usize]);
         if a.impact != b.impact {
             return false;
+        }
+        // The rays of a hit keep their distance by themselves.
+        if matches!(self.params.markers, MarkerLayout::Polar { .. }) {
+            return true;
         }
         let apart = (3.0 * self.params.arrest.max(self.params.island_distance) / self.params.step_length) as u32 + 2;
         // Up from both to the node where they meet; a parent is always older than its child.

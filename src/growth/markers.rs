@@ -13,6 +13,8 @@ use std::f32::consts::TAU;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Region {
     pub(super) center: Vec2,
+    /// Energy of the hit, when it came.
+    pub(super) energy: f32,
     /// What lies closer was populated before.
     pub(super) inner: f32,
     pub(super) outer: f32,
@@ -97,6 +99,7 @@ pub(super) fn lay_out(
         }
         MarkerLayout::Polar { sectors, rings, ring_growth, jitter, occupancy } => {
             let turn = TAU * hash_unit(seed, 0);
+            let sectors = by_energy(sectors, region.energy, 360);
             for ray in 0..sectors {
                 let mut rng = Rng::new(mix(seed ^ u64::from(ray)));
                 let mut angle = turn + TAU * (ray as f32 + jitter * (rng.unit() - 0.5)) / sectors as f32;
@@ -214,6 +217,14 @@ fn span(center: f32, radius: f32, cell: f32, count: u32) -> (u32, u32) {
     (low.min(count), high.min(count))
 }
 
+/// What is `count` at energy 1.
+fn by_energy(count: u32, energy: f32, most: u32) -> u32 {
+    ((count as f32 * energy.sqrt()).round() as u32).clamp(2, most.max(2))
+}
+
+/// Rings of a crushed core.
+const CORE_RINGS: u32 = 3;
+
 /// The places of the first nodes of a hit.
 pub(super) fn starts(
     layout: StartLayout,
@@ -234,6 +245,21 @@ pub(super) fn starts(
             places
         }
         StartLayout::Disc { count, radius } => scatter(count, radius),
+        StartLayout::Crushed { count, radius } => {
+            // Rings around a centre, each node a little off its place.
+            let (count, radius) = (by_energy(count, energy, 1024), radius * energy.sqrt().sqrt());
+            let mut places = vec![center];
+            for ring in 1..=CORE_RINGS {
+                let share = ring as f32 / CORE_RINGS as f32;
+                let n = ((count as f32 * share) as u32).max(3);
+                let turn = rng.unit();
+                places.extend((0..n).map(|i| {
+                    let angle = TAU * (i as f32 + turn + 0.35 * rng.signed()) / n as f32;
+                    center + ops::unit(angle) * (radius * share * (1.0 + 0.15 * rng.signed()))
+                }));
+            }
+            places
+        }
         StartLayout::Ring { count, radius } => {
             let turn = rng.unit();
             (0..count).map(|i| center + ops::unit(TAU * (i as f32 + turn) / count as f32) * radius).collect()

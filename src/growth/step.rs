@@ -1,7 +1,7 @@
 //! The growth itself: hits, steps, and what they leave behind.
 
 use super::{
-    GrowthParams, MarkerLayout, ParamError,
+    GrowthParams, MarkerLayout, ParamError, StartLayout,
     arrest::{Advance, Arrest},
     field::{ANY_IMPACT, MarkerField},
     links::{self, Linker},
@@ -28,6 +28,10 @@ pub struct Impact {
     pub pos: Vec2,
     /// Sum of the energies of all hits merged into it, at most [`MAX_ENERGY`].
     pub energy: f32,
+    /// Energy of the first of them.
+    pub first_energy: f32,
+    /// How many times wider its cracks are, for the hits merged into it.
+    pub widening: f32,
 }
 
 /// Why a hit was refused.
@@ -309,6 +313,7 @@ impl CrackGrowth {
             impact.energy = (before + energy).min(MAX_ENERGY);
             let (center, after) = (impact.pos, impact.energy);
             if after > before {
+                self.widen(index);
                 self.populate(index, center, self.reach(before), self.reach(after));
                 self.steps_left = self.params.num_iterations;
             }
@@ -316,7 +321,7 @@ impl CrackGrowth {
         }
         let index = self.impacts.len() as u32;
         let energy = energy.min(MAX_ENERGY);
-        self.impacts.push(Impact { pos, energy });
+        self.impacts.push(Impact { pos, energy, first_energy: energy, widening: 1.0 });
         let reach = self.reach(energy);
         let first = self.network.nodes.len() as u32;
         let seed = mix(self.seed ^ mix(u64::from(index)));
@@ -328,6 +333,8 @@ impl CrackGrowth {
         }
         if first == self.network.nodes.len() as u32 {
             self.sprout(pos, index);
+        } else if matches!(self.params.starts, StartLayout::Crushed { .. }) {
+            self.crush(first);
         }
         for node in first..self.network.nodes.len() as u32 {
             self.field.visit(node, &self.network.nodes, &self.nodes);
@@ -345,7 +352,8 @@ impl CrackGrowth {
 
     fn populate(&mut self, impact: u32, center: Vec2, inner: f32, outer: f32) {
         let extent = self.network.extent();
-        let region = Region { center, inner, outer, extent };
+        let energy = self.impacts[impact as usize].first_energy;
+        let region = Region { center, energy, inner, outer, extent };
         let seed = mix(self.seed ^ mix(u64::from(impact) | 1 << 40));
         // Darts keep their distance from each other, and from the markers of hits that no step has taken up yet.
         let mut darts = None;
@@ -391,7 +399,8 @@ impl CrackGrowth {
     /// Adds a node; the caller lets it visit the markers.
     pub(super) fn bear(&mut self, pos: Vec2, parent: u32, generation: u32, impact: u32, bend: f32) {
         let node = self.network.nodes.len() as u64;
-        let width = self.widths.tip(parent, hash_unit(self.seed ^ 0x1D, node));
+        let wider = self.impacts.get(impact as usize).map_or(1.0, |impact| impact.widening);
+        let width = self.widths.tip(parent, hash_unit(self.seed ^ 0x1D, node), wider);
         if let Some(arrest) = &mut self.arrest {
             arrest.push_node(false);
         }
@@ -546,6 +555,44 @@ impl CrackGrowth {
         let close = 0.3 * self.params.step_length;
         self.params.arrest > 0.0
             && self.arrest.as_ref().is_some_and(|arrest| arrest.walls.any_within(place, close))
+    }
+
+    /// Joins the nodes of a crushed core, from `first` on: each to the nearest before it, and most to the one after it.
+    fn crush(&mut self, first: u32) {
+        let last = self.network.nodes.len() as u32;
+        for node in first + 1..last {
+            let pos = self.network.nodes[node as usize].pos;
+            let to = |other: u32| self.network.nodes[other as usize].pos.distance_squared(pos);
+            // The node before it is on its own ring.
+            let inner = (first..node.saturating_sub(1).max(first + 1)).min_by(|&a, &b| to(a).total_cmp(&to(b)));
+            let draw = hash_unit(self.seed ^ 0xC3, u64::from(node));
+            for other in [inner.filter(|_| draw < 0.8), Some(node - 1).filter(|_| draw > 0.15)].into_iter().flatten() {
+                let width = self.params.line_width;
+                let (birth, kind) = (self.steps, LinkKind::Connection);
+                self.link(Link { a: other, b: node, width, birth, kind, bend: 1.0 });
+            }
+        }
+    }
+
+    /// Widens the cracks of an impact that was hit again: by the fourth root of the energy that it has gathered, up to twice.
+    fn widen(&mut self, impact: u32) {
+        let Impact { energy, first_energy, widening, .. } = self.impacts[impact as usize];
+        let wider = (energy / first_energy).sqrt().sqrt().min(2.0);
+        // In steps that can be seen, so that a thousand little hits do not repaint it all a thousand times.
+        if wider < 1.05 * widening {
+            return;
+        }
+        self.impacts[impact as usize].widening = wider;
+        for node in 0..self.network.nodes.len() as u32 {
+            let this = &mut self.network.nodes[node as usize];
+            if this.impact == impact {
+                this.width = (this.width * (wider / widening)).min(0.4);
+                self.widths.scale(node, wider / widening);
+                let (width, parent) = (this.width, this.parent);
+                self.changes.widened(node, parent != NO_PARENT);
+                self.timeline.widen(node, width);
+            }
+        }
     }
 
     /// A hit on a crack: new cracks start from it to either side.

@@ -52,6 +52,7 @@ fn random_params(rng: &mut Rng, small: bool) -> GrowthParams {
         roughness: 0.5 * rng.unit(),
         draw_connections: rng.unit() < 0.5,
         connection_gaps: rng.unit(),
+        chips: 0.3 * rng.unit(),
         connection_every: 1 + rng.next_u32() % 4,
         draw_islands: rng.unit() < 0.5,
         island_distance: 0.2 * rng.unit(),

@@ -1,7 +1,7 @@
 //! From hits to cracks: a surface gets its growth and textures at its first hit.
 
 use super::{
-    CrackBudget, CrackError, CrackFailed, CrackResolution, CrackState, CrackStats, CrackStatus, CrackSurface,
+    CrackBudget, CrackClock, CrackError, CrackFailed, CrackResolution, CrackState, CrackStats, CrackStatus, CrackSurface,
     CrackTextures, HitPoint,
     budget::FrameClock,
     carrier::{self, Carrier, Found, Shown},
@@ -98,6 +98,10 @@ fn apply(world: &mut World, entity: Entity, hit: QueuedHit) -> Result<HitOutcome
         surfaces.start_growing(entity);
         // The nodes it starts with show at once.
         surfaces.soil(entity);
+        let turned = surfaces.active.get_mut(&entity).and_then(Active::turn_forwards);
+        if let (Some(turned), Some(mut clock)) = (turned, world.get_mut::<CrackClock>(entity)) {
+            *clock = turned;
+        }
         set_status(world, entity, CrackStatus::Growing);
     }
     Ok(outcome)
@@ -170,6 +174,9 @@ fn make_ready(world: &mut World, entity: Entity) -> Result<bool, CrackError> {
         view: 0,
         rate: preset.steps_per_second,
         due: 0.0,
+        clock: None,
+        closing: None,
+        playback: None,
         hits: 0,
         touched: Touched::new(frame.size()),
         is_growing: false,
@@ -181,6 +188,9 @@ fn make_ready(world: &mut World, entity: Entity) -> Result<bool, CrackError> {
         preset,
         has_new_settings: false,
     };
+    if let Some(mut clock) = world.get_mut::<CrackClock>(entity) {
+        active.follow(clock.bypass_change_detection());
+    }
     active.show(draft.rect);
     // The textures begin as the base: nothing is dirty.
     active.views[0].dirty.clear();

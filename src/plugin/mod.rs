@@ -19,6 +19,7 @@
 mod activate;
 mod budget;
 mod carrier;
+mod clock;
 mod error;
 mod grow;
 mod heal;
@@ -44,6 +45,7 @@ mod upload;
 mod watch;
 
 pub use budget::{CrackBudget, CrackStats};
+pub use clock::{CrackClock, CrackDrive};
 pub use error::CrackError;
 pub use heal::CrackCommandsExt;
 pub use hit::{CrackHit, HitPoint};
@@ -66,9 +68,9 @@ use bevy::{
 /// What a game names.
 pub mod prelude {
     pub use super::{
-        CrackBudget, CrackCommandsExt, CrackError, CrackFailed, CrackFinished, CrackHit, CrackMaps, CrackMaskSource,
-        CrackPlugin, CrackPlugins, CrackResolution, CrackState, CrackStats, CrackStatus, CrackSurface, CrackSystems,
-        CrackTextures, CrackTip, HitPoint, PresetSource,
+        CrackBudget, CrackClock, CrackCommandsExt, CrackDrive, CrackError, CrackFailed, CrackFinished, CrackHit,
+        CrackMaps, CrackMaskSource, CrackPlugin, CrackPlugins, CrackResolution, CrackState, CrackStats, CrackStatus,
+        CrackSurface, CrackSystems, CrackTextures, CrackTip, HitPoint, PresetSource,
     };
     #[cfg(feature = "2d")]
     pub use super::{CrackLight2d, CrackLitMaterial};
@@ -106,6 +108,7 @@ impl Plugin for CrackPlugin {
     fn build(&self, app: &mut App) {
         use CrackSystems::{Grow, Hit, Paint, Upload};
         app.register_type::<CrackSurface>()
+            .register_type::<CrackClock>()
             .register_type::<CrackState>()
             .register_type::<CrackTextures>()
             .register_type::<CrackHit>()
@@ -139,7 +142,7 @@ impl Plugin for CrackPlugin {
                     )
                         .chain()
                         .in_set(Hit),
-                    grow::grow_surfaces.in_set(Grow),
+                    (clock::follow_clocks, grow::grow_surfaces).chain().in_set(Grow),
                     paint::paint_surfaces.in_set(Paint),
                     upload::drop_unwanted.in_set(Upload),
                 ),

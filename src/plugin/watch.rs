@@ -5,9 +5,9 @@ use super::{
     activate::{attach, density, draft, fail, frame, look, make_textures, set_status},
     carrier::{self, Carrier, Found, Shown},
     mask::{self, PictureMasks},
-    paint::stamp_all,
+    paint::stamp_anew,
     preset,
-    surfaces::{Active, Surfaces, Touched},
+    surfaces::{Active, Surfaces},
 };
 use crate::{
     CrackPreset,
@@ -171,7 +171,10 @@ fn update_preset(active: &mut Active, preset: CrackPreset) -> Result<(), CrackEr
         outcome.map_err(|error| CrackError::Preset { reason: error.to_string() })?;
     }
     active.look = look;
-    active.profile = preset.profile;
+    if active.profile != preset.profile {
+        active.profile = preset.profile;
+        stamp_anew(active);
+    }
     active.rate = preset.steps_per_second;
     active.preset = preset;
     let whole = TexelRect::whole(active.field.frame.size());
@@ -224,8 +227,7 @@ fn update_picture(world: &mut World, entity: Entity, active: &mut Active, shown:
         active.look = look;
         active.field = DepthField::new(frame);
         active.field.forbid(&mask);
-        active.touched = Touched::new(frame.size());
-        stamp_all(active);
+        stamp_anew(active);
     }
     active.views.clear();
     active.show(draft.rect);

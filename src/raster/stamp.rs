@@ -282,8 +282,9 @@ impl Capsule {
         dy: f32,
     ) {
         let uniform = section.cut(self.r_from);
-        for (depth, centre) in block.iter_mut().zip(CENTRES) {
-            let dx = (x + centre) - self.from.x;
+        let mut values = [0.0; LANES];
+        for i in 0..LANES {
+            let dx = (x + CENTRES[i]) - self.from.x;
             let t = clamp01((dx * self.along.x + dy * self.along.y) * self.inv_len_sq);
             let (across_x, across_y) = (dx - t * self.along.x, dy - t * self.along.y);
             let distance = (across_x * across_x + across_y * across_y).sqrt();
@@ -292,7 +293,10 @@ impl Capsule {
             if RIM {
                 value = max(value, section.rim_depth * clamp01((cut.rim_reach - distance) * section.inv_rim));
             }
-            *depth = (*depth).max(round_to_u16(value * cut.scale));
+            values[i] = value * cut.scale;
+        }
+        for (depth, value) in block.iter_mut().zip(values) {
+            *depth = (*depth).max(round_to_u16(value));
         }
     }
 }

@@ -7,7 +7,7 @@ use super::{
     noise::Noise,
     params::MAX_LEVELS,
     resample::Resampler,
-    seams::{Seams, Steepest, Tracer},
+    seams::{Guidance, Seams, Tracer},
     search::BLOCK,
     sites::{sites, texel},
     strokes::Astride,
@@ -258,6 +258,11 @@ impl VoronoiBake {
 }
 
 impl VoronoiMap {
+    #[cfg(test)]
+    pub(super) fn lattice(&self, level: usize) -> &Lattice {
+        &self.lattices[level]
+    }
+
     const fn height(&self) -> usize {
         self.frame.size().y as usize
     }
@@ -359,14 +364,13 @@ impl VoronoiMap {
 
     /// The seams that a tracer has found, and the cost of full width.
     fn follow(&self, tracer: Tracer) -> (Seams, f32) {
-        let beta = self.params.beta;
-        let steepest = Steepest { ground: self.params.alpha / beta + 1.0, guides: self.guides_weight() };
-        tracer.finish(&self.levels, &self.params, &self.frame, steepest, self.full_cost)
-    }
-
-    /// The heaviest guide, in β.
-    fn guides_weight(&self) -> f32 {
-        self.layers[1..].iter().map(Layer::weight_in_beta).fold(0.0, f32::max)
+        let layers = &self.layers[1..];
+        let guides = Guidance {
+            ground: self.params.alpha / self.params.beta + 1.0,
+            weight: layers.iter().map(Layer::weight_in_beta).fold(0.0, f32::max),
+            layers,
+        };
+        tracer.finish(&self.levels, &self.params, &self.frame, &guides, self.full_cost)
     }
 
     /// The boundaries of the regions.

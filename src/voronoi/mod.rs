@@ -32,6 +32,8 @@
 //! ```
 
 mod bake;
+mod edges;
+mod front;
 mod lattice;
 mod level;
 mod noise;
@@ -45,6 +47,8 @@ mod strokes;
 mod tests;
 
 pub use bake::{BakeProgress, VoronoiBake, VoronoiMap};
+pub use edges::edges;
+pub use front::{FRONT_STEP, Front};
 pub use params::{Guide, MAX_LEVELS, MAX_SITES, SiteLayout, VoronoiError, VoronoiParams};
 pub use seams::{Seam, SeamVertex, Seams};
 pub use strokes::StrokeReport;

@@ -48,8 +48,9 @@ impl Resampler {
             let mut sum = 0.0;
             for (row, weight) in (down.first..).zip(&down.weights) {
                 let row = &picture.row(row)[across.first..across.first + across.weights.len()];
-                // `max` takes the zero if the value is not a number.
-                let part: f32 = row.iter().zip(&across.weights).map(|(&v, w)| v.max(0.0).min(1.0) * w).sum();
+                // What is not a number is not above zero either.
+                let cut = |value: f32| if value > 0.0 { value.min(1.0) } else { 0.0 };
+                let part: f32 = row.iter().zip(&across.weights).map(|(&value, weight)| cut(value) * weight).sum();
                 sum += part * weight;
             }
             *out = (sum * 65535.0 + 0.5) as u16;

@@ -6,11 +6,10 @@
 //! its neighbours, as if the line were a taut thread. Nothing ever leaves its connection or its square, so lines touch at
 //! their ends only.
 
-use super::{level::Level, params::VoronoiParams};
+use super::{lattice::Layer, level::Level, params::VoronoiParams};
 use crate::{
     math::ops,
-    pattern::{PathPoint, SegmentPath, SurfaceFrame},
-    raster::{DepthField, Profile, stamp_path},
+    pattern::{PathPoint, SurfaceFrame},
 };
 use glam::{IVec2, UVec2, Vec2};
 
@@ -58,17 +57,6 @@ pub struct Seams {
     pub vertices: Vec<SeamVertex>,
     /// The seams, in the order in which rows are read.
     pub seams: Vec<Seam>,
-}
-
-impl Seams {
-    /// Stamps all seams into `field`.
-    pub fn stamp(&self, field: &mut DepthField, profile: &Profile) {
-        for seam in &self.seams {
-            for pair in seam.points.windows(2) {
-                stamp_path(field, profile, &SegmentPath::straight(pair[0], pair[1]));
-            }
-        }
-    }
 }
 
 /// The sides of a corner of four texels, in the order north, east, south, west.
@@ -279,7 +267,7 @@ impl Tracer {
         levels: &[Level],
         params: &VoronoiParams,
         frame: &SurfaceFrame,
-        steepest: Steepest,
+        guides: &Guidance<'_>,
         full: Option<f32>,
     ) -> (Seams, f32) {
         let mut seams = Seams { extent: frame.extent(), ..Seams::default() };
@@ -288,7 +276,7 @@ impl Tracer {
         tauten(&mut joints, &mut lines);
         let births: Vec<usize> = lines.iter().map(|line| self.birth(line, levels)).collect();
         let costs: Vec<Vec<f32>> =
-            lines.iter().zip(&births).map(|(line, &birth)| self.costs(line, &levels[birth], steepest)).collect();
+            lines.iter().zip(&births).map(|(line, &birth)| self.costs(line, &levels[birth], guides)).collect();
         let full = full.unwrap_or_else(|| dearest(&costs));
         let (least, gain) = (params.least_width, params.width - params.least_width);
         let widths = Widths { least, gain, taper: params.taper, full };
@@ -335,37 +323,61 @@ impl Tracer {
     }
 
     /// Path costs along a line, in β.
-    fn costs(&self, line: &Line, level: &Level, steepest: Steepest) -> Vec<f32> {
+    fn costs(&self, line: &Line, level: &Level, guides: &Guidance<'_>) -> Vec<f32> {
         let cost = |crossing: &Crossing| self.beside(crossing).map(|texel| level.cost(texel)).iter().sum::<f32>() * 0.5;
         let mut costs: Vec<f32> = line.crossings.iter().map(cost).collect();
         smooth(&mut costs);
-        lower_thorns(&costs, steepest)
+        lower_thorns(&mut costs, guides);
+        let share = guides.share();
+        for (cost, crossing) in costs.iter_mut().zip(&line.crossings) {
+            let [a, b] = self.beside(crossing).map(|texel| guides.at(texel));
+            *cost *= 1.0 - ASIDE * share * (1.0 - 0.5 * (a + b));
+        }
+        costs
     }
 }
 
-/// How steeply costs rise, in β a texel.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Steepest {
-    /// In the ground.
+/// What the widths of cracks have to know of the guides.
+pub(super) struct Guidance<'a> {
+    /// The most that an edge of bare ground costs, in β.
     pub ground: f32,
-    /// In the strokes of the guides, beside that.
-    pub guides: f32,
+    /// The weight of the heaviest guide, in β.
+    pub weight: f32,
+    /// The guides.
+    pub layers: &'a [Layer],
 }
+
+impl Guidance<'_> {
+    /// How much of the cost of the dearest edge is the guides', 0..1.
+    fn share(&self) -> f32 {
+        self.weight / (self.ground + self.weight)
+    }
+
+    /// The largest value of a guide at a texel, 0..=1; guides count by their weight.
+    fn at(&self, texel: usize) -> f32 {
+        let value = |layer: &Layer| f32::from(layer.values.as_slice()[texel]) / 65535.0 * layer.weight_in_beta();
+        self.layers.iter().map(value).fold(0.0, f32::max) / self.weight.max(1.0e-6)
+    }
+}
+
+/// How much less cracks beside the guides count, at most. With 0 a crack far from all sites is as wide as those that
+/// draw the picture; with 1 the picture stands alone.
+const ASIDE: f32 = 0.55;
 
 /// Of the distance from the edge of a stroke to its middle, how much of a crack that comes in from the side stays thin.
 /// Below a half such cracks show as thorns on the letters; above one the ends of strokes get lost.
 const THORN: f32 = 0.8;
 
-/// The least cost nearby, where a guide is: what runs along the middle of a stroke stays, what runs into it from the
-/// side, with costs that rise all the way, is lowered to what it was at the edge.
-fn lower_thorns(costs: &[f32], steepest: Steepest) -> Vec<f32> {
-    let all = steepest.ground + steepest.guides;
-    let reach_per_cost = THORN * steepest.guides / (all * all);
-    let near = |i: usize, cost: f32| {
-        let reach = (cost * reach_per_cost) as usize;
-        &costs[i.saturating_sub(reach)..(i + reach + 1).min(costs.len())]
-    };
-    costs.iter().enumerate().map(|(i, &cost)| near(i, cost).iter().copied().fold(cost, f32::min)).collect()
+/// Lowers each cost to the least one nearby, where a guide is: what runs along the middle of a stroke stays, what runs
+/// into it from the side, with costs that rise all the way, becomes what it was at the edge.
+fn lower_thorns(costs: &mut [f32], guides: &Guidance<'_>) {
+    let reach_per_cost = THORN * guides.share() / (guides.ground + guides.weight);
+    let before = costs.to_vec();
+    for (i, cost) in costs.iter_mut().enumerate() {
+        let reach = (*cost * reach_per_cost) as usize;
+        let near = &before[i.saturating_sub(reach)..(i + reach + 1).min(before.len())];
+        *cost = near.iter().copied().fold(*cost, f32::min);
+    }
 }
 
 /// Path cost to width (Mould 2005, section 3.2: "the further the site, the wider").

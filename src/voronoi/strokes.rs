@@ -19,7 +19,7 @@ const INK: u16 = 1 << 15;
 const MOST_INK: f32 = 0.7;
 
 /// Share of the sites that is laid astride at once, and that may be after all gaps have been closed.
-const AT_ONCE: f32 = 0.25;
+const AT_ONCE: f32 = 0.2;
 const IN_ALL: f32 = 0.85;
 
 /// Distance of a site from its stroke, texels.
@@ -284,7 +284,7 @@ impl Astride {
             free += step;
         }
         let place = at(out + (0.5 * free).min(GAP));
-        (self.has_ink(place)? == false).then(|| place.as_uvec2())
+        (!self.has_ink(place)?).then(|| place.as_uvec2())
     }
 
     /// Whether no stroke lies between two texels.
@@ -381,11 +381,8 @@ fn thin(ink: &[bool], size: UVec2) -> Vec<u32> {
                 let n = near.iter().filter(|&&near| near).count();
                 let turns = (0..8).filter(|&k| !near[k] && near[(k + 1) % 8]).count();
                 let [north, _, east, _, south, _, west, _] = near;
-                let open = if first {
-                    !(north && east && south) && !(east && south && west)
-                } else {
-                    !(north && east && west) && !(north && south && west)
-                };
+                let open =
+                    if first { !(east && south && (north || west)) } else { !(north && west && (east || south)) };
                 (2..=6).contains(&n) && turns == 1 && open
             };
             let gone: Vec<usize> = texels.iter().copied().filter(goes).collect();

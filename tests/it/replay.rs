@@ -2,7 +2,7 @@
 
 use bevy_crack::{
     CrackPreset,
-    growth::CrackGrowth,
+    growth::{CrackGrowth, Venation},
     math::Rng,
     pattern::{Moment, NO_PARENT, Node, SegmentId, SurfaceFrame},
     raster::{DOT_DEPTH, DepthField, Redrawn, Replay, TexelRect, stamp_dot, stamp_path},
@@ -73,13 +73,18 @@ impl Scene {
     }
 }
 
+/// Those of the crate, and whatever else growth can do.
 fn presets() -> impl Iterator<Item = CrackPreset> {
-    let dotted = {
-        let mut preset = CrackPreset::CONCRETE;
-        preset.growth.draw_markers = true;
-        preset
-    };
-    CrackPreset::NAMES.into_iter().filter_map(CrackPreset::named).chain([dotted])
+    let mut dotted = CrackPreset::CONCRETE;
+    dotted.growth.draw_markers = true;
+    let mut closed = CrackPreset::CLAY;
+    closed.growth.venation = Venation::Closed;
+    let mut arrested = CrackPreset::CLAY;
+    arrested.growth.arrest = 0.08;
+    arrested.growth.inertia = 0.5;
+    arrested.growth.nucleation = 0.5;
+    arrested.growth.unevenness = 0.3;
+    CrackPreset::NAMES.into_iter().filter_map(CrackPreset::named).chain([dotted, closed, arrested])
 }
 
 /// Which texels of `a` and `b` differ.
@@ -177,7 +182,7 @@ fn the_end_is_the_finished_network() {
         for segment in network.segments() {
             stamp_path(&mut finished, &scene.preset.profile, &network.path(segment).unwrap());
         }
-        let (mut markers, radius) = (Vec::new(), scene.preset.growth.line_width);
+        let (mut markers, radius) = (Vec::new(), scene.growth.params().line_width);
         scene.growth.take_markers(&mut markers);
         for marker in markers {
             stamp_dot(&mut finished, marker, radius, DOT_DEPTH);
