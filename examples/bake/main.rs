@@ -8,6 +8,7 @@
 
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "a command-line tool")]
 
+mod gallery;
 mod growth;
 mod guided;
 mod realism;
@@ -27,6 +28,8 @@ struct Arguments {
 enum Method {
     /// Cracks that grow from hits, by space colonization.
     Growth(growth::Options),
+    /// Every preset on its own picture, at three moments, on one sheet.
+    Gallery(gallery::Options),
     /// Cracks that draw a picture or a word, all at once.
     Guided(Box<guided::Options>),
     /// Masks of every preset with random hits, to be measured against photographs.
@@ -35,6 +38,7 @@ enum Method {
 
 fn main() -> ExitCode {
     let done = match Arguments::parse().method {
+        Method::Gallery(options) => gallery::bake(&options),
         Method::Growth(options) => growth::bake(&options),
         Method::Guided(options) => guided::bake(&options),
         Method::Realism(options) => realism::bake(&options),
