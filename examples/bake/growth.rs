@@ -85,13 +85,14 @@ pub(crate) fn setting(text: &str) -> Result<(String, String), String> {
 }
 
 /// The pictures that ship with the crate.
-fn own_picture(preset: &str) -> PathBuf {
+pub(crate) fn own_picture(preset: &str) -> PathBuf {
     let file = match preset {
-        "glass" => "glass_pane.png",
-        "clay" => "clay.png",
-        _ => "concrete_fine.png",
+        "glass" | "tempered_glass" | "laminated_glass" => "glass_pane",
+        "brick" => "brick_red",
+        "plaster" | "clay" | "mud" | "glaze" | "ice" | "toon" => preset,
+        _ => "concrete_fine",
     };
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/textures").join(file)
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/textures").join(file).with_extension("png")
 }
 
 /// Writes the textures, and returns the network and the cracked picture.

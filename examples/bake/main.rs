@@ -9,6 +9,7 @@
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "a command-line tool")]
 
 mod figures;
+mod gallery;
 mod growth;
 mod guided;
 mod picture;
@@ -30,6 +31,8 @@ struct Arguments {
 enum Method {
     /// Cracks that grow from hits, by space colonization.
     Growth(growth::Options),
+    /// Every preset on its own picture, at three moments, on one sheet.
+    Gallery(gallery::Options),
     /// Cracks that draw a picture or a word, all at once.
     Guided(Box<guided::Options>),
     /// The figures of the paper on image-guided fracture, made again.
@@ -42,6 +45,7 @@ enum Method {
 
 fn main() -> ExitCode {
     let done = match Arguments::parse().method {
+        Method::Gallery(options) => gallery::bake(&options),
         Method::Growth(options) => growth::bake(&options).map(drop),
         Method::Guided(options) => guided::bake(&options),
         Method::FiguresMould(options) => figures::bake(&options),

@@ -145,6 +145,11 @@ impl Active {
         }
     }
 
+    /// The moment that is shown.
+    pub(super) fn shown(&self) -> Moment {
+        self.playback.as_ref().map_or(Moment::after(self.growth.timeline().end()), |playback| playback.shown)
+    }
+
     /// Whether another moment is shown.
     pub(super) fn is_behind(&self) -> bool {
         self.playback.as_ref().is_some_and(|playback| playback.shown != self.moment())
