@@ -353,6 +353,7 @@ impl Frame<'_> {
 
     /// The colour at texel `at` + `offset`, bilinear, weighted by alpha so that the hidden colour of transparent
     /// texels does not show; `None` where all is transparent.
+    #[inline(always)]
     fn shifted(&self, at: UVec2, offset: [f32; 2]) -> Option<[f32; 3]> {
         let place = |at: u32, offset: f32, size: u32| {
             let pos = (at as f32 + offset).clamp(0.0, (size - 1) as f32);
