@@ -7,7 +7,9 @@
 //! - [`pattern`]: networks and frames, the words everything else speaks.
 //! - [`growth`]: cracks by space colonization, step by step.
 //! - [`raster`]: networks to a depth field.
+//! - [`voronoi`]: cracks that draw a picture, all at once.
 //! - [`paint`]: a base picture and a depth field to diffuse, normal and depth textures.
+//! - [`shatter`]: the pieces into which cracks cut a surface, and how they fall.
 //! - `plugin` (feature `bevy`): components, hits, systems, upload.
 
 mod grid;
@@ -17,6 +19,8 @@ pub mod paint;
 pub mod pattern;
 pub mod preset;
 pub mod raster;
+pub mod shatter;
+pub mod voronoi;
 
 #[cfg(feature = "bevy")]
 pub mod plugin;

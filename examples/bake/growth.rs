@@ -4,17 +4,18 @@ use bevy_crack::{
     CrackPreset,
     growth::{CrackGrowth, HitOutcome},
     paint::{BaseTexels, Look, LookTable, PaintTargets, paint_into},
-    pattern::{LinkKind, NO_PARENT, Network, SurfaceFrame},
+    pattern::{CrackMask, LinkKind, NO_PARENT, Network, SurfaceFrame},
     raster::{DepthField, TexelRect, stamp_dot, stamp_path},
 };
 use clap::Args;
 use glam::{UVec2, Vec2};
-use image::{ImageBuffer, ImageReader, Limits, Luma, Rgba, RgbaImage, imageops::FilterType};
+use image::{GrayImage, ImageBuffer, ImageReader, Limits, Luma, Rgba, RgbaImage, imageops::FilterType};
 use serde_json::json;
 use std::{
     error::Error,
     fs,
     path::{Path, PathBuf},
+    sync::Arc,
     time::Instant,
 };
 
@@ -37,6 +38,18 @@ pub(crate) struct Options {
     /// A growth parameter, as in `kill_distance=0.02`; may be given many times
     #[arg(long, value_parser = setting)]
     set: Vec<(String, String)>,
+    /// Where cracks like to run: light texels of this picture
+    #[arg(long)]
+    weak: Option<PathBuf>,
+    /// Where they do not
+    #[arg(long)]
+    strong: Option<PathBuf>,
+    /// Where they never go
+    #[arg(long)]
+    forbidden: Option<PathBuf>,
+    /// Cracks like to run in the lines of the base picture (mortar, joints) and never where it is transparent
+    #[arg(long)]
+    mask_from_picture: bool,
     /// Another look than the preset's: groove, frosted or toon
     #[arg(long)]
     look: Option<String>,
@@ -48,7 +61,7 @@ pub(crate) struct Options {
     out: PathBuf,
 }
 
-fn size(text: &str) -> Result<UVec2, String> {
+pub(crate) fn size(text: &str) -> Result<UVec2, String> {
     let (width, height) = text.split_once('x').ok_or("a size is WIDTHxHEIGHT")?;
     let side = |text: &str| text.parse::<u32>().map_err(|error| format!("{text}: {error}"));
     let size = UVec2::new(side(width)?, side(height)?);
@@ -65,7 +78,7 @@ fn hit(text: &str) -> Result<(Vec2, f32), String> {
     }
 }
 
-fn setting(text: &str) -> Result<(String, String), String> {
+pub(crate) fn setting(text: &str) -> Result<(String, String), String> {
     let (name, value) = text.split_once('=').ok_or("a setting is NAME=VALUE")?;
     Ok((name.into(), value.into()))
 }
@@ -81,7 +94,7 @@ fn own_picture(preset: &str) -> PathBuf {
 }
 
 /// A picture of at most 8192 texels a side and 256 MiB; the header is checked before memory is taken.
-fn read_picture(path: &Path) -> Result<RgbaImage, Box<dyn Error>> {
+pub(crate) fn read_picture(path: &Path) -> Result<RgbaImage, Box<dyn Error>> {
     let mut reader = ImageReader::open(path).map_err(|error| format!("{}: {error}", path.display()))?;
     let mut limits = Limits::default();
     limits.max_image_width = Some(8192);
@@ -116,6 +129,23 @@ pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
 
     let frame = SurfaceFrame::new(size)?;
     let mut growth = CrackGrowth::new(preset.growth.clone(), frame.extent(), options.seed)?;
+    let mut layers = if options.mask_from_picture {
+        CrackMask::from_picture(size, base.as_raw())?
+    } else {
+        CrackMask::default()
+    };
+    for (layer, path) in [
+        (&mut layers.weak, &options.weak),
+        (&mut layers.strong, &options.strong),
+        (&mut layers.forbidden, &options.forbidden),
+    ] {
+        if let Some(path) = path {
+            let picture = read_picture(path)?;
+            *layer = Some(CrackMask::layer(picture.dimensions().into(), picture.as_raw())?);
+        }
+    }
+    let layers = Arc::new(layers);
+    growth.set_mask(layers.clone());
     for &(uv, energy) in &options.hit {
         if let HitOutcome::Rejected(reason) = growth.hit(frame.uv_to_pos(uv), energy) {
             return Err(format!("the hit at {uv}: {reason}").into());
@@ -127,6 +157,7 @@ pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
 
     let clock = Instant::now();
     let mut field = DepthField::new(frame);
+    field.forbid(&layers);
     let mut changed = Vec::new();
     growth.take_changed(&mut changed);
     for segment in changed {
@@ -155,15 +186,12 @@ pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
     let painted = clock.elapsed();
 
     fs::create_dir_all(&options.out)?;
-    let texels = field.depth.as_slice();
     diffuse.save(options.out.join("diffuse.png"))?;
     normal.save(options.out.join("normal.png"))?;
-    let depth = ImageBuffer::<Luma<u16>, _>::from_raw(size.x, size.y, texels.to_vec()).ok_or("depth size")?;
+    let texels = field.depth.as_slice().to_vec();
+    let depth = ImageBuffer::<Luma<u16>, _>::from_raw(size.x, size.y, texels).ok_or("depth size")?;
     depth.save(options.out.join("depth.png"))?;
-    // What a person would mark as crack: not the chipped rim.
-    let mask = texels.iter().map(|&depth| if depth > u16::MAX / 3 { 255 } else { 0 }).collect();
-    let mask = ImageBuffer::<Luma<u8>, Vec<u8>>::from_raw(size.x, size.y, mask).ok_or("mask size")?;
-    mask.save(options.out.join("mask.png"))?;
+    mask(&field).save(options.out.join("mask.png"))?;
     let network = growth.network();
     fs::write(options.out.join("network.json"), serde_json::to_string(&describe(network, options))?)?;
 
@@ -178,6 +206,15 @@ pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
         options.out.display()
     );
     Ok(())
+}
+
+/// White where a person would mark a crack: not on the chipped rim.
+pub(crate) fn mask(field: &DepthField) -> GrayImage {
+    let size = field.frame.size();
+    GrayImage::from_fn(size.x, size.y, |x, y| {
+        let depth = field.depth.get(x, y).unwrap_or(0);
+        Luma([if depth > u16::MAX / 3 { 255 } else { 0 }])
+    })
 }
 
 /// The network in pattern units (the shorter side is 1), with the rough line of each segment.
@@ -198,6 +235,7 @@ fn describe(network: &Network, options: &Options) -> serde_json::Value {
             let kind = match link.kind {
                 LinkKind::Connection => "connection",
                 LinkKind::Island => "island",
+                LinkKind::Junction => "junction",
             };
             json!({ "a": link.a, "b": link.b, "width": link.width, "birth": link.birth, "kind": kind })
         })

@@ -9,6 +9,9 @@
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "a command-line tool")]
 
 mod growth;
+mod guided;
+mod realism;
+mod text;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -24,11 +27,17 @@ struct Arguments {
 enum Method {
     /// Cracks that grow from hits, by space colonization.
     Growth(growth::Options),
+    /// Cracks that draw a picture or a word, all at once.
+    Guided(Box<guided::Options>),
+    /// Masks of every preset with random hits, to be measured against photographs.
+    Realism(realism::Options),
 }
 
 fn main() -> ExitCode {
     let done = match Arguments::parse().method {
         Method::Growth(options) => growth::bake(&options),
+        Method::Guided(options) => guided::bake(&options),
+        Method::Realism(options) => realism::bake(&options),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

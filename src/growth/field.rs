@@ -4,6 +4,12 @@
 //! markers lie still, sorted by the cells of a uniform grid, and remember their nearest node; a newborn node looks once at
 //! the markers within its reach and wins those that it is nearest to.
 
+use super::{
+    GrowthParams,
+    closed::{Bond, Relations},
+    nodes::NodeGrid,
+    params::Venation,
+};
 use crate::pattern::Node;
 use glam::{UVec2, Vec2};
 
@@ -22,9 +28,6 @@ const LANES: usize = 8;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Marker {
     pub(super) pos: Vec2,
-    /// Squared distance to the nearest node.
-    pub(super) near_sq: f32,
-    pub(super) node: u32,
     /// Order of birth, for ties.
     pub(super) id: u32,
 }
@@ -35,7 +38,11 @@ struct Newborn {
     pos: Vec2,
     id: u32,
     loyal: u32,
+    given_up: u8,
 }
+
+/// A marker that was given up so often dies.
+pub(super) const MOST_GIVEN_UP: u8 = 4;
 
 #[derive(Clone, Debug)]
 pub(super) struct MarkerField {
@@ -51,6 +58,10 @@ pub(super) struct MarkerField {
     id: Vec<u32>,
     /// The impact whose nodes alone may win the marker, or [`ANY_IMPACT`]. Every node that reaches it kills it.
     loyal: Vec<u32>,
+    /// How often the marker was given up.
+    given_up: Vec<u8>,
+    /// Closed venation: what each marker attracts besides its nearest node.
+    pub(super) relations: Option<Relations>,
     /// Markers that lie in no cell yet.
     newborn: Vec<Newborn>,
     cells: UVec2,
@@ -65,17 +76,19 @@ pub(super) struct MarkerField {
 }
 
 impl MarkerField {
-    pub(super) fn new(extent: Vec2, radius: f32, kill_distance: f32) -> Self {
+    pub(super) fn new(extent: Vec2, params: &GrowthParams) -> Self {
         Self {
             extent,
-            radius,
-            kill_sq: kill_distance * kill_distance,
+            radius: params.crack_radius,
+            kill_sq: params.kill_distance * params.kill_distance,
             x: Vec::new(),
             y: Vec::new(),
             near_sq: Vec::new(),
             node: Vec::new(),
             id: Vec::new(),
             loyal: Vec::new(),
+            given_up: Vec::new(),
+            relations: (params.venation == Venation::Closed).then(|| Relations::new(params)),
             newborn: Vec::new(),
             cells: UVec2::ONE,
             per_unit: extent.recip(),
@@ -86,10 +99,15 @@ impl MarkerField {
         }
     }
 
-    /// Changes the distances; every marker looks for its node anew when it [settles](Self::settle).
-    pub(super) fn set_distances(&mut self, radius: f32, kill_distance: f32) {
-        self.radius = radius;
-        self.kill_sq = kill_distance * kill_distance;
+    /// Takes up other parameters; every marker looks for its nodes anew when it [settles](Self::settle).
+    pub(super) fn set_params(&mut self, params: &GrowthParams) {
+        self.radius = params.crack_radius;
+        self.kill_sq = params.kill_distance * params.kill_distance;
+        self.relations = (params.venation == Venation::Closed).then(|| {
+            let mut relations = Relations::new(params);
+            (0..self.made).for_each(|_| relations.add());
+            relations
+        });
         let mut living = self.take_living();
         living.append(&mut self.newborn);
         self.newborn = living;
@@ -98,7 +116,12 @@ impl MarkerField {
     /// Empties the field of its settled markers and returns the living.
     fn take_living(&mut self) -> Vec<Newborn> {
         let living = (0..self.x.len()).filter(|&i| self.near_sq[i] > DEAD);
-        let marker = |i: usize| Newborn { pos: Vec2::new(self.x[i], self.y[i]), id: self.id[i], loyal: self.loyal[i] };
+        let marker = |i: usize| Newborn {
+            pos: Vec2::new(self.x[i], self.y[i]),
+            id: self.id[i],
+            loyal: self.loyal[i],
+            given_up: self.given_up[i],
+        };
         let living = living.map(marker).collect();
         for plane in [&mut self.x, &mut self.y, &mut self.near_sq] {
             plane.clear();
@@ -106,25 +129,29 @@ impl MarkerField {
         self.node.clear();
         self.id.clear();
         self.loyal.clear();
+        self.given_up.clear();
         self.active.clear();
         self.first.fill(0);
         living
     }
 
     pub(super) fn add(&mut self, pos: Vec2, loyal: u32) {
-        self.newborn.push(Newborn { pos, id: self.made, loyal });
+        self.newborn.push(Newborn { pos, id: self.made, loyal, given_up: 0 });
         self.made += 1;
+        if let Some(relations) = &mut self.relations {
+            relations.add();
+        }
     }
 
     #[inline]
     pub(super) fn marker(&self, index: u32) -> Marker {
         let i = index as usize;
         let pos = Vec2::new(self.x[i], self.y[i]);
-        Marker { pos, near_sq: self.near_sq[i], node: self.node[i], id: self.id[i] }
+        Marker { pos, id: self.id[i] }
     }
 
     /// Takes up the newborn markers: forgets the dead, sorts all into cells, and lets every node win what it is nearest to.
-    pub(super) fn settle(&mut self, nodes: &[Node]) {
+    pub(super) fn settle(&mut self, nodes: &[Node], grid: &NodeGrid) {
         if self.newborn.is_empty() {
             return;
         }
@@ -152,17 +179,28 @@ impl MarkerField {
         self.y.resize(padded, 0.0);
         self.id.resize(padded, 0);
         self.loyal.resize(padded, ANY_IMPACT);
+        self.given_up.resize(padded, 0);
         self.node.resize(padded, NO_NODE);
         self.near_sq.resize(all.len(), self.radius * self.radius);
         self.near_sq.resize(padded, DEAD);
-        for (Newborn { pos, id, loyal }, home) in all.into_iter().zip(homes) {
+        for (Newborn { pos, id, loyal, given_up }, home) in all.into_iter().zip(homes) {
             let slot = &mut next[home as usize];
             let i = *slot as usize;
             *slot += 1;
             (self.x[i], self.y[i], self.id[i], self.loyal[i]) = (pos.x, pos.y, id, loyal);
+            self.given_up[i] = given_up;
         }
-        for (index, node) in (0u32..).zip(nodes) {
-            self.visit(index, node);
+        if let Some(relations) = &self.relations {
+            // These have looked at all nodes already.
+            for i in 0..self.x.len() - LANES {
+                if let Some(&node) = relations.neighbours(self.id[i]).first() {
+                    self.node[i] = node;
+                    self.active.push(i as u32);
+                }
+            }
+        }
+        for index in 0..nodes.len() as u32 {
+            self.visit(index, nodes, grid);
         }
     }
 
@@ -185,13 +223,20 @@ impl MarkerField {
     /// Lets a newborn node win the markers that it is nearest to, and kills those that it reaches.
     ///
     /// Must be called in order of the nodes' indices: at equal distance the lower index keeps the marker.
-    pub(super) fn visit(&mut self, index: u32, node: &Node) {
+    pub(super) fn visit(&mut self, index: u32, nodes: &[Node], grid: &NodeGrid) {
+        let node = &nodes[index as usize];
         for (from, to) in self.rows(node.pos, self.radius) {
             let (from, to) = (self.first[from] as usize, self.first[to] as usize);
             // Whole lanes, even beyond the cells: a marker that is not won is left as it is, and there is padding.
             for i in (from..to).step_by(LANES) {
                 if self.any_won(i, node.pos) {
-                    (i..i + LANES).for_each(|marker| self.offer(marker, index, node));
+                    for marker in i..i + LANES {
+                        if self.relations.is_none() {
+                            self.offer(marker, index, node);
+                        } else {
+                            self.relate(marker, index, nodes, grid);
+                        }
+                    }
                 }
             }
         }
@@ -230,10 +275,110 @@ impl MarkerField {
         self.node[marker] = index;
     }
 
-    /// Drops the dead from the active markers.
+    /// Closed venation: shows a marker a node that may come to be among its relative neighbours.
+    fn relate(&mut self, marker: usize, index: u32, nodes: &[Node], grid: &NodeGrid) {
+        let (pos, node) = (Vec2::new(self.x[marker], self.y[marker]), &nodes[index as usize]);
+        let distance_sq = distance_sq(pos.x, pos.y, node.pos);
+        let Some(relations) = self.relations.as_mut().filter(|_| distance_sq < self.near_sq[marker]) else { return };
+        let is_own = self.loyal[marker] == ANY_IMPACT || self.loyal[marker] == node.impact;
+        let bond = relations.visit((self.id[marker], pos), (index, distance_sq, is_own), nodes, grid);
+        self.bind(marker, bond);
+    }
+
+    fn bind(&mut self, marker: usize, bond: Bond) {
+        match bond {
+            Bond::Attracts(node) => {
+                if std::mem::replace(&mut self.node[marker], node) == NO_NODE {
+                    self.active.push(marker as u32);
+                }
+            }
+            // It stays among the active until the next sweep, and must not be put there twice.
+            Bond::Waits => {}
+            Bond::Dead => {
+                self.near_sq[marker] = DEAD;
+                self.killed += 1;
+            }
+        }
+    }
+
+    /// Makes the active markers a step older, where they can be too old.
+    pub(super) fn grow_older(&mut self) {
+        for i in 0..self.active.len() {
+            let marker = self.active[i] as usize;
+            let id = self.id[marker];
+            if self.near_sq[marker] <= DEAD {
+                continue;
+            }
+            match self.relations.as_mut().map(|relations| relations.grow_older(id)) {
+                Some(Bond::Waits) => self.node[marker] = NO_NODE,
+                Some(bond) => self.bind(marker, bond),
+                None => return,
+            }
+        }
+    }
+
+    /// Calls `visit` with each marker that attracts a node, that node, and their squared distance.
+    #[inline]
+    pub(super) fn each_pull(&self, nodes: &[Node], mut visit: impl FnMut(u32, u32, f32)) {
+        match &self.relations {
+            None => {
+                for &index in &self.active {
+                    visit(index, self.node[index as usize], self.near_sq[index as usize]);
+                }
+            }
+            Some(relations) => {
+                for &index in &self.active {
+                    let i = index as usize;
+                    for &node in relations.neighbours(self.id[i]) {
+                        visit(index, node, distance_sq(self.x[i], self.y[i], nodes[node as usize].pos));
+                    }
+                }
+            }
+        }
+    }
+
+    /// Drops the dead and the given up from the active markers.
     pub(super) fn sweep(&mut self) {
-        let near_sq = &self.near_sq;
-        self.active.retain(|&i| near_sq[i as usize] > DEAD);
+        let (near_sq, node) = (&self.near_sq, &self.node);
+        self.active.retain(|&i| near_sq[i as usize] > DEAD && node[i as usize] != NO_NODE);
+    }
+
+    /// Takes a marker from its node, for which it is behind a crack: only a nearer node may win it now. After a few times it dies.
+    pub(super) fn give_up(&mut self, index: u32, node: u32) {
+        let i = index as usize;
+        if let Some(relations) = &mut self.relations {
+            match relations.give_up(self.id[i], node) {
+                Bond::Attracts(other) => self.node[i] = other,
+                Bond::Waits => self.node[i] = NO_NODE,
+                Bond::Dead if self.near_sq[i] > DEAD => {
+                    self.near_sq[i] = DEAD;
+                    self.killed += 1;
+                }
+                Bond::Dead => {}
+            }
+            return;
+        }
+        self.node[i] = NO_NODE;
+        self.given_up[i] += 1;
+        if self.given_up[i] >= MOST_GIVEN_UP {
+            self.near_sq[i] = DEAD;
+            self.killed += 1;
+        }
+    }
+
+    /// Takes a living marker that no node attracts, the first from a place that `draw` chooses; its place and its impact.
+    pub(super) fn take_waiting(&mut self, draw: u64) -> Option<(Vec2, u32)> {
+        let n = self.made_settled();
+        let from = (draw % n.max(1) as u64) as usize;
+        let i = (from..n).chain(0..from).find(|&i| self.near_sq[i] > DEAD && self.node[i] == NO_NODE)?;
+        self.near_sq[i] = DEAD;
+        self.killed += 1;
+        Some((Vec2::new(self.x[i], self.y[i]), self.loyal[i]))
+    }
+
+    /// Markers in the cells, dead ones included.
+    fn made_settled(&self) -> usize {
+        self.x.len().saturating_sub(LANES)
     }
 
     /// Markers that are alive, and how many of them attract a node.

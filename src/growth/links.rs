@@ -7,9 +7,11 @@ use crate::{
 };
 use std::{collections::VecDeque, ops::Range};
 
-/// Joins newborn nodes to others.
+/// Finds what newborn nodes are joined to.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Linker {
+    /// Links found and not taken yet.
+    links: Vec<Link>,
     /// Newborn nodes of one ring with their angle around the impact.
     ring: Vec<(f32, u32)>,
     /// Per node: whether another grew from it.
@@ -22,28 +24,11 @@ pub(super) struct Linker {
 const KIN: usize = 8;
 
 impl Linker {
-    pub(super) fn join(
+    /// Links between neighbours on a ring: nodes of one impact and one generation, next to each other as seen from the impact.
+    pub(super) fn rings(
         &mut self,
         params: &GrowthParams,
-        network: &mut Network,
-        nodes: &NodeGrid,
-        impacts: &[Impact],
-        newborn: Range<u32>,
-        seed: u64,
-    ) {
-        if params.draw_connections {
-            self.join_rings(params, network, impacts, newborn.clone(), seed);
-        }
-        if params.draw_islands {
-            self.join_islands(params, network, nodes, newborn);
-        }
-    }
-
-    /// Joins neighbours on a ring: nodes of one impact and one generation, next to each other as seen from the impact.
-    fn join_rings(
-        &mut self,
-        params: &GrowthParams,
-        network: &mut Network,
+        network: &Network,
         impacts: &[Impact],
         newborn: Range<u32>,
         seed: u64,
@@ -78,7 +63,9 @@ impl Linker {
                 let radius = from.distance(impact.pos).max(params.step_length);
                 // Rings thin out on the way to the rim, and none spans a wide gap between radials.
                 let out = (radius / (params.reach * impact.energy.sqrt())).min(1.0);
-                let gaps = params.connection_gaps + (1.0 - params.connection_gaps) * out * (2.0 - out);
+                // A soft hit makes fewer of them.
+                let few = (out * (2.0 - out)).max(1.0 - impact.energy.sqrt());
+                let gaps = params.connection_gaps + (1.0 - params.connection_gaps) * few;
                 let apart =
                     generation != network.nodes()[b as usize].generation || from.distance(beside) > 0.75 * radius;
                 if apart || draw(0xC0) < gaps {
@@ -91,15 +78,23 @@ impl Linker {
                 }
                 let width = 0.8 * params.line_width;
                 let birth = network.nodes()[first as usize].birth;
-                network.links.push(Link { a, b, width, birth, kind: LinkKind::Connection });
+                if parent != NO_PARENT && draw(0xC4) < params.chips {
+                    // A chip has come off between two ends of the ring.
+                    let other = if b == parent { self.ring[(i + 1) % n].1 } else { parent };
+                    self.links.push(Link { a, b: other, width, birth, kind: LinkKind::Connection, bend: 1.0 });
+                }
+                self.links.push(Link { a, b, width, birth, kind: LinkKind::Connection, bend: 1.0 });
             }
         }
     }
 
-    /// Joins each tip that has come to rest to the nearest node of another branch ahead of it.
-    ///
-    /// A node that has no child two steps after its birth is such a tip; when growth has ended, all the others are.
-    fn join_islands(&mut self, params: &GrowthParams, network: &mut Network, nodes: &NodeGrid, newborn: Range<u32>) {
+    /// The links found since the last call.
+    pub(super) fn take_links(&mut self) -> Vec<Link> {
+        std::mem::take(&mut self.links)
+    }
+
+    /// Tips that have come to rest: nodes without a child two steps after their birth; when growth has ended, all of them.
+    pub(super) fn tips_at_rest(&mut self, network: &Network, newborn: Range<u32>) -> Vec<u32> {
         self.parents.resize(network.nodes().len(), false);
         for node in newborn.clone() {
             if let Some(is_parent) = self.parents.get_mut(network.nodes()[node as usize].parent as usize) {
@@ -107,35 +102,33 @@ impl Linker {
             }
         }
         self.waiting.push_back(newborn.clone());
+        let mut tips = Vec::new();
         while self.waiting.len() > 2 || (newborn.is_empty() && !self.waiting.is_empty()) {
-            for node in self.waiting.pop_front().into_iter().flatten() {
-                if !self.parents[node as usize] {
-                    self.join_island(params, network, nodes, node);
-                }
-            }
+            let settled = self.waiting.pop_front().into_iter().flatten();
+            tips.extend(settled.filter(|&node| !self.parents[node as usize]));
         }
+        tips
     }
+}
 
-    fn join_island(&self, params: &GrowthParams, network: &mut Network, nodes: &NodeGrid, tip: u32) {
-        let born = network.nodes()[tip as usize];
-        let Some(parent) = network.nodes().get(born.parent as usize) else { return };
-        let ahead = (born.pos - parent.pos).normalize_or_zero();
-        let kin = ancestors(network, tip);
-        let mut best = (f32::INFINITY, u32::MAX);
-        nodes.within(born.pos, params.island_distance, |other, distance_sq| {
-            let way = network.nodes()[other as usize].pos - born.pos;
-            if (distance_sq, other) < best
-                && way.dot(ahead) > 0.3 * distance_sq.sqrt()
-                && !ancestors(network, other).iter().any(|a| *a != NO_PARENT && kin.contains(a))
-            {
-                best = (distance_sq, other);
-            }
-        });
-        if best.1 != u32::MAX {
-            let link = Link { a: best.1, b: tip, width: born.width, birth: born.birth, kind: LinkKind::Island };
-            network.links.push(link);
+/// A link from a tip to the nearest node of another branch ahead of it.
+pub(super) fn island(params: &GrowthParams, network: &Network, nodes: &NodeGrid, tip: u32) -> Option<Link> {
+    let born = network.nodes()[tip as usize];
+    let parent = network.nodes().get(born.parent as usize)?;
+    let ahead = (born.pos - parent.pos).normalize_or_zero();
+    let kin = ancestors(network, tip);
+    let mut best = (f32::INFINITY, u32::MAX);
+    nodes.within(born.pos, params.island_distance, |other, distance_sq| {
+        let way = network.nodes()[other as usize].pos - born.pos;
+        if (distance_sq, other) < best
+            && way.dot(ahead) > 0.3 * distance_sq.sqrt()
+            && !ancestors(network, other).iter().any(|a| *a != NO_PARENT && kin.contains(a))
+        {
+            best = (distance_sq, other);
         }
-    }
+    });
+    let link = Link { a: best.1, b: tip, width: born.width, birth: born.birth, kind: LinkKind::Island, bend: 1.0 };
+    (best.1 != u32::MAX).then_some(link)
 }
 
 /// Whether generation `generation` carries a ring: the rings lie at `every` times 1, 3, 6, 10 ..., wider apart further out.

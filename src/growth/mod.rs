@@ -31,6 +31,8 @@
 //! # Ok::<(), bevy_crack::growth::ParamError>(())
 //! ```
 
+mod arrest;
+mod closed;
 mod field;
 mod links;
 mod markers;
@@ -39,7 +41,8 @@ mod params;
 mod step;
 #[cfg(test)]
 mod tests;
+mod walls;
 mod width;
 
-pub use params::{GrowthParams, MAX_MARKERS, MarkerLayout, ParamError, StartLayout};
+pub use params::{GrowthParams, MAX_MARKERS, MarkerLayout, ParamError, StartLayout, Venation};
 pub use step::{Census, CrackGrowth, HitOutcome, Impact, MAX_ENERGY, Rejected, StepReport};

@@ -69,10 +69,26 @@ impl NodeGrid {
         }
     }
 
+    /// Whether a node within `radius` of `pos` is as asked, by its index and squared distance.
+    pub(super) fn any(&self, pos: Vec2, radius: f32, mut is_so: impl FnMut(u32, f32) -> bool) -> bool {
+        let (low, high) = (self.cell_at(pos - radius), self.cell_at(pos + radius));
+        (low.y..=high.y).any(|y| {
+            (low.x..=high.x).any(|x| {
+                let mut node = self.head[y as usize * self.cells.x as usize + x as usize];
+                while node != NONE {
+                    let distance_sq = self.places[node as usize].distance_squared(pos);
+                    if distance_sq <= radius * radius && is_so(node, distance_sq) {
+                        return true;
+                    }
+                    node = self.next[node as usize];
+                }
+                false
+            })
+        })
+    }
+
     /// Whether a node lies within `distance` of `pos`.
     pub(super) fn any_within(&self, pos: Vec2, distance: f32) -> bool {
-        let mut any = false;
-        self.within(pos, distance, |_, _| any = true);
-        any
+        self.any(pos, distance, |_, _| true)
     }
 }

@@ -1,5 +1,7 @@
 //! What is asked of a growth: [`GrowthParams`].
 
+use crate::math::{Rng, ops};
+
 /// How markers are laid out around a hit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]
@@ -19,7 +21,7 @@ pub enum MarkerLayout {
     },
     /// Rays around the hit, with rings of markers on them (glass). They attract the nodes of their own hit only.
     Polar {
-        /// Number of rays at the centre, 1..=360.
+        /// Number of rays of a hit of energy 1, 1..=360; in proportion to the root of the energy.
         sectors: u32,
         /// Number of rings, 1..=256.
         rings: u32,
@@ -30,6 +32,19 @@ pub enum MarkerLayout {
         /// Probability that a place carries a marker, 0..=1.
         occupancy: f32,
     },
+}
+
+/// How cracks share the markers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Venation {
+    /// A marker attracts its nearest node and dies when it is reached: cracks branch, and do not come together.
+    #[default]
+    Open,
+    /// A marker attracts all its relative neighbours and dies when each has reached it (Runions et al. 2005): cracks come together
+    /// and close cells.
+    Closed,
 }
 
 /// The nodes with which a hit begins.
@@ -49,6 +64,13 @@ pub enum StartLayout {
         /// 1..=1024.
         count: u32,
         /// Pattern units, 0..=1.
+        radius: f32,
+    },
+    /// A crushed core: a fine mesh around the hit, with `count` nodes on its rim, in proportion to the root of the energy.
+    Crushed {
+        /// Nodes on the rim at energy 1, 1..=1024.
+        count: u32,
+        /// Radius at energy 1, pattern units, 0..=1.
         radius: f32,
     },
     /// `count` nodes scattered over a disc around the hit.
@@ -79,6 +101,8 @@ pub struct GrowthParams {
     pub num_columns_grid: u32,
     /// How markers are laid out.
     pub markers: MarkerLayout,
+    /// How cracks share the markers.
+    pub venation: Venation,
     /// How much denser markers are near the hit: 0 = even, 4 = nearly all in the inner half. 0..=4.
     pub focus: f32,
     /// Radius around a hit of energy 1 that markers populate; grows with the root of the energy. Pattern units, 0.01..=64.
@@ -91,8 +115,14 @@ pub struct GrowthParams {
     pub line_growth: f32,
     /// Exponent of the pipe model: a node with `n` nodes behind it is as wide as `n^(1/murray)` tips. 1..=8.
     pub murray: f32,
-    /// The widest a crack gets. Pattern units, at least `line_width`, at most 0.4.
+    /// The widest that what hangs on it makes a crack. Pattern units, at least `line_width`, at most 0.4. Hammering on the
+    /// same spot makes it up to twice as wide.
     pub max_width: f32,
+    /// How much the width varies along a crack, 0..=0.9, as a share of it.
+    pub unevenness: f32,
+    /// How much a crack keeps its direction, against the pull of the markers: 0 = not at all, 1 = as much as it follows them.
+    /// 0..=8.
+    pub inertia: f32,
     /// How much the direction of growth strays at each node, radians, 0..=1.
     pub wander: f32,
     /// How rough the line between two nodes is, as a share of its length, 0..=0.5.
@@ -101,12 +131,25 @@ pub struct GrowthParams {
     pub draw_connections: bool,
     /// Share of possible connections that are left out, 0..=1.
     pub connection_gaps: f32,
+    /// Share of the crossings of rings and rays where a chip has come off: a ring meets the ray twice there. 0..=1.
+    pub chips: f32,
     /// Generations to the first ring of connections; the next ones lie 2, 3, 4 ... times as far apart. 1..=1000.
     pub connection_every: u32,
     /// Whether close nodes of different branches are joined (the cells of clay).
     pub draw_islands: bool,
     /// How close they must be. Pattern units, 0..=1.
     pub island_distance: f32,
+    /// How far a tip notices an older crack or the border ahead of it, pattern units, 0..=1: it turns to meet it steeply and
+    /// stops there. No less than 2.5 segment lengths, which it needs to turn. No two cracks cross then. 0 = off: cracks neither see nor mind each other, as in the papers.
+    pub arrest: f32,
+    /// Share of tips that stop short of the crack that they would have met, 0..=1.
+    pub open_ends: f32,
+    /// Cracks that begin by themselves where markers are out of every crack's reach: how many for each step of growth, 0..=64.
+    /// They come late, so they end at the older ones.
+    pub nucleation: f32,
+    /// How much one surface differs from the next, by its seed: widths, roughness, the spacing of markers, the number of starts and
+    /// of free ends. 0 = not at all; at 1 each differs by a factor of about 2 either way. 0..=1.
+    pub variety: f32,
     /// Whether the markers themselves are drawn.
     pub draw_markers: bool,
     /// The most nodes that a surface gets, 1..=1000000.
@@ -123,6 +166,7 @@ impl GrowthParams {
         num_lines_grid: 20,
         num_columns_grid: 20,
         markers: MarkerLayout::PseudoGrid { occupancy: 0.7, jitter: 0.8 },
+        venation: Venation::Open,
         focus: 0.0,
         reach: 0.6,
         starts: StartLayout::Point,
@@ -130,13 +174,20 @@ impl GrowthParams {
         line_growth: 0.4,
         murray: 3.0,
         max_width: 0.03,
+        unevenness: 0.0,
+        inertia: 0.0,
         wander: 0.1,
         roughness: 0.12,
         draw_connections: false,
         connection_gaps: 0.3,
+        chips: 0.0,
         connection_every: 1,
         draw_islands: false,
         island_distance: 0.03,
+        open_ends: 0.0,
+        arrest: 0.0,
+        nucleation: 0.0,
+        variety: 0.0,
         draw_markers: false,
         max_nodes: 20_000,
     };
@@ -220,11 +271,18 @@ impl GrowthParams {
         line_growth: f32 = 0.0, 16.0;
         murray: f32 = 1.0, 8.0;
         max_width: f32 = 0.0005, 0.4;
+        unevenness: f32 = 0.0, 0.9;
+        inertia: f32 = 0.0, 8.0;
         wander: f32 = 0.0, 1.0;
         roughness: f32 = 0.0, 0.5;
         connection_gaps: f32 = 0.0, 1.0;
+        chips: f32 = 0.0, 1.0;
         connection_every: u32 = 1.0, 1000.0;
         island_distance: f32 = 0.0, 1.0;
+        open_ends: f32 = 0.0, 1.0;
+        arrest: f32 = 0.0, 1.0;
+        nucleation: f32 = 0.0, 64.0;
+        variety: f32 = 0.0, 1.0;
         max_nodes: u32 = 1.0, 1_000_000.0;
     }
 
@@ -249,7 +307,9 @@ impl GrowthParams {
         let starts: &[_] = match self.starts {
             StartLayout::Point => &[],
             StartLayout::Points { count } => &[("start_count", f64::from(count), 1.0, 1024.0)],
-            StartLayout::Ring { count, radius } | StartLayout::Disc { count, radius } => {
+            StartLayout::Ring { count, radius }
+            | StartLayout::Crushed { count, radius }
+            | StartLayout::Disc { count, radius } => {
                 &[("start_count", f64::from(count), 1.0, 1024.0), ("start_radius", f64::from(radius), 0.0, 1.0)]
             }
         };
@@ -271,7 +331,7 @@ impl GrowthParams {
     /// Sets one parameter from text, by the name of its field or by the paper's own (`D`).
     ///
     /// Besides the fields: `markers` (`grid`, `darts`, `polar`), `occupancy`, `jitter`, `spacing`, `sectors`, `rings`,
-    /// `ring_growth` of the present layout; `starts` (`point`, `points`, `ring`, `disc`), `start_count`, `start_radius`.
+    /// `ring_growth` of the present layout; `venation` (`open`, `closed`), `starts` (`point`, `points`, `ring`, `crushed`, `disc`), `start_count`, `start_radius`.
     ///
     /// ```
     /// use bevy_crack::growth::GrowthParams;
@@ -305,11 +365,19 @@ impl GrowthParams {
                     _ => return Err(unreadable()),
                 }
             }
+            ("venation", ..) => {
+                self.venation = match text {
+                    "open" => Venation::Open,
+                    "closed" => Venation::Closed,
+                    _ => return Err(unreadable()),
+                }
+            }
             ("starts", ..) => {
                 self.starts = match text {
                     "point" => StartLayout::Point,
                     "points" => StartLayout::Points { count: 8 },
                     "ring" => StartLayout::Ring { count: 12, radius: 0.02 },
+                    "crushed" => StartLayout::Crushed { count: 16, radius: 0.02 },
                     "disc" => StartLayout::Disc { count: 12, radius: 0.03 },
                     _ => return Err(unreadable()),
                 }
@@ -327,9 +395,16 @@ impl GrowthParams {
             (
                 "start_count",
                 _,
-                StartLayout::Points { count } | StartLayout::Ring { count, .. } | StartLayout::Disc { count, .. },
+                StartLayout::Points { count }
+                | StartLayout::Ring { count, .. }
+                | StartLayout::Crushed { count, .. }
+                | StartLayout::Disc { count, .. },
             ) => *count = parse(name, text)?,
-            ("start_radius", _, StartLayout::Ring { radius, .. } | StartLayout::Disc { radius, .. }) => {
+            (
+                "start_radius",
+                _,
+                StartLayout::Ring { radius, .. } | StartLayout::Crushed { radius, .. } | StartLayout::Disc { radius, .. },
+            ) => {
                 *radius = parse(name, text)?;
             }
             _ => return Err(ParamError::Unknown { name: name.to_owned() }),
@@ -337,13 +412,60 @@ impl GrowthParams {
         Ok(())
     }
 
+    /// The parameters of the surface with this seed: what [`variety`](Self::variety) makes of them. Valid if these are.
+    #[must_use]
+    pub fn varied(&self, seed: u64) -> Self {
+        let mut varied = self.clone();
+        if self.variety <= 0.0 {
+            return varied;
+        }
+        let mut rng = Rng::new(seed).stream("variety");
+        let mut factor = || ops::exp(self.variety * 0.7 * (rng.signed() + rng.signed()));
+        let (width, rough, stray, spacing, starts, free) = (factor(), factor(), factor(), factor(), factor(), factor());
+        varied.line_width = (self.line_width * width).clamp(0.0005, 0.2);
+        varied.max_width = (self.max_width * width).clamp(varied.line_width, 0.4);
+        varied.roughness = (self.roughness * rough).min(0.5);
+        varied.wander = (self.wander * stray).min(1.0);
+        varied.open_ends = (self.open_ends * free).min(1.0);
+        let count = |count: u32, by: f32, most: u32| ((count as f32 * by).round() as u32).clamp(1, most);
+        match &mut varied.markers {
+            MarkerLayout::PseudoGrid { .. } => {
+                varied.num_lines_grid = count(self.num_lines_grid, 1.0 / spacing, 512);
+                varied.num_columns_grid = count(self.num_columns_grid, 1.0 / spacing, 512);
+            }
+            MarkerLayout::DartThrowing { spacing: apart } => *apart = (*apart * spacing).clamp(0.002, 1.0),
+            MarkerLayout::Polar { sectors, .. } => *sectors = count(*sectors, 1.0 / spacing, 360),
+        }
+        match &mut varied.starts {
+            StartLayout::Point => {}
+            StartLayout::Points { count: n }
+            | StartLayout::Ring { count: n, .. }
+            | StartLayout::Crushed { count: n, .. }
+            | StartLayout::Disc { count: n, .. } => {
+                *n = count(*n, starts, 1024);
+            }
+        }
+        varied
+    }
+
     /// The most nodes that `markers` markers and `starts` starts can make: growth ends by itself within as many steps.
     ///
     /// Each new node either kills a marker or brings one closer by at least `D²/4` of squared distance, and no marker
-    /// begins further than [`crack_radius`](Self::crack_radius) from the node that it attracts.
+    /// begins further than [`crack_radius`](Self::crack_radius) from the node that it attracts. With closed venation a marker
+    /// attracts no more than six nodes at once, and for no longer than twice as many steps. With arrest a marker counts for each
+    /// time that it may be given up, every node may be a tip that runs on, and with nucleation every marker a start.
     #[must_use]
     pub fn most_nodes(&self, markers: u64, starts: u64) -> u64 {
-        let approaches = (self.crack_radius / self.step_length).powi(2) / PROGRESS;
-        starts + markers * (2 + approaches.ceil() as u64)
+        let approaches = ((self.crack_radius / self.step_length).powi(2) / PROGRESS).ceil() as u64;
+        let mut births = markers * (2 + approaches);
+        if self.venation == Venation::Closed {
+            births = 6 * markers * u64::from(super::closed::patience(self));
+        }
+        let starts = starts + if self.nucleation > 0.0 { markers } else { 0 };
+        if self.arrest <= 0.0 {
+            return starts + births;
+        }
+        let run = u64::from(super::arrest::steps_for(self.arrest.max(self.island_distance), self.step_length)) + 2;
+        (starts + births * u64::from(super::field::MOST_GIVEN_UP)) * (1 + run)
     }
 }

@@ -1,9 +1,10 @@
 //! The growth itself: hits, steps, and what they leave behind.
 
 use super::{
-    GrowthParams, MarkerLayout, ParamError,
-    field::{ANY_IMPACT, MarkerField, NO_NODE},
-    links::Linker,
+    GrowthParams, MarkerLayout, ParamError, StartLayout,
+    arrest::{Advance, Arrest},
+    field::{ANY_IMPACT, MarkerField},
+    links::{self, Linker},
     markers::{self, Region},
     nodes::NodeGrid,
     params::{MAX_MARKERS, PROGRESS},
@@ -12,10 +13,10 @@ use super::{
 use crate::{
     Grid,
     math::{hash_unit, mix},
-    pattern::{NO_PARENT, Network, Node, SegmentId},
+    pattern::{CrackMask, Dot, Link, LinkKind, NO_PARENT, Network, Node, SegmentId, Timeline},
 };
 use glam::Vec2;
-use std::ops::Range;
+use std::{ops::Range, sync::Arc};
 
 /// The most energy that an impact gathers.
 pub const MAX_ENERGY: f32 = 16.0;
@@ -27,6 +28,10 @@ pub struct Impact {
     pub pos: Vec2,
     /// Sum of the energies of all hits merged into it, at most [`MAX_ENERGY`].
     pub energy: f32,
+    /// Energy of the first of them.
+    pub first_energy: f32,
+    /// How many times wider its cracks are, for the hits merged into it.
+    pub widening: f32,
 }
 
 /// Why a hit was refused.
@@ -42,6 +47,9 @@ pub enum Rejected {
     /// It lies off the surface.
     #[error("it lies off the surface")]
     OffSurface,
+    /// Cracks are forbidden there.
+    #[error("cracks are forbidden there")]
+    Forbidden,
     /// The surface has all the nodes it may have.
     #[error("the surface has all the nodes it may have")]
     Full,
@@ -99,6 +107,8 @@ struct Pull {
     closest_id: u32,
     child: Vec2,
     serves: bool,
+    /// Where nothing grows from the node any more: its markers on that side are given up.
+    stopped: Option<Vec2>,
 }
 
 const FIXED: f32 = 16_777_216.0;
@@ -118,21 +128,30 @@ const NO_PULL: u32 = u32::MAX;
 /// ```
 #[derive(Clone, Debug)]
 pub struct CrackGrowth {
-    params: GrowthParams,
-    seed: u64,
-    network: Network,
+    pub(super) params: GrowthParams,
+    pub(super) seed: u64,
+    pub(super) network: Network,
     pub(super) field: MarkerField,
-    nodes: NodeGrid,
+    pub(super) nodes: NodeGrid,
+    /// Only where cracks must not cross.
+    pub(super) arrest: Option<Arrest>,
     widths: Widths,
     linker: Linker,
     impacts: Vec<Impact>,
     density: Option<Grid<f32>>,
-    steps: u32,
+    pub(super) mask: Arc<CrackMask>,
+    pub(super) steps: u32,
     steps_left: u32,
+    /// Cracks that began by themselves, and markers that were tried for it.
+    nucleated: u32,
+    tried: u32,
     newborn: Range<u32>,
+    /// Links that are among the changes.
+    links_told: u32,
     /// Places of markers made since they were last asked for.
     shown_markers: Vec<Vec2>,
     changes: Changes,
+    timeline: Timeline,
     pulls: Vec<Pull>,
     /// Node and entry in `pulls`, in order of the nodes.
     order: Vec<(u32, u32)>,
@@ -204,19 +223,27 @@ impl CrackGrowth {
                 return Err(ParamError::OutOfRange { name: "extent", value: f64::from(value), min: 1e-4, max: 64.0 });
             }
         }
+        let params = params.varied(seed);
+        let network = Network::new(extent, params.roughness, seed);
         Ok(Self {
-            network: Network::new(extent, params.roughness, seed),
-            field: MarkerField::new(extent, params.crack_radius, params.kill_distance),
+            arrest: (params.arrest > 0.0).then(|| Arrest::new(&network, params.step_length)),
+            network,
+            field: MarkerField::new(extent, &params),
             nodes: NodeGrid::new(extent, 2.0 * params.step_length.max(params.kill_distance)),
             widths: Widths::new(&params),
             linker: Linker::default(),
             impacts: Vec::new(),
             density: None,
+            mask: Arc::default(),
             steps: 0,
             steps_left: 0,
+            nucleated: 0,
+            tried: 0,
             newborn: 0..0,
+            links_told: 0,
             shown_markers: Vec::new(),
             changes: Changes::default(),
+            timeline: Timeline::default(),
             pulls: Vec::new(),
             order: Vec::new(),
             pull_of: Vec::new(),
@@ -229,6 +256,23 @@ impl CrackGrowth {
     /// nearest cell; `None` = everywhere. Values that are not finite count as 0.
     pub fn set_density(&mut self, density: Option<Grid<f32>>) {
         self.density = density.filter(|grid| grid.size().min_element() > 0);
+    }
+
+    /// Where cracks of later hits and steps like to run, avoid to, and never go; an empty mask = everywhere alike.
+    ///
+    /// Markers move to the weakest place near them, cracks steer along what is weak and around what is strong, and no line
+    /// enters a forbidden texel. A hit on one is [rejected](Rejected::Forbidden). What is grown stays.
+    pub fn set_mask(&mut self, mask: impl Into<Arc<CrackMask>>) {
+        self.mask = mask.into();
+        self.mind_others();
+    }
+
+    /// Keeps account of lines if cracks must not cross, or if there are places that they must not enter.
+    fn mind_others(&mut self) {
+        let must = self.params.arrest > 0.0 || self.mask.forbidden.is_some();
+        if must != self.arrest.is_some() {
+            self.arrest = must.then(|| Arrest::new(&self.network, self.params.step_length));
+        }
     }
 
     /// Hits the surface at `pos` (pattern units) with `energy` (1 = an ordinary hit; 4 reaches twice as far).
@@ -249,9 +293,13 @@ impl CrackGrowth {
         if energy == 0.0 {
             return HitOutcome::Nothing;
         }
+        if self.mask.is_forbidden(pos / extent) {
+            return HitOutcome::Rejected(Rejected::Forbidden);
+        }
         if self.network.nodes.len() >= self.params.max_nodes as usize {
             return HitOutcome::Rejected(Rejected::Full);
         }
+        self.timeline.begin(self.steps.saturating_add(1));
         let merge = self.params.step_length.max(self.params.kill_distance).min(0.05);
         let nearest = (0u32..)
             .zip(&self.impacts)
@@ -265,6 +313,7 @@ impl CrackGrowth {
             impact.energy = (before + energy).min(MAX_ENERGY);
             let (center, after) = (impact.pos, impact.energy);
             if after > before {
+                self.widen(index);
                 self.populate(index, center, self.reach(before), self.reach(after));
                 self.steps_left = self.params.num_iterations;
             }
@@ -272,17 +321,23 @@ impl CrackGrowth {
         }
         let index = self.impacts.len() as u32;
         let energy = energy.min(MAX_ENERGY);
-        self.impacts.push(Impact { pos, energy });
+        self.impacts.push(Impact { pos, energy, first_energy: energy, widening: 1.0 });
         let reach = self.reach(energy);
         let first = self.network.nodes.len() as u32;
         let seed = mix(self.seed ^ mix(u64::from(index)));
         for place in markers::starts(self.params.starts, (pos, energy), reach, extent, seed) {
-            if !self.nodes.any_within(place, 1e-4) {
-                self.bear(place, NO_PARENT, 0, index);
+            let is_free = !self.nodes.any_within(place, 1e-4) && !self.is_on_crack(place);
+            if is_free && !self.mask.is_forbidden(place / extent) {
+                self.bear(place, NO_PARENT, 0, index, 1.0);
             }
         }
+        if first == self.network.nodes.len() as u32 {
+            self.sprout(pos, index);
+        } else if matches!(self.params.starts, StartLayout::Crushed { .. }) {
+            self.crush(first);
+        }
         for node in first..self.network.nodes.len() as u32 {
-            self.field.visit(node, &self.network.nodes[node as usize]);
+            self.field.visit(node, &self.network.nodes, &self.nodes);
         }
         self.newborn = first..self.network.nodes.len() as u32;
         self.join_newborn();
@@ -297,19 +352,23 @@ impl CrackGrowth {
 
     fn populate(&mut self, impact: u32, center: Vec2, inner: f32, outer: f32) {
         let extent = self.network.extent();
-        let region = Region { center, inner, outer, extent };
+        let energy = self.impacts[impact as usize].first_energy;
+        let region = Region { center, energy, inner, outer, extent };
         let seed = mix(self.seed ^ mix(u64::from(impact) | 1 << 40));
         // Darts keep their distance from each other, and from the markers of hits that no step has taken up yet.
         let mut darts = None;
         if let MarkerLayout::DartThrowing { spacing } = self.params.markers {
-            self.field.settle(&self.network.nodes);
+            self.field.settle(&self.network.nodes, &self.nodes);
             darts = Some(NodeGrid::new(extent, spacing));
         }
         let (field, nodes, shown) = (&mut self.field, &self.nodes, &mut self.shown_markers);
+        let (timeline, radius) = (&mut self.timeline, self.params.line_width);
         let show = self.params.draw_markers;
         // The rays of a hit are its own: older cracks do not sprout towards them.
-        let loyal = if matches!(self.params.markers, MarkerLayout::Polar { .. }) { impact } else { ANY_IMPACT };
-        markers::lay_out(&self.params, region, self.density.as_ref(), seed, |pos, spacing| {
+        let is_loyal = self.params.arrest > 0.0 || matches!(self.params.markers, MarkerLayout::Polar { .. });
+        let loyal = if is_loyal { impact } else { ANY_IMPACT };
+        let wishes = (self.density.as_ref(), &*self.mask);
+        markers::lay_out(&self.params, region, wishes, seed, |pos, spacing| {
             if field.living_at_most() >= MAX_MARKERS {
                 return;
             }
@@ -322,6 +381,7 @@ impl CrackGrowth {
             field.add(pos, loyal);
             if show {
                 shown.push(pos);
+                timeline.add_dot(Dot { pos, radius });
             }
         });
         // A large growth makes about two nodes a marker: room for them now, so that no step pauses to move them all.
@@ -332,16 +392,23 @@ impl CrackGrowth {
             self.widths.reserve(expected);
             self.pull_of.reserve(expected);
             self.changes.reserve(expected);
+            self.timeline.reserve(expected);
         }
     }
 
     /// Adds a node; the caller lets it visit the markers.
-    fn bear(&mut self, pos: Vec2, parent: u32, generation: u32, impact: u32) {
-        let width = self.widths.tip();
-        self.network.nodes.push(Node { pos, width, parent, generation, birth: self.steps, impact });
+    pub(super) fn bear(&mut self, pos: Vec2, parent: u32, generation: u32, impact: u32, bend: f32) {
+        let node = self.network.nodes.len() as u64;
+        let wider = self.impacts.get(impact as usize).map_or(1.0, |impact| impact.widening);
+        let width = self.widths.tip(parent, hash_unit(self.seed ^ 0x1D, node), wider);
+        if let Some(arrest) = &mut self.arrest {
+            arrest.push_node(false);
+        }
+        self.network.nodes.push(Node { pos, width, parent, generation, birth: self.steps, impact, bend });
         self.nodes.push(pos);
         self.pull_of.push(NO_PULL);
         self.changes.push_node(parent);
+        self.timeline.add_node(width);
         let (changes, network) = (&mut self.changes, &mut self.network);
         let mut widened = [NO_PARENT; 64];
         let mut n = 0;
@@ -353,7 +420,9 @@ impl CrackGrowth {
             }
         });
         for &node in &widened[..n] {
-            changes.widened(node, network.nodes[node as usize].parent != NO_PARENT);
+            let widened = network.nodes[node as usize];
+            changes.widened(node, widened.parent != NO_PARENT);
+            self.timeline.widen(node, widened.width);
         }
     }
 
@@ -366,67 +435,216 @@ impl CrackGrowth {
     /// [`GrowthParams::most_nodes`]. A node beyond the border, or closer to it than the kill distance on its way, lies on it.
     pub fn step(&mut self) -> StepReport {
         self.newborn = 0..0;
-        if self.steps_left == 0 {
-            return StepReport { born: 0 };
+        // A tip that has just set out to meet a crack may be all that moves, and has no node to show for it yet.
+        while self.steps_left > 0 && self.newborn.is_empty() {
+            self.make_step();
         }
+        StepReport { born: self.newborn.len() as u32 }
+    }
+
+    fn make_step(&mut self) {
         self.steps_left -= 1;
-        self.field.settle(&self.network.nodes);
+        self.field.settle(&self.network.nodes, &self.nodes);
         self.gather_pulls();
         self.aim();
         let first = self.network.nodes.len() as u32;
         let room = (self.params.max_nodes as usize).saturating_sub(self.network.nodes.len());
-        if !self.pulls.is_empty() {
+        // What comes when growth has ended takes a step of the timeline all the same.
+        self.timeline.begin(self.steps.saturating_add(1));
+        if !self.pulls.is_empty() || self.arrest.as_ref().is_some_and(Arrest::is_running) {
             self.steps = self.steps.saturating_add(1);
         }
-        for i in 0..self.order.len() {
-            let (node, slot) = self.order[i];
-            self.pull_of[node as usize] = NO_PULL;
-            if i < room {
-                let (parent, child) = (self.network.nodes[node as usize], self.pulls[slot as usize].child);
-                self.bear(child, node, parent.generation.saturating_add(1), parent.impact);
+        let mut any_stopped = false;
+        if self.arrest.is_some() {
+            any_stopped = self.advance_all();
+        } else {
+            for i in 0..self.order.len() {
+                let (node, slot) = self.order[i];
+                self.pull_of[node as usize] = NO_PULL;
+                if i < room {
+                    let (parent, child) = (self.network.nodes[node as usize], self.pulls[slot as usize].child);
+                    self.bear(child, node, parent.generation.saturating_add(1), parent.impact, 1.0);
+                }
             }
         }
         self.pulls.clear();
+        if self.params.nucleation > 0.0 {
+            self.nucleate();
+        }
         let last = self.network.nodes.len() as u32;
         self.newborn = first..last;
         for node in first..last {
-            self.field.visit(node, &self.network.nodes[node as usize]);
+            self.field.visit(node, &self.network.nodes, &self.nodes);
         }
         self.join_newborn();
-        if first == last {
+        if first == last && !any_stopped && !self.arrest.as_ref().is_some_and(Arrest::is_running) {
             self.steps_left = 0;
         }
-        StepReport { born: last - first }
+    }
+
+    /// Grows from every node that is pulled, unless older cracks are in the way; then from those that are on their way to one.
+    /// Says whether a marker was given up: the others may pull elsewhere then.
+    fn advance_all(&mut self) -> bool {
+        let mut any_stopped = false;
+        for i in 0..self.order.len() {
+            let (node, slot) = self.order[i];
+            let is_sealed = self.arrest.as_ref().is_some_and(|arrest| arrest.is_sealed(node));
+            let stopped = if is_sealed {
+                Some(Vec2::ZERO)
+            } else if !self.pulls[slot as usize].serves {
+                let closest = self.field.marker(self.pulls[slot as usize].closest).pos;
+                Some((closest - self.network.nodes[node as usize].pos).normalize_or_zero())
+            } else {
+                match self.advance(node, self.pulls[slot as usize].child) {
+                    Advance::Grown => None,
+                    Advance::Stopped(direction) => Some(direction),
+                }
+            };
+            self.pulls[slot as usize].stopped = stopped;
+            any_stopped |= stopped.is_some();
+        }
+        if any_stopped {
+            let Self { field, network, pulls, pull_of, .. } = self;
+            let mut given_up = Vec::new();
+            field.each_pull(&network.nodes, |index, node, _| {
+                let pull = &pulls[pull_of[node as usize] as usize];
+                if let Some(direction) = pull.stopped {
+                    let way = field.marker(index).pos - network.nodes[node as usize].pos;
+                    if index == pull.closest || way.dot(direction) >= 0.0 {
+                        given_up.push((index, node));
+                    }
+                }
+            });
+            for (index, node) in given_up {
+                field.give_up(index, node);
+            }
+            field.sweep();
+        }
+        for &(node, _) in &self.order {
+            self.pull_of[node as usize] = NO_PULL;
+        }
+        self.advance_runners();
+        any_stopped
+    }
+
+    /// Begins new cracks where markers are out of reach of all others.
+    fn nucleate(&mut self) {
+        let due = self.params.nucleation * (self.steps + 1) as f32;
+        let room = (self.params.max_nodes as usize).saturating_sub(self.network.nodes.len());
+        for _ in 0..room {
+            if self.nucleated as f32 >= due {
+                break;
+            }
+            let Some((place, loyal)) = self.field.take_waiting(mix(self.seed ^ 0x0C ^ u64::from(self.tried) << 8))
+            else {
+                break;
+            };
+            self.tried += 1;
+            let impact = if loyal == ANY_IMPACT { self.impacts.len().saturating_sub(1) as u32 } else { loyal };
+            let is_free = !self.nodes.any_within(place, 2.0 * self.params.step_length)
+                && !self.mask.is_forbidden(place / self.network.extent());
+            if is_free {
+                self.nucleated += 1;
+                self.bear(place, NO_PARENT, 0, impact, 1.0);
+            }
+        }
+    }
+
+    /// Whether a place lies on a crack, or as good as.
+    fn is_on_crack(&self, place: Vec2) -> bool {
+        let close = 0.3 * self.params.step_length;
+        self.params.arrest > 0.0
+            && self.arrest.as_ref().is_some_and(|arrest| arrest.walls.any_within(place, close))
+    }
+
+    /// Joins the nodes of a crushed core, from `first` on: each to the nearest before it, and most to the one after it.
+    fn crush(&mut self, first: u32) {
+        let last = self.network.nodes.len() as u32;
+        for node in first + 1..last {
+            let pos = self.network.nodes[node as usize].pos;
+            let to = |other: u32| self.network.nodes[other as usize].pos.distance_squared(pos);
+            // The node before it is on its own ring.
+            let inner = (first..node.saturating_sub(1).max(first + 1)).min_by(|&a, &b| to(a).total_cmp(&to(b)));
+            let draw = hash_unit(self.seed ^ 0xC3, u64::from(node));
+            for other in [inner.filter(|_| draw < 0.8), Some(node - 1).filter(|_| draw > 0.15)].into_iter().flatten() {
+                let width = self.params.line_width;
+                let (birth, kind) = (self.steps, LinkKind::Connection);
+                self.link(Link { a: other, b: node, width, birth, kind, bend: 1.0 });
+            }
+        }
+    }
+
+    /// Widens the cracks of an impact that was hit again: by the fourth root of the energy that it has gathered, up to twice.
+    fn widen(&mut self, impact: u32) {
+        let Impact { energy, first_energy, widening, .. } = self.impacts[impact as usize];
+        let wider = (energy / first_energy).sqrt().sqrt().min(2.0);
+        // In steps that can be seen, so that a thousand little hits do not repaint it all a thousand times.
+        if wider < 1.05 * widening {
+            return;
+        }
+        self.impacts[impact as usize].widening = wider;
+        for node in 0..self.network.nodes.len() as u32 {
+            let this = &mut self.network.nodes[node as usize];
+            if this.impact == impact {
+                this.width = (this.width * (wider / widening)).min(0.4);
+                self.widths.scale(node, wider / widening);
+                let (width, parent) = (this.width, this.parent);
+                self.changes.widened(node, parent != NO_PARENT);
+                self.timeline.widen(node, width);
+            }
+        }
+    }
+
+    /// A hit on a crack: new cracks start from it to either side.
+    fn sprout(&mut self, pos: Vec2, impact: u32) {
+        let length = self.params.step_length;
+        let mut nearest = (f32::INFINITY, u32::MAX);
+        self.nodes.within(pos, 2.0 * length, |node, distance_sq| {
+            if (distance_sq, node) < nearest {
+                nearest = (distance_sq, node);
+            }
+        });
+        let Some(&node) = self.network.nodes.get(nearest.1 as usize) else { return };
+        let Some(&parent) = self.network.nodes.get(node.parent as usize) else { return };
+        let across = (node.pos - parent.pos).perp().normalize_or_zero();
+        for way in [across, -across] {
+            let born = self.network.nodes.len();
+            self.extend(nearest.1, node.pos + way * length, false);
+            if let Some(child) = self.network.nodes.get_mut(born) {
+                child.impact = impact;
+            }
+        }
     }
 
     /// Collects `S(c)` of every node, and the order of the nodes.
     fn gather_pulls(&mut self) {
+        self.field.grow_older();
         self.field.sweep();
-        for i in 0..self.field.active.len() {
-            let index = self.field.active[i];
-            let marker = self.field.marker(index);
-            debug_assert_ne!(marker.node, NO_NODE, "an active marker attracts a node");
-            let slot = &mut self.pull_of[marker.node as usize];
+        let Self { field, network, pulls, pull_of, .. } = self;
+        field.each_pull(&network.nodes, |index, node, distance_sq| {
+            let slot = &mut pull_of[node as usize];
             if *slot == NO_PULL {
-                *slot = self.pulls.len() as u32;
-                self.pulls.push(Pull {
-                    node: marker.node,
+                *slot = pulls.len() as u32;
+                pulls.push(Pull {
+                    node,
                     sum: [0, 0],
                     closest: index,
                     closest_sq: f32::INFINITY,
                     closest_id: u32::MAX,
                     child: Vec2::ZERO,
                     serves: false,
+                    stopped: None,
                 });
             }
-            let pull = &mut self.pulls[*slot as usize];
-            let towards = (marker.pos - self.network.nodes[marker.node as usize].pos) * (FIXED / marker.near_sq.sqrt());
+            let pull = &mut pulls[*slot as usize];
+            let marker = field.marker(index);
+            let towards = (marker.pos - network.nodes[node as usize].pos) * (FIXED / distance_sq.sqrt());
             pull.sum[0] += i64::from(towards.x as i32);
             pull.sum[1] += i64::from(towards.y as i32);
-            if (marker.near_sq, marker.id) < (pull.closest_sq, pull.closest_id) {
-                (pull.closest, pull.closest_sq, pull.closest_id) = (index, marker.near_sq, marker.id);
+            if (distance_sq, marker.id) < (pull.closest_sq, pull.closest_id) {
+                (pull.closest, pull.closest_sq, pull.closest_id) = (index, distance_sq, marker.id);
             }
-        }
+        });
         self.order.clear();
         self.order.extend((0u32..).zip(&self.pulls).map(|(slot, pull)| (pull.node, slot)));
         self.order.sort_unstable();
@@ -441,35 +659,79 @@ impl CrackGrowth {
             let pull = &mut self.pulls[slot as usize];
             let from = self.network.nodes[pull.node as usize].pos;
             let mut direction = Vec2::new(pull.sum[0] as f32, pull.sum[1] as f32).normalize_or_zero();
+            if self.params.inertia > 0.0
+                && let Some(before) = self.network.nodes.get(self.network.nodes[pull.node as usize].parent as usize)
+            {
+                let heading = (from - before.pos).normalize_or_zero();
+                // A side branch has left that heading already.
+                if heading.dot(direction) > 0.0 {
+                    direction = (direction + heading * self.params.inertia).normalize_or_zero();
+                }
+            }
             if self.params.wander > 0.0 {
                 // A draw per child, frozen by its index.
                 let stray = self.params.wander * (2.0 * hash_unit(self.seed ^ 0x57A6, child) - 1.0);
                 direction = (direction + direction.perp() * stray).normalize_or_zero();
             }
+            if !self.mask.is_empty() {
+                direction = steer(from, direction, length, &self.mask, extent);
+            }
             pull.child = up_to_border(from, direction, length, kill, extent);
         }
-        for &index in &self.field.active {
-            let marker = self.field.marker(index);
-            let pull = &mut self.pulls[self.pull_of[marker.node as usize] as usize];
+        let Self { field, network, pulls, pull_of, .. } = self;
+        field.each_pull(&network.nodes, |index, node, distance_sq| {
+            let pull = &mut pulls[pull_of[node as usize] as usize];
             if !pull.serves {
-                let distance_sq = marker.pos.distance_squared(pull.child);
-                pull.serves = distance_sq <= kill * kill || distance_sq <= marker.near_sq - PROGRESS * length * length;
+                let left_sq = field.marker(index).pos.distance_squared(pull.child);
+                pull.serves = left_sq <= kill * kill || left_sq <= distance_sq - PROGRESS * length * length;
             }
+        });
+        if (self.params.arrest > 0.0 && self.params.inertia > 0.0) || !self.mask.is_empty() && self.arrest.is_some() {
+            // A crack does not turn on its heel: what it cannot serve on its way is left to others.
+            return;
         }
         for pull in &mut self.pulls {
             if !pull.serves {
                 let (from, to) = (self.network.nodes[pull.node as usize].pos, self.field.marker(pull.closest).pos);
                 let distance = pull.closest_sq.sqrt();
                 pull.child = if distance <= length { to } else { from + (to - from) * (length / distance) };
+                pull.serves = true;
             }
         }
     }
 
     fn join_newborn(&mut self) {
-        let links = self.network.links.len();
-        self.linker.join(&self.params, &mut self.network, &self.nodes, &self.impacts, self.newborn.clone(), self.seed);
+        let newborn = self.newborn.clone();
+        let met = self.field.relations.as_mut().map(|relations| std::mem::take(&mut relations.met));
+        for (a, b) in met.into_iter().flatten() {
+            let nodes = &self.network.nodes;
+            if a != b && nodes[a as usize].parent != b && nodes[b as usize].parent != a && !self.stays_open(b) {
+                let width = nodes[a as usize].width.min(nodes[b as usize].width);
+                self.link(Link { a, b, width, birth: self.steps, kind: LinkKind::Junction, bend: 1.0 });
+            }
+        }
+        if self.params.draw_connections {
+            self.linker.rings(&self.params, &self.network, &self.impacts, newborn.clone(), self.seed);
+            for link in self.linker.take_links() {
+                self.link(link);
+            }
+        }
+        if self.params.draw_islands {
+            for tip in self.linker.tips_at_rest(&self.network, newborn) {
+                if self.stays_open(tip) {
+                    continue;
+                }
+                if self.arrest.is_some() {
+                    self.run_on(tip, self.params.island_distance);
+                } else if let Some(link) = links::island(&self.params, &self.network, &self.nodes, tip) {
+                    self.link(link);
+                }
+            }
+        }
         let all = self.network.links.len() as u32;
-        self.changes.list.extend((links as u32..all).map(SegmentId::Link));
+        (self.links_told..all).for_each(|_| self.timeline.add_link());
+        self.changes.list.extend((self.links_told..all).map(SegmentId::Link));
+        self.links_told = all;
     }
 
     /// Whether another step may grow something.
@@ -482,6 +744,12 @@ impl CrackGrowth {
     #[must_use]
     pub const fn network(&self) -> &Network {
         &self.network
+    }
+
+    /// When all of it came.
+    #[must_use]
+    pub const fn timeline(&self) -> &Timeline {
+        &self.timeline
     }
 
     /// The impacts so far.
@@ -524,7 +792,7 @@ impl CrackGrowth {
         Census { total: self.field.made, killed: self.field.killed, attracting, waiting: living - attracting }
     }
 
-    /// The parameters.
+    /// The parameters, as [varied](GrowthParams::varied) by the seed.
     #[must_use]
     pub const fn params(&self) -> &GrowthParams {
         &self.params
@@ -536,11 +804,45 @@ impl CrackGrowth {
     /// If a parameter is out of its range; nothing changes then.
     pub fn set_params(&mut self, params: GrowthParams) -> Result<(), ParamError> {
         params.validate()?;
-        self.field.set_distances(params.crack_radius, params.kill_distance);
+        let params = params.varied(self.seed);
+        self.field.set_params(&params);
         self.widths.set_params(&params);
         self.params = params;
+        self.mind_others();
         Ok(())
     }
+}
+
+/// Turns `direction` by up to 80 degrees towards what is weak and away from what is strong or forbidden.
+fn steer(from: Vec2, direction: Vec2, length: f32, mask: &CrackMask, extent: Vec2) -> Vec2 {
+    // Cosine and sine of 0, 10, ... 80 degrees.
+    const TURNS: [(f32, f32); 9] = [
+        (1.0, 0.0),
+        (0.984_807_8, 0.173_648_18),
+        (0.939_692_6, 0.342_020_15),
+        (0.866_025_4, 0.5),
+        (0.766_044_4, 0.642_787_6),
+        (0.642_787_6, 0.766_044_4),
+        (0.5, 0.866_025_4),
+        (0.342_020_15, 0.939_692_6),
+        (0.173_648_18, 0.984_807_8),
+    ];
+    let mut best = (f32::NEG_INFINITY, direction);
+    for (cos, sin) in TURNS.into_iter().flat_map(|(cos, sin)| [(cos, sin), (cos, -sin)]) {
+        let way = direction * cos + direction.perp() * sin;
+        let mut liking = 0.35 * cos;
+        for share in [0.5, 1.0, 1.5] {
+            let uv = (from + way * (share * length)) / extent;
+            liking += mask.weak_at(uv) - mask.strong_at(uv);
+        }
+        if mask.blocks(from / extent, (from + way * length) / extent) {
+            liking -= 100.0;
+        }
+        if liking > best.0 {
+            best = (liking, way);
+        }
+    }
+    best.1
 }
 
 /// The end of a segment of `length`; where the border of the surface is no further than `margin` beyond, the border.

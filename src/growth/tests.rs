@@ -1,6 +1,6 @@
 //! Growth against a brute-force reference, its end, and its frozen patterns.
 
-use super::{CrackGrowth, GrowthParams, HitOutcome, MAX_ENERGY, MarkerLayout, Rejected, StartLayout};
+use super::{CrackGrowth, GrowthParams, HitOutcome, MAX_ENERGY, MarkerLayout, Rejected, StartLayout, Venation};
 use crate::{
     CrackPreset, Grid,
     math::{Rng, hash_unit, mix},
@@ -52,9 +52,17 @@ fn random_params(rng: &mut Rng, small: bool) -> GrowthParams {
         roughness: 0.5 * rng.unit(),
         draw_connections: rng.unit() < 0.5,
         connection_gaps: rng.unit(),
+        chips: 0.3 * rng.unit(),
         connection_every: 1 + rng.next_u32() % 4,
         draw_islands: rng.unit() < 0.5,
         island_distance: 0.2 * rng.unit(),
+        open_ends: 0.5 * rng.unit(),
+        arrest: 0.0,
+        venation: Venation::Open,
+        nucleation: 0.0,
+        unevenness: 0.0,
+        inertia: 0.0,
+        variety: 0.0,
         draw_markers: rng.unit() < 0.2,
         max_nodes: 1_000_000,
     };
@@ -496,4 +504,334 @@ fn patterns_are_frozen() {
     let stored = include_str!("../../tests/golden/growth_fingerprints.txt");
     assert_eq!(found, stored.lines().collect::<Vec<_>>(), "the pattern of a seed has changed");
     assert_ne!(mix(1), 1);
+}
+
+/// Closed venation, all nodes against all markers, every step: relative neighbours straight from their definition.
+struct ClosedReference {
+    params: GrowthParams,
+    extent: Vec2,
+    nodes: Vec<(Vec2, u32)>,
+    markers: Vec<ClosedMarker>,
+    links: Vec<(u32, u32)>,
+}
+
+struct ClosedMarker {
+    pos: Vec2,
+    alive: bool,
+    /// The node that reached it, and what it attracts since then.
+    reached: Option<(usize, Vec<usize>)>,
+    seen: usize,
+}
+
+impl ClosedReference {
+    fn is_on(&self, marker: Vec2, node: usize, child: usize) -> bool {
+        let (before, after) =
+            (self.nodes[node].0.distance_squared(marker), self.nodes[child].0.distance_squared(marker));
+        let p = &self.params;
+        after <= p.kill_distance * p.kill_distance || after <= before - 0.25 * p.step_length * p.step_length
+    }
+
+    /// Relative neighbours of a marker among the first `n` nodes.
+    fn neighbours(&self, marker: Vec2, n: usize) -> Vec<usize> {
+        let p = &self.params;
+        let to = |node: usize| self.nodes[node].0.distance_squared(marker);
+        let near: Vec<usize> = (0..n).filter(|&node| to(node) < p.crack_radius * p.crack_radius).collect();
+        let is_neighbour = |&v: &usize| {
+            let blocked = near
+                .iter()
+                .any(|&u| u != v && to(u) < to(v) && self.nodes[u].0.distance_squared(self.nodes[v].0) < to(v));
+            let carried_on = near.iter().any(|&c| self.nodes[c].1 == v as u32 && self.is_on(marker, v, c));
+            to(v) > p.kill_distance * p.kill_distance && !blocked && !carried_on
+        };
+        near.iter().copied().filter(is_neighbour).collect()
+    }
+
+    /// Shows every marker the nodes that it has not seen.
+    fn look(&mut self) {
+        let p = self.params.clone();
+        let mut met = Vec::new();
+        for node in 0..self.nodes.len() {
+            for i in 0..self.markers.len() {
+                let (pos, place, parent) = (self.markers[i].pos, self.nodes[node].0, self.nodes[node].1 as usize);
+                let distance_sq = place.distance_squared(pos);
+                if !self.markers[i].alive
+                    || node < self.markers[i].seen
+                    || distance_sq >= p.crack_radius * p.crack_radius
+                {
+                    continue;
+                }
+                let reaches = distance_sq <= p.kill_distance * p.kill_distance;
+                if let Some((first, mut rest)) = self.markers[i].reached.take() {
+                    if let Some(k) = rest.iter().position(|&v| v == parent && self.is_on(pos, v, node)) {
+                        if reaches {
+                            rest.remove(k);
+                            met.push((node, i, (first as u32, node as u32)));
+                        } else {
+                            rest[k] = node;
+                        }
+                    }
+                    self.markers[i].alive = !rest.is_empty();
+                    self.markers[i].reached = Some((first, rest));
+                } else if reaches {
+                    let rest = self.neighbours(pos, node + 1);
+                    self.markers[i].alive = !rest.is_empty();
+                    self.markers[i].reached = Some((node, rest));
+                }
+            }
+        }
+        let n = self.nodes.len();
+        self.markers.iter_mut().for_each(|marker| marker.seen = n);
+        for (.., (a, b)) in met {
+            if a != b && self.nodes[a as usize].1 != b && self.nodes[b as usize].1 != a {
+                self.links.push((a, b));
+            }
+        }
+    }
+
+    fn step(&mut self) -> usize {
+        let p = self.params.clone();
+        let mut attracted: Vec<Vec<(f32, usize)>> = vec![Vec::new(); self.nodes.len()];
+        for (id, marker) in self.markers.iter().enumerate().filter(|(_, marker)| marker.alive) {
+            let all = match &marker.reached {
+                Some((_, rest)) => rest.clone(),
+                None => self.neighbours(marker.pos, self.nodes.len()),
+            };
+            for node in all {
+                attracted[node].push((self.nodes[node].0.distance_squared(marker.pos), id));
+            }
+        }
+        let before = self.nodes.len();
+        for (node, set) in attracted.iter().enumerate().filter(|(_, set)| !set.is_empty()) {
+            let from = self.nodes[node].0;
+            let mut sum = [0i64; 2];
+            for &(distance_sq, id) in set {
+                let towards = (self.markers[id].pos - from) * (16_777_216.0 / distance_sq.sqrt());
+                sum[0] += i64::from(towards.x as i32);
+                sum[1] += i64::from(towards.y as i32);
+            }
+            let direction = Vec2::new(sum[0] as f32, sum[1] as f32).normalize_or_zero();
+            let mut to = from + direction * p.step_length;
+            let far = from + direction * (p.step_length + p.kill_distance);
+            let mut share = 1.0f32;
+            for axis in 0..2 {
+                if far[axis] < 0.0 {
+                    share = share.min(-from[axis] / (far[axis] - from[axis]));
+                } else if far[axis] > self.extent[axis] {
+                    share = share.min((self.extent[axis] - from[axis]) / (far[axis] - from[axis]));
+                }
+            }
+            if share < 1.0 {
+                to = (from + (far - from) * share).clamp(Vec2::ZERO, self.extent);
+            }
+            let serves = set.iter().any(|&(distance_sq, id)| {
+                let after = self.markers[id].pos.distance_squared(to);
+                after <= p.kill_distance * p.kill_distance
+                    || after <= distance_sq - 0.25 * p.step_length * p.step_length
+            });
+            if !serves {
+                let (closest_sq, id) = set.iter().copied().min_by(|a, b| a.partial_cmp(b).unwrap()).unwrap();
+                let (marker, distance) = (self.markers[id].pos, closest_sq.sqrt());
+                to = if distance <= p.step_length {
+                    marker
+                } else {
+                    from + (marker - from) * (p.step_length / distance)
+                };
+            }
+            self.nodes.push((to, node as u32));
+        }
+        self.look();
+        self.nodes.len() - before
+    }
+}
+
+#[test]
+fn closed_venation_equals_brute_force() {
+    let (mut ended, mut met) = (0, 0);
+    for case in 0..200u64 {
+        let mut rng = Rng::new(case).stream("closed");
+        let step_length = rng.range(0.02, 0.1);
+        let params = GrowthParams {
+            venation: Venation::Closed,
+            step_length,
+            kill_distance: rng.range(0.01, 0.08),
+            crack_radius: rng.range(0.1, 0.5),
+            markers: MarkerLayout::DartThrowing { spacing: rng.range(0.12, 0.3) },
+            starts: if rng.unit() < 0.5 { StartLayout::Point } else { StartLayout::Points { count: 5 } },
+            reach: 1.0,
+            wander: 0.0,
+            num_iterations: 100_000,
+            ..GrowthParams::DEFAULT
+        };
+        let extent = random_extent(&mut rng);
+        let mut growth = CrackGrowth::new(params.clone(), extent, case).unwrap();
+        let mut reference =
+            ClosedReference { params, extent, nodes: Vec::new(), markers: Vec::new(), links: Vec::new() };
+        for hit in 0..2 {
+            growth.hit(Vec2::new(rng.unit(), rng.unit()) * extent, 1.0);
+            let known = reference.nodes.len();
+            reference.nodes.extend(growth.network().nodes()[known..].iter().map(|node| (node.pos, node.parent)));
+            // The markers that are there already see the start at once, the new ones with the first step.
+            reference.look();
+            let new =
+                growth.field.unsettled().map(|(pos, _)| ClosedMarker { pos, alive: true, reached: None, seen: 0 });
+            reference.markers.extend(new);
+            reference.look();
+            let steps = if hit == 1 { 400 } else { 1 + rng.next_u32() % 12 };
+            for step in 0..steps {
+                let born = growth.step().born as usize;
+                assert_eq!(born, reference.step(), "case {case}, hit {hit}, step {step}");
+                let mine: Vec<_> = growth.network().nodes().iter().map(|node| (node.pos, node.parent)).collect();
+                assert_eq!(mine, reference.nodes, "case {case}, hit {hit}, step {step}");
+                if born == 0 || mine.len() > 600 {
+                    break;
+                }
+            }
+        }
+        let (mut mine, mut theirs): (Vec<_>, Vec<_>) =
+            (growth.network().links().iter().map(|link| (link.a, link.b)).collect(), reference.links.clone());
+        mine.sort_unstable();
+        theirs.sort_unstable();
+        assert_eq!(mine, theirs, "case {case}: what came together");
+        met += mine.len();
+        ended += u32::from(!growth.is_growing());
+    }
+    assert!(ended > 150 && met > 1000, "{ended} growths ended, {met} pairs met");
+}
+
+/// Random parameters with arrest.
+fn random_arrest(rng: &mut Rng) -> GrowthParams {
+    let params = random_params(rng, true);
+    let step_length = rng.range(0.012, 0.05);
+    let crack_radius = rng.range(0.08, 0.6).max(2.0 * step_length);
+    GrowthParams {
+        step_length,
+        crack_radius,
+        kill_distance: rng.range(0.01, 0.07).min(crack_radius),
+        venation: if rng.unit() < 0.3 { Venation::Closed } else { Venation::Open },
+        arrest: rng.range(0.01, 0.12),
+        inertia: if rng.unit() < 0.3 { 0.0 } else { rng.range(0.0, 6.0) },
+        nucleation: if rng.unit() < 0.5 { 0.0 } else { rng.range(0.0, 3.0) },
+        open_ends: if rng.unit() < 0.5 { 0.0 } else { rng.unit() },
+        unevenness: 0.9 * rng.unit(),
+        reach: rng.range(0.3, 1.5),
+        max_nodes: 3000,
+        ..params
+    }
+}
+
+/// All pieces of all drawn lines, with the nodes that the first and the last of a line lie at.
+fn pieces(growth: &CrackGrowth) -> Vec<(Vec2, Vec2, [Option<u32>; 2])> {
+    let mut pieces = Vec::new();
+    for segment in growth.network().segments() {
+        let (a, b) = growth.network().ends(segment).unwrap();
+        let path = growth.network().path(segment).unwrap();
+        let last = path.points().len() - 2;
+        for (i, pair) in path.points().windows(2).enumerate() {
+            pieces.push((pair[0].pos, pair[1].pos, [(i == 0).then_some(a), (i == last).then_some(b)]));
+        }
+    }
+    pieces
+}
+
+fn cross(one: (Vec2, Vec2), other: (Vec2, Vec2)) -> bool {
+    let side = |p: Vec2, q: Vec2, r: Vec2| (q - p).as_dvec2().perp_dot((r - p).as_dvec2());
+    let (a, b, c, d) = (one.0, one.1, other.0, other.1);
+    let apart = |k: usize| a[k].max(b[k]) < c[k].min(d[k]) || c[k].max(d[k]) < a[k].min(b[k]);
+    if apart(0) || apart(1) {
+        return false;
+    }
+    side(a, b, c) * side(a, b, d) <= 0.0 && side(c, d, a) * side(c, d, b) <= 0.0
+}
+
+#[test]
+fn no_two_cracks_cross_and_junctions_are_steep() {
+    let mut angles = Vec::new();
+    let mut pairs = 0u64;
+    for case in 0..1000u64 {
+        let mut rng = Rng::new(case).stream("arrest");
+        let params = random_arrest(&mut rng);
+        let extent = random_extent(&mut rng);
+        let mut growth = CrackGrowth::new(params, extent, case).unwrap();
+        for _ in 0..3 {
+            growth.hit(Vec2::new(rng.unit(), rng.unit()) * extent, rng.range(0.3, 2.0));
+            for _ in 0..rng.next_u32() % 200 {
+                growth.step();
+            }
+        }
+        while growth.step().grew() {}
+        let pieces = pieces(&growth);
+        let mut ends = std::collections::BTreeSet::new();
+        for (a, b) in growth.network().segments().filter_map(|segment| growth.network().ends(segment)) {
+            assert!(ends.insert((a.min(b), a.max(b))), "case {case}: {a} and {b} are joined twice");
+        }
+        for (from, to, _) in &pieces {
+            assert!(from != to, "case {case}: a piece without length at {from}");
+        }
+        // By the left end, so that only what overlaps is compared.
+        let mut order: Vec<usize> = (0..pieces.len()).collect();
+        order.sort_by(|&a, &b| pieces[a].0.x.min(pieces[a].1.x).total_cmp(&pieces[b].0.x.min(pieces[b].1.x)));
+        for (k, &i) in order.iter().enumerate() {
+            let right = pieces[i].0.x.max(pieces[i].1.x);
+            for &j in order[k + 1..].iter().take_while(|&&j| pieces[j].0.x.min(pieces[j].1.x) <= right) {
+                let shares = |end: Option<u32>| end.is_some() && pieces[j].2.contains(&end);
+                // Pieces next to each other come one after the other; no two other pieces share a point.
+                let follow = i.abs_diff(j) == 1 && (pieces[i].0 == pieces[j].1 || pieces[i].1 == pieces[j].0);
+                if pieces[i].2.into_iter().any(shares) || follow {
+                    continue;
+                }
+                pairs += 1;
+                let (one, other) = ((pieces[i].0, pieces[i].1), (pieces[j].0, pieces[j].1));
+                assert!(!cross(one, other), "case {case}: {one:?} crosses {other:?}");
+            }
+        }
+        // T-junctions: a crack that ends at a node in the middle of another.
+        let (nodes, mut around) = (growth.network().nodes(), vec![Vec::new(); growth.network().nodes().len()]);
+        for (a, b) in growth.network().segments().filter_map(|segment| growth.network().ends(segment)) {
+            around[a as usize].push(b);
+            around[b as usize].push(a);
+        }
+        for link in growth.network().links().iter().filter(|link| link.kind == LinkKind::Junction) {
+            let (end, tip) = (nodes[link.a as usize].pos, nodes[link.b as usize].pos);
+            let through: Vec<_> = around[link.a as usize].iter().filter(|&&node| node != link.b).collect();
+            if let [one, other] = through[..] {
+                let (one, other) = (nodes[*one as usize].pos, nodes[*other as usize].pos);
+                let (along, coming) = ((other - one).normalize(), (tip - end).normalize());
+                angles.push(along.dot(coming).abs().clamp(0.0, 1.0).acos().to_degrees());
+            }
+        }
+    }
+    angles.sort_by(f32::total_cmp);
+    let median = angles[angles.len() / 2];
+    println!("{pairs} pairs of pieces, {} T-junctions, median angle {median:.1} degrees", angles.len());
+    // The smaller of the two angles, so at most 90.
+    assert!(median > 70.0, "median angle {median}");
+    assert!(angles.len() > 1000, "only {} T-junctions", angles.len());
+}
+
+#[test]
+fn always_ends_with_arrest_and_closed_venation() {
+    for case in 0..2_000u64 {
+        let mut rng = Rng::new(case).stream("ends with arrest");
+        let mut params = GrowthParams { max_nodes: 1_000_000, ..random_arrest(&mut rng) };
+        if rng.unit() < 0.4 {
+            params.arrest = 0.0;
+        }
+        let extent = random_extent(&mut rng);
+        let mut growth = CrackGrowth::new(params.clone(), extent, case).unwrap();
+        for _ in 0..2 {
+            growth.hit(Vec2::new(rng.unit(), rng.unit()) * extent, 4.0 * rng.unit());
+            for _ in 0..rng.next_u32() % 30 {
+                growth.step();
+            }
+        }
+        let starts = growth.network().nodes().iter().filter(|node| node.parent == NO_PARENT).count() as u64;
+        let bound = params.most_nodes(u64::from(growth.census().total), starts);
+        while growth.step().grew() {
+            assert!((growth.network().nodes().len() as u64) < bound, "case {case}: {params:?}");
+        }
+        let census = growth.census();
+        assert!(!growth.is_growing(), "case {case}");
+        assert_eq!(census.attracting, 0, "case {case}: {params:?}");
+        assert_eq!(census.killed + census.waiting, census.total, "case {case}: {census:?}");
+    }
 }

@@ -18,6 +18,8 @@ const NOTCH: f32 = 1.5;
 pub(super) struct Widths {
     /// Nodes behind from which each notch holds, with its width.
     notches: Vec<(u32, f32)>,
+    /// How much widths vary along a crack, as a share.
+    unevenness: f32,
     pipes: Vec<Pipe>,
 }
 
@@ -28,6 +30,10 @@ struct Pipe {
     /// How much of that its parent has been told.
     told: u32,
     notch: u8,
+    /// What the width of its notch is multiplied by.
+    factor: f32,
+    /// And for the hammering on its impact.
+    wider: f32,
 }
 
 impl Widths {
@@ -42,12 +48,13 @@ impl Widths {
             let width = (params.line_width * (1.0 + params.line_growth * pipes)).min(params.max_width);
             notches.push((count, width));
         }
-        Self { notches, pipes: Vec::new() }
+        Self { notches, unevenness: params.unevenness, pipes: Vec::new() }
     }
 
     /// Other notches for the nodes to come; those that are there never become thinner.
     pub(super) fn set_params(&mut self, params: &GrowthParams) {
         self.notches = Self::new(params).notches;
+        self.unevenness = params.unevenness;
         let last = (self.notches.len() - 1) as u8;
         for pipe in &mut self.pipes {
             pipe.notch = pipe.notch.min(last);
@@ -58,14 +65,26 @@ impl Widths {
         self.pipes.reserve(nodes);
     }
 
-    /// Width of a tip.
-    pub(super) fn tip(&self) -> f32 {
-        self.notches[0].1
+    /// Prepares the place of a node that grows from `parent`, with a draw of its own; returns its width.
+    pub(super) fn tip(&mut self, parent: u32, draw: f32, wider: f32) -> f32 {
+        let mut factor = 1.0;
+        if self.unevenness > 0.0 {
+            // Each node is much like the one before.
+            let before = self.pipes.get(parent as usize).map_or(1.0, |pipe| pipe.factor);
+            factor += 0.75 * (before - 1.0) + self.unevenness * (draw - 0.5);
+            factor = factor.clamp(1.0 - self.unevenness, 1.0 + self.unevenness);
+        }
+        self.pipes.push(Pipe { behind: 1, told: 1, notch: 0, factor, wider });
+        self.notches[0].1 * factor * wider
     }
 
-    /// Takes up the newest node and widens what it hangs on; calls `widened` with each node that became wider.
+    /// Makes a node wider for good.
+    pub(super) fn scale(&mut self, node: u32, by: f32) {
+        self.pipes[node as usize].wider *= by;
+    }
+
+    /// Widens what it hangs on; calls `widened` with each node that became wider.
     pub(super) fn push(&mut self, nodes: &mut [Node], mut widened: impl FnMut(u32)) {
-        self.pipes.push(Pipe { behind: 1, told: 1, notch: 0 });
         let Some(newest) = nodes.last() else { return };
         let (mut node, mut more) = (newest.parent, 1);
         while node != NO_PARENT {
@@ -81,7 +100,7 @@ impl Widths {
             more = pipe.behind - pipe.told;
             pipe.told = pipe.behind;
             let this = &mut nodes[node as usize];
-            this.width = this.width.max(self.notches[usize::from(pipe.notch)].1);
+            this.width = this.width.max(self.notches[usize::from(pipe.notch)].1 * pipe.factor * pipe.wider);
             widened(node);
             node = this.parent;
         }

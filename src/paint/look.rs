@@ -191,7 +191,7 @@ impl Look {
     }
 }
 
-fn within(field: &'static str, value: f32, allowed: RangeInclusive<f32>, range: &'static str) -> Result<(), LookError> {
+pub(super) fn within(field: &'static str, value: f32, allowed: RangeInclusive<f32>, range: &'static str) -> Result<(), LookError> {
     if allowed.contains(&value) { Ok(()) } else { Err(LookError::OutOfRange { field, value, range }) }
 }
 

@@ -5,7 +5,9 @@
 //! painted texel is the base texel.
 
 mod look;
+mod modulate;
 mod texel;
 
 pub use look::{ColorStop, Look, LookError, LookTable};
+pub use modulate::{Modulation, modulate};
 pub use texel::{BaseTexels, PaintTargets, paint_into};

@@ -4,10 +4,20 @@
 //! right, y runs down. Texels exist only in [`raster`](crate::raster) and [`paint`](crate::paint); [`SurfaceFrame`]
 //! converts.
 
+mod cells;
 mod frame;
+mod lines;
+mod mask;
 mod network;
 mod path;
+#[cfg(test)]
+pub(crate) mod random;
+mod timeline;
 
+pub use cells::{CORNERS, Cell, CellTracker};
 pub use frame::{FrameError, MAX_ASPECT, MAX_SIDE, SurfaceFrame};
+pub use mask::{CrackMask, MaskError};
 pub use network::{Link, LinkKind, NO_PARENT, Network, Node, SegmentId};
 pub use path::{MAX_PATH_POINTS, PathPoint, SegmentPath};
+pub(crate) use timeline::Entries;
+pub use timeline::{Dot, Moment, Timeline};

@@ -21,6 +21,8 @@ pub struct Node {
     pub birth: u32,
     /// Index of the impact it belongs to.
     pub impact: u32,
+    /// How much of the network's roughness the line from its parent has, 0 (straight) to 1.
+    pub bend: f32,
 }
 
 /// What a [`Link`] stands for.
@@ -30,6 +32,8 @@ pub enum LinkKind {
     Connection,
     /// Between close nodes of different branches: `draw_islands` of Couto et al., the cells of clay.
     Island,
+    /// From the end of a crack to the older crack that stops it.
+    Junction,
 }
 
 /// A segment between two nodes neither of which is the other's parent.
@@ -45,6 +49,8 @@ pub struct Link {
     pub birth: u32,
     /// Why it is there.
     pub kind: LinkKind,
+    /// How much of the network's roughness its line has, 0 (straight) to 1.
+    pub bend: f32,
 }
 
 /// Names one segment of a [`Network`].
@@ -122,14 +128,30 @@ impl Network {
     #[must_use]
     pub fn path(&self, segment: SegmentId) -> Option<SegmentPath> {
         let (a, b) = self.ends(segment)?;
-        let (from, to) = (self.nodes[a as usize], self.nodes[b as usize]);
-        let (widths, salt) = match segment {
-            SegmentId::Branch(child) => ((from.width, to.width), u64::from(child)),
-            SegmentId::Link(i) => {
-                let width = self.links[i as usize].width;
-                ((width, width), u64::from(i) | 1 << 32)
-            }
+        let widths = match segment {
+            SegmentId::Branch(_) => (self.nodes[a as usize].width, self.nodes[b as usize].width),
+            SegmentId::Link(i) => (self.links[i as usize].width, self.links[i as usize].width),
         };
-        Some(rough_path((from.pos, to.pos), widths, self.roughness, self.extent, self.seed, salt))
+        self.path_with(segment, widths)
+    }
+
+    /// The line of a segment with other widths at its ends: what it was when it was thinner.
+    pub(super) fn path_with(&self, segment: SegmentId, widths: (f32, f32)) -> Option<SegmentPath> {
+        let (a, b) = self.ends(segment)?;
+        let ends = (self.nodes[a as usize].pos, self.nodes[b as usize].pos);
+        let bend = match segment {
+            SegmentId::Branch(child) => self.nodes[child as usize].bend,
+            SegmentId::Link(link) => self.links[link as usize].bend,
+        };
+        Some(self.draft(segment, ends, widths, bend))
+    }
+
+    /// The rough line that `segment` would have between two places.
+    pub(crate) fn draft(&self, segment: SegmentId, ends: (Vec2, Vec2), widths: (f32, f32), bend: f32) -> SegmentPath {
+        let salt = match segment {
+            SegmentId::Branch(child) => u64::from(child),
+            SegmentId::Link(link) => u64::from(link) | 1 << 32,
+        };
+        rough_path(ends, widths, self.roughness * bend, self.extent, self.seed, salt)
     }
 }

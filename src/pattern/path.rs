@@ -37,6 +37,25 @@ impl SegmentPath {
     pub fn points(&self) -> &[PathPoint] {
         &self.points[..self.len]
     }
+
+    /// The line up to a share of its points, 0..=1, the last one between two of them.
+    #[must_use]
+    pub(super) fn up_to(mut self, share: f32) -> Self {
+        let last_point = self.len - 1;
+        let reach = (share * last_point as f32).clamp(0.0, last_point as f32);
+        let whole = reach as usize;
+        let part = reach - whole as f32;
+        if whole < last_point && (part > 0.0 || whole == 0) {
+            let (from, to) = (self.points[whole], self.points[whole + 1]);
+            // No wider than the line will be further on, so that a line that gets longer only ever adds to its stamp.
+            let width = (from.width + (to.width - from.width) * part).min(to.width);
+            self.points[whole + 1] = PathPoint { pos: from.pos + (to.pos - from.pos) * part, width };
+            self.len = whole + 2;
+        } else {
+            self.len = whole + 1;
+        }
+        self
+    }
 }
 
 /// Pieces of a rough line are about this long (pattern units): 8 texels of a 512-texel surface, the length at which

@@ -16,6 +16,11 @@ pub struct CrackState {
     pub nodes: u32,
     /// Hits that started or fed a crack.
     pub hits: u32,
+    /// What of the cracks is shown: as they were after this many steps, with fractions; below [`end`](Self::end) only under a
+    /// [`CrackClock`](super::CrackClock) or while they close.
+    pub time: f32,
+    /// Number of steps that the cracks have grown.
+    pub end: f32,
     /// Where cracks grew in the last frame they grew in (for sound and dust); empty when done. At most
     /// [`MAX_TIPS`](Self::MAX_TIPS).
     pub tips: Vec<CrackTip>,
@@ -34,9 +39,9 @@ pub enum CrackStatus {
     Untouched,
     /// Hit, but its picture is still loading. The hits wait.
     Waiting,
-    /// Cracks are growing.
+    /// Cracks are growing, or a clock has not shown their end yet.
     Growing,
-    /// Cracks have come to an end, until the next hit.
+    /// Cracks have come to an end and were shown whole, until the next hit. A clock may show less of them since.
     Done,
     /// It cannot crack.
     Failed(CrackError),
@@ -51,7 +56,8 @@ pub struct CrackTip {
     pub direction: Vec2,
 }
 
-/// The cracks of a surface have come to an end.
+/// The cracks of a surface have come to an end, and all of them are shown: once after a hit, however often a
+/// [`CrackClock`](super::CrackClock) runs over the end.
 #[derive(EntityEvent, Reflect, Clone, Copy, Debug, PartialEq)]
 #[reflect(Event)]
 pub struct CrackFinished {

@@ -47,6 +47,7 @@ pub fn stamp_path(field: &mut DepthField, profile: &Profile, path: &SegmentPath)
             changed = changed.union(capsule.stamp(field, &section));
         }
     }
+    field.spare(changed);
     changed
 }
 
@@ -57,7 +58,11 @@ pub fn stamp_dot(field: &mut DepthField, pos: Vec2, radius: f32, depth: f32) -> 
     let section = Section::upright(depth);
     let point = PathPoint { pos, width: 2.0 * radius };
     match Capsule::clipped(&field.frame, field.depth.size(), &section, point, point) {
-        Some(capsule) => capsule.stamp(field, &section),
+        Some(capsule) => {
+            let changed = capsule.stamp(field, &section);
+            field.spare(changed);
+            changed
+        }
         None => TexelRect::default(),
     }
 }
@@ -519,7 +524,15 @@ mod tests {
     fn rough_paths_have_no_gaps() {
         let mut field = field([256, 256]);
         let mut network = Network::new(Vec2::ONE, 0.2, 9);
-        let node = |pos, parent| crate::pattern::Node { pos, width: 0.01, parent, generation: 0, birth: 0, impact: 0 };
+        let node = |pos, parent| crate::pattern::Node {
+            pos,
+            width: 0.01,
+            parent,
+            generation: 0,
+            birth: 0,
+            impact: 0,
+            bend: 1.0,
+        };
         network.nodes.push(node(Vec2::new(0.1, 0.1), crate::pattern::NO_PARENT));
         network.nodes.push(node(Vec2::new(0.9, 0.7), 0));
         let path = network.path(crate::pattern::SegmentId::Branch(1)).unwrap();

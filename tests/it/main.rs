@@ -11,8 +11,12 @@ mod hits;
 mod images;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod lifecycle;
+mod masks;
 mod pictures;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod plugin;
+#[cfg(feature = "serde")]
+mod presets;
+mod replay;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod support;

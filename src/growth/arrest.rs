@@ -1,0 +1,406 @@
+//! Cracks that know older cracks: a tip that comes near one turns to meet it steeply and stops there.
+
+use super::{CrackGrowth, MarkerLayout, StartLayout, walls::Walls};
+use crate::math::hash_unit;
+use crate::pattern::{Link, LinkKind, NO_PARENT, Network, PathPoint, SegmentId, SegmentPath};
+use glam::Vec2;
+
+/// Shares of the roughness that a line is tried with, until it touches no other.
+const BENDS: [f32; 3] = [1.0, 0.4, 0.0];
+
+/// Cosine of the angle to the heading within which a crack is ahead of a tip: 60 degrees.
+const AHEAD: f32 = 0.5;
+
+/// A crack this many segment lengths away is met by the next segment.
+const LAST: f32 = 1.35;
+
+/// Segment lengths that a tip needs to turn.
+const TURN: f32 = 2.5;
+
+/// The node of a crack that is met lies no more than so many segment lengths away.
+const LAST_REACH: f32 = 1.8;
+
+/// A node this many segment lengths from another crack beside it would run along it.
+const BESIDE: f32 = 0.7;
+
+/// What a growth with arrest knows besides its network.
+#[derive(Clone, Debug)]
+pub(super) struct Arrest {
+    pub(super) walls: Walls,
+    /// Per node: whether nothing more may grow from it.
+    sealed: Vec<bool>,
+    runners: Vec<Runner>,
+}
+
+/// A tip on its way to a crack or to the border.
+#[derive(Clone, Copy, Debug)]
+struct Runner {
+    tip: u32,
+    goal: Goal,
+    steps_left: u32,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Goal {
+    Node(u32),
+    Border(Vec2),
+}
+
+/// What became of the wish to grow from a node.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Advance {
+    Grown,
+    /// Nothing grows from the node in this direction any more.
+    Stopped(Vec2),
+}
+
+impl Arrest {
+    pub(super) fn new(network: &Network, length: f32) -> Self {
+        let mut walls = Walls::new(network.extent(), length);
+        for segment in network.segments() {
+            if let (Some(ends), Some(path)) = (network.ends(segment), network.path(segment)) {
+                walls.add(ends, &path);
+            }
+        }
+        Self { walls, sealed: vec![false; network.nodes().len()], runners: Vec::new() }
+    }
+
+    pub(super) fn push_node(&mut self, is_sealed: bool) {
+        self.sealed.push(is_sealed);
+    }
+
+    pub(super) fn is_sealed(&self, node: u32) -> bool {
+        self.sealed[node as usize]
+    }
+
+    pub(super) const fn is_running(&self) -> bool {
+        !self.runners.is_empty()
+    }
+}
+
+impl CrackGrowth {
+    /// Grows a segment from a node towards `to`, or what older cracks make of it.
+    pub(super) fn advance(&mut self, from: u32, to: Vec2) -> Advance {
+        let pos = self.network.nodes[from as usize].pos;
+        let heading = (to - pos).normalize_or_zero();
+        let length = self.params.step_length;
+        if self.params.arrest <= 0.0 {
+            return match self.extend(from, to, false) {
+                Some(_) => Advance::Grown,
+                None => Advance::Stopped(heading),
+            };
+        }
+        let reach = self.params.arrest.max(TURN * length);
+        match self.goal_ahead(from, heading, reach, AHEAD) {
+            None => {}
+            Some(_) if self.stays_open(from) => {
+                self.seal(from);
+                return Advance::Stopped(heading);
+            }
+            Some((distance, goal)) if distance <= LAST * length => {
+                self.meet(from, goal);
+                return Advance::Stopped(heading);
+            }
+            Some((_, goal)) => {
+                let to = pos + self.turned(pos, heading, goal) * length;
+                let Some(tip) = self.extend(from, to, true) else { return Advance::Stopped(heading) };
+                self.run(Runner { tip, goal, steps_left: steps_for(reach, length) });
+                return Advance::Grown;
+            }
+        }
+        let Some(node) = self.extend(from, to, false) else { return Advance::Stopped(heading) };
+        // It may have come to lie close beside a crack that was not ahead.
+        if let Some((_, beside)) = self.foreign(node, None, BESIDE * length, AHEAD) {
+            let way = self.network.nodes[beside as usize].pos - self.network.nodes[node as usize].pos;
+            self.join_near(node, way, LAST_REACH);
+            self.seal(node);
+        }
+        Advance::Grown
+    }
+
+    /// Whether a tip is one of those that stop short of other cracks.
+    pub(super) fn stays_open(&self, tip: u32) -> bool {
+        self.params.open_ends > 0.0 && hash_unit(self.seed ^ 0x15, u64::from(tip)) < self.params.open_ends
+    }
+
+    /// Sends a tip at rest on its way to the nearest crack ahead of it, if there is one within `distance`.
+    pub(super) fn run_on(&mut self, tip: u32, distance: f32) {
+        let node = self.network.nodes[tip as usize];
+        let Some(parent) = self.network.nodes.get(node.parent as usize) else { return };
+        let heading = (node.pos - parent.pos).normalize_or_zero();
+        if self.is_sealed(tip) {
+            return;
+        }
+        if let Some((_, goal)) = self.goal_ahead(tip, heading, distance, AHEAD) {
+            self.seal(tip);
+            self.run(Runner { tip, goal, steps_left: steps_for(distance, self.params.step_length) });
+        }
+    }
+
+    fn run(&mut self, runner: Runner) {
+        if let Some(arrest) = &mut self.arrest {
+            arrest.runners.push(runner);
+        }
+    }
+
+    fn seal(&mut self, node: u32) {
+        if let Some(arrest) = &mut self.arrest {
+            arrest.sealed[node as usize] = true;
+        }
+    }
+
+    fn is_sealed(&self, node: u32) -> bool {
+        self.arrest.as_ref().is_some_and(|arrest| arrest.is_sealed(node))
+    }
+
+    /// One step of every tip that is on its way.
+    pub(super) fn advance_runners(&mut self) {
+        let Some(arrest) = &mut self.arrest else { return };
+        let runners = std::mem::take(&mut arrest.runners);
+        for runner in runners {
+            if self.network.nodes.len() >= self.params.max_nodes as usize {
+                return;
+            }
+            if let Some(on) = self.advance_runner(runner) {
+                self.run(on);
+            }
+        }
+    }
+
+    fn advance_runner(&mut self, mut runner: Runner) -> Option<Runner> {
+        let node = self.network.nodes[runner.tip as usize];
+        let heading = match self.network.nodes.get(node.parent as usize) {
+            Some(parent) => (node.pos - parent.pos).normalize_or_zero(),
+            None => Vec2::ZERO,
+        };
+        let length = self.params.step_length;
+        let mut distance = self.place_of(runner.goal).distance(node.pos);
+        // A crack that has come nearer is met sooner.
+        if let Some((nearer, goal)) = self.goal_ahead(runner.tip, heading, distance, 0.3) {
+            (distance, runner.goal) = (nearer, goal);
+        }
+        if distance <= LAST * length {
+            self.meet(runner.tip, runner.goal);
+            return None;
+        }
+        runner.steps_left = runner.steps_left.checked_sub(1)?;
+        let to = node.pos + self.turned(node.pos, heading, runner.goal) * length;
+        runner.tip = self.extend(runner.tip, to, true)?;
+        Some(runner)
+    }
+
+    fn place_of(&self, goal: Goal) -> Vec2 {
+        match goal {
+            Goal::Node(node) => self.network.nodes[node as usize].pos,
+            Goal::Border(place) => place,
+        }
+    }
+
+    /// The direction from `pos` that turns from `heading` towards the goal.
+    fn turned(&self, pos: Vec2, heading: Vec2, goal: Goal) -> Vec2 {
+        let way = (self.place_of(goal) - pos).normalize_or_zero();
+        (0.5 * heading + way).normalize_or(way)
+    }
+
+    /// The last segment: onto the crack or the border.
+    fn meet(&mut self, tip: u32, goal: Goal) {
+        match goal {
+            Goal::Node(_) => {
+                let way = self.place_of(goal) - self.network.nodes[tip as usize].pos;
+                self.join_near(tip, way, LAST_REACH);
+            }
+            Goal::Border(place) => {
+                self.extend(tip, place, true);
+            }
+        }
+    }
+
+    /// Links a tip to the node of another crack that lies best: near, and so that the two meet steeply. Says whether it did.
+    fn join_near(&mut self, tip: u32, heading: Vec2, reach: f32) -> bool {
+        let length = self.params.step_length;
+        let mut nearby = Vec::new();
+        self.each_foreign(tip, reach * length, |node, distance_sq, way| {
+            if way.dot(heading) > 0.0 {
+                let end = self.network.nodes[node as usize];
+                let along = match self.network.nodes.get(end.parent as usize) {
+                    Some(before) => (end.pos - before.pos).normalize_or_zero(),
+                    None => Vec2::ZERO,
+                };
+                let distance = distance_sq.sqrt();
+                let slant = along.dot(way / distance).abs();
+                nearby.push((distance / length + 2.0 * slant, node));
+            }
+        });
+        nearby.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        nearby.into_iter().take(5).any(|(_, node)| self.join(node, tip))
+    }
+
+    /// Bears a node at `to` if its line touches no other; if it does, joins the crack that is in the way.
+    pub(super) fn extend(&mut self, from: u32, to: Vec2, is_sealed: bool) -> Option<u32> {
+        let node = self.network.nodes[from as usize];
+        let child = self.network.nodes.len() as u32;
+        if child >= self.params.max_nodes {
+            return None;
+        }
+        let extent = self.network.extent();
+        let to = to.clamp(Vec2::ZERO, extent);
+        // The border is a crack too: none runs along it.
+        let (low, high) =
+            (node.pos.cmpeq(Vec2::ZERO) & to.cmpeq(Vec2::ZERO), node.pos.cmpeq(extent) & to.cmpeq(extent));
+        if (low | high).any() {
+            return None;
+        }
+        match self.free_line(SegmentId::Branch(child), (from, u32::MAX), (node.pos, to)) {
+            Ok((bend, path)) => {
+                let on_border = (to.cmpeq(Vec2::ZERO) | to.cmpeq(extent)).any();
+                self.bear(to, from, node.generation.saturating_add(1), node.impact, bend);
+                if let Some(arrest) = &mut self.arrest {
+                    arrest.walls.add((from, child), &path);
+                    arrest.sealed[child as usize] = is_sealed || on_border;
+                }
+                Some(child)
+            }
+            Err(()) if self.params.arrest <= 0.0 => None,
+            Err(()) => {
+                self.join_near(from, to - node.pos, LAST_REACH);
+                None
+            }
+        }
+    }
+
+    /// The roughest line between two places that touches no other; an error if even the straight one does.
+    fn free_line(
+        &self,
+        segment: SegmentId,
+        ends: (u32, u32),
+        (from, to): (Vec2, Vec2),
+    ) -> Result<(f32, SegmentPath), ()> {
+        for bend in BENDS {
+            let path = self.network.draft(segment, (from, to), (0.0, 0.0), bend);
+            let touches = self.params.arrest > 0.0
+                && self.arrest.as_ref().is_some_and(|arrest| arrest.walls.touches_any(ends, &path));
+            let extent = self.network.extent();
+            let is_forbidden = |pair: &[PathPoint]| self.mask.blocks(pair[0].pos / extent, pair[1].pos / extent);
+            if !touches && !path.points().windows(2).any(is_forbidden) {
+                return Ok((bend, path));
+            }
+        }
+        Err(())
+    }
+
+    /// Links a tip to a node of another crack, unless a third is in the way; says whether it did.
+    fn join(&mut self, node: u32, tip: u32) -> bool {
+        let (width, birth) = (self.network.nodes[tip as usize].width, self.steps);
+        self.link(Link { a: node, b: tip, width, birth, kind: LinkKind::Junction, bend: 1.0 })
+    }
+
+    /// Adds a link, unless cracks must not cross and it would; says whether it did.
+    pub(super) fn link(&mut self, mut link: Link) -> bool {
+        let index = self.network.links.len() as u32;
+        if self.arrest.is_some() {
+            if link.a == link.b {
+                return false;
+            }
+            let ends = (link.a, link.b);
+            let places = (self.network.nodes[link.a as usize].pos, self.network.nodes[link.b as usize].pos);
+            let Ok((bend, path)) = self.free_line(SegmentId::Link(index), ends, places) else { return false };
+            link.bend = bend;
+            if let Some(arrest) = &mut self.arrest {
+                arrest.walls.add(ends, &path);
+            }
+        }
+        self.network.links.push(link);
+        true
+    }
+
+    /// The nearest crack or border within `reach` and ahead of a node, and how far it is.
+    fn goal_ahead(&self, from: u32, heading: Vec2, reach: f32, ahead: f32) -> Option<(f32, Goal)> {
+        let crack =
+            self.foreign(from, Some(heading), reach, ahead).map(|(distance, node)| (distance, Goal::Node(node)));
+        let border = self.border_ahead(self.network.nodes[from as usize].pos, heading, reach, ahead);
+        match (crack, border) {
+            (Some(crack), Some(border)) => Some(if border.0 < crack.0 { border } else { crack }),
+            (crack, border) => crack.or(border),
+        }
+    }
+
+    fn border_ahead(&self, pos: Vec2, heading: Vec2, reach: f32, ahead: f32) -> Option<(f32, Goal)> {
+        let extent = self.network.extent();
+        let sides = [
+            (pos.x, Vec2::NEG_X, Vec2::new(0.0, pos.y)),
+            (extent.x - pos.x, Vec2::X, Vec2::new(extent.x, pos.y)),
+            (pos.y, Vec2::NEG_Y, Vec2::new(pos.x, 0.0)),
+            (extent.y - pos.y, Vec2::Y, Vec2::new(pos.x, extent.y)),
+        ];
+        sides
+            .into_iter()
+            .filter(|&(distance, out, _)| distance > 0.0 && distance <= reach && heading.dot(out) >= ahead)
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+            .map(|(distance, out, foot)| {
+                // Half way between where it would get to and the nearest place: a crack does not hook round.
+                let straight = pos + heading * (distance / heading.dot(out));
+                let place = (0.5 * (foot + straight)).clamp(Vec2::ZERO, extent);
+                // Exactly on the border, whatever rounding has made of it.
+                let place = Vec2::select(out.abs().cmpgt(Vec2::splat(0.5)), foot, place);
+                (distance, Goal::Border(place))
+            })
+    }
+
+    /// The nearest node of another crack within `reach` of a node, ahead of it if it has a heading.
+    fn foreign(&self, from: u32, heading: Option<Vec2>, reach: f32, ahead: f32) -> Option<(f32, u32)> {
+        let mut best = (f32::INFINITY, u32::MAX);
+        self.each_foreign(from, reach, |node, distance_sq, way| {
+            let is_ahead = heading.is_none_or(|heading| way.dot(heading) >= ahead * distance_sq.sqrt());
+            if is_ahead && (distance_sq, node) < best {
+                best = (distance_sq, node);
+            }
+        });
+        (best.1 != u32::MAX).then(|| (best.0.sqrt(), best.1))
+    }
+
+    /// Calls `visit` with each node of another crack within `reach`, its squared distance and the way to it.
+    fn each_foreign(&self, from: u32, reach: f32, mut visit: impl FnMut(u32, f32, Vec2)) {
+        let pos = self.network.nodes[from as usize].pos;
+        self.nodes.within(pos, reach, |node, distance_sq| {
+            if distance_sq > 0.0 && !self.is_kin(from, node) {
+                visit(node, distance_sq, self.network.nodes[node as usize].pos - pos);
+            }
+        });
+    }
+
+    /// Whether two nodes are of the same crack: not so many generations from one another that between them a cell could lie.
+    fn is_kin(&self, one: u32, other: u32) -> bool {
+        let (a, b) = (&self.network.nodes[one as usize], &self.network.nodes[other as usize]);
+        if a.impact != b.impact {
+            return false;
+        }
+        // The rays of a hit keep their distance by themselves.
+        if matches!(self.params.markers, MarkerLayout::Polar { .. }) {
+            return true;
+        }
+        let apart = (3.0 * self.params.arrest.max(self.params.island_distance) / self.params.step_length) as u32 + 2;
+        // Up from both to the node where they meet; a parent is always older than its child.
+        let (mut a, mut b, mut steps) = (one, other, 0);
+        while a != b {
+            let later = if a > b { &mut a } else { &mut b };
+            let parent = self.network.nodes[*later as usize].parent;
+            if parent == NO_PARENT {
+                // The starts of a compact hit are of one crack.
+                let to_start = |node: u32| self.network.nodes[node as usize].generation;
+                return !matches!(self.params.starts, StartLayout::Points { .. })
+                    && to_start(one).saturating_add(to_start(other)) <= apart;
+            }
+            *later = parent;
+            steps += 1;
+            if steps > apart {
+                return false;
+            }
+        }
+        true
+    }
+}
+
+/// Steps that a tip may take to a goal at `distance`.
+pub(super) fn steps_for(distance: f32, length: f32) -> u32 {
+    (1.5 * distance / length) as u32 + 2
+}

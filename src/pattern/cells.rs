@@ -1,0 +1,961 @@
+//! [`CellTracker`]: the closed cells of a growing network, found as they close.
+//!
+//! The network is a planar drawing: its nodes are the vertices, its segments (taken as straight) and the surface's
+//! border the edges. The tracker keeps the half-edges of that drawing in loops, one loop for each side of each connected
+//! part (Muller and Preparata 1978). A new edge either joins two parts, which merges two loops, or two places of one part,
+//! which splits a loop: then a cell has closed. The two new loops are walked side by side until the shorter one ends, and only
+//! that one is marked anew; areas and moments are whole numbers, so the longer loop's follow by subtraction.
+//!
+//! Directions are compared by exact cross products of whole numbers, never by angles.
+
+use super::{NO_PARENT, Network};
+use glam::Vec2;
+use std::{
+    collections::{BTreeMap, HashMap},
+    ops::Range,
+};
+
+/// The surface's corners in a [`CellTracker::outline`]: this plus 0, 1, 2, 3 from the top left, right, down, left, up.
+pub const CORNERS: u32 = u32::MAX - 4;
+
+/// Coordinates are whole numbers up to this.
+const RANGE: f64 = (1u32 << 30) as f64;
+const NONE: u32 = u32::MAX;
+
+/// A part of the surface that cracks and border enclose.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cell {
+    /// Area inside the straight outline, without the holes, pattern units squared.
+    pub area: f32,
+    /// Centre of that area, pattern units.
+    pub centroid: Vec2,
+    /// Step at which the segment was born that closed it.
+    pub birth: u32,
+    /// The later of the impacts of that segment's ends.
+    pub impact: u32,
+    /// A half-edge of its outer loop.
+    start: u32,
+    /// Any half-edge of each loop that runs around something inside it that hangs on nothing.
+    holes: Vec<u32>,
+}
+
+/// What lies to the left of a loop.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Side {
+    /// This cell, with the loop around it.
+    Cell(u32),
+    /// The cell `host`, with the loop as a hole in it. Unknown ([`NONE`]) as long as the part encloses nothing.
+    Around { host: u32 },
+    /// Nothing: it is beyond the border.
+    Beyond,
+}
+
+/// Half-edges that follow each other around one side of a connected part.
+#[derive(Clone, Copy, Debug)]
+struct Loop {
+    /// The loop that it has become part of; itself if none.
+    root: u32,
+    side: Side,
+    sums: Sums,
+}
+
+/// Integrals over the inside of a loop, in whole numbers.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Sums {
+    /// Twice the area; negative if the loop runs around it the other way.
+    area: i64,
+    /// Six times the first moment.
+    moment: [i128; 2],
+}
+
+impl Sums {
+    fn add_edge(&mut self, [ax, ay]: [i32; 2], [bx, by]: [i32; 2]) {
+        let (ax, ay, bx, by) = (i64::from(ax), i64::from(ay), i64::from(bx), i64::from(by));
+        let cross = ax * by - bx * ay;
+        // Sums on the way may wrap; the last one fits.
+        self.area = self.area.wrapping_add(cross);
+        self.moment[0] = self.moment[0].wrapping_add(i128::from(ax + bx) * i128::from(cross));
+        self.moment[1] = self.moment[1].wrapping_add(i128::from(ay + by) * i128::from(cross));
+    }
+
+    fn add(&mut self, other: Self) {
+        self.area = self.area.wrapping_add(other.area);
+        self.moment = [0, 1].map(|i| self.moment[i].wrapping_add(other.moment[i]));
+    }
+
+    fn subtract(&mut self, other: Self) {
+        self.area = self.area.wrapping_sub(other.area);
+        self.moment = [0, 1].map(|i| self.moment[i].wrapping_sub(other.moment[i]));
+    }
+}
+
+/// A point where edges meet.
+#[derive(Clone, Copy, Debug)]
+struct Vertex {
+    /// Index of the first node at this place, or [`CORNERS`] plus the corner.
+    name: u32,
+    pos: Vec2,
+    at: [i32; 2],
+    /// One half-edge that leaves from here.
+    first: u32,
+    /// Towards the vertex that stands for its connected part.
+    part: u32,
+}
+
+/// Where a new edge leaves a vertex: between the half-edge that comes before it in the loop, and the one after.
+#[derive(Clone, Copy, Debug)]
+struct Gap {
+    before: u32,
+    after: u32,
+}
+
+/// What is known of the segment being added.
+#[derive(Clone, Copy, Debug)]
+struct Cause {
+    birth: u32,
+    impact: u32,
+}
+
+/// The closed cells of a network that grows, with the surface's border.
+///
+/// Cell 0 is there from the start: what no crack has cut off yet. When a crack cuts through a cell, the larger part keeps
+/// its number and the smaller one is a new cell: so a cell's number never changes, cells are never removed, and their
+/// areas always add up to the surface.
+///
+/// Nodes closer than about 2⁻³⁰ of the surface's longer side count as one. A segment that runs along another or along the
+/// border, or crosses from one cell into another, closes nothing and is left out.
+///
+/// ```
+/// use bevy_crack::{CrackPreset, growth::CrackGrowth, pattern::CellTracker};
+///
+/// let mut growth = CrackGrowth::new(CrackPreset::CLAY.growth, [1.0, 1.0].into(), 1)?;
+/// growth.hit([0.5, 0.5].into(), 1.0);
+/// let mut tracker = CellTracker::new(growth.network().extent());
+/// while growth.step().grew() {
+///     for id in tracker.update(growth.network()) {
+///         let cell = &tracker.cells()[id as usize];
+///         assert!(cell.birth <= growth.steps());
+///     }
+/// }
+/// assert!(tracker.closed() > 10);
+/// # Ok::<(), bevy_crack::growth::ParamError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct CellTracker {
+    extent: Vec2,
+    /// Whole numbers per pattern unit; 0 for an extent that no surface can have.
+    scale: f64,
+    corner: [i32; 2],
+    vertices: Vec<Vertex>,
+    vertex_at: HashMap<[i32; 2], u32>,
+    /// Per node: its vertex, or [`NONE`].
+    vertex_of: Vec<u32>,
+    links: usize,
+    /// Way along the border from the top left, and the half-edge along it that begins there.
+    border: BTreeMap<i64, u32>,
+    /// Per half-edge: where it begins, the next of its loop, and a loop whose root is its own. `h ^ 1` runs the other way.
+    origin: Vec<u32>,
+    next: Vec<u32>,
+    loop_of: Vec<u32>,
+    loops: Vec<Loop>,
+    cells: Vec<Cell>,
+    /// Cells whose area has to be computed again.
+    touched: Vec<u32>,
+}
+
+impl CellTracker {
+    /// The tracker of a surface of `extent` pattern units, see [`Network::extent`]: one cell, the whole.
+    ///
+    /// With an extent that is not finite and above zero there are no cells.
+    #[must_use]
+    pub fn new(extent: Vec2) -> Self {
+        let valid = extent.is_finite() && extent.min_element() > 0.0;
+        let scale = if valid { RANGE / f64::from(extent.max_element()) } else { 0.0 };
+        let mut tracker = Self {
+            extent,
+            scale,
+            corner: [0; 2],
+            vertices: Vec::new(),
+            vertex_at: HashMap::new(),
+            vertex_of: Vec::new(),
+            links: 0,
+            border: BTreeMap::new(),
+            origin: Vec::new(),
+            next: Vec::new(),
+            loop_of: Vec::new(),
+            loops: Vec::new(),
+            cells: Vec::new(),
+            touched: Vec::new(),
+        };
+        tracker.corner = tracker.whole(extent);
+        if valid && tracker.corner[0] > 0 && tracker.corner[1] > 0 {
+            tracker.lay_border();
+        }
+        tracker
+    }
+
+    fn lay_border(&mut self) {
+        let corners = [Vec2::ZERO, Vec2::new(self.extent.x, 0.0), self.extent, Vec2::new(0.0, self.extent.y)];
+        for (i, pos) in (0u32..).zip(corners) {
+            let at = self.whole(pos);
+            self.vertices.push(Vertex { name: CORNERS + i, pos, at, first: 2 * i, part: 0 });
+            self.vertex_at.insert(at, i);
+            self.border.insert(self.way(at).unwrap_or(0), 2 * i);
+            self.origin.extend([i, (i + 1) % 4]);
+            self.next.extend([2 * ((i + 1) % 4), 2 * ((i + 3) % 4) + 1]);
+            self.loop_of.extend([0, 1]);
+        }
+        let inside = Loop { root: 0, side: Side::Cell(0), sums: Sums::default() };
+        self.loops.extend([inside, Loop { root: 1, side: Side::Beyond, ..inside }]);
+        self.loops[0].sums = self.sums_from(0);
+        self.cells.push(Cell { area: 0.0, centroid: Vec2::ZERO, birth: 0, impact: 0, start: 0, holes: Vec::new() });
+        self.measure(0);
+    }
+
+    /// Takes in what `network` has gained since the last call, and returns the numbers of the cells that closed thereby.
+    ///
+    /// Must be given the same network every time, which may only gain nodes and links. Costs as much as what was gained,
+    /// and the shorter outline of each cell that closes; a few times the whole network for each unconnected part that
+    /// closes its first cell.
+    pub fn update(&mut self, network: &Network) -> Range<u32> {
+        let first = self.cells.len() as u32;
+        if self.cells.is_empty() {
+            return 0..0;
+        }
+        let (nodes, links) = (network.nodes(), network.links());
+        // In order of birth, so that it does not matter how often this is called.
+        while self.vertex_of.len() < nodes.len() || self.links < links.len() {
+            let i = self.vertex_of.len();
+            if let Some(link) = links.get(self.links)
+                && nodes.get(i).is_none_or(|node| link.birth < node.birth && (link.a.max(link.b) as usize) < i)
+            {
+                self.links += 1;
+                if let (Some(a), Some(b)) = (nodes.get(link.a as usize), nodes.get(link.b as usize)) {
+                    let cause = Cause { birth: link.birth, impact: a.impact.max(b.impact) };
+                    self.join(self.vertex_of[link.a as usize], self.vertex_of[link.b as usize], cause);
+                }
+            } else {
+                let node = nodes[i];
+                let vertex = self.add_vertex(i as u32, node.pos);
+                self.vertex_of.push(vertex);
+                if node.parent != NO_PARENT
+                    && let Some(&parent) = self.vertex_of.get(node.parent as usize)
+                {
+                    let impact = node.impact.max(nodes[node.parent as usize].impact);
+                    self.join(parent, vertex, Cause { birth: node.birth, impact });
+                }
+            }
+        }
+        self.touched.sort_unstable();
+        self.touched.dedup();
+        for cell in std::mem::take(&mut self.touched) {
+            self.measure(cell);
+        }
+        first..self.cells.len() as u32
+    }
+
+    /// All cells by their number; the first is what no crack has cut off yet.
+    #[must_use]
+    pub fn cells(&self) -> &[Cell] {
+        &self.cells
+    }
+
+    /// How many cells the cracks have cut off.
+    #[must_use]
+    pub fn closed(&self) -> u32 {
+        (self.cells.len() as u32).saturating_sub(1)
+    }
+
+    /// The outline of a cell: indices of nodes and [`CORNERS`], x turning to y, without cracks that end inside it.
+    ///
+    /// Empty if there is no such cell. A place is passed more than once where the cell touches itself.
+    #[must_use]
+    pub fn outline(&self, cell: u32) -> Vec<u32> {
+        self.cells.get(cell as usize).map_or_else(Vec::new, |cell| self.trace(cell.start))
+    }
+
+    /// The outlines of what lies inside a cell without being joined to its outline, the other way round.
+    pub fn holes(&self, cell: u32) -> impl Iterator<Item = Vec<u32>> + '_ {
+        self.cells.get(cell as usize).into_iter().flat_map(|cell| &cell.holes).map(|&hole| self.trace(hole))
+    }
+
+    /// Place of a point of an outline, pattern units.
+    #[must_use]
+    pub fn pos(&self, point: u32) -> Option<Vec2> {
+        let vertex = if point >= CORNERS { point - CORNERS } else { *self.vertex_of.get(point as usize)? };
+        self.vertices.get(vertex as usize).map(|vertex| vertex.pos)
+    }
+
+    /// The cell at a place; costs as much as the network is large.
+    #[must_use]
+    pub fn cell_at(&self, pos: Vec2) -> Option<u32> {
+        let inside = !self.cells.is_empty() && pos.is_finite() && pos.cmpge(Vec2::ZERO).all();
+        (inside && pos.cmple(self.extent).all()).then(|| self.cell_around(self.whole(pos), None))
+    }
+
+    fn whole(&self, pos: Vec2) -> [i32; 2] {
+        let coordinate = |x: f32| (f64::from(x) * self.scale).round().clamp(0.0, RANGE) as i32;
+        [coordinate(pos.x), coordinate(pos.y)]
+    }
+
+    /// How far along the border a place is, if it is on it.
+    fn way(&self, [x, y]: [i32; 2]) -> Option<i64> {
+        let [w, h] = self.corner.map(i64::from);
+        let (x, y) = (i64::from(x), i64::from(y));
+        match () {
+            () if y == 0 => Some(x),
+            () if x == w => Some(w + y),
+            () if y == h => Some(w + h + (w - x)),
+            () if x == 0 => Some(w + h + w + (h - y)),
+            () => None,
+        }
+    }
+
+    /// The vertex at `pos`; where there is none, a new one, in the border if it lies on it.
+    fn add_vertex(&mut self, name: u32, pos: Vec2) -> u32 {
+        if !pos.is_finite() {
+            return NONE;
+        }
+        let at = self.whole(pos.clamp(Vec2::ZERO, self.extent));
+        let vertex = self.vertices.len() as u32;
+        let known = *self.vertex_at.entry(at).or_insert(vertex);
+        if known != vertex {
+            return known;
+        }
+        self.vertices.push(Vertex { name, pos, at, first: NONE, part: vertex });
+        if let Some(way) = self.way(at)
+            && let Some((_, &inner)) = self.border.range(..way).next_back()
+        {
+            self.split_border(inner, vertex);
+            self.border.insert(way, self.vertices[vertex as usize].first);
+        }
+        vertex
+    }
+
+    /// Puts `vertex` into the border's edge `inner`.
+    fn split_border(&mut self, inner: u32, vertex: u32) {
+        let outer = inner ^ 1;
+        let end = self.origin[outer as usize];
+        // What comes before `outer` around its origin.
+        let mut before = inner;
+        while self.next[before as usize] != outer {
+            before = self.next[before as usize] ^ 1;
+        }
+        let (rest, back) = (self.origin.len() as u32, self.origin.len() as u32 + 1);
+        self.origin.extend([vertex, end]);
+        self.origin[outer as usize] = vertex;
+        self.next.extend([self.next[inner as usize], outer]);
+        self.next[inner as usize] = rest;
+        self.next[before as usize] = back;
+        self.loop_of.extend([self.loop_of[inner as usize], self.loop_of[outer as usize]]);
+        self.vertices[end as usize].first = back;
+        self.vertices[vertex as usize].first = rest;
+        self.vertices[vertex as usize].part = 0;
+    }
+
+    fn head(&self, half_edge: u32) -> u32 {
+        self.origin[half_edge as usize ^ 1]
+    }
+
+    fn at(&self, vertex: u32) -> [i32; 2] {
+        self.vertices[vertex as usize].at
+    }
+
+    /// The half-edges of a loop from one of them.
+    fn walk(&self, start: u32) -> impl Iterator<Item = u32> + '_ {
+        let mut following = Some(start);
+        std::iter::from_fn(move || {
+            let half_edge = following?;
+            following = Some(self.next[half_edge as usize]).filter(|&next| next != start);
+            Some(half_edge)
+        })
+    }
+
+    /// Names along a loop, without the ways to dead ends and back.
+    fn trace(&self, start: u32) -> Vec<u32> {
+        let mut line: Vec<u32> = Vec::new();
+        for half_edge in self.walk(start) {
+            if line.last() == Some(&(half_edge ^ 1)) {
+                line.pop();
+            } else {
+                line.push(half_edge);
+            }
+        }
+        // The walk may have begun on such a way.
+        let mut ends = 0..line.len();
+        while ends.len() > 1 && line[ends.start] == line[ends.end - 1] ^ 1 {
+            ends = ends.start + 1..ends.end - 1;
+        }
+        line[ends].iter().map(|&h| self.vertices[self.origin[h as usize] as usize].name).collect()
+    }
+
+    fn sums_from(&self, start: u32) -> Sums {
+        let mut sums = Sums::default();
+        for half_edge in self.walk(start) {
+            sums.add_edge(self.at(self.origin[half_edge as usize]), self.at(self.head(half_edge)));
+        }
+        sums
+    }
+
+    fn part(&mut self, mut vertex: u32) -> u32 {
+        while self.vertices[vertex as usize].part != vertex {
+            let above = self.vertices[self.vertices[vertex as usize].part as usize].part;
+            self.vertices[vertex as usize].part = above;
+            vertex = above;
+        }
+        vertex
+    }
+
+    fn loop_root(&self, half_edge: u32) -> u32 {
+        let mut root = self.loop_of[half_edge as usize];
+        while self.loops[root as usize].root != root {
+            root = self.loops[root as usize].root;
+        }
+        root
+    }
+
+    /// [`loop_root`](Self::loop_root), remembered.
+    fn find_loop(&mut self, half_edge: u32) -> u32 {
+        let root = self.loop_root(half_edge);
+        let mut way = std::mem::replace(&mut self.loop_of[half_edge as usize], root);
+        while way != root {
+            way = std::mem::replace(&mut self.loops[way as usize].root, root);
+        }
+        root
+    }
+
+    /// Where an edge from `u` towards `v` finds its place; `Err` if it would run along another, `Ok(None)` if it is the first.
+    fn gap(&self, u: u32, v: u32) -> Result<Option<Gap>, Overlap> {
+        let vertex = &self.vertices[u as usize];
+        if vertex.first == NONE {
+            return Ok(None);
+        }
+        let new = direction(vertex.at, self.at(v));
+        // The first half-edge to the left of the new one comes out just before it in their loop's twin.
+        let mut left = (vertex.first, self.turn(new, vertex, vertex.first)?);
+        let mut half_edge = self.next[vertex.first as usize ^ 1];
+        while half_edge != vertex.first {
+            let turn = self.turn(new, vertex, half_edge)?;
+            let (half, way) = left.1;
+            if turn.0 < half || (turn.0 == half && cross(turn.1, way) > 0) {
+                left = (half_edge, turn);
+            }
+            half_edge = self.next[half_edge as usize ^ 1];
+        }
+        let before = left.0 ^ 1;
+        Ok(Some(Gap { before, after: self.next[before as usize] }))
+    }
+
+    /// Which half turn from `new` a half-edge lies in, and its direction.
+    fn turn(&self, new: [i64; 2], from: &Vertex, half_edge: u32) -> Result<(u8, [i64; 2]), Overlap> {
+        let way = direction(from.at, self.at(self.head(half_edge)));
+        match cross(new, way) {
+            1.. => Ok((0, way)),
+            0 if new[0] * way[0] + new[1] * way[1] < 0 => Ok((1, way)),
+            0 => Err(Overlap),
+            _ => Ok((2, way)),
+        }
+    }
+
+    /// Adds the edge between two vertices, unless it runs along another or crosses one.
+    fn join(&mut self, u: u32, v: u32, cause: Cause) {
+        if u == v || u == NONE || v == NONE || self.along_border(u, v) {
+            return;
+        }
+        let (Ok(gap_u), Ok(gap_v)) = (self.gap(u, v), self.gap(v, u)) else { return };
+        let loops = [gap_u, gap_v].map(|gap| gap.map(|gap| self.find_loop(gap.after)));
+        let Some(side) = self.common_side(loops) else { return };
+        let (part_u, part_v) = (self.part(u), self.part(v));
+        let closes = part_u == part_v;
+        // In a planar drawing two places of one part that see each other are on one loop, and those of two parts are not.
+        if closes != (loops[0] == loops[1] && loops[0].is_some()) {
+            return;
+        }
+
+        let (out, back) = (self.origin.len() as u32, self.origin.len() as u32 + 1);
+        self.origin.extend([u, v]);
+        self.next.extend([back, out]);
+        for (vertex, gap, leaving) in [(u, gap_u, out), (v, gap_v, back)] {
+            match gap {
+                Some(Gap { before, after }) => {
+                    self.next[before as usize] = leaving;
+                    self.next[leaving as usize ^ 1] = after;
+                }
+                None => self.vertices[vertex as usize].first = leaving,
+            }
+        }
+        if closes {
+            let whole = loops[0].unwrap_or(0);
+            self.loop_of.extend([whole; 2]);
+            self.close(whole, out, cause);
+            return;
+        }
+        // The border's part keeps its number.
+        let (above, below) = (part_u.min(part_v), part_u.max(part_v));
+        self.vertices[below as usize].part = above;
+        let merged = match loops {
+            [Some(a), Some(b)] => self.merge(a, b, side),
+            [Some(one), None] | [None, Some(one)] => one,
+            [None, None] => {
+                let root = self.loops.len() as u32;
+                self.loops.push(Loop { root, side, sums: Sums::default() });
+                root
+            }
+        };
+        self.loop_of.extend([merged; 2]);
+    }
+
+    /// Whether the line between two vertices lies in the border.
+    fn along_border(&self, u: u32, v: u32) -> bool {
+        let (a, b) = (self.at(u), self.at(v));
+        (0..2).any(|i| a[i] == b[i] && (a[i] == 0 || a[i] == self.corner[i]))
+    }
+
+    /// What the loops at the ends of a new edge have on their left, if it can be the same.
+    fn common_side(&self, loops: [Option<u32>; 2]) -> Option<Side> {
+        let unknown = Side::Around { host: NONE };
+        let [a, b] = loops.map(|root| root.map_or(unknown, |root| self.loops[root as usize].side));
+        match (a, b) {
+            (Side::Beyond, _) | (_, Side::Beyond) => None,
+            (Side::Cell(cell), Side::Cell(other)) => (cell == other).then_some(a),
+            (Side::Cell(cell), Side::Around { host }) => (host == NONE || host == cell).then_some(a),
+            (Side::Around { host }, Side::Cell(cell)) => (host == NONE || host == cell).then_some(b),
+            (Side::Around { host }, Side::Around { host: other }) => {
+                (host == NONE || other == NONE || host == other).then_some(if host == NONE { b } else { a })
+            }
+        }
+    }
+
+    /// Makes one loop of two parts' loops.
+    fn merge(&mut self, a: u32, b: u32, side: Side) -> u32 {
+        let hole_of = |root: u32| match self.loops[root as usize].side {
+            Side::Around { host } if host != NONE => Some(host),
+            _ => None,
+        };
+        let (hole_a, hole_b) = (hole_of(a), hole_of(b));
+        // A hole that has come to hang on the outline is none any more, and of two holes one remains.
+        if matches!(side, Side::Cell(_)) {
+            for (host, root) in [(hole_a, a), (hole_b, b)] {
+                host.into_iter().for_each(|host| self.remove_holes(host, &[root]));
+            }
+        } else if let (Some(_), Some(host)) = (hole_a, hole_b) {
+            self.remove_holes(host, &[b]);
+        }
+        let sums = self.loops[b as usize].sums;
+        self.loops[b as usize].root = a;
+        let root = &mut self.loops[a as usize];
+        root.sums.add(sums);
+        root.side = side;
+        a
+    }
+
+    /// Strikes loops off a cell's list of holes.
+    fn remove_holes(&mut self, host: u32, roots: &[u32]) {
+        let mut holes = std::mem::take(&mut self.cells[host as usize].holes);
+        holes.retain(|&hole| !roots.contains(&self.loop_root(hole)));
+        self.cells[host as usize].holes = holes;
+    }
+
+    /// The edge `out` has just cut the loop `whole` in two: a cell has closed.
+    fn close(&mut self, whole: u32, out: u32, Cause { birth, impact }: Cause) {
+        let (mut one, mut other) = (self.next[out as usize], self.next[out as usize ^ 1]);
+        while one != out && other != out ^ 1 {
+            (one, other) = (self.next[one as usize], self.next[other as usize]);
+        }
+        let (short, long) = if one == out { (out, out ^ 1) } else { (out ^ 1, out) };
+
+        let cut = self.loops.len() as u32;
+        let mut half_edge = short;
+        while self.loop_of[half_edge as usize] != cut {
+            self.loop_of[half_edge as usize] = cut;
+            half_edge = self.next[half_edge as usize];
+        }
+        let (side, sums) = (self.loops[whole as usize].side, self.sums_from(short));
+        self.loops.push(Loop { root: cut, side, sums });
+        self.loops[whole as usize].sums.subtract(sums);
+        let rest = self.loops[whole as usize].sums;
+
+        // The smaller part of a cell is new; of a hole's loop, the part that runs the right way round.
+        let short_is_new = match side {
+            Side::Cell(_) => sums.area < rest.area || (sums.area == rest.area && short == out),
+            _ => sums.area > rest.area,
+        };
+        let ((new, new_loop), (old, old_loop)) =
+            if short_is_new { ((short, cut), (long, whole)) } else { ((long, whole), (short, cut)) };
+        let id = self.cells.len() as u32;
+        self.cells.push(Cell { area: 0.0, centroid: Vec2::ZERO, birth, impact, start: new, holes: Vec::new() });
+        self.loops[new_loop as usize].side = Side::Cell(id);
+        let host = match side {
+            Side::Cell(cell) => {
+                self.cells[cell as usize].start = old;
+                cell
+            }
+            Side::Around { host } if host != NONE => {
+                self.remove_holes(host, &[whole, cut]);
+                host
+            }
+            _ => self.cell_around(self.at(self.origin[new as usize]), Some(id)),
+        };
+        self.hand_over_holes(host, id);
+        if !matches!(side, Side::Cell(_)) {
+            self.loops[old_loop as usize].side = Side::Around { host };
+            self.cells[host as usize].holes.push(old);
+        }
+        self.touched.extend([host, id]);
+    }
+
+    /// Gives those holes of a cell to another that lie in its loop.
+    fn hand_over_holes(&mut self, from: u32, to: u32) {
+        let start = self.cells[to as usize].start;
+        let (inside, outside): (Vec<u32>, Vec<u32>) = std::mem::take(&mut self.cells[from as usize].holes)
+            .into_iter()
+            .partition(|&hole| self.is_inside(start, self.at(self.origin[hole as usize])));
+        for &hole in &inside {
+            let root = self.find_loop(hole);
+            self.loops[root as usize].side = Side::Around { host: to };
+        }
+        self.cells[from as usize].holes = outside;
+        self.cells[to as usize].holes = inside;
+    }
+
+    /// Whether a place lies within a loop.
+    fn is_inside(&self, start: u32, at: [i32; 2]) -> bool {
+        self.walk(start).filter(|&h| self.passes_right_of(h, at).is_some()).count() % 2 == 1
+    }
+
+    /// Where the ray from just below a place to the right meets an edge.
+    fn passes_right_of(&self, half_edge: u32, at: [i32; 2]) -> Option<f64> {
+        let (a, b) = (self.at(self.origin[half_edge as usize]), self.at(self.head(half_edge)));
+        if (a[1] <= at[1]) == (b[1] <= at[1]) {
+            return None;
+        }
+        // Half a unit below, where there are no vertices.
+        let share = (f64::from(at[1]) + 0.5 - f64::from(a[1])) / (f64::from(b[1]) - f64::from(a[1]));
+        let x = f64::from(a[0]) + share * (f64::from(b[0]) - f64::from(a[0]));
+        (x > f64::from(at[0])).then_some(x)
+    }
+
+    /// The cell around a place, other than `except`.
+    fn cell_around(&self, at: [i32; 2], except: Option<u32>) -> u32 {
+        let mut found = (f64::INFINITY, 0);
+        for h in (0..self.origin.len() as u32).step_by(2) {
+            let Some(x) = self.passes_right_of(h, at).filter(|&x| x < found.0) else { continue };
+            let goes_down = self.at(self.origin[h as usize])[1] < self.at(self.head(h))[1];
+            // What encloses nothing has the same on both sides.
+            match self.loops[self.loop_root(if goes_down { h } else { h ^ 1 }) as usize].side {
+                Side::Cell(cell) | Side::Around { host: cell } if cell != NONE && Some(cell) != except => {
+                    found = (x, cell);
+                }
+                _ => {}
+            }
+        }
+        found.1
+    }
+
+    /// Area and centre from the loops.
+    fn measure(&mut self, cell: u32) {
+        let Cell { start, ref holes, .. } = self.cells[cell as usize];
+        let mut sums = self.loops[self.loop_root(start) as usize].sums;
+        for &hole in holes {
+            sums.add(self.loops[self.loop_root(hole) as usize].sums);
+        }
+        let area = sums.area as f64;
+        let centroid = if sums.area == 0 {
+            self.vertices[self.origin[start as usize] as usize].pos
+        } else {
+            let [x, y] = sums.moment.map(|moment| moment as f64 / (3.0 * area) / self.scale);
+            Vec2::new(x as f32, y as f32)
+        };
+        let cell = &mut self.cells[cell as usize];
+        cell.area = (0.5 * area / (self.scale * self.scale)) as f32;
+        cell.centroid = centroid;
+    }
+}
+
+/// An edge that would leave a vertex in the direction of another.
+#[derive(Clone, Copy, Debug)]
+struct Overlap;
+
+fn direction(from: [i32; 2], to: [i32; 2]) -> [i64; 2] {
+    [0, 1].map(|i| i64::from(to[i]) - i64::from(from[i]))
+}
+
+fn cross(a: [i64; 2], b: [i64; 2]) -> i64 {
+    a[0] * b[1] - a[1] * b[0]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        CrackPreset,
+        growth::CrackGrowth,
+        math::Rng,
+        pattern::random::{link, node, planar_network},
+    };
+
+    /// Twice the signed area of a closed line.
+    fn shoelace(line: &[Vec2]) -> f64 {
+        (0..line.len()).map(|i| line[i].as_dvec2().perp_dot(line[(i + 1) % line.len()].as_dvec2())).sum()
+    }
+
+    fn contains(line: &[Vec2], p: Vec2) -> bool {
+        let crossings = (0..line.len()).filter(|&i| {
+            let (a, b) = (line[i].as_dvec2(), line[(i + 1) % line.len()].as_dvec2());
+            let p = p.as_dvec2();
+            (a.y <= p.y) != (b.y <= p.y) && a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x) > p.x
+        });
+        crossings.count() % 2 == 1
+    }
+
+    /// All faces at once, with angles: the areas of the cells without their holes, smallest first, and the number of parts.
+    fn brute_force(network: &Network) -> (Vec<f64>, usize) {
+        let extent = network.extent();
+        let mut points: Vec<Vec2> = network.nodes.iter().map(|node| node.pos).collect();
+        let mut edges: Vec<(usize, usize)> =
+            network.segments().map(|s| network.ends(s).map(|(a, b)| (a as usize, b as usize)).unwrap()).collect();
+        let nodes = points.len();
+        points.extend([Vec2::ZERO, Vec2::new(extent.x, 0.0), extent, Vec2::new(0.0, extent.y)]);
+        for side in [0, 1, 2, 3] {
+            let on_side = |p: Vec2| [p.y == 0.0, p.x == extent.x, p.y == extent.y, p.x == 0.0][side];
+            let mut line: Vec<usize> = (0..points.len()).filter(|&i| on_side(points[i])).collect();
+            line.sort_by(|&a, &b| (points[a].x + points[a].y).total_cmp(&(points[b].x + points[b].y)));
+            edges.extend(line.windows(2).map(|pair| (pair[0], pair[1])));
+        }
+        let half: Vec<(usize, usize)> = edges.iter().flat_map(|&(a, b)| [(a, b), (b, a)]).collect();
+        let angle = |h: usize| {
+            let way = (points[half[h].1] - points[half[h].0]).as_dvec2();
+            way.y.atan2(way.x)
+        };
+        let mut around: Vec<Vec<usize>> = vec![Vec::new(); points.len()];
+        for h in 0..half.len() {
+            around[half[h].0].push(h);
+        }
+        for leaving in &mut around {
+            leaving.sort_by(|&a, &b| angle(a).total_cmp(&angle(b)));
+        }
+        let mut part: Vec<usize> = (0..points.len()).collect();
+        for _ in 0..points.len() {
+            for &(a, b) in &edges {
+                let low = part[a].min(part[b]);
+                (part[a], part[b]) = (low, low);
+            }
+        }
+        let mut seen = vec![false; half.len()];
+        let (mut cells, mut holes) = (Vec::new(), Vec::new());
+        for start in 0..half.len() {
+            let (mut line, mut h) = (Vec::new(), start);
+            while !seen[h] {
+                seen[h] = true;
+                line.push(points[half[h].0]);
+                let leaving = &around[half[h].1];
+                let back = leaving.iter().position(|&other| other == h ^ 1).unwrap();
+                h = leaving[(back + leaving.len() - 1) % leaving.len()];
+            }
+            let area = shoelace(&line);
+            if area > 0.0 {
+                cells.push((area, area, line, part[half[start].0]));
+            } else if area < 0.0 {
+                holes.push((area, line[0], part[half[start].0]));
+            }
+        }
+        for (area, at, inner) in holes {
+            let host = cells
+                .iter_mut()
+                .filter(|cell| cell.3 != inner && contains(&cell.2, at))
+                .min_by(|a, b| a.0.total_cmp(&b.0));
+            if let Some(host) = host {
+                host.1 += area;
+            }
+        }
+        let mut areas: Vec<f64> = cells.iter().map(|cell| cell.1 / 2.0).collect();
+        areas.sort_by(f64::total_cmp);
+        part[nodes..].fill(nodes);
+        let mut parts: Vec<usize> = network.nodes.iter().enumerate().map(|(i, _)| part[i]).collect();
+        parts.push(part_of_border(&part, network));
+        parts.sort_unstable();
+        parts.dedup();
+        (areas, parts.len())
+    }
+
+    fn part_of_border(part: &[usize], network: &Network) -> usize {
+        let on_border =
+            network.nodes.iter().position(|n| n.pos.min_element() == 0.0 || n.pos.cmpeq(network.extent()).any());
+        on_border.map_or(network.nodes.len(), |i| part[i])
+    }
+
+    fn check(network: &Network, tracker: &CellTracker) {
+        let (areas, parts) = brute_force(network);
+        let mut ours: Vec<f64> = tracker.cells().iter().map(|cell| f64::from(cell.area)).collect();
+        ours.sort_by(f64::total_cmp);
+        assert_eq!(ours.len(), areas.len());
+        for (ours, area) in ours.iter().zip(&areas) {
+            assert!((ours - area).abs() < 1e-6, "{ours} {area}");
+        }
+        let sum: f64 = ours.iter().sum();
+        assert!((sum - f64::from(network.extent().element_product())).abs() < 1e-6 * sum);
+
+        let on_border = |p: Vec2| p.min_element() == 0.0 || p.cmpeq(network.extent()).any();
+        let vertices = network.nodes.len() + 4;
+        let edges = network.segments().count() + 4 + network.nodes.iter().filter(|node| on_border(node.pos)).count();
+        let faces = tracker.cells().len() + 1;
+        assert_eq!(vertices + faces, 1 + parts + edges, "Euler");
+
+        for (id, cell) in (0u32..).zip(tracker.cells()) {
+            let line =
+                |outline: Vec<u32>| -> Vec<Vec2> { outline.into_iter().map(|i| tracker.pos(i).unwrap()).collect() };
+            let outer = line(tracker.outline(id));
+            let area = shoelace(&outer) + tracker.holes(id).map(|hole| shoelace(&line(hole))).sum::<f64>();
+            assert!((area / 2.0 - f64::from(cell.area)).abs() < 1e-6, "{area} {}", cell.area);
+            assert!(cell.centroid.cmpge(Vec2::ZERO).all() && cell.centroid.cmple(network.extent()).all());
+        }
+    }
+
+    #[test]
+    fn equals_tracing_everything_at_once() {
+        let mut rng = Rng::new(11);
+        let (mut closed, mut holes) = (0, 0);
+        for _ in 0..1000 {
+            let extent = [Vec2::ONE, Vec2::new(2.0, 1.0), Vec2::new(1.0, 1.5)][rng.next_u32() as usize % 3];
+            let nodes = 2 + rng.next_u32() % 90;
+            let network = planar_network(nodes, extent, &mut rng);
+            let mut tracker = CellTracker::new(extent);
+            let born = tracker.update(&network);
+            assert_eq!(born, 1..tracker.cells().len() as u32);
+            check(&network, &tracker);
+            assert_eq!(tracker.update(&network).len(), 0);
+            closed += tracker.closed();
+            holes += (0..=tracker.closed()).map(|id| tracker.holes(id).count()).sum::<usize>();
+        }
+        assert!(closed > 10_000 && holes > 100, "{closed} cells and {holes} holes put it to the test");
+    }
+
+    #[test]
+    fn it_does_not_matter_how_often_it_looks() {
+        let mut rng = Rng::new(12);
+        for _ in 0..100 {
+            let whole = planar_network(60, Vec2::ONE, &mut rng);
+            let mut at_once = CellTracker::new(Vec2::ONE);
+            at_once.update(&whole);
+            let (mut part, mut tracker) = (Network::new(Vec2::ONE, 0.0, 0), CellTracker::new(Vec2::ONE));
+            let mut last = 0;
+            for birth in 0..60 {
+                part.nodes.extend(whole.nodes.iter().filter(|node| node.birth == birth));
+                part.links.extend(whole.links.iter().filter(|link| link.birth == birth));
+                for id in tracker.update(&part) {
+                    assert_eq!((id, tracker.cells()[id as usize].birth), (last + 1, birth));
+                    last = id;
+                }
+                check(&part, &tracker);
+            }
+            assert_eq!(tracker.cells(), at_once.cells());
+        }
+    }
+
+    #[test]
+    fn the_cell_at_a_place_has_it_inside() {
+        let mut rng = Rng::new(13);
+        for _ in 0..100 {
+            let network = planar_network(80, Vec2::ONE, &mut rng);
+            let mut tracker = CellTracker::new(Vec2::ONE);
+            tracker.update(&network);
+            let line =
+                |outline: Vec<u32>| -> Vec<Vec2> { outline.into_iter().map(|i| tracker.pos(i).unwrap()).collect() };
+            for _ in 0..50 {
+                let place = Vec2::new(rng.unit(), rng.unit());
+                let cell = tracker.cell_at(place).unwrap();
+                assert!(contains(&line(tracker.outline(cell)), place));
+                assert!(tracker.holes(cell).all(|hole| !contains(&line(hole), place)));
+            }
+        }
+        assert_eq!(CellTracker::new(Vec2::ONE).cell_at(Vec2::new(1.5, 0.5)), None);
+        assert_eq!(CellTracker::new(Vec2::ONE).cell_at(Vec2::NAN), None);
+    }
+
+    #[test]
+    fn a_crack_from_side_to_side_cuts_the_smaller_part_off() {
+        let mut network = Network::new(Vec2::ONE, 0.0, 0);
+        let mut tracker = CellTracker::new(Vec2::ONE);
+        for (i, x) in [0.0, 0.25, 0.25, 0.25].into_iter().enumerate() {
+            let y = [0.5, 0.5, 0.0, 1.0][i];
+            let parent = [NO_PARENT, 0, 1, 1][i];
+            network.nodes.push(node(Vec2::new(x, y), parent, i as u32));
+        }
+        assert_eq!(tracker.update(&network), 1..3);
+        let corner = |i| CORNERS + i;
+        let areas: Vec<f32> = tracker.cells().iter().map(|cell| cell.area).collect();
+        assert_eq!(areas, [0.75, 0.125, 0.125]);
+        assert_eq!(tracker.outline(0), [3, 1, 2, corner(1), corner(2)]);
+        assert_eq!(tracker.cells()[1].centroid, Vec2::new(0.125, 0.25));
+        assert_eq!((tracker.cells()[2].birth, tracker.cells()[2].impact), (3, 0));
+    }
+
+    #[test]
+    fn degenerate_networks_stay_sane() {
+        let pos = |x: f32, y: f32| Vec2::new(x, y);
+        let mut network = Network::new(Vec2::ONE, 0.0, 0);
+        // A triangle, one of its corners twice, a link beside a branch, a link from a node to itself, an edge along the
+        // border, one through a corner, three in a row, a node that is not a number, a link to nowhere.
+        let places = [pos(0.25, 0.25), pos(0.75, 0.25), pos(0.5, 0.75), pos(0.5, 0.75), pos(0.0, 0.5), pos(0.0, 0.75)];
+        for (i, place) in (0u32..).zip(places) {
+            network.nodes.push(node(place, if i == 0 { NO_PARENT } else { i - 1 }, i));
+        }
+        network.nodes.push(node(Vec2::ZERO, 0, 6));
+        network.nodes.push(node(pos(0.5, 0.25), 0, 7));
+        network.nodes.push(node(pos(f32::NAN, 0.25), 0, 8));
+        network.nodes.push(node(pos(2.0, 0.25), 8, 9));
+        for (a, b) in [(0, 2), (0, 3), (1, 0), (2, 2), (0, 7), (8, 9), (77, 1), (6, 4)] {
+            network.links.push(link(a, b, 10));
+        }
+        let mut tracker = CellTracker::new(Vec2::ONE);
+        tracker.update(&network);
+        let areas: Vec<f32> = tracker.cells().iter().map(|cell| cell.area).collect();
+        // The triangle, and the part left of it between corner and border.
+        assert_eq!(areas.len(), 3, "{areas:?}");
+        assert!((areas.iter().sum::<f32>() - 1.0).abs() < 1e-6 && areas.contains(&0.125), "{areas:?}");
+
+        for extent in
+            [Vec2::ZERO, Vec2::NAN, Vec2::new(1.0, f32::INFINITY), Vec2::new(-1.0, 1.0), Vec2::new(1e-30, 1.0)]
+        {
+            let mut tracker = CellTracker::new(extent);
+            assert_eq!(tracker.update(&network), 0..0);
+            assert_eq!((tracker.cells().len(), tracker.outline(0).len(), tracker.cell_at(Vec2::ZERO)), (0, 0, None));
+        }
+    }
+
+    /// Segments that cross, on top of each other, in each other's way: no answer is right, but it must come.
+    #[test]
+    fn crossing_segments_do_no_harm() {
+        let mut rng = Rng::new(14);
+        for _ in 0..2000 {
+            let mut network = Network::new(Vec2::ONE, 0.0, 0);
+            let grid = 2 + rng.next_u32() % 30;
+            let place = |rng: &mut Rng| (rng.next_u32() % (grid + 1)) as f32 / grid as f32;
+            for i in 0..rng.next_u32() % 60 {
+                let parent = if rng.unit() < 0.2 || i == 0 { NO_PARENT } else { rng.next_u32() % i };
+                network.nodes.push(node(Vec2::new(place(&mut rng), place(&mut rng)), parent, i));
+            }
+            let n = network.nodes.len() as u32 + 1;
+            network.links.extend((0..rng.next_u32() % 60).map(|_| link(rng.next_u32() % n, rng.next_u32() % n, 60)));
+            let mut tracker = CellTracker::new(Vec2::ONE);
+            tracker.update(&network);
+            let sum: f32 = tracker.cells().iter().map(|cell| cell.area).sum();
+            assert!((sum - 1.0).abs() < 1e-4, "{sum}");
+            for id in 0..=tracker.closed() {
+                assert!(tracker.cells()[id as usize].centroid.is_finite());
+                assert!(tracker.outline(id).len() < 1000 && tracker.holes(id).count() < 100);
+            }
+        }
+    }
+
+    #[test]
+    fn clay_closes_cells() {
+        let mut growth = CrackGrowth::new(CrackPreset::CLAY.growth, Vec2::ONE, 1).unwrap();
+        growth.hit(Vec2::splat(0.5), 1.0);
+        let mut tracker = CellTracker::new(Vec2::ONE);
+        while growth.step().grew() {
+            tracker.update(growth.network());
+        }
+        assert!(tracker.closed() > 10, "{}", tracker.closed());
+    }
+}

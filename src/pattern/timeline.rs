@@ -1,0 +1,264 @@
+//! [`Timeline`]: which part of a network came when, and what it looked like at any time.
+
+use super::{Network, SegmentId, path::SegmentPath};
+use glam::Vec2;
+use std::ops::Range;
+
+/// A time of a [`Timeline`]: steps of growth, with a fraction of 1/256.
+///
+/// ```
+/// use bevy_crack::pattern::Moment;
+///
+/// assert_eq!(Moment::after(3).steps(), 3.0);
+/// assert_eq!(Moment::nearest(2.251), Moment::nearest(2.25));
+/// assert_eq!(Moment::nearest(f64::NAN), Moment::START);
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Moment(u32);
+
+impl Moment {
+    /// Before the first step: nothing is there.
+    pub const START: Self = Self(0);
+
+    /// Moments of a step.
+    const PARTS: u32 = 256;
+
+    /// The end of step number `steps`, the first being 1.
+    #[must_use]
+    pub const fn after(steps: u32) -> Self {
+        Self(steps.saturating_mul(Self::PARTS))
+    }
+
+    /// The moment nearest to a number of steps; below zero and not a number: the start.
+    #[must_use]
+    pub fn nearest(steps: f64) -> Self {
+        Self((steps * f64::from(Self::PARTS) + 0.5) as u32)
+    }
+
+    /// Number of steps, with their fraction.
+    #[must_use]
+    pub fn steps(self) -> f64 {
+        f64::from(self.0) / f64::from(Self::PARTS)
+    }
+
+    /// Number of steps that are over.
+    #[must_use]
+    pub const fn whole(self) -> u32 {
+        self.0 / Self::PARTS
+    }
+
+    /// Number of steps that have begun.
+    #[must_use]
+    pub const fn begun(self) -> u32 {
+        self.0.div_ceil(Self::PARTS)
+    }
+
+    /// How much of what comes in a step is there, 0..=1.
+    fn share(self, step: u32) -> f32 {
+        let start = u64::from(step.saturating_sub(1)) * u64::from(Self::PARTS);
+        let passed = u64::from(self.0).saturating_sub(start).min(u64::from(Self::PARTS));
+        passed as f32 / Self::PARTS as f32
+    }
+}
+
+/// A disc that stands for a marker.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Dot {
+    /// Position, pattern units.
+    pub pos: Vec2,
+    /// Pattern units.
+    pub radius: f32,
+}
+
+/// Which part of a network came in which step, and when it became how wide.
+///
+/// What comes in step `s` grows from nothing at moment `s - 1` to its whole at moment `s`: a segment by its length, a
+/// width from what it was to what it becomes, a dot by its radius. What a hit makes comes in the step after it. So at
+/// [`Moment::START`] nothing is there, and at the [`end`](Self::end) the network is as it is.
+///
+/// Entries are only ever added, in order of their steps.
+///
+/// ```
+/// use bevy_crack::{growth::{CrackGrowth, GrowthParams}, pattern::{Moment, SegmentId}};
+///
+/// let mut growth = CrackGrowth::new(GrowthParams::default(), [1.0, 1.0].into(), 7)?;
+/// growth.hit([0.5, 0.5].into(), 1.0);
+/// while growth.step().grew() {}
+/// let (network, timeline) = (growth.network(), growth.timeline());
+/// let segment = SegmentId::Branch(1);
+/// assert_eq!(timeline.path_at(network, segment, Moment::START), None);
+/// let (young, old) = (Moment::after(1), Moment::after(timeline.end()));
+/// let width = |moment| timeline.path_at(network, segment, moment).map(|path| path.points()[0].width);
+/// assert!(width(young) < width(old));
+/// assert_eq!(timeline.path_at(network, segment, old), network.path(segment));
+/// # Ok::<(), bevy_crack::growth::ParamError>(())
+/// ```
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Timeline {
+    /// The step that entries belong to.
+    now: u32,
+    nodes: Vec<Birth>,
+    /// Per link: the step in which it came.
+    links: Vec<u32>,
+    widenings: Vec<Widening>,
+    dots: Vec<(u32, Dot)>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Birth {
+    step: u32,
+    width: f32,
+    /// The latest of its widenings, or [`NONE`].
+    latest: u32,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Widening {
+    step: u32,
+    node: u32,
+    width: f32,
+    /// The one before of the same node, or [`NONE`].
+    before: u32,
+}
+
+const NONE: u32 = u32::MAX;
+
+/// Numbers of entries of each kind.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Entries {
+    pub(crate) nodes: usize,
+    pub(crate) links: usize,
+    pub(crate) widenings: usize,
+    pub(crate) dots: usize,
+}
+
+impl Timeline {
+    /// Step that the entries to come belong to, at least 1 and never lower than before.
+    pub(crate) fn begin(&mut self, step: u32) {
+        self.now = self.now.max(step);
+    }
+
+    pub(crate) fn reserve(&mut self, nodes: usize) {
+        self.nodes.reserve(nodes);
+        self.widenings.reserve(2 * nodes);
+    }
+
+    /// The next node comes, of this width.
+    pub(crate) fn add_node(&mut self, width: f32) {
+        self.nodes.push(Birth { step: self.now, width, latest: NONE });
+    }
+
+    /// The next link comes.
+    pub(crate) fn add_link(&mut self) {
+        self.links.push(self.now);
+    }
+
+    /// A node becomes wider.
+    pub(crate) fn widen(&mut self, node: u32, width: f32) {
+        let next = self.widenings.len() as u32;
+        if let Some(birth) = self.nodes.get_mut(node as usize) {
+            let before = std::mem::replace(&mut birth.latest, next);
+            self.widenings.push(Widening { step: self.now, node, width, before });
+        }
+    }
+
+    pub(crate) fn add_dot(&mut self, dot: Dot) {
+        self.dots.push((self.now, dot));
+    }
+
+    /// The step after which all is there, 0 if there is nothing.
+    #[must_use]
+    pub fn end(&self) -> u32 {
+        let last = [
+            self.nodes.last().map(|birth| birth.step),
+            self.links.last().copied(),
+            self.widenings.last().map(|widening| widening.step),
+            self.dots.last().map(|dot| dot.0),
+        ];
+        last.into_iter().flatten().max().unwrap_or(0)
+    }
+
+    /// The line of a segment at `moment`; `None` if it is not there (yet).
+    ///
+    /// `network` must be the one whose growth wrote the timeline.
+    #[must_use]
+    pub fn path_at(&self, network: &Network, segment: SegmentId, moment: Moment) -> Option<SegmentPath> {
+        let share = moment.share(self.step_of(segment)?);
+        if share <= 0.0 {
+            return None;
+        }
+        let (a, b) = network.ends(segment)?;
+        let widths = match segment {
+            SegmentId::Branch(_) => (self.width_at(a, moment)?, self.width_at(b, moment)?),
+            SegmentId::Link(i) => {
+                let width = network.links().get(i as usize)?.width;
+                (width, width)
+            }
+        };
+        let path = network.path_with(segment, widths)?;
+        Some(if share < 1.0 { path.up_to(share) } else { path })
+    }
+
+    /// Width of a node at `moment`, pattern units; before its birth that of its birth. `None` if there is no such node.
+    #[must_use]
+    pub fn width_at(&self, node: u32, moment: Moment) -> Option<f32> {
+        let birth = self.nodes.get(node as usize)?;
+        let goal = self.version(birth.latest, moment.begun());
+        let base = self.version(goal, moment.whole());
+        let width = |version: u32| self.widenings.get(version as usize).map_or(birth.width, |widening| widening.width);
+        let (from, to) = (width(base), width(goal));
+        Some(if goal == base { to } else { from + (to - from) * moment.share(moment.begun()) })
+    }
+
+    /// The latest widening up to `step`, from `from` back.
+    fn version(&self, from: u32, step: u32) -> u32 {
+        let mut version = from;
+        while let Some(widening) = self.widenings.get(version as usize).filter(|widening| widening.step > step) {
+            version = widening.before;
+        }
+        version
+    }
+
+    /// The disc number `index` at `moment`; `None` if it is not there (yet).
+    #[must_use]
+    pub fn dot_at(&self, index: u32, moment: Moment) -> Option<Dot> {
+        let &(step, dot) = self.dots.get(index as usize)?;
+        let share = moment.share(step);
+        (share > 0.0).then_some(Dot { radius: dot.radius * share, ..dot })
+    }
+
+    /// The nodes that are born in steps after `from` up to `to`.
+    #[must_use]
+    pub fn born(&self, from: u32, to: u32) -> Range<u32> {
+        let up_to = |step: u32| self.nodes.partition_point(|birth| birth.step <= step) as u32;
+        up_to(from)..up_to(to.max(from))
+    }
+
+    /// The step in which a segment comes.
+    pub(crate) fn step_of(&self, segment: SegmentId) -> Option<u32> {
+        match segment {
+            SegmentId::Branch(node) => self.nodes.get(node as usize).map(|birth| birth.step),
+            SegmentId::Link(link) => self.links.get(link as usize).copied(),
+        }
+    }
+
+    /// The node that a widening is of.
+    pub(crate) fn widened(&self, widening: usize) -> Option<u32> {
+        self.widenings.get(widening).map(|widening| widening.node)
+    }
+
+    /// The disc number `index` when it is whole.
+    pub(crate) fn dot(&self, index: usize) -> Option<Dot> {
+        self.dots.get(index).map(|&(_, dot)| dot)
+    }
+
+    /// Numbers of entries of the steps up to `step`.
+    pub(crate) fn entries(&self, step: u32) -> Entries {
+        Entries {
+            nodes: self.nodes.partition_point(|birth| birth.step <= step),
+            links: self.links.partition_point(|&link| link <= step),
+            widenings: self.widenings.partition_point(|widening| widening.step <= step),
+            dots: self.dots.partition_point(|dot| dot.0 <= step),
+        }
+    }
+}

@@ -1,0 +1,410 @@
+//! [`Replay`]: a depth field that shows a network at any time.
+
+use super::{DepthField, Profile, TexelRect, stamp_dot, stamp_path};
+use crate::pattern::{Entries, Moment, NO_PARENT, Network, SegmentId, Timeline};
+use glam::{UVec2, Vec2};
+
+/// Depth of the discs that stand for markers.
+pub const DOT_DEPTH: f32 = 0.5;
+
+/// Side of a tile, texels: what changes is cleared and drawn again by tiles.
+const TILE: u32 = 8;
+
+/// Side of a cell of the index, tiles.
+const CELL: u32 = 4;
+
+const NONE: u32 = u32::MAX;
+
+/// Shows a network in a [`DepthField`] as it was at any [`Moment`].
+///
+/// The field depends on the moment alone, bit for bit, not on the moments shown before: tiles under what has changed are
+/// cleared, and whatever touches them is stamped again. At the end of the timeline the field is that of stamping every segment
+/// once. A move costs as much as what changes between the two moments, not as the network.
+///
+/// ```
+/// use bevy_crack::{
+///     growth::{CrackGrowth, GrowthParams},
+///     pattern::{Moment, SurfaceFrame},
+///     raster::{DepthField, Profile, Redrawn, Replay},
+/// };
+///
+/// let frame = SurfaceFrame::new([256, 256].into())?;
+/// let mut growth = CrackGrowth::new(GrowthParams::default(), frame.extent(), 7)?;
+/// growth.hit([0.5, 0.5].into(), 1.0);
+/// while growth.step().grew() {}
+///
+/// let (mut field, mut redrawn) = (DepthField::new(frame), Redrawn::default());
+/// let mut replay = Replay::new(frame.size(), Profile::default());
+/// let mut show = |field: &mut _, steps| {
+///     replay.show(field, growth.network(), growth.timeline(), Moment::nearest(steps), &mut redrawn);
+/// };
+/// show(&mut field, 10.5);
+/// let halfway = field.clone();
+/// show(&mut field, 14.0);
+/// assert_ne!(field, halfway);
+/// show(&mut field, 10.5);
+/// assert_eq!(field, halfway);
+/// show(&mut field, 0.0);
+/// assert_eq!(field, DepthField::new(frame));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Replay {
+    size: UVec2,
+    profile: Profile,
+    at: Moment,
+    /// Whether the field may hold anything.
+    is_stale: bool,
+    /// What of the timeline is in the index.
+    seen: Entries,
+    parts: Vec<Part>,
+    /// Part, first child and next sibling of each node.
+    nodes: Vec<Kin>,
+    /// The part of each link and dot.
+    links: Vec<u32>,
+    dots: Vec<u32>,
+    cells: Vec<Vec<u32>>,
+    tiles: UVec2,
+    /// Per tile and cell: the last move that has marked it.
+    tile_marks: Vec<u32>,
+    cell_marks: Vec<u32>,
+    /// Number of the move.
+    turn: u32,
+    /// Marked tiles, and their texels before the move.
+    marked: Vec<u32>,
+    before: Vec<[u16; (TILE * TILE) as usize]>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Kin {
+    part: u32,
+    child: u32,
+    sibling: u32,
+}
+
+/// A segment or a dot.
+#[derive(Clone, Copy, Debug)]
+struct Part {
+    what: What,
+    /// Holds everything that it has ever stamped.
+    rect: TexelRect,
+    /// The last move that has changed it, and the last that has looked at it.
+    changed: u32,
+    visited: u32,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum What {
+    Segment(SegmentId),
+    Dot(u32),
+}
+
+/// What a move of a [`Replay`] has done.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Redrawn {
+    /// Tiles that were cleared and drawn again, disjoint.
+    pub cleared: Vec<TexelRect>,
+    /// The texels of each segment that was stamped.
+    pub stamped: Vec<TexelRect>,
+    /// What is not as before, disjoint, each within a tile.
+    pub changed: Vec<TexelRect>,
+}
+
+impl Redrawn {
+    fn clear(&mut self) {
+        self.cleared.clear();
+        self.stamped.clear();
+        self.changed.clear();
+    }
+}
+
+impl Replay {
+    /// For an untouched field of `size` texels; cracks have the cross-section `profile`.
+    #[must_use]
+    pub fn new(size: UVec2, profile: Profile) -> Self {
+        let tiles = UVec2::new(size.x.div_ceil(TILE), size.y.div_ceil(TILE));
+        let cells = UVec2::new(tiles.x.div_ceil(CELL), tiles.y.div_ceil(CELL));
+        let count = |grid: UVec2| grid.x as usize * grid.y as usize;
+        Self {
+            size,
+            profile,
+            at: Moment::START,
+            is_stale: false,
+            seen: Entries::default(),
+            parts: Vec::new(),
+            nodes: Vec::new(),
+            links: Vec::new(),
+            dots: Vec::new(),
+            cells: vec![Vec::new(); count(cells)],
+            tiles,
+            tile_marks: vec![0; count(tiles)],
+            cell_marks: vec![0; count(cells)],
+            turn: 0,
+            marked: Vec::new(),
+            before: Vec::new(),
+        }
+    }
+
+    /// For a field that holds anything: the first move draws all of it anew.
+    #[must_use]
+    pub fn over(size: UVec2, profile: Profile) -> Self {
+        Self { is_stale: true, ..Self::new(size, profile) }
+    }
+
+    /// The moment that the field shows.
+    #[must_use]
+    pub const fn at(&self) -> Moment {
+        self.at
+    }
+
+    /// Makes `field` show `network` at the moment `to`, and tells in `redrawn` what has changed.
+    ///
+    /// `field` must be the one of the moves before, unchanged (one of another size is drawn anew), and `network` and `timeline`
+    /// those of one growth, which may have grown since.
+    pub fn show(
+        &mut self,
+        field: &mut DepthField,
+        network: &Network,
+        timeline: &Timeline,
+        to: Moment,
+        redrawn: &mut Redrawn,
+    ) {
+        if field.depth.size() != self.size {
+            *self = Self::over(field.depth.size(), self.profile);
+        }
+        redrawn.clear();
+        self.turn += 1;
+        let seen = self.take_up(field, network, timeline);
+        if std::mem::take(&mut self.is_stale) {
+            for tile in 0..self.tiles.x * self.tiles.y {
+                self.mark_tile(tile);
+            }
+        } else {
+            self.mark_changes(timeline, seen, to);
+        }
+        self.at = to;
+        self.clear_marked(field, redrawn);
+        self.draw_marked(field, network, timeline, redrawn);
+        self.compare_marked(field, redrawn);
+    }
+
+    /// Marks the tiles under all that is not at the moment `to` as it is shown. Of the timeline, `seen` is shown.
+    fn mark_changes(&mut self, timeline: &Timeline, seen: Entries, to: Moment) {
+        let (early, late) = (self.at.min(to), self.at.max(to));
+        // Steps that have begun at one moment and are not over at the other, and steps written since, if they have begun.
+        let (over, begun, new) =
+            (timeline.entries(early.whole()), timeline.entries(late.begun()), timeline.entries(to.begun()));
+        let range = |count: fn(&Entries) -> usize| {
+            let seen = count(&seen);
+            (count(&over).min(seen)..count(&begun).min(seen)).chain(seen..count(&new).max(seen))
+        };
+        for node in range(|entries| entries.nodes) {
+            self.mark_part(self.nodes[node].part);
+        }
+        for widening in range(|entries| entries.widenings) {
+            let Some(node) = timeline.widened(widening) else { continue };
+            // A branch tapers between two widths.
+            let Kin { part, mut child, .. } = self.nodes[node as usize];
+            self.mark_part(part);
+            while child != NONE {
+                let kin = self.nodes[child as usize];
+                if timeline.step_of(SegmentId::Branch(child)).is_some_and(|step| step <= late.begun()) {
+                    self.mark_part(kin.part);
+                }
+                child = kin.sibling;
+            }
+        }
+        for link in range(|entries| entries.links) {
+            self.mark_part(self.links[link]);
+        }
+        for dot in range(|entries| entries.dots) {
+            self.mark_part(self.dots[dot]);
+        }
+    }
+
+    fn mark_part(&mut self, part: u32) {
+        let Some(part) = self.parts.get_mut(part as usize) else { return };
+        if std::mem::replace(&mut part.changed, self.turn) == self.turn {
+            return;
+        }
+        let rect = tiles_of(part.rect, TILE);
+        for y in rect.min.y..rect.max.y {
+            for x in rect.min.x..rect.max.x {
+                self.mark_tile(y * self.tiles.x + x);
+            }
+        }
+    }
+
+    fn mark_tile(&mut self, tile: u32) {
+        if std::mem::replace(&mut self.tile_marks[tile as usize], self.turn) != self.turn {
+            self.marked.push(tile);
+        }
+    }
+
+    fn tile(&self, tile: u32) -> TexelRect {
+        let min = UVec2::new(tile % self.tiles.x, tile / self.tiles.x) * TILE;
+        TexelRect { min, max: (min + TILE).min(self.size) }
+    }
+
+    /// Clears the marked tiles, keeping what was there.
+    fn clear_marked(&mut self, field: &mut DepthField, redrawn: &mut Redrawn) {
+        self.before.clear();
+        for &tile in &self.marked {
+            let rect = self.tile(tile);
+            let mut before = [0; (TILE * TILE) as usize];
+            for (y, kept) in (rect.min.y..rect.max.y).zip(before.chunks_exact_mut(TILE as usize)) {
+                let row = &mut field.depth.row_mut(y as usize)[rect.min.x as usize..rect.max.x as usize];
+                kept[..row.len()].copy_from_slice(row);
+                row.fill(0);
+            }
+            self.before.push(before);
+            redrawn.cleared.push(rect);
+        }
+    }
+
+    /// Stamps what touches a marked tile, all of it: beside the marked tiles it changes nothing, for it is there already.
+    fn draw_marked(&mut self, field: &mut DepthField, network: &Network, timeline: &Timeline, redrawn: &mut Redrawn) {
+        let columns = self.tiles.x.div_ceil(CELL);
+        for &tile in &self.marked {
+            let cell = tile / self.tiles.x / CELL * columns + tile % self.tiles.x / CELL;
+            if std::mem::replace(&mut self.cell_marks[cell as usize], self.turn) == self.turn {
+                continue;
+            }
+            for &part in &self.cells[cell as usize] {
+                let part = &mut self.parts[part as usize];
+                if std::mem::replace(&mut part.visited, self.turn) == self.turn {
+                    continue;
+                }
+                let rect = tiles_of(part.rect, TILE);
+                let is_marked = |x, y| self.tile_marks[(y * self.tiles.x + x) as usize] == self.turn;
+                if !(rect.min.y..rect.max.y).any(|y| (rect.min.x..rect.max.x).any(|x| is_marked(x, y))) {
+                    continue;
+                }
+                match part.what {
+                    What::Segment(segment) => {
+                        if let Some(path) = timeline.path_at(network, segment, self.at) {
+                            redrawn.stamped.push(stamp_path(field, &self.profile, &path));
+                        }
+                    }
+                    What::Dot(dot) => {
+                        if let Some(dot) = timeline.dot_at(dot, self.at) {
+                            stamp_dot(field, dot.pos, dot.radius, DOT_DEPTH);
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// Notes the texels of the marked tiles that differ from before.
+    fn compare_marked(&mut self, field: &DepthField, redrawn: &mut Redrawn) {
+        for (&tile, before) in self.marked.iter().zip(&self.before) {
+            let rect = self.tile(tile);
+            let mut changed = TexelRect::default();
+            for (y, kept) in (rect.min.y..rect.max.y).zip(before.chunks_exact(TILE as usize)) {
+                let row = &field.depth.row(y as usize)[rect.min.x as usize..rect.max.x as usize];
+                let mut differing = (rect.min.x..).zip(row.iter().zip(kept)).filter(|(_, (a, b))| a != b);
+                if let Some((first, _)) = differing.next() {
+                    let last = differing.last().map_or(first, |(x, _)| x);
+                    changed = changed.union(TexelRect { min: UVec2::new(first, y), max: UVec2::new(last + 1, y + 1) });
+                }
+            }
+            if !changed.is_empty() {
+                redrawn.changed.push(changed);
+            }
+        }
+        self.marked.clear();
+    }
+
+    /// Puts into the index what was written since the last time; returns how much was in it before.
+    fn take_up(&mut self, field: &DepthField, network: &Network, timeline: &Timeline) -> Entries {
+        let (seen, all) = (self.seen, timeline.entries(u32::MAX));
+        if seen == all {
+            return seen;
+        }
+        self.seen = all;
+        for node in seen.nodes..all.nodes {
+            let parent = network.nodes().get(node).map_or(NO_PARENT, |node| node.parent);
+            let id = node as u32;
+            let mut kin = Kin { part: NONE, child: NONE, sibling: NONE };
+            if let Some(parent) = self.nodes.get_mut(parent as usize) {
+                kin.sibling = std::mem::replace(&mut parent.child, id);
+                kin.part = self.add(What::Segment(SegmentId::Branch(id)));
+            }
+            self.nodes.push(kin);
+            self.measure(kin.part, field, network, timeline);
+        }
+        for link in seen.links..all.links {
+            let part = self.add(What::Segment(SegmentId::Link(link as u32)));
+            self.links.push(part);
+            self.measure(part, field, network, timeline);
+        }
+        for dot in seen.dots..all.dots {
+            let part = self.add(What::Dot(dot as u32));
+            self.dots.push(part);
+            self.measure(part, field, network, timeline);
+        }
+        for widening in seen.widenings..all.widenings {
+            let Some(node) = timeline.widened(widening) else { continue };
+            self.measure(self.nodes[node as usize].part, field, network, timeline);
+            let mut child = self.nodes[node as usize].child;
+            while child != NONE {
+                self.measure(self.nodes[child as usize].part, field, network, timeline);
+                child = self.nodes[child as usize].sibling;
+            }
+        }
+        seen
+    }
+
+    fn add(&mut self, what: What) -> u32 {
+        self.parts.push(Part { what, rect: TexelRect::default(), changed: 0, visited: 0 });
+        self.parts.len() as u32 - 1
+    }
+
+    /// Finds the texels of a part, and enters it in the cells that it touches now and has not before.
+    fn measure(&mut self, index: u32, field: &DepthField, network: &Network, timeline: &Timeline) {
+        let Some(part) = self.parts.get_mut(index as usize) else { return };
+        let (low, high, radius) = match part.what {
+            What::Segment(segment) => {
+                let Some(path) = network.path(segment) else { return };
+                let none = (Vec2::INFINITY, Vec2::NEG_INFINITY, 0.0f32);
+                path.points().iter().fold(none, |(low, high, radius), point| {
+                    (low.min(point.pos), high.max(point.pos), radius.max(0.5 * point.width))
+                })
+            }
+            What::Dot(dot) => {
+                let Some(dot) = timeline.dot(dot as usize) else { return };
+                (dot.pos, dot.pos, dot.radius)
+            }
+        };
+        // The edge of a stamp is a texel soft; one more for rounding.
+        let reach = (radius + self.profile.rim_width.max(0.0)) * field.frame.texels_per_unit() + 2.5;
+        let rect = TexelRect {
+            min: (field.frame.to_texel(low) - reach).max(Vec2::ZERO).as_uvec2(),
+            max: (field.frame.to_texel(high) + reach).ceil().max(Vec2::ZERO).as_uvec2().min(self.size),
+        };
+        let before = part.rect;
+        part.rect = before.union(rect);
+        let (old, new) = (tiles_of(before, TILE * CELL), tiles_of(part.rect, TILE * CELL));
+        if old == new {
+            return;
+        }
+        let columns = self.tiles.x.div_ceil(CELL);
+        for y in new.min.y..new.max.y {
+            for x in new.min.x..new.max.x {
+                let cell = UVec2::new(x, y);
+                if cell.cmplt(old.min).any() || cell.cmpge(old.max).any() {
+                    self.cells[(y * columns + x) as usize].push(index);
+                }
+            }
+        }
+    }
+}
+
+/// Columns and rows of the tiles of `side` that `rect` touches.
+fn tiles_of(rect: TexelRect, side: u32) -> TexelRect {
+    if rect.is_empty() {
+        return TexelRect::default();
+    }
+    TexelRect { min: rect.min / side, max: (rect.max - 1) / side + 1 }
+}

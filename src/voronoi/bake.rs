@@ -1,0 +1,489 @@
+//! A map in the making, and made: [`VoronoiBake`], [`VoronoiMap`].
+
+use super::{
+    Guide, SiteLayout, StrokeReport, VoronoiError, VoronoiParams,
+    lattice::{Lattice, Layer, edges_across, edges_down},
+    level::Level,
+    noise::Noise,
+    params::MAX_LEVELS,
+    resample::Resampler,
+    seams::{Guidance, Seams, Tracer},
+    search::BLOCK,
+    sites::{sites, texel},
+    strokes::Astride,
+};
+use crate::{Grid, math::Rng, pattern::SurfaceFrame};
+use glam::UVec2;
+
+/// How far a bake is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum BakeProgress {
+    /// There is more to do; 0..1, never falls.
+    Working(f32),
+    /// The map is ready: [`VoronoiBake::finish`] does nothing more.
+    Done,
+}
+
+enum Stage {
+    /// Guides and noise are brought to the lattice, row by row.
+    Guides {
+        y: usize,
+    },
+    /// Edges get their costs, row by row.
+    Costs {
+        y: usize,
+    },
+    /// Sites are laid out.
+    Sites,
+    /// Sites are laid out astride, round by round.
+    Astride(Box<Astride>),
+    /// The regions of the level before become walls, row by row.
+    Walls {
+        y: usize,
+    },
+    /// Paths of the last level.
+    Search,
+    /// Boundaries are looked for, row by row.
+    Seams(Tracer),
+    Done(Seams),
+}
+
+/// A map in the making: [`step`](Self::step) until it is done, or drop it.
+///
+/// ```
+/// use bevy_crack::voronoi::{BakeProgress, VoronoiBake, VoronoiParams};
+///
+/// let mut bake = VoronoiBake::new(VoronoiParams::DEFAULT, Vec::new(), [64, 48].into(), 7)?;
+/// while let BakeProgress::Working(_share) = bake.step(16) {}
+/// let (map, seams) = bake.finish();
+/// assert_eq!(map.sites().len(), 175);
+/// assert!(!seams.seams.is_empty());
+/// # Ok::<(), bevy_crack::voronoi::VoronoiError>(())
+/// ```
+pub struct VoronoiBake {
+    guides: Vec<Guide>,
+    resamplers: Vec<Option<Resampler>>,
+    noise: Noise,
+    seed: u64,
+    map: VoronoiMap,
+    stage: Stage,
+    progress: f32,
+}
+
+/// Regions and path costs of every texel (Mould 2005, section 3).
+///
+/// Holds all that a further change needs, some 12 bytes a texel with one level and one guide, 8 more for each further
+/// level and 2 for each further guide.
+#[derive(Clone, Debug)]
+pub struct VoronoiMap {
+    params: VoronoiParams,
+    frame: SurfaceFrame,
+    sites: Vec<UVec2>,
+    /// Noise, then guides.
+    layers: Vec<Layer>,
+    levels: Vec<Level>,
+    lattices: Vec<Lattice>,
+    /// For each row and block whether a guide has anything there.
+    guided: Vec<bool>,
+    strokes: Option<StrokeReport>,
+    /// Path cost at which cracks reach full width, in β: that of the dearest ones when the map was made.
+    full_cost: Option<f32>,
+}
+
+impl VoronoiBake {
+    /// Begins a map of `size` texels.
+    ///
+    /// # Errors
+    /// If a parameter or the size is out of its range.
+    pub fn new(params: VoronoiParams, guides: Vec<Guide>, size: UVec2, seed: u64) -> Result<Self, VoronoiError> {
+        params.validate(&guides)?;
+        let frame = SurfaceFrame::new(size)?;
+        let mut noise = Rng::new(seed).stream("noise");
+        let noise_seed = u64::from(noise.next_u32()) << 32 | u64::from(noise.next_u32());
+        let layer = |gamma: f32| {
+            let mut layer = Layer { values: Grid::new(size, 0), weight: 0 };
+            layer.set_weight(gamma / params.beta);
+            layer
+        };
+        let layers = std::iter::once(params.alpha).chain(guides.iter().map(|guide| guide.gamma)).map(layer).collect();
+        let resampler = |guide: &Guide| {
+            let from = guide.image.size();
+            (from.min_element() > 0).then(|| Resampler::new(from, size))
+        };
+        Ok(Self {
+            resamplers: guides.iter().map(resampler).collect(),
+            guides,
+            noise: Noise::new(&frame, params.noise_scale, noise_seed),
+            seed,
+            map: VoronoiMap {
+                params,
+                frame,
+                sites: Vec::new(),
+                layers,
+                levels: Vec::new(),
+                lattices: vec![Lattice::new(size)],
+                guided: Vec::new(),
+                strokes: None,
+                full_cost: None,
+            },
+            stage: Stage::Guides { y: 0 },
+            progress: 0.0,
+        })
+    }
+
+    /// Does the work of about `rows` rows of texels.
+    pub fn step(&mut self, rows: usize) -> BakeProgress {
+        let rows = rows.max(1);
+        let height = self.map.height();
+        self.stage = match std::mem::replace(&mut self.stage, Stage::Sites) {
+            Stage::Guides { y } => {
+                let end = height.min(y + rows);
+                (y..end).for_each(|y| self.fill_layers(y));
+                if end < height { Stage::Guides { y: end } } else { Stage::Costs { y: 0 } }
+            }
+            Stage::Costs { y } => {
+                let end = height.min(y + rows);
+                for y in y..end {
+                    self.map.lattices[0].set_row(y, &self.map.layers);
+                    self.map.mark_guided(y);
+                }
+                if end < height { Stage::Costs { y: end } } else { Stage::Sites }
+            }
+            Stage::Sites => self.lay_sites(),
+            Stage::Astride(mut astride) => {
+                if astride.advance() {
+                    Stage::Astride(astride)
+                } else {
+                    self.map.strokes = Some(astride.report());
+                    let mut rng = Rng::new(self.seed).stream("sites");
+                    let points = astride.finish(self.map.frame.extent(), &mut rng);
+                    self.map.sites = points.into_iter().map(|point| texel(&self.map.frame, point)).collect();
+                    self.first_level()
+                }
+            }
+            Stage::Walls { y } => {
+                let end = height.min(y + rows);
+                self.map.set_walls(y..end);
+                if end < height { Stage::Walls { y: end } } else { self.next_level() }
+            }
+            Stage::Search => {
+                if self.map.search(rows) {
+                    Stage::Search
+                } else if self.map.levels.len() < self.map.n_levels() {
+                    self.map.lattices.push(self.map.lattices[0].clone());
+                    Stage::Walls { y: 0 }
+                } else {
+                    Stage::Seams(Tracer::new(self.map.frame.size()))
+                }
+            }
+            Stage::Seams(mut tracer) => match self.map.levels.last() {
+                Some(level) if tracer.scan(level, rows) => Stage::Seams(tracer),
+                _ => {
+                    let (seams, full) = self.map.follow(tracer);
+                    self.map.full_cost = Some(full);
+                    Stage::Done(seams)
+                }
+            },
+            done @ Stage::Done(_) => done,
+        };
+        let share = self.share();
+        self.progress = self.progress.max(share);
+        match self.stage {
+            Stage::Done(_) => BakeProgress::Done,
+            _ => BakeProgress::Working(self.progress),
+        }
+    }
+
+    /// The map and its seams, after whatever work is left.
+    #[must_use]
+    pub fn finish(mut self) -> (VoronoiMap, Seams) {
+        while let BakeProgress::Working(_) = self.step(1 << 20) {}
+        match self.stage {
+            Stage::Done(seams) => (self.map, seams),
+            _ => (self.map, Seams::default()),
+        }
+    }
+
+    /// How far the bake is, by what the stages cost.
+    fn share(&self) -> f32 {
+        let rows = |y: usize| y as f32 / self.map.height() as f32;
+        let levels = self.map.n_levels() as f32;
+        let level = |more: f32| 0.5 + 0.4 * (self.map.levels.len() as f32 - 1.0 + more) / levels;
+        match &self.stage {
+            Stage::Guides { y } => 0.3 * rows(*y),
+            Stage::Costs { y } => 0.3 + 0.1 * rows(*y),
+            Stage::Sites => 0.4,
+            Stage::Astride(astride) => 0.4 + 0.1 * astride.progress(),
+            Stage::Walls { .. } => level(1.0),
+            Stage::Search => level(self.map.levels.last().map_or(0.0, Level::progress)),
+            Stage::Seams(tracer) => 0.9 + 0.1 * tracer.progress(),
+            Stage::Done(_) => 1.0,
+        }
+    }
+
+    fn fill_layers(&mut self, y: usize) {
+        let Some((noise, guides)) = self.map.layers.split_first_mut() else { return };
+        self.noise.fill_row(y, noise.values.row_mut(y));
+        for ((layer, guide), resampler) in guides.iter_mut().zip(&self.guides).zip(&self.resamplers) {
+            if let Some(resampler) = resampler {
+                resampler.fill_row(&guide.image, y, layer.values.row_mut(y));
+            }
+        }
+    }
+
+    fn lay_sites(&mut self) -> Stage {
+        let map = &mut self.map;
+        if map.params.layout == SiteLayout::Astride
+            && let Some(astride) = Astride::new(&map.frame, &map.layers, map.params.sites as usize)
+        {
+            return Stage::Astride(Box::new(astride));
+        }
+        map.sites = sites(&map.params, &map.frame, self.seed);
+        self.first_level()
+    }
+
+    fn first_level(&mut self) -> Stage {
+        if self.map.sites.is_empty() {
+            return Stage::Done(Seams { extent: self.map.frame.extent(), ..Seams::default() });
+        }
+        self.next_level()
+    }
+
+    fn next_level(&mut self) -> Stage {
+        let map = &mut self.map;
+        let n = map.sites_of(map.levels.len());
+        map.levels.push(Level::new(map.frame.size(), &map.sites[..n], n, !map.levels.is_empty()));
+        Stage::Search
+    }
+}
+
+impl VoronoiMap {
+    #[cfg(test)]
+    pub(super) fn lattice(&self, level: usize) -> &Lattice {
+        &self.lattices[level]
+    }
+
+    const fn height(&self) -> usize {
+        self.frame.size().y as usize
+    }
+
+    fn n_levels(&self) -> usize {
+        self.params.levels.clamp(1, MAX_LEVELS) as usize
+    }
+
+    /// How many of the sites a level has.
+    fn sites_of(&self, level: usize) -> usize {
+        let finer = self.n_levels() - 1 - level;
+        (self.sites.len() >> (2 * finer)).max(1)
+    }
+
+    /// Sweeps rows of the last level; says whether there is more to do.
+    fn search(&mut self, rows: usize) -> bool {
+        let Some(level) = self.levels.last_mut() else { return false };
+        let (lattice, n) = (&self.lattices[self.lattices.len() - 1], level.n_sites());
+        level.advance(lattice, &self.sites[..n], rows)
+    }
+
+    /// Puts walls between the regions of the last level into the last lattice.
+    fn set_walls(&mut self, rows: std::ops::Range<usize>) {
+        let width = self.frame.size().x as usize;
+        let (mut row, mut below) = (vec![0; width], vec![0; width]);
+        if let (Some(level), Some(lattice)) = (self.levels.last(), self.lattices.last_mut()) {
+            for y in rows {
+                level.wall_row(lattice, y, &mut row, &mut below);
+            }
+        }
+    }
+
+    fn mark_guided(&mut self, y: usize) {
+        let width = self.frame.size().x as usize;
+        let guides = &self.layers[1..];
+        for x0 in (0..width).step_by(BLOCK) {
+            // With the texels to the right and below, whose edges to here belong to this block.
+            let x1 = (x0 + BLOCK + 1).min(width);
+            let rows = y..(y + 2).min(self.frame.size().y as usize);
+            let any = guides
+                .iter()
+                .any(|guide| rows.clone().any(|y| guide.values.row(y)[x0..x1].iter().any(|&value| value > 0)));
+            self.guided.push(any);
+        }
+    }
+
+    /// Where the map lies in pattern space.
+    #[must_use]
+    pub const fn frame(&self) -> &SurfaceFrame {
+        &self.frame
+    }
+
+    /// What was asked.
+    #[must_use]
+    pub const fn params(&self) -> &VoronoiParams {
+        &self.params
+    }
+
+    /// The texel of each site. Of several at one texel only the first has a region.
+    #[must_use]
+    pub fn sites(&self) -> &[UVec2] {
+        &self.sites
+    }
+
+    /// How well the cracks cover the strokes of the guides; `None` unless the layout was [`SiteLayout::Astride`] and
+    /// there are strokes.
+    #[must_use]
+    pub const fn strokes(&self) -> Option<StrokeReport> {
+        self.strokes
+    }
+
+    fn index(&self, x: u32, y: u32) -> Option<usize> {
+        let size = self.frame.size();
+        (x < size.x && y < size.y).then(|| y as usize * size.x as usize + x as usize)
+    }
+
+    /// The region of a texel: the index of its site. `None` outside, and where there are no sites.
+    #[must_use]
+    pub fn region(&self, x: u32, y: u32) -> Option<u32> {
+        Some(self.levels.last()?.region(self.index(x, y)?))
+    }
+
+    /// Cost of the shortest path from the site to a texel, in units of β / 256. `None` outside, and where there are no sites.
+    #[must_use]
+    pub fn cost(&self, x: u32, y: u32) -> Option<u64> {
+        Some(self.levels.last()?.units(self.index(x, y)?))
+    }
+
+    /// The regions of all texels; `None` where there are no sites.
+    #[must_use]
+    pub fn regions(&self) -> Option<Grid<u32>> {
+        let level = self.levels.last()?;
+        let mut regions = Grid::new(self.frame.size(), 0);
+        for y in 0..self.height() {
+            level.fill_regions(y, regions.row_mut(y));
+        }
+        Some(regions)
+    }
+
+    /// The seams that a tracer has found, and the cost of full width.
+    fn follow(&self, tracer: Tracer) -> (Seams, f32) {
+        let layers = &self.layers[1..];
+        let guides = Guidance {
+            ground: self.params.alpha / self.params.beta + 1.0,
+            weight: layers.iter().map(Layer::weight_in_beta).fold(0.0, f32::max),
+            layers,
+        };
+        tracer.finish(&self.levels, &self.params, &self.frame, &guides, self.full_cost)
+    }
+
+    /// The boundaries of the regions.
+    ///
+    /// The cost that stands for full width stays that of the map when it was made, so that widths do not jump as weights change.
+    #[must_use]
+    pub fn seams(&self) -> Seams {
+        let mut tracer = Tracer::new(self.frame.size());
+        match self.levels.last() {
+            Some(level) => {
+                tracer.scan(level, self.height());
+                self.follow(tracer).0
+            }
+            None => Seams { extent: self.frame.extent(), ..Seams::default() },
+        }
+    }
+
+    /// Changes the weights of the guides, with sites and noise as they are (Mould 2005, section 6.1, and eq. 4).
+    ///
+    /// Computes only what can change: the texels whose path led over an edge that has become dearer, and those that
+    /// a cheaper edge brings closer. The result equals a new map's.
+    ///
+    /// ```
+    /// use bevy_crack::{Grid, voronoi::{Guide, VoronoiBake, VoronoiParams}};
+    ///
+    /// // A bar down the middle; the weight of the guide rises from nothing.
+    /// let mut bar = Grid::new([9, 1].into(), 0.0);
+    /// bar.row_mut(0)[4] = 1.0;
+    /// let guide = Guide { gamma: 0.0, ..Guide::new(bar) };
+    /// let mut map = VoronoiBake::new(VoronoiParams::DEFAULT, vec![guide], [90, 90].into(), 1)?.finish().0;
+    /// let before = map.cost(45, 45);
+    /// map.set_gammas(&[28.0])?;
+    /// assert!(map.cost(45, 45) > before);
+    /// # Ok::<(), bevy_crack::voronoi::VoronoiError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// If a weight is out of its range; the map is left as it is. Weights beyond the number of guides are not looked at,
+    /// guides beyond the number of weights keep theirs.
+    pub fn set_gammas(&mut self, gammas: &[f32]) -> Result<(), VoronoiError> {
+        let guides: Vec<Guide> = gammas
+            .iter()
+            .take(self.layers.len() - 1)
+            .map(|&gamma| Guide { gamma, ..Guide::new(Grid::new(UVec2::ZERO, 0.0)) })
+            .collect();
+        self.params.validate(&guides)?;
+        let beta = self.params.beta;
+        for (layer, guide) in self.layers[1..].iter_mut().zip(&guides) {
+            layer.set_weight(guide.gamma / beta);
+        }
+        for i in 0..self.levels.len() {
+            let change = if i == 0 { self.change_base() } else { self.change_walls(i) };
+            let level = &mut self.levels[i];
+            level.reconsider(&self.lattices[i], &change.dearer, &change.cheaper);
+            let n = level.n_sites();
+            while level.advance(&self.lattices[i], &self.sites[..n], usize::MAX) {}
+        }
+        Ok(())
+    }
+
+    /// Brings the first lattice up to date where a guide has anything.
+    fn change_base(&mut self) -> Change {
+        let (width, height) = (self.frame.size().x as usize, self.height());
+        let blocks = width.div_ceil(BLOCK);
+        let (lattice, layers) = (&mut self.lattices[0], &self.layers[..]);
+        let mut change = Change::default();
+        let mut new = [0; BLOCK];
+        for (block, _) in self.guided.iter().enumerate().filter(|(_, guided)| **guided) {
+            let (y, x0) = (block / blocks, block % blocks * BLOCK);
+            let x1 = (x0 + BLOCK).min(width);
+            let new = &mut new[..x1 - x0];
+            edges_across(new, layers, y, x0);
+            change.apply(&mut lattice.across_mut(y)[x0..x1], new, y * width + x0, 1);
+            if y + 1 < height {
+                edges_down(new, layers, y, x0);
+                change.apply(&mut lattice.down_mut(y)[x0..x1], new, y * width + x0, width);
+            }
+        }
+        change
+    }
+
+    /// Brings the lattice of level `i` up to date after the level before has changed.
+    fn change_walls(&mut self, i: usize) -> Change {
+        let (width, height) = (self.frame.size().x as usize, self.height());
+        let mut new = self.lattices[0].clone();
+        let (mut row, mut below) = (vec![0; width], vec![0; width]);
+        let mut change = Change::default();
+        let lattice = &mut self.lattices[i];
+        for y in 0..height {
+            self.levels[i - 1].wall_row(&mut new, y, &mut row, &mut below);
+            change.apply(lattice.across_mut(y), new.across(y), y * width, 1);
+            change.apply(lattice.down_mut(y), new.down(y), y * width, width);
+        }
+        change
+    }
+}
+
+/// The texels on either side of changed edges.
+#[derive(Default)]
+struct Change {
+    dearer: Vec<u32>,
+    cheaper: Vec<u32>,
+}
+
+impl Change {
+    /// Overwrites `edges`, which lead from the texels `first..` each `to` further.
+    fn apply(&mut self, edges: &mut [u16], new: &[u16], first: usize, to: usize) {
+        for (i, (edge, &new)) in edges.iter_mut().zip(new).enumerate() {
+            if *edge != new {
+                let side = if new > *edge { &mut self.dearer } else { &mut self.cheaper };
+                side.extend([(first + i) as u32, (first + i + to) as u32]);
+                *edge = new;
+            }
+        }
+    }
+}

@@ -1,0 +1,43 @@
+//! A picture's own edges as a guide.
+
+use crate::Grid;
+
+/// Edges as strong as this share of the strongest one count in full.
+const FULL: f32 = 0.4;
+
+/// The edges of a picture (lightness 0..=1, or the alpha of a sprite) as a guide: 1 on strong edges, 0 where it is even.
+///
+/// The slope of the picture by Sobel's kernel. A picture without edges gives an empty guide; what is not a number counts
+/// as 0.
+///
+/// ```
+/// use bevy_crack::{Grid, voronoi::edges};
+///
+/// let step = Grid::from_vec([4, 1].into(), vec![0.0, 0.0, 1.0, 1.0]).unwrap();
+/// assert_eq!(edges(&step).as_slice(), [0.0, 1.0, 1.0, 0.0]);
+/// ```
+#[must_use]
+pub fn edges(picture: &Grid<f32>) -> Grid<f32> {
+    let mut slopes = Grid::new(picture.size(), 0.0f32);
+    let (w, h) = (picture.width(), picture.height());
+    let mut strongest = 0.0f32;
+    for y in 0..h {
+        let rows = [y.saturating_sub(1), y, (y + 1).min(h - 1)].map(|y| picture.row(y));
+        for x in 0..w {
+            let columns = [x.saturating_sub(1), x, (x + 1).min(w - 1)];
+            let value = |row: usize, column: usize| {
+                let value = rows[row][columns[column]];
+                if value > 0.0 { value.min(1.0) } else { 0.0 }
+            };
+            let side = |k: usize| value(0, k) + 2.0 * value(1, k) + value(2, k);
+            let level = |k: usize| value(k, 0) + 2.0 * value(k, 1) + value(k, 2);
+            let (dx, dy) = (side(2) - side(0), level(2) - level(0));
+            let slope = (dx * dx + dy * dy).sqrt();
+            slopes.row_mut(y)[x] = slope;
+            strongest = strongest.max(slope);
+        }
+    }
+    let scale = 1.0 / (strongest * FULL).max(1.0e-6);
+    slopes.as_mut_slice().iter_mut().for_each(|slope| *slope = (*slope * scale).min(1.0));
+    slopes
+}

@@ -1,0 +1,82 @@
+//! Cracks that draw a picture, all at once: Voronoi diagrams of a weighted graph.
+//!
+//! The method of Mould 2005 ("Image-Guided Fracture"): every texel is joined to its four neighbours by edges that cost
+//!
+//! ```text
+//! e_ij = α max(N_i, N_j) + β + Σ_k γ_k max(I^k_i, I^k_j)        (eq. 1, 2 and 4)
+//! ```
+//!
+//! where `N` is noise and the `I^k` are guides. A texel belongs to the *site* that has the cheapest path to it. Where two
+//! regions meet there is a crack; strokes of a guide are dear to cross, so regions from either side meet in their middle.
+//!
+//! [`VoronoiParams`] and [`Guide`] are what is asked, [`VoronoiBake`] what runs, row by row; [`VoronoiMap`] has regions and
+//! costs of every texel, [`Seams`] the cracks as lines. Costs are whole numbers (β is 256 units), so the map is the same on
+//! every machine; ties go to the lower site.
+//!
+//! Differs from the paper: a level of cracks divides the regions of the one before exactly, as if crossing an
+//! older crack had no price; the paper only makes it dearer.
+//!
+//! ```
+//! use bevy_crack::voronoi::{SiteLayout, VoronoiParams, voronoi_map};
+//! use std::ops::ControlFlow;
+//!
+//! // Two sites and no noise: the crack runs half way between them.
+//! let sites = SiteLayout::Given(vec![[0.1, 0.3].into(), [0.5, 0.3].into()]);
+//! let params = VoronoiParams { alpha: 0.0, layout: sites, ..VoronoiParams::DEFAULT };
+//! let map = voronoi_map(&params, &[], [7, 5].into(), 1, |_| ControlFlow::Continue(()))?;
+//! for y in 0..5 {
+//!     let row: Vec<_> = (0..7).filter_map(|x| map.region(x, y)).collect();
+//!     assert_eq!(row, [0, 0, 1, 1, 1, 1, 1]);
+//! }
+//! # Ok::<(), bevy_crack::voronoi::VoronoiError>(())
+//! ```
+
+mod bake;
+mod edges;
+mod front;
+mod lattice;
+mod level;
+mod noise;
+mod params;
+mod resample;
+mod seams;
+mod search;
+mod sites;
+mod strokes;
+#[cfg(test)]
+mod tests;
+
+pub use bake::{BakeProgress, VoronoiBake, VoronoiMap};
+pub use edges::edges;
+pub use front::{FRONT_STEP, Front};
+pub use params::{Guide, MAX_LEVELS, MAX_SITES, SiteLayout, VoronoiError, VoronoiParams};
+pub use seams::{Seam, SeamVertex, Seams};
+pub use strokes::StrokeReport;
+
+use glam::UVec2;
+use std::ops::ControlFlow;
+
+/// Rows between two calls of a progress callback.
+const SLICE: usize = 64;
+
+/// Nearest site and path cost of every texel over the weighted lattice, in one go.
+///
+/// `progress` is told the share that is done and stops the work with `Break`.
+///
+/// # Errors
+/// If a parameter or the size is out of its range, or `progress` asked to stop.
+pub fn voronoi_map(
+    params: &VoronoiParams,
+    guides: &[Guide],
+    size: UVec2,
+    seed: u64,
+    mut progress: impl FnMut(f32) -> ControlFlow<()>,
+) -> Result<VoronoiMap, VoronoiError> {
+    let mut bake = VoronoiBake::new(params.clone(), guides.to_vec(), size, seed)?;
+    while let BakeProgress::Working(share) = bake.step(SLICE) {
+        if progress(share).is_break() {
+            return Err(VoronoiError::Cancelled);
+        }
+    }
+    Ok(bake.finish().0)
+}

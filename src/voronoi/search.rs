@@ -1,0 +1,319 @@
+//! Exact shortest paths from all sites at once: [`Search`].
+//!
+//! Cost and site of a texel are one number, the cost above the site, so that one `min` does it all and a tie goes to
+//! the lower site. Rows are swept down and up: each takes over what is cheaper by way of the row before, then passes it
+//! on along itself, right and left. That reaches the costs of Dijkstra's method, since a row is at rest only if no
+//! neighbour has a cheaper way into it; rows are cut into blocks with stamps of time, so that a block at rest beside
+//! blocks at rest is not looked at.
+
+use super::lattice::{Lattice, WALL};
+use glam::UVec2;
+
+/// Texels of a block.
+pub(super) const BLOCK: usize = 128;
+
+/// Cost and site of a texel in one number.
+pub(super) trait Packed: Copy + Ord {
+    /// Of a texel that no path has reached. Adding an edge does not overflow.
+    const FAR: Self;
+    /// How many sites there can be.
+    const MAX_SITES: usize;
+    /// The site itself.
+    fn site(index: u32) -> Self;
+    /// One edge further.
+    fn plus(self, edge: u16) -> Self;
+    /// Index of the site.
+    fn index(self) -> u32;
+    /// Cost in units.
+    fn cost(self) -> u64;
+}
+
+/// For up to 256 sites and costs below 32,000 β: 23 bits of cost, 8 of site.
+impl Packed for i32 {
+    const FAR: Self = Self::MAX - ((WALL as Self) << 8) - 255;
+    const MAX_SITES: usize = 1 << 8;
+
+    #[inline(always)]
+    fn site(index: u32) -> Self {
+        (index & 0xFF) as Self
+    }
+
+    #[inline(always)]
+    fn plus(self, edge: u16) -> Self {
+        self + (Self::from(edge) << 8)
+    }
+
+    fn index(self) -> u32 {
+        (self & 0xFF) as u32
+    }
+
+    fn cost(self) -> u64 {
+        (self >> 8) as u64
+    }
+}
+
+/// For everything else: 47 bits of cost, 16 of site.
+impl Packed for i64 {
+    const FAR: Self = Self::MAX - ((WALL as Self) << 16) - 0xFFFF;
+    const MAX_SITES: usize = 1 << 16;
+
+    #[inline(always)]
+    fn site(index: u32) -> Self {
+        Self::from(index & 0xFFFF)
+    }
+
+    #[inline(always)]
+    fn plus(self, edge: u16) -> Self {
+        self + (Self::from(edge) << 16)
+    }
+
+    fn index(self) -> u32 {
+        (self & 0xFFFF) as u32
+    }
+
+    fn cost(self) -> u64 {
+        (self >> 16) as u64
+    }
+}
+
+/// One edge further, or nowhere through a wall.
+#[inline(always)]
+fn step<P: Packed, const WALLS: bool>(from: P, edge: u16) -> P {
+    if WALLS && edge == WALL { P::FAR } else { from.plus(edge) }
+}
+
+#[inline(always)]
+fn min<P: Packed>(a: P, b: P) -> P {
+    if a < b { a } else { b }
+}
+
+/// When a block of a row changed, and when it last took over from the rows above and below.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Stamps {
+    changed: u32,
+    looked: [u32; 2],
+    /// To be passed on along its row whatever the rows beside it say.
+    stirred: bool,
+}
+
+/// The state of a search, which can stand still between any two rows.
+#[derive(Clone, Debug)]
+pub(super) struct Search<P> {
+    size: UVec2,
+    field: Vec<P>,
+    blocks: usize,
+    stamps: Vec<Stamps>,
+    /// Whether a block of the present row is to be passed on.
+    active: Vec<bool>,
+    clock: u32,
+    /// The next row of the sweep.
+    row: usize,
+    upwards: bool,
+    /// Whether this sweep has changed anything, and how many in a row have not.
+    moved: bool,
+    quiet: u32,
+    /// Sweeps begun since the search was last at rest.
+    sweeps: u32,
+}
+
+impl<P: Packed> Search<P> {
+    pub(super) fn new(size: UVec2) -> Self {
+        let (w, h) = (size.x as usize, size.y as usize);
+        let blocks = w.div_ceil(BLOCK);
+        Self {
+            size,
+            field: vec![P::FAR; w * h],
+            blocks,
+            stamps: vec![Stamps::default(); blocks * h],
+            active: vec![false; blocks],
+            clock: 1,
+            row: 0,
+            upwards: false,
+            moved: false,
+            quiet: 2,
+            sweeps: 0,
+        }
+    }
+
+    pub(super) fn field(&self) -> &[P] {
+        &self.field
+    }
+
+    /// A source of paths; of two at one texel the lower index stays.
+    pub(super) fn add_site(&mut self, texel: UVec2, index: u32) {
+        let i = texel.y as usize * self.size.x as usize + texel.x as usize;
+        self.field[i] = min(self.field[i], P::site(index));
+        self.stir(texel.x as usize, texel.y as usize);
+    }
+
+    /// Has the block of a texel looked at again, and by its neighbours.
+    fn stir(&mut self, x: usize, y: usize) {
+        self.stamps[y * self.blocks + x / BLOCK] = Stamps { changed: self.clock, looked: [0; 2], stirred: true };
+        self.quiet = 0;
+    }
+
+    /// Takes over changed costs of edges: the search is at rest again, after further sweeps, where a new one would be.
+    ///
+    /// `dearer` are the texels on either side of edges that have become dearer, `cheaper` those of edges that have
+    /// become cheaper. A texel whose path has become dearer is forgotten, and with it every texel that may have come by
+    /// it; the others stay. No texel holds itself up, since each step costs something.
+    pub(super) fn reconsider(&mut self, lattice: &Lattice, dearer: &[u32], cheaper: &[u32]) {
+        let (w, n) = (self.size.x as usize, self.field.len());
+        for &texel in cheaper {
+            self.stir(texel as usize % w, texel as usize / w);
+        }
+        let mut suspects = dearer.to_vec();
+        while let Some(suspect) = suspects.pop() {
+            let i = suspect as usize;
+            let here = self.field[i];
+            if here >= P::FAR || here.cost() == 0 {
+                continue;
+            }
+            let x = i % w;
+            let around = [
+                (x + 1 < w).then(|| (i + 1, lattice.edges(i).0)),
+                (x > 0).then(|| (i - 1, lattice.edges(i - 1).0)),
+                (i + w < n).then(|| (i + w, lattice.edges(i).1)),
+                (i >= w).then(|| (i - w, lattice.edges(i - w).1)),
+            ];
+            let mut neighbours = around.into_iter().flatten();
+            if neighbours.clone().any(|(from, edge)| step::<P, true>(self.field[from], edge) <= here) {
+                continue;
+            }
+            let leads_to = |&(to, edge): &(usize, u16)| step::<P, true>(here, edge) <= self.field[to];
+            suspects.extend(neighbours.by_ref().filter(leads_to).map(|(to, _)| to as u32));
+            self.field[i] = P::FAR;
+            self.stir(x, i / w);
+        }
+    }
+
+    /// Whether every texel has its cost.
+    pub(super) const fn at_rest(&self) -> bool {
+        self.quiet >= 2
+    }
+
+    /// How far the search is, 0..=1: a guess from the number of sweeps, of which three or four do most of the work.
+    pub(super) fn progress(&self) -> f32 {
+        if self.at_rest() {
+            return 1.0;
+        }
+        let height = self.size.y.max(1) as f32;
+        let row = if self.upwards { height - self.row as f32 } else { self.row as f32 };
+        let sweeps = self.sweeps as f32 + row / height;
+        sweeps / (sweeps + 1.0)
+    }
+
+    /// Sweeps up to `rows` rows.
+    pub(super) fn advance<const WALLS: bool>(&mut self, lattice: &Lattice, rows: usize) {
+        let height = self.size.y as usize;
+        for _ in 0..rows {
+            if self.at_rest() {
+                self.sweeps = 0;
+                return;
+            }
+            if self.upwards {
+                self.visit::<WALLS>(lattice, self.row, (self.row + 1 < height).then_some(self.row + 1));
+            } else {
+                self.visit::<WALLS>(lattice, self.row, self.row.checked_sub(1));
+            }
+            let last = if self.upwards { 0 } else { height - 1 };
+            if self.row != last {
+                self.row = if self.upwards { self.row - 1 } else { self.row + 1 };
+                continue;
+            }
+            self.upwards = !self.upwards;
+            self.sweeps += 1;
+            self.quiet = if self.moved { 0 } else { self.quiet + 1 };
+            self.moved = false;
+        }
+    }
+
+    /// Sweeps to the end.
+    #[cfg(test)]
+    pub(super) fn finish<const WALLS: bool>(&mut self, lattice: &Lattice) {
+        while !self.at_rest() {
+            self.advance::<WALLS>(lattice, 1 << 20);
+        }
+    }
+
+    /// Takes over what is cheaper from row `before` and passes it on along row `y`.
+    fn visit<const WALLS: bool>(&mut self, lattice: &Lattice, y: usize, before: Option<usize>) {
+        let (w, blocks, side) = (self.size.x as usize, self.blocks, usize::from(self.upwards));
+        let mut any = false;
+        for b in 0..blocks {
+            let stamps = self.stamps[y * blocks + b];
+            let mut active = stamps.stirred;
+            if let Some(before) = before
+                && self.stamps[before * blocks + b].changed > stamps.looked[side]
+            {
+                self.stamps[y * blocks + b].looked[side] = self.clock;
+                let (x0, x1) = (b * BLOCK, ((b + 1) * BLOCK).min(w));
+                let (above, below) = self.field.split_at_mut(y.max(before) * w);
+                let edges = &lattice.down(y.min(before))[x0..x1];
+                active |= if before < y {
+                    pull::<P, WALLS>(&mut below[x0..x1], &above[before * w + x0..before * w + x1], edges)
+                } else {
+                    pull::<P, WALLS>(&mut above[y * w + x0..y * w + x1], &below[x0..x1], edges)
+                };
+            }
+            self.active[b] = active;
+            any |= active;
+        }
+        self.clock += 1;
+        if any {
+            self.moved = true;
+            self.pass_on::<WALLS>(lattice, y);
+        }
+    }
+
+    /// Along row `y`, to the right and then to the left; blocks that nothing enters are left out.
+    fn pass_on<const WALLS: bool>(&mut self, lattice: &Lattice, y: usize) {
+        let w = self.size.x as usize;
+        let row = &mut self.field[y * w..(y + 1) * w];
+        let edges = lattice.across(y);
+        for b in 0..self.blocks {
+            let (x0, x1) = (b * BLOCK, ((b + 1) * BLOCK).min(w));
+            let mut from = P::FAR;
+            if b > 0 {
+                from = step::<P, WALLS>(row[x0 - 1], edges[x0 - 1]);
+                self.active[b] |= from < row[x0];
+            }
+            if self.active[b] {
+                for (texel, &edge) in row[x0..x1].iter_mut().zip(&edges[x0..x1]) {
+                    *texel = min(*texel, from);
+                    from = step::<P, WALLS>(*texel, edge);
+                }
+            }
+        }
+        for b in (0..self.blocks).rev() {
+            let (x0, x1) = (b * BLOCK, ((b + 1) * BLOCK).min(w));
+            let mut from = row[x1 - 1];
+            if x1 < w {
+                from = step::<P, WALLS>(row[x1], edges[x1 - 1]);
+                self.active[b] |= from < row[x1 - 1];
+            }
+            if self.active[b] {
+                row[x1 - 1] = min(row[x1 - 1], from);
+                from = row[x1 - 1];
+                for (texel, &edge) in row[x0..x1 - 1].iter_mut().zip(&edges[x0..x1 - 1]).rev() {
+                    *texel = min(*texel, step::<P, WALLS>(from, edge));
+                    from = *texel;
+                }
+                let stamps = &mut self.stamps[y * self.blocks + b];
+                stamps.changed = self.clock;
+                stamps.stirred = false;
+            }
+        }
+    }
+}
+
+/// Takes over what is cheaper by way of `from`; says whether anything was.
+fn pull<P: Packed, const WALLS: bool>(row: &mut [P], from: &[P], edges: &[u16]) -> bool {
+    let mut any = 0u8;
+    for ((texel, &from), &edge) in row.iter_mut().zip(from).zip(edges) {
+        let by = step::<P, WALLS>(from, edge);
+        any |= u8::from(by < *texel);
+        *texel = min(*texel, by);
+    }
+    any != 0
+}

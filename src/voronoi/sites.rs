@@ -1,0 +1,125 @@
+//! Where sites lie.
+
+use super::{SiteLayout, VoronoiParams, params::MAX_SITES};
+use crate::{
+    Grid,
+    math::{Rng, ops},
+    pattern::SurfaceFrame,
+};
+use glam::{UVec2, Vec2};
+
+/// Darts thrown in vain before sites may lie closer together.
+const TRIES: u32 = 30;
+
+/// By how much they then may.
+const CLOSER: f32 = 0.93;
+
+/// The texel of a point, pattern units.
+pub(super) fn texel(frame: &SurfaceFrame, pos: Vec2) -> UVec2 {
+    frame.to_texel(pos).max(Vec2::ZERO).as_uvec2().min(frame.size() - 1)
+}
+
+/// The sites of every layout but [`SiteLayout::Astride`], in an order of which every beginning is such a layout too.
+pub(super) fn sites(params: &VoronoiParams, frame: &SurfaceFrame, seed: u64) -> Vec<UVec2> {
+    let mut rng = Rng::new(seed).stream("sites");
+    let n = params.sites.min(MAX_SITES) as usize;
+    let extent = frame.extent();
+    let points = match &params.layout {
+        SiteLayout::Uniform => (0..n).map(|_| Vec2::new(rng.unit(), rng.unit()) * extent).collect(),
+        SiteLayout::Even | SiteLayout::Astride => even(n, Vec::new(), extent, &mut rng, |_| true),
+        SiteLayout::Impact { at, focus } => around(n, *at, *focus, extent, &mut rng),
+        SiteLayout::Density(density) => {
+            by_density(n, density, extent, &mut rng).unwrap_or_else(|| even(n, Vec::new(), extent, &mut rng, |_| true))
+        }
+        SiteLayout::Given(points) => {
+            points.iter().copied().filter(|point| point.is_finite()).take(MAX_SITES as usize).collect()
+        }
+    };
+    points.into_iter().map(|point| texel(frame, point)).collect()
+}
+
+/// Adds points to `points` until there are `n`, each as far from all others as a few darts can find.
+pub(super) fn even(
+    n: usize,
+    mut points: Vec<Vec2>,
+    extent: Vec2,
+    rng: &mut Rng,
+    allowed: impl Fn(Vec2) -> bool,
+) -> Vec<Vec2> {
+    if n <= points.len() {
+        return points;
+    }
+    // About two points to a cell at the end.
+    let cell = (2.0 * extent.x * extent.y / n as f32).sqrt();
+    let columns = (extent / cell).ceil().max(Vec2::ONE).as_uvec2();
+    let mut cells = vec![Vec::<u32>::new(); columns.x as usize * columns.y as usize];
+    let cell_of = |point: Vec2| (point / cell).max(Vec2::ZERO).as_uvec2().min(columns - 1);
+    let index = |at: UVec2| at.y as usize * columns.x as usize + at.x as usize;
+    for (i, &point) in (0u32..).zip(&points) {
+        cells[index(cell_of(point))].push(i);
+    }
+    let mut apart = 0.9 * (extent.x * extent.y / (points.len() + 1) as f32).sqrt();
+    let mut missed = 0;
+    while points.len() < n {
+        let dart = Vec2::new(rng.unit(), rng.unit()) * extent;
+        let (low, high) = (cell_of(dart - apart), cell_of(dart + apart));
+        let mut near = (low.y..=high.y).flat_map(|y| (low.x..=high.x).map(move |x| UVec2::new(x, y)));
+        let free = |i: &u32| points[*i as usize].distance_squared(dart) >= apart * apart;
+        if (allowed(dart) || apart < 1.0e-4) && near.all(|at| cells[index(at)].iter().all(free)) {
+            cells[index(cell_of(dart))].push(points.len() as u32);
+            points.push(dart);
+            missed = 0;
+        } else {
+            missed += 1;
+            if missed == TRIES {
+                missed = 0;
+                apart *= CLOSER;
+            }
+        }
+    }
+    points
+}
+
+fn around(n: usize, at: Vec2, focus: f32, extent: Vec2, rng: &mut Rng) -> Vec<Vec2> {
+    let at = at.clamp(Vec2::ZERO, extent);
+    let reach = at.max(extent - at).length();
+    let mut point = || {
+        // At least a quarter of the circle lies on the surface.
+        for _ in 0..64 {
+            let radius = reach * ops::powf(rng.unit(), focus);
+            let point = at + ops::unit(rng.unit() * std::f32::consts::TAU) * radius;
+            if point.cmpge(Vec2::ZERO).all() && point.cmplt(extent).all() {
+                return point;
+            }
+        }
+        at
+    };
+    (0..n).map(|_| point()).collect()
+}
+
+/// `None` where the density is zero everywhere.
+fn by_density(n: usize, density: &Grid<f32>, extent: Vec2, rng: &mut Rng) -> Option<Vec<Vec2>> {
+    let most = density.as_slice().iter().copied().filter(|value| value.is_finite()).fold(0.0, f32::max);
+    if most <= 0.0 {
+        return None;
+    }
+    // Whole numbers, so that the sum does not depend on the order.
+    let mut sum = 0u64;
+    let weight = |value: f32| if value.is_finite() { (value.max(0.0) / most * 65536.0) as u64 } else { 0 };
+    let sums: Vec<u64> = density
+        .as_slice()
+        .iter()
+        .map(|&value| {
+            sum += weight(value);
+            sum
+        })
+        .collect();
+    let cell = extent / density.size().as_vec2();
+    let point = |_| {
+        let drawn = (u128::from(u64::from(rng.next_u32()) << 32 | u64::from(rng.next_u32())) * u128::from(sum)) >> 64;
+        let i = sums.partition_point(|&sum| u128::from(sum) <= drawn);
+        let corner = Vec2::new((i % density.width()) as f32, (i / density.width()) as f32);
+        (corner + Vec2::new(rng.unit(), rng.unit())) * cell
+    };
+    Some((0..n).map(point).collect())
+}

@@ -1,0 +1,235 @@
+//! Masks: what is read out of pictures, and how it is asked.
+
+use bevy_crack::{
+    Grid,
+    math::Rng,
+    pattern::{CrackMask, MaskError},
+};
+use glam::{UVec2, Vec2};
+use image::RgbaImage;
+use std::path::Path;
+
+fn texture(name: &str) -> RgbaImage {
+    image::open(Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/textures").join(name)).unwrap().to_rgba8()
+}
+
+fn weak(picture: &RgbaImage) -> Option<Grid<f32>> {
+    CrackMask::weak_from_picture(picture.dimensions().into(), picture.as_raw()).unwrap()
+}
+
+/// Distance of a point of `brick_red.png` (512 x 512) to the middle of the nearest mortar joint, texels. The wall was
+/// measured by hand: courses of 32 texels, stones of 64, every other course half a stone along.
+fn to_joint(at: Vec2) -> f32 {
+    let to_multiple = |x: f32, of: f32| (x - (x / of).round() * of).abs();
+    let shift = if (at.y / 32.0).floor() as i32 % 2 == 0 { 0.0 } else { 32.0 };
+    to_multiple(at.y, 32.0).min(to_multiple(at.x + shift, 64.0))
+}
+
+#[test]
+fn the_mortar_of_a_brick_wall_is_one_clean_net() {
+    let layer = weak(&texture("brick_red.png")).expect("a brick wall has joints");
+    if let Some(folder) = std::env::var_os("SHOW_MASKS") {
+        save(&layer, &Path::new(&folder).join("brick_red_weak.png"));
+    }
+    let mask = CrackMask { weak: Some(layer.clone()), ..CrackMask::default() };
+    let (mut in_joints, mut found, mut marked, mut astray) = (0, 0, 0, 0);
+    for y in 0..512 {
+        for x in 0..512 {
+            let at = Vec2::new(x as f32, y as f32) + 0.5;
+            let is_marked = mask.weak_at(at / 512.0) > 0.5;
+            in_joints += u32::from(to_joint(at) < 1.0);
+            found += u32::from(to_joint(at) < 1.0 && is_marked);
+            marked += u32::from(is_marked);
+            astray += u32::from(to_joint(at) > 5.0 && is_marked);
+        }
+    }
+    let (recall, error) = (found as f32 / in_joints as f32, astray as f32 / marked as f32);
+    let cover = marked as f32 / (512.0 * 512.0);
+    println!(
+        "mortar: {:.1} % of the joints found, {:.2} % of the mask off them, {:.1} % covered",
+        100.0 * recall,
+        100.0 * error,
+        100.0 * cover
+    );
+    assert!(recall > 0.95, "{recall}");
+    assert!(error < 0.01, "{error}");
+    assert!(cover < 0.25, "{cover}");
+    let parts = parts(&layer);
+    let most = *parts.iter().max().unwrap_or(&0) as f32 / parts.iter().sum::<usize>() as f32;
+    assert!(most > 0.99, "the joints hang together: {parts:?}");
+}
+
+/// Texels of each connected part above one half.
+fn parts(layer: &Grid<f32>) -> Vec<usize> {
+    let (w, h) = (layer.width() as i32, layer.height() as i32);
+    let mut open: Vec<bool> = layer.as_slice().iter().map(|v| *v > 0.5).collect();
+    let mut parts = Vec::new();
+    for first in 0..open.len() {
+        let (mut todo, mut count) = (vec![first as i32], 0);
+        while let Some(i) = todo.pop() {
+            if !core::mem::take(&mut open[i as usize]) {
+                continue;
+            }
+            count += 1;
+            for (dx, dy) in [(-1, -1), (0, -1), (1, -1), (-1, 0), (1, 0), (-1, 1), (0, 1), (1, 1)] {
+                let (x, y) = (i % w + dx, i / w + dy);
+                if (0..w).contains(&x) && (0..h).contains(&y) {
+                    todo.push(y * w + x);
+                }
+            }
+        }
+        parts.extend((count > 0).then_some(count));
+    }
+    parts
+}
+
+fn save(layer: &Grid<f32>, path: &Path) {
+    let texels = layer.as_slice().iter().map(|v| (255.0 * v) as u8).collect();
+    image::GrayImage::from_raw(layer.size().x, layer.size().y, texels).unwrap().save(path).unwrap();
+}
+
+#[test]
+fn joints_of_either_kind_are_found_and_edges_are_none() {
+    let drawn = |size: u32, paint: &dyn Fn(u32, u32) -> u8| {
+        let mut rng = Rng::new(3);
+        RgbaImage::from_fn(size, size, |x, y| {
+            let shade = paint(x, y).saturating_add((rng.unit() * 12.0) as u8);
+            image::Rgba([shade, shade, shade, 255])
+        })
+    };
+    for (size, pitch, thick) in [(256, 64, 3), (512, 64, 4), (700, 100, 8), (120, 30, 2)] {
+        let is_joint = |x: u32, y: u32| x % pitch < thick || y % pitch < thick;
+        for (ground, joint) in [(120, 190), (120, 60)] {
+            let layer = weak(&drawn(size, &|x, y| if is_joint(x, y) { joint } else { ground })).expect("joints");
+            let mask = CrackMask { weak: Some(layer), ..CrackMask::default() };
+            let value = |x: f32, y: f32| mask.weak_at(Vec2::new(x, y) / size as f32);
+            // Along each joint and along the middle of the stones, away from the crossings.
+            let (middle, half) = (thick as f32 / 2.0, pitch as f32 / 2.0);
+            for joint in (1..size / pitch).map(|i| (i * pitch) as f32) {
+                for across in (0..size / pitch).map(|i| (i * pitch) as f32 + half) {
+                    assert!(value(joint + middle, across) > 0.5, "{size}, {ground}: joint at x {joint}, y {across}");
+                    assert!(value(across, joint + middle) > 0.5, "{size}, {ground}: joint at y {joint}, x {across}");
+                    assert!(value(joint + half, across) < 0.1, "{size}, {ground}: stone at {joint}, {across}");
+                }
+            }
+        }
+        // The same distances as mere edges: a chessboard.
+        let chess = drawn(size, &|x, y| if (x / pitch + y / pitch) % 2 == 0 { 190 } else { 120 });
+        assert!(weak(&chess).is_none(), "a chessboard of {size} has no joints");
+    }
+}
+
+#[test]
+fn pictures_without_joints_have_no_lines() {
+    for name in ["concrete_fine.png", "clay.png"] {
+        assert!(weak(&texture(name)).is_none(), "{name}");
+    }
+    for size in [1, 2, 3, 40] {
+        assert!(weak(&RgbaImage::from_pixel(size, 1, image::Rgba([9, 9, 9, 255]))).is_none());
+    }
+    assert!(weak(&RgbaImage::new(3000, 2)).is_none());
+}
+
+#[test]
+fn forbidden_is_what_is_less_than_half_opaque() {
+    let size = UVec2::new(4, 1);
+    let rgba: Vec<u8> = [0, 127, 128, 255].iter().flat_map(|alpha| [200, 10, 10, *alpha]).collect();
+    let mask = CrackMask::from_picture(size, &rgba).unwrap();
+    let forbidden = [0.1, 0.3, 0.6, 0.9].map(|u| mask.is_forbidden(Vec2::new(u, 0.5)));
+    assert_eq!(forbidden, [true, true, false, false]);
+    assert!(mask.is_forbidden(Vec2::new(-5.0, 9.0)), "beyond the border as at the border");
+    assert!(!mask.is_forbidden(Vec2::NAN));
+    let opaque = [7, 7, 7, 255].repeat(4);
+    assert!(CrackMask::from_picture(size, &opaque).unwrap().is_empty());
+}
+
+/// A layer of random zeros and ones.
+fn random_layer(rng: &mut Rng, share: f32) -> Grid<f32> {
+    let size = UVec2::new(1 + (rng.unit() * 9.0) as u32, 1 + (rng.unit() * 9.0) as u32);
+    let texels: Vec<u8> = (0..size.x * size.y).map(|_| if rng.unit() < share { 255 } else { 0 }).collect();
+    CrackMask::layer(size, &texels).unwrap()
+}
+
+#[test]
+fn lines_that_meet_a_forbidden_texel_are_blocked() {
+    let mut rng = Rng::new(5);
+    let (mut free, mut blocked) = (0, 0);
+    for _ in 0..5_000 {
+        let layer = random_layer(&mut rng, 0.15);
+        let size = layer.size().as_dvec2();
+        let mask = CrackMask { forbidden: Some(layer), ..CrackMask::default() };
+        let mut point = || Vec2::new(rng.unit(), rng.unit());
+        let (from, to) = (point(), point());
+        // The length of the line within each texel, in double precision (slabs).
+        let (a, b) = (from.as_dvec2() * size, to.as_dvec2() * size);
+        let inside = |x: u32, y: u32| {
+            let clip = |low: f64, a: f64, b: f64| {
+                let (t0, t1) = ((low - a) / (b - a), (low + 1.0 - a) / (b - a));
+                (t0.min(t1), t0.max(t1))
+            };
+            let ((x0, x1), (y0, y1)) = (clip(f64::from(x), a.x, b.x), clip(f64::from(y), a.y, b.y));
+            x1.min(y1).min(1.0) - x0.max(y0).max(0.0)
+        };
+        let (mut most, mut least) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
+        for y in 0..size.y as u32 {
+            for x in 0..size.x as u32 {
+                let center = (Vec2::new(x as f32, y as f32) + 0.5) / size.as_vec2();
+                if mask.is_forbidden(center) {
+                    most = most.max(inside(x, y));
+                    least = least.max(inside(x, y) + 1.0e-5);
+                }
+            }
+        }
+        let is_blocked = mask.blocks(from, to);
+        if most > 1.0e-5 {
+            assert!(is_blocked, "{from} to {to} runs through a forbidden texel");
+            blocked += 1;
+        } else if least < 0.0 {
+            assert!(!is_blocked, "{from} to {to} is free");
+            free += 1;
+        }
+    }
+    assert!(free > 1_000 && blocked > 1_000, "{free} free, {blocked} blocked");
+}
+
+#[test]
+fn values_between_texels_are_bilinear() {
+    let mut rng = Rng::new(6);
+    for _ in 0..2_000 {
+        let layer = random_layer(&mut rng, 0.5);
+        let size = layer.size();
+        let uv = Vec2::new(rng.unit() * 1.4 - 0.2, rng.unit() * 1.4 - 0.2);
+        // The sum over all texels of tents around their centres.
+        let at = (uv.as_dvec2() * size.as_dvec2()).clamp(glam::DVec2::splat(0.5), size.as_dvec2() - 0.5);
+        let mut sum = 0.0;
+        for y in 0..size.y {
+            for x in 0..size.x {
+                let tent = |center: f64, at: f64| (1.0 - (at - center).abs()).max(0.0);
+                let weight = tent(f64::from(x) + 0.5, at.x) * tent(f64::from(y) + 0.5, at.y);
+                sum += weight * f64::from(layer.get(x, y).unwrap());
+            }
+        }
+        let mask = CrackMask { weak: Some(layer.clone()), strong: Some(layer), forbidden: None };
+        assert!((f64::from(mask.weak_at(uv)) - sum).abs() < 1.0e-5, "{uv}");
+        assert_eq!(mask.weak_at(uv), mask.strong_at(uv));
+    }
+}
+
+#[test]
+fn odd_layers_are_refused_or_harmless() {
+    for (size, length) in [([0, 4], 0), ([2, 2], 3), ([2, 2], 5), ([2, 2], 8), ([20_000, 1], 20_000), ([1, 1], 0)] {
+        let error = MaskError { width: size[0], height: size[1], length };
+        assert_eq!(CrackMask::layer(size.into(), &vec![0; length]), Err(error));
+        assert_eq!(CrackMask::from_picture(size.into(), &vec![0; length]), Err(error));
+    }
+    let strange = Grid::from_vec(UVec2::new(4, 1), vec![f32::NAN, f32::INFINITY, -3.0, 7.0]).unwrap();
+    let none = Grid::new(UVec2::ZERO, 1.0);
+    for layer in [strange, none] {
+        let mask = CrackMask { weak: Some(layer.clone()), strong: Some(layer.clone()), forbidden: Some(layer) };
+        for u in [-1.0e30, -1.0, 0.0, 0.1, 0.4, 0.6, 0.9, 1.0, 1.0e30, f32::NAN, f32::INFINITY] {
+            let uv = Vec2::new(u, 0.5);
+            assert!((0.0..=1.0).contains(&mask.weak_at(uv)) && (0.0..=1.0).contains(&mask.strong_at(uv)), "{u}");
+            assert_eq!(mask.blocks(uv, uv), mask.is_forbidden(uv), "{u}");
+        }
+    }
+}
