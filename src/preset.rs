@@ -138,14 +138,7 @@ impl CrackPreset {
             variety: 0.8,
             ..GrowthParams::DEFAULT
         },
-        profile: Profile {
-            depth: 1.0,
-            full_width: 0.016,
-            wall: 0.3,
-            rim_width: 0.006,
-            rim_depth: 0.16,
-            faintest: 0.6,
-        },
+        profile: Profile { depth: 1.0, full_width: 0.016, wall: 0.3, rim_width: 0.006, rim_depth: 0.16, faintest: 0.6 },
         look: Look::GROOVE,
         steps_per_second: 60.0,
     };

@@ -129,11 +129,8 @@ pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
 
     let frame = SurfaceFrame::new(size)?;
     let mut growth = CrackGrowth::new(preset.growth.clone(), frame.extent(), options.seed)?;
-    let mut layers = if options.mask_from_picture {
-        CrackMask::from_picture(size, base.as_raw())?
-    } else {
-        CrackMask::default()
-    };
+    let mut layers =
+        if options.mask_from_picture { CrackMask::from_picture(size, base.as_raw())? } else { CrackMask::default() };
     for (layer, path) in [
         (&mut layers.weak, &options.weak),
         (&mut layers.strong, &options.strong),

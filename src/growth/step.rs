@@ -553,8 +553,7 @@ impl CrackGrowth {
     /// Whether a place lies on a crack, or as good as.
     fn is_on_crack(&self, place: Vec2) -> bool {
         let close = 0.3 * self.params.step_length;
-        self.params.arrest > 0.0
-            && self.arrest.as_ref().is_some_and(|arrest| arrest.walls.any_within(place, close))
+        self.params.arrest > 0.0 && self.arrest.as_ref().is_some_and(|arrest| arrest.walls.any_within(place, close))
     }
 
     /// Joins the nodes of a crushed core, from `first` on: each to the nearest before it, and most to the one after it.

@@ -1,8 +1,8 @@
 //! From hits to cracks: a surface gets its growth and textures at its first hit.
 
 use super::{
-    CrackBudget, CrackClock, CrackError, CrackFailed, CrackResolution, CrackState, CrackStats, CrackStatus, CrackSurface,
-    CrackTextures, HitPoint,
+    CrackBudget, CrackClock, CrackError, CrackFailed, CrackResolution, CrackState, CrackStats, CrackStatus,
+    CrackSurface, CrackTextures, HitPoint,
     budget::FrameClock,
     carrier::{self, Carrier, Found, Shown},
     mask,
