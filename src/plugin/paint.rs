@@ -76,7 +76,7 @@ fn stamp(active: &mut Active, scratch: &mut Scratch) {
     active.growth.take_changed(&mut scratch.segments);
     for segment in scratch.segments.drain(..) {
         if let Some(path) = active.growth.network().path(segment) {
-            let changed = |rect| scratch.rects.push(rect);
+            let changed = &mut |rect| scratch.rects.push(rect);
             let rect = stamp_path_with(&mut active.field, &active.profile, &path, changed);
             active.touched.mark(rect);
         }

@@ -43,7 +43,7 @@ const FLATTEST: f32 = 64.0;
 /// Half widths are linear between the points of the path. Points that are not finite are skipped with the pieces
 /// beside them; widths below zero or not a number count as zero.
 pub fn stamp_path(field: &mut DepthField, profile: &Profile, path: &SegmentPath) -> TexelRect {
-    stamp_path_with(field, profile, path, |_| {})
+    stamp_pieces::<false>(field, profile, path, &mut |_| {})
 }
 
 /// As [`stamp_path`]; calls `changed` with small rectangles that together hold every texel that is not as before.
@@ -53,13 +53,23 @@ pub fn stamp_path_with(
     field: &mut DepthField,
     profile: &Profile,
     path: &SegmentPath,
-    mut changed: impl FnMut(TexelRect),
+    changed: &mut dyn FnMut(TexelRect),
+) -> TexelRect {
+    stamp_pieces::<true>(field, profile, path, changed)
+}
+
+/// Stamps a path; calls `changed` if `TELL`.
+fn stamp_pieces<const TELL: bool>(
+    field: &mut DepthField,
+    profile: &Profile,
+    path: &SegmentPath,
+    changed: &mut dyn FnMut(TexelRect),
 ) -> TexelRect {
     let section = Section::new(profile, field.frame.texels_per_unit());
     let mut bounds = TexelRect::default();
     for pair in path.points().windows(2) {
         if let Some(capsule) = Capsule::clipped(&field.frame, field.depth.size(), &section, pair[0], pair[1]) {
-            bounds = bounds.union(capsule.stamp(field, &section, &mut changed));
+            bounds = bounds.union(capsule.stamp::<TELL>(field, &section, changed));
         }
     }
     field.spare(bounds);
@@ -74,7 +84,7 @@ pub fn stamp_dot(field: &mut DepthField, pos: Vec2, radius: f32, depth: f32) -> 
     let point = PathPoint { pos, width: 2.0 * radius };
     match Capsule::clipped(&field.frame, field.depth.size(), &section, point, point) {
         Some(capsule) => {
-            let changed = capsule.stamp(field, &section, &mut |_| {});
+            let changed = capsule.stamp::<false>(field, &section, &mut |_| {});
             field.spare(changed);
             changed
         }
@@ -233,27 +243,32 @@ impl Capsule {
         TexelRect { min: low.as_uvec2(), max: high.as_uvec2() }
     }
 
-    fn stamp(&self, field: &mut DepthField, section: &Section, changed: &mut impl FnMut(TexelRect)) -> TexelRect {
+    fn stamp<const TELL: bool>(
+        &self,
+        field: &mut DepthField,
+        section: &Section,
+        changed: &mut dyn FnMut(TexelRect),
+    ) -> TexelRect {
         let rect = self.bounds(field.depth.size());
         if rect.is_empty() {
             return TexelRect::default();
         }
         match (self.r_gain != 0.0, section.rim_depth > 0.0) {
-            (false, false) => self.stamp_rows::<false, false>(field, section, rect, changed),
-            (false, true) => self.stamp_rows::<false, true>(field, section, rect, changed),
-            (true, false) => self.stamp_rows::<true, false>(field, section, rect, changed),
-            (true, true) => self.stamp_rows::<true, true>(field, section, rect, changed),
+            (false, false) => self.stamp_rows::<TELL, false, false>(field, section, rect, changed),
+            (false, true) => self.stamp_rows::<TELL, false, true>(field, section, rect, changed),
+            (true, false) => self.stamp_rows::<TELL, true, false>(field, section, rect, changed),
+            (true, true) => self.stamp_rows::<TELL, true, true>(field, section, rect, changed),
         }
         rect
     }
 
     /// Blocks of [`LANES`] texels, row by row. A block may stick out of `rect`: the values there are zero.
-    fn stamp_rows<const TAPER: bool, const RIM: bool>(
+    fn stamp_rows<const TELL: bool, const TAPER: bool, const RIM: bool>(
         &self,
         field: &mut DepthField,
         section: &Section,
         rect: TexelRect,
-        changed: &mut impl FnMut(TexelRect),
+        changed: &mut dyn FnMut(TexelRect),
     ) {
         let width = field.depth.width();
         let mut band = TexelRect::default();
@@ -276,35 +291,39 @@ impl Capsule {
             let n = (x1 - x0).next_multiple_of(LANES);
             x0 = x0.min(width.saturating_sub(n));
             let end = (x0 + n).min(width);
-            // The columns that have changed: from the first such block to the last.
+            // The columns that have changed, and those between them.
             let mut span = end..x0;
+            let mut add = |x0: usize, change: u128| {
+                if TELL && change != 0 {
+                    span.start = span.start.min(x0 + change.trailing_zeros() as usize / 16);
+                    span.end = end.min(x0 + LANES - change.leading_zeros() as usize / 16);
+                }
+            };
             let (blocks, rest) = field.depth.row_mut(y as usize)[x0..end].as_chunks_mut::<LANES>();
             for block in blocks {
-                if self.stamp_block::<TAPER, RIM>(block, section, x0 as f32, dy) {
-                    span = span.start.min(x0)..x0 + LANES;
-                }
+                add(x0, self.stamp_block::<TAPER, RIM>(block, section, x0 as f32, dy));
                 x0 += LANES;
             }
             if !rest.is_empty() {
                 let mut block = [0; LANES];
                 block[..rest.len()].copy_from_slice(rest);
-                if self.stamp_block::<TAPER, RIM>(&mut block, section, x0 as f32, dy) {
-                    span = span.start.min(x0)..end;
-                }
+                add(x0, self.stamp_block::<TAPER, RIM>(&mut block, section, x0 as f32, dy));
                 rest.copy_from_slice(&block[..rest.len()]);
             }
-            if span.start < span.end {
-                if y >= band.max.y.next_multiple_of(BAND) {
+            if TELL && span.start < span.end {
+                if !band.is_empty() && y >= band.max.y.next_multiple_of(BAND) {
                     changed(std::mem::take(&mut band));
                 }
                 let (min, max) = (UVec2::new(span.start as u32, y), UVec2::new(span.end as u32, y + 1));
-                band = band.union(TexelRect { min, max }.intersect(rect));
+                band = band.union(TexelRect { min, max });
             }
         }
-        changed(band);
+        if !band.is_empty() {
+            changed(band);
+        }
     }
 
-    /// Returns whether a texel has become deeper.
+    /// Returns the bits that have changed, 16 a texel.
     #[inline(always)]
     fn stamp_block<const TAPER: bool, const RIM: bool>(
         &self,
@@ -312,7 +331,7 @@ impl Capsule {
         section: &Section,
         x: f32,
         dy: f32,
-    ) -> bool {
+    ) -> u128 {
         let uniform = section.cut(self.r_from);
         let mut values = [0.0; LANES];
         for i in 0..LANES {
@@ -327,11 +346,13 @@ impl Capsule {
             }
             values[i] = value * cut.scale;
         }
-        let before = *block;
-        for (depth, value) in block.iter_mut().zip(values) {
-            *depth = (*depth).max(round_to_u16(value));
+        let mut change = [[0; 2]; LANES];
+        for ((depth, value), change) in block.iter_mut().zip(values).zip(&mut change) {
+            let deeper = (*depth).max(round_to_u16(value));
+            *change = (*depth ^ deeper).to_le_bytes();
+            *depth = deeper;
         }
-        *block != before
+        change.as_flattened().first_chunk().map_or(0, |bytes| u128::from_le_bytes(*bytes))
     }
 }
 
@@ -452,7 +473,7 @@ mod tests {
             for _ in 0..60 {
                 let (before, profile, path) = (field.clone(), random_profile(&mut rng), random_piece(&mut rng, &field));
                 let mut rects = Vec::new();
-                let rect = stamp_path_with(&mut field, &profile, &path, |rect| rects.push(rect));
+                let rect = stamp_path_with(&mut field, &profile, &path, &mut |rect| rects.push(rect));
                 let holds = |rect: &TexelRect, x, y| {
                     (rect.min.x..rect.max.x).contains(&x) && (rect.min.y..rect.max.y).contains(&y)
                 };
@@ -539,8 +560,8 @@ mod tests {
             let Some(capsule) = Capsule::clipped(&general.frame, general.depth.size(), &section, points[0], to) else {
                 continue;
             };
-            let rect = capsule.stamp(&mut special, &section, &mut |_| {});
-            capsule.stamp_rows::<true, true>(&mut general, &section, rect, &mut |_| {});
+            let rect = capsule.stamp::<false>(&mut special, &section, &mut |_| {});
+            capsule.stamp_rows::<false, true, true>(&mut general, &section, rect, &mut |_| {});
             assert_eq!(general, special);
         }
     }
