@@ -1,7 +1,8 @@
 //! `bake gallery`: every preset on its own picture, at three moments, on one sheet.
 
 use crate::{
-    growth::{own_picture, read_picture},
+    growth::own_picture,
+    picture::read_picture,
     text::{FONT, draw_text_up_to},
 };
 use bevy_crack::{

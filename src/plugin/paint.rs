@@ -9,7 +9,7 @@ use super::{
 use crate::{
     paint::{BaseTexels, PaintTargets, paint_into},
     pattern::{Moment, NO_PARENT, SegmentId},
-    raster::{DOT_DEPTH, Redrawn, TexelRect, stamp_dot, stamp_path},
+    raster::{DOT_DEPTH, DepthField, Redrawn, TexelRect, stamp_dot, stamp_path, stamp_path_with},
 };
 use bevy::prelude::*;
 
@@ -77,11 +77,12 @@ fn stamp(active: &mut Active, scratch: &mut Scratch) {
     active.growth.take_changed(&mut scratch.segments);
     for segment in scratch.segments.drain(..) {
         if let Some(path) = active.growth.network().path(segment) {
-            let rect = stamp_path(&mut active.field, &active.profile, &path);
+            let changed = &mut |rect| scratch.rects.push(rect);
+            let rect = stamp_path_with(&mut active.field, &active.profile, &path, changed);
             active.touched.mark(rect);
-            active.mark(rect);
         }
     }
+    scratch.rects.drain(..).for_each(|rect| active.mark(rect));
     active.growth.take_markers(&mut scratch.markers);
     let radius = active.growth.params().line_width;
     for marker in scratch.markers.drain(..) {

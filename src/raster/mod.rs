@@ -13,7 +13,7 @@ pub use dirty::DirtyTiles;
 pub use distance::{MAX_DISTANCE, crack_distance};
 pub use rect::TexelRect;
 pub use replay::{DOT_DEPTH, Redrawn, Replay};
-pub use stamp::{stamp_dot, stamp_path};
+pub use stamp::{stamp_dot, stamp_path, stamp_path_with};
 
 use crate::{
     Grid,
