@@ -672,6 +672,7 @@ impl CrackGrowth {
                     direction = (direction + heading * self.params.inertia).normalize_or_zero();
                 }
             }
+            direction = self.params.direct(direction);
             if self.params.wander > 0.0 {
                 // A draw per child, frozen by its index.
                 let stray = self.params.wander * (2.0 * hash_unit(self.seed ^ 0x57A6, child) - 1.0);

@@ -62,6 +62,8 @@ fn random_params(rng: &mut Rng, small: bool) -> GrowthParams {
         nucleation: 0.0,
         unevenness: 0.0,
         inertia: 0.0,
+        axis: 0.0,
+        directed: 0.0,
         variety: 0.0,
         draw_markers: rng.unit() < 0.2,
         max_nodes: 1_000_000,
@@ -716,6 +718,8 @@ fn random_arrest(rng: &mut Rng) -> GrowthParams {
         // A crack that strays by more at every node has no direction that another could meet steeply.
         wander: params.wander.min(0.5),
         unevenness: 0.9 * rng.unit(),
+        axis: 3.0 * rng.signed(),
+        directed: if rng.unit() < 0.5 { 0.0 } else { rng.unit() },
         reach: rng.range(0.3, 1.5),
         max_nodes: 3000,
         ..params
