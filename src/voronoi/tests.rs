@@ -209,9 +209,14 @@ fn levels_divide_the_regions_of_the_level_before() {
 #[test]
 fn changed_weights_give_the_map_that_a_new_one_has() {
     let mut rng = Rng::new(21);
-    for (n, size) in [[97, 61], [300, 140], [1, 200], [260, 3]].into_iter().enumerate() {
+    // Drawings that change most of the edges, and one that changes a few.
+    for (n, size) in [[97, 61], [300, 140], [1, 200], [260, 3], [301, 139]].into_iter().enumerate() {
         for levels in [1, 3] {
-            let images = [0, 1].map(|_| drawing(&mut rng, UVec2::new(90, 70)));
+            let mut images = [0, 1].map(|_| drawing(&mut rng, UVec2::new(90, 70)));
+            if n == 4 {
+                let beside = |image: &mut Grid<f32>| (0..70).for_each(|y| image.row_mut(y)[..75].fill(0.0));
+                images.iter_mut().for_each(beside);
+            }
             let guides = |gammas: [f32; 2]| [0, 1].map(|i| Guide { image: images[i].clone(), gamma: gammas[i] });
             let params = VoronoiParams { sites: 60, levels, ..VoronoiParams::DEFAULT };
             let mut map = made(&params, &guides([0.0, 28.0]), size, n as u64).0;
