@@ -567,3 +567,30 @@ fn fronts_only_open_and_end_with_all_seams() {
     seams.stamp_share(&mut field, &profile, 7.0);
     assert!(field == full);
 }
+
+/// A change here changes the patterns of all users.
+#[test]
+fn maps_are_frozen() {
+    let mut rng = Rng::new(1);
+    let guide = Guide::new(drawing(&mut rng, UVec2::new(120, 90)));
+    let print = |layout: SiteLayout, levels: u32| {
+        let params = VoronoiParams { layout, levels, ..VoronoiParams::DEFAULT };
+        let (map, seams) = made(&params, std::slice::from_ref(&guide), [160, 120], 7);
+        let texels = values(&map).into_iter().flatten().flat_map(|(cost, region)| [cost, u64::from(region)]);
+        let points = seams.seams.iter().flat_map(|seam| &seam.points);
+        let bits = points.flat_map(|point| [point.pos.x, point.pos.y, point.width]).map(|value| value.to_bits().into());
+        texels.chain(bits).fold(0xCBF2_9CE4_8422_2325, |hash: u64, value| (hash ^ value).wrapping_mul(0x100_0000_01B3))
+    };
+    let impact = SiteLayout::Impact { at: Vec2::new(0.5, 0.4), focus: 2.0 };
+    let prints = [
+        print(SiteLayout::Uniform, 1),
+        print(SiteLayout::Even, 3),
+        print(impact, 1),
+        print(SiteLayout::Density(guide.image.clone()), 1),
+        print(SiteLayout::Astride, 2),
+    ];
+    assert_eq!(
+        prints,
+        [602153815688971355, 1395409872095271797, 1085447894532221202, 6191331822148883251, 2635211142915938557]
+    );
+}
