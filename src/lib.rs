@@ -9,6 +9,7 @@
 //! - [`raster`]: networks to a depth field.
 //! - [`voronoi`]: cracks that draw a picture, all at once.
 //! - [`paint`]: a base picture and a depth field to diffuse, normal and depth textures.
+//! - [`shatter`]: the pieces into which cracks cut a surface, and how they fall.
 //! - `plugin` (feature `bevy`): components, hits, systems, upload.
 
 mod grid;
@@ -18,6 +19,7 @@ pub mod paint;
 pub mod pattern;
 pub mod preset;
 pub mod raster;
+pub mod shatter;
 pub mod voronoi;
 
 #[cfg(feature = "bevy")]

@@ -7,7 +7,7 @@ mod file;
 pub use check::PresetError;
 
 use crate::{
-    growth::{GrowthParams, MarkerLayout, StartLayout},
+    growth::{GrowthParams, MarkerLayout, StartLayout, Venation},
     paint::Look,
     raster::Profile,
 };
@@ -37,28 +37,44 @@ pub struct CrackPreset {
 
 impl CrackPreset {
     /// The names that [`named`](Self::named) knows.
-    pub const NAMES: [&'static str; 3] = ["glass", "concrete", "clay"];
+    pub const NAMES: [&'static str; 11] = [
+        "glass",
+        "tempered_glass",
+        "laminated_glass",
+        "concrete",
+        "plaster",
+        "brick",
+        "clay",
+        "mud",
+        "glaze",
+        "ice",
+        "toon",
+    ];
 
-    /// Concrete: a few long, rough, branching cracks.
+    /// Concrete: a few long, rough, branching cracks of uneven width.
     ///
     /// Couto et al. use `kill_distance` 0.08, `D` 1.0, `num_iterations` 100, `crack_radius` 0.4, a grid of 7 x 7 and
     /// `line_growth` 1, in a unit that they do not give.
     pub const CONCRETE: Self = Self {
         growth: GrowthParams {
-            kill_distance: 0.05,
+            kill_distance: 0.052,
             step_length: 0.022,
             crack_radius: 0.4,
             num_lines_grid: 7,
-            num_columns_grid: 7,
-            markers: MarkerLayout::PseudoGrid { occupancy: 0.45, jitter: 1.0 },
+            num_columns_grid: 5,
+            markers: MarkerLayout::PseudoGrid { occupancy: 0.3, jitter: 1.0 },
             focus: 0.3,
-            reach: 0.55,
-            line_width: 0.004,
-            line_growth: 0.55,
-            murray: 2.6,
-            max_width: 0.022,
-            wander: 0.55,
-            roughness: 0.3,
+            reach: 0.78,
+            line_width: 0.0074,
+            line_growth: 2.0,
+            murray: 3.7,
+            max_width: 0.05,
+            unevenness: 0.36,
+            inertia: 2.4,
+            wander: 0.39,
+            roughness: 0.1,
+            arrest: 0.06,
+            variety: 0.76,
             ..GrowthParams::DEFAULT
         },
         profile: Profile {
@@ -73,7 +89,61 @@ impl CrackPreset {
         steps_per_second: 60.0,
     };
 
-    /// Window glass: bright radials and broken rings.
+    /// Plaster: thin, long cracks that wander and hardly branch.
+    pub const PLASTER: Self = Self {
+        growth: GrowthParams {
+            kill_distance: 0.05,
+            step_length: 0.02,
+            crack_radius: 0.4,
+            num_lines_grid: 6,
+            num_columns_grid: 6,
+            markers: MarkerLayout::PseudoGrid { occupancy: 0.3, jitter: 1.0 },
+            reach: 0.8,
+            line_width: 0.005,
+            line_growth: 0.5,
+            murray: 3.0,
+            max_width: 0.03,
+            unevenness: 0.3,
+            inertia: 1.5,
+            wander: 0.4,
+            roughness: 0.13,
+            arrest: 0.06,
+            variety: 0.6,
+            ..GrowthParams::DEFAULT
+        },
+        profile: Profile { depth: 1.0, full_width: 0.008, wall: 0.3, rim_width: 0.008, rim_depth: 0.2, faintest: 0.6 },
+        look: Look::GROOVE,
+        steps_per_second: 60.0,
+    };
+
+    /// Brick: wide cracks, one or two, that keep to the mortar where a [mask](crate::growth::CrackGrowth::set_mask) shows it.
+    pub const BRICK: Self = Self {
+        growth: GrowthParams {
+            kill_distance: 0.05,
+            step_length: 0.022,
+            crack_radius: 0.5,
+            num_lines_grid: 5,
+            num_columns_grid: 5,
+            markers: MarkerLayout::PseudoGrid { occupancy: 0.25, jitter: 1.0 },
+            reach: 0.9,
+            line_width: 0.014,
+            line_growth: 0.5,
+            murray: 3.0,
+            max_width: 0.06,
+            unevenness: 0.3,
+            inertia: 1.0,
+            wander: 0.3,
+            roughness: 0.08,
+            arrest: 0.06,
+            variety: 0.8,
+            ..GrowthParams::DEFAULT
+        },
+        profile: Profile { depth: 1.0, full_width: 0.016, wall: 0.3, rim_width: 0.006, rim_depth: 0.16, faintest: 0.6 },
+        look: Look::GROOVE,
+        steps_per_second: 60.0,
+    };
+
+    /// Annealed window glass: a crushed core, a few long uneven radials up to the edge, few rings with gaps.
     ///
     /// Couto et al. use `kill_distance` 0.02, `D` 0.8, `num_iterations` 80, `crack_radius` 1.0, a grid of 20 x 20,
     /// `draw_connections` and `line_growth` 0.5 for the white lines, in a unit that they do not give.
@@ -82,46 +152,114 @@ impl CrackPreset {
             kill_distance: 0.036,
             step_length: 0.02,
             crack_radius: 0.2,
-            num_iterations: 80,
-            markers: MarkerLayout::Polar { sectors: 24, rings: 16, ring_growth: 1.12, jitter: 0.9, occupancy: 1.0 },
-            reach: 0.75,
-            starts: StartLayout::Ring { count: 24, radius: 0.014 },
-            line_width: 0.0022,
-            line_growth: 0.9,
+            num_iterations: 120,
+            markers: MarkerLayout::Polar { sectors: 5, rings: 12, ring_growth: 1.12, jitter: 0.83, occupancy: 1.0 },
+            reach: 0.84,
+            starts: StartLayout::Crushed { count: 7, radius: 0.014 },
+            line_width: 0.0106,
+            line_growth: 0.12,
             murray: 2.6,
-            max_width: 0.009,
-            wander: 0.07,
-            roughness: 0.05,
+            max_width: 0.03,
+            unevenness: 0.34,
+            wander: 0.175,
+            roughness: 0.066,
             draw_connections: true,
-            connection_gaps: 0.1,
+            connection_gaps: 0.74,
+            chips: 0.25,
             connection_every: 2,
+            arrest: 0.04,
+            variety: 0.32,
             ..GrowthParams::DEFAULT
         },
         profile: Profile { depth: 1.0, full_width: 0.004, wall: 0.3, rim_width: 0.006, rim_depth: 0.3, faintest: 0.6 },
         look: Look { relief: 0.004, glint: 0.5, ..Look::FROSTED },
-        steps_per_second: 90.0,
+        steps_per_second: 120.0,
     };
 
-    /// Dry clay: many short cracks that close into cells.
+    /// Tempered glass: the whole pane goes to small dice, from the hit outward.
+    pub const TEMPERED_GLASS: Self = Self {
+        growth: GrowthParams {
+            kill_distance: 0.026,
+            step_length: 0.014,
+            crack_radius: 0.1,
+            markers: MarkerLayout::DartThrowing { spacing: 0.05 },
+            venation: Venation::Closed,
+            reach: 64.0,
+            starts: StartLayout::Crushed { count: 12, radius: 0.02 },
+            line_width: 0.006,
+            line_growth: 0.1,
+            murray: 3.0,
+            max_width: 0.012,
+            unevenness: 0.3,
+            wander: 0.1,
+            roughness: 0.1,
+            arrest: 0.03,
+            open_ends: 0.03,
+            variety: 0.6,
+            max_nodes: 40_000,
+            ..GrowthParams::DEFAULT
+        },
+        profile: Profile { depth: 1.0, full_width: 0.006, wall: 0.3, rim_width: 0.005, rim_depth: 0.3, faintest: 0.6 },
+        look: Look { relief: 0.004, glint: 0.5, ..Look::FROSTED },
+        steps_per_second: 240.0,
+    };
+
+    /// Laminated glass: a dense web of radials and rings around the hit, which holds together.
+    pub const LAMINATED_GLASS: Self = Self {
+        growth: GrowthParams {
+            kill_distance: 0.03,
+            step_length: 0.018,
+            crack_radius: 0.2,
+            num_iterations: 120,
+            markers: MarkerLayout::Polar { sectors: 34, rings: 18, ring_growth: 1.14, jitter: 0.85, occupancy: 1.0 },
+            reach: 0.6,
+            starts: StartLayout::Crushed { count: 30, radius: 0.035 },
+            line_width: 0.0022,
+            line_growth: 0.8,
+            murray: 2.6,
+            max_width: 0.008,
+            unevenness: 0.3,
+            wander: 0.08,
+            roughness: 0.07,
+            draw_connections: true,
+            connection_gaps: 0.1,
+            chips: 0.15,
+            connection_every: 1,
+            arrest: 0.02,
+            variety: 0.2,
+            ..GrowthParams::DEFAULT
+        },
+        profile: Profile { depth: 1.0, full_width: 0.004, wall: 0.3, rim_width: 0.006, rim_depth: 0.3, faintest: 0.6 },
+        look: Look { relief: 0.004, glint: 0.5, ..Look::FROSTED },
+        steps_per_second: 120.0,
+    };
+
+    /// Dry clay: long cracks first, shorter ones between them, which end at them: cells that do not all close.
     ///
     /// Couto et al. use `kill_distance` 0.08, `D` 0.8, `num_iterations` 100, `crack_radius` 0.4, a grid of 20 x 20,
     /// `line_growth` 0.5 and `draw_islands`, in a unit that they do not give.
     pub const CLAY: Self = Self {
         growth: GrowthParams {
-            kill_distance: 0.045,
+            kill_distance: 0.05,
             step_length: 0.02,
-            crack_radius: 0.25,
-            markers: MarkerLayout::DartThrowing { spacing: 0.06 },
-            reach: 0.7,
-            starts: StartLayout::Points { count: 24 },
-            line_width: 0.006,
-            line_growth: 0.3,
-            murray: 3.5,
-            max_width: 0.016,
-            wander: 0.45,
-            roughness: 0.22,
+            crack_radius: 0.21,
+            markers: MarkerLayout::DartThrowing { spacing: 0.03 },
+            reach: 2.0,
+            starts: StartLayout::Points { count: 12 },
+            line_width: 0.009,
+            line_growth: 0.5,
+            murray: 2.5,
+            max_width: 0.05,
+            unevenness: 0.33,
+            inertia: 2.5,
+            wander: 0.08,
+            roughness: 0.06,
             draw_islands: true,
-            island_distance: 0.16,
+            island_distance: 0.11,
+            arrest: 0.1,
+            open_ends: 0.6,
+            nucleation: 1.1,
+            variety: 0.9,
             ..GrowthParams::DEFAULT
         },
         profile: Profile { depth: 1.0, full_width: 0.014, wall: 0.5, rim_width: 0.012, rim_depth: 0.12, faintest: 0.6 },
@@ -129,13 +267,132 @@ impl CrackPreset {
         steps_per_second: 40.0,
     };
 
+    /// Mud: wide cracks that close into rounded cells.
+    pub const MUD: Self = Self {
+        growth: GrowthParams {
+            kill_distance: 0.037,
+            step_length: 0.02,
+            crack_radius: 0.111,
+            markers: MarkerLayout::DartThrowing { spacing: 0.066 },
+            venation: Venation::Closed,
+            reach: 3.0,
+            starts: StartLayout::Points { count: 3 },
+            line_width: 0.0082,
+            line_growth: 0.157,
+            murray: 2.28,
+            max_width: 0.05,
+            unevenness: 0.45,
+            wander: 0.06,
+            roughness: 0.135,
+            arrest: 0.045,
+            open_ends: 0.083,
+            nucleation: 0.78,
+            variety: 0.9,
+            ..GrowthParams::DEFAULT
+        },
+        profile: Profile { depth: 1.0, full_width: 0.016, wall: 0.6, rim_width: 0.014, rim_depth: 0.12, faintest: 0.6 },
+        look: Look::GROOVE,
+        steps_per_second: 40.0,
+    };
+
+    /// The glaze of pottery: fine, nearly straight cracks, each ending at an older one.
+    pub const GLAZE: Self = Self {
+        growth: GrowthParams {
+            kill_distance: 0.04,
+            step_length: 0.018,
+            crack_radius: 0.15,
+            markers: MarkerLayout::DartThrowing { spacing: 0.035 },
+            reach: 3.0,
+            starts: StartLayout::Points { count: 4 },
+            line_width: 0.006,
+            line_growth: 0.3,
+            murray: 2.5,
+            max_width: 0.02,
+            unevenness: 0.3,
+            inertia: 3.0,
+            wander: 0.08,
+            roughness: 0.06,
+            draw_islands: true,
+            island_distance: 0.11,
+            arrest: 0.08,
+            open_ends: 0.4,
+            nucleation: 1.0,
+            variety: 0.8,
+            ..GrowthParams::DEFAULT
+        },
+        profile: Profile { depth: 0.8, full_width: 0.006, wall: 0.4, rim_width: 0.0, rim_depth: 0.0, faintest: 0.6 },
+        look: Look { relief: 0.003, ..Look::GROOVE },
+        steps_per_second: 60.0,
+    };
+
+    /// Ice: bright, branching cracks that run far and cross-link.
+    pub const ICE: Self = Self {
+        growth: GrowthParams {
+            kill_distance: 0.045,
+            step_length: 0.022,
+            crack_radius: 0.35,
+            num_lines_grid: 9,
+            num_columns_grid: 9,
+            markers: MarkerLayout::PseudoGrid { occupancy: 0.5, jitter: 1.0 },
+            reach: 0.9,
+            line_width: 0.004,
+            line_growth: 1.2,
+            murray: 2.4,
+            max_width: 0.02,
+            unevenness: 0.4,
+            inertia: 2.0,
+            wander: 0.25,
+            roughness: 0.12,
+            draw_islands: true,
+            island_distance: 0.14,
+            arrest: 0.06,
+            open_ends: 0.5,
+            variety: 0.5,
+            ..GrowthParams::DEFAULT
+        },
+        profile: Profile { depth: 1.0, full_width: 0.012, wall: 0.8, rim_width: 0.012, rim_depth: 0.3, faintest: 0.6 },
+        look: Look { relief: 0.004, ..Look::FROSTED },
+        steps_per_second: 90.0,
+    };
+
+    /// Cartoon: few bold, smooth, tapering cracks with an outline.
+    pub const TOON: Self = Self {
+        growth: GrowthParams {
+            kill_distance: 0.07,
+            step_length: 0.04,
+            crack_radius: 0.5,
+            markers: MarkerLayout::Polar { sectors: 7, rings: 6, ring_growth: 1.2, jitter: 0.7, occupancy: 1.0 },
+            reach: 0.5,
+            line_width: 0.006,
+            line_growth: 3.0,
+            murray: 1.6,
+            max_width: 0.04,
+            wander: 0.5,
+            roughness: 0.0,
+            arrest: 0.05,
+            variety: 0.2,
+            ..GrowthParams::DEFAULT
+        },
+        profile: Profile { depth: 1.0, full_width: 0.012, wall: 0.2, rim_width: 0.0, rim_depth: 0.0, faintest: 0.0 },
+        look: Look::TOON,
+        steps_per_second: 30.0,
+    };
+
     /// The preset of this name (lower case), see [`NAMES`](Self::NAMES).
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         match name {
             "glass" => Some(Self::GLASS),
+            "tempered_glass" => Some(Self::TEMPERED_GLASS),
+            "laminated_glass" => Some(Self::LAMINATED_GLASS),
             "concrete" => Some(Self::CONCRETE),
+            "plaster" => Some(Self::PLASTER),
+            "brick" => Some(Self::BRICK),
             "clay" => Some(Self::CLAY),
+            "mud" => Some(Self::MUD),
+            "glaze" => Some(Self::GLAZE),
+            "ice" => Some(Self::ICE),
+            "toon" => Some(Self::TOON),
             _ => None,
         }
     }

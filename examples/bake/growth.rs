@@ -5,7 +5,7 @@ use bevy_crack::{
     CrackPreset,
     growth::{CrackGrowth, HitOutcome},
     paint::{BaseTexels, Look, LookTable, PaintTargets, paint_into},
-    pattern::{LinkKind, NO_PARENT, Network, SurfaceFrame},
+    pattern::{CrackMask, LinkKind, NO_PARENT, Network, SurfaceFrame},
     raster::{DepthField, TexelRect, stamp_dot, stamp_path},
 };
 use clap::Args;
@@ -16,6 +16,7 @@ use std::{
     error::Error,
     fs,
     path::{Path, PathBuf},
+    sync::Arc,
     time::Instant,
 };
 
@@ -28,16 +29,28 @@ pub(crate) struct Options {
     #[arg(long, value_parser = size)]
     size: Option<UVec2>,
     #[arg(long, default_value_t = 1)]
-    seed: u64,
+    pub(crate) seed: u64,
     /// Where and how hard: u,v or u,v,energy; may be given many times
     #[arg(long, value_parser = hit, default_value = "0.5,0.5")]
-    hit: Vec<(Vec2, f32)>,
+    pub(crate) hit: Vec<(Vec2, f32)>,
     /// The picture to crack; by default one that suits the preset
     #[arg(long)]
     base: Option<PathBuf>,
     /// A growth parameter, as in `kill_distance=0.02`; may be given many times
     #[arg(long, value_parser = setting)]
     set: Vec<(String, String)>,
+    /// Where cracks like to run: light texels of this picture
+    #[arg(long)]
+    weak: Option<PathBuf>,
+    /// Where they do not
+    #[arg(long)]
+    strong: Option<PathBuf>,
+    /// Where they never go
+    #[arg(long)]
+    forbidden: Option<PathBuf>,
+    /// Cracks like to run in the lines of the base picture (mortar, joints) and never where it is transparent
+    #[arg(long)]
+    mask_from_picture: bool,
     /// Another look than the preset's: groove, frosted or toon
     #[arg(long)]
     look: Option<String>,
@@ -46,7 +59,7 @@ pub(crate) struct Options {
     steps: Option<u32>,
     /// Folder to write to; made if it is not there
     #[arg(long, default_value = "out")]
-    out: PathBuf,
+    pub(crate) out: PathBuf,
 }
 
 pub(crate) fn size(text: &str) -> Result<UVec2, String> {
@@ -72,16 +85,18 @@ pub(crate) fn setting(text: &str) -> Result<(String, String), String> {
 }
 
 /// The pictures that ship with the crate.
-fn own_picture(preset: &str) -> PathBuf {
+pub(crate) fn own_picture(preset: &str) -> PathBuf {
     let file = match preset {
-        "glass" => "glass_pane.png",
-        "clay" => "clay.png",
-        _ => "concrete_fine.png",
+        "glass" | "tempered_glass" | "laminated_glass" => "glass_pane",
+        "brick" => "brick_red",
+        "plaster" | "clay" | "mud" | "glaze" | "ice" | "toon" => preset,
+        _ => "concrete_fine",
     };
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/textures").join(file)
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/textures").join(file).with_extension("png")
 }
 
-pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
+/// Writes the textures, and returns the network and the cracked picture.
+pub(crate) fn bake(options: &Options) -> Result<(Network, RgbaImage), Box<dyn Error>> {
     let mut preset = CrackPreset::named(&options.preset)
         .ok_or_else(|| format!("no preset `{}`; there are {}", options.preset, CrackPreset::NAMES.join(", ")))?;
     for (name, value) in &options.set {
@@ -105,6 +120,20 @@ pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
 
     let frame = SurfaceFrame::new(size)?;
     let mut growth = CrackGrowth::new(preset.growth.clone(), frame.extent(), options.seed)?;
+    let mut layers =
+        if options.mask_from_picture { CrackMask::from_picture(size, base.as_raw())? } else { CrackMask::default() };
+    for (layer, path) in [
+        (&mut layers.weak, &options.weak),
+        (&mut layers.strong, &options.strong),
+        (&mut layers.forbidden, &options.forbidden),
+    ] {
+        if let Some(path) = path {
+            let picture = read_picture(path)?;
+            *layer = Some(CrackMask::layer(picture.dimensions().into(), picture.as_raw())?);
+        }
+    }
+    let layers = Arc::new(layers);
+    growth.set_mask(layers.clone());
     for &(uv, energy) in &options.hit {
         if let HitOutcome::Rejected(reason) = growth.hit(frame.uv_to_pos(uv), energy) {
             return Err(format!("the hit at {uv}: {reason}").into());
@@ -116,6 +145,7 @@ pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
 
     let clock = Instant::now();
     let mut field = DepthField::new(frame);
+    field.forbid(&layers);
     let mut changed = Vec::new();
     growth.take_changed(&mut changed);
     for segment in changed {
@@ -163,7 +193,7 @@ pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
         painted.as_secs_f64() * 1e3,
         options.out.display()
     );
-    Ok(())
+    Ok((network.clone(), diffuse))
 }
 
 /// White where a person would mark a crack: not on the chipped rim.
@@ -193,6 +223,7 @@ fn describe(network: &Network, options: &Options) -> serde_json::Value {
             let kind = match link.kind {
                 LinkKind::Connection => "connection",
                 LinkKind::Island => "island",
+                LinkKind::Meeting => "meeting",
                 LinkKind::Junction => "junction",
             };
             json!({ "a": link.a, "b": link.b, "width": link.width, "birth": link.birth, "kind": kind })

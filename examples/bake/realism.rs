@@ -35,6 +35,12 @@ pub(crate) struct Options {
 const fn hits(preset: &str) -> ((u32, u32), (f32, f32)) {
     match preset.as_bytes() {
         b"concrete" => ((1, 4), (0.3, 1.5)),
+        b"plaster" => ((1, 3), (0.1, 1.0)),
+        b"brick" => ((1, 3), (0.1, 1.0)),
+        // Weak ones: flying stones, not hammers.
+        b"glass" | b"laminated_glass" => ((1, 4), (0.02, 0.5)),
+        // One hit cracks the whole surface.
+        b"tempered_glass" | b"mud" | b"glaze" => ((1, 1), (1.0, 1.0)),
         _ => ((1, 3), (0.5, 1.5)),
     }
 }

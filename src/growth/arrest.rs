@@ -1,8 +1,11 @@
 //! Cracks that know older cracks: a tip that comes near one turns to meet it steeply and stops there.
 
-use super::{CrackGrowth, StartLayout, walls::Walls};
+use super::{
+    CrackGrowth, MarkerLayout, StartLayout,
+    walls::{Walls, crosses_itself},
+};
 use crate::math::hash_unit;
-use crate::pattern::{Link, LinkKind, NO_PARENT, Network, SegmentId, SegmentPath};
+use crate::pattern::{Link, LinkKind, NO_PARENT, Network, PathPoint, SegmentId, SegmentPath};
 use glam::Vec2;
 
 /// Shares of the roughness that a line is tried with, until it touches no other.
@@ -18,7 +21,7 @@ const LAST: f32 = 1.35;
 const TURN: f32 = 2.5;
 
 /// The node of a crack that is met lies no more than so many segment lengths away.
-const LAST_REACH: f32 = 1.8;
+const LAST_REACH: f32 = 1.5;
 
 /// A node this many segment lengths from another crack beside it would run along it.
 const BESIDE: f32 = 0.7;
@@ -84,10 +87,16 @@ impl CrackGrowth {
         let pos = self.network.nodes[from as usize].pos;
         let heading = (to - pos).normalize_or_zero();
         let length = self.params.step_length;
+        if self.params.arrest <= 0.0 {
+            return match self.extend(from, to, false) {
+                Some(_) => Advance::Grown,
+                None => Advance::Stopped(heading),
+            };
+        }
         let reach = self.params.arrest.max(TURN * length);
         match self.goal_ahead(from, heading, reach, AHEAD) {
             None => {}
-            Some(_) if self.stays_open(from) => {
+            Some((_, Goal::Node(_))) if self.stays_open(from) => {
                 self.seal(from);
                 return Advance::Stopped(heading);
             }
@@ -114,7 +123,9 @@ impl CrackGrowth {
 
     /// Whether a tip is one of those that stop short of other cracks.
     pub(super) fn stays_open(&self, tip: u32) -> bool {
-        self.params.open_ends > 0.0 && hash_unit(self.seed ^ 0x15, u64::from(tip)) < self.params.open_ends
+        self.params.open_ends > 0.0
+            && self.network.nodes[tip as usize].parent != NO_PARENT
+            && hash_unit(self.seed ^ 0x15, u64::from(tip)) < self.params.open_ends
     }
 
     /// Sends a tip at rest on its way to the nearest crack ahead of it, if there is one within `distance`.
@@ -216,13 +227,11 @@ impl CrackGrowth {
         self.each_foreign(tip, reach * length, |node, distance_sq, way| {
             if way.dot(heading) > 0.0 {
                 let end = self.network.nodes[node as usize];
-                let along = match self.network.nodes.get(end.parent as usize) {
-                    Some(before) => (end.pos - before.pos).normalize_or_zero(),
-                    None => Vec2::ZERO,
-                };
+                let place = |node: u32| self.network.nodes.get(node as usize).map_or(end.pos, |node| node.pos);
+                let along = (place(self.child_of(node)) - place(end.parent)).normalize_or_zero();
                 let distance = distance_sq.sqrt();
                 let slant = along.dot(way / distance).abs();
-                nearby.push((distance / length + 2.0 * slant, node));
+                nearby.push((distance / length + 3.0 * slant, node));
             }
         });
         nearby.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
@@ -239,10 +248,9 @@ impl CrackGrowth {
         let extent = self.network.extent();
         let to = to.clamp(Vec2::ZERO, extent);
         // The border is a crack too: none runs along it.
+        let inward = Vec2::splat(0.3 * self.params.step_length).min(0.5 * extent);
         let (low, high) = (node.pos.cmpeq(Vec2::ZERO) & to.cmpeq(Vec2::ZERO), node.pos.cmpeq(extent) & to.cmpeq(extent));
-        if (low | high).any() {
-            return None;
-        }
+        let to = Vec2::select(low, inward, Vec2::select(high, extent - inward, to));
         match self.free_line(SegmentId::Branch(child), (from, u32::MAX), (node.pos, to)) {
             Ok((bend, path)) => {
                 let on_border = (to.cmpeq(Vec2::ZERO) | to.cmpeq(extent)).any();
@@ -253,6 +261,7 @@ impl CrackGrowth {
                 }
                 Some(child)
             }
+            Err(()) if self.params.arrest <= 0.0 => None,
             Err(()) => {
                 self.join_near(from, to - node.pos, LAST_REACH);
                 None
@@ -269,7 +278,12 @@ impl CrackGrowth {
     ) -> Result<(f32, SegmentPath), ()> {
         for bend in BENDS {
             let path = self.network.draft(segment, (from, to), (0.0, 0.0), bend);
-            if !self.arrest.as_ref().is_some_and(|arrest| arrest.walls.touches_any(ends, &path)) {
+            let touches = self.params.arrest > 0.0
+                && self.arrest.as_ref().is_some_and(|arrest| arrest.walls.touches_any(ends, &path));
+            let extent = self.network.extent();
+            let touches = touches || crosses_itself(&path);
+            let is_forbidden = |pair: &[PathPoint]| self.mask.blocks(pair[0].pos / extent, pair[1].pos / extent);
+            if !touches && !path.points().windows(2).any(is_forbidden) {
                 return Ok((bend, path));
             }
         }
@@ -324,7 +338,14 @@ impl CrackGrowth {
             .into_iter()
             .filter(|&(distance, out, _)| distance > 0.0 && distance <= reach && heading.dot(out) >= ahead)
             .min_by(|a, b| a.0.total_cmp(&b.0))
-            .map(|(distance, _, foot)| (distance, Goal::Border(foot)))
+            .map(|(distance, out, foot)| {
+                // Half way between where it would get to and the nearest place: a crack does not hook round.
+                let straight = pos + heading * (distance / heading.dot(out));
+                let place = (0.5 * (foot + straight)).clamp(Vec2::ZERO, extent);
+                // Exactly on the border, whatever rounding has made of it.
+                let place = Vec2::select(out.abs().cmpgt(Vec2::splat(0.5)), foot, place);
+                (distance, Goal::Border(place))
+            })
     }
 
     /// The nearest node of another crack within `reach` of a node, ahead of it if it has a heading.
@@ -354,6 +375,10 @@ impl CrackGrowth {
         let (a, b) = (&self.network.nodes[one as usize], &self.network.nodes[other as usize]);
         if a.impact != b.impact {
             return false;
+        }
+        // The rays of a hit keep their distance by themselves.
+        if matches!(self.params.markers, MarkerLayout::Polar { .. }) {
+            return true;
         }
         let apart = (3.0 * self.params.arrest.max(self.params.island_distance) / self.params.step_length) as u32 + 2;
         // Up from both to the node where they meet; a parent is always older than its child.

@@ -63,7 +63,9 @@ impl Linker {
                 let radius = from.distance(impact.pos).max(params.step_length);
                 // Rings thin out on the way to the rim, and none spans a wide gap between radials.
                 let out = (radius / (params.reach * impact.energy.sqrt())).min(1.0);
-                let gaps = params.connection_gaps + (1.0 - params.connection_gaps) * out * (2.0 - out);
+                // A soft hit makes fewer of them.
+                let few = (out * (2.0 - out)).max(1.0 - impact.energy.sqrt());
+                let gaps = params.connection_gaps + (1.0 - params.connection_gaps) * few;
                 let apart =
                     generation != network.nodes()[b as usize].generation || from.distance(beside) > 0.75 * radius;
                 if apart || draw(0xC0) < gaps {
@@ -76,6 +78,11 @@ impl Linker {
                 }
                 let width = 0.8 * params.line_width;
                 let birth = network.nodes()[first as usize].birth;
+                if parent != NO_PARENT && draw(0xC4) < params.chips {
+                    // A chip has come off between two ends of the ring.
+                    let other = if b == parent { self.ring[(i + 1) % n].1 } else { parent };
+                    self.links.push(Link { a, b: other, width, birth, kind: LinkKind::Connection, bend: 1.0 });
+                }
                 self.links.push(Link { a, b, width, birth, kind: LinkKind::Connection, bend: 1.0 });
             }
         }

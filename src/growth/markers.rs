@@ -4,6 +4,7 @@ use super::params::{GrowthParams, MarkerLayout, StartLayout};
 use crate::{
     Grid,
     math::{Rng, hash_unit, mix, ops},
+    pattern::CrackMask,
 };
 use glam::Vec2;
 use std::f32::consts::TAU;
@@ -12,6 +13,8 @@ use std::f32::consts::TAU;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Region {
     pub(super) center: Vec2,
+    /// Energy of the hit, when it came.
+    pub(super) energy: f32,
     /// What lies closer was populated before.
     pub(super) inner: f32,
     pub(super) outer: f32,
@@ -42,14 +45,20 @@ fn density_at(density: Option<&Grid<f32>>, pos: Vec2, extent: Vec2) -> f32 {
 pub(super) fn lay_out(
     params: &GrowthParams,
     region: Region,
-    density: Option<&Grid<f32>>,
+    (density, mask): (Option<&Grid<f32>>, &CrackMask),
     seed: u64,
     mut keep: impl FnMut(Vec2, Option<f32>),
 ) {
     let mut kept = 0;
+    let apart = spacing(params, region.extent);
     let mut offer = |pos: Vec2, chance: f32, probability: f32, spacing: Option<f32>| {
         let Some(share) = region.share(pos) else { return };
-        let thinned = if params.focus > 0.0 { ops::powf(1.0 - share, params.focus) } else { 1.0 };
+        let mut thinned = if params.focus > 0.0 { ops::powf(1.0 - share, params.focus) } else { 1.0 };
+        let mut pos = pos;
+        if !mask.is_empty() {
+            let (place, liking) = to_weak_place(pos, apart, mask, region.extent, seed);
+            (pos, thinned) = (place, thinned * liking);
+        }
         if chance < probability * thinned * density_at(density, pos, region.extent) {
             keep(pos, spacing);
             // A closer one dies at once.
@@ -90,6 +99,7 @@ pub(super) fn lay_out(
         }
         MarkerLayout::Polar { sectors, rings, ring_growth, jitter, occupancy } => {
             let turn = TAU * hash_unit(seed, 0);
+            let sectors = by_energy(sectors, region.energy, 360);
             for ray in 0..sectors {
                 let mut rng = Rng::new(mix(seed ^ u64::from(ray)));
                 let mut angle = turn + TAU * (ray as f32 + jitter * (rng.unit() - 0.5)) / sectors as f32;
@@ -139,11 +149,45 @@ pub(super) fn lay_out(
             let pos = region.center + ops::unit(angle) * arm;
             let inside = pos.cmpge(Vec2::ZERO).all() && pos.cmple(region.extent).all();
             let pos = if inside { pos } else { towards_room(region, arm) };
-            if density_at(density, pos, region.extent) > 0.0 {
+            if density_at(density, pos, region.extent) > 0.0 && !mask.is_forbidden(pos / region.extent) {
                 keep(pos, None);
             }
         }
     }
+}
+
+/// About how far the markers of a layout lie from each other.
+fn spacing(params: &GrowthParams, extent: Vec2) -> f32 {
+    match params.markers {
+        MarkerLayout::PseudoGrid { .. } => {
+            (extent / Vec2::new(params.num_columns_grid as f32, params.num_lines_grid as f32)).max_element()
+        }
+        MarkerLayout::DartThrowing { spacing } => spacing,
+        MarkerLayout::Polar { rings, .. } => params.reach / rings as f32,
+    }
+}
+
+/// The weakest place near a marker, and how much of its chance it keeps there: none where cracks are forbidden, little where
+/// all around is strong or, if some places of the surface are weak, nothing here is.
+fn to_weak_place(pos: Vec2, apart: f32, mask: &CrackMask, extent: Vec2, seed: u64) -> (Vec2, f32) {
+    const TRIES: u32 = 24;
+    let place = mix(seed ^ u64::from(pos.x.to_bits()) << 32 ^ u64::from(pos.y.to_bits()));
+    let mut best = (pos, f32::NEG_INFINITY);
+    for i in 0..TRIES {
+        let stray = ops::unit(TAU * hash_unit(place, u64::from(2 * i))) * hash_unit(place, u64::from(2 * i + 1)).sqrt();
+        let near = if i == 0 { pos } else { (pos + stray * (0.8 * apart)).clamp(Vec2::ZERO, extent) };
+        let uv = near / extent;
+        let liking = mask.weak_at(uv) - mask.strong_at(uv);
+        if liking > best.1 && !mask.is_forbidden(uv) {
+            best = (near, liking);
+        }
+    }
+    let kept = match best.1 {
+        f32::NEG_INFINITY => 0.0,
+        liking if mask.weak.is_some() => (0.15 + 1.2 * liking).clamp(0.02, 1.0),
+        liking => (1.0 + liking).clamp(0.02, 1.0),
+    };
+    (best.0, kept)
 }
 
 /// A place `arm` away from the hit, along the longer side, where there is more room: even a surface that is hardly more than a
@@ -173,6 +217,14 @@ fn span(center: f32, radius: f32, cell: f32, count: u32) -> (u32, u32) {
     (low.min(count), high.min(count))
 }
 
+/// What is `count` at energy 1.
+fn by_energy(count: u32, energy: f32, most: u32) -> u32 {
+    ((count as f32 * energy.sqrt()).round() as u32).clamp(2, most.max(2))
+}
+
+/// Rings of a crushed core.
+const CORE_RINGS: u32 = 3;
+
 /// The places of the first nodes of a hit.
 pub(super) fn starts(
     layout: StartLayout,
@@ -193,6 +245,21 @@ pub(super) fn starts(
             places
         }
         StartLayout::Disc { count, radius } => scatter(count, radius),
+        StartLayout::Crushed { count, radius } => {
+            // Rings around a centre, each node a little off its place.
+            let (count, radius) = (by_energy(count, energy, 1024), radius * energy.sqrt().sqrt());
+            let mut places = vec![center];
+            for ring in 1..=CORE_RINGS {
+                let share = ring as f32 / CORE_RINGS as f32;
+                let n = ((count as f32 * share) as u32).max(3);
+                let turn = rng.unit();
+                places.extend((0..n).map(|i| {
+                    let angle = TAU * (i as f32 + turn + 0.35 * rng.signed()) / n as f32;
+                    center + ops::unit(angle) * (radius * share * (1.0 + 0.15 * rng.signed()))
+                }));
+            }
+            places
+        }
         StartLayout::Ring { count, radius } => {
             let turn = rng.unit();
             (0..count).map(|i| center + ops::unit(TAU * (i as f32 + turn) / count as f32) * radius).collect()

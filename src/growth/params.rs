@@ -21,7 +21,7 @@ pub enum MarkerLayout {
     },
     /// Rays around the hit, with rings of markers on them (glass). They attract the nodes of their own hit only.
     Polar {
-        /// Number of rays at the centre, 1..=360.
+        /// Number of rays of a hit of energy 1, 1..=360; in proportion to the root of the energy.
         sectors: u32,
         /// Number of rings, 1..=256.
         rings: u32,
@@ -66,6 +66,13 @@ pub enum StartLayout {
         /// Pattern units, 0..=1.
         radius: f32,
     },
+    /// A crushed core: a fine mesh around the hit, with `count` nodes on its rim, in proportion to the root of the energy.
+    Crushed {
+        /// Nodes on the rim at energy 1, 1..=1024.
+        count: u32,
+        /// Radius at energy 1, pattern units, 0..=1.
+        radius: f32,
+    },
     /// `count` nodes scattered over a disc around the hit.
     Disc {
         /// 1..=1024.
@@ -108,7 +115,8 @@ pub struct GrowthParams {
     pub line_growth: f32,
     /// Exponent of the pipe model: a node with `n` nodes behind it is as wide as `n^(1/murray)` tips. 1..=8.
     pub murray: f32,
-    /// The widest a crack gets. Pattern units, at least `line_width`, at most 0.4.
+    /// The widest that what hangs on it makes a crack. Pattern units, at least `line_width`, at most 0.4. Hammering on the
+    /// same spot makes it up to twice as wide.
     pub max_width: f32,
     /// How much the width varies along a crack, 0..=0.9, as a share of it.
     pub unevenness: f32,
@@ -123,6 +131,8 @@ pub struct GrowthParams {
     pub draw_connections: bool,
     /// Share of possible connections that are left out, 0..=1.
     pub connection_gaps: f32,
+    /// Share of the crossings of rings and rays where a chip has come off: a ring meets the ray twice there. 0..=1.
+    pub chips: f32,
     /// Generations to the first ring of connections; the next ones lie 2, 3, 4 ... times as far apart. 1..=1000.
     pub connection_every: u32,
     /// Whether close nodes of different branches are joined (the cells of clay).
@@ -170,6 +180,7 @@ impl GrowthParams {
         roughness: 0.12,
         draw_connections: false,
         connection_gaps: 0.3,
+        chips: 0.0,
         connection_every: 1,
         draw_islands: false,
         island_distance: 0.03,
@@ -265,6 +276,7 @@ impl GrowthParams {
         wander: f32 = 0.0, 1.0;
         roughness: f32 = 0.0, 0.5;
         connection_gaps: f32 = 0.0, 1.0;
+        chips: f32 = 0.0, 1.0;
         connection_every: u32 = 1.0, 1000.0;
         island_distance: f32 = 0.0, 1.0;
         open_ends: f32 = 0.0, 1.0;
@@ -295,7 +307,9 @@ impl GrowthParams {
         let starts: &[_] = match self.starts {
             StartLayout::Point => &[],
             StartLayout::Points { count } => &[("start_count", f64::from(count), 1.0, 1024.0)],
-            StartLayout::Ring { count, radius } | StartLayout::Disc { count, radius } => {
+            StartLayout::Ring { count, radius }
+            | StartLayout::Crushed { count, radius }
+            | StartLayout::Disc { count, radius } => {
                 &[("start_count", f64::from(count), 1.0, 1024.0), ("start_radius", f64::from(radius), 0.0, 1.0)]
             }
         };
@@ -317,7 +331,7 @@ impl GrowthParams {
     /// Sets one parameter from text, by the name of its field or by the paper's own (`D`).
     ///
     /// Besides the fields: `markers` (`grid`, `darts`, `polar`), `occupancy`, `jitter`, `spacing`, `sectors`, `rings`,
-    /// `ring_growth` of the present layout; `venation` (`open`, `closed`), `starts` (`point`, `points`, `ring`, `disc`), `start_count`, `start_radius`.
+    /// `ring_growth` of the present layout; `venation` (`open`, `closed`), `starts` (`point`, `points`, `ring`, `crushed`, `disc`), `start_count`, `start_radius`.
     ///
     /// ```
     /// use bevy_crack::growth::GrowthParams;
@@ -363,6 +377,7 @@ impl GrowthParams {
                     "point" => StartLayout::Point,
                     "points" => StartLayout::Points { count: 8 },
                     "ring" => StartLayout::Ring { count: 12, radius: 0.02 },
+                    "crushed" => StartLayout::Crushed { count: 16, radius: 0.02 },
                     "disc" => StartLayout::Disc { count: 12, radius: 0.03 },
                     _ => return Err(unreadable()),
                 }
@@ -380,9 +395,18 @@ impl GrowthParams {
             (
                 "start_count",
                 _,
-                StartLayout::Points { count } | StartLayout::Ring { count, .. } | StartLayout::Disc { count, .. },
+                StartLayout::Points { count }
+                | StartLayout::Ring { count, .. }
+                | StartLayout::Crushed { count, .. }
+                | StartLayout::Disc { count, .. },
             ) => *count = parse(name, text)?,
-            ("start_radius", _, StartLayout::Ring { radius, .. } | StartLayout::Disc { radius, .. }) => {
+            (
+                "start_radius",
+                _,
+                StartLayout::Ring { radius, .. }
+                | StartLayout::Crushed { radius, .. }
+                | StartLayout::Disc { radius, .. },
+            ) => {
                 *radius = parse(name, text)?;
             }
             _ => return Err(ParamError::Unknown { name: name.to_owned() }),
@@ -418,6 +442,7 @@ impl GrowthParams {
             StartLayout::Point => {}
             StartLayout::Points { count: n }
             | StartLayout::Ring { count: n, .. }
+            | StartLayout::Crushed { count: n, .. }
             | StartLayout::Disc { count: n, .. } => {
                 *n = count(*n, starts, 1024);
             }

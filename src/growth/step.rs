@@ -1,7 +1,7 @@
 //! The growth itself: hits, steps, and what they leave behind.
 
 use super::{
-    GrowthParams, MarkerLayout, ParamError,
+    GrowthParams, MarkerLayout, ParamError, StartLayout,
     arrest::{Advance, Arrest},
     field::{ANY_IMPACT, MarkerField},
     links::{self, Linker},
@@ -13,10 +13,10 @@ use super::{
 use crate::{
     Grid,
     math::{hash_unit, mix},
-    pattern::{Dot, Link, LinkKind, NO_PARENT, Network, Node, SegmentId, Timeline},
+    pattern::{CrackMask, Dot, Link, LinkKind, NO_PARENT, Network, Node, SegmentId, Timeline},
 };
 use glam::Vec2;
-use std::ops::Range;
+use std::{ops::Range, sync::Arc};
 
 /// The most energy that an impact gathers.
 pub const MAX_ENERGY: f32 = 16.0;
@@ -28,6 +28,10 @@ pub struct Impact {
     pub pos: Vec2,
     /// Sum of the energies of all hits merged into it, at most [`MAX_ENERGY`].
     pub energy: f32,
+    /// Energy of the first of them.
+    pub first_energy: f32,
+    /// How many times wider its cracks are, for the hits merged into it.
+    pub widening: f32,
 }
 
 /// Why a hit was refused.
@@ -43,6 +47,9 @@ pub enum Rejected {
     /// It lies off the surface.
     #[error("it lies off the surface")]
     OffSurface,
+    /// Cracks are forbidden there.
+    #[error("cracks are forbidden there")]
+    Forbidden,
     /// The surface has all the nodes it may have.
     #[error("the surface has all the nodes it may have")]
     Full,
@@ -132,6 +139,7 @@ pub struct CrackGrowth {
     linker: Linker,
     impacts: Vec<Impact>,
     density: Option<Grid<f32>>,
+    pub(super) mask: Arc<CrackMask>,
     pub(super) steps: u32,
     steps_left: u32,
     /// Cracks that began by themselves, and markers that were tried for it.
@@ -226,6 +234,7 @@ impl CrackGrowth {
             linker: Linker::default(),
             impacts: Vec::new(),
             density: None,
+            mask: Arc::default(),
             steps: 0,
             steps_left: 0,
             nucleated: 0,
@@ -249,6 +258,23 @@ impl CrackGrowth {
         self.density = density.filter(|grid| grid.size().min_element() > 0);
     }
 
+    /// Where cracks of later hits and steps like to run, avoid to, and never go; an empty mask = everywhere alike.
+    ///
+    /// Markers move to the weakest place near them, cracks steer along what is weak and around what is strong, and no line
+    /// enters a forbidden texel. A hit on one is [rejected](Rejected::Forbidden). What is grown stays.
+    pub fn set_mask(&mut self, mask: impl Into<Arc<CrackMask>>) {
+        self.mask = mask.into();
+        self.mind_others();
+    }
+
+    /// Keeps account of lines if cracks must not cross, or if there are places that they must not enter.
+    fn mind_others(&mut self) {
+        let must = self.params.arrest > 0.0 || self.mask.forbidden.is_some();
+        if must != self.arrest.is_some() {
+            self.arrest = must.then(|| Arrest::new(&self.network, self.params.step_length));
+        }
+    }
+
     /// Hits the surface at `pos` (pattern units) with `energy` (1 = an ordinary hit; 4 reaches twice as far).
     ///
     /// Lays out starts and markers; growth happens in [`step`](Self::step). A hit as good as on top of an earlier one adds
@@ -267,6 +293,9 @@ impl CrackGrowth {
         if energy == 0.0 {
             return HitOutcome::Nothing;
         }
+        if self.mask.is_forbidden(pos / extent) {
+            return HitOutcome::Rejected(Rejected::Forbidden);
+        }
         if self.network.nodes.len() >= self.params.max_nodes as usize {
             return HitOutcome::Rejected(Rejected::Full);
         }
@@ -284,6 +313,7 @@ impl CrackGrowth {
             impact.energy = (before + energy).min(MAX_ENERGY);
             let (center, after) = (impact.pos, impact.energy);
             if after > before {
+                self.widen(index);
                 self.populate(index, center, self.reach(before), self.reach(after));
                 self.steps_left = self.params.num_iterations;
             }
@@ -291,17 +321,20 @@ impl CrackGrowth {
         }
         let index = self.impacts.len() as u32;
         let energy = energy.min(MAX_ENERGY);
-        self.impacts.push(Impact { pos, energy });
+        self.impacts.push(Impact { pos, energy, first_energy: energy, widening: 1.0 });
         let reach = self.reach(energy);
         let first = self.network.nodes.len() as u32;
         let seed = mix(self.seed ^ mix(u64::from(index)));
         for place in markers::starts(self.params.starts, (pos, energy), reach, extent, seed) {
-            if !self.nodes.any_within(place, 1e-4) && !self.is_on_crack(place) {
+            let is_free = !self.nodes.any_within(place, 1e-4) && !self.is_on_crack(place);
+            if is_free && !self.mask.is_forbidden(place / extent) {
                 self.bear(place, NO_PARENT, 0, index, 1.0);
             }
         }
         if first == self.network.nodes.len() as u32 {
             self.sprout(pos, index);
+        } else if matches!(self.params.starts, StartLayout::Crushed { .. }) {
+            self.crush(first);
         }
         for node in first..self.network.nodes.len() as u32 {
             self.field.visit(node, &self.network.nodes, &self.nodes);
@@ -319,7 +352,8 @@ impl CrackGrowth {
 
     fn populate(&mut self, impact: u32, center: Vec2, inner: f32, outer: f32) {
         let extent = self.network.extent();
-        let region = Region { center, inner, outer, extent };
+        let energy = self.impacts[impact as usize].first_energy;
+        let region = Region { center, energy, inner, outer, extent };
         let seed = mix(self.seed ^ mix(u64::from(impact) | 1 << 40));
         // Darts keep their distance from each other, and from the markers of hits that no step has taken up yet.
         let mut darts = None;
@@ -333,7 +367,8 @@ impl CrackGrowth {
         // The rays of a hit are its own: older cracks do not sprout towards them.
         let is_loyal = self.params.arrest > 0.0 || matches!(self.params.markers, MarkerLayout::Polar { .. });
         let loyal = if is_loyal { impact } else { ANY_IMPACT };
-        markers::lay_out(&self.params, region, self.density.as_ref(), seed, |pos, spacing| {
+        let wishes = (self.density.as_ref(), &*self.mask);
+        markers::lay_out(&self.params, region, wishes, seed, |pos, spacing| {
             if field.living_at_most() >= MAX_MARKERS {
                 return;
             }
@@ -364,7 +399,8 @@ impl CrackGrowth {
     /// Adds a node; the caller lets it visit the markers.
     pub(super) fn bear(&mut self, pos: Vec2, parent: u32, generation: u32, impact: u32, bend: f32) {
         let node = self.network.nodes.len() as u64;
-        let width = self.widths.tip(parent, hash_unit(self.seed ^ 0x1D, node));
+        let wider = self.impacts.get(impact as usize).map_or(1.0, |impact| impact.widening);
+        let width = self.widths.tip(parent, hash_unit(self.seed ^ 0x1D, node), wider);
         if let Some(arrest) = &mut self.arrest {
             arrest.push_node(false);
         }
@@ -505,7 +541,8 @@ impl CrackGrowth {
             };
             self.tried += 1;
             let impact = if loyal == ANY_IMPACT { self.impacts.len().saturating_sub(1) as u32 } else { loyal };
-            let is_free = !self.nodes.any_within(place, 2.0 * self.params.step_length);
+            let is_free = !self.nodes.any_within(place, 2.0 * self.params.step_length)
+                && !self.mask.is_forbidden(place / self.network.extent());
             if is_free {
                 self.nucleated += 1;
                 self.bear(place, NO_PARENT, 0, impact, 1.0);
@@ -513,10 +550,53 @@ impl CrackGrowth {
         }
     }
 
+    /// The last child of a node, or [`NO_PARENT`].
+    pub(super) fn child_of(&self, node: u32) -> u32 {
+        self.changes.child[node as usize]
+    }
+
     /// Whether a place lies on a crack, or as good as.
     fn is_on_crack(&self, place: Vec2) -> bool {
         let close = 0.3 * self.params.step_length;
-        self.arrest.as_ref().is_some_and(|arrest| arrest.walls.any_within(place, close))
+        self.params.arrest > 0.0 && self.arrest.as_ref().is_some_and(|arrest| arrest.walls.any_within(place, close))
+    }
+
+    /// Joins the nodes of a crushed core, from `first` on: each to the nearest before it, and most to the one after it.
+    fn crush(&mut self, first: u32) {
+        let last = self.network.nodes.len() as u32;
+        for node in first + 1..last {
+            let pos = self.network.nodes[node as usize].pos;
+            let to = |other: u32| self.network.nodes[other as usize].pos.distance_squared(pos);
+            // The node before it is on its own ring.
+            let inner = (first..node.saturating_sub(1).max(first + 1)).min_by(|&a, &b| to(a).total_cmp(&to(b)));
+            let draw = hash_unit(self.seed ^ 0xC3, u64::from(node));
+            for other in [inner.filter(|_| draw < 0.8), Some(node - 1).filter(|_| draw > 0.15)].into_iter().flatten() {
+                let width = self.params.line_width;
+                let (birth, kind) = (self.steps, LinkKind::Connection);
+                self.link(Link { a: other, b: node, width, birth, kind, bend: 1.0 });
+            }
+        }
+    }
+
+    /// Widens the cracks of an impact that was hit again: by the fourth root of the energy that it has gathered, up to twice.
+    fn widen(&mut self, impact: u32) {
+        let Impact { energy, first_energy, widening, .. } = self.impacts[impact as usize];
+        let wider = (energy / first_energy).sqrt().sqrt().min(2.0);
+        // In steps that can be seen, so that a thousand little hits do not repaint it all a thousand times.
+        if wider < 1.05 * widening {
+            return;
+        }
+        self.impacts[impact as usize].widening = wider;
+        for node in 0..self.network.nodes.len() as u32 {
+            let this = &mut self.network.nodes[node as usize];
+            if this.impact == impact {
+                this.width = (this.width * (wider / widening)).min(0.4);
+                self.widths.scale(node, wider / widening);
+                let (width, parent) = (this.width, this.parent);
+                self.changes.widened(node, parent != NO_PARENT);
+                self.timeline.widen(node, width);
+            }
+        }
     }
 
     /// A hit on a crack: new cracks start from it to either side.
@@ -597,6 +677,9 @@ impl CrackGrowth {
                 let stray = self.params.wander * (2.0 * hash_unit(self.seed ^ 0x57A6, child) - 1.0);
                 direction = (direction + direction.perp() * stray).normalize_or_zero();
             }
+            if !self.mask.is_empty() {
+                direction = steer(from, direction, length, &self.mask, extent);
+            }
             pull.child = up_to_border(from, direction, length, kill, extent);
         }
         let Self { field, network, pulls, pull_of, .. } = self;
@@ -607,12 +690,11 @@ impl CrackGrowth {
                 pull.serves = left_sq <= kill * kill || left_sq <= distance_sq - PROGRESS * length * length;
             }
         });
-        if self.params.arrest > 0.0 && self.params.inertia > 0.0 {
-            // A crack does not turn on its heel: what it cannot serve on its way is left to others.
-            return;
-        }
+        // A crack does not turn on its heel: what it cannot serve on its way is left to others.
+        let keeps_on = self.arrest.is_some() && (self.params.inertia > 0.0 || !self.mask.is_empty());
         for pull in &mut self.pulls {
-            if !pull.serves {
+            let is_start = self.network.nodes[pull.node as usize].parent == NO_PARENT;
+            if !pull.serves && (is_start || !keeps_on) {
                 let (from, to) = (self.network.nodes[pull.node as usize].pos, self.field.marker(pull.closest).pos);
                 let distance = pull.closest_sq.sqrt();
                 pull.child = if distance <= length { to } else { from + (to - from) * (length / distance) };
@@ -628,7 +710,7 @@ impl CrackGrowth {
             let nodes = &self.network.nodes;
             if a != b && nodes[a as usize].parent != b && nodes[b as usize].parent != a && !self.stays_open(b) {
                 let width = nodes[a as usize].width.min(nodes[b as usize].width);
-                self.link(Link { a, b, width, birth: self.steps, kind: LinkKind::Junction, bend: 1.0 });
+                self.link(Link { a, b, width, birth: self.steps, kind: LinkKind::Meeting, bend: 1.0 });
             }
         }
         if self.params.draw_connections {
@@ -728,12 +810,42 @@ impl CrackGrowth {
         let params = params.varied(self.seed);
         self.field.set_params(&params);
         self.widths.set_params(&params);
-        if (params.arrest > 0.0) != self.arrest.is_some() {
-            self.arrest = (params.arrest > 0.0).then(|| Arrest::new(&self.network, params.step_length));
-        }
         self.params = params;
+        self.mind_others();
         Ok(())
     }
+}
+
+/// Turns `direction` by up to 80 degrees towards what is weak and away from what is strong or forbidden.
+fn steer(from: Vec2, direction: Vec2, length: f32, mask: &CrackMask, extent: Vec2) -> Vec2 {
+    // Cosine and sine of 0, 10, ... 80 degrees.
+    const TURNS: [(f32, f32); 9] = [
+        (1.0, 0.0),
+        (0.984_807_8, 0.173_648_18),
+        (0.939_692_6, 0.342_020_15),
+        (0.866_025_4, 0.5),
+        (0.766_044_4, 0.642_787_6),
+        (0.642_787_6, 0.766_044_4),
+        (0.5, 0.866_025_4),
+        (0.342_020_15, 0.939_692_6),
+        (0.173_648_18, 0.984_807_8),
+    ];
+    let mut best = (f32::NEG_INFINITY, direction);
+    for (cos, sin) in TURNS.into_iter().flat_map(|(cos, sin)| [(cos, sin), (cos, -sin)]) {
+        let way = direction * cos + direction.perp() * sin;
+        let mut liking = 0.35 * cos;
+        for share in [0.5, 1.0, 1.5] {
+            let uv = (from + way * (share * length)) / extent;
+            liking += mask.weak_at(uv) - mask.strong_at(uv);
+        }
+        if mask.blocks(from / extent, (from + way * length) / extent) {
+            liking -= 100.0;
+        }
+        if liking > best.0 {
+            best = (liking, way);
+        }
+    }
+    best.1
 }
 
 /// The end of a segment of `length`; where the border of the surface is no further than `margin` beyond, the border.

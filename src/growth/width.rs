@@ -32,6 +32,8 @@ struct Pipe {
     notch: u8,
     /// What the width of its notch is multiplied by.
     factor: f32,
+    /// And for the hammering on its impact.
+    wider: f32,
 }
 
 impl Widths {
@@ -64,7 +66,7 @@ impl Widths {
     }
 
     /// Prepares the place of a node that grows from `parent`, with a draw of its own; returns its width.
-    pub(super) fn tip(&mut self, parent: u32, draw: f32) -> f32 {
+    pub(super) fn tip(&mut self, parent: u32, draw: f32, wider: f32) -> f32 {
         let mut factor = 1.0;
         if self.unevenness > 0.0 {
             // Each node is much like the one before.
@@ -72,8 +74,13 @@ impl Widths {
             factor += 0.75 * (before - 1.0) + self.unevenness * (draw - 0.5);
             factor = factor.clamp(1.0 - self.unevenness, 1.0 + self.unevenness);
         }
-        self.pipes.push(Pipe { behind: 1, told: 1, notch: 0, factor });
-        self.notches[0].1 * factor
+        self.pipes.push(Pipe { behind: 1, told: 1, notch: 0, factor, wider });
+        self.notches[0].1 * factor * wider
+    }
+
+    /// Makes a node wider for good.
+    pub(super) fn scale(&mut self, node: u32, by: f32) {
+        self.pipes[node as usize].wider *= by;
     }
 
     /// Widens what it hangs on; calls `widened` with each node that became wider.
@@ -93,7 +100,7 @@ impl Widths {
             more = pipe.behind - pipe.told;
             pipe.told = pipe.behind;
             let this = &mut nodes[node as usize];
-            this.width = this.width.max(self.notches[usize::from(pipe.notch)].1 * pipe.factor);
+            this.width = this.width.max(self.notches[usize::from(pipe.notch)].1 * pipe.factor * pipe.wider);
             widened(node);
             node = this.parent;
         }

@@ -1,21 +1,23 @@
 //! From hits to cracks: a surface gets its growth and textures at its first hit.
 
 use super::{
-    CrackBudget, CrackError, CrackFailed, CrackResolution, CrackState, CrackStats, CrackStatus, CrackSurface,
-    CrackTextures, HitPoint,
+    CrackBudget, CrackClock, CrackError, CrackFailed, CrackResolution, CrackState, CrackStats, CrackStatus,
+    CrackSurface, CrackTextures, HitPoint,
     budget::FrameClock,
     carrier::{self, Carrier, Found, Shown},
+    mask,
     picture::{self, BasePicture, Space},
+    preset,
     queue::{HitQueue, QueuedHit},
     surfaces::{Active, Surfaces, Touched},
     textures,
     upload::Uploads,
 };
 use crate::{
-    Grid,
+    CrackPreset, Grid,
     growth::{CrackGrowth, HitOutcome},
     paint::LookTable,
-    pattern::SurfaceFrame,
+    pattern::{CellTracker, SurfaceFrame},
     raster::{DepthField, TexelRect},
 };
 use bevy::{image::ImageSampler, prelude::*, render::renderer::RenderDevice};
@@ -96,6 +98,10 @@ fn apply(world: &mut World, entity: Entity, hit: QueuedHit) -> Result<HitOutcome
         surfaces.start_growing(entity);
         // The nodes it starts with show at once.
         surfaces.soil(entity);
+        let turned = surfaces.active.get_mut(&entity).and_then(Active::turn_forwards);
+        if let (Some(turned), Some(mut clock)) = (turned, world.get_mut::<CrackClock>(entity)) {
+            *clock = turned;
+        }
         set_status(world, entity, CrackStatus::Growing);
     }
     Ok(outcome)
@@ -140,20 +146,25 @@ fn make_ready(world: &mut World, entity: Entity) -> Result<bool, CrackError> {
         (_, Found::Unusable(error)) => return Err(error),
         _ => return Err(CrackError::NothingToCrack),
     };
+    let Some(preset) = preset::resolve(world, &surface.preset)? else { return Ok(false) };
     let Some(draft) = draft(world, &surface, &shown, 0)? else { return Ok(false) };
+    let Some(mask) = mask::resolve(world, &surface, &shown, &draft)? else { return Ok(false) };
     let frame = frame(draft.rect)?;
-    let mut growth = CrackGrowth::new(surface.preset.growth.clone(), frame.extent(), surface.seed)
+    let mut growth = CrackGrowth::new(preset.growth.clone(), frame.extent(), surface.seed)
         .map_err(|error| CrackError::Preset { reason: error.to_string() })?;
-    let look = look(&surface, frame)?;
+    let look = look(&preset, frame)?;
     if surface.alpha_mask {
-        growth.set_density(mask(&draft.base, draft.rect));
+        growth.set_density(density(&draft.base, draft.rect));
     }
+    let mut field = DepthField::new(frame);
+    field.forbid(&mask);
+    growth.set_mask(mask);
 
     let carrier = Carrier { kind, shown, own: None, mesh: None, is_sized: false };
     let mut active = Active {
         growth,
-        field: DepthField::new(frame),
-        profile: surface.preset.profile,
+        field,
+        profile: preset.profile,
         look,
         textures: make_textures(world, &draft, None)?,
         base: draft.base,
@@ -161,8 +172,11 @@ fn make_ready(world: &mut World, entity: Entity) -> Result<bool, CrackError> {
         bytes: draft.bytes,
         views: Vec::new(),
         view: 0,
-        rate: surface.preset.steps_per_second,
+        rate: preset.steps_per_second,
         due: 0.0,
+        clock: None,
+        closing: None,
+        playback: None,
         hits: 0,
         touched: Touched::new(frame.size()),
         is_growing: false,
@@ -170,8 +184,15 @@ fn make_ready(world: &mut World, entity: Entity) -> Result<bool, CrackError> {
         is_open: false,
         is_outdated: false,
         tips_from: 0,
+        cells: CellTracker::new(frame.extent()),
+        cells_told: 1,
         surface,
+        preset,
+        has_new_settings: false,
     };
+    if let Some(mut clock) = world.get_mut::<CrackClock>(entity) {
+        active.follow(clock.bypass_change_detection());
+    }
     active.show(draft.rect);
     // The textures begin as the base: nothing is dirty.
     active.views[0].dirty.clear();
@@ -185,7 +206,7 @@ fn make_ready(world: &mut World, entity: Entity) -> Result<bool, CrackError> {
 
 /// Makes the entity show the surface's textures.
 pub(super) fn attach(world: &mut World, entity: Entity, active: &mut Active) {
-    let relief = (active.surface.preset.look.relief / active.field.frame.extent().max_element()).min(MAX_PARALLAX);
+    let relief = (active.preset.look.relief / active.field.frame.extent().max_element()).min(MAX_PARALLAX);
     (active.carrier.kind.attach)(world, entity, &mut active.carrier, &active.textures, relief);
     if let Ok(mut entity) = world.get_entity_mut(entity) {
         entity.insert(active.textures.clone());
@@ -296,8 +317,8 @@ pub(super) fn frame(rect: TexelRect) -> Result<SurfaceFrame, CrackError> {
 }
 
 /// The look of a surface, ready to paint with.
-pub(super) fn look(surface: &CrackSurface, frame: SurfaceFrame) -> Result<LookTable, CrackError> {
-    LookTable::new(&surface.preset.look, frame.texels_per_unit())
+pub(super) fn look(preset: &CrackPreset, frame: SurfaceFrame) -> Result<LookTable, CrackError> {
+    LookTable::new(&preset.look, frame.texels_per_unit())
         .map_err(|error| CrackError::Preset { reason: error.to_string() })
 }
 
@@ -334,7 +355,7 @@ pub(super) fn make_textures(
 }
 
 /// Where cracks may go: not over holes. `None` if there are none.
-pub(super) fn mask(base: &BasePicture, rect: TexelRect) -> Option<Grid<f32>> {
+pub(super) fn density(base: &BasePicture, rect: TexelRect) -> Option<Grid<f32>> {
     let size = rect.size();
     let is_hole = |x, y| base.is_hole(rect.min + UVec2::new(x, y));
     if !(0..size.y).any(|y| (0..size.x).any(|x| is_hole(x, y))) {

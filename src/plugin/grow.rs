@@ -1,19 +1,17 @@
 //! The growth systems: time to steps.
 
-use super::{CrackBudget, budget::FrameClock, surfaces::Surfaces};
+use super::{CrackBudget, CrackCommandsExt, budget::FrameClock, surfaces::Surfaces};
 use bevy::prelude::*;
 
 /// Share of the frame's budget after which no further step is made.
 const SHARE: f32 = 0.7;
-
-/// The most steps that can be due: after a long pause a surface does not make up for all of it.
-const MAX_DUE: f32 = 64.0;
 
 /// Length of a frame where there is no clock, seconds.
 const DEFAULT_FRAME: f32 = 1.0 / 60.0;
 
 /// Makes the steps that are due, one surface after the other, one step each, until none is due or the budget is spent.
 pub(super) fn grow_surfaces(
+    mut commands: Commands,
     time: Option<Res<Time>>,
     budget: Res<CrackBudget>,
     mut clock: ResMut<FrameClock>,
@@ -29,8 +27,7 @@ pub(super) fn grow_surfaces(
     growing.extend(held.drain(..room));
     for entity in growing.iter() {
         if let Some(active) = active.get_mut(entity) {
-            let steps = if active.rate.is_finite() { active.rate.max(0.0) * seconds } else { 0.0 };
-            active.due = (active.due + steps).min(MAX_DUE);
+            active.pass(seconds);
         }
     }
     // Surfaces in a row that had nothing to do.
@@ -39,18 +36,20 @@ pub(super) fn grow_surfaces(
         let Some(entity) = growing.pop_front() else { break };
         let Some(active) = active.get_mut(&entity).filter(|active| active.is_growing) else { continue };
         idle += 1;
-        if active.due >= 1.0 && active.growth.is_growing() {
-            active.due -= 1.0;
-            active.growth.step();
+        if active.step_if_due() {
             idle = 0;
         }
-        if active.growth.is_growing() {
+        if !active.is_at_rest() {
             growing.push_back(entity);
         } else {
             active.is_growing = false;
             active.due = 0.0;
+            if active.has_closed() {
+                commands.entity(entity).heal_cracks();
+            }
         }
-        if (idle == 0 || !active.is_growing) && !active.is_dirty {
+        let is_news = idle == 0 || active.is_behind() || (!active.is_growing && active.is_open);
+        if is_news && !active.is_dirty {
             active.is_dirty = true;
             dirty.push_back(entity);
         }

@@ -16,6 +16,11 @@ pub trait CrackCommandsExt {
     /// Takes all cracks away: the surface shows its own pictures again, its textures and its growth are dropped, hits
     /// that wait on it are refused. Does nothing on entities without cracks.
     fn heal_cracks(&mut self) -> &mut Self;
+
+    /// Closes all cracks within so many seconds: they run back the way they came, whatever a [`CrackClock`](super::CrackClock)
+    /// says, and are healed as by [`heal_cracks`](Self::heal_cracks) then. Hits that wait on the surface are refused; one that comes
+    /// while they close makes them grow on from where they are. Not a number, zero or below: at once.
+    fn close_cracks(&mut self, seconds: f32) -> &mut Self;
 }
 
 impl CrackCommandsExt for EntityCommands<'_> {
@@ -23,6 +28,24 @@ impl CrackCommandsExt for EntityCommands<'_> {
         let entity = self.id();
         self.commands().queue(move |world: &mut World| heal(world, entity));
         self
+    }
+
+    fn close_cracks(&mut self, seconds: f32) -> &mut Self {
+        let entity = self.id();
+        self.commands().queue(move |world: &mut World| close(world, entity, seconds));
+        self
+    }
+}
+
+fn close(world: &mut World, entity: Entity, seconds: f32) {
+    purge(world, entity);
+    let is_closing = world.get_resource_mut::<Surfaces>().is_some_and(|mut surfaces| {
+        let is_closing = surfaces.active.get_mut(&entity).is_some_and(|active| active.close(seconds));
+        surfaces.wake(entity);
+        is_closing
+    });
+    if !is_closing {
+        heal(world, entity);
     }
 }
 

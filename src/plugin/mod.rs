@@ -19,18 +19,23 @@
 mod activate;
 mod budget;
 mod carrier;
+mod clock;
 mod error;
 mod grow;
 mod heal;
 mod hit;
 #[cfg(feature = "2d")]
 mod lit;
+mod mask;
 #[cfg(any(feature = "2d", feature = "3d"))]
 mod material;
 #[cfg(any(feature = "2d", feature = "3d"))]
 mod mesh;
 mod paint;
 mod picture;
+#[cfg(any(feature = "2d", feature = "3d"))]
+mod place;
+mod preset;
 mod queue;
 #[cfg(feature = "2d")]
 mod sprite;
@@ -42,12 +47,17 @@ mod upload;
 mod watch;
 
 pub use budget::{CrackBudget, CrackStats};
+pub use clock::{CrackClock, CrackDrive};
 pub use error::CrackError;
 pub use heal::CrackCommandsExt;
 pub use hit::{CrackHit, HitPoint};
 #[cfg(feature = "2d")]
 pub use lit::{CrackLight2d, CrackLitMaterial, CrackLitUniform, MAX_LIGHTS};
-pub use state::{CrackFailed, CrackFinished, CrackState, CrackStatus, CrackTip};
+pub use mask::CrackMaskSource;
+#[cfg(any(feature = "2d", feature = "3d"))]
+pub use place::{CrackPlace, CrackPlaces};
+pub use preset::PresetSource;
+pub use state::{CellClosed, CrackFailed, CrackFinished, CrackState, CrackStatus, CrackTip};
 pub use surface::{CrackMaps, CrackResolution, CrackSurface};
 pub use textures::CrackTextures;
 pub use upload::CrackUploadStats;
@@ -62,12 +72,14 @@ use bevy::{
 /// What a game names.
 pub mod prelude {
     pub use super::{
-        CrackBudget, CrackCommandsExt, CrackError, CrackFailed, CrackFinished, CrackHit, CrackMaps, CrackPlugin,
-        CrackPlugins, CrackResolution, CrackState, CrackStats, CrackStatus, CrackSurface, CrackSystems, CrackTextures,
-        CrackTip, HitPoint,
+        CellClosed, CrackBudget, CrackClock, CrackCommandsExt, CrackDrive, CrackError, CrackFailed, CrackFinished,
+        CrackHit, CrackMaps, CrackMaskSource, CrackPlugin, CrackPlugins, CrackResolution, CrackState, CrackStats,
+        CrackStatus, CrackSurface, CrackSystems, CrackTextures, CrackTip, HitPoint, PresetSource,
     };
     #[cfg(feature = "2d")]
     pub use super::{CrackLight2d, CrackLitMaterial};
+    #[cfg(any(feature = "2d", feature = "3d"))]
+    pub use super::{CrackPlace, CrackPlaces};
     pub use crate::preset::CrackPreset;
 }
 
@@ -102,11 +114,13 @@ impl Plugin for CrackPlugin {
     fn build(&self, app: &mut App) {
         use CrackSystems::{Grow, Hit, Paint, Upload};
         app.register_type::<CrackSurface>()
+            .register_type::<CrackClock>()
             .register_type::<CrackState>()
             .register_type::<CrackTextures>()
             .register_type::<CrackHit>()
             .register_type::<CrackFinished>()
             .register_type::<CrackFailed>()
+            .register_type::<CellClosed>()
             .register_type::<CrackBudget>()
             .register_type::<CrackStats>()
             .register_type::<CrackUploadStats>()
@@ -116,6 +130,7 @@ impl Plugin for CrackPlugin {
             .init_resource::<upload::Uploads>()
             .init_resource::<budget::FrameClock>()
             .init_resource::<queue::HitQueue>()
+            .init_resource::<mask::PictureMasks>()
             .init_resource::<surfaces::Surfaces>()
             .add_message::<CrackHit>()
             .add_observer(hit::receive_hit)
@@ -127,14 +142,14 @@ impl Plugin for CrackPlugin {
                 PostUpdate,
                 (
                     (
-                        (budget::start_frame, watch::watch_surfaces, watch::watch_pictures),
+                        (budget::start_frame, watch::watch_surfaces, watch::watch_pictures, preset::watch_presets),
                         watch::update_changed.run_if(watch::any_changed),
                         hit::collect_hits,
                         activate::apply_hits.run_if(queue::any_queued),
                     )
                         .chain()
                         .in_set(Hit),
-                    grow::grow_surfaces.in_set(Grow),
+                    (clock::follow_clocks, grow::grow_surfaces).chain().in_set(Grow),
                     paint::paint_surfaces.in_set(Paint),
                     upload::drop_unwanted.in_set(Upload),
                 ),
@@ -158,6 +173,7 @@ impl Plugin for CrackPlugin {
     }
 
     fn finish(&self, app: &mut App) {
+        preset::add_assets(app);
         upload::connect(app);
         #[cfg(feature = "2d")]
         lit::add_material(app);

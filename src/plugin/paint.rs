@@ -1,26 +1,24 @@
 //! The painting system: networks to texels.
 
 use super::{
-    CrackBudget, CrackFinished, CrackState, CrackStatus, CrackTextures, CrackTip,
+    CellClosed, CrackBudget, CrackFinished, CrackState, CrackStatus, CrackTextures, CrackTip,
     budget::FrameClock,
-    surfaces::{Active, Surfaces},
+    surfaces::{Active, Surfaces, Touched},
     upload::Uploads,
 };
 use crate::{
     paint::{BaseTexels, PaintTargets, paint_into},
-    pattern::{NO_PARENT, SegmentId},
-    raster::{TexelRect, stamp_dot, stamp_path},
+    pattern::{Moment, NO_PARENT, SegmentId},
+    raster::{DOT_DEPTH, DepthField, Redrawn, TexelRect, stamp_dot, stamp_path, stamp_path_with},
 };
 use bevy::prelude::*;
-
-/// Depth of the dots that `draw_markers` asks for.
-const MARKER_DEPTH: f32 = 0.5;
 
 /// Buffers kept from frame to frame.
 #[derive(Default)]
 pub(super) struct Scratch {
     segments: Vec<SegmentId>,
     markers: Vec<Vec2>,
+    redrawn: Redrawn,
     rects: Vec<TexelRect>,
 }
 
@@ -44,12 +42,15 @@ pub(super) fn paint_surfaces(
     while let Some(entity) = dirty.pop_front() {
         let Some(active) = active.get_mut(&entity) else { continue };
         active.is_dirty = false;
+        let before = active.playback.as_ref().map(|playback| playback.shown);
         stamp(active, &mut scratch);
         paint(active, &mut images, &mut uploads, &mut scratch.rects);
-        let is_done = !active.is_growing && active.is_open;
+        let is_done = active.is_open && active.is_complete();
+        tell_cells(active, entity, &mut commands);
         if let Ok(mut state) = states.get_mut(entity) {
-            tell(active, &mut state, is_done);
+            tell(active, &mut state, before, is_done);
         }
+        active.close_playback();
         if is_done {
             active.is_open = false;
             commands.trigger(CrackFinished { entity });
@@ -61,27 +62,50 @@ pub(super) fn paint_surfaces(
     clock.stop(&timer);
 }
 
-/// Stamps what has grown since the last time into the field.
+/// Stamps what has grown since the last time into the field, or whatever is to be shown.
 fn stamp(active: &mut Active, scratch: &mut Scratch) {
+    let moment = active.moment();
+    if let Some(playback) = &mut active.playback {
+        let (growth, redrawn) = (&active.growth, &mut scratch.redrawn);
+        playback.replay.show(&mut active.field, growth.network(), growth.timeline(), moment, redrawn);
+        playback.shown = moment;
+        redrawn.cleared.iter().for_each(|tile| active.touched.unmark(*tile));
+        redrawn.stamped.iter().for_each(|rect| active.touched.mark(*rect));
+        redrawn.changed.iter().for_each(|rect| active.mark(*rect));
+        return;
+    }
     active.growth.take_changed(&mut scratch.segments);
     for segment in scratch.segments.drain(..) {
         if let Some(path) = active.growth.network().path(segment) {
-            let rect = stamp_path(&mut active.field, &active.profile, &path);
+            let changed = &mut |rect| scratch.rects.push(rect);
+            let rect = stamp_path_with(&mut active.field, &active.profile, &path, changed);
             active.touched.mark(rect);
-            active.mark(rect);
         }
     }
+    scratch.rects.drain(..).for_each(|rect| active.mark(rect));
     active.growth.take_markers(&mut scratch.markers);
     let radius = active.growth.params().line_width;
     for marker in scratch.markers.drain(..) {
-        let rect = stamp_dot(&mut active.field, marker, radius, MARKER_DEPTH);
+        let rect = stamp_dot(&mut active.field, marker, radius, DOT_DEPTH);
         active.mark(rect);
     }
 }
 
-/// Stamps the whole network into the field anew.
-pub(super) fn stamp_all(active: &mut Active) {
-    let network = active.growth.network();
+/// Clears the field and stamps the whole network anew; at another time than the end that is left to the next
+/// [`paint_surfaces`].
+pub(super) fn stamp_anew(active: &mut Active) {
+    let frame = active.field.frame;
+    active.field.clear();
+    active.touched = Touched::new(frame.size());
+    if let Some(playback) = &mut active.playback {
+        playback.start_over(frame, active.profile);
+        return;
+    }
+    let (network, timeline) = (active.growth.network(), active.growth.timeline());
+    let end = Moment::after(timeline.end());
+    for dot in (0..).map_while(|dot| timeline.dot_at(dot, end)) {
+        stamp_dot(&mut active.field, dot.pos, dot.radius, DOT_DEPTH);
+    }
     for segment in network.segments() {
         if let Some(path) = network.path(segment) {
             let rect = stamp_path(&mut active.field, &active.profile, &path);
@@ -142,21 +166,57 @@ fn put_data(images: &mut Assets<Image>, texture: Option<&Handle<Image>>, data: O
     }
 }
 
-/// Writes down how the surface is doing.
-fn tell(active: &mut Active, state: &mut CrackState, is_done: bool) {
+/// Tells of the cells that have closed and are shown closed for the first time.
+fn tell_cells(active: &mut Active, entity: Entity, commands: &mut Commands) {
+    active.cells.update(active.growth.network());
+    let now = active.shown().whole();
+    while let Some(cell) = active.cells.cells().get(active.cells_told).filter(|cell| cell.birth <= now) {
+        let uv = active.field.frame.pos_to_uv(cell.centroid);
+        commands.trigger(CellClosed { entity, cell: active.cells_told as u32, area: cell.area, uv });
+        active.cells_told += 1;
+    }
+}
+
+/// Writes down how the surface is doing; `before` was shown before if it has a playback.
+fn tell(active: &mut Active, state: &mut CrackState, before: Option<Moment>, is_done: bool) {
     let network = active.growth.network();
     let nodes = network.nodes();
     state.damage = active.touched.share();
     state.nodes = u32::try_from(nodes.len()).unwrap_or(u32::MAX);
     state.hits = active.hits;
+    let moment = active.shown();
+    // In order of birth; the first is no piece.
+    let cells = active.cells.cells().get(1..).unwrap_or_default();
+    state.cells = cells.partition_point(|cell| cell.birth <= moment.whole()) as u32;
+    state.time = moment.steps() as f32;
+    state.end = active.growth.timeline().end() as f32;
     state.tips.clear();
     if is_done {
         state.status = CrackStatus::Done;
+    }
+    if active.is_complete() {
+        // No crack is on its way.
+    } else if let Some(before) = before {
+        let timeline = active.growth.timeline();
+        let born = if before < moment { timeline.born(before.whole(), moment.begun()) } else { 0..0 };
+        let first = born.start.max(born.end.saturating_sub(CrackState::MAX_TIPS as u32));
+        state.tips.extend((first..born.end).filter_map(|node| {
+            // From the node it grows from to as far as it is shown.
+            let way = |moment| match timeline.path_at(network, SegmentId::Branch(node), moment)?.points() {
+                [from, .., to] => Some((to.pos, to.pos - from.pos)),
+                _ => None,
+            };
+            let (tip, now) = way(moment)?;
+            let length = now.length() - way(before).map_or(0.0, |(_, earlier)| earlier.length());
+            let uv = active.field.frame.pos_to_uv(tip);
+            Some(CrackTip { uv, direction: now.normalize_or_zero(), length: length.max(0.0) })
+        }));
     } else {
         let first = active.tips_from.max(nodes.len().saturating_sub(CrackState::MAX_TIPS)).min(nodes.len());
-        state.tips.extend(nodes[first..].iter().filter(|node| node.parent != NO_PARENT).map(|node| CrackTip {
-            uv: active.field.frame.pos_to_uv(node.pos),
-            direction: (node.pos - nodes[node.parent as usize].pos).normalize_or_zero(),
+        state.tips.extend(nodes[first..].iter().filter(|node| node.parent != NO_PARENT).map(|node| {
+            let way = node.pos - nodes[node.parent as usize].pos;
+            let uv = active.field.frame.pos_to_uv(node.pos);
+            CrackTip { uv, direction: way.normalize_or_zero(), length: way.length() }
         }));
     }
     active.tips_from = nodes.len();

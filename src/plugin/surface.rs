@@ -1,7 +1,6 @@
 //! [`CrackSurface`]: this sprite or mesh can crack.
 
-use super::{CrackState, heal};
-use crate::preset::CrackPreset;
+use super::{CrackMaskSource, CrackState, PresetSource, heal};
 use bevy::{
     ecs::{lifecycle::HookContext, world::DeferredWorld},
     prelude::*,
@@ -16,8 +15,9 @@ use bevy::{
 #[require(CrackState)]
 #[component(on_add = added, on_remove = removed)]
 pub struct CrackSurface {
-    /// How cracks grow and look. Changes hold for what grows from then on; invalid ones are refused with one warning.
-    pub preset: CrackPreset,
+    /// How cracks grow and look, here or in a file. Changes hold for what grows from then on; invalid ones are refused with
+    /// one warning.
+    pub preset: PresetSource,
     /// Seed of the pattern. A change takes effect after healing.
     pub seed: u64,
     /// Size of the textures.
@@ -26,18 +26,22 @@ pub struct CrackSurface {
     pub write: CrackMaps,
     /// Whether transparent texels refuse hits and attract no cracks; default true.
     pub alpha_mask: bool,
+    /// Where cracks like to run and where they never go. A change takes effect after healing.
+    pub mask: CrackMaskSource,
 }
 
 impl CrackSurface {
-    /// A surface of the given material, with seed 0, everything else by default.
+    /// A surface of the given material (a [`CrackPreset`](crate::CrackPreset) or the handle of one), with seed 0, everything
+    /// else by default.
     #[must_use]
-    pub fn new(preset: CrackPreset) -> Self {
+    pub fn new(preset: impl Into<PresetSource>) -> Self {
         Self {
-            preset,
+            preset: preset.into(),
             seed: 0,
             resolution: CrackResolution::Picture,
             write: CrackMaps { diffuse: true, normal: true, depth: true },
             alpha_mask: true,
+            mask: CrackMaskSource::None,
         }
     }
 
@@ -47,11 +51,18 @@ impl CrackSurface {
         self.seed = seed;
         self
     }
+
+    /// The same with a mask.
+    #[must_use]
+    pub fn with_mask(mut self, mask: CrackMaskSource) -> Self {
+        self.mask = mask;
+        self
+    }
 }
 
 impl Default for CrackSurface {
     fn default() -> Self {
-        Self::new(CrackPreset::default())
+        Self::new(PresetSource::default())
     }
 }
 

@@ -1,9 +1,11 @@
 //! [`Surfaces`]: the surfaces that have been hit.
 
-use super::{CrackSurface, CrackTextures, carrier::Carrier, picture::BasePicture};
+use super::{CrackClock, CrackSurface, CrackTextures, carrier::Carrier, clock::Playback, picture::BasePicture};
 use crate::{
+    CrackPreset,
     growth::CrackGrowth,
     paint::LookTable,
+    pattern::CellTracker,
     raster::{DepthField, DirtyTiles, Profile, TexelRect},
 };
 use bevy::{asset::UntypedAssetId, ecs::entity::EntityHashMap, platform::collections::HashMap, prelude::*};
@@ -23,6 +25,10 @@ pub(super) struct View {
 pub(super) struct Active {
     /// The component as it was when it was last looked at.
     pub(super) surface: CrackSurface,
+    /// The preset in use; that of the component unless it was refused.
+    pub(super) preset: CrackPreset,
+    /// Whether the component or the preset has changed and was not taken up yet.
+    pub(super) has_new_settings: bool,
     pub(super) growth: CrackGrowth,
     pub(super) field: DepthField,
     pub(super) profile: Profile,
@@ -38,11 +44,17 @@ pub(super) struct Active {
     /// Steps of growth a second.
     pub(super) rate: f32,
     /// Steps of growth that are due, with their fraction.
-    pub(super) due: f32,
+    pub(super) due: f64,
+    /// The component, if it has one.
+    pub(super) clock: Option<CrackClock>,
+    /// While its cracks close: steps a second, backwards.
+    pub(super) closing: Option<f64>,
+    /// Shows other times than the end; `None` = everything that has grown is shown.
+    pub(super) playback: Option<Playback>,
     pub(super) hits: u32,
     /// Tiles that a crack has touched.
     pub(super) touched: Touched,
-    /// Whether it is in a growing list.
+    /// Whether it is in a growing list: it grows, or its time passes.
     pub(super) is_growing: bool,
     /// Whether it is in the dirty list.
     pub(super) is_dirty: bool,
@@ -52,6 +64,9 @@ pub(super) struct Active {
     pub(super) is_outdated: bool,
     /// Nodes that were there when tips were last listed.
     pub(super) tips_from: usize,
+    pub(super) cells: CellTracker,
+    /// Cells whose closing has been told, with the one that is there from the start.
+    pub(super) cells_told: usize,
 }
 
 impl Active {
@@ -79,7 +94,7 @@ impl Active {
     }
 }
 
-/// A set of tiles that only grows.
+/// A set of tiles.
 #[derive(Default)]
 pub(super) struct Touched {
     columns: u32,
@@ -106,6 +121,16 @@ impl Touched {
                     self.count += 1;
                 }
             }
+        }
+    }
+
+    /// Takes the one tile `rect` out.
+    pub(super) fn unmark(&mut self, rect: TexelRect) {
+        let tile = rect.min / DirtyTiles::TILE;
+        if let Some(tile) = self.tiles.get_mut((tile.y * self.columns + tile.x) as usize)
+            && core::mem::replace(tile, false)
+        {
+            self.count -= 1;
         }
     }
 
@@ -140,10 +165,17 @@ impl Surfaces {
     pub(super) fn start_growing(&mut self, entity: Entity) {
         if let Some(active) = self.active.get_mut(&entity) {
             active.is_open = true;
-            if !active.is_growing {
-                active.is_growing = true;
-                self.held.push_back(entity);
-            }
+            self.wake(entity);
+        }
+    }
+
+    /// Puts a surface whose time may pass in the line to grow.
+    pub(super) fn wake(&mut self, entity: Entity) {
+        if let Some(active) = self.active.get_mut(&entity)
+            && !active.is_growing
+        {
+            active.is_growing = true;
+            self.held.push_back(entity);
         }
     }
 

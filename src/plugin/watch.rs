@@ -1,18 +1,22 @@
 //! Changes from outside: other presets, other pictures, another frame of an animation.
 
 use super::{
-    CrackError, CrackState, CrackStatus, CrackSurface, CrackTextures,
-    activate::{attach, draft, fail, frame, look, make_textures, mask, set_status},
+    CrackError, CrackMaskSource, CrackState, CrackStatus, CrackSurface, CrackTextures,
+    activate::{attach, density, draft, fail, frame, look, make_textures, set_status},
     carrier::{self, Carrier, Found, Shown},
-    paint::stamp_all,
-    surfaces::{Active, Surfaces, Touched},
+    mask::{self, PictureMasks},
+    paint::stamp_anew,
+    preset,
+    surfaces::{Active, Surfaces},
 };
 use crate::{
+    CrackPreset,
     growth::CrackGrowth,
-    pattern::SurfaceFrame,
+    pattern::{CellTracker, CrackMask, SurfaceFrame},
     raster::{DepthField, TexelRect},
 };
 use bevy::prelude::*;
+use std::sync::Arc;
 
 /// Notes the cracked surfaces whose settings have changed.
 pub(super) fn watch_surfaces(
@@ -32,11 +36,16 @@ pub(super) fn watch<C: Component>(
 }
 
 /// Notes the cracked surfaces whose original pictures have changed.
-pub(super) fn watch_pictures(events: Option<MessageReader<AssetEvent<Image>>>, mut surfaces: ResMut<Surfaces>) {
+pub(super) fn watch_pictures(
+    events: Option<MessageReader<AssetEvent<Image>>>,
+    mut surfaces: ResMut<Surfaces>,
+    mut masks: ResMut<PictureMasks>,
+) {
     let Some(mut events) = events else { return };
     let Surfaces { active, changed, sources, .. } = &mut *surfaces;
     for event in events.read() {
         if let AssetEvent::Modified { id } | AssetEvent::Added { id } = event {
+            masks.forget(*id);
             for entity in sources.get(id).into_iter().flatten() {
                 changed.push(*entity);
                 if let Some(active) = active.get_mut(entity) {
@@ -101,11 +110,8 @@ fn take(world: &mut World, entity: Entity) -> Option<Active> {
 
 /// `false` if the new picture is not there yet. On an error the cracks stay as they are.
 fn update(world: &mut World, entity: Entity, active: &mut Active) -> Result<bool, CrackError> {
-    if let Some(surface) = world.get::<CrackSurface>(entity)
-        && *surface != active.surface
-    {
-        let surface = surface.clone();
-        update_settings(entity, active, surface);
+    if !update_settings(world, entity, active) {
+        return Ok(false);
     }
     let (kind, found) = carrier::inspect(world, entity);
     let shown = match found {
@@ -134,38 +140,58 @@ fn update(world: &mut World, entity: Entity, active: &mut Active) -> Result<bool
     update_picture(world, entity, active, shown)
 }
 
-/// Takes up another preset; an invalid one is refused and the old one stays.
-fn update_settings(entity: Entity, active: &mut Active, surface: CrackSurface) {
-    let look = look(&surface, active.field.frame).map_err(|error| error.to_string());
-    let outcome = look.and_then(|look| {
-        if surface.preset.growth != active.surface.preset.growth {
-            active.growth.set_params(surface.preset.growth.clone()).map_err(|error| error.to_string())?;
-        }
-        Ok(look)
-    });
-    match outcome {
-        Ok(look) => {
-            active.look = look;
-            active.profile = surface.preset.profile;
-            active.rate = surface.preset.steps_per_second;
-            let whole = TexelRect::whole(active.field.frame.size());
-            active.mark(whole);
-        }
+/// Takes up other settings; a preset that is invalid is refused and the old one stays. `false` if it is not there yet.
+fn update_settings(world: &World, entity: Entity, active: &mut Active) -> bool {
+    if let Some(surface) = world.get::<CrackSurface>(entity)
+        && *surface != active.surface
+    {
+        // Remembered even if refused, so that it is refused once only.
+        active.surface = surface.clone();
+        active.has_new_settings = true;
+    }
+    if !active.has_new_settings {
+        return true;
+    }
+    let preset = preset::resolve(world, &active.surface.preset);
+    if matches!(preset, Ok(None)) {
+        return false;
+    }
+    active.has_new_settings = false;
+    match preset.and_then(|preset| preset.map_or(Ok(()), |preset| update_preset(active, preset))) {
+        Ok(()) => {}
         Err(error) => warn!("the changed preset of {entity} is not used: {error}"),
     }
-    // Remembered even if refused, so that it is refused once only.
-    active.surface = surface;
+    true
+}
+
+fn update_preset(active: &mut Active, preset: CrackPreset) -> Result<(), CrackError> {
+    let look = look(&preset, active.field.frame)?;
+    if preset.growth != active.preset.growth {
+        let outcome = active.growth.set_params(preset.growth.clone());
+        outcome.map_err(|error| CrackError::Preset { reason: error.to_string() })?;
+    }
+    active.look = look;
+    if active.profile != preset.profile {
+        active.profile = preset.profile;
+        stamp_anew(active);
+    }
+    active.rate = preset.steps_per_second;
+    active.preset = preset;
+    let whole = TexelRect::whole(active.field.frame.size());
+    active.mark(whole);
+    Ok(())
 }
 
 /// On a picture of other proportions the same hits, in the same places, make other cracks: grown as far as they were.
 /// `None` if they may stay.
-fn regrow(active: &Active, frame: SurfaceFrame) -> Result<Option<CrackGrowth>, CrackError> {
+fn regrow(active: &Active, frame: SurfaceFrame, mask: Arc<CrackMask>) -> Result<Option<CrackGrowth>, CrackError> {
     let (before, extent) = (active.growth.network().extent(), frame.extent());
     if before == extent {
         return Ok(None);
     }
     let mut growth = CrackGrowth::new(active.growth.params().clone(), extent, active.surface.seed)
         .map_err(|error| CrackError::Preset { reason: error.to_string() })?;
+    growth.set_mask(mask);
     for impact in active.growth.impacts() {
         growth.hit((impact.pos / before * extent).min(extent), impact.energy);
     }
@@ -179,26 +205,32 @@ fn regrow(active: &Active, frame: SurfaceFrame) -> Result<Option<CrackGrowth>, C
 fn update_picture(world: &mut World, entity: Entity, active: &mut Active, shown: Shown) -> Result<bool, CrackError> {
     active.is_outdated = true;
     let Some(draft) = draft(world, &active.surface, &shown, active.bytes)? else { return Ok(false) };
+    let Some(mask) = mask::resolve(world, &active.surface, &shown, &draft)? else { return Ok(false) };
     let frame = frame(draft.rect)?;
-    let look = look(&active.surface, frame)?;
-    let regrown = regrow(active, frame)?;
+    let look = look(&active.preset, frame)?;
+    let regrown = regrow(active, frame, mask.clone())?;
     active.textures = make_textures(world, &draft, Some(&active.textures))?;
     active.is_outdated = false;
     if let Some(growth) = regrown {
+        active.cells = CellTracker::new(frame.extent());
+        active.cells.update(growth.network());
+        active.cells_told = active.cells.cells().len();
         active.growth = growth;
     }
     if active.surface.alpha_mask {
-        active.growth.set_density(mask(&draft.base, draft.rect));
+        active.growth.set_density(density(&draft.base, draft.rect));
     }
+    active.growth.set_mask(mask.clone());
     world.resource_mut::<Surfaces>().bytes += draft.bytes;
     world.resource_mut::<Surfaces>().bytes -= active.bytes;
     active.bytes = draft.bytes;
     active.base = draft.base;
-    if frame != active.field.frame {
+    // What the mask forbids may be elsewhere now.
+    if frame != active.field.frame || active.surface.mask != CrackMaskSource::None {
         active.look = look;
         active.field = DepthField::new(frame);
-        active.touched = Touched::new(frame.size());
-        stamp_all(active);
+        active.field.forbid(&mask);
+        stamp_anew(active);
     }
     active.views.clear();
     active.show(draft.rect);

@@ -104,7 +104,7 @@ impl CrackPreset {
     /// assert_eq!(preset.profile, CrackPreset::GLASS.profile);
     ///
     /// let error = CrackPreset::from_ron("(look: (glimt: 2.0))").unwrap_err();
-    /// assert!(error.to_string().starts_with("line 1, column 13: "), "{error}");
+    /// assert!(error.to_string().starts_with("line 1, column 14: "), "{error}");
     /// # Ok::<(), bevy_crack::preset::PresetError>(())
     /// ```
     ///

@@ -13,9 +13,13 @@ pub use dirty::DirtyTiles;
 pub use distance::{MAX_DISTANCE, crack_distance};
 pub use rect::TexelRect;
 pub use replay::{DOT_DEPTH, Redrawn, Replay};
-pub use stamp::{stamp_dot, stamp_path};
+pub use stamp::{stamp_dot, stamp_path, stamp_path_with};
 
-use crate::{Grid, pattern::SurfaceFrame};
+use crate::{
+    Grid,
+    pattern::{CrackMask, SurfaceFrame},
+};
+use glam::UVec2;
 
 /// How deep the crack is at each texel: 0 = untouched, 65535 = the deepest; row-major from the top left.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,13 +28,52 @@ pub struct DepthField {
     pub frame: SurfaceFrame,
     /// One value per texel of the frame.
     pub depth: Grid<u16>,
+    /// Texels that stay untouched.
+    forbidden: Option<Grid<bool>>,
 }
 
 impl DepthField {
     /// An untouched field.
     #[must_use]
     pub fn new(frame: SurfaceFrame) -> Self {
-        Self { frame, depth: Grid::new(frame.size(), 0) }
+        Self { frame, depth: Grid::new(frame.size(), 0), forbidden: None }
+    }
+
+    /// Makes all of it untouched. What is forbidden stays so.
+    pub fn clear(&mut self) {
+        self.depth.as_mut_slice().fill(0);
+    }
+
+    /// Keeps every texel whose centre `mask` forbids untouched from now on, and gives back those that are not.
+    ///
+    /// Growth keeps its lines out of them; this keeps the width of the lines out as well.
+    pub fn forbid(&mut self, mask: &CrackMask) {
+        let size = self.frame.size();
+        self.forbidden = mask.forbidden.as_ref().map(|_| {
+            let forbids = |x, y| mask.is_forbidden((UVec2::new(x, y).as_vec2() + 0.5) / size.as_vec2());
+            let mut forbidden = Grid::new(size, false);
+            for y in 0..size.y {
+                for (x, texel) in (0..).zip(forbidden.row_mut(y as usize)) {
+                    *texel = forbids(x, y);
+                }
+            }
+            forbidden
+        });
+        self.spare(TexelRect::whole(size));
+    }
+
+    /// Takes back what was stamped on forbidden texels in `rect`.
+    fn spare(&mut self, rect: TexelRect) {
+        let Some(forbidden) = &self.forbidden else { return };
+        for y in rect.min.y..rect.max.y {
+            let texels = rect.min.x as usize..rect.max.x as usize;
+            let depth = &mut self.depth.row_mut(y as usize)[texels.clone()];
+            for (depth, forbidden) in depth.iter_mut().zip(&forbidden.row(y as usize)[texels]) {
+                if *forbidden {
+                    *depth = 0;
+                }
+            }
+        }
     }
 }
 

@@ -898,7 +898,7 @@ fn t14_a_cracked_picture_is_as_bright_as_before() {
         steps(&mut app, 2);
         let before = drawn(&mut app, &target);
         // A dot in a corner.
-        app.world_mut().get_mut::<CrackSurface>(entity).unwrap().preset.growth.reach = 0.01;
+        app.world_mut().get_mut::<CrackSurface>(entity).unwrap().preset.as_mut().unwrap().growth.reach = 0.01;
         hit(&mut app, CrackHit::uv(entity, Vec2::splat(0.1)));
         settle(&mut app, entity);
         let after = drawn(&mut app, &target);

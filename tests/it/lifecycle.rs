@@ -505,7 +505,7 @@ fn e7_a_long_frame_makes_a_bounded_number_of_steps() {
     // Rates that are none.
     set_frame(&mut app, FRAME);
     for rate in [f32::NAN, f32::INFINITY, -5.0, 0.0] {
-        app.world_mut().get_mut::<CrackSurface>(entity).unwrap().preset.steps_per_second = rate;
+        app.world_mut().get_mut::<CrackSurface>(entity).unwrap().preset.as_mut().unwrap().steps_per_second = rate;
         // What was due before.
         steps(&mut app, 5);
         let before = state(&app, entity).nodes;

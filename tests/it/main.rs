@@ -4,6 +4,8 @@
 #![cfg(test)]
 
 #[cfg(all(feature = "2d", feature = "3d"))]
+mod clock;
+#[cfg(all(feature = "2d", feature = "3d"))]
 mod gpu;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod hits;
@@ -15,9 +17,9 @@ mod masks;
 mod pictures;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod plugin;
-mod replay;
 #[cfg(feature = "serde")]
 mod presets;
+mod replay;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod support;
 mod voronoi;

@@ -223,7 +223,7 @@ fn sprites_are_hit_where_they_are_seen() {
         app.update();
         assert_eq!(counts(&app).applied, 1, "round {round}");
         // One node, drawn nowhere yet: let it grow a little and look where the texels change.
-        app.world_mut().get_mut::<CrackSurface>(entity).unwrap().preset.steps_per_second = 50.0;
+        app.world_mut().get_mut::<CrackSurface>(entity).unwrap().preset.as_mut().unwrap().steps_per_second = 50.0;
         let before = texels(&app, &app.world().get::<Sprite>(entity).unwrap().image.clone());
         for _ in 0..3 {
             app.update();
@@ -473,16 +473,17 @@ fn settings_change() {
     for i in 0..100 {
         app.update();
         let mut surface = app.world_mut().get_mut::<CrackSurface>(entity).unwrap();
-        let growth = &mut surface.preset.growth;
+        let preset = surface.preset.as_mut().unwrap();
+        let growth = &mut preset.growth;
         match i % 4 {
             0 => growth.step_length = rng.range(-0.01, 0.1),
             1 => growth.crack_radius = if i % 8 == 1 { f32::NAN } else { rng.range(0.05, 0.5) },
-            2 => surface.preset.look.glint = rng.range(-1.0, 3.0),
-            _ => surface.preset.steps_per_second = [f32::NAN, -5.0, 1e9, 60.0][i / 4 % 4],
+            2 => preset.look.glint = rng.range(-1.0, 3.0),
+            _ => preset.steps_per_second = [f32::NAN, -5.0, 1e9, 60.0][i / 4 % 4],
         }
     }
     counts(&app);
-    app.world_mut().get_mut::<CrackSurface>(entity).unwrap().preset = CrackPreset::GLASS;
+    app.world_mut().get_mut::<CrackSurface>(entity).unwrap().preset = CrackPreset::GLASS.into();
     settle(&mut app, entity);
 }
 

@@ -1,0 +1,143 @@
+//! [`PresetSource`]: presets in components and presets in files.
+
+use super::{CrackError, surfaces::Surfaces};
+use crate::preset::{CrackPreset, PresetError};
+use bevy::{
+    asset::{AssetLoader, AsyncReadExt, LoadContext, LoadState, io::Reader},
+    prelude::*,
+};
+
+/// Where a surface's preset comes from: itself, or a file.
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_crack::prelude::*;
+///
+/// fn setup(mut commands: Commands, assets: Res<AssetServer>) {
+///     let mut slow = CrackPreset::GLASS;
+///     slow.steps_per_second = 5.0;
+///     commands.spawn((Sprite::default(), CrackSurface::new(slow)));
+///     commands.spawn((Sprite::default(), CrackSurface::new(assets.load("presets/mine.crack.ron"))));
+/// }
+/// ```
+#[derive(Reflect, Clone, Debug, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "the large one is the usual one")]
+pub enum PresetSource {
+    /// This preset.
+    Inline(CrackPreset),
+    /// An asset, for instance a file `*.crack.ron` (see [`CrackPreset::from_ron`]). Hits wait until it is loaded. When it
+    /// changes, surfaces that use it take it up as they do a changed component; a broken file is one error in the log, and
+    /// what was there before stays.
+    Asset(Handle<CrackPreset>),
+}
+
+impl PresetSource {
+    /// The preset, to change it; `None` if it is an asset.
+    #[must_use]
+    pub const fn as_mut(&mut self) -> Option<&mut CrackPreset> {
+        match self {
+            Self::Inline(preset) => Some(preset),
+            Self::Asset(_) => None,
+        }
+    }
+}
+
+impl Default for PresetSource {
+    fn default() -> Self {
+        Self::Inline(CrackPreset::default())
+    }
+}
+
+impl From<CrackPreset> for PresetSource {
+    fn from(preset: CrackPreset) -> Self {
+        Self::Inline(preset)
+    }
+}
+
+impl From<Handle<CrackPreset>> for PresetSource {
+    fn from(preset: Handle<CrackPreset>) -> Self {
+        Self::Asset(preset)
+    }
+}
+
+/// The preset, valid; `None` if it is not there yet.
+pub(super) fn resolve(world: &World, source: &PresetSource) -> Result<Option<CrackPreset>, CrackError> {
+    let refused = |reason: String| CrackError::Preset { reason };
+    let preset = match source {
+        PresetSource::Inline(preset) => preset,
+        PresetSource::Asset(handle) => {
+            let presets = world.get_resource::<Assets<CrackPreset>>();
+            let presets = presets.ok_or_else(|| refused("there are no assets: add `AssetPlugin`".into()))?;
+            match (presets.get(handle), world.get_resource::<AssetServer>()) {
+                (Some(preset), _) => preset,
+                (None, Some(server)) => match server.get_load_state(handle) {
+                    // With backtraces on, the text goes on for pages.
+                    Some(LoadState::Failed(error)) => {
+                        return Err(refused(error.to_string().lines().next().unwrap_or_default().to_owned()));
+                    }
+                    _ => return Ok(None),
+                },
+                (None, None) => return Ok(None),
+            }
+        }
+    };
+    preset.validate().map_err(|error| refused(error.to_string()))?;
+    Ok(Some(preset.clone()))
+}
+
+/// Notes the cracked surfaces whose preset has changed on disk.
+pub(super) fn watch_presets(events: Option<MessageReader<AssetEvent<CrackPreset>>>, mut surfaces: ResMut<Surfaces>) {
+    let Some(mut events) = events else { return };
+    for event in events.read() {
+        let (AssetEvent::Modified { id } | AssetEvent::Added { id }) = event else { continue };
+        let Surfaces { active, changed, .. } = &mut *surfaces;
+        for (entity, active) in active {
+            if matches!(&active.surface.preset, PresetSource::Asset(handle) if handle.id() == *id) {
+                active.has_new_settings = true;
+                changed.push(*entity);
+            }
+        }
+    }
+}
+
+/// Loads `*.crack.ron`.
+#[derive(TypePath, Default)]
+struct PresetLoader;
+
+/// Why a file is no preset.
+#[derive(Debug, thiserror::Error)]
+enum LoadError {
+    #[error("{0}")]
+    Io(#[from] std::io::Error),
+    #[error("not UTF-8: {0}")]
+    Text(#[from] std::str::Utf8Error),
+    #[error("{0}")]
+    Preset(#[from] PresetError),
+}
+
+impl AssetLoader for PresetLoader {
+    type Asset = CrackPreset;
+    type Settings = ();
+    type Error = LoadError;
+
+    async fn load(&self, reader: &mut dyn Reader, (): &(), _: &mut LoadContext<'_>) -> Result<CrackPreset, LoadError> {
+        // One byte more than allowed tells that the file is too large, however large it is.
+        let mut bytes = Vec::new();
+        reader.take(CrackPreset::MAX_FILE as u64 + 1).read_to_end(&mut bytes).await?;
+        if bytes.len() > CrackPreset::MAX_FILE {
+            return Err(PresetError::TooLarge { bytes: bytes.len() }.into());
+        }
+        Ok(CrackPreset::from_ron(str::from_utf8(&bytes)?)?)
+    }
+
+    fn extensions(&self) -> &[&str] {
+        &[CrackPreset::EXTENSION]
+    }
+}
+
+/// Makes presets assets, where there are any.
+pub(super) fn add_assets(app: &mut App) {
+    if app.world().contains_resource::<AssetServer>() {
+        app.init_asset::<CrackPreset>().register_asset_reflect::<CrackPreset>().register_asset_loader(PresetLoader);
+    }
+}

@@ -1,0 +1,108 @@
+//! Pieces that break again.
+
+use super::{Shards, ShatterError, cuts::in_range, drawing::Drawing, faces::Faces};
+use crate::math::{Rng, ops};
+
+/// Sizes of pieces: at an impact a piece breaks into pieces of the next smaller class.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct SizeClasses {
+    /// The largest area of each class, the smallest class first; pattern units squared. A piece above the last is of one class more.
+    pub largest: [f32; 3],
+}
+
+impl SizeClasses {
+    /// Splinters to a thousandth of the shorter side squared, pieces to 6 thousandths, plates to 36.
+    pub const DEFAULT: Self = Self { largest: [0.001, 0.006, 0.036] };
+
+    /// The class of a piece of this area: 0 does not break any more.
+    #[must_use]
+    pub fn class(&self, area: f32) -> u8 {
+        self.largest.iter().filter(|&&largest| area > largest).count() as u8
+    }
+
+    /// The area that no piece exceeds when a piece of this area breaks; `None` if it does not.
+    #[must_use]
+    pub fn next(&self, area: f32) -> Option<f32> {
+        self.class(area).checked_sub(1).map(|class| self.largest[class as usize])
+    }
+}
+
+impl Default for SizeClasses {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
+}
+
+/// A piece is halved at most so often.
+const ROUNDS: u32 = 12;
+
+impl Shards {
+    /// Breaks a shard into pieces of at most `largest_area` (pattern units squared), which fill it.
+    ///
+    /// A piece is cut across its length, a little askew, until it is small enough. Positions stay those of the surface, so that
+    /// texture coordinates do.
+    ///
+    /// # Errors
+    /// If there is no such shard, or the area does not lie in 1e-6..=4096.
+    pub fn break_again(&self, shard: u32, largest_area: f32, seed: u64) -> Result<Self, ShatterError> {
+        in_range("largest_area", largest_area, 1e-6, 4096.0)?;
+        if self.get(shard).is_none() {
+            return Err(ShatterError::NoShard { shard });
+        }
+        let mut drawing = Drawing::new(self.lattice);
+        for ring in self.rings_of(shard) {
+            let closed = ring.iter().chain(&ring[..1]);
+            drawing.line(closed.map(|&corner| self.positions()[corner as usize]));
+        }
+        drawing.make_planar();
+        let mut rng = Rng::new(seed).stream("break again").nth(u64::from(shard));
+        let mut round = 0;
+        loop {
+            let mut faces = Faces::trace(&mut drawing);
+            let mut pieces = Self::new(&drawing, &faces, Vec::new());
+            let mut inside = self.inside(shard, &pieces);
+            let splinter = 0.02 * f64::from(largest_area) * 2.0 * self.lattice.scale * self.lattice.scale;
+            if faces.join_small(&mut drawing, splinter as i64, usize::MAX, |face| inside[face as usize]) {
+                faces = Faces::trace(&mut drawing);
+                pieces = Self::new(&drawing, &faces, Vec::new());
+                inside = self.inside(shard, &pieces);
+            }
+            let large: Vec<u32> = (0..pieces.len() as u32)
+                .filter(|&piece| inside[piece as usize] && pieces.shards[piece as usize].area > largest_area)
+                .collect();
+            if large.is_empty() || round == ROUNDS {
+                pieces.retain(&inside);
+                return Ok(pieces);
+            }
+            for piece in large {
+                let Some(from) = pieces.inner_point(piece) else { continue };
+                let askew = 0.4 * rng.signed();
+                let across = pieces.axis(piece) + std::f32::consts::FRAC_PI_2 + askew;
+                let own = u64::from(rng.next_u32());
+                drawing.cut_across(from, ops::unit(across), rng.nth(own));
+            }
+            drawing.make_planar();
+            round += 1;
+        }
+    }
+
+    fn inside(&self, shard: u32, pieces: &Self) -> Vec<bool> {
+        let inner = (0..pieces.len() as u32).map(|piece| pieces.inner_place(piece));
+        inner.map(|place| place.is_some_and(|place| self.contains_place(shard, place))).collect()
+    }
+
+    /// The angle of a shard's length: the axis of its corners.
+    fn axis(&self, shard: u32) -> f32 {
+        let Some(centroid) = self.get(shard).map(|shard| shard.centroid) else { return 0.0 };
+        let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
+        for &corner in self.outline(shard) {
+            let arm = self.positions()[corner as usize] - centroid;
+            xx += arm.x * arm.x;
+            xy += arm.x * arm.y;
+            yy += arm.y * arm.y;
+        }
+        0.5 * ops::atan2(2.0 * xy, xx - yy)
+    }
+}

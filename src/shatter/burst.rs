@@ -1,0 +1,242 @@
+//! [`Burst`]: how pieces fly, as a function of time.
+
+use super::{Shard, ShatterError, cuts::in_range};
+use crate::math::{Rng, ops};
+use glam::{Quat, Vec2, Vec3};
+
+/// How a burst looks. Lengths are pattern units, times seconds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
+pub struct BurstParams {
+    /// How long the cracked surface stands before it bursts, 0..=60. Default: 0.15.
+    pub hold: f32,
+    /// How fast the release runs outward from the hit, 0.01..=1000. Default: 8.
+    pub front: f32,
+    /// Speed of pieces at a hit of energy 1, 0..=100; grows with the root of the energy. Default: 0.9.
+    pub speed: f32,
+    /// Distance at which a piece gets half of it, 0.001..=64. Default: 0.5.
+    pub falloff: f32,
+    /// Share of the speed that goes along the direction of the hit instead of away from it, 0..=1. Default: 0.5.
+    pub along: f32,
+    /// How uneven speeds and directions are, 0..=1. Default: 0.35.
+    pub scatter: f32,
+    /// Turns of a piece of 0.01 area, radians a second, 0..=100; smaller pieces turn faster. Default: 4.
+    pub spin: f32,
+    /// Whether pieces turn about any axis; else about the one through the picture. Default: `true`.
+    pub tumble: bool,
+    /// Acceleration, y up; each component -100..=100. Default: 2.2 down.
+    pub gravity: Vec2,
+    /// Share of the speed that air takes a second, 0..=100. Default: 0.4.
+    pub drag: f32,
+    /// When a piece begins to fade, after its release, 0..=600. Default: 1.6.
+    pub fade_after: f32,
+    /// How long that takes, 0..=600. Default: 0.6.
+    pub fade: f32,
+}
+
+impl BurstParams {
+    /// The default: glass in a cartoon.
+    pub const DEFAULT: Self = Self {
+        hold: 0.15,
+        front: 8.0,
+        speed: 0.9,
+        falloff: 0.5,
+        along: 0.5,
+        scatter: 0.35,
+        spin: 4.0,
+        tumble: true,
+        gravity: Vec2::new(0.0, -2.2),
+        drag: 0.4,
+        fade_after: 1.6,
+        fade: 0.6,
+    };
+
+    fn validate(&self) -> Result<(), ShatterError> {
+        in_range("hold", self.hold, 0.0, 60.0)?;
+        in_range("front", self.front, 0.01, 1000.0)?;
+        in_range("speed", self.speed, 0.0, 100.0)?;
+        in_range("falloff", self.falloff, 0.001, 64.0)?;
+        in_range("along", self.along, 0.0, 1.0)?;
+        in_range("scatter", self.scatter, 0.0, 1.0)?;
+        in_range("spin", self.spin, 0.0, 100.0)?;
+        in_range("gravity", self.gravity.x, -100.0, 100.0)?;
+        in_range("gravity", self.gravity.y, -100.0, 100.0)?;
+        in_range("drag", self.drag, 0.0, 100.0)?;
+        in_range("fade_after", self.fade_after, 0.0, 600.0)?;
+        in_range("fade", self.fade, 0.0, 600.0)
+    }
+}
+
+impl Default for BurstParams {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
+}
+
+/// A burst of pieces from one hit.
+///
+/// ```
+/// use bevy_crack::shatter::{Burst, BurstParams, Cuts, Pose, ShatterParams, shatter};
+/// use glam::Vec3;
+///
+/// let mut cuts = Cuts::new([1.0, 1.0].into())?;
+/// cuts.add_line(&[[0.5, 0.0].into(), [0.5, 1.0].into()])?;
+/// let shards = shatter(cuts, &ShatterParams::DEFAULT)?;
+/// let burst = Burst::new(BurstParams::DEFAULT, [0.5, 0.5].into(), Vec3::NEG_Z, 1.0, 7)?;
+/// for (number, shard) in (0u32..).zip(shards.iter()) {
+///     let flight = burst.flight(number, shard);
+///     // The left half flies to the left, the right one to the right; backwards, each comes back to its place.
+///     assert_eq!(flight.pose(1.0).offset.x < 0.0, shard.centroid.x < 0.5);
+///     assert_eq!(flight.pose(0.0), Pose::AT_REST);
+/// }
+/// # Ok::<(), bevy_crack::shatter::ShatterError>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Burst {
+    params: BurstParams,
+    from: Vec2,
+    direction: Vec3,
+    energy: f32,
+    seed: u64,
+}
+
+/// The way of one piece.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Flight {
+    /// Seconds until it leaves its place.
+    pub delay: f32,
+    /// Velocity as it leaves, pattern units a second; x right, y up, z towards the viewer. For a physics engine, too.
+    pub velocity: Vec3,
+    /// Axis of its turning, a unit vector.
+    pub axis: Vec3,
+    /// Radians a second about it.
+    pub spin: f32,
+    gravity: Vec3,
+    drag: f32,
+    fade_after: f32,
+    fade: f32,
+}
+
+/// Where a piece is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pose {
+    /// From its place in the surface, pattern units; x right, y up, z towards the viewer.
+    pub offset: Vec3,
+    /// About its centroid.
+    pub rotation: Quat,
+    /// 1 = there, 0 = faded and to be forgotten.
+    pub opacity: f32,
+}
+
+impl Pose {
+    /// In its place.
+    pub const AT_REST: Self = Self { offset: Vec3::ZERO, rotation: Quat::IDENTITY, opacity: 1.0 };
+}
+
+/// Area of a piece that flies and turns as the parameters say.
+const USUAL_AREA: f32 = 0.01;
+
+impl Burst {
+    /// A burst from `from` (pattern units, y down), hit in `direction` (y up, z towards the viewer; of any length, zero = head on).
+    ///
+    /// # Errors
+    /// If a parameter lies outside its range, the energy outside 0..=1000, or a coordinate is not finite.
+    pub fn new(params: BurstParams, from: Vec2, direction: Vec3, energy: f32, seed: u64) -> Result<Self, ShatterError> {
+        params.validate()?;
+        in_range("energy", energy, 0.0, 1000.0)?;
+        if !from.is_finite() || !direction.is_finite() {
+            return Err(ShatterError::NotFinite { index: 0 });
+        }
+        let direction = direction.try_normalize().unwrap_or(Vec3::NEG_Z);
+        Ok(Self { params, from, direction, energy, seed })
+    }
+
+    /// The flight of a piece that the burst knocks out; `number` tells pieces apart.
+    #[must_use]
+    pub fn flight(&self, number: u32, shard: &Shard) -> Flight {
+        let BurstParams { speed, falloff, along, scatter, .. } = self.params;
+        let away = shard.centroid - self.from;
+        let distance = away.length();
+        let mut rng = Rng::new(self.seed).stream("burst").nth(u64::from(number));
+        let mut noise = || Vec3::new(rng.signed(), rng.signed(), rng.signed());
+        // Away from the hit; right behind it, only along its direction.
+        let out = Vec3::new(away.x, -away.y, 0.0) / (distance * distance + 0.1 * falloff * falloff).sqrt();
+        let direction = out * (1.0 - along) + self.direction * along + noise() * (0.5 * scatter);
+        let unevenness = 1.0 + scatter * rng.signed();
+        let strength = falloff * falloff / (falloff * falloff + distance * distance);
+        let velocity = direction * (speed * self.energy.sqrt() * strength * unevenness * lightness(shard.area));
+        self.released(shard, velocity, distance, rng)
+    }
+
+    /// The flight of a piece that merely falls.
+    #[must_use]
+    pub fn fall(&self, number: u32, shard: &Shard) -> Flight {
+        let mut rng = Rng::new(self.seed).stream("fall").nth(u64::from(number));
+        let velocity = Vec3::new(rng.signed(), 0.0, rng.signed()) * (0.04 * self.params.scatter);
+        let mut flight = self.released(shard, velocity, shard.centroid.distance(self.from), rng);
+        flight.spin *= 0.25;
+        flight
+    }
+
+    fn released(&self, shard: &Shard, velocity: Vec3, distance: f32, mut rng: Rng) -> Flight {
+        let BurstParams { hold, front, spin, tumble, gravity, drag, fade_after, fade, .. } = self.params;
+        let any = Vec3::new(rng.signed(), rng.signed(), 0.5 * rng.signed());
+        let turn = rng.signed();
+        let (axis, spin) =
+            if tumble { (any.normalize_or(Vec3::X), spin * (0.4 + 0.6 * turn.abs())) } else { (Vec3::Z, spin * turn) };
+        Flight {
+            delay: hold + distance / front,
+            velocity,
+            axis,
+            spin: spin * lightness(shard.area),
+            gravity: gravity.extend(0.0),
+            drag,
+            fade_after: fade_after * (0.8 + 0.4 * rng.unit()),
+            fade,
+        }
+    }
+}
+
+/// How much faster a piece moves than one of the usual area: by the fourth root of the ratio, up to twice.
+fn lightness(area: f32) -> f32 {
+    (USUAL_AREA / area.max(1e-9)).sqrt().sqrt().clamp(0.5, 2.0)
+}
+
+impl Flight {
+    /// Where the piece is `seconds` after the hit: the same for the same time, however it came to it.
+    #[must_use]
+    pub fn pose(&self, seconds: f32) -> Pose {
+        let time = seconds - self.delay;
+        if time.is_nan() || time <= 0.0 {
+            return Pose::AT_REST;
+        }
+        // The integral of exp(-drag t), and the integral of that; by their series where the formula would lose digits.
+        let x = self.drag * time;
+        let (run, fallen) = if x > 0.05 {
+            let run = (1.0 - ops::exp(-x)) / self.drag;
+            (run, (time - run) / self.drag)
+        } else {
+            let run = time * (1.0 - x / 2.0 * (1.0 - x / 3.0 * (1.0 - x / 4.0)));
+            (run, time * time / 2.0 * (1.0 - x / 3.0 * (1.0 - x / 4.0 * (1.0 - x / 5.0))))
+        };
+        let half_turn = 0.5 * self.spin * run;
+        let rotation = (self.axis * ops::sin(half_turn)).extend(ops::cos(half_turn));
+        let faded = if self.fade > 0.0 {
+            ((time - self.fade_after) / self.fade).clamp(0.0, 1.0)
+        } else {
+            f32::from(u8::from(time > self.fade_after))
+        };
+        Pose {
+            offset: self.velocity * run + self.gravity * fallen,
+            rotation: Quat::from_vec4(rotation),
+            opacity: 1.0 - faded,
+        }
+    }
+
+    /// Seconds after the hit at which the piece has faded.
+    #[must_use]
+    pub fn end(&self) -> f32 {
+        self.delay + self.fade_after + self.fade
+    }
+}

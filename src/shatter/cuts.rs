@@ -1,0 +1,163 @@
+//! [`Cuts`], and [`shatter`] from them to [`Shards`].
+
+use super::{Shards, drawing::Drawing, faces::Faces, lattice::Lattice};
+use crate::pattern::Network;
+use glam::Vec2;
+
+/// What cannot be shattered.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ShatterError {
+    /// The surface has no size.
+    #[error(
+        "a surface of {width} x {height} pattern units: both must be finite, above zero, and not 2^24 times the other"
+    )]
+    Extent {
+        /// Width given.
+        width: f32,
+        /// Height given.
+        height: f32,
+    },
+    /// A point of a line is NaN or infinite.
+    #[error("point {index} of a line is not finite")]
+    NotFinite {
+        /// Which point.
+        index: usize,
+    },
+    /// A parameter outside its range, or not finite.
+    #[error("parameter `{name}` is {value}, must lie in {min}..={max}")]
+    OutOfRange {
+        /// Name of the field.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// Least value allowed.
+        min: f64,
+        /// Greatest value allowed.
+        max: f64,
+    },
+    /// There is no such shard.
+    #[error("there is no shard {shard}")]
+    NoShard {
+        /// The number asked for.
+        shard: u32,
+    },
+}
+
+/// `Ok` if a parameter lies in its range.
+pub(super) fn in_range(name: &'static str, value: f32, min: f64, max: f64) -> Result<(), ShatterError> {
+    let value = f64::from(value);
+    if (min..=max).contains(&value) { Ok(()) } else { Err(ShatterError::OutOfRange { name, value, min, max }) }
+}
+
+/// The lines along which a surface is to be cut.
+///
+/// They may cross, touch, lie on each other and end anywhere. Points move by up to half a place of the lattice, that is
+/// by up to 2⁻²⁴ of the longer side, and those off the surface to its border.
+///
+/// ```
+/// use bevy_crack::{CrackPreset, growth::CrackGrowth, shatter::{Cuts, ShatterParams, shatter}};
+///
+/// let mut growth = CrackGrowth::new(CrackPreset::GLASS.growth, [1.0, 1.0].into(), 1)?;
+/// growth.hit([0.5, 0.5].into(), 1.0);
+/// while growth.step().grew() {}
+/// let shards = shatter(Cuts::from_network(growth.network())?, &ShatterParams { carry_on: true, ..Default::default() })?;
+/// assert!(shards.len() > 50);
+/// let area: f32 = shards.iter().map(|shard| shard.area).sum();
+/// assert!((area - 1.0).abs() < 1e-4);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Cuts {
+    pub(super) drawing: Drawing,
+}
+
+impl Cuts {
+    /// No cuts in a surface of `extent` pattern units.
+    ///
+    /// # Errors
+    /// If the extent is not finite, not above zero, or one side is more than 2²⁴ times the other.
+    pub fn new(extent: Vec2) -> Result<Self, ShatterError> {
+        let lattice = Lattice::new(extent).ok_or(ShatterError::Extent { width: extent.x, height: extent.y })?;
+        Ok(Self { drawing: Drawing::new(lattice) })
+    }
+
+    /// The drawn lines of a network.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new), for the extent of the network; and if one of its nodes is not finite.
+    pub fn from_network(network: &Network) -> Result<Self, ShatterError> {
+        let mut cuts = Self::new(network.extent())?;
+        cuts.drawing.reserve(2 * network.nodes().len());
+        for segment in network.segments() {
+            if let Some(path) = network.path(segment) {
+                let points = path.points();
+                if let Some(index) = points.iter().position(|point| !point.pos.is_finite()) {
+                    return Err(ShatterError::NotFinite { index });
+                }
+                cuts.drawing.line(points.iter().map(|point| point.pos));
+            }
+        }
+        Ok(cuts)
+    }
+
+    /// Adds a line through points in pattern units.
+    ///
+    /// # Errors
+    /// If a point is NaN or infinite; then nothing is added.
+    pub fn add_line(&mut self, points: &[Vec2]) -> Result<(), ShatterError> {
+        if let Some(index) = points.iter().position(|point| !point.is_finite()) {
+            return Err(ShatterError::NotFinite { index });
+        }
+        self.drawing.line(points.iter().copied());
+        Ok(())
+    }
+}
+
+/// How lines become shards.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
+pub struct ShatterParams {
+    /// Whether cracks that end inside a piece are carried on to the next crack or the border. Default: `false`.
+    pub carry_on: bool,
+    /// Pieces below this area join the neighbour with which they share most. Pattern units squared, 0..=1; default: 2e-5, five
+    /// texels of a surface of 512. 0 keeps every splinter.
+    pub min_area: f32,
+    /// The most shards, 1..=1000000; the smallest join their neighbours. Default: 10,000.
+    pub max_shards: u32,
+    /// Fixes the lines that are carried on.
+    pub seed: u64,
+}
+
+impl ShatterParams {
+    /// The default.
+    pub const DEFAULT: Self = Self { carry_on: false, min_area: 2e-5, max_shards: 10_000, seed: 0 };
+}
+
+impl Default for ShatterParams {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
+}
+
+/// Cuts a surface along lines: the faces that they and the border enclose.
+///
+/// Lines that enclose nothing cut nothing; without any there is one shard, the surface.
+///
+/// # Errors
+/// If a parameter lies outside its range.
+pub fn shatter(cuts: Cuts, params: &ShatterParams) -> Result<Shards, ShatterError> {
+    in_range("min_area", params.min_area, 0.0, 1.0)?;
+    in_range("max_shards", params.max_shards as f32, 1.0, 1e6)?;
+    let mut drawing = cuts.drawing;
+    drawing.make_planar();
+    let carried = if params.carry_on { drawing.carry_on(params.seed) } else { Vec::new() };
+    let scale = drawing.lattice.scale;
+    let least = (2.0 * f64::from(params.min_area) * scale * scale) as i64;
+    let mut faces = Faces::trace(&mut drawing);
+    while faces.join_small(&mut drawing, least, params.max_shards as usize, |_| ()) {
+        faces = Faces::trace(&mut drawing);
+    }
+    Ok(Shards::new(&drawing, &faces, carried))
+}

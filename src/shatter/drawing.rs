@@ -1,0 +1,437 @@
+//! [`Drawing`]: lines on the lattice, made planar.
+
+use super::lattice::{Lattice, Place, PlaceMap, cross, distance_sq, dot, key, orient, vector};
+use crate::math::Rng;
+use glam::Vec2;
+
+/// Lines as edges between places; once planar, the four sides of the surface among them.
+#[derive(Clone, Debug)]
+pub(super) struct Drawing {
+    pub(super) lattice: Lattice,
+    pub(super) places: Vec<Place>,
+    vertex_at: PlaceMap,
+    /// Indices of two places.
+    pub(super) edges: Vec<[u32; 2]>,
+}
+
+/// Crossings are cut at the nearest place, which moves lines a little and may make them cross again: after so many rounds
+/// the younger of two crossing lines gives way. Three are enough for all but made-up cases.
+const ROUNDS: u32 = 8;
+
+/// No line: both ends the same.
+pub(super) const DEAD: [u32; 2] = [u32::MAX; 2];
+
+/// Pieces of a line that is carried on are about this long, pattern units; as the pieces of a crack.
+const PIECE: f32 = 1.0 / 72.0;
+
+/// How far a line that is carried on strays, as a share of its length.
+const ROUGHNESS: f32 = 0.12;
+
+impl Drawing {
+    /// The bare surface.
+    pub(super) fn new(lattice: Lattice) -> Self {
+        let mut drawing = Self { lattice, places: Vec::new(), vertex_at: PlaceMap::default(), edges: Vec::new() };
+        let [w, h] = lattice.corner;
+        for corner in [[0, 0], [w, 0], [w, h], [0, h]] {
+            drawing.vertex(corner);
+        }
+        drawing
+    }
+
+    /// Makes room for so many more points.
+    pub(super) fn reserve(&mut self, points: usize) {
+        self.places.reserve(points);
+        self.vertex_at.reserve(points);
+        self.edges.reserve(points);
+    }
+
+    pub(super) fn vertex(&mut self, place: Place) -> u32 {
+        let new = self.places.len() as u32;
+        let vertex = *self.vertex_at.entry(key(place)).or_insert(new);
+        if vertex == new {
+            self.places.push(place);
+        }
+        vertex
+    }
+
+    pub(super) fn line(&mut self, points: impl Iterator<Item = Vec2>) {
+        let mut last = None;
+        for point in points {
+            let vertex = self.vertex(self.lattice.snap(point));
+            if let Some(last) = last.replace(vertex).filter(|&last| last != vertex) {
+                self.edges.push([last, vertex]);
+            }
+        }
+    }
+
+    fn ends(&self, edge: u32) -> [Place; 2] {
+        self.edges[edge as usize].map(|vertex| self.places[vertex as usize])
+    }
+
+    /// Cuts lines where they meet, until they share nothing but ends, and drops what is there twice.
+    pub(super) fn make_planar(&mut self) {
+        self.lay_border();
+        let (mut round, mut cuts) = (0, Vec::new());
+        loop {
+            let grid = EdgeGrid::new(self);
+            let mut changed = false;
+            grid.pairs(|e, f| changed |= self.separate(e, f, round < ROUNDS, &mut cuts));
+            if !changed {
+                break;
+            }
+            self.apply(&mut cuts);
+            round += 1;
+        }
+    }
+
+    /// Lays the border anew, from each place on it to the next.
+    fn lay_border(&mut self) {
+        self.edges.retain(|&[a, b]| {
+            let sides = [a, b].map(|vertex| self.places[vertex as usize]);
+            self.lattice.side_of(sides[0], sides[1]).is_none()
+        });
+        let mut on_side: [Vec<u32>; 4] = Default::default();
+        for (vertex, &place) in (0u32..).zip(&self.places) {
+            for (vertices, is_on) in on_side.iter_mut().zip(self.lattice.sides(place)) {
+                if is_on {
+                    vertices.push(vertex);
+                }
+            }
+        }
+        for mut vertices in on_side {
+            // One coordinate is the same for all.
+            vertices.sort_unstable_by_key(|&vertex| self.places[vertex as usize]);
+            self.edges.extend(vertices.windows(2).map(|pair| [pair[0], pair[1]]));
+        }
+    }
+
+    /// Notes where two edges must be cut so that they share nothing but ends. `false` if they need not be.
+    fn separate(&mut self, e: u32, f: u32, may_cross: bool, cuts: &mut Vec<(u32, u32)>) -> bool {
+        let ([a, b], [c, d]) = (self.edges[e as usize], self.edges[f as usize]);
+        if [a, b] == DEAD || [c, d] == DEAD {
+            return false;
+        }
+        let shared = match () {
+            () if a == c => Some((a, b, d)),
+            () if a == d => Some((a, b, c)),
+            () if b == c => Some((b, a, d)),
+            () if b == d => Some((b, a, c)),
+            () => None,
+        };
+        let place = |vertex: u32| self.places[vertex as usize];
+        if let Some((hub, p, q)) = shared {
+            if p == q {
+                self.edges[e.max(f) as usize] = DEAD;
+                return true;
+            }
+            let (to_p, to_q) = (vector(place(hub), place(p)), vector(place(hub), place(q)));
+            if cross(to_p, to_q) != 0 || dot(to_p, to_q) < 0 {
+                return false;
+            }
+            cuts.push(if dot(to_p, to_p) < dot(to_q, to_q) { (f, p) } else { (e, q) });
+            return true;
+        }
+        let (pa, pb, pc, pd) = (place(a), place(b), place(c), place(d));
+        let apart = |i: usize| pa[i].max(pb[i]) < pc[i].min(pd[i]) || pc[i].max(pd[i]) < pa[i].min(pb[i]);
+        if apart(0) || apart(1) {
+            return false;
+        }
+        let (oc, od) = (orient(pa, pb, pc).signum(), orient(pa, pb, pd).signum());
+        if oc * od > 0 {
+            return false;
+        }
+        let (oa, ob) = (orient(pc, pd, pa).signum(), orient(pc, pd, pb).signum());
+        if oa * ob > 0 {
+            return false;
+        }
+        if oc * od < 0 && oa * ob < 0 {
+            if !may_cross {
+                self.edges[e.max(f) as usize] = DEAD;
+                return true;
+            }
+            let at = self.vertex(crossing([pa, pb], [pc, pd]));
+            cuts.extend([(e, at), (f, at)]);
+            return true;
+        }
+        let between = |p: Place, a: Place, b: Place| dot(vector(p, a), vector(p, b)) < 0;
+        let before = cuts.len();
+        cuts.extend((oc == 0 && between(pc, pa, pb)).then_some((e, c)));
+        cuts.extend((od == 0 && between(pd, pa, pb)).then_some((e, d)));
+        cuts.extend((oa == 0 && between(pa, pc, pd)).then_some((f, a)));
+        cuts.extend((ob == 0 && between(pb, pc, pd)).then_some((f, b)));
+        cuts.len() > before
+    }
+
+    /// Replaces edges by the pieces between the vertices at which they are cut.
+    fn apply(&mut self, cuts: &mut Vec<(u32, u32)>) {
+        cuts.sort_by_key(|&(edge, vertex)| {
+            let [from, _] = self.edges[edge as usize];
+            let start = self.places.get(from as usize).copied().unwrap_or_default();
+            (edge, distance_sq(start, self.places[vertex as usize]), vertex)
+        });
+        for on_edge in cuts.chunk_by(|a, b| a.0 == b.0) {
+            let edge = on_edge[0].0 as usize;
+            let [from, to] = std::mem::replace(&mut self.edges[edge], DEAD);
+            if from == to {
+                continue;
+            }
+            let mut last = from;
+            for next in on_edge.iter().map(|cut| cut.1).chain([to]) {
+                if next != last {
+                    self.edges.push([last, next]);
+                }
+                last = next;
+            }
+        }
+        cuts.clear();
+        self.edges.retain(|&edge| edge != DEAD);
+    }
+
+    /// Carries every open end on, in the direction in which it came, to the next line. Returns the new lines.
+    pub(super) fn carry_on(&mut self, seed: u64) -> Vec<Vec<Vec2>> {
+        let mut at: Vec<(u32, u32)> = vec![(0, u32::MAX); self.places.len()];
+        for (edge, ends) in (0u32..).zip(&self.edges) {
+            for &end in ends {
+                at[end as usize].0 += 1;
+                // Any edge but the last does not matter: ends have one, the way back from them two.
+                at[end as usize].1 ^= edge;
+            }
+        }
+        let on_border = |place: Place| self.lattice.sides(place).contains(&true);
+        let tips: Vec<u32> =
+            (0..at.len() as u32).filter(|&v| at[v as usize].0 == 1 && !on_border(self.places[v as usize])).collect();
+        let grid = EdgeGrid::new(self);
+        let rng = Rng::new(seed).stream("carry on");
+        let (mut younger, mut lines) = (Vec::new(), Vec::new());
+        for tip in tips {
+            let back = self.way_back(&at, tip);
+            let [start, back] = [tip, back].map(|vertex| self.places[vertex as usize]);
+            let way = vector(back, start).map(|x| x as f64);
+            let Some((edge, hit)) = self.first_hit(start, way, &grid, &younger) else { continue };
+            let [from, to] = self.edges[edge as usize];
+            if let Some(pieces) = self.split(edge, hit) {
+                for (end, piece) in [from, to].into_iter().zip(pieces) {
+                    if let Some((_, edges)) = at.get_mut(end as usize) {
+                        *edges ^= edge ^ piece;
+                    }
+                }
+                younger.extend(pieces);
+            }
+            let ends = [tip, hit].map(|v| self.lattice.pos(self.places[v as usize]));
+            let line = self.rough_line(ends, rng.nth(u64::from(tip)));
+            let first = self.edges.len() as u32;
+            self.line(line.iter().copied());
+            younger.extend(first..self.edges.len() as u32);
+            lines.push(line);
+        }
+        self.edges.retain(|&edge| edge != DEAD);
+        self.make_planar();
+        lines
+    }
+
+    /// A vertex a few pieces back along the crack that ends at `tip`.
+    fn way_back(&self, at: &[(u32, u32)], tip: u32) -> u32 {
+        let reach = (f64::from(4.0 * PIECE) * self.lattice.scale) as i64;
+        let (mut vertex, mut edge) = (tip, at[tip as usize].1 ^ u32::MAX);
+        loop {
+            let Some(&[a, b]) = self.edges.get(edge as usize).filter(|&&ends| ends != DEAD) else { return vertex };
+            vertex = if a == vertex { b } else { a };
+            let far = distance_sq(self.places[tip as usize], self.places[vertex as usize]) > reach * reach;
+            match at.get(vertex as usize) {
+                Some(&(2, both)) if !far && vertex != tip => edge ^= both ^ u32::MAX,
+                _ => return vertex,
+            }
+        }
+    }
+
+    /// The first edge on the way from a place, other than those that begin there, and the vertex at which the way meets it.
+    fn first_hit(&mut self, start: Place, way: [f64; 2], grid: &EdgeGrid, younger: &[u32]) -> Option<(u32, u32)> {
+        // To the first side of the surface.
+        let share = [0, 1]
+            .map(|i| {
+                let room = if way[i] > 0.0 { self.lattice.corner[i] - start[i] } else { -start[i] };
+                if way[i] == 0.0 { f64::INFINITY } else { f64::from(room) / way[i] }
+            })
+            .into_iter()
+            .fold(f64::INFINITY, f64::min);
+        if !share.is_finite() {
+            return None;
+        }
+        let end: Place =
+            [0, 1].map(|i| ((f64::from(start[i]) + way[i] * share).round() as i32).clamp(0, self.lattice.corner[i]));
+        let mut best: Option<(f64, u32)> = None;
+        let mut look = |edge: u32| {
+            if self.edges[edge as usize] == DEAD {
+                return;
+            }
+            let [c, d] = self.ends(edge);
+            if c == start || d == start {
+                return;
+            }
+            let (oc, od) = (orient(start, end, c), orient(start, end, d));
+            if oc.signum() * od.signum() > 0 || (oc == 0 && od == 0) {
+                return;
+            }
+            let (side, run) = (vector(c, d), vector(start, end));
+            let along = cross(vector(start, c), side) as f64 / cross(run, side) as f64;
+            if (0.0..=1.0).contains(&along) && best.is_none_or(|best| (along, edge) < best) {
+                best = Some((along, edge));
+            }
+        };
+        grid.along(start, end, |edges| edges.iter().copied().for_each(&mut look));
+        younger.iter().copied().for_each(&mut look);
+        let (along, edge) = best?;
+        let run = vector(start, end);
+        let hit: Place = [0, 1].map(|i| start[i] + (run[i] as f64 * along).round() as i32);
+        // The sides of the surface stay straight.
+        let [c, d] = self.ends(edge);
+        let hit = match self.lattice.side_of(c, d) {
+            Some(side) if side < 2 => [c[0], hit[1]],
+            Some(_) => [hit[0], c[1]],
+            None => hit,
+        };
+        (hit != start).then(|| (edge, self.vertex(hit)))
+    }
+
+    /// Cuts an edge at a vertex that lies on it, or nearly. Returns its pieces.
+    fn split(&mut self, edge: u32, at: u32) -> Option<[u32; 2]> {
+        let [from, to] = self.edges[edge as usize];
+        if at == from || at == to {
+            return None;
+        }
+        let pieces = [self.edges.len() as u32, self.edges.len() as u32 + 1];
+        self.edges[edge as usize] = DEAD;
+        self.edges.extend([[from, at], [at, to]]);
+        Some(pieces)
+    }
+
+    /// Adds a rough line through a point, both ways to the next line.
+    pub(super) fn cut_across(&mut self, from: Vec2, way: Vec2, rng: Rng) {
+        let start = self.lattice.snap(from);
+        let way = way.as_dvec2().to_array();
+        let grid = EdgeGrid::new(self);
+        let Some((there, one)) = self.first_hit(start, way, &grid, &[]) else { return };
+        let Some((back, other)) = self.first_hit(start, way.map(|x| -x), &grid, &[]) else { return };
+        self.split(there, one);
+        if back != there {
+            self.split(back, other);
+        }
+        let ends = [other, one].map(|vertex| self.lattice.pos(self.places[vertex as usize]));
+        let line = self.rough_line(ends, rng);
+        self.line(line.into_iter());
+        self.edges.retain(|&edge| edge != DEAD);
+    }
+
+    /// Midpoint displacement between two points.
+    fn rough_line(&self, [from, to]: [Vec2; 2], mut rng: Rng) -> Vec<Vec2> {
+        let mut line = vec![from, to];
+        while line.len() < 64 && line[0].distance(line[1]) > PIECE {
+            let mut finer = Vec::with_capacity(2 * line.len());
+            for pair in line.windows(2) {
+                let across = (pair[1] - pair[0]).perp() * (ROUGHNESS * rng.signed());
+                finer.extend([pair[0], (0.5 * (pair[0] + pair[1]) + across).clamp(Vec2::ZERO, self.lattice.extent)]);
+            }
+            finer.push(to);
+            line = finer;
+        }
+        line
+    }
+}
+
+/// The place nearest to where two lines cross.
+fn crossing([a, b]: [Place; 2], [c, d]: [Place; 2]) -> Place {
+    let (run, side) = (vector(a, b), vector(c, d));
+    let (above, below) = (i128::from(cross(vector(a, c), side)), i128::from(cross(run, side)));
+    let (above, below) = if below < 0 { (-above, -below) } else { (above, below) };
+    [0, 1].map(|i| {
+        let doubled = 2 * i128::from(run[i]) * above + below;
+        a[i] + doubled.div_euclid(2 * below) as i32
+    })
+}
+
+/// Which edges pass through which square.
+struct EdgeGrid {
+    /// Squares are `1 << shift` wide.
+    shift: u32,
+    columns: usize,
+    /// Per square: where its edges begin in `edges`; one more at the end.
+    starts: Vec<u32>,
+    edges: Vec<u32>,
+}
+
+impl EdgeGrid {
+    fn new(drawing: &Drawing) -> Self {
+        let [w, h] = drawing.lattice.corner.map(|side| side as u64 + 1);
+        // About as many squares as edges.
+        let mut shift = 0;
+        while ((w >> shift) + 1) * ((h >> shift) + 1) > drawing.edges.len() as u64 + 16 {
+            shift += 1;
+        }
+        let (columns, rows) = ((w >> shift) as usize + 1, (h >> shift) as usize + 1);
+        let mut grid = Self { shift, columns, starts: vec![0; columns * rows + 1], edges: Vec::new() };
+        let mut passes = Vec::with_capacity(3 * drawing.edges.len());
+        for edge in 0..drawing.edges.len() as u32 {
+            if drawing.edges[edge as usize] == DEAD {
+                continue;
+            }
+            let [a, b] = drawing.ends(edge);
+            grid.squares(a, b, |square| passes.push((square, edge)));
+        }
+        for &(square, _) in &passes {
+            grid.starts[square as usize + 1] += 1;
+        }
+        for i in 1..grid.starts.len() {
+            grid.starts[i] += grid.starts[i - 1];
+        }
+        grid.edges.resize(passes.len(), 0);
+        let mut fill = grid.starts.clone();
+        for (square, edge) in passes {
+            grid.edges[fill[square as usize] as usize] = edge;
+            fill[square as usize] += 1;
+        }
+        grid
+    }
+
+    /// Every square that the line between two places touches, row by row.
+    fn squares(&self, a: Place, b: Place, mut visit: impl FnMut(u32)) {
+        let (top, bottom) = if a[1] <= b[1] { (a, b) } else { (b, a) };
+        let square = |x: i32| (x >> self.shift) as usize;
+        let (first, last) = (square(top[1]), square(bottom[1]));
+        let (low, high) = (top[0].min(bottom[0]), top[0].max(bottom[0]));
+        if first == last || square(low) == square(high) {
+            for row in first..=last {
+                (square(low)..=square(high)).for_each(|column| visit((row * self.columns + column) as u32));
+            }
+            return;
+        }
+        let slope = f64::from(bottom[0] - top[0]) / f64::from(bottom[1] - top[1]);
+        for row in first..=last {
+            // One place wider on either side, for rounding.
+            let x_at = |y: i64| f64::from(top[0]) + slope * (y as f64 - f64::from(top[1]));
+            let ends = [x_at((row << self.shift) as i64), x_at(((row + 1) << self.shift) as i64)];
+            let from = low.max((ends[0].min(ends[1]).floor() - 1.0) as i32);
+            let to = high.min((ends[0].max(ends[1]).ceil() + 1.0) as i32);
+            (square(from)..=square(to)).for_each(|column| visit((row * self.columns + column) as u32));
+        }
+    }
+
+    fn in_square(&self, square: u32) -> &[u32] {
+        &self.edges[self.starts[square as usize] as usize..self.starts[square as usize + 1] as usize]
+    }
+
+    fn along(&self, a: Place, b: Place, mut visit: impl FnMut(&[u32])) {
+        self.squares(a, b, |square| visit(self.in_square(square)));
+    }
+
+    /// Every pair of edges that share a square, the older first; some more than once.
+    fn pairs(&self, mut visit: impl FnMut(u32, u32)) {
+        for square in 0..self.starts.len() as u32 - 1 {
+            let edges = self.in_square(square);
+            for (i, &e) in edges.iter().enumerate() {
+                for &f in &edges[i + 1..] {
+                    visit(e, f);
+                }
+            }
+        }
+    }
+}

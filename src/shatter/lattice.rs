@@ -1,0 +1,118 @@
+//! Whole-number coordinates: every question about them has an exact answer.
+
+use glam::Vec2;
+use std::hash::{BuildHasherDefault, Hasher};
+
+/// A place on the lattice.
+pub(super) type Place = [i32; 2];
+
+/// Coordinates are below this, so that they fit a 32-bit float and products of differences fit 64 bits.
+const RANGE: f64 = (1u32 << 24) as f64;
+
+/// Between pattern space and the lattice.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Lattice {
+    pub(super) extent: Vec2,
+    /// Places per pattern unit, a power of two.
+    pub(super) scale: f64,
+    /// The corner opposite to (0, 0).
+    pub(super) corner: Place,
+}
+
+impl Lattice {
+    pub(super) fn new(extent: Vec2) -> Option<Self> {
+        if !extent.is_finite() || extent.min_element() <= 0.0 {
+            return None;
+        }
+        let longest = f64::from(extent.max_element());
+        let mut scale = 1.0;
+        while longest * scale > RANGE {
+            scale *= 0.5;
+        }
+        while longest * scale * 2.0 <= RANGE {
+            scale *= 2.0;
+        }
+        let corner = extent.to_array().map(|side| (f64::from(side) * scale).round() as i32);
+        (corner[0] > 0 && corner[1] > 0).then_some(Self { extent, scale, corner })
+    }
+
+    /// The place nearest to a point; points off the surface go to the border.
+    pub(super) fn snap(&self, pos: Vec2) -> Place {
+        let coordinate = |x: f32, most: i32| ((f64::from(x) * self.scale).round() as i32).clamp(0, most);
+        [coordinate(pos.x, self.corner[0]), coordinate(pos.y, self.corner[1])]
+    }
+
+    /// Exact, as the scale is a power of two.
+    pub(super) fn pos(&self, [x, y]: Place) -> Vec2 {
+        let coordinate = |x: i32, most: i32, end: f32| if x == most { end } else { (f64::from(x) / self.scale) as f32 };
+        Vec2::new(coordinate(x, self.corner[0], self.extent.x), coordinate(y, self.corner[1], self.extent.y))
+    }
+
+    /// Which sides of the border a place lies on: left, right, top, bottom.
+    pub(super) const fn sides(&self, [x, y]: Place) -> [bool; 4] {
+        [x == 0, x == self.corner[0], y == 0, y == self.corner[1]]
+    }
+
+    /// The side in which the line between two places lies.
+    pub(super) fn side_of(&self, a: Place, b: Place) -> Option<usize> {
+        let (a, b) = (self.sides(a), self.sides(b));
+        (0..4).find(|&side| a[side] && b[side])
+    }
+}
+
+pub(super) fn vector(from: Place, to: Place) -> [i64; 2] {
+    [i64::from(to[0]) - i64::from(from[0]), i64::from(to[1]) - i64::from(from[1])]
+}
+
+pub(super) const fn cross(a: [i64; 2], b: [i64; 2]) -> i64 {
+    a[0] * b[1] - a[1] * b[0]
+}
+
+pub(super) const fn dot(a: [i64; 2], b: [i64; 2]) -> i64 {
+    a[0] * b[0] + a[1] * b[1]
+}
+
+/// Above zero if `c` lies on the side of the line from `a` to `b` to which x turns to reach y.
+pub(super) fn orient(a: Place, b: Place, c: Place) -> i64 {
+    cross(vector(a, b), vector(a, c))
+}
+
+pub(super) fn distance_sq(a: Place, b: Place) -> i64 {
+    let way = vector(a, b);
+    dot(way, way)
+}
+
+/// Twice the signed area of a ring.
+pub(super) fn ring_area(ring: impl Iterator<Item = Place> + Clone) -> i64 {
+    let following = ring.clone().skip(1).chain(ring.clone().take(1));
+    ring.zip(following).map(|(a, b)| cross(a.map(i64::from), b.map(i64::from))).sum()
+}
+
+/// A quick hash for places, which are no secret.
+#[derive(Clone, Copy, Default)]
+pub(super) struct PlaceHasher(u64);
+
+/// Where each place is kept.
+pub(super) type PlaceMap = std::collections::HashMap<u64, u32, BuildHasherDefault<PlaceHasher>>;
+
+/// A place as one number.
+pub(super) const fn key([x, y]: Place) -> u64 {
+    (x as u32 as u64) << 32 | y as u32 as u64
+}
+
+impl Hasher for PlaceHasher {
+    fn finish(&self) -> u64 {
+        self.0
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        for &byte in bytes {
+            self.write_u64(u64::from(byte));
+        }
+    }
+
+    fn write_u64(&mut self, x: u64) {
+        let mixed = (self.0 ^ x).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+        self.0 = mixed ^ mixed >> 32;
+    }
+}

@@ -1,0 +1,44 @@
+//! Shards: the pieces into which cracks and border cut a surface.
+//!
+//! [`Cuts`] takes lines: the drawn, rough lines of a network, seams of a Voronoi diagram, lines of one's own. [`shatter`] puts
+//! them on a lattice of whole numbers (at least 2²³ places along the longer side), where they are made planar: crossings become
+//! common places, what is there twice goes, what encloses nothing goes. Its faces are the [`Shards`]: they tile the surface
+//! exactly, and neighbours share every place of their common edge.
+//!
+//! What a shard then needs is beside it: triangles, [meshes](Shards::flat_mesh), [convex pieces](Shards::convex_pieces) for
+//! colliders, neighbours; [`Support`] tells what falls, [`Shards::break_again`] cuts a piece further, and [`Burst`] moves the
+//! pieces as a function of time, so that it can be shown at any speed, and backwards.
+//!
+//! ```
+//! use bevy_crack::shatter::{Cuts, ShatterParams, shatter};
+//!
+//! // Two lines that cross: four pieces.
+//! let mut cuts = Cuts::new([2.0, 1.0].into())?;
+//! cuts.add_line(&[[0.5, 0.0].into(), [0.5, 1.0].into()])?;
+//! cuts.add_line(&[[0.0, 0.25].into(), [2.0, 0.25].into()])?;
+//! let shards = shatter(cuts, &ShatterParams::DEFAULT)?;
+//! let mut areas: Vec<f32> = shards.iter().map(|shard| shard.area).collect();
+//! areas.sort_by(f32::total_cmp);
+//! assert_eq!(areas, [0.125, 0.375, 0.375, 1.125]);
+//! # Ok::<(), bevy_crack::shatter::ShatterError>(())
+//! ```
+
+mod again;
+mod burst;
+mod cuts;
+mod drawing;
+mod faces;
+mod lattice;
+mod mesh;
+mod shards;
+mod support;
+#[cfg(test)]
+mod tests;
+mod triangulate;
+
+pub use again::SizeClasses;
+pub use burst::{Burst, BurstParams, Flight, Pose};
+pub use cuts::{Cuts, ShatterError, ShatterParams, shatter};
+pub use mesh::{MeshFrame, ShardMesh};
+pub use shards::{ConvexPiece, Neighbour, Shard, Shards};
+pub use support::{Anchor, Fallen, Support};

@@ -1,0 +1,165 @@
+//! [`Support`]: what holds, and what falls.
+
+use super::{Shards, ShatterError, cuts::in_range};
+use glam::Vec2;
+
+/// What holds a surface.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Anchor {
+    /// Nothing: pieces stay where they are until they are hit.
+    Nothing,
+    /// The whole border, as a pane in its frame.
+    #[default]
+    Border,
+    /// These sides: left, right, top, bottom.
+    Sides([bool; 4]),
+}
+
+/// Which shards are still in their places, and which of them are held.
+///
+/// A held shard holds its neighbours, and so on; what is not held any more falls.
+///
+/// ```
+/// use bevy_crack::shatter::{Anchor, Cuts, ShatterParams, Support, shatter};
+///
+/// // Three shelves; only the top is fixed.
+/// let mut cuts = Cuts::new([1.0, 1.0].into())?;
+/// cuts.add_line(&[[0.0, 0.3].into(), [1.0, 0.3].into()])?;
+/// cuts.add_line(&[[0.0, 0.6].into(), [1.0, 0.6].into()])?;
+/// let shards = shatter(cuts, &ShatterParams::DEFAULT)?;
+/// let mut support = Support::new(&shards, Anchor::Sides([false, false, true, false]));
+/// let fallen = support.hit(&shards, [0.5, 0.45].into(), 0.1)?;
+/// let number = |y: f32| shards.at([0.5, y].into()).into_iter().collect::<Vec<u32>>();
+/// assert_eq!((fallen.hit, fallen.loose), (number(0.45), number(0.8)));
+/// # Ok::<(), bevy_crack::shatter::ShatterError>(())
+/// ```
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Support {
+    anchored: Vec<bool>,
+    gone: Vec<bool>,
+}
+
+/// What a hit has released.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Fallen {
+    /// Shards that it knocked out, by number.
+    pub hit: Vec<u32>,
+    /// Shards that nothing holds any more, by number.
+    pub loose: Vec<u32>,
+}
+
+impl Support {
+    /// All shards in their places; those are held that lie along the anchor.
+    #[must_use]
+    pub fn new(shards: &Shards, anchor: Anchor) -> Self {
+        let sides = match anchor {
+            Anchor::Nothing => [false; 4],
+            Anchor::Border => [true; 4],
+            Anchor::Sides(sides) => sides,
+        };
+        let anchored = shards.iter().map(|shard| (0..4).any(|side| sides[side] && shard.border[side] > 0.0)).collect();
+        Self { anchored, gone: vec![false; shards.len()] }
+    }
+
+    /// All shards in their places; those are held of which a corner or the centre lies where `held` says so (pattern units).
+    #[must_use]
+    pub fn from_mask(shards: &Shards, mut held: impl FnMut(Vec2) -> bool) -> Self {
+        let anchored = (0u32..).zip(shards.iter()).map(|(i, shard)| {
+            held(shard.centroid) || shards.corners(i).iter().any(|&corner| held(shards.positions()[corner as usize]))
+        });
+        Self { anchored: anchored.collect(), gone: vec![false; shards.len()] }
+    }
+
+    /// The support of a surface that has been cracked further: what lies where a shard had gone is gone.
+    #[must_use]
+    pub fn renewed(&self, old: &Shards, new: &Shards, anchor: Anchor) -> Self {
+        let mut support = Self::new(new, anchor);
+        let mut holes: Vec<(f64, f64, u32)> = self.gone().map(|shard| span(old, shard)).collect();
+        holes.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.2.cmp(&b.2)));
+        for shard in 0..new.len() as u32 {
+            let Some(at) = new.inner_place(shard) else { continue };
+            let up_to = holes.partition_point(|hole| hole.0 <= at.x);
+            support.gone[shard as usize] =
+                holes[..up_to].iter().any(|&(_, right, hole)| at.x <= right && old.contains_place(hole, at));
+        }
+        support
+    }
+
+    /// Whether a shard is in its place.
+    #[must_use]
+    pub fn is_there(&self, shard: u32) -> bool {
+        self.gone.get(shard as usize).is_some_and(|gone| !gone)
+    }
+
+    /// Shards that are not in their places any more, by number.
+    pub fn gone(&self) -> impl Iterator<Item = u32> + '_ {
+        (0u32..).zip(&self.gone).filter(|(_, gone)| **gone).map(|(shard, _)| shard)
+    }
+
+    /// Puts every shard back.
+    pub fn restore(&mut self) {
+        self.gone.fill(false);
+    }
+
+    /// Takes one shard out, and returns what nothing holds any more.
+    pub fn take(&mut self, shards: &Shards, shard: u32) -> Vec<u32> {
+        if let Some(gone) = self.gone.get_mut(shard as usize) {
+            *gone = true;
+        }
+        self.drop_loose(shards)
+    }
+
+    /// Knocks out what lies within `reach` of a place (pattern units), and drops what nothing holds any more.
+    ///
+    /// A shard along the anchor stays in its frame unless it is itself hit.
+    ///
+    /// # Errors
+    /// If the place is not finite or `reach` does not lie in 0..=64.
+    pub fn hit(&mut self, shards: &Shards, at: Vec2, reach: f32) -> Result<Fallen, ShatterError> {
+        in_range("reach", reach, 0.0, 64.0)?;
+        if !at.is_finite() {
+            return Err(ShatterError::NotFinite { index: 0 });
+        }
+        let mut hit = Vec::new();
+        for shard in 0..self.gone.len().min(shards.len()) as u32 {
+            let distance = if self.is_there(shard) { shards.distance(shard, at) } else { f32::INFINITY };
+            if distance <= if self.anchored[shard as usize] { 0.0 } else { reach } {
+                hit.push(shard);
+                self.gone[shard as usize] = true;
+            }
+        }
+        Ok(Fallen { hit, loose: self.drop_loose(shards) })
+    }
+
+    /// Takes out what no anchored shard holds, by number. Where nothing is anchored, nothing falls by itself.
+    pub fn drop_loose(&mut self, shards: &Shards) -> Vec<u32> {
+        if !self.anchored.contains(&true) {
+            return Vec::new();
+        }
+        let mut held: Vec<bool> =
+            self.anchored.iter().zip(&self.gone).map(|(anchored, gone)| *anchored && !gone).collect();
+        let mut open: Vec<u32> = (0u32..).zip(&held).filter(|(_, held)| **held).map(|(shard, _)| shard).collect();
+        while let Some(shard) = open.pop() {
+            for neighbour in shards.neighbours(shard) {
+                if self.is_there(neighbour.shard) && !std::mem::replace(&mut held[neighbour.shard as usize], true) {
+                    open.push(neighbour.shard);
+                }
+            }
+        }
+        let loose: Vec<u32> =
+            (0..held.len() as u32).filter(|&shard| self.is_there(shard) && !held[shard as usize]).collect();
+        for &shard in &loose {
+            self.gone[shard as usize] = true;
+        }
+        loose
+    }
+}
+
+/// Left and right end of a shard on the lattice, and its number.
+fn span(shards: &Shards, shard: u32) -> (f64, f64, u32) {
+    let ends = shards.outline(shard).iter().map(|&corner| f64::from(shards.places[corner as usize][0]));
+    let (left, right) = ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+    (left, right, shard)
+}
