@@ -32,7 +32,7 @@ pub fn crack_distance(field: &DepthField, depth: u16, reach: u8) -> Grid<f32> {
     let (w, h) = (field.depth.width(), field.depth.height());
     let (mut columns, mut near) = (vec![reach + 1; w], vec![false; h]);
     // How far the nearest crack is in each column, 0..=reach + 1: first from above, then from below too.
-    let mut vertical = Grid::new(field.depth.size(), reach + 1);
+    let mut vertical = Grid::new(field.depth.size(), 0u8);
     for (y, near) in near.iter_mut().enumerate() {
         // Three loops, each of one width of numbers.
         let out = vertical.row_mut(y);

@@ -8,7 +8,7 @@ use super::{
     params::MAX_LEVELS,
     resample::Resampler,
     seams::{Guidance, Seams, Tracer},
-    search::BLOCK,
+    search::{BLOCK, Dearer},
     sites::{sites, texel},
     strokes::Astride,
 };
@@ -371,11 +371,14 @@ impl VoronoiMap {
 
     /// Computes the paths of all levels anew, from the same sites and edges: the same map again. For measurements.
     pub fn search_again(&mut self) {
-        for (level, lattice) in self.levels.iter_mut().zip(&self.lattices) {
-            let sites = &self.sites[..level.n_sites()];
-            *level = Level::new(self.frame.size(), sites, sites.len(), level.has_walls());
-            while level.advance(lattice, sites, usize::MAX) {}
-        }
+        (0..self.levels.len()).for_each(|i| self.search_level_again(i));
+    }
+
+    fn search_level_again(&mut self, i: usize) {
+        let (level, lattice) = (&mut self.levels[i], &self.lattices[i]);
+        let sites = &self.sites[..level.n_sites()];
+        *level = Level::new(self.frame.size(), sites, sites.len(), level.has_walls());
+        while level.advance(lattice, sites, usize::MAX) {}
     }
 
     /// The regions of all texels; `None` where there are no sites.
@@ -460,6 +463,10 @@ impl VoronoiMap {
         }
         for i in 0..self.levels.len() {
             let change = if i == 0 { self.change_base() } else { self.change_walls(i) };
+            if change.len() * MOST_CHANGES > self.lattices[i].n_texels() {
+                self.search_level_again(i);
+                continue;
+            }
             let level = &mut self.levels[i];
             level.reconsider(&self.lattices[i], &change.dearer, &change.cheaper);
             let n = level.n_sites();
@@ -505,22 +512,32 @@ impl VoronoiMap {
     }
 }
 
-/// The texels on either side of changed edges.
+/// Changed edges: those that have become dearer, and the texels on either side of those that have become cheaper.
 #[derive(Default)]
 struct Change {
-    dearer: Vec<u32>,
+    dearer: Vec<Dearer>,
     cheaper: Vec<u32>,
 }
 
+/// If more than this part of the edges has changed, a new search is faster.
+const MOST_CHANGES: usize = 8;
+
 impl Change {
+    /// How many edges have changed.
+    fn len(&self) -> usize {
+        self.dearer.len() + self.cheaper.len() / 2
+    }
+
     /// Overwrites `edges`, which lead from the texels `first..` each `to` further.
     fn apply(&mut self, edges: &mut [u16], new: &[u16], first: usize, to: usize) {
         for (i, (edge, &new)) in edges.iter_mut().zip(new).enumerate() {
-            if *edge != new {
-                let side = if new > *edge { &mut self.dearer } else { &mut self.cheaper };
-                side.extend([(first + i) as u32, (first + i + to) as u32]);
-                *edge = new;
+            let ends = [(first + i) as u32, (first + i + to) as u32];
+            if new > *edge {
+                self.dearer.push(Dearer { ends, before: *edge });
+            } else if new < *edge {
+                self.cheaper.extend(ends);
             }
+            *edge = new;
         }
     }
 }

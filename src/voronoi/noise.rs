@@ -3,7 +3,7 @@
 use crate::{math::hash_unit, pattern::SurfaceFrame};
 
 /// Octaves; the finest features are 1/32 of the largest.
-const OCTAVES: u32 = 6;
+const OCTAVES: usize = 6;
 
 /// Amplitude of an octave in that of the one before. Below 0.6 cracks are smooth and keep to the axes of the lattice.
 const PERSISTENCE: f32 = 0.9;
@@ -42,8 +42,12 @@ impl Noise {
     /// Noise over `frame` whose largest features are `scale` pattern units.
     pub(super) fn new(frame: &SurfaceFrame, scale: f32, seed: u64) -> Self {
         let width = frame.size().x as usize;
-        let sum: f32 = (0..OCTAVES).map(|octave| PERSISTENCE.powi(octave as i32)).sum();
-        let octaves = (0..OCTAVES).map(|octave| {
+        let mut amplitudes = [1.0; OCTAVES];
+        for octave in 1..OCTAVES {
+            amplitudes[octave] = amplitudes[octave - 1] * PERSISTENCE;
+        }
+        let sum: f32 = amplitudes.iter().sum();
+        let octaves = (0u32..).zip(amplitudes).map(|(octave, amplitude)| {
             let frequency = (1u32 << octave) as f32 / (scale * frame.texels_per_unit());
             let places = (0..width).map(|x| (x as f32 + 0.5) * frequency);
             let fade = places.clone().map(|place| smooth(place - place.floor())).collect();
@@ -58,7 +62,7 @@ impl Noise {
             let corners = vec![0.0; begins.len()];
             Octave {
                 seed: seed.wrapping_add(u64::from(octave)),
-                amplitude: PERSISTENCE.powi(octave as i32) / sum,
+                amplitude: amplitude / sum,
                 frequency,
                 fade,
                 begins,
