@@ -1,5 +1,6 @@
 //! `bake growth`: hits in, textures and the network out.
 
+use crate::picture::read_picture;
 use bevy_crack::{
     CrackPreset,
     growth::{CrackGrowth, HitOutcome},
@@ -9,7 +10,7 @@ use bevy_crack::{
 };
 use clap::Args;
 use glam::{UVec2, Vec2};
-use image::{GrayImage, ImageBuffer, ImageReader, Limits, Luma, Rgba, RgbaImage, imageops::FilterType};
+use image::{GrayImage, ImageBuffer, Luma, Rgba, RgbaImage, imageops::FilterType};
 use serde_json::json;
 use std::{
     error::Error,
@@ -84,25 +85,14 @@ pub(crate) fn setting(text: &str) -> Result<(String, String), String> {
 }
 
 /// The pictures that ship with the crate.
-fn own_picture(preset: &str) -> PathBuf {
+pub(crate) fn own_picture(preset: &str) -> PathBuf {
     let file = match preset {
-        "glass" => "glass_pane.png",
-        "clay" => "clay.png",
-        _ => "concrete_fine.png",
+        "glass" | "tempered_glass" | "laminated_glass" => "glass_pane",
+        "brick" => "brick_red",
+        "plaster" | "clay" | "mud" | "glaze" | "ice" | "toon" => preset,
+        _ => "concrete_fine",
     };
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/textures").join(file)
-}
-
-/// A picture of at most 8192 texels a side and 256 MiB; the header is checked before memory is taken.
-pub(crate) fn read_picture(path: &Path) -> Result<RgbaImage, Box<dyn Error>> {
-    let mut reader = ImageReader::open(path).map_err(|error| format!("{}: {error}", path.display()))?;
-    let mut limits = Limits::default();
-    limits.max_image_width = Some(8192);
-    limits.max_image_height = Some(8192);
-    limits.max_alloc = Some(256 << 20);
-    reader.limits(limits);
-    let picture = reader.with_guessed_format()?.decode().map_err(|error| format!("{}: {error}", path.display()))?;
-    Ok(picture.to_rgba8())
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/textures").join(file).with_extension("png")
 }
 
 /// Writes the textures, and returns the network and the cracked picture.
@@ -130,11 +120,8 @@ pub(crate) fn bake(options: &Options) -> Result<(Network, RgbaImage), Box<dyn Er
 
     let frame = SurfaceFrame::new(size)?;
     let mut growth = CrackGrowth::new(preset.growth.clone(), frame.extent(), options.seed)?;
-    let mut layers = if options.mask_from_picture {
-        CrackMask::from_picture(size, base.as_raw())?
-    } else {
-        CrackMask::default()
-    };
+    let mut layers =
+        if options.mask_from_picture { CrackMask::from_picture(size, base.as_raw())? } else { CrackMask::default() };
     for (layer, path) in [
         (&mut layers.weak, &options.weak),
         (&mut layers.strong, &options.strong),
@@ -236,6 +223,7 @@ fn describe(network: &Network, options: &Options) -> serde_json::Value {
             let kind = match link.kind {
                 LinkKind::Connection => "connection",
                 LinkKind::Island => "island",
+                LinkKind::Meeting => "meeting",
                 LinkKind::Junction => "junction",
             };
             json!({ "a": link.a, "b": link.b, "width": link.width, "birth": link.birth, "kind": kind })

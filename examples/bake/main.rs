@@ -8,8 +8,11 @@
 
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "a command-line tool")]
 
+mod figures;
+mod gallery;
 mod growth;
 mod guided;
+mod picture;
 mod realism;
 mod shatter;
 mod text;
@@ -28,8 +31,12 @@ struct Arguments {
 enum Method {
     /// Cracks that grow from hits, by space colonization.
     Growth(growth::Options),
+    /// Every preset on its own picture, at three moments, on one sheet.
+    Gallery(gallery::Options),
     /// Cracks that draw a picture or a word, all at once.
     Guided(Box<guided::Options>),
+    /// The figures of the paper on image-guided fracture, made again.
+    FiguresMould(figures::Options),
     /// Masks of every preset with random hits, to be measured against photographs.
     Realism(realism::Options),
     /// Shards: the pieces into which the cracks cut the picture.
@@ -38,8 +45,10 @@ enum Method {
 
 fn main() -> ExitCode {
     let done = match Arguments::parse().method {
+        Method::Gallery(options) => gallery::bake(&options),
         Method::Growth(options) => growth::bake(&options).map(drop),
         Method::Guided(options) => guided::bake(&options),
+        Method::FiguresMould(options) => figures::bake(&options),
         Method::Realism(options) => realism::bake(&options),
         Method::Shatter(options) => shatter::bake(&options),
     };

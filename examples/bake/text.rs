@@ -15,13 +15,18 @@ const MARGIN: f32 = 0.06;
 ///
 /// Letters that the font lacks are drawn as its box; a text without letters gives an empty guide.
 pub(crate) fn draw_text(font: &[u8], text: &str, size: UVec2) -> Option<Grid<f32>> {
+    draw_text_up_to(font, text, size, f32::INFINITY)
+}
+
+/// The same, in letters of at most this size, texels.
+pub(crate) fn draw_text_up_to(font: &[u8], text: &str, size: UVec2, most: f32) -> Option<Grid<f32>> {
     let font = FontRef::try_from_slice(font).ok()?;
     let mut grid = Grid::new(size, 0.0f32);
     // Laid out at a size of 100, then scaled.
     let letters = lay_out(&font, text, 100.0);
     let Some((min, max)) = bounds(&font, &letters) else { return Some(grid) };
     let room = size.as_vec2() * (1.0 - 2.0 * MARGIN);
-    let scale = (room / (max - min).max(glam::Vec2::splat(1.0e-3))).min_element();
+    let scale = (room / (max - min).max(glam::Vec2::splat(1.0e-3))).min_element().min(most / 100.0);
     let letters = lay_out(&font, text, 100.0 * scale);
     let Some((min, max)) = bounds(&font, &letters) else { return Some(grid) };
     let shift = (size.as_vec2() - (max - min)) * 0.5 - min;

@@ -403,7 +403,9 @@ impl GrowthParams {
             (
                 "start_radius",
                 _,
-                StartLayout::Ring { radius, .. } | StartLayout::Crushed { radius, .. } | StartLayout::Disc { radius, .. },
+                StartLayout::Ring { radius, .. }
+                | StartLayout::Crushed { radius, .. }
+                | StartLayout::Disc { radius, .. },
             ) => {
                 *radius = parse(name, text)?;
             }

@@ -191,7 +191,12 @@ impl Look {
     }
 }
 
-pub(super) fn within(field: &'static str, value: f32, allowed: RangeInclusive<f32>, range: &'static str) -> Result<(), LookError> {
+pub(super) fn within(
+    field: &'static str,
+    value: f32,
+    allowed: RangeInclusive<f32>,
+    range: &'static str,
+) -> Result<(), LookError> {
     if allowed.contains(&value) { Ok(()) } else { Err(LookError::OutOfRange { field, value, range }) }
 }
 

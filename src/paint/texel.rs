@@ -1,8 +1,10 @@
 //! The texel loops.
 //!
-//! A row is painted in pieces of up to `N` texels. A piece looks at its [`Window`] of the depth field; if that is
-//! untouched, the base is copied, else the slopes are computed for the whole piece at once and used by diffuse and
-//! normal. Pieces are a matter of speed alone: every texel depends on its own 3 x 3 depths and on the base.
+//! A rectangle is painted in patches. A patch looks at the depth field; if that is untouched, the base is copied. Else the
+//! slopes of the whole patch are computed at once and used by diffuse and normal, the former in blocks, of which the
+//! untouched ones are copied. Patches and blocks are a matter of speed alone: every texel depends on its own 3 x 3 depths
+//! and on the base. Sums of whole numbers that cannot overflow are written as wrapping ones, as a check for each texel
+//! would cost more than the sum.
 
 use super::LookTable;
 use crate::{
@@ -10,6 +12,7 @@ use crate::{
     raster::{DepthField, TexelRect},
 };
 use glam::UVec2;
+use std::ops::Range;
 
 /// The untouched picture. All slices are row-major over the whole image of `size` texels.
 #[derive(Clone, Copy, Debug)]
@@ -41,12 +44,16 @@ type Rgba = [u8; 4];
 /// The normal of an even surface.
 const FLAT: Rgba = [128, 128, 255, 255];
 
-/// Texels of a piece: in wide rectangles many, in narrow ones (dirty tiles) few, as a piece is computed as a whole.
-const WIDE: usize = 64;
-const NARROW: usize = 16;
-
-/// Texels whose colours are computed at once, or copied if all are untouched. Divides the pieces.
+/// Texels whose colours are computed at once, or copied if all are untouched.
 const BLOCK: usize = 8;
+
+/// The widest patch.
+const WIDE: usize = 64;
+
+/// Room for the depths of a patch and of the texels around it, and for what a last block may read beyond: for most dirty
+/// rectangles, and for larger ones.
+const LITTLE: usize = 360;
+const MUCH: usize = 800;
 
 /// How much brighter a wall gets that faces the light squarely, for a glint of 1: a highlight of the crack's own, sRGB
 /// levels, and a share of what is there. Found by eye on glass (the first) and concrete (the second).
@@ -93,10 +100,11 @@ pub fn paint_into(
         normal_out,
         depth_out,
     };
-    if rect.size().x as usize > WIDE {
-        job.paint::<WIDE>(rect);
+    let around = rect.size() + 2;
+    if around.x as usize * around.y as usize + BLOCK <= LITTLE {
+        job.paint::<LITTLE>(rect);
     } else {
-        job.paint::<NARROW>(rect);
+        job.paint::<MUCH>(rect);
     }
 }
 
@@ -113,117 +121,160 @@ struct Job<'a> {
 }
 
 impl Job<'_> {
-    fn paint<const N: usize>(&mut self, rect: TexelRect) {
-        let (mut window, mut slopes) = (Window::EMPTY, Slopes::LEVEL);
+    fn paint<const ROOM: usize>(&mut self, rect: TexelRect) {
+        let size = rect.size();
+        let width = size.x.min(WIDE as u32);
+        // A patch has two rows and columns more than are painted; the room suffices for one row at least.
+        let height = ((ROOM - BLOCK) as u32 / (width + 2) - 2).min(size.y);
+        let mut patch = Patch::<ROOM>::EMPTY;
+        for y in (rect.min.y..rect.max.y).step_by(height as usize) {
+            for x in (rect.min.x..rect.max.x).step_by(WIDE) {
+                let min = UVec2::new(x, y);
+                let part = TexelRect { min, max: (min + UVec2::new(width, height)).min(rect.max) };
+                if patch.load(&self.field.depth, part) {
+                    self.paint_patch(&mut patch, part);
+                } else {
+                    self.restore(part);
+                }
+            }
+        }
+    }
+
+    /// The texels of row `y` of a rectangle, in the slices.
+    fn range(&self, rect: TexelRect, y: u32) -> Range<usize> {
+        let first = self.frame.index(rect.min.x, y);
+        first..first + rect.size().x as usize
+    }
+
+    /// Gives the base back to texels that are untouched.
+    fn restore(&mut self, rect: TexelRect) {
         for y in rect.min.y..rect.max.y {
-            for x in (rect.min.x..rect.max.x).step_by(N) {
-                let n = N.min((rect.max.x - x) as usize);
-                window.load::<N>(&self.field.depth, x as usize, y as usize, n);
-                self.paint_piece::<N>(&window, &mut slopes, UVec2::new(x, y));
+            let range = self.range(rect, y);
+            if let Some(out) = &mut self.diffuse_out {
+                out[range.clone()].copy_from_slice(&self.frame.base[range.clone()]);
+            }
+            if let Some(out) = &mut self.normal_out {
+                match self.normal {
+                    Some(base) => out[range.clone()].copy_from_slice(&base[range.clone()]),
+                    None => out[range.clone()].fill(FLAT),
+                }
+            }
+            if let Some(out) = &mut self.depth_out {
+                match self.depth {
+                    Some(base) => out[range.clone()].copy_from_slice(&base[range]),
+                    None => out[range].fill(0),
+                }
             }
         }
     }
 
-    /// Paints the piece of the window, whose first texel is `at` of the field.
-    #[inline]
-    fn paint_piece<const N: usize>(&mut self, window: &Window, slopes: &mut Slopes, at: UVec2) {
-        let first = self.frame.index(at.x, at.y);
-        let range = first..first + window.n;
-        let touched = window.is_touched::<N>();
-        if touched && (self.diffuse_out.is_some() || self.normal_out.is_some()) {
-            slopes.measure::<N>(window, self.look.slope);
+    fn paint_patch<const ROOM: usize>(&mut self, patch: &mut Patch<ROOM>, rect: TexelRect) {
+        if self.diffuse_out.is_some() || self.normal_out.is_some() {
+            patch.measure(self.look.slope);
         }
-        if let Some(out) = &mut self.diffuse_out {
-            let (out, base) = (&mut out[range.clone()], &self.frame.base[range.clone()]);
-            if touched {
-                diffuse_piece(out, base, &self.frame, window, slopes, self.look, at);
-            } else {
-                out.copy_from_slice(base);
+        for (row, y) in (rect.min.y..rect.max.y).enumerate() {
+            let range = self.range(rect, y);
+            if let Some(out) = &mut self.diffuse_out {
+                let (out, base) = (&mut out[range.clone()], &self.frame.base[range.clone()]);
+                diffuse_row(out, base, &self.frame, patch, row, self.look, UVec2::new(rect.min.x, y));
             }
-        }
-        if let Some(out) = &mut self.normal_out {
-            let out = &mut out[range.clone()];
-            match (self.normal, touched) {
-                (Some(base), true) => tilted_piece(out, &base[range.clone()], slopes),
-                (Some(base), false) => out.copy_from_slice(&base[range.clone()]),
-                (None, true) => flat_piece(out, slopes),
-                (None, false) => out.fill(FLAT),
+            if let Some(out) = &mut self.normal_out {
+                let out = &mut out[range.clone()];
+                match self.normal {
+                    Some(base) => tilted_row(out, &base[range.clone()], patch, row),
+                    None => flat_row(out, patch, row),
+                }
             }
-        }
-        if let Some(out) = &mut self.depth_out {
-            depth_piece(&mut out[range.clone()], self.depth.map(|base| &base[range]), window.middle());
+            if let Some(out) = &mut self.depth_out {
+                depth_row(&mut out[range.clone()], self.depth.map(|base| &base[range]), patch.depths(row));
+            }
         }
     }
 }
 
-/// The depths of a piece and of the texels around it, repeated at the border of the field.
+/// The depths of a patch and of the texels around it, and what is made of them.
 ///
-/// Used again for every piece: what lies beyond `n` is of an earlier one.
-struct Window {
-    rows: [[u16; WIDE + 2]; 3],
-    n: usize,
-}
-
-impl Window {
-    const EMPTY: Self = Self { rows: [[0; WIDE + 2]; 3], n: 0 };
-
-    /// The window of the `n <= N` texels from column `x` of row `y`.
-    #[inline(always)]
-    fn load<const N: usize>(&mut self, depth: &Grid<u16>, x: usize, y: usize, n: usize) {
-        self.n = n;
-        for (row, y) in self.rows.iter_mut().zip([y.saturating_sub(1), y, (y + 1).min(depth.height() - 1)]) {
-            let from = depth.row(y);
-            if n == N {
-                // A copy of fixed length is a few moves in place of a call.
-                row[1..=N].copy_from_slice(&from[x..x + N]);
-            } else {
-                row[1..=n].copy_from_slice(&from[x..x + n]);
-            }
-            row[0] = from[x.saturating_sub(1)];
-            row[n + 1] = from[(x + n).min(from.len() - 1)];
-        }
-    }
-
-    #[inline(always)]
-    fn is_touched<const N: usize>(&self) -> bool {
-        // All N, as that is faster: an earlier piece can only make this one be computed without need.
-        self.rows.iter().flat_map(|row| &row[..N + 2]).fold(0, |any, &depth| any | depth) != 0
-    }
-
-    fn middle(&self) -> &[u16] {
-        &self.rows[1][1..=self.n]
-    }
-}
-
-/// Slopes of a piece of the surface, as the normal before normalizing: `(x, y, 1)`, x right, y **down** the picture.
-struct Slopes {
-    x: [f32; WIDE],
-    y: [f32; WIDE],
+/// All texels lie in one line, row after row, so that the loops over them are long whatever the shape: the texel in column
+/// `x` of row `y` is at `y * stride + x`, and what is computed for the two last places of a row is of no use.
+struct Patch<const ROOM: usize> {
+    /// Width of the patch.
+    width: usize,
+    /// Width with the texels around.
+    stride: usize,
+    /// Places in all rows of the patch.
+    len: usize,
+    /// The depth of the texel above and to the left, repeated at the border of the field.
+    depth: [u16; ROOM],
+    /// Zero where the texel and those around it are untouched.
+    touch: [u16; ROOM],
+    /// Slope of the surface, to the right.
+    x: [f32; ROOM],
+    /// Slope of the surface, **down** the picture.
+    y: [f32; ROOM],
     /// One over the length of `(x, y, 1)`.
-    inv_len: [f32; WIDE],
+    inv_len: [f32; ROOM],
 }
 
-impl Slopes {
-    const LEVEL: Self = Self { x: [0.0; WIDE], y: [0.0; WIDE], inv_len: [1.0; WIDE] };
+impl<const ROOM: usize> Patch<ROOM> {
+    const EMPTY: Self = Self {
+        width: 0,
+        stride: 0,
+        len: 0,
+        depth: [0; ROOM],
+        touch: [0; ROOM],
+        x: [0.0; ROOM],
+        y: [0.0; ROOM],
+        inv_len: [0.0; ROOM],
+    };
 
-    /// Sobel's operator on the depths; a wall that goes down to the right leans to the right.
-    #[inline(always)]
-    fn measure<const N: usize>(&mut self, window: &Window, scale: f32) {
-        let [up, middle, down] = &window.rows;
-        let mut sum = [0i32; WIDE + 2];
-        let mut gain = [0i32; WIDE + 2];
-        for i in 0..N + 2 {
-            let [u, m, d] = [up[i], middle[i], down[i]].map(i32::from);
-            sum[i] = u + 2 * m + d;
-            gain[i] = d - u;
+    /// Reads the depths; false if they are all zero.
+    fn load(&mut self, depth: &Grid<u16>, rect: TexelRect) -> bool {
+        let (min, max) = (rect.min.as_usizevec2(), rect.max.as_usizevec2());
+        self.width = max.x - min.x;
+        self.stride = self.width + 2;
+        self.len = self.stride * (max.y - min.y);
+        let (left, right) = (min.x.saturating_sub(1), (max.x + 1).min(depth.width()));
+        let mut touched = false;
+        for (to, y) in self.depth.chunks_exact_mut(self.stride).zip(min.y..max.y + 2) {
+            let row = depth.row(y.saturating_sub(1).min(depth.height() - 1));
+            let (inner, outer) = (&mut to[1..=self.width], &row[min.x..max.x]);
+            inner.copy_from_slice(outer);
+            to[0] = row[left];
+            to[self.width + 1] = row[right - 1];
+            touched = touched || to.iter().fold(0, |any, &depth| any | depth) != 0;
         }
-        for i in 0..N {
-            let x = (sum[i + 2] - sum[i]) as f32 * scale;
-            let y = (gain[i] + 2 * gain[i + 1] + gain[i + 2]) as f32 * scale;
-            self.x[i] = x;
-            self.y[i] = y;
-            self.inv_len[i] = 1.0 / (x * x + y * y + 1.0).sqrt();
+        touched
+    }
+
+    /// Finds what is touched, and the slopes by Sobel's operator; a wall that goes down to the right leans to the right.
+    fn measure(&mut self, scale: f32) {
+        let n = self.len;
+        let place = |row: usize, column: usize| &self.depth[row * self.stride + column..][..n];
+        let [[a, b, c], [d, e, f], [g, h, i]] = [0, 1, 2].map(|row| [0, 1, 2].map(|column| place(row, column)));
+        let (touch, x, y, inv_len) = (&mut self.touch[..n], &mut self.x[..n], &mut self.y[..n], &mut self.inv_len[..n]);
+        for k in 0..n {
+            touch[k] = a[k] | b[k] | c[k] | d[k] | e[k] | f[k] | g[k] | h[k] | i[k];
         }
+        let gain = |low: u16, high: u16| i32::from(high).wrapping_sub(i32::from(low));
+        for k in 0..n {
+            let right = gain(a[k], c[k]).wrapping_add(gain(d[k], f[k]) << 1).wrapping_add(gain(g[k], i[k]));
+            let down = gain(a[k], g[k]).wrapping_add(gain(b[k], h[k]) << 1).wrapping_add(gain(c[k], i[k]));
+            let (right, down) = (right as f32 * scale, down as f32 * scale);
+            x[k] = right;
+            y[k] = down;
+            inv_len[k] = 1.0 / (right * right + down * down + 1.0).sqrt();
+        }
+    }
+
+    /// The places of a row.
+    fn row(&self, row: usize) -> Range<usize> {
+        let first = row * self.stride;
+        first..first + self.width
+    }
+
+    /// The depths of a row.
+    fn depths(&self, row: usize) -> &[u16] {
+        &self.depth[self.stride + 1..][self.row(row)]
     }
 }
 
@@ -240,30 +291,32 @@ fn normal_bytes(x: f32, y: f32, z: f32, alpha: u32) -> u32 {
 }
 
 /// Normals over an even base.
-fn flat_piece(out: &mut [Rgba], slopes: &Slopes) {
-    for (((out, &x), &y), &inv_len) in out.iter_mut().zip(&slopes.x).zip(&slopes.y).zip(&slopes.inv_len) {
+fn flat_row<const ROOM: usize>(out: &mut [Rgba], patch: &Patch<ROOM>, row: usize) {
+    let (x, y, inv_len) = (&patch.x[patch.row(row)], &patch.y[patch.row(row)], &patch.inv_len[patch.row(row)]);
+    for (((out, &x), &y), &inv_len) in out.iter_mut().zip(x).zip(y).zip(inv_len) {
         *out = normal_bytes(x * inv_len, -y * inv_len, inv_len, 255).to_le_bytes();
     }
 }
 
 /// Normals over base normals: the slopes of base and crack add up, which is exact for heights that add up.
-fn tilted_piece(out: &mut [Rgba], base: &[Rgba], slopes: &Slopes) {
-    for (((out, &base), &x), &y) in out.iter_mut().zip(base).zip(&slopes.x).zip(&slopes.y) {
+fn tilted_row<const ROOM: usize>(out: &mut [Rgba], base: &[Rgba], patch: &Patch<ROOM>, row: usize) {
+    let (x, y) = (&patch.x[patch.row(row)], &patch.y[patch.row(row)]);
+    for (((out, &base), &x), &y) in out.iter_mut().zip(base).zip(x).zip(y) {
         let bytes = u32::from_le_bytes(base);
-        let part = |shift: u32| ((bytes >> shift & 255) as i32 as f32 - 127.5) * (1.0 / 127.5);
-        let (base_x, base_y, base_z) = (part(0), part(8), part(16));
+        let part = |c: u32| (channel(bytes, c) - 127.5) * (1.0 / 127.5);
+        let (base_x, base_y, base_z) = (part(0), part(1), part(2));
         // A normal that points into the surface is no normal; it counts as nearly level.
         let z = if base_z > 0.05 { base_z } else { 0.05 };
         let (sum_x, sum_y) = (base_x + x * z, base_y - y * z);
         let inv_len = 1.0 / (sum_x * sum_x + sum_y * sum_y + z * z).sqrt();
         let painted = normal_bytes(sum_x * inv_len, sum_y * inv_len, z * inv_len, bytes >> 24);
-        let level = x == 0.0 && y == 0.0;
+        let level = (x == 0.0) & (y == 0.0);
         *out = if level { bytes } else { painted }.to_le_bytes();
     }
 }
 
-fn depth_piece(out: &mut [u8], base: Option<&[u8]>, depths: &[u16]) {
-    let byte = |depth: u16| ((u32::from(depth) * 255 + 32_895) >> 16) as u8;
+fn depth_row(out: &mut [u8], base: Option<&[u8]>, depths: &[u16]) {
+    let byte = |depth: u16| (u32::from(depth).wrapping_mul(255).wrapping_add(32_895) >> 16) as u8;
     match base {
         Some(base) => {
             for ((out, &base), &depth) in out.iter_mut().zip(base).zip(depths) {
@@ -300,6 +353,7 @@ impl Frame<'_> {
 
     /// The colour at texel `at` + `offset`, bilinear, weighted by alpha so that the hidden colour of transparent
     /// texels does not show; `None` where all is transparent.
+    #[inline(always)]
     fn shifted(&self, at: UVec2, offset: [f32; 2]) -> Option<[f32; 3]> {
         let place = |at: u32, offset: f32, size: u32| {
             let pos = (at as f32 + offset).clamp(0.0, (size - 1) as f32);
@@ -339,94 +393,124 @@ fn noise(x: u32, y: u32) -> f32 {
 /// Byte `i` of a texel.
 #[inline(always)]
 fn channel(texel: u32, i: u32) -> f32 {
-    (texel >> (8 * i) & 255) as i32 as f32
+    (texel.wrapping_shr(8 * i) & 255) as i32 as f32
 }
 
-/// Colours of a piece whose first texel is `at` of the field.
-#[inline]
-fn diffuse_piece(
+/// Colours of a row whose first texel is `at` of the field.
+fn diffuse_row<const ROOM: usize>(
     out: &mut [Rgba],
     base: &[Rgba],
     frame: &Frame<'_>,
-    window: &Window,
-    slopes: &Slopes,
+    patch: &Patch<ROOM>,
+    row: usize,
     look: &LookTable,
     mut at: UVec2,
 ) {
-    let (slopes_x, slopes_y) = (slopes.x.as_chunks::<BLOCK>().0, slopes.y.as_chunks::<BLOCK>().0);
-    let lengths = slopes.inv_len.as_chunks::<BLOCK>().0;
-    let inputs = base.chunks(BLOCK).zip(window.middle().chunks(BLOCK)).zip(slopes_x).zip(slopes_y).zip(lengths);
-    for (out, ((((base, depths), x), y), inv_len)) in out.chunks_mut(BLOCK).zip(inputs) {
-        let level = |slopes: &[f32; BLOCK]| slopes.iter().all(|&slope| slope == 0.0);
-        if depths.iter().all(|&depth| depth == 0) && level(x) && level(y) {
-            out.copy_from_slice(base);
+    let mut place = patch.row(row).start;
+    for (out, base) in out.chunks_mut(BLOCK).zip(base.chunks(BLOCK)) {
+        if let Some(block) = Block::load(base, patch, place) {
+            let painted =
+                if look.opaque { block.paint::<true>(frame, look, at) } else { block.paint::<false>(frame, look, at) };
+            let painted = painted.map(u32::to_le_bytes);
+            match out.first_chunk_mut() {
+                Some(out) => *out = painted,
+                None => out.copy_from_slice(&painted[..out.len()]),
+            }
+        } else if let (Some(out), Some(base)) = (out.first_chunk_mut::<BLOCK>(), base.first_chunk()) {
+            // A copy of fixed length is a few moves in place of a call.
+            *out = *base;
         } else {
-            let mut block = Block { base: [0; BLOCK], depth: [0; BLOCK], x, y, inv_len };
-            block.depth[..depths.len()].copy_from_slice(depths);
-            for (to, from) in block.base.iter_mut().zip(base) {
-                *to = u32::from_le_bytes(*from);
-            }
-            for (out, painted) in out.iter_mut().zip(block.paint(frame, look, at)) {
-                *out = painted.to_le_bytes();
-            }
+            out.copy_from_slice(base);
         }
+        place += BLOCK;
         at.x += BLOCK as u32;
     }
 }
 
-/// What the colours of a block are made of.
+/// What the colours of a block are made of. What lies beyond the end of a row is of no use.
 struct Block<'a> {
     base: [u32; BLOCK],
-    depth: [u16; BLOCK],
+    depth: &'a [u16; BLOCK],
     x: &'a [f32; BLOCK],
     y: &'a [f32; BLOCK],
     inv_len: &'a [f32; BLOCK],
 }
 
+impl<'a> Block<'a> {
+    /// The block at `place` of a patch, `None` if it is untouched.
+    #[inline(always)]
+    fn load<const ROOM: usize>(base: &[Rgba], patch: &'a Patch<ROOM>, place: usize) -> Option<Self> {
+        if *patch.touch[place..].first_chunk()? == [0; BLOCK] {
+            return None;
+        }
+        let mut bytes = [[0; 4]; BLOCK];
+        match base.first_chunk() {
+            Some(base) => bytes = *base,
+            None => bytes[..base.len()].copy_from_slice(base),
+        }
+        Some(Self {
+            base: bytes.map(u32::from_le_bytes),
+            depth: patch.depth[place + patch.stride + 1..].first_chunk()?,
+            x: patch.x[place..].first_chunk()?,
+            y: patch.y[place..].first_chunk()?,
+            inv_len: patch.inv_len[place..].first_chunk()?,
+        })
+    }
+}
+
 impl Block<'_> {
     #[inline(always)]
-    fn paint(&self, frame: &Frame<'_>, look: &LookTable, at: UVec2) -> [u32; BLOCK] {
+    fn paint<const OPAQUE: bool>(&self, frame: &Frame<'_>, look: &LookTable, at: UVec2) -> [u32; BLOCK] {
         // Channel by channel, so that each loop works on many texels at once.
         let mut over = [[0.0; BLOCK]; 4];
-        for (i, &depth) in self.depth.iter().enumerate() {
-            for (over, value) in over.iter_mut().zip(look.layer(depth)) {
-                over[i] = value;
-            }
+        for i in 0..BLOCK {
+            let [r, g, b, cover] = look.layer(self.depth[i]);
+            (over[0][i], over[1][i], over[2][i], over[3][i]) = (r, g, b, cover);
         }
         if look.grain > 0.0 {
+            let mut share = [0.0; BLOCK];
             for i in 0..BLOCK {
-                let share = 1.0 - look.grain * noise(at.x + i as u32, at.y);
-                over.iter_mut().for_each(|over| over[i] *= share);
+                share[i] = 1.0 - look.grain * noise(at.x.wrapping_add(i as u32), at.y);
+            }
+            for over in &mut over {
+                for i in 0..BLOCK {
+                    over[i] *= share[i];
+                }
             }
         }
         let under = self.picture(frame, look, at);
-        let opaque = if look.opaque { 1.0 } else { 0.0 };
         let mut painted = [0; BLOCK];
-        let (mut under_share, mut over_share, mut facing) = ([0.0; BLOCK], [0.0; BLOCK], [0.0; BLOCK]);
+        let (mut under_share, mut over_share, mut facing) = ([0.0; BLOCK], [1.0; BLOCK], [0.0; BLOCK]);
         for i in 0..BLOCK {
-            let (alpha, cover) = (channel(self.base[i], 3) * (1.0 / 255.0), over[3][i]);
-            // An opaque crack lies over the picture as another pane would; else it is as translucent as the picture,
-            // which is the same with an alpha of one.
-            let pane = 1.0 - opaque * (1.0 - alpha);
-            let pane_out = pane * (1.0 - cover) + cover;
-            over_share[i] = 1.0 / pane_out;
-            under_share[i] = pane * (1.0 - cover) * over_share[i];
-            painted[i] = round(255.0 * (alpha + opaque * (pane_out - alpha))) << 24;
+            let cover = over[3][i];
+            if OPAQUE {
+                // An opaque crack lies over the picture as another pane would; else it is as translucent as the picture.
+                let alpha = channel(self.base[i], 3) * (1.0 / 255.0);
+                let pane = 1.0 - (1.0 - alpha);
+                let pane_out = pane * (1.0 - cover) + cover;
+                over_share[i] = 1.0 / pane_out;
+                under_share[i] = pane * (1.0 - cover) * over_share[i];
+                painted[i] = round(255.0 * (alpha + (pane_out - alpha))) << 24;
+            } else {
+                under_share[i] = 1.0 - cover;
+                painted[i] = self.base[i] & 0xFF00_0000;
+            }
             // Light from the upper left, on a normal whose y runs down.
             facing[i] = (self.x[i] + self.y[i]) * self.inv_len[i] * (-std::f32::consts::FRAC_1_SQRT_2 * look.glint);
         }
-        for (c, (under, over)) in under.iter().zip(&over).enumerate() {
+        for c in 0..3 {
+            let (under, over) = (&under[c], &over[c]);
             for i in 0..BLOCK {
                 let mixed = under[i] * under_share[i] + over[i] * over_share[i];
                 let lit = mixed + facing[i] * (HIGHLIGHT + SHADING * mixed);
                 let lit = if lit > 0.0 { lit } else { 0.0 };
-                painted[i] |= round(if lit < 255.0 { lit } else { 255.0 }) << (8 * c);
+                painted[i] |= round(if lit < 255.0 { lit } else { 255.0 }).wrapping_shl(8 * c as u32);
             }
         }
-        for (i, painted) in painted.iter_mut().enumerate() {
+        for i in 0..BLOCK {
             let untouched = (self.depth[i] == 0) & (self.x[i] == 0.0) & (self.y[i] == 0.0);
             if untouched | (self.base[i] >> 24 == 0) {
-                *painted = self.base[i];
+                painted[i] = self.base[i];
             }
         }
         painted
@@ -436,9 +520,9 @@ impl Block<'_> {
     #[inline(always)]
     fn picture(&self, frame: &Frame<'_>, look: &LookTable, at: UVec2) -> [[f32; BLOCK]; 3] {
         let mut under = [[0.0; BLOCK]; 3];
-        for (c, under) in (0..).zip(&mut under) {
-            for (under, &base) in under.iter_mut().zip(&self.base) {
-                *under = channel(base, c);
+        for c in 0..3 {
+            for i in 0..BLOCK {
+                under[c][i] = channel(self.base[i], c as u32);
             }
         }
         if look.shift > 0.0 {

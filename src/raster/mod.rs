@@ -13,7 +13,7 @@ pub use dirty::DirtyTiles;
 pub use distance::{MAX_DISTANCE, crack_distance};
 pub use rect::TexelRect;
 pub use replay::{DOT_DEPTH, Redrawn, Replay};
-pub use stamp::{stamp_dot, stamp_path};
+pub use stamp::{stamp_dot, stamp_path, stamp_path_with};
 
 use crate::{
     Grid,
@@ -37,6 +37,11 @@ impl DepthField {
     #[must_use]
     pub fn new(frame: SurfaceFrame) -> Self {
         Self { frame, depth: Grid::new(frame.size(), 0), forbidden: None }
+    }
+
+    /// Makes all of it untouched. What is forbidden stays so.
+    pub fn clear(&mut self) {
+        self.depth.as_mut_slice().fill(0);
     }
 
     /// Keeps every texel whose centre `mask` forbids untouched from now on, and gives back those that are not.

@@ -15,7 +15,7 @@
 //!
 //! The value depends on the texel and the capsule alone, and grows with `r`: stamps may come in any order.
 
-use super::{DepthField, Profile, TexelRect};
+use super::{DepthField, DirtyTiles, Profile, TexelRect};
 use crate::pattern::{PathPoint, SegmentPath, SurfaceFrame};
 use glam::{DVec2, UVec2, Vec2};
 
@@ -24,6 +24,9 @@ const LANES: usize = 8;
 
 /// Centres of the texels of one block, from its left edge.
 const CENTRES: [f32; LANES] = [0.5, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5, 7.5];
+
+/// Changes are told for so many rows at once: those of a row of dirty tiles.
+const BAND: u32 = DirtyTiles::TILE;
 
 /// Half widths are cut to this many texels, far above the diagonal of the largest surface.
 const MAX_RADIUS: f32 = 1.0e6;
@@ -40,15 +43,37 @@ const FLATTEST: f32 = 64.0;
 /// Half widths are linear between the points of the path. Points that are not finite are skipped with the pieces
 /// beside them; widths below zero or not a number count as zero.
 pub fn stamp_path(field: &mut DepthField, profile: &Profile, path: &SegmentPath) -> TexelRect {
+    stamp_pieces::<false>(field, profile, path, &mut |_| {})
+}
+
+/// As [`stamp_path`]; calls `changed` with small rectangles that together hold every texel that is not as before.
+///
+/// They hold far fewer texels than the rectangle that is returned where a line is slanted, or lies over deeper ones.
+pub fn stamp_path_with(
+    field: &mut DepthField,
+    profile: &Profile,
+    path: &SegmentPath,
+    changed: &mut dyn FnMut(TexelRect),
+) -> TexelRect {
+    stamp_pieces::<true>(field, profile, path, changed)
+}
+
+/// Stamps a path; calls `changed` if `TELL`.
+fn stamp_pieces<const TELL: bool>(
+    field: &mut DepthField,
+    profile: &Profile,
+    path: &SegmentPath,
+    changed: &mut dyn FnMut(TexelRect),
+) -> TexelRect {
     let section = Section::new(profile, field.frame.texels_per_unit());
-    let mut changed = TexelRect::default();
+    let mut bounds = TexelRect::default();
     for pair in path.points().windows(2) {
         if let Some(capsule) = Capsule::clipped(&field.frame, field.depth.size(), &section, pair[0], pair[1]) {
-            changed = changed.union(capsule.stamp(field, &section));
+            bounds = bounds.union(capsule.stamp::<TELL>(field, &section, changed));
         }
     }
-    field.spare(changed);
-    changed
+    field.spare(bounds);
+    bounds
 }
 
 /// Stamps a disc of `radius` pattern units at `pos` (pattern units), `depth` (0..=1) deep; returns the texels that it may have changed.
@@ -59,7 +84,7 @@ pub fn stamp_dot(field: &mut DepthField, pos: Vec2, radius: f32, depth: f32) -> 
     let point = PathPoint { pos, width: 2.0 * radius };
     match Capsule::clipped(&field.frame, field.depth.size(), &section, point, point) {
         Some(capsule) => {
-            let changed = capsule.stamp(field, &section);
+            let changed = capsule.stamp::<false>(field, &section, &mut |_| {});
             field.spare(changed);
             changed
         }
@@ -218,28 +243,35 @@ impl Capsule {
         TexelRect { min: low.as_uvec2(), max: high.as_uvec2() }
     }
 
-    fn stamp(&self, field: &mut DepthField, section: &Section) -> TexelRect {
+    fn stamp<const TELL: bool>(
+        &self,
+        field: &mut DepthField,
+        section: &Section,
+        changed: &mut dyn FnMut(TexelRect),
+    ) -> TexelRect {
         let rect = self.bounds(field.depth.size());
         if rect.is_empty() {
             return TexelRect::default();
         }
         match (self.r_gain != 0.0, section.rim_depth > 0.0) {
-            (false, false) => self.stamp_rows::<false, false>(field, section, rect),
-            (false, true) => self.stamp_rows::<false, true>(field, section, rect),
-            (true, false) => self.stamp_rows::<true, false>(field, section, rect),
-            (true, true) => self.stamp_rows::<true, true>(field, section, rect),
+            (false, false) => self.stamp_rows::<TELL, false, false>(field, section, rect, changed),
+            (false, true) => self.stamp_rows::<TELL, false, true>(field, section, rect, changed),
+            (true, false) => self.stamp_rows::<TELL, true, false>(field, section, rect, changed),
+            (true, true) => self.stamp_rows::<TELL, true, true>(field, section, rect, changed),
         }
         rect
     }
 
     /// Blocks of [`LANES`] texels, row by row. A block may stick out of `rect`: the values there are zero.
-    fn stamp_rows<const TAPER: bool, const RIM: bool>(
+    fn stamp_rows<const TELL: bool, const TAPER: bool, const RIM: bool>(
         &self,
         field: &mut DepthField,
         section: &Section,
         rect: TexelRect,
+        changed: &mut dyn FnMut(TexelRect),
     ) {
         let width = field.depth.width();
+        let mut band = TexelRect::default();
         let (left, right) = (rect.min.x as f32, rect.max.x as f32);
         let slope = self.along.x / self.along.y;
         let narrow = slope.abs() < FLATTEST && rect.size().x as usize > LANES;
@@ -259,20 +291,39 @@ impl Capsule {
             let n = (x1 - x0).next_multiple_of(LANES);
             x0 = x0.min(width.saturating_sub(n));
             let end = (x0 + n).min(width);
+            // The columns that have changed, and those between them.
+            let mut span = end..x0;
+            let mut add = |x0: usize, change: u128| {
+                if TELL && change != 0 {
+                    span.start = span.start.min(x0 + change.trailing_zeros() as usize / 16);
+                    span.end = end.min(x0 + LANES - change.leading_zeros() as usize / 16);
+                }
+            };
             let (blocks, rest) = field.depth.row_mut(y as usize)[x0..end].as_chunks_mut::<LANES>();
             for block in blocks {
-                self.stamp_block::<TAPER, RIM>(block, section, x0 as f32, dy);
+                add(x0, self.stamp_block::<TAPER, RIM>(block, section, x0 as f32, dy));
                 x0 += LANES;
             }
             if !rest.is_empty() {
                 let mut block = [0; LANES];
                 block[..rest.len()].copy_from_slice(rest);
-                self.stamp_block::<TAPER, RIM>(&mut block, section, x0 as f32, dy);
+                add(x0, self.stamp_block::<TAPER, RIM>(&mut block, section, x0 as f32, dy));
                 rest.copy_from_slice(&block[..rest.len()]);
             }
+            if TELL && span.start < span.end {
+                if !band.is_empty() && y >= band.max.y.next_multiple_of(BAND) {
+                    changed(std::mem::take(&mut band));
+                }
+                let (min, max) = (UVec2::new(span.start as u32, y), UVec2::new(span.end as u32, y + 1));
+                band = band.union(TexelRect { min, max });
+            }
+        }
+        if !band.is_empty() {
+            changed(band);
         }
     }
 
+    /// Returns the bits that have changed, 16 a texel.
     #[inline(always)]
     fn stamp_block<const TAPER: bool, const RIM: bool>(
         &self,
@@ -280,7 +331,7 @@ impl Capsule {
         section: &Section,
         x: f32,
         dy: f32,
-    ) {
+    ) -> u128 {
         let uniform = section.cut(self.r_from);
         let mut values = [0.0; LANES];
         for i in 0..LANES {
@@ -295,9 +346,13 @@ impl Capsule {
             }
             values[i] = value * cut.scale;
         }
-        for (depth, value) in block.iter_mut().zip(values) {
-            *depth = (*depth).max(round_to_u16(value));
+        let mut change = [[0; 2]; LANES];
+        for ((depth, value), change) in block.iter_mut().zip(values).zip(&mut change) {
+            let deeper = (*depth).max(round_to_u16(value));
+            *change = (*depth ^ deeper).to_le_bytes();
+            *depth = deeper;
         }
+        change.as_flattened().first_chunk().map_or(0, |bytes| u128::from_le_bytes(*bytes))
     }
 }
 
@@ -410,6 +465,33 @@ mod tests {
     }
 
     #[test]
+    fn every_change_is_told_and_little_else() {
+        let mut rng = Rng::new(6);
+        let (mut told, mut bounds) = (0, 0);
+        for size in [[64, 64], [97, 53], [1, 1], [3, 5], [7, 40], [200, 90]] {
+            let mut field = field(size);
+            for _ in 0..60 {
+                let (before, profile, path) = (field.clone(), random_profile(&mut rng), random_piece(&mut rng, &field));
+                let mut rects = Vec::new();
+                let rect = stamp_path_with(&mut field, &profile, &path, &mut |rect| rects.push(rect));
+                let holds = |rect: &TexelRect, x, y| {
+                    (rect.min.x..rect.max.x).contains(&x) && (rect.min.y..rect.max.y).contains(&y)
+                };
+                for y in 0..size[1] {
+                    for x in 0..size[0] {
+                        let same = field.depth.get(x, y) == before.depth.get(x, y);
+                        assert!(same || rects.iter().any(|rect| holds(rect, x, y)), "{x} {y} is not in {rects:?}");
+                    }
+                }
+                assert!(rects.iter().all(|part| part.union(rect) == rect), "{rects:?} stick out of {rect:?}");
+                told += rects.iter().map(TexelRect::area).sum::<u64>();
+                bounds += rect.area();
+            }
+        }
+        assert!(3 * told < bounds, "{told} texels of {bounds} told");
+    }
+
+    #[test]
     fn areas_are_those_of_capsules() {
         for (width, length, angle) in
             [(4.0f32, 40.0f32, 0.3f32), (7.3, 60.0, 1.1), (12.0, 100.0, 2.0), (1.0, 90.0, 0.77)]
@@ -478,8 +560,8 @@ mod tests {
             let Some(capsule) = Capsule::clipped(&general.frame, general.depth.size(), &section, points[0], to) else {
                 continue;
             };
-            let rect = capsule.stamp(&mut special, &section);
-            capsule.stamp_rows::<true, true>(&mut general, &section, rect);
+            let rect = capsule.stamp::<false>(&mut special, &section, &mut |_| {});
+            capsule.stamp_rows::<false, true, true>(&mut general, &section, rect, &mut |_| {});
             assert_eq!(general, special);
         }
     }
