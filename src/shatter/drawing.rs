@@ -71,15 +71,16 @@ impl Drawing {
     /// Cuts lines where they meet, until they share nothing but ends, and drops what is there twice.
     pub(super) fn make_planar(&mut self) {
         self.lay_border();
-        let (mut round, mut cuts) = (0, Vec::new());
+        // After the first round, only pairs with a new edge can meet.
+        let (mut round, mut new, mut cuts) = (0, 0, Vec::new());
         loop {
             let grid = EdgeGrid::new(self);
             let mut changed = false;
-            grid.pairs(|e, f| changed |= self.separate(e, f, round < ROUNDS, &mut cuts));
+            grid.pairs(new, |e, f| changed |= self.separate(e, f, round < ROUNDS, &mut cuts));
             if !changed {
                 break;
             }
-            self.apply(&mut cuts);
+            new = self.apply(&mut cuts);
             round += 1;
         }
     }
@@ -162,8 +163,9 @@ impl Drawing {
         cuts.len() > before
     }
 
-    /// Replaces edges by the pieces between the vertices at which they are cut.
-    fn apply(&mut self, cuts: &mut Vec<(u32, u32)>) {
+    /// Replaces edges by the pieces between the vertices at which they are cut. Returns the first of them.
+    fn apply(&mut self, cuts: &mut Vec<(u32, u32)>) -> u32 {
+        let old = self.edges.len();
         cuts.sort_by_key(|&(edge, vertex)| {
             let [from, _] = self.edges[edge as usize];
             let start = self.places.get(from as usize).copied().unwrap_or_default();
@@ -184,7 +186,9 @@ impl Drawing {
             }
         }
         cuts.clear();
+        let first = self.edges[..old].iter().filter(|&&edge| edge != DEAD).count() as u32;
         self.edges.retain(|&edge| edge != DEAD);
+        first
     }
 
     /// Carries every open end on, in the direction in which it came, to the next line. Returns the new lines.
@@ -406,11 +410,11 @@ impl EdgeGrid {
         }
         let slope = f64::from(bottom[0] - top[0]) / f64::from(bottom[1] - top[1]);
         for row in first..=last {
-            // One place wider on either side, for rounding.
+            // A little wider on either side, for rounding.
             let x_at = |y: i64| f64::from(top[0]) + slope * (y as f64 - f64::from(top[1]));
             let ends = [x_at((row << self.shift) as i64), x_at(((row + 1) << self.shift) as i64)];
-            let from = low.max((ends[0].min(ends[1]).floor() - 1.0) as i32);
-            let to = high.min((ends[0].max(ends[1]).ceil() + 1.0) as i32);
+            let from = low.max((ends[0].min(ends[1]) as i32).saturating_sub(2));
+            let to = high.min((ends[0].max(ends[1]) as i32).saturating_add(2));
             (square(from)..=square(to)).for_each(|column| visit((row * self.columns + column) as u32));
         }
     }
@@ -423,14 +427,14 @@ impl EdgeGrid {
         self.squares(a, b, |square| visit(self.in_square(square)));
     }
 
-    /// Every pair of edges that share a square, the older first; some more than once.
-    fn pairs(&self, mut visit: impl FnMut(u32, u32)) {
+    /// Every pair of edges that share a square of which one is not older than `new`, the older first; some more than once.
+    fn pairs(&self, new: u32, mut visit: impl FnMut(u32, u32)) {
         for square in 0..self.starts.len() as u32 - 1 {
             let edges = self.in_square(square);
-            for (i, &e) in edges.iter().enumerate() {
-                for &f in &edges[i + 1..] {
-                    visit(e, f);
-                }
+            // In every square the older edges come first.
+            let first = edges.iter().rposition(|&edge| edge < new).map_or(0, |last| last + 1);
+            for (i, &f) in edges.iter().enumerate().skip(first.max(1)) {
+                edges[..i].iter().for_each(|&e| visit(e, f));
             }
         }
     }
