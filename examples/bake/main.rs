@@ -8,9 +8,12 @@
 
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "a command-line tool")]
 
+mod figures;
 mod growth;
 mod guided;
+mod picture;
 mod realism;
+mod shatter;
 mod text;
 
 use clap::{Parser, Subcommand};
@@ -29,15 +32,21 @@ enum Method {
     Growth(growth::Options),
     /// Cracks that draw a picture or a word, all at once.
     Guided(Box<guided::Options>),
+    /// The figures of the paper on image-guided fracture, made again.
+    FiguresMould(figures::Options),
     /// Masks of every preset with random hits, to be measured against photographs.
     Realism(realism::Options),
+    /// Shards: the pieces into which the cracks cut the picture.
+    Shatter(Box<shatter::Options>),
 }
 
 fn main() -> ExitCode {
     let done = match Arguments::parse().method {
-        Method::Growth(options) => growth::bake(&options),
+        Method::Growth(options) => growth::bake(&options).map(drop),
         Method::Guided(options) => guided::bake(&options),
+        Method::FiguresMould(options) => figures::bake(&options),
         Method::Realism(options) => realism::bake(&options),
+        Method::Shatter(options) => shatter::bake(&options),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

@@ -4,7 +4,7 @@ use super::lattice::{Lattice, Place, PlaceMap, cross, distance_sq, dot, key, ori
 use crate::math::Rng;
 use glam::Vec2;
 
-/// Lines as edges between places. The four sides of the surface come first.
+/// Lines as edges between places; once planar, the four sides of the surface among them.
 #[derive(Clone, Debug)]
 pub(super) struct Drawing {
     pub(super) lattice: Lattice,
@@ -35,7 +35,6 @@ impl Drawing {
         for corner in [[0, 0], [w, 0], [w, h], [0, h]] {
             drawing.vertex(corner);
         }
-        drawing.edges.extend([[0, 1], [1, 2], [2, 3], [3, 0]]);
         drawing
     }
 
@@ -71,6 +70,7 @@ impl Drawing {
 
     /// Cuts lines where they meet, until they share nothing but ends, and drops what is there twice.
     pub(super) fn make_planar(&mut self) {
+        self.lay_border();
         let (mut round, mut cuts) = (0, Vec::new());
         loop {
             let grid = EdgeGrid::new(self);
@@ -81,6 +81,27 @@ impl Drawing {
             }
             self.apply(&mut cuts);
             round += 1;
+        }
+    }
+
+    /// Lays the border anew, from each place on it to the next.
+    fn lay_border(&mut self) {
+        self.edges.retain(|&[a, b]| {
+            let sides = [a, b].map(|vertex| self.places[vertex as usize]);
+            self.lattice.side_of(sides[0], sides[1]).is_none()
+        });
+        let mut on_side: [Vec<u32>; 4] = Default::default();
+        for (vertex, &place) in (0u32..).zip(&self.places) {
+            for (vertices, is_on) in on_side.iter_mut().zip(self.lattice.sides(place)) {
+                if is_on {
+                    vertices.push(vertex);
+                }
+            }
+        }
+        for mut vertices in on_side {
+            // One coordinate is the same for all.
+            vertices.sort_unstable_by_key(|&vertex| self.places[vertex as usize]);
+            self.edges.extend(vertices.windows(2).map(|pair| [pair[0], pair[1]]));
         }
     }
 
@@ -376,20 +397,21 @@ impl EdgeGrid {
         let (top, bottom) = if a[1] <= b[1] { (a, b) } else { (b, a) };
         let square = |x: i32| (x >> self.shift) as usize;
         let (first, last) = (square(top[1]), square(bottom[1]));
-        let slope = if first == last { 0.0 } else { f64::from(bottom[0] - top[0]) / f64::from(bottom[1] - top[1]) };
         let (low, high) = (top[0].min(bottom[0]), top[0].max(bottom[0]));
+        if first == last || square(low) == square(high) {
+            for row in first..=last {
+                (square(low)..=square(high)).for_each(|column| visit((row * self.columns + column) as u32));
+            }
+            return;
+        }
+        let slope = f64::from(bottom[0] - top[0]) / f64::from(bottom[1] - top[1]);
         for row in first..=last {
-            let (mut from, mut to) = (low, high);
-            if first != last {
-                // One place wider on either side, for rounding.
-                let x_at = |y: i64| f64::from(top[0]) + slope * (y as f64 - f64::from(top[1]));
-                let ends = [x_at((row << self.shift) as i64), x_at(((row + 1) << self.shift) as i64)];
-                from = from.max((ends[0].min(ends[1]).floor() - 1.0) as i32);
-                to = to.min((ends[0].max(ends[1]).ceil() + 1.0) as i32);
-            }
-            for column in square(from)..=square(to.max(from)) {
-                visit((row * self.columns + column) as u32);
-            }
+            // One place wider on either side, for rounding.
+            let x_at = |y: i64| f64::from(top[0]) + slope * (y as f64 - f64::from(top[1]));
+            let ends = [x_at((row << self.shift) as i64), x_at(((row + 1) << self.shift) as i64)];
+            let from = low.max((ends[0].min(ends[1]).floor() - 1.0) as i32);
+            let to = high.min((ends[0].max(ends[1]).ceil() + 1.0) as i32);
+            (square(from)..=square(to)).for_each(|column| visit((row * self.columns + column) as u32));
         }
     }
 

@@ -53,6 +53,10 @@ impl Level {
         self.n_sites += sites.len();
     }
 
+    pub(super) const fn has_walls(&self) -> bool {
+        self.walls
+    }
+
     pub(super) const fn n_sites(&self) -> usize {
         self.n_sites
     }

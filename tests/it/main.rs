@@ -22,3 +22,4 @@ mod presets;
 mod replay;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod support;
+mod voronoi;
