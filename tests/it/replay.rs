@@ -26,7 +26,7 @@ impl Scene {
         let replay = Replay::new(size, preset.profile);
         // Every other one has a bar that no crack enters.
         let mut mask = CrackMask::default();
-        if seed % 2 == 0 {
+        if seed.is_multiple_of(2) {
             mask.forbidden = Grid::from_vec(UVec2::new(5, 1), vec![0.0, 0.0, 1.0, 0.0, 0.0]);
         }
         growth.set_mask(mask.clone());
