@@ -1,5 +1,6 @@
 //! `bake growth`: hits in, textures and the network out.
 
+use crate::pictures::{own_picture, read_picture};
 use bevy_crack::{
     CrackPreset,
     growth::{CrackGrowth, HitOutcome},
@@ -9,19 +10,13 @@ use bevy_crack::{
 };
 use clap::Args;
 use glam::{UVec2, Vec2};
-use image::{GrayImage, ImageBuffer, ImageReader, Limits, Luma, Rgba, RgbaImage, imageops::FilterType};
+use image::{GrayImage, ImageBuffer, Luma, Rgba, RgbaImage, imageops::FilterType};
 use serde_json::json;
-use std::{
-    error::Error,
-    fs,
-    path::{Path, PathBuf},
-    sync::Arc,
-    time::Instant,
-};
+use std::{error::Error, fs, path::PathBuf, sync::Arc, time::Instant};
 
 #[derive(Args)]
 pub(crate) struct Options {
-    /// glass, concrete or clay
+    /// One of the presets: glass, concrete, clay and others
     #[arg(long, default_value = "concrete")]
     preset: String,
     /// Width and height in texels; by default those of the base picture, or 512x512
@@ -83,29 +78,6 @@ pub(crate) fn setting(text: &str) -> Result<(String, String), String> {
     Ok((name.into(), value.into()))
 }
 
-/// The pictures that ship with the crate.
-pub(crate) fn own_picture(preset: &str) -> PathBuf {
-    let file = match preset {
-        "glass" | "tempered_glass" | "laminated_glass" => "glass_pane",
-        "brick" => "brick_red",
-        "plaster" | "clay" | "mud" | "glaze" | "ice" | "toon" => preset,
-        _ => "concrete_fine",
-    };
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/textures").join(file).with_extension("png")
-}
-
-/// A picture of at most 8192 texels a side and 256 MiB; the header is checked before memory is taken.
-pub(crate) fn read_picture(path: &Path) -> Result<RgbaImage, Box<dyn Error>> {
-    let mut reader = ImageReader::open(path).map_err(|error| format!("{}: {error}", path.display()))?;
-    let mut limits = Limits::default();
-    limits.max_image_width = Some(8192);
-    limits.max_image_height = Some(8192);
-    limits.max_alloc = Some(256 << 20);
-    reader.limits(limits);
-    let picture = reader.with_guessed_format()?.decode().map_err(|error| format!("{}: {error}", path.display()))?;
-    Ok(picture.to_rgba8())
-}
-
 pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
     let mut preset = CrackPreset::named(&options.preset)
         .ok_or_else(|| format!("no preset `{}`; there are {}", options.preset, CrackPreset::NAMES.join(", ")))?;
@@ -130,11 +102,8 @@ pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
 
     let frame = SurfaceFrame::new(size)?;
     let mut growth = CrackGrowth::new(preset.growth.clone(), frame.extent(), options.seed)?;
-    let mut layers = if options.mask_from_picture {
-        CrackMask::from_picture(size, base.as_raw())?
-    } else {
-        CrackMask::default()
-    };
+    let mut layers =
+        if options.mask_from_picture { CrackMask::from_picture(size, base.as_raw())? } else { CrackMask::default() };
     for (layer, path) in [
         (&mut layers.weak, &options.weak),
         (&mut layers.strong, &options.strong),

@@ -1,7 +1,8 @@
 //! `bake guided`: a picture or a word in, textures of cracks that draw it out.
 
 use crate::{
-    growth::{read_picture, size},
+    growth::size,
+    pictures::{own_picture, read_picture},
     text::{FONT, draw_text},
 };
 use bevy_crack::{
@@ -111,7 +112,8 @@ pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
     }
     for text in &options.text {
         let text = text.replace("\\n", "\n");
-        let image = draw_text(font.as_deref().unwrap_or(FONT), &text, options.size).ok_or("the font cannot be read")?;
+        let image = draw_text(font.as_deref().unwrap_or(FONT), &text, options.size, f32::INFINITY)
+            .ok_or("the font cannot be read")?;
         guides.push(Guide { image, gamma: options.gamma });
     }
     let frame = SurfaceFrame::new(options.size)?;
@@ -146,7 +148,7 @@ pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
     seams.stamp(&mut field, &profile);
     let base = match &options.base {
         Some(path) => read_picture(path)?,
-        None => read_picture(&Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/textures/concrete_fine.png"))?,
+        None => read_picture(&own_picture("concrete"))?,
     };
     let base = image::imageops::resize(&base, options.size.x, options.size.y, FilterType::CatmullRom);
     let look = Look::named(&options.look).ok_or_else(|| format!("no look `{}`", options.look))?;

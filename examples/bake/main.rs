@@ -11,11 +11,16 @@
 mod gallery;
 mod growth;
 mod guided;
+mod pictures;
 mod realism;
+mod sheet;
 mod text;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
+
+/// Pictures, fonts and presets that ship with the crate.
+pub(crate) const ASSETS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/assets");
 
 #[derive(Parser)]
 #[command(about = "Makes crack textures without an engine")]
