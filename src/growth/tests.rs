@@ -60,6 +60,7 @@ fn random_params(rng: &mut Rng, small: bool) -> GrowthParams {
         arrest: 0.0,
         venation: Venation::Open,
         nucleation: 0.0,
+        tip_taper: 0.0,
         unevenness: 0.0,
         inertia: 0.0,
         axis: 0.0,
@@ -717,6 +718,7 @@ fn random_arrest(rng: &mut Rng) -> GrowthParams {
         open_ends: if rng.unit() < 0.5 { 0.0 } else { rng.unit() },
         // A crack that strays by more at every node has no direction that another could meet steeply.
         wander: params.wander.min(0.5),
+        tip_taper: 0.9 * rng.unit(),
         unevenness: 0.9 * rng.unit(),
         axis: 3.0 * rng.signed(),
         directed: if rng.unit() < 0.5 { 0.0 } else { rng.unit() },
