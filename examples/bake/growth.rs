@@ -1,5 +1,6 @@
 //! `bake growth`: hits in, textures and the network out.
 
+use crate::pictures::{own_picture, read_picture};
 use bevy_crack::{
     CrackPreset,
     growth::{CrackGrowth, HitOutcome},
@@ -9,29 +10,23 @@ use bevy_crack::{
 };
 use clap::Args;
 use glam::{UVec2, Vec2};
-use image::{GrayImage, ImageBuffer, ImageReader, Limits, Luma, Rgba, RgbaImage, imageops::FilterType};
+use image::{GrayImage, ImageBuffer, Luma, Rgba, RgbaImage, imageops::FilterType};
 use serde_json::json;
-use std::{
-    error::Error,
-    fs,
-    path::{Path, PathBuf},
-    sync::Arc,
-    time::Instant,
-};
+use std::{error::Error, fs, path::PathBuf, sync::Arc, time::Instant};
 
 #[derive(Args)]
 pub(crate) struct Options {
-    /// glass, concrete or clay
+    /// One of the presets: glass, concrete, clay and others
     #[arg(long, default_value = "concrete")]
     preset: String,
     /// Width and height in texels; by default those of the base picture, or 512x512
     #[arg(long, value_parser = size)]
     size: Option<UVec2>,
     #[arg(long, default_value_t = 1)]
-    seed: u64,
+    pub(crate) seed: u64,
     /// Where and how hard: u,v or u,v,energy; may be given many times
     #[arg(long, value_parser = hit, default_value = "0.5,0.5")]
-    hit: Vec<(Vec2, f32)>,
+    pub(crate) hit: Vec<(Vec2, f32)>,
     /// The picture to crack; by default one that suits the preset
     #[arg(long)]
     base: Option<PathBuf>,
@@ -58,7 +53,7 @@ pub(crate) struct Options {
     steps: Option<u32>,
     /// Folder to write to; made if it is not there
     #[arg(long, default_value = "out")]
-    out: PathBuf,
+    pub(crate) out: PathBuf,
 }
 
 pub(crate) fn size(text: &str) -> Result<UVec2, String> {
@@ -83,29 +78,8 @@ pub(crate) fn setting(text: &str) -> Result<(String, String), String> {
     Ok((name.into(), value.into()))
 }
 
-/// The pictures that ship with the crate.
-fn own_picture(preset: &str) -> PathBuf {
-    let file = match preset {
-        "glass" => "glass_pane.png",
-        "clay" => "clay.png",
-        _ => "concrete_fine.png",
-    };
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/textures").join(file)
-}
-
-/// A picture of at most 8192 texels a side and 256 MiB; the header is checked before memory is taken.
-pub(crate) fn read_picture(path: &Path) -> Result<RgbaImage, Box<dyn Error>> {
-    let mut reader = ImageReader::open(path).map_err(|error| format!("{}: {error}", path.display()))?;
-    let mut limits = Limits::default();
-    limits.max_image_width = Some(8192);
-    limits.max_image_height = Some(8192);
-    limits.max_alloc = Some(256 << 20);
-    reader.limits(limits);
-    let picture = reader.with_guessed_format()?.decode().map_err(|error| format!("{}: {error}", path.display()))?;
-    Ok(picture.to_rgba8())
-}
-
-pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
+/// Writes the textures, and returns the network and the cracked picture.
+pub(crate) fn bake(options: &Options) -> Result<(Network, RgbaImage), Box<dyn Error>> {
     let mut preset = CrackPreset::named(&options.preset)
         .ok_or_else(|| format!("no preset `{}`; there are {}", options.preset, CrackPreset::NAMES.join(", ")))?;
     for (name, value) in &options.set {
@@ -202,7 +176,7 @@ pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
         painted.as_secs_f64() * 1e3,
         options.out.display()
     );
-    Ok(())
+    Ok((network.clone(), diffuse))
 }
 
 /// White where a person would mark a crack: not on the chipped rim.
@@ -232,6 +206,7 @@ fn describe(network: &Network, options: &Options) -> serde_json::Value {
             let kind = match link.kind {
                 LinkKind::Connection => "connection",
                 LinkKind::Island => "island",
+                LinkKind::Meeting => "meeting",
                 LinkKind::Junction => "junction",
             };
             json!({ "a": link.a, "b": link.b, "width": link.width, "birth": link.birth, "kind": kind })

@@ -1,45 +1,56 @@
 //! `bake guided`: a picture or a word in, textures of cracks that draw it out.
 
 use crate::{
-    growth::{read_picture, size},
+    growth::size,
+    ink::{ink, lightness},
+    pictures::read_picture,
     text::{FONT, draw_text},
 };
 use bevy_crack::{
-    Grid,
-    paint::{BaseTexels, Look, LookTable, PaintTargets, paint_into},
-    pattern::SurfaceFrame,
+    paint::{BaseTexels, Look, LookTable, Modulation, PaintTargets, modulate, paint_into},
+    pattern::{NO_PARENT, SurfaceFrame},
     raster::{DepthField, Profile, TexelRect},
-    voronoi::{Guide, SiteLayout, VoronoiBake, VoronoiMap, VoronoiParams},
+    voronoi::{Front, Guide, Seams, SiteLayout, VoronoiBake, VoronoiMap, VoronoiParams, edges},
 };
 use clap::{Args, ValueEnum};
 use glam::{UVec2, Vec2};
-use image::{GrayImage, ImageBuffer, Luma, Rgba, RgbaImage, imageops::FilterType};
+use image::{
+    Delay, Frame, GrayImage, ImageBuffer, Luma, Rgba, RgbaImage,
+    codecs::gif::{GifEncoder, Repeat},
+    imageops::FilterType,
+};
+use serde_json::json;
 use std::{
     error::Error,
-    fs,
+    fs::{self, File},
     path::{Path, PathBuf},
     time::Instant,
 };
 
 #[derive(Args)]
 pub(crate) struct Options {
-    /// A picture to follow, IMG or IMG:GAMMA; the darker part is the drawing where the picture is mostly light; may be given many times
+    /// A drawing to follow, IMG or IMG:GAMMA: its dark part, or its light part if most of it is dark; may be given many times
     #[arg(long, value_parser = guide)]
     guide: Vec<(PathBuf, f32)>,
+    /// A picture whose edges to follow, IMG or IMG:GAMMA; may be given many times
+    #[arg(long, value_parser = guide)]
+    edges: Vec<(PathBuf, f32)>,
     /// A word to draw, with \n between lines; may be given many times
     #[arg(long)]
     text: Vec<String>,
     /// Weight of the words
-    #[arg(long, default_value_t = 28.0)]
+    #[arg(long, default_value_t = GAMMA)]
     gamma: f32,
     /// The font of the words, TTF or OTF; by default the one that ships with the crate
     #[arg(long)]
     font: Option<PathBuf>,
+    /// How many sites there are
     #[arg(long, default_value_t = 175)]
     sites: u32,
+    /// Where they lie; by default astride the drawing, or uniform where there is none
     #[arg(long, value_enum)]
     layout: Option<Layout>,
-    /// Where the impact is, u,v
+    /// Where the impact is, for `--layout impact` and `--animate front`: u,v
     #[arg(long, value_parser = pair, default_value = "0.5,0.5")]
     at: Vec2,
     /// Generations of cracks, 1 to 5
@@ -51,6 +62,7 @@ pub(crate) struct Options {
     /// Width of the widest crack, in shares of the shorter side
     #[arg(long)]
     width: Option<f32>,
+    /// Width and height in texels
     #[arg(long, value_parser = size, default_value = "400x400")]
     size: UVec2,
     #[arg(long, default_value_t = 1)]
@@ -58,9 +70,15 @@ pub(crate) struct Options {
     /// The picture to crack; by default plain concrete
     #[arg(long)]
     base: Option<PathBuf>,
-    /// groove, frosted or toon
+    /// groove, frosted or toon; dark or bright: the plain modulation of the paper
     #[arg(long, default_value = "groove")]
     look: String,
+    /// Also frames of an animation, and an animated GIF
+    #[arg(long, value_enum)]
+    animate: Option<Animation>,
+    /// How many frames
+    #[arg(long, default_value_t = 24)]
+    frames: u32,
     /// Folder to write to; made if it is not there
     #[arg(long, default_value = "out")]
     out: PathBuf,
@@ -75,12 +93,31 @@ enum Layout {
     Astride,
 }
 
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Animation {
+    /// The picture emerges from plain cracks.
+    Gamma,
+    /// From the first guide to the second.
+    Morph,
+    /// All cracks widen.
+    Width,
+    /// The cracks run outward from a point.
+    Front,
+}
+
+/// The weight that the paper gives its guides.
+const GAMMA: f32 = 28.0;
+
+/// Deeper than this are the cracks that draw.
+const DEEP: u16 = u16::MAX / 2;
+
+/// The cross-section of the cracks.
+pub(crate) const PROFILE: Profile = Profile { full_width: 0.014, wall: 0.4, faintest: 0.5, ..Profile::DEFAULT };
+
 fn guide(text: &str) -> Result<(PathBuf, f32), String> {
-    match text.rsplit_once(':') {
-        Some((path, gamma)) if !path.is_empty() && gamma.parse::<f32>().is_ok() => {
-            Ok((path.into(), gamma.parse().map_err(|error| format!("{gamma}: {error}"))?))
-        }
-        _ => Ok((text.into(), 28.0)),
+    match text.rsplit_once(':').map(|(path, gamma)| (path, gamma.parse::<f32>())) {
+        Some((path, Ok(gamma))) if !path.is_empty() => Ok((path.into(), gamma)),
+        _ => Ok((text.into(), GAMMA)),
     }
 }
 
@@ -90,69 +127,95 @@ fn pair(text: &str) -> Result<Vec2, String> {
     Ok(Vec2::new(number(u)?, number(v)?))
 }
 
-/// The drawing in a picture: 1 where it is dark on light (or light on dark), where transparent 0.
-pub(crate) fn ink(picture: &RgbaImage) -> Option<Grid<f32>> {
-    let light = |p: &Rgba<u8>| (f32::from(p[0]) * 0.299 + f32::from(p[1]) * 0.587 + f32::from(p[2]) * 0.114) / 255.0;
-    let n = picture.pixels().len().max(1) as f32;
-    let mean = picture.pixels().map(|p| light(p) as f64).sum::<f64>() as f32 / n;
-    let values = picture.pixels().map(|p| {
-        let value = if mean > 0.5 { 1.0 - light(p) } else { light(p) };
-        value * f32::from(p[3]) / 255.0
-    });
-    Grid::from_vec(picture.dimensions().into(), values.collect())
-}
-
-pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
+/// Pictures, then edges, then words.
+fn guides(options: &Options) -> Result<Vec<Guide>, Box<dyn Error>> {
     let font = options.font.as_ref().map(fs::read).transpose()?;
     let mut guides = Vec::new();
     for (path, gamma) in &options.guide {
-        let image = ink(&read_picture(path)?).ok_or("picture size")?;
-        guides.push(Guide { image, gamma: *gamma });
+        guides.push(Guide { image: ink(&read_picture(path)?).ok_or("picture size")?, gamma: *gamma });
+    }
+    for (path, gamma) in &options.edges {
+        let picture = lightness(&read_picture(path)?).ok_or("picture size")?;
+        guides.push(Guide { image: edges(&picture), gamma: *gamma });
     }
     for text in &options.text {
         let text = text.replace("\\n", "\n");
-        let image = draw_text(font.as_deref().unwrap_or(FONT), &text, options.size).ok_or("the font cannot be read")?;
+        let image = draw_text(font.as_deref().unwrap_or(FONT), &text, options.size, f32::INFINITY)
+            .ok_or("the font cannot be read")?;
         guides.push(Guide { image, gamma: options.gamma });
     }
-    let frame = SurfaceFrame::new(options.size)?;
+    Ok(guides)
+}
+
+fn params(options: &Options, guides: &[Guide], frame: &SurfaceFrame) -> Result<VoronoiParams, Box<dyn Error>> {
     let layout = match options.layout {
-        Some(Layout::Uniform) => SiteLayout::Uniform,
         None if guides.is_empty() => SiteLayout::Uniform,
+        Some(Layout::Uniform) => SiteLayout::Uniform,
         None | Some(Layout::Astride) => SiteLayout::Astride,
         Some(Layout::Even) => SiteLayout::Even,
         Some(Layout::Impact) => SiteLayout::Impact { at: frame.uv_to_pos(options.at), focus: 2.2 },
-        Some(Layout::Image) => match guides.first() {
-            Some(guide) => SiteLayout::Density(guide.image.clone()),
-            None => return Err("--layout image needs a --guide".into()),
-        },
+        Some(Layout::Image) => {
+            SiteLayout::Density(guides.first().ok_or("`--layout image` needs a `--guide`")?.image.clone())
+        }
     };
-    let mut params = VoronoiParams {
-        sites: options.sites,
-        layout,
-        levels: options.levels,
-        alpha: options.alpha,
-        ..VoronoiParams::DEFAULT
-    };
+    let (sites, levels, alpha) = (options.sites, options.levels, options.alpha);
+    let mut params = VoronoiParams { sites, layout, levels, alpha, ..VoronoiParams::DEFAULT };
     if let Some(width) = options.width {
         params.width = width;
         params.least_width = params.least_width.min(width);
     }
+    Ok(params)
+}
+
+pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
+    let frame = SurfaceFrame::new(options.size)?;
+    let guides = guides(options)?;
+    let params = params(options, &guides, &frame)?;
+    let gammas: Vec<f32> = guides.iter().map(|guide| guide.gamma).collect();
     let clock = Instant::now();
-    let (map, seams) = VoronoiBake::new(params, guides, options.size, options.seed)?.finish();
+    let (mut map, seams) = VoronoiBake::new(params, guides, options.size, options.seed)?.finish();
     let baked = clock.elapsed();
 
-    let profile = Profile { full_width: 0.014, wall: 0.4, faintest: 0.5, ..Profile::DEFAULT };
     let mut field = DepthField::new(frame);
-    seams.stamp(&mut field, &profile);
-    let base = match &options.base {
-        Some(path) => read_picture(path)?,
-        None => read_picture(&Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/textures/concrete_fine.png"))?,
-    };
-    let base = image::imageops::resize(&base, options.size.x, options.size.y, FilterType::CatmullRom);
-    let look = Look::named(&options.look).ok_or_else(|| format!("no look `{}`", options.look))?;
+    seams.stamp(&mut field, &PROFILE);
+    let base = base_picture(options.base.as_deref(), options.size)?;
+    let paint = Paint::new(&options.look, &frame)?;
     fs::create_dir_all(&options.out)?;
-    write(&options.out, &base, &field, &look)?;
-    regions(&map)?.save(options.out.join("regions.png"))?;
+    let [diffuse, normal] = paint.paint(&base, &field)?;
+    diffuse.save(options.out.join("diffuse.png"))?;
+    normal.save(options.out.join("normal.png"))?;
+    let texels = field.depth.as_slice().to_vec();
+    let depth = ImageBuffer::<Luma<u16>, _>::from_raw(options.size.x, options.size.y, texels).ok_or("depth size")?;
+    depth.save(options.out.join("depth.png"))?;
+    // What a person would mark as crack, white as in `bake growth`; and the cracks that draw, black on white.
+    let mask: Vec<u8> = field.depth.as_slice().iter().map(|&d| if d > u16::MAX / 3 { 255 } else { 0 }).collect();
+    GrayImage::from_raw(options.size.x, options.size.y, mask).ok_or("mask size")?.save(options.out.join("mask.png"))?;
+    deep(&field).ok_or("mask size")?.save(options.out.join("deep.png"))?;
+    regions(&map).save(options.out.join("regions.png"))?;
+    let at = frame.uv_to_pos(options.at);
+    fs::write(options.out.join("network.json"), serde_json::to_string(&describe(&seams, at))?)?;
+
+    if let Some(animation) = options.animate {
+        let front = Front::new(&seams, at);
+        if animation == Animation::Morph {
+            map.set_gammas(&[GAMMA, 0.0])?;
+            map.rescale_widths();
+        }
+        animate(options, &base, &paint, |t, field| {
+            let weights: Vec<f32> = match animation {
+                Animation::Gamma => gammas.iter().map(|gamma| gamma * t).collect(),
+                Animation::Morph => match gammas[..] {
+                    [first, second, ..] => vec![first * (1.0 - t), second * t],
+                    _ => return Err("`--animate morph` needs two guides".into()),
+                },
+                Animation::Width => return Ok(seams.stamp_share(field, &PROFILE, t)),
+                Animation::Front => return Ok(seams.stamp_front(field, &PROFILE, &front, t * front.reach())),
+            };
+            map.set_gammas(&weights)?;
+            map.seams().stamp(field, &PROFILE);
+            Ok(())
+        })?;
+    }
     let report = map.strokes().map_or(String::new(), |strokes| {
         format!("; {:.1} % of {:.2} units of strokes are covered", strokes.covered * 100.0, strokes.length)
     });
@@ -166,53 +229,120 @@ pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Diffuse, normal, depth and mask.
-fn write(out: &Path, base: &RgbaImage, field: &DepthField, look: &Look) -> Result<(), Box<dyn Error>> {
-    let size: UVec2 = base.dimensions().into();
-    let table = LookTable::new(look, field.frame.texels_per_unit())?;
-    let (mut diffuse, mut normal) = (RgbaImage::new(size.x, size.y), RgbaImage::new(size.x, size.y));
-    paint_into(
-        BaseTexels { size, diffuse: base.as_raw(), normal: None, depth: None },
-        field,
-        &table,
-        TexelRect::whole(size),
-        UVec2::ZERO,
-        &mut PaintTargets { diffuse: Some(&mut diffuse), normal: Some(&mut normal), depth: None },
-    );
-    diffuse.save(out.join("diffuse.png"))?;
-    normal.save(out.join("normal.png"))?;
-    let texels = field.depth.as_slice();
-    let depth = ImageBuffer::<Luma<u16>, _>::from_raw(size.x, size.y, texels.to_vec()).ok_or("depth size")?;
-    depth.save(out.join("depth.png"))?;
-    // What a person would mark as crack, and the cracks that draw.
-    darker(field, u16::MAX / 3)?.save(out.join("mask.png"))?;
-    darker(field, DEEP)?.save(out.join("deep.png"))?;
+/// Writes the frames at times 0..=1 that `stamp` draws.
+fn animate(
+    options: &Options,
+    base: &RgbaImage,
+    paint: &Paint,
+    mut stamp: impl FnMut(f32, &mut DepthField) -> Result<(), Box<dyn Error>>,
+) -> Result<(), Box<dyn Error>> {
+    let folder = options.out.join("frames");
+    fs::create_dir_all(&folder)?;
+    let mut gif = GifEncoder::new_with_speed(File::create(options.out.join("animation.gif"))?, 10);
+    gif.set_repeat(Repeat::Infinite)?;
+    for i in 0..options.frames {
+        let t = i as f32 / (options.frames.max(2) - 1) as f32;
+        let mut field = DepthField::new(SurfaceFrame::new(options.size)?);
+        stamp(t, &mut field)?;
+        let [diffuse, _] = paint.paint(base, &field)?;
+        diffuse.save(folder.join(format!("{i:04}.png")))?;
+        gif.encode_frame(Frame::from_parts(diffuse, 0, 0, Delay::from_numer_denom_ms(70, 1)))?;
+    }
     Ok(())
 }
 
-/// Deeper than this are the cracks that draw.
-pub(crate) const DEEP: u16 = u16::MAX / 2;
+/// The picture at `path`, or concrete, stretched to `size`.
+pub(crate) fn base_picture(path: Option<&Path>, size: UVec2) -> Result<RgbaImage, Box<dyn Error>> {
+    let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/textures/concrete_fine.png");
+    let picture = read_picture(path.unwrap_or(&own))?;
+    Ok(image::imageops::resize(&picture, size.x, size.y, FilterType::CatmullRom))
+}
 
-/// The cracks deeper than `depth`, black on white.
-pub(crate) fn darker(field: &DepthField, depth: u16) -> Result<GrayImage, Box<dyn Error>> {
+/// How cracks are shown.
+pub(crate) enum Paint {
+    Look(Box<LookTable>),
+    Modulation(Modulation),
+}
+
+impl Paint {
+    pub(crate) fn new(name: &str, frame: &SurfaceFrame) -> Result<Self, Box<dyn Error>> {
+        match name {
+            "dark" => Ok(Self::Modulation(Modulation::DARK)),
+            "bright" => Ok(Self::Modulation(Modulation::BRIGHT)),
+            _ => {
+                let names = Look::NAMES.join(", ");
+                let look = Look::named(name).ok_or(format!("no look `{name}`; there are {names}, dark, bright"))?;
+                Ok(Self::Look(Box::new(LookTable::new(&look, frame.texels_per_unit())?)))
+            }
+        }
+    }
+
+    /// Diffuse and normal.
+    pub(crate) fn paint(&self, base: &RgbaImage, field: &DepthField) -> Result<[RgbaImage; 2], Box<dyn Error>> {
+        let size: UVec2 = base.dimensions().into();
+        let (mut diffuse, mut normal) = (base.clone(), RgbaImage::new(size.x, size.y));
+        let plain = LookTable::new(&Look::GROOVE, field.frame.texels_per_unit())?;
+        let (table, with_diffuse) = match self {
+            Self::Look(table) => (&**table, true),
+            Self::Modulation(modulation) => {
+                modulate(&mut diffuse, field, modulation)?;
+                (&plain, false)
+            }
+        };
+        let texels = BaseTexels { size, diffuse: base.as_raw(), normal: None, depth: None };
+        let diffuse_target = with_diffuse.then_some(&mut *diffuse);
+        let mut targets = PaintTargets { diffuse: diffuse_target, normal: Some(&mut normal), depth: None };
+        paint_into(texels, field, table, TexelRect::whole(size), UVec2::ZERO, &mut targets);
+        Ok([diffuse, normal])
+    }
+}
+
+/// The cracks that draw, black on white.
+pub(crate) fn deep(field: &DepthField) -> Option<GrayImage> {
     let size = field.depth.size();
-    let mask = field.depth.as_slice().iter().map(|&texel| if texel > depth { 0 } else { 255 }).collect();
-    Ok(GrayImage::from_raw(size.x, size.y, mask).ok_or("mask size")?)
+    let mask = field.depth.as_slice().iter().map(|&depth| if depth > DEEP { 0 } else { 255 }).collect();
+    GrayImage::from_raw(size.x, size.y, mask)
 }
 
 /// A colour for each region, darker with path cost; sites are white.
-fn regions(map: &VoronoiMap) -> Result<RgbaImage, Box<dyn Error>> {
+pub(crate) fn regions(map: &VoronoiMap) -> RgbaImage {
     let size = map.frame().size();
     let mut picture = RgbaImage::from_fn(size.x, size.y, |x, y| match (map.region(x, y), map.cost(x, y)) {
         (Some(region), Some(cost)) => {
             let dark = 1.0 / (1.0 + cost as f32 / 40_000.0);
-            let channel = |k: u32| (((region * 7919 + 31) * (k * 104_729 + 13) % 160 + 90) as f32 * dark) as u8;
-            Rgba([channel(1), channel(2), channel(3), 255])
+            let channel =
+                |k: u32| ((region.wrapping_mul(7919) + 31).wrapping_mul(k * 104_729 + 13) % 160 + 90) as f32 * dark;
+            Rgba([channel(1) as u8, channel(2) as u8, channel(3) as u8, 255])
         }
         _ => Rgba([0, 0, 0, 255]),
     });
     for site in map.sites() {
         picture.put_pixel(site.x, site.y, Rgba([255; 4]));
     }
-    Ok(picture)
+    picture
+}
+
+/// The seams as a network that has grown from `at`, in the form of `bake growth`.
+fn describe(seams: &Seams, at: Vec2) -> serde_json::Value {
+    let network = seams.network(at);
+    let nodes: Vec<_> = network
+        .nodes()
+        .iter()
+        .map(|node| {
+            let parent = (node.parent != NO_PARENT).then_some(node.parent);
+            json!({ "pos": node.pos.to_array(), "width": node.width, "parent": parent, "generation": node.generation,
+                    "birth": node.birth })
+        })
+        .collect();
+    let lines: Vec<_> = seams
+        .seams
+        .iter()
+        .map(|seam| {
+            let path: Vec<_> = seam.points.iter().map(|point| [point.pos.x, point.pos.y, point.width]).collect();
+            json!({ "from": seam.from, "to": seam.to, "left": seam.left, "right": seam.right, "level": seam.level,
+                    "path": path })
+        })
+        .collect();
+    let links: Vec<_> = network.links().iter().map(|link| json!({ "a": link.a, "b": link.b })).collect();
+    json!({ "extent": seams.extent.to_array(), "nodes": nodes, "links": links, "seams": lines })
 }

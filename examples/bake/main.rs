@@ -8,13 +8,22 @@
 
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "a command-line tool")]
 
+mod figures;
+mod gallery;
 mod growth;
 mod guided;
+mod ink;
+mod pictures;
 mod realism;
+mod shatter;
+mod sheet;
 mod text;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
+
+/// Pictures, fonts and presets that ship with the crate.
+pub(crate) const ASSETS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/assets");
 
 #[derive(Parser)]
 #[command(about = "Makes crack textures without an engine")]
@@ -27,17 +36,26 @@ struct Arguments {
 enum Method {
     /// Cracks that grow from hits, by space colonization.
     Growth(growth::Options),
+    /// Every preset on its own picture, at three moments, on one sheet.
+    Gallery(gallery::Options),
     /// Cracks that draw a picture or a word, all at once.
     Guided(Box<guided::Options>),
+    /// The figures of the paper on image-guided fracture, made again.
+    FiguresMould(figures::Options),
     /// Masks of every preset with random hits, to be measured against photographs.
     Realism(realism::Options),
+    /// Shards: the pieces into which the cracks cut the picture.
+    Shatter(Box<shatter::Options>),
 }
 
 fn main() -> ExitCode {
     let done = match Arguments::parse().method {
-        Method::Growth(options) => growth::bake(&options),
+        Method::Gallery(options) => gallery::bake(&options),
+        Method::Growth(options) => growth::bake(&options).map(drop),
         Method::Guided(options) => guided::bake(&options),
+        Method::FiguresMould(options) => figures::bake(&options),
         Method::Realism(options) => realism::bake(&options),
+        Method::Shatter(options) => shatter::bake(&options),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

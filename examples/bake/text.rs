@@ -10,18 +10,18 @@ pub(crate) const FONT: &[u8] = include_bytes!("../../assets/fonts/open_sans_extr
 /// Share of the surface that stays free on each side.
 const MARGIN: f32 = 0.06;
 
-/// The lines of `text` as large as they fit into `size` texels: 1 inside the letters, 0 outside; `None` if the font
+/// The lines of `text` as large as they fit into `size` texels, in letters of at most `most` texels: 1 inside the letters, 0 outside; `None` if the font
 /// cannot be read.
 ///
 /// Letters that the font lacks are drawn as its box; a text without letters gives an empty guide.
-pub(crate) fn draw_text(font: &[u8], text: &str, size: UVec2) -> Option<Grid<f32>> {
+pub(crate) fn draw_text(font: &[u8], text: &str, size: UVec2, most: f32) -> Option<Grid<f32>> {
     let font = FontRef::try_from_slice(font).ok()?;
     let mut grid = Grid::new(size, 0.0f32);
     // Laid out at a size of 100, then scaled.
     let letters = lay_out(&font, text, 100.0);
     let Some((min, max)) = bounds(&font, &letters) else { return Some(grid) };
     let room = size.as_vec2() * (1.0 - 2.0 * MARGIN);
-    let scale = (room / (max - min).max(glam::Vec2::splat(1.0e-3))).min_element();
+    let scale = (room / (max - min).max(glam::Vec2::splat(1.0e-3))).min_element().min(most / 100.0);
     let letters = lay_out(&font, text, 100.0 * scale);
     let Some((min, max)) = bounds(&font, &letters) else { return Some(grid) };
     let shift = (size.as_vec2() - (max - min)) * 0.5 - min;

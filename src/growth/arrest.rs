@@ -1,6 +1,9 @@
 //! Cracks that know older cracks: a tip that comes near one turns to meet it steeply and stops there.
 
-use super::{CrackGrowth, MarkerLayout, StartLayout, walls::Walls};
+use super::{
+    CrackGrowth, MarkerLayout, StartLayout,
+    walls::{Walls, crosses_itself},
+};
 use crate::math::hash_unit;
 use crate::pattern::{Link, LinkKind, NO_PARENT, Network, PathPoint, SegmentId, SegmentPath};
 use glam::Vec2;
@@ -18,7 +21,7 @@ const LAST: f32 = 1.35;
 const TURN: f32 = 2.5;
 
 /// The node of a crack that is met lies no more than so many segment lengths away.
-const LAST_REACH: f32 = 1.8;
+const LAST_REACH: f32 = 1.5;
 
 /// A node this many segment lengths from another crack beside it would run along it.
 const BESIDE: f32 = 0.7;
@@ -93,7 +96,7 @@ impl CrackGrowth {
         let reach = self.params.arrest.max(TURN * length);
         match self.goal_ahead(from, heading, reach, AHEAD) {
             None => {}
-            Some(_) if self.stays_open(from) => {
+            Some((_, Goal::Node(_))) if self.stays_open(from) => {
                 self.seal(from);
                 return Advance::Stopped(heading);
             }
@@ -120,7 +123,9 @@ impl CrackGrowth {
 
     /// Whether a tip is one of those that stop short of other cracks.
     pub(super) fn stays_open(&self, tip: u32) -> bool {
-        self.params.open_ends > 0.0 && hash_unit(self.seed ^ 0x15, u64::from(tip)) < self.params.open_ends
+        self.params.open_ends > 0.0
+            && self.network.nodes[tip as usize].parent != NO_PARENT
+            && hash_unit(self.seed ^ 0x15, u64::from(tip)) < self.params.open_ends
     }
 
     /// Sends a tip at rest on its way to the nearest crack ahead of it, if there is one within `distance`.
@@ -222,13 +227,11 @@ impl CrackGrowth {
         self.each_foreign(tip, reach * length, |node, distance_sq, way| {
             if way.dot(heading) > 0.0 {
                 let end = self.network.nodes[node as usize];
-                let along = match self.network.nodes.get(end.parent as usize) {
-                    Some(before) => (end.pos - before.pos).normalize_or_zero(),
-                    None => Vec2::ZERO,
-                };
+                let place = |node: u32| self.network.nodes.get(node as usize).map_or(end.pos, |node| node.pos);
+                let along = (place(self.child_of(node)) - place(end.parent)).normalize_or_zero();
                 let distance = distance_sq.sqrt();
                 let slant = along.dot(way / distance).abs();
-                nearby.push((distance / length + 2.0 * slant, node));
+                nearby.push((distance / length + 3.0 * slant, node));
             }
         });
         nearby.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
@@ -245,11 +248,9 @@ impl CrackGrowth {
         let extent = self.network.extent();
         let to = to.clamp(Vec2::ZERO, extent);
         // The border is a crack too: none runs along it.
-        let (low, high) =
-            (node.pos.cmpeq(Vec2::ZERO) & to.cmpeq(Vec2::ZERO), node.pos.cmpeq(extent) & to.cmpeq(extent));
-        if (low | high).any() {
-            return None;
-        }
+        let inward = Vec2::splat(0.3 * self.params.step_length).min(0.5 * extent);
+        let (low, high) = (node.pos.cmpeq(Vec2::ZERO) & to.cmpeq(Vec2::ZERO), node.pos.cmpeq(extent) & to.cmpeq(extent));
+        let to = Vec2::select(low, inward, Vec2::select(high, extent - inward, to));
         match self.free_line(SegmentId::Branch(child), (from, u32::MAX), (node.pos, to)) {
             Ok((bend, path)) => {
                 let on_border = (to.cmpeq(Vec2::ZERO) | to.cmpeq(extent)).any();
@@ -280,6 +281,7 @@ impl CrackGrowth {
             let touches = self.params.arrest > 0.0
                 && self.arrest.as_ref().is_some_and(|arrest| arrest.walls.touches_any(ends, &path));
             let extent = self.network.extent();
+            let touches = touches || crosses_itself(&path);
             let is_forbidden = |pair: &[PathPoint]| self.mask.blocks(pair[0].pos / extent, pair[1].pos / extent);
             if !touches && !path.points().windows(2).any(is_forbidden) {
                 return Ok((bend, path));

@@ -94,7 +94,7 @@ impl Relations {
         relation.neighbours.retain(|&node| {
             let is_blocked =
                 distance_sq < apart_sq(node) && nodes[node as usize].pos.distance_squared(place) < apart_sq(node);
-            !is_blocked && !(node == parent && is_on(node))
+            !(is_blocked || node == parent && is_on(node))
         });
         if distance_sq <= self.kill_sq {
             relation.reached_by = Some(index);

@@ -118,7 +118,7 @@ pub(super) fn lay_out(
                     // A ray bends a little from ring to ring.
                     angle += 0.12 * jitter * rng.signed() * (first / radius.max(first)).max(0.25);
                     let along = radius + 0.5 * jitter * gap * rng.signed();
-                    let (pos, chance) = (region.center + ops::unit(angle) * along, rng.unit());
+                    let (pos, chance) = (region.center + params.direct(ops::unit(angle)) * along, rng.unit());
                     offer(pos, chance, occupancy, None);
                     if pos.clamp(Vec2::ZERO, region.extent) != pos {
                         // A ray that leaves the surface runs up to its border.

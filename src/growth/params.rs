@@ -1,6 +1,8 @@
 //! What is asked of a growth: [`GrowthParams`].
 
 use crate::math::{Rng, ops};
+use glam::Vec2;
+use std::f32::consts::FRAC_PI_2;
 
 /// How markers are laid out around a hit.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -123,6 +125,10 @@ pub struct GrowthParams {
     /// How much a crack keeps its direction, against the pull of the markers: 0 = not at all, 1 = as much as it follows them.
     /// 0..=8.
     pub inertia: f32,
+    /// Direction in which cracks like to run, radians from the x axis (y runs down): across what pulls the surface apart. -7..=7.
+    pub axis: f32,
+    /// How much they keep to [`axis`](Self::axis): 0 = not at all, 1 = nearly straight along it. 0..=1.
+    pub directed: f32,
     /// How much the direction of growth strays at each node, radians, 0..=1.
     pub wander: f32,
     /// How rough the line between two nodes is, as a share of its length, 0..=0.5.
@@ -148,7 +154,7 @@ pub struct GrowthParams {
     /// They come late, so they end at the older ones.
     pub nucleation: f32,
     /// How much one surface differs from the next, by its seed: widths, roughness, the spacing of markers, the number of starts and
-    /// of free ends. 0 = not at all; at 1 each differs by a factor of about 2 either way. 0..=1.
+    /// of free ends, the axis. 0 = not at all; at 1 each differs by a factor of about 2 either way. 0..=1.
     pub variety: f32,
     /// Whether the markers themselves are drawn.
     pub draw_markers: bool,
@@ -176,6 +182,8 @@ impl GrowthParams {
         max_width: 0.03,
         unevenness: 0.0,
         inertia: 0.0,
+        axis: 0.0,
+        directed: 0.0,
         wander: 0.1,
         roughness: 0.12,
         draw_connections: false,
@@ -273,6 +281,8 @@ impl GrowthParams {
         max_width: f32 = 0.0005, 0.4;
         unevenness: f32 = 0.0, 0.9;
         inertia: f32 = 0.0, 8.0;
+        axis: f32 = -7.0, 7.0;
+        directed: f32 = 0.0, 1.0;
         wander: f32 = 0.0, 1.0;
         roughness: f32 = 0.0, 0.5;
         connection_gaps: f32 = 0.0, 1.0;
@@ -414,6 +424,16 @@ impl GrowthParams {
         Ok(())
     }
 
+    /// Turns a direction towards the axis.
+    pub(super) fn direct(&self, direction: Vec2) -> Vec2 {
+        if self.directed <= 0.0 {
+            return direction;
+        }
+        let axis = ops::unit(self.axis);
+        let along = axis * axis.dot(direction);
+        (along + (direction - along) * (1.0 - self.directed)).normalize_or(direction)
+    }
+
     /// The parameters of the surface with this seed: what [`variety`](Self::variety) makes of them. Valid if these are.
     #[must_use]
     pub fn varied(&self, seed: u64) -> Self {
@@ -428,6 +448,7 @@ impl GrowthParams {
         varied.max_width = (self.max_width * width).clamp(varied.line_width, 0.4);
         varied.roughness = (self.roughness * rough).min(0.5);
         varied.wander = (self.wander * stray).min(1.0);
+        varied.axis = (self.axis + FRAC_PI_2 * self.variety * rng.signed()).clamp(-7.0, 7.0);
         varied.open_ends = (self.open_ends * free).min(1.0);
         let count = |count: u32, by: f32, most: u32| ((count as f32 * by).round() as u32).clamp(1, most);
         match &mut varied.markers {

@@ -550,6 +550,11 @@ impl CrackGrowth {
         }
     }
 
+    /// The last child of a node, or [`NO_PARENT`].
+    pub(super) fn child_of(&self, node: u32) -> u32 {
+        self.changes.child[node as usize]
+    }
+
     /// Whether a place lies on a crack, or as good as.
     fn is_on_crack(&self, place: Vec2) -> bool {
         let close = 0.3 * self.params.step_length;
@@ -667,6 +672,7 @@ impl CrackGrowth {
                     direction = (direction + heading * self.params.inertia).normalize_or_zero();
                 }
             }
+            direction = self.params.direct(direction);
             if self.params.wander > 0.0 {
                 // A draw per child, frozen by its index.
                 let stray = self.params.wander * (2.0 * hash_unit(self.seed ^ 0x57A6, child) - 1.0);
@@ -685,12 +691,11 @@ impl CrackGrowth {
                 pull.serves = left_sq <= kill * kill || left_sq <= distance_sq - PROGRESS * length * length;
             }
         });
-        if (self.params.arrest > 0.0 && self.params.inertia > 0.0) || !self.mask.is_empty() && self.arrest.is_some() {
-            // A crack does not turn on its heel: what it cannot serve on its way is left to others.
-            return;
-        }
+        // A crack does not turn on its heel: what it cannot serve on its way is left to others.
+        let keeps_on = self.arrest.is_some() && (self.params.inertia > 0.0 || !self.mask.is_empty());
         for pull in &mut self.pulls {
-            if !pull.serves {
+            let is_start = self.network.nodes[pull.node as usize].parent == NO_PARENT;
+            if !pull.serves && (is_start || !keeps_on) {
                 let (from, to) = (self.network.nodes[pull.node as usize].pos, self.field.marker(pull.closest).pos);
                 let distance = pull.closest_sq.sqrt();
                 pull.child = if distance <= length { to } else { from + (to - from) * (length / distance) };
@@ -706,7 +711,7 @@ impl CrackGrowth {
             let nodes = &self.network.nodes;
             if a != b && nodes[a as usize].parent != b && nodes[b as usize].parent != a && !self.stays_open(b) {
                 let width = nodes[a as usize].width.min(nodes[b as usize].width);
-                self.link(Link { a, b, width, birth: self.steps, kind: LinkKind::Junction, bend: 1.0 });
+                self.link(Link { a, b, width, birth: self.steps, kind: LinkKind::Meeting, bend: 1.0 });
             }
         }
         if self.params.draw_connections {

@@ -62,6 +62,8 @@ fn random_params(rng: &mut Rng, small: bool) -> GrowthParams {
         nucleation: 0.0,
         unevenness: 0.0,
         inertia: 0.0,
+        axis: 0.0,
+        directed: 0.0,
         variety: 0.0,
         draw_markers: rng.unit() < 0.2,
         max_nodes: 1_000_000,
@@ -393,6 +395,7 @@ fn i1_i4_any_bits_as_a_hit() {
             HitOutcome::Rejected(Rejected::NotFinite) => assert!(![x, y, energy].iter().all(|v| v.is_finite())),
             HitOutcome::Rejected(Rejected::NegativeEnergy) => assert!(energy < 0.0),
             HitOutcome::Rejected(Rejected::OffSurface) => assert!(!on),
+            HitOutcome::Rejected(Rejected::Forbidden) => panic!("nothing is forbidden"),
             HitOutcome::Rejected(Rejected::Full) => assert!(growth.network().nodes().len() >= 20_000),
             HitOutcome::Nothing => assert_eq!(energy, 0.0),
             HitOutcome::Started(_) | HitOutcome::Merged(_) => assert!(on && energy > 0.0),
@@ -712,7 +715,11 @@ fn random_arrest(rng: &mut Rng) -> GrowthParams {
         inertia: if rng.unit() < 0.3 { 0.0 } else { rng.range(0.0, 6.0) },
         nucleation: if rng.unit() < 0.5 { 0.0 } else { rng.range(0.0, 3.0) },
         open_ends: if rng.unit() < 0.5 { 0.0 } else { rng.unit() },
+        // A crack that strays by more at every node has no direction that another could meet steeply.
+        wander: params.wander.min(0.5),
         unevenness: 0.9 * rng.unit(),
+        axis: 3.0 * rng.signed(),
+        directed: if rng.unit() < 0.5 { 0.0 } else { rng.unit() },
         reach: rng.range(0.3, 1.5),
         max_nodes: 3000,
         ..params
@@ -805,7 +812,7 @@ fn no_two_cracks_cross_and_junctions_are_steep() {
     println!("{pairs} pairs of pieces, {} T-junctions, median angle {median:.1} degrees", angles.len());
     // The smaller of the two angles, so at most 90.
     assert!(median > 70.0, "median angle {median}");
-    assert!(angles.len() > 1000, "only {} T-junctions", angles.len());
+    assert!(angles.len() > 800, "only {} T-junctions", angles.len());
 }
 
 #[test]

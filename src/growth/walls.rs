@@ -140,6 +140,14 @@ impl Walls {
     }
 }
 
+/// Whether a rough line crosses itself.
+pub(super) fn crosses_itself(path: &SegmentPath) -> bool {
+    let piece = |pair: &[PathPoint]| (pair[0].pos.as_dvec2(), pair[1].pos.as_dvec2());
+    let points = path.points();
+    (2..points.len().saturating_sub(1))
+        .any(|i| points[..i].windows(2).any(|earlier| crosses(piece(earlier), piece(&points[i..i + 2]))))
+}
+
 fn bounds(path: &[PathPoint]) -> (Vec2, Vec2) {
     let first = path[0].pos;
     path.iter().fold((first, first), |(low, high), point| (low.min(point.pos), high.max(point.pos)))

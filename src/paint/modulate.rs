@@ -20,13 +20,13 @@ pub struct Modulation {
     pub fade: f32,
     /// Colour of the crack itself, sRGB 0..=1; default black.
     pub tone: [f32; 3],
-    /// Depth from which a texel is crack, 0..=1; default 0.5.
+    /// Depth from which a texel is crack, 0..=1; default 0.2.
     pub depth: f32,
 }
 
 impl Modulation {
     /// Dark cracks.
-    pub const DARK: Self = Self { fade: 0.008, tone: [0.0; 3], depth: 0.5 };
+    pub const DARK: Self = Self { fade: 0.008, tone: [0.0; 3], depth: 0.2 };
 
     /// Bright cracks, as in ice.
     pub const BRIGHT: Self = Self { tone: [0.93, 0.97, 1.0], ..Self::DARK };

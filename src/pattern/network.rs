@@ -32,6 +32,8 @@ pub enum LinkKind {
     Connection,
     /// Between close nodes of different branches: `draw_islands` of Couto et al., the cells of clay.
     Island,
+    /// Where cracks come together in a marker: closed venation of Runions et al. 2005.
+    Meeting,
     /// From the end of a crack to the older crack that stops it.
     Junction,
 }

@@ -17,7 +17,7 @@ use crate::{
     CrackPreset, Grid,
     growth::{CrackGrowth, HitOutcome},
     paint::LookTable,
-    pattern::SurfaceFrame,
+    pattern::{CellTracker, SurfaceFrame},
     raster::{DepthField, TexelRect},
 };
 use bevy::{image::ImageSampler, prelude::*, render::renderer::RenderDevice};
@@ -156,12 +156,14 @@ fn make_ready(world: &mut World, entity: Entity) -> Result<bool, CrackError> {
     if surface.alpha_mask {
         growth.set_density(density(&draft.base, draft.rect));
     }
+    let mut field = DepthField::new(frame);
+    field.forbid(&mask);
     growth.set_mask(mask);
 
     let carrier = Carrier { kind, shown, own: None, mesh: None, is_sized: false };
     let mut active = Active {
         growth,
-        field: DepthField::new(frame),
+        field,
         profile: preset.profile,
         look,
         textures: make_textures(world, &draft, None)?,
@@ -182,6 +184,8 @@ fn make_ready(world: &mut World, entity: Entity) -> Result<bool, CrackError> {
         is_open: false,
         is_outdated: false,
         tips_from: 0,
+        cells: CellTracker::new(frame.extent()),
+        cells_told: 1,
         surface,
         preset,
         has_new_settings: false,

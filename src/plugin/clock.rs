@@ -40,8 +40,10 @@ pub struct CrackClock {
     pub drive: CrackDrive,
     /// Whether time stands still. Growth stands still as well then.
     pub paused: bool,
-    /// Where time is to jump to, steps.
-    jump: Option<f32>,
+    /// Where time is to jump to, steps, also when paused; `None` again when it has. What lies beyond the end is grown as fast as the
+    /// budget allows until the cracks come to their end: infinity jumps there. Not a number = no jump. A
+    /// [`CrackDrive::Value`] that is not paused has the last word.
+    pub seek: Option<f32>,
 }
 
 /// What makes time pass for the cracks of a surface.
@@ -67,19 +69,13 @@ impl CrackClock {
     /// A clock that runs by itself, see [`CrackDrive::Speed`].
     #[must_use]
     pub const fn speed(speed: f32) -> Self {
-        Self { drive: CrackDrive::Speed(speed), paused: false, jump: None }
+        Self { drive: CrackDrive::Speed(speed), paused: false, seek: None }
     }
 
     /// A clock set from outside, see [`CrackDrive::Value`].
     #[must_use]
     pub const fn value(value: f32) -> Self {
-        Self { drive: CrackDrive::Value(value), paused: false, jump: None }
-    }
-
-    /// Jumps to a time, steps, also when paused. What lies beyond the end is grown as fast as the budget allows, until cracks
-    /// come to their end (infinity = the end). Not a number = no jump; a [`CrackDrive::Value`] that is not paused has the last word.
-    pub const fn seek(&mut self, steps: f32) {
-        self.jump = Some(steps);
+        Self { drive: CrackDrive::Value(value), paused: false, seek: None }
     }
 }
 
@@ -147,6 +143,11 @@ impl Active {
             (Some(playback), _) => Moment::nearest(playback.want.min(self.end())),
             (None, _) => Moment::after(self.growth.timeline().end()),
         }
+    }
+
+    /// The moment that is shown.
+    pub(super) fn shown(&self) -> Moment {
+        self.playback.as_ref().map_or(Moment::after(self.growth.timeline().end()), |playback| playback.shown)
     }
 
     /// Whether another moment is shown.
@@ -223,7 +224,7 @@ impl Active {
     /// Goes by `clock` from now on, jumping if it says so.
     pub(super) fn follow(&mut self, clock: &mut CrackClock) {
         self.stand_still();
-        let jump = clock.jump.take().filter(|steps| !steps.is_nan());
+        let jump = clock.seek.take().filter(|steps| !steps.is_nan());
         self.clock = Some(*clock);
         let playback = self.open_playback();
         if let Some(steps) = jump {

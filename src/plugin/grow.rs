@@ -30,16 +30,17 @@ pub(super) fn grow_surfaces(
             active.pass(seconds);
         }
     }
-    // Surfaces in a row that had nothing to do.
+    // Surfaces in a row that had nothing to do and are still in the list.
     let mut idle = 0;
     while idle < growing.len() {
         let Some(entity) = growing.pop_front() else { break };
         let Some(active) = active.get_mut(&entity).filter(|active| active.is_growing) else { continue };
-        idle += 1;
-        if active.step_if_due() {
+        let has_grown = active.step_if_due();
+        if has_grown {
             idle = 0;
         }
         if !active.is_at_rest() {
+            idle += usize::from(!has_grown);
             growing.push_back(entity);
         } else {
             active.is_growing = false;
@@ -48,7 +49,7 @@ pub(super) fn grow_surfaces(
                 commands.entity(entity).heal_cracks();
             }
         }
-        let is_news = idle == 0 || active.is_behind() || (!active.is_growing && active.is_open);
+        let is_news = has_grown || active.is_behind() || (!active.is_growing && active.is_open);
         if is_news && !active.is_dirty {
             active.is_dirty = true;
             dirty.push_back(entity);

@@ -70,7 +70,7 @@ impl PictureMasks {
         let mask = match self.in_work.iter().position(|(known, _)| *known == key) {
             Some(index) => {
                 let mask = check_ready(&mut self.in_work[index].1)?;
-                self.in_work.swap_remove(index);
+                drop(self.in_work.swap_remove(index));
                 mask
             }
             None => {

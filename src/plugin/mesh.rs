@@ -9,37 +9,54 @@ use bevy::{
 /// for stray shots.
 const MAX_DISTANCE: f32 = 0.25;
 
+/// The triangles of a mesh.
+struct Triangles<'a> {
+    positions: &'a [[f32; 3]],
+    uvs: &'a [[f32; 2]],
+    indices: Option<&'a Indices>,
+}
+
+impl<'a> Triangles<'a> {
+    fn of(mesh: &'a Mesh) -> Result<Self, &'static str> {
+        const NO_DATA: &str = "the mesh has no data on the CPU: load it with `RenderAssetUsages::MAIN_WORLD`";
+        let positions = match mesh.try_attribute_option(Mesh::ATTRIBUTE_POSITION) {
+            Ok(Some(VertexAttributeValues::Float32x3(positions))) => positions,
+            Ok(_) => return Err("the mesh has no positions"),
+            Err(_) => return Err(NO_DATA),
+        };
+        let uvs = match mesh.try_attribute_option(Mesh::ATTRIBUTE_UV_0) {
+            Ok(Some(VertexAttributeValues::Float32x2(uvs))) => uvs,
+            Ok(_) => return Err("the mesh has no texture coordinates (`UV_0`)"),
+            Err(_) => return Err(NO_DATA),
+        };
+        if mesh.primitive_topology() != PrimitiveTopology::TriangleList {
+            return Err("the mesh is not a list of triangles");
+        }
+        Ok(Self { positions, uvs, indices: mesh.try_indices_option().map_err(|_| NO_DATA)? })
+    }
+
+    fn len(&self) -> usize {
+        self.indices.map_or(self.positions.len(), Indices::len) / 3
+    }
+
+    /// Corners and their texture coordinates; `None` for a triangle with a vertex that is not there.
+    fn get(&self, i: usize) -> Option<([Vec3; 3], [Vec2; 3])> {
+        let vertex = |i: usize| match self.indices {
+            None => i,
+            Some(Indices::U16(indices)) => usize::from(indices[i]),
+            Some(Indices::U32(indices)) => indices[i] as usize,
+        };
+        let corners = [vertex(3 * i), vertex(3 * i + 1), vertex(3 * i + 2)];
+        Some((read(self.positions, corners)?.map(Vec3::from_array), read(self.uvs, corners)?.map(Vec2::from_array)))
+    }
+}
+
 /// Texture coordinates at the point of `mesh` that is closest to `point`, both in the mesh's space.
 pub(super) fn closest_uv(mesh: &Mesh, point: Vec3) -> Result<Vec2, &'static str> {
-    const NO_DATA: &str = "the mesh has no data on the CPU: load it with `RenderAssetUsages::MAIN_WORLD`";
-    let positions = match mesh.try_attribute_option(Mesh::ATTRIBUTE_POSITION) {
-        Ok(Some(VertexAttributeValues::Float32x3(positions))) => positions,
-        Ok(_) => return Err("the mesh has no positions"),
-        Err(_) => return Err(NO_DATA),
-    };
-    let uvs = match mesh.try_attribute_option(Mesh::ATTRIBUTE_UV_0) {
-        Ok(Some(VertexAttributeValues::Float32x2(uvs))) => uvs,
-        Ok(_) => return Err("the mesh has no texture coordinates (`UV_0`)"),
-        Err(_) => return Err(NO_DATA),
-    };
-    if mesh.primitive_topology() != PrimitiveTopology::TriangleList {
-        return Err("the mesh is not a list of triangles");
-    }
-    let indices = mesh.try_indices_option().map_err(|_| NO_DATA)?;
-    let n = indices.map_or(positions.len(), Indices::len);
-    let vertex = |i: usize| match indices {
-        None => i,
-        Some(Indices::U16(indices)) => usize::from(indices[i]),
-        Some(Indices::U32(indices)) => indices[i] as usize,
-    };
+    let triangles = Triangles::of(mesh)?;
     let mut best: Option<(f32, Vec2)> = None;
     let (mut min, mut max) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-    for first in (0..n.saturating_sub(2)).step_by(3) {
-        let corners = [vertex(first), vertex(first + 1), vertex(first + 2)];
-        let Some([a, b, c]) = read(positions, corners) else { continue };
-        let Some([uv_a, uv_b, uv_c]) = read(uvs, corners) else { continue };
-        let [a, b, c] = [a, b, c].map(Vec3::from_array);
-        let [uv_a, uv_b, uv_c] = [uv_a, uv_b, uv_c].map(Vec2::from_array);
+    for ([a, b, c], [uv_a, uv_b, uv_c]) in (0..triangles.len()).filter_map(|i| triangles.get(i)) {
         min = min.min(a).min(b).min(c);
         max = max.max(a).max(b).max(c);
         let weights = closest_weights(point, a, b, c);
@@ -55,6 +72,20 @@ pub(super) fn closest_uv(mesh: &Mesh, point: Vec3) -> Result<Vec2, &'static str>
         return Err("the point lies off the mesh");
     }
     Ok(uv)
+}
+
+/// The point of the first triangle that has these texture coordinates, and the way it faces, in the mesh's space.
+pub(super) fn place_of(mesh: &Mesh, uv: Vec2) -> Option<(Vec3, Vec3)> {
+    let triangles = Triangles::of(mesh).ok()?;
+    (0..triangles.len()).filter_map(|i| triangles.get(i)).find_map(|([a, b, c], [uv_a, uv_b, uv_c])| {
+        const SLACK: f32 = -1e-4;
+        let (ab, ac, to) = (uv_b - uv_a, uv_c - uv_a, uv - uv_a);
+        let area = ab.perp_dot(ac);
+        let (v, w) = (to.perp_dot(ac) / area, ab.perp_dot(to) / area);
+        // Not a number where the triangle has no area.
+        (v >= SLACK && w >= SLACK && 1.0 - v - w >= SLACK)
+            .then(|| (a + (b - a) * v + (c - a) * w, (b - a).cross(c - a).normalize_or_zero()))
+    })
 }
 
 /// Texture coordinates within 0..=1: those beyond are of a texture that repeats.

@@ -33,6 +33,8 @@ mod material;
 mod mesh;
 mod paint;
 mod picture;
+#[cfg(any(feature = "2d", feature = "3d"))]
+mod place;
 mod preset;
 mod queue;
 #[cfg(feature = "2d")]
@@ -52,8 +54,10 @@ pub use hit::{CrackHit, HitPoint};
 #[cfg(feature = "2d")]
 pub use lit::{CrackLight2d, CrackLitMaterial, CrackLitUniform, MAX_LIGHTS};
 pub use mask::CrackMaskSource;
+#[cfg(any(feature = "2d", feature = "3d"))]
+pub use place::{CrackPlace, CrackPlaces};
 pub use preset::PresetSource;
-pub use state::{CrackFailed, CrackFinished, CrackState, CrackStatus, CrackTip};
+pub use state::{CellClosed, CrackFailed, CrackFinished, CrackState, CrackStatus, CrackTip};
 pub use surface::{CrackMaps, CrackResolution, CrackSurface};
 pub use textures::CrackTextures;
 pub use upload::CrackUploadStats;
@@ -68,12 +72,14 @@ use bevy::{
 /// What a game names.
 pub mod prelude {
     pub use super::{
-        CrackBudget, CrackClock, CrackCommandsExt, CrackDrive, CrackError, CrackFailed, CrackFinished, CrackHit,
-        CrackMaps, CrackMaskSource, CrackPlugin, CrackPlugins, CrackResolution, CrackState, CrackStats, CrackStatus,
-        CrackSurface, CrackSystems, CrackTextures, CrackTip, HitPoint, PresetSource,
+        CellClosed, CrackBudget, CrackClock, CrackCommandsExt, CrackDrive, CrackError, CrackFailed, CrackFinished,
+        CrackHit, CrackMaps, CrackMaskSource, CrackPlugin, CrackPlugins, CrackResolution, CrackState, CrackStats,
+        CrackStatus, CrackSurface, CrackSystems, CrackTextures, CrackTip, HitPoint, PresetSource,
     };
     #[cfg(feature = "2d")]
     pub use super::{CrackLight2d, CrackLitMaterial};
+    #[cfg(any(feature = "2d", feature = "3d"))]
+    pub use super::{CrackPlace, CrackPlaces};
     pub use crate::preset::CrackPreset;
 }
 
@@ -114,6 +120,7 @@ impl Plugin for CrackPlugin {
             .register_type::<CrackHit>()
             .register_type::<CrackFinished>()
             .register_type::<CrackFailed>()
+            .register_type::<CellClosed>()
             .register_type::<CrackBudget>()
             .register_type::<CrackStats>()
             .register_type::<CrackUploadStats>()

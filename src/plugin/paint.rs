@@ -1,7 +1,7 @@
 //! The painting system: networks to texels.
 
 use super::{
-    CrackBudget, CrackFinished, CrackState, CrackStatus, CrackTextures, CrackTip,
+    CellClosed, CrackBudget, CrackFinished, CrackState, CrackStatus, CrackTextures, CrackTip,
     budget::FrameClock,
     surfaces::{Active, Surfaces, Touched},
     upload::Uploads,
@@ -46,6 +46,7 @@ pub(super) fn paint_surfaces(
         stamp(active, &mut scratch);
         paint(active, &mut images, &mut uploads, &mut scratch.rects);
         let is_done = active.is_open && active.is_complete();
+        tell_cells(active, entity, &mut commands);
         if let Ok(mut state) = states.get_mut(entity) {
             tell(active, &mut state, before, is_done);
         }
@@ -90,11 +91,11 @@ fn stamp(active: &mut Active, scratch: &mut Scratch) {
     }
 }
 
-/// Stamps the whole network anew into a field of the same frame; at another time than the end that is left to the next
+/// Clears the field and stamps the whole network anew; at another time than the end that is left to the next
 /// [`paint_surfaces`].
 pub(super) fn stamp_anew(active: &mut Active) {
     let frame = active.field.frame;
-    active.field = DepthField::new(frame);
+    active.field.clear();
     active.touched = Touched::new(frame.size());
     if let Some(playback) = &mut active.playback {
         playback.start_over(frame, active.profile);
@@ -165,6 +166,17 @@ fn put_data(images: &mut Assets<Image>, texture: Option<&Handle<Image>>, data: O
     }
 }
 
+/// Tells of the cells that have closed and are shown closed for the first time.
+fn tell_cells(active: &mut Active, entity: Entity, commands: &mut Commands) {
+    active.cells.update(active.growth.network());
+    let now = active.shown().whole();
+    while let Some(cell) = active.cells.cells().get(active.cells_told).filter(|cell| cell.birth <= now) {
+        let uv = active.field.frame.pos_to_uv(cell.centroid);
+        commands.trigger(CellClosed { entity, cell: active.cells_told as u32, area: cell.area, uv });
+        active.cells_told += 1;
+    }
+}
+
 /// Writes down how the surface is doing; `before` was shown before if it has a playback.
 fn tell(active: &mut Active, state: &mut CrackState, before: Option<Moment>, is_done: bool) {
     let network = active.growth.network();
@@ -172,7 +184,10 @@ fn tell(active: &mut Active, state: &mut CrackState, before: Option<Moment>, is_
     state.damage = active.touched.share();
     state.nodes = u32::try_from(nodes.len()).unwrap_or(u32::MAX);
     state.hits = active.hits;
-    let moment = active.playback.as_ref().map_or(Moment::after(active.growth.timeline().end()), |p| p.shown);
+    let moment = active.shown();
+    // In order of birth; the first is no piece.
+    let cells = active.cells.cells().get(1..).unwrap_or_default();
+    state.cells = cells.partition_point(|cell| cell.birth <= moment.whole()) as u32;
     state.time = moment.steps() as f32;
     state.end = active.growth.timeline().end() as f32;
     state.tips.clear();
@@ -186,16 +201,22 @@ fn tell(active: &mut Active, state: &mut CrackState, before: Option<Moment>, is_
         let born = if before < moment { timeline.born(before.whole(), moment.begun()) } else { 0..0 };
         let first = born.start.max(born.end.saturating_sub(CrackState::MAX_TIPS as u32));
         state.tips.extend((first..born.end).filter_map(|node| {
-            let path = timeline.path_at(network, SegmentId::Branch(node), moment)?;
-            let [from, .., to] = path.points() else { return None };
-            let direction = (to.pos - from.pos).normalize_or_zero();
-            Some(CrackTip { uv: active.field.frame.pos_to_uv(to.pos), direction })
+            // From the node it grows from to as far as it is shown.
+            let way = |moment| match timeline.path_at(network, SegmentId::Branch(node), moment)?.points() {
+                [from, .., to] => Some((to.pos, to.pos - from.pos)),
+                _ => None,
+            };
+            let (tip, now) = way(moment)?;
+            let length = now.length() - way(before).map_or(0.0, |(_, earlier)| earlier.length());
+            let uv = active.field.frame.pos_to_uv(tip);
+            Some(CrackTip { uv, direction: now.normalize_or_zero(), length: length.max(0.0) })
         }));
     } else {
         let first = active.tips_from.max(nodes.len().saturating_sub(CrackState::MAX_TIPS)).min(nodes.len());
-        state.tips.extend(nodes[first..].iter().filter(|node| node.parent != NO_PARENT).map(|node| CrackTip {
-            uv: active.field.frame.pos_to_uv(node.pos),
-            direction: (node.pos - nodes[node.parent as usize].pos).normalize_or_zero(),
+        state.tips.extend(nodes[first..].iter().filter(|node| node.parent != NO_PARENT).map(|node| {
+            let way = node.pos - nodes[node.parent as usize].pos;
+            let uv = active.field.frame.pos_to_uv(node.pos);
+            CrackTip { uv, direction: way.normalize_or_zero(), length: way.length() }
         }));
     }
     active.tips_from = nodes.len();

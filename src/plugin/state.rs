@@ -21,6 +21,8 @@ pub struct CrackState {
     pub time: f32,
     /// Number of steps that the cracks have grown.
     pub end: f32,
+    /// Closed cells of what is shown: parts of the surface that cracks and border enclose.
+    pub cells: u32,
     /// Where cracks grew in the last frame they grew in (for sound and dust); empty when done. At most
     /// [`MAX_TIPS`](Self::MAX_TIPS).
     pub tips: Vec<CrackTip>,
@@ -54,6 +56,22 @@ pub struct CrackTip {
     pub uv: Vec2,
     /// Direction of growth in the same axes, a unit vector in pattern space.
     pub direction: Vec2,
+    /// How far it has grown in this frame, pattern units (the surface's shorter side is 1).
+    pub length: f32,
+}
+
+/// Cracks have closed a cell: a piece that could fall. Told when the crack that closes it is shown for the first time.
+#[derive(EntityEvent, Reflect, Clone, Copy, Debug, PartialEq)]
+#[reflect(Event)]
+pub struct CellClosed {
+    /// The surface.
+    pub entity: Entity,
+    /// Number of the cell, from 1; see [`CellTracker`](crate::pattern::CellTracker).
+    pub cell: u32,
+    /// Its area, pattern units squared (the surface's shorter side is 1).
+    pub area: f32,
+    /// Its centre, texture coordinates in the surface's picture or sprite frame, 0..=1, v down.
+    pub uv: Vec2,
 }
 
 /// The cracks of a surface have come to an end, and all of them are shown: once after a hit, however often a

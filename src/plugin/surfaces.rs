@@ -5,6 +5,7 @@ use crate::{
     CrackPreset,
     growth::CrackGrowth,
     paint::LookTable,
+    pattern::CellTracker,
     raster::{DepthField, DirtyTiles, Profile, TexelRect},
 };
 use bevy::{asset::UntypedAssetId, ecs::entity::EntityHashMap, platform::collections::HashMap, prelude::*};
@@ -63,6 +64,9 @@ pub(super) struct Active {
     pub(super) is_outdated: bool,
     /// Nodes that were there when tips were last listed.
     pub(super) tips_from: usize,
+    pub(super) cells: CellTracker,
+    /// Cells whose closing has been told, with the one that is there from the start.
+    pub(super) cells_told: usize,
 }
 
 impl Active {

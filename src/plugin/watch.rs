@@ -1,7 +1,7 @@
 //! Changes from outside: other presets, other pictures, another frame of an animation.
 
 use super::{
-    CrackError, CrackState, CrackStatus, CrackSurface, CrackTextures,
+    CrackError, CrackMaskSource, CrackState, CrackStatus, CrackSurface, CrackTextures,
     activate::{attach, density, draft, fail, frame, look, make_textures, set_status},
     carrier::{self, Carrier, Found, Shown},
     mask::{self, PictureMasks},
@@ -12,7 +12,7 @@ use super::{
 use crate::{
     CrackPreset,
     growth::CrackGrowth,
-    pattern::{CrackMask, SurfaceFrame},
+    pattern::{CellTracker, CrackMask, SurfaceFrame},
     raster::{DepthField, TexelRect},
 };
 use bevy::prelude::*;
@@ -212,19 +212,24 @@ fn update_picture(world: &mut World, entity: Entity, active: &mut Active, shown:
     active.textures = make_textures(world, &draft, Some(&active.textures))?;
     active.is_outdated = false;
     if let Some(growth) = regrown {
+        active.cells = CellTracker::new(frame.extent());
+        active.cells.update(growth.network());
+        active.cells_told = active.cells.cells().len();
         active.growth = growth;
     }
     if active.surface.alpha_mask {
         active.growth.set_density(density(&draft.base, draft.rect));
     }
-    active.growth.set_mask(mask);
+    active.growth.set_mask(mask.clone());
     world.resource_mut::<Surfaces>().bytes += draft.bytes;
     world.resource_mut::<Surfaces>().bytes -= active.bytes;
     active.bytes = draft.bytes;
     active.base = draft.base;
-    if frame != active.field.frame {
+    // What the mask forbids may be elsewhere now.
+    if frame != active.field.frame || active.surface.mask != CrackMaskSource::None {
         active.look = look;
         active.field = DepthField::new(frame);
+        active.field.forbid(&mask);
         stamp_anew(active);
     }
     active.views.clear();

@@ -10,7 +10,7 @@ use crate::Grid;
 pub const MAX_DISTANCE: u8 = 127;
 
 /// Texels whose distances are computed at once.
-const BLOCK: usize = 64;
+const BLOCK: usize = 32;
 
 /// Distance from each texel's centre to that of the nearest texel at least `depth` deep, texels.
 ///
@@ -32,15 +32,18 @@ pub fn crack_distance(field: &DepthField, depth: u16, reach: u8) -> Grid<f32> {
     let (w, h) = (field.depth.width(), field.depth.height());
     let (mut columns, mut near) = (vec![reach + 1; w], vec![false; h]);
     // How far the nearest crack is in each column, 0..=reach + 1: first from above, then from below too.
-    let mut vertical = Grid::new(field.depth.size(), reach + 1);
-    for y in 0..h {
-        let mut least = reach + 1;
-        for ((column, out), &texel) in columns.iter_mut().zip(vertical.row_mut(y)).zip(field.depth.row(y)) {
-            *column = if texel >= depth { 0 } else { (*column + 1).min(reach + 1) };
-            *out = *column;
-            least = least.min(*column);
+    let mut vertical = Grid::new(field.depth.size(), 0u8);
+    for (y, near) in near.iter_mut().enumerate() {
+        // Three loops, each of one width of numbers.
+        let out = vertical.row_mut(y);
+        for (out, &texel) in out.iter_mut().zip(field.depth.row(y)) {
+            *out = if texel >= depth { 0 } else { reach + 1 };
         }
-        near[y] = least <= reach;
+        for (column, out) in columns.iter_mut().zip(out.iter_mut()) {
+            *out = (*column + 1).min(*out);
+            *column = *out;
+        }
+        *near = out.iter().fold(u8::MAX, |least, &value| least.min(value)) <= reach;
     }
     columns.fill(reach + 1);
     let mut distance = Grid::new(field.depth.size(), f32::INFINITY);
@@ -48,13 +51,13 @@ pub fn crack_distance(field: &DepthField, depth: u16, reach: u8) -> Grid<f32> {
     // Squares of a row with a margin on either side, and to whole blocks.
     let mut squares = vec![far_square(reach); w.next_multiple_of(BLOCK) + 2 * margin];
     for y in (0..h).rev() {
-        let row = vertical.row(y);
-        let mut least = reach + 1;
-        for ((column, &above), square) in columns.iter_mut().zip(row).zip(&mut squares[margin..]) {
+        for (column, &above) in columns.iter_mut().zip(vertical.row(y)) {
             *column = (*column + 1).min(above);
-            least = least.min(*column);
-            *square = i16::from(*column) * i16::from(*column);
         }
+        for (square, &column) in squares[margin..].iter_mut().zip(&columns) {
+            *square = i16::from(column) * i16::from(column);
+        }
+        let least = columns.iter().fold(u8::MAX, |least, &value| least.min(value));
         if near[y] || least <= reach {
             across(&squares, reach, distance.row_mut(y));
         }
@@ -76,12 +79,14 @@ fn across(squares: &[i16], reach: u8, out: &mut [f32]) {
         if lowest > limit {
             continue;
         }
+        // Left and right at once; `off` cannot overflow, as squares are at most 2¹⁴.
         let mut best = [i16::MAX; BLOCK];
-        for (k, dx) in (-i16::from(reach)..=i16::from(reach)).enumerate() {
-            let off = dx * dx;
-            if let Some(shifted) = window[k..].first_chunk::<BLOCK>() {
-                for (best, &square) in best.iter_mut().zip(shifted) {
-                    let square = square + off;
+        let shifted = |k: usize| window[k..].first_chunk::<BLOCK>();
+        for dx in 0..=margin {
+            let off = (dx * dx) as i16;
+            if let (Some(left), Some(right)) = (shifted(margin - dx), shifted(margin + dx)) {
+                for ((best, &left), &right) in best.iter_mut().zip(left).zip(right) {
+                    let square = if left < right { left } else { right } + off;
                     *best = if square < *best { square } else { *best };
                 }
             }

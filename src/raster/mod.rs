@@ -39,6 +39,11 @@ impl DepthField {
         Self { frame, depth: Grid::new(frame.size(), 0), forbidden: None }
     }
 
+    /// Makes all of it untouched. What is forbidden stays so.
+    pub fn clear(&mut self) {
+        self.depth.as_mut_slice().fill(0);
+    }
+
     /// Keeps every texel whose centre `mask` forbids untouched from now on, and gives back those that are not.
     ///
     /// Growth keeps its lines out of them; this keeps the width of the lines out as well.

@@ -82,7 +82,7 @@ impl Default for BurstParams {
 ///
 /// let mut cuts = Cuts::new([1.0, 1.0].into())?;
 /// cuts.add_line(&[[0.5, 0.0].into(), [0.5, 1.0].into()])?;
-/// let shards = shatter(&cuts, &ShatterParams::DEFAULT)?;
+/// let shards = shatter(cuts, &ShatterParams::DEFAULT)?;
 /// let burst = Burst::new(BurstParams::DEFAULT, [0.5, 0.5].into(), Vec3::NEG_Z, 1.0, 7)?;
 /// for (number, shard) in (0u32..).zip(shards.iter()) {
 ///     let flight = burst.flight(number, shard);

@@ -4,7 +4,7 @@ use super::lattice::{Lattice, Place, PlaceMap, cross, distance_sq, dot, key, ori
 use crate::math::Rng;
 use glam::Vec2;
 
-/// Lines as edges between places. The four sides of the surface come first.
+/// Lines as edges between places; once planar, the four sides of the surface among them.
 #[derive(Clone, Debug)]
 pub(super) struct Drawing {
     pub(super) lattice: Lattice,
@@ -35,7 +35,6 @@ impl Drawing {
         for corner in [[0, 0], [w, 0], [w, h], [0, h]] {
             drawing.vertex(corner);
         }
-        drawing.edges.extend([[0, 1], [1, 2], [2, 3], [3, 0]]);
         drawing
     }
 
@@ -71,16 +70,39 @@ impl Drawing {
 
     /// Cuts lines where they meet, until they share nothing but ends, and drops what is there twice.
     pub(super) fn make_planar(&mut self) {
-        let (mut round, mut cuts) = (0, Vec::new());
+        self.lay_border();
+        // After the first round, only pairs with a new edge can meet.
+        let (mut round, mut new, mut cuts) = (0, 0, Vec::new());
         loop {
             let grid = EdgeGrid::new(self);
             let mut changed = false;
-            grid.pairs(|e, f| changed |= self.separate(e, f, round < ROUNDS, &mut cuts));
+            grid.pairs(new, |e, f| changed |= self.separate(e, f, round < ROUNDS, &mut cuts));
             if !changed {
                 break;
             }
-            self.apply(&mut cuts);
+            new = self.apply(&mut cuts);
             round += 1;
+        }
+    }
+
+    /// Lays the border anew, from each place on it to the next.
+    fn lay_border(&mut self) {
+        self.edges.retain(|&[a, b]| {
+            let sides = [a, b].map(|vertex| self.places[vertex as usize]);
+            self.lattice.side_of(sides[0], sides[1]).is_none()
+        });
+        let mut on_side: [Vec<u32>; 4] = Default::default();
+        for (vertex, &place) in (0u32..).zip(&self.places) {
+            for (vertices, is_on) in on_side.iter_mut().zip(self.lattice.sides(place)) {
+                if is_on {
+                    vertices.push(vertex);
+                }
+            }
+        }
+        for mut vertices in on_side {
+            // One coordinate is the same for all.
+            vertices.sort_unstable_by_key(|&vertex| self.places[vertex as usize]);
+            self.edges.extend(vertices.windows(2).map(|pair| [pair[0], pair[1]]));
         }
     }
 
@@ -141,8 +163,9 @@ impl Drawing {
         cuts.len() > before
     }
 
-    /// Replaces edges by the pieces between the vertices at which they are cut.
-    fn apply(&mut self, cuts: &mut Vec<(u32, u32)>) {
+    /// Replaces edges by the pieces between the vertices at which they are cut. Returns the first of them.
+    fn apply(&mut self, cuts: &mut Vec<(u32, u32)>) -> u32 {
+        let old = self.edges.len();
         cuts.sort_by_key(|&(edge, vertex)| {
             let [from, _] = self.edges[edge as usize];
             let start = self.places.get(from as usize).copied().unwrap_or_default();
@@ -163,7 +186,9 @@ impl Drawing {
             }
         }
         cuts.clear();
+        let first = self.edges[..old].iter().filter(|&&edge| edge != DEAD).count() as u32;
         self.edges.retain(|&edge| edge != DEAD);
+        first
     }
 
     /// Carries every open end on, in the direction in which it came, to the next line. Returns the new lines.
@@ -376,20 +401,21 @@ impl EdgeGrid {
         let (top, bottom) = if a[1] <= b[1] { (a, b) } else { (b, a) };
         let square = |x: i32| (x >> self.shift) as usize;
         let (first, last) = (square(top[1]), square(bottom[1]));
-        let slope = if first == last { 0.0 } else { f64::from(bottom[0] - top[0]) / f64::from(bottom[1] - top[1]) };
         let (low, high) = (top[0].min(bottom[0]), top[0].max(bottom[0]));
+        if first == last || square(low) == square(high) {
+            for row in first..=last {
+                (square(low)..=square(high)).for_each(|column| visit((row * self.columns + column) as u32));
+            }
+            return;
+        }
+        let slope = f64::from(bottom[0] - top[0]) / f64::from(bottom[1] - top[1]);
         for row in first..=last {
-            let (mut from, mut to) = (low, high);
-            if first != last {
-                // One place wider on either side, for rounding.
-                let x_at = |y: i64| f64::from(top[0]) + slope * (y as f64 - f64::from(top[1]));
-                let ends = [x_at((row << self.shift) as i64), x_at(((row + 1) << self.shift) as i64)];
-                from = from.max((ends[0].min(ends[1]).floor() - 1.0) as i32);
-                to = to.min((ends[0].max(ends[1]).ceil() + 1.0) as i32);
-            }
-            for column in square(from)..=square(to.max(from)) {
-                visit((row * self.columns + column) as u32);
-            }
+            // A little wider on either side, for rounding.
+            let x_at = |y: i64| f64::from(top[0]) + slope * (y as f64 - f64::from(top[1]));
+            let ends = [x_at((row << self.shift) as i64), x_at(((row + 1) << self.shift) as i64)];
+            let from = low.max((ends[0].min(ends[1]) as i32).saturating_sub(2));
+            let to = high.min((ends[0].max(ends[1]) as i32).saturating_add(2));
+            (square(from)..=square(to)).for_each(|column| visit((row * self.columns + column) as u32));
         }
     }
 
@@ -401,14 +427,14 @@ impl EdgeGrid {
         self.squares(a, b, |square| visit(self.in_square(square)));
     }
 
-    /// Every pair of edges that share a square, the older first; some more than once.
-    fn pairs(&self, mut visit: impl FnMut(u32, u32)) {
+    /// Every pair of edges that share a square of which one is not older than `new`, the older first; some more than once.
+    fn pairs(&self, new: u32, mut visit: impl FnMut(u32, u32)) {
         for square in 0..self.starts.len() as u32 - 1 {
             let edges = self.in_square(square);
-            for (i, &e) in edges.iter().enumerate() {
-                for &f in &edges[i + 1..] {
-                    visit(e, f);
-                }
+            // In every square the older edges come first.
+            let first = edges.iter().rposition(|&edge| edge < new).map_or(0, |last| last + 1);
+            for (i, &f) in edges.iter().enumerate().skip(first.max(1)) {
+                edges[..i].iter().for_each(|&e| visit(e, f));
             }
         }
     }

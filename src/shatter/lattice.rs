@@ -38,7 +38,8 @@ impl Lattice {
 
     /// The place nearest to a point; points off the surface go to the border.
     pub(super) fn snap(&self, pos: Vec2) -> Place {
-        let coordinate = |x: f32, most: i32| ((f64::from(x) * self.scale).round() as i32).clamp(0, most);
+        // Rounds: below zero, where adding a half does not, the border is nearest anyway.
+        let coordinate = |x: f32, most: i32| ((f64::from(x) * self.scale + 0.5) as i32).clamp(0, most);
         [coordinate(pos.x, self.corner[0]), coordinate(pos.y, self.corner[1])]
     }
 

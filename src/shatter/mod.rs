@@ -16,7 +16,7 @@
 //! let mut cuts = Cuts::new([2.0, 1.0].into())?;
 //! cuts.add_line(&[[0.5, 0.0].into(), [0.5, 1.0].into()])?;
 //! cuts.add_line(&[[0.0, 0.25].into(), [2.0, 0.25].into()])?;
-//! let shards = shatter(&cuts, &ShatterParams::DEFAULT)?;
+//! let shards = shatter(cuts, &ShatterParams::DEFAULT)?;
 //! let mut areas: Vec<f32> = shards.iter().map(|shard| shard.area).collect();
 //! areas.sort_by(f32::total_cmp);
 //! assert_eq!(areas, [0.125, 0.375, 0.375, 1.125]);

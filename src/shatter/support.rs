@@ -28,7 +28,7 @@ pub enum Anchor {
 /// let mut cuts = Cuts::new([1.0, 1.0].into())?;
 /// cuts.add_line(&[[0.0, 0.3].into(), [1.0, 0.3].into()])?;
 /// cuts.add_line(&[[0.0, 0.6].into(), [1.0, 0.6].into()])?;
-/// let shards = shatter(&cuts, &ShatterParams::DEFAULT)?;
+/// let shards = shatter(cuts, &ShatterParams::DEFAULT)?;
 /// let mut support = Support::new(&shards, Anchor::Sides([false, false, true, false]));
 /// let fallen = support.hit(&shards, [0.5, 0.45].into(), 0.1)?;
 /// let number = |y: f32| shards.at([0.5, y].into()).into_iter().collect::<Vec<u32>>();

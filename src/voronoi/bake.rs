@@ -2,13 +2,13 @@
 
 use super::{
     Guide, SiteLayout, StrokeReport, VoronoiError, VoronoiParams,
-    lattice::{Lattice, Layer, edges_across, edges_down},
+    lattice::{Lattice, Layer, WALL, edges_across, edges_down},
     level::Level,
     noise::Noise,
     params::MAX_LEVELS,
     resample::Resampler,
     seams::{Guidance, Seams, Tracer},
-    search::BLOCK,
+    search::{BLOCK, Dearer},
     sites::{sites, texel},
     strokes::Astride,
 };
@@ -68,6 +68,7 @@ pub struct VoronoiBake {
     map: VoronoiMap,
     stage: Stage,
     progress: f32,
+    with_seams: bool,
 }
 
 /// Regions and path costs of every texel (Mould 2005, section 3).
@@ -128,7 +129,13 @@ impl VoronoiBake {
             },
             stage: Stage::Guides { y: 0 },
             progress: 0.0,
+            with_seams: true,
         })
+    }
+
+    /// Leaves the seams out.
+    pub(super) fn regions_alone(self) -> Self {
+        Self { with_seams: false, ..self }
     }
 
     /// Does the work of about `rows` rows of texels.
@@ -172,8 +179,10 @@ impl VoronoiBake {
                 } else if self.map.levels.len() < self.map.n_levels() {
                     self.map.lattices.push(self.map.lattices[0].clone());
                     Stage::Walls { y: 0 }
-                } else {
+                } else if self.with_seams {
                     Stage::Seams(Tracer::new(self.map.frame.size()))
+                } else {
+                    Stage::Done(Seams::default())
                 }
             }
             Stage::Seams(mut tracer) => match self.map.levels.last() {
@@ -351,6 +360,27 @@ impl VoronoiMap {
         Some(self.levels.last()?.units(self.index(x, y)?))
     }
 
+    /// Costs of the edges of a texel to its right and downwards in the finest level, in units of β / 256; `None` where
+    /// there is no edge.
+    #[must_use]
+    pub fn edges(&self, x: u32, y: u32) -> (Option<u16>, Option<u16>) {
+        let edges = self.index(x, y).zip(self.lattices.last()).map(|(i, lattice)| lattice.edges(i));
+        let passable = |edge: u16| (edge != WALL).then_some(edge);
+        edges.map_or((None, None), |(across, down)| (passable(across), passable(down)))
+    }
+
+    /// Computes the paths of all levels anew, from the same sites and edges: the same map again. For measurements.
+    pub fn search_again(&mut self) {
+        (0..self.levels.len()).for_each(|i| self.search_level_again(i));
+    }
+
+    fn search_level_again(&mut self, i: usize) {
+        let (level, lattice) = (&mut self.levels[i], &self.lattices[i]);
+        let sites = &self.sites[..level.n_sites()];
+        *level = Level::new(self.frame.size(), sites, sites.len(), level.has_walls());
+        while level.advance(lattice, sites, usize::MAX) {}
+    }
+
     /// The regions of all texels; `None` where there are no sites.
     #[must_use]
     pub fn regions(&self) -> Option<Grid<u32>> {
@@ -371,6 +401,16 @@ impl VoronoiMap {
             layers,
         };
         tracer.finish(&self.levels, &self.params, &self.frame, &guides, self.full_cost)
+    }
+
+    /// Makes the cracks that are now the dearest the widest, as they were when the map was made.
+    pub fn rescale_widths(&mut self) {
+        self.full_cost = None;
+        if let Some(level) = self.levels.last() {
+            let mut tracer = Tracer::new(self.frame.size());
+            tracer.scan(level, self.height());
+            self.full_cost = Some(self.follow(tracer).1);
+        }
     }
 
     /// The boundaries of the regions.
@@ -423,6 +463,10 @@ impl VoronoiMap {
         }
         for i in 0..self.levels.len() {
             let change = if i == 0 { self.change_base() } else { self.change_walls(i) };
+            if change.len() * MOST_CHANGES > self.lattices[i].n_texels() {
+                self.search_level_again(i);
+                continue;
+            }
             let level = &mut self.levels[i];
             level.reconsider(&self.lattices[i], &change.dearer, &change.cheaper);
             let n = level.n_sites();
@@ -468,22 +512,32 @@ impl VoronoiMap {
     }
 }
 
-/// The texels on either side of changed edges.
+/// Changed edges: those that have become dearer, and the texels on either side of those that have become cheaper.
 #[derive(Default)]
 struct Change {
-    dearer: Vec<u32>,
+    dearer: Vec<Dearer>,
     cheaper: Vec<u32>,
 }
 
+/// If more than this part of the edges has changed, a new search is faster.
+const MOST_CHANGES: usize = 8;
+
 impl Change {
+    /// How many edges have changed.
+    fn len(&self) -> usize {
+        self.dearer.len() + self.cheaper.len() / 2
+    }
+
     /// Overwrites `edges`, which lead from the texels `first..` each `to` further.
     fn apply(&mut self, edges: &mut [u16], new: &[u16], first: usize, to: usize) {
         for (i, (edge, &new)) in edges.iter_mut().zip(new).enumerate() {
-            if *edge != new {
-                let side = if new > *edge { &mut self.dearer } else { &mut self.cheaper };
-                side.extend([(first + i) as u32, (first + i + to) as u32]);
-                *edge = new;
+            let ends = [(first + i) as u32, (first + i + to) as u32];
+            if new > *edge {
+                self.dearer.push(Dearer { ends, before: *edge });
+            } else if new < *edge {
+                self.cheaper.extend(ends);
             }
+            *edge = new;
         }
     }
 }

@@ -64,6 +64,10 @@ impl Lattice {
         self.size.x as usize
     }
 
+    pub(super) const fn n_texels(&self) -> usize {
+        self.across.len()
+    }
+
     pub(super) fn across(&self, y: usize) -> &[u16] {
         let w = self.width();
         &self.across[y * w..(y + 1) * w]

@@ -2,7 +2,7 @@
 
 use super::{
     lattice::{Lattice, UNIT, WALL},
-    search::{Packed, Search},
+    search::{Dearer, Packed, Search},
 };
 use glam::UVec2;
 
@@ -53,6 +53,10 @@ impl Level {
         self.n_sites += sites.len();
     }
 
+    pub(super) const fn has_walls(&self) -> bool {
+        self.walls
+    }
+
     pub(super) const fn n_sites(&self) -> usize {
         self.n_sites
     }
@@ -91,8 +95,8 @@ impl Level {
     }
 
     /// Takes over changed costs of edges, see [`Search::reconsider`].
-    pub(super) fn reconsider(&mut self, lattice: &Lattice, dearer: &[u32], changed: &[u32]) {
-        paths!(&mut self.paths, search => search.reconsider(lattice, dearer, changed));
+    pub(super) fn reconsider(&mut self, lattice: &Lattice, dearer: &[Dearer], cheaper: &[u32]) {
+        paths!(&mut self.paths, search => search.reconsider(lattice, dearer, cheaper));
     }
 
     /// The region of a texel. Not to be asked before there are sites.

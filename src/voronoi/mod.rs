@@ -72,7 +72,7 @@ pub fn voronoi_map(
     seed: u64,
     mut progress: impl FnMut(f32) -> ControlFlow<()>,
 ) -> Result<VoronoiMap, VoronoiError> {
-    let mut bake = VoronoiBake::new(params.clone(), guides.to_vec(), size, seed)?;
+    let mut bake = VoronoiBake::new(params.clone(), guides.to_vec(), size, seed)?.regions_alone();
     while let BakeProgress::Working(share) = bake.step(SLICE) {
         if progress(share).is_break() {
             return Err(VoronoiError::Cancelled);

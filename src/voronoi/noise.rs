@@ -2,11 +2,14 @@
 
 use crate::{math::hash_unit, pattern::SurfaceFrame};
 
-/// Octaves; the finest features are 1/16 of the largest.
-const OCTAVES: u32 = 5;
+/// Octaves; the finest features are 1/32 of the largest.
+const OCTAVES: usize = 6;
 
-/// By how much the sum of the octaves is stretched about its middle: five octaves together rarely leave 0.2..0.8.
-const CONTRAST: f32 = 1.8;
+/// Amplitude of an octave in that of the one before. Below 0.6 cracks are smooth and keep to the axes of the lattice.
+const PERSISTENCE: f32 = 0.9;
+
+/// By how much the sum of the octaves is stretched about its middle: six octaves together rarely leave 0.25..0.75.
+const CONTRAST: f32 = 2.6;
 
 /// Value noise of several octaves, in pattern space, row by row.
 #[derive(Clone, Debug)]
@@ -39,7 +42,12 @@ impl Noise {
     /// Noise over `frame` whose largest features are `scale` pattern units.
     pub(super) fn new(frame: &SurfaceFrame, scale: f32, seed: u64) -> Self {
         let width = frame.size().x as usize;
-        let octaves = (0..OCTAVES).map(|octave| {
+        let mut amplitudes = [1.0; OCTAVES];
+        for octave in 1..OCTAVES {
+            amplitudes[octave] = amplitudes[octave - 1] * PERSISTENCE;
+        }
+        let sum: f32 = amplitudes.iter().sum();
+        let octaves = (0u32..).zip(amplitudes).map(|(octave, amplitude)| {
             let frequency = (1u32 << octave) as f32 / (scale * frame.texels_per_unit());
             let places = (0..width).map(|x| (x as f32 + 0.5) * frequency);
             let fade = places.clone().map(|place| smooth(place - place.floor())).collect();
@@ -54,7 +62,7 @@ impl Noise {
             let corners = vec![0.0; begins.len()];
             Octave {
                 seed: seed.wrapping_add(u64::from(octave)),
-                amplitude: 0.5f32.powi(octave as i32 + 1) / (1.0 - 0.5f32.powi(OCTAVES as i32)),
+                amplitude: amplitude / sum,
                 frequency,
                 fade,
                 begins,

@@ -75,7 +75,7 @@ pub struct VoronoiParams {
     /// How many generations of cracks (Mould 2005, section 3.2 and fig. 3): each divides the regions of the one before,
     /// with four times as many sites, and has thinner cracks. 1..=[`MAX_LEVELS`]; default 1.
     pub levels: u32,
-    /// Size of the largest features of the noise, pattern units, 0.01..=1; default 0.12. Four more octaves follow.
+    /// Size of the largest features of the noise, pattern units, 0.01..=1; default 0.12. Five more octaves follow.
     pub noise_scale: f32,
     /// Width of the widest cracks, pattern units, 0..=0.2; default 0.014.
     pub width: f32,

@@ -43,13 +43,19 @@ impl Resampler {
 
     /// Writes row `y`, 0..=1 to 0..=65535.
     pub(super) fn fill_row(&self, picture: &Grid<f32>, y: usize, out: &mut [u16]) {
+        // What is not a number is not above zero either.
+        let cut = |value: f32| if value > 0.0 { value.min(1.0) } else { 0.0 };
+        if picture.width() == out.len() && picture.height() == self.down.len() {
+            for (out, &value) in out.iter_mut().zip(picture.row(y)) {
+                *out = (cut(value) * 65535.0 + 0.5) as u16;
+            }
+            return;
+        }
         let down = &self.down[y];
         for (out, across) in out.iter_mut().zip(&self.across) {
             let mut sum = 0.0;
             for (row, weight) in (down.first..).zip(&down.weights) {
                 let row = &picture.row(row)[across.first..across.first + across.weights.len()];
-                // What is not a number is not above zero either.
-                let cut = |value: f32| if value > 0.0 { value.min(1.0) } else { 0.0 };
                 let part: f32 = row.iter().zip(&across.weights).map(|(&value, weight)| cut(value) * weight).sum();
                 sum += part * weight;
             }

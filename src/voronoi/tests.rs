@@ -209,9 +209,14 @@ fn levels_divide_the_regions_of_the_level_before() {
 #[test]
 fn changed_weights_give_the_map_that_a_new_one_has() {
     let mut rng = Rng::new(21);
-    for (n, size) in [[97, 61], [300, 140], [1, 200], [260, 3]].into_iter().enumerate() {
+    // Drawings that change most of the edges, and one that changes a few.
+    for (n, size) in [[97, 61], [300, 140], [1, 200], [260, 3], [301, 139]].into_iter().enumerate() {
         for levels in [1, 3] {
-            let images = [0, 1].map(|_| drawing(&mut rng, UVec2::new(90, 70)));
+            let mut images = [0, 1].map(|_| drawing(&mut rng, UVec2::new(90, 70)));
+            if n == 4 {
+                let beside = |image: &mut Grid<f32>| (0..70).for_each(|y| image.row_mut(y)[..75].fill(0.0));
+                images.iter_mut().for_each(beside);
+            }
             let guides = |gammas: [f32; 2]| [0, 1].map(|i| Guide { image: images[i].clone(), gamma: gammas[i] });
             let params = VoronoiParams { sites: 60, levels, ..VoronoiParams::DEFAULT };
             let mut map = made(&params, &guides([0.0, 28.0]), size, n as u64).0;
@@ -561,4 +566,31 @@ fn fronts_only_open_and_end_with_all_seams() {
     assert!(field == empty);
     seams.stamp_share(&mut field, &profile, 7.0);
     assert!(field == full);
+}
+
+/// A change here changes the patterns of all users.
+#[test]
+fn maps_are_frozen() {
+    let mut rng = Rng::new(1);
+    let guide = Guide::new(drawing(&mut rng, UVec2::new(120, 90)));
+    let print = |layout: SiteLayout, levels: u32| {
+        let params = VoronoiParams { layout, levels, ..VoronoiParams::DEFAULT };
+        let (map, seams) = made(&params, std::slice::from_ref(&guide), [160, 120], 7);
+        let texels = values(&map).into_iter().flatten().flat_map(|(cost, region)| [cost, u64::from(region)]);
+        let points = seams.seams.iter().flat_map(|seam| &seam.points);
+        let bits = points.flat_map(|point| [point.pos.x, point.pos.y, point.width]).map(|value| value.to_bits().into());
+        texels.chain(bits).fold(0xCBF2_9CE4_8422_2325, |hash: u64, value| (hash ^ value).wrapping_mul(0x100_0000_01B3))
+    };
+    let impact = SiteLayout::Impact { at: Vec2::new(0.5, 0.4), focus: 2.0 };
+    let prints = [
+        print(SiteLayout::Uniform, 1),
+        print(SiteLayout::Even, 3),
+        print(impact, 1),
+        print(SiteLayout::Density(guide.image.clone()), 1),
+        print(SiteLayout::Astride, 2),
+    ];
+    assert_eq!(
+        prints,
+        [602153815688971355, 1395409872095271797, 1085447894532221202, 6191331822148883251, 2635211142915938557]
+    );
 }

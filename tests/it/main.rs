@@ -4,6 +4,10 @@
 #![cfg(test)]
 
 #[cfg(all(feature = "2d", feature = "3d"))]
+mod cells;
+#[cfg(all(feature = "2d", feature = "3d"))]
+mod clock;
+#[cfg(all(feature = "2d", feature = "3d"))]
 mod gpu;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod hits;
@@ -20,3 +24,4 @@ mod presets;
 mod replay;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod support;
+mod voronoi;

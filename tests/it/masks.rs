@@ -233,3 +233,124 @@ fn odd_layers_are_refused_or_harmless() {
         }
     }
 }
+
+#[cfg(all(feature = "2d", feature = "3d"))]
+mod in_apps {
+    use super::texture;
+    use crate::support::{add, app, center, counts, get, hit, settle, shown, solid, state, steps};
+    use bevy::{
+        asset::RenderAssetUsages,
+        prelude::*,
+        render::render_resource::{Extent3d, TextureDimension, TextureFormat},
+    };
+    use bevy_crack::prelude::*;
+
+    fn image(size: UVec2, rgba: Vec<u8>) -> Image {
+        let extent = Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 };
+        let (dimension, format) = (TextureDimension::D2, TextureFormat::Rgba8UnormSrgb);
+        Image::new(extent, dimension, rgba, format, RenderAssetUsages::default())
+    }
+
+    /// A quarter turn of a checkerboard of `n` x `n` squares: white where the sum of column and row is even.
+    fn squares(n: u32) -> Image {
+        let texels = (0..n * n)
+            .flat_map(|i| [if (i % n + i / n).is_multiple_of(2) { 255 } else { 0 }; 3].into_iter().chain([255]));
+        image(UVec2::splat(n), texels.collect())
+    }
+
+    fn spawn(app: &mut App, picture: Image, preset: CrackPreset, mask: CrackMaskSource) -> Entity {
+        let image = add(app, picture);
+        app.world_mut().spawn((Sprite::from_image(image), CrackSurface::new(preset).with_mask(mask))).id()
+    }
+
+    /// Indices of the texels that differ from the picture.
+    fn cracked(app: &App, entity: Entity, clean: &[u8]) -> Vec<u32> {
+        let now = shown(app, entity);
+        (0..).zip(now.chunks(4).zip(clean.chunks(4))).filter(|(_, (a, b))| a != b).map(|(i, _)| i).collect()
+    }
+
+    #[test]
+    fn cracks_never_enter_what_an_image_forbids() {
+        let mut app = app();
+        let (size, clean) = (UVec2::splat(96), solid(UVec2::splat(96), [150, 150, 150, 255]).data.unwrap());
+        let white = add(&mut app, squares(3));
+        let mask = CrackMaskSource::Images { weak: None, strong: None, forbidden: Some(white) };
+        let mut touched = 0;
+        for preset in CrackPreset::NAMES.into_iter().filter_map(CrackPreset::named) {
+            let entity = spawn(&mut app, image(size, clean.clone()), preset.clone(), mask.clone());
+            let free = spawn(&mut app, image(size, clean.clone()), preset, CrackMaskSource::None);
+            // The squares in the middle of the sides are free, those in the corners and the centre are not.
+            for uv in [Vec2::new(0.5, 0.2), Vec2::new(0.2, 0.55), Vec2::new(0.85, 0.5), Vec2::new(0.5, 0.9)] {
+                hit(&mut app, CrackHit::uv(entity, uv));
+                hit(&mut app, CrackHit::uv(free, uv));
+            }
+            settle(&mut app, entity);
+            settle(&mut app, free);
+            // The outermost texels of a square are lit by the slope of the crack beside them.
+            let is_inside = |x: u32| (1..31).contains(&(x % 32));
+            let is_forbidden = |i: &u32| {
+                let (x, y) = (i % 96, i / 96);
+                (x / 32 + y / 32).is_multiple_of(2) && is_inside(x) && is_inside(y)
+            };
+            let inside = cracked(&app, entity, &clean);
+            assert!(!inside.iter().any(is_forbidden), "a crack on a forbidden texel");
+            assert!(!inside.is_empty());
+            touched += cracked(&app, free, &clean).iter().filter(|i| is_forbidden(i)).count();
+        }
+        assert!(touched > 100, "without the mask they would have been there: {touched}");
+        // On a forbidden texel itself nothing begins.
+        let entity = spawn(&mut app, image(size, clean.clone()), CrackPreset::GLASS, mask);
+        let refused = counts(&app).rejected;
+        hit(&mut app, center(entity));
+        steps(&mut app, 3);
+        assert_eq!(counts(&app).rejected, refused + 1);
+    }
+
+    #[test]
+    fn the_brick_walls_own_joints_draw_the_cracks() {
+        let mut app = app();
+        let picture = texture("brick_red.png");
+        let share = |app: &mut App, mask: CrackMaskSource| {
+            let wall = image(UVec2::splat(512), picture.as_raw().clone());
+            let preset = CrackPreset::named("brick").unwrap_or(CrackPreset::CONCRETE);
+            let entity = spawn(app, wall, preset, mask);
+            hit(app, CrackHit::uv(entity, Vec2::new(0.5, 0.47)).with_energy(2.0));
+            settle(app, entity);
+            let cracked = cracked(app, entity, picture.as_raw());
+            let at = |i: &u32| Vec2::new((i % 512) as f32 + 0.5, (i / 512) as f32 + 0.5);
+            let in_joints = cracked.iter().filter(|i| super::to_joint(at(i)) < 4.0).count();
+            in_joints as f32 / cracked.len() as f32
+        };
+        let without = share(&mut app, CrackMaskSource::None);
+        let with = share(&mut app, CrackMaskSource::FromPicture);
+        println!(
+            "cracked texels in or beside the mortar: {:.0} % with the mask, {:.0} % without",
+            100.0 * with,
+            100.0 * without
+        );
+        assert!(with > 0.6 && with > 1.5 * without, "{with} against {without}");
+    }
+
+    #[test]
+    fn masks_that_fail_to_load_fail_the_surface_and_those_in_loading_hold_it() {
+        let mut app = app();
+        let clean = solid(UVec2::splat(32), [150, 150, 150, 255]);
+        let server = app.world().resource::<AssetServer>().clone();
+        let missing = CrackMaskSource::Images { weak: Some(server.load("nowhere.png")), strong: None, forbidden: None };
+        let late = app.world().resource::<Assets<Image>>().reserve_handle();
+        let waiting = CrackMaskSource::Images { weak: None, strong: Some(late.clone()), forbidden: None };
+        let failing = spawn(&mut app, clean.clone(), CrackPreset::CONCRETE, missing);
+        let entity = spawn(&mut app, clean, CrackPreset::CONCRETE, waiting);
+        for entity in [failing, entity] {
+            hit(&mut app, center(entity));
+        }
+        crate::support::wait_for(&mut app, "the failure", |app| {
+            matches!(state(app, failing).status, CrackStatus::Failed(_))
+        });
+        steps(&mut app, 5);
+        assert_eq!(state(&app, entity).status, CrackStatus::Waiting);
+        app.world_mut().resource_mut::<Assets<Image>>().insert(&late, squares(2)).unwrap();
+        settle(&mut app, entity);
+        let _: CrackTextures = get(&app, entity);
+    }
+}

@@ -186,3 +186,189 @@ fn damaged_files_are_errors_or_valid_presets() {
     }
     assert!(good > 50 && bad > 500, "{good} good, {bad} bad");
 }
+
+#[cfg(all(feature = "2d", feature = "3d"))]
+mod in_apps {
+    use super::CrackPreset;
+    use crate::support::{
+        add, center, counts, finish, hit, picture, settle, shown, single_threaded, small_preset, state, step, steps,
+        wait_for, warnings,
+    };
+    use bevy::{
+        asset::AssetLoadFailedEvent,
+        image::{CompressedImageFormats, ImageLoader, TextureAtlasLayout},
+        prelude::*,
+    };
+    use bevy_crack::prelude::*;
+    use std::path::PathBuf;
+
+    const FILE: &str = "mine.crack.ron";
+
+    /// An app whose assets lie in a folder of its own.
+    struct Folder {
+        path: PathBuf,
+        app: App,
+    }
+
+    impl Folder {
+        fn new(name: &str) -> Self {
+            let path = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name);
+            std::fs::create_dir_all(&path).unwrap();
+            let mut app = App::new();
+            let assets = AssetPlugin {
+                file_path: path.to_str().unwrap().to_owned(),
+                // Files are loaded anew when the test says so.
+                watch_for_changes_override: Some(false),
+                ..default()
+            };
+            app.add_plugins((MinimalPlugins, TransformPlugin, assets, ImagePlugin::default(), CrackPlugins))
+                .register_asset_loader(ImageLoader::new(CompressedImageFormats::NONE))
+                .init_asset::<TextureAtlasLayout>()
+                .init_asset::<Mesh>()
+                .init_asset::<ColorMaterial>()
+                .init_asset::<StandardMaterial>();
+            finish(&mut app);
+            single_threaded(&mut app);
+            app.update();
+            Self { path, app }
+        }
+
+        fn write(&self, text: &str) {
+            std::fs::write(self.path.join(FILE), text).unwrap();
+        }
+
+        fn load(&self) -> Handle<CrackPreset> {
+            self.app.world().resource::<AssetServer>().load(FILE)
+        }
+
+        /// Writes and loads the file anew, and waits until it is there or, if `is_broken`, refused.
+        fn rewrite(&mut self, text: &str, preset: &Handle<CrackPreset>, is_broken: bool) {
+            self.write(text);
+            let world = self.app.world();
+            let mut failures = world.resource::<Messages<AssetLoadFailedEvent<CrackPreset>>>().get_cursor_current();
+            let before = world.resource::<Assets<CrackPreset>>().get(preset).cloned();
+            world.resource::<AssetServer>().reload(FILE);
+            let id = preset.id();
+            wait_for(&mut self.app, "the file", |app| {
+                let failed = app.world().resource::<Messages<AssetLoadFailedEvent<CrackPreset>>>();
+                let is_new = app.world().resource::<Assets<CrackPreset>>().get(id) != before.as_ref();
+                let is_refused = failures.read(failed).count() > 0;
+                assert!(if is_broken { !is_new } else { !is_refused });
+                is_new || is_refused
+            });
+            // The change is told in one frame, read in the next.
+            steps(&mut self.app, 3);
+        }
+
+        fn spawn(&mut self, preset: impl Into<PresetSource>) -> Entity {
+            let image = add(&mut self.app, picture(UVec2::splat(64)));
+            self.app.world_mut().spawn((Sprite::from_image(image), CrackSurface::new(preset))).id()
+        }
+    }
+
+    #[test]
+    fn a_preset_in_a_file_cracks_as_one_in_the_component() {
+        let mut folder = Folder::new("preset_file");
+        let preset = small_preset();
+        folder.write(&preset.to_ron().unwrap());
+        let from_file = folder.load();
+        let (a, b) = (folder.spawn(from_file), folder.spawn(preset));
+        for entity in [a, b] {
+            hit(&mut folder.app, center(entity));
+        }
+        step(&mut folder.app);
+        for entity in [a, b] {
+            settle(&mut folder.app, entity);
+        }
+        assert!(shown(&folder.app, a) == shown(&folder.app, b), "the same cracks");
+        assert_eq!(counts(&folder.app).applied, 2);
+    }
+
+    #[test]
+    fn a_missing_or_broken_file_fails_the_surface_until_it_is_whole() {
+        let mut folder = Folder::new("preset_broken");
+        folder.write("(growth: (kill_distance: -1.0))");
+        let preset = folder.load();
+        let missing = folder.app.world().resource::<AssetServer>().load("nowhere.crack.ron");
+        let entities = [folder.spawn(preset.clone()), folder.spawn(missing)];
+        for entity in entities {
+            hit(&mut folder.app, center(entity));
+        }
+        let heard = warnings(|| {
+            for entity in entities {
+                wait_for(&mut folder.app, "the failure", |app| {
+                    matches!(state(app, entity).status, CrackStatus::Failed(_))
+                });
+            }
+            // Further hits are refused without another word.
+            for entity in entities {
+                hit(&mut folder.app, center(entity));
+            }
+            steps(&mut folder.app, 5);
+        });
+        assert_eq!(heard.len(), 2, "{heard:#?}");
+        let reason = format!("{:?}", state(&folder.app, entities[0]).status);
+        assert!(reason.contains("`growth.kill_distance` is -1, must lie in"), "{reason}");
+        let reason = format!("{:?}", state(&folder.app, entities[1]).status);
+        assert!(reason.contains("nowhere.crack.ron"), "{reason}");
+        assert_eq!(counts(&folder.app).rejected, 4);
+        // Whole again, it cracks.
+        folder.rewrite(&small_preset().to_ron().unwrap(), &preset, false);
+        hit(&mut folder.app, center(entities[0]));
+        settle(&mut folder.app, entities[0]);
+    }
+
+    /// E8 for files: new steps take up what has changed, what is drawn stays, and a broken file changes nothing.
+    #[test]
+    fn a_changed_file_is_taken_up_while_cracks_grow() {
+        let mut folder = Folder::new("preset_reload");
+        let preset = CrackPreset { steps_per_second: 10.0, ..CrackPreset::CONCRETE };
+        folder.write(&preset.to_ron().unwrap());
+        let handle = folder.load();
+        let entity = folder.spawn(handle.clone());
+        let other = folder.spawn(preset.clone());
+        for entity in [entity, other] {
+            hit(&mut folder.app, center(entity));
+        }
+        wait_for(&mut folder.app, "some nodes", |app| state(app, entity).nodes > 6);
+        // Halted: nothing grows, nothing goes.
+        folder.rewrite("(steps_per_second: 0)", &handle, false);
+        let (nodes, before) = (state(&folder.app, entity).nodes, shown(&folder.app, entity));
+        steps(&mut folder.app, 30);
+        assert_eq!(
+            (state(&folder.app, entity).nodes, state(&folder.app, entity).status),
+            (nodes, CrackStatus::Growing)
+        );
+        // Broken: the old one stays.
+        for broken in ["(growth: (reach: NaN))", "((((", "(gorwth: ())"] {
+            let heard = warnings(|| folder.rewrite(broken, &handle, true));
+            assert_eq!(heard, [""; 0], "the asset server has said it");
+            steps(&mut folder.app, 10);
+            assert_eq!(state(&folder.app, entity).nodes, nodes);
+            assert!(shown(&folder.app, entity) == before, "a broken file changes nothing");
+        }
+        // Another look is painted at once; what was drawn stays where it is.
+        folder.rewrite(
+            "(steps_per_second: 0, look: (ramp: [(depth: 0.01, color: (1, 0, 0), cover: 1)], glint: 0, grain: 0))",
+            &handle,
+            false,
+        );
+        let red = shown(&folder.app, entity);
+        let clean = picture(UVec2::splat(64)).data.unwrap();
+        let cracked =
+            |texels: &[u8]| -> Vec<bool> { texels.chunks(4).zip(clean.chunks(4)).map(|(a, b)| a != b).collect() };
+        assert!(red != before, "the look has changed");
+        // Slopes light the texel beside a crack as well; this look has none.
+        let (was, is) = (cracked(&before), cracked(&red));
+        let around = |i: usize| [0, 1, 63, 64, 65].into_iter().flat_map(move |d| [i.checked_sub(d), i.checked_add(d)]);
+        for (i, _) in was.iter().enumerate().filter(|(_, was)| **was) {
+            assert!(around(i).flatten().any(|i| is.get(i) == Some(&true)), "a texel that was cracked is whole");
+        }
+        // And it grows on.
+        folder.rewrite("(steps_per_second: 500)", &handle, false);
+        settle(&mut folder.app, entity);
+        assert!(state(&folder.app, entity).nodes > nodes);
+        // The other surface has never heard of the file.
+        assert!(state(&folder.app, other).nodes > 0);
+    }
+}

@@ -1,10 +1,10 @@
 //! Any moment of a growth, shown in whatever order.
 
 use bevy_crack::{
-    CrackPreset,
+    CrackPreset, Grid,
     growth::{CrackGrowth, Venation},
     math::Rng,
-    pattern::{Moment, NO_PARENT, Node, SegmentId, SurfaceFrame},
+    pattern::{CrackMask, Moment, NO_PARENT, Node, SegmentId, SurfaceFrame},
     raster::{DOT_DEPTH, DepthField, Redrawn, Replay, TexelRect, stamp_dot, stamp_path},
 };
 use glam::{UVec2, Vec2};
@@ -14,6 +14,7 @@ struct Scene {
     preset: CrackPreset,
     growth: CrackGrowth,
     field: DepthField,
+    untouched: DepthField,
     replay: Replay,
     redrawn: Redrawn,
 }
@@ -21,14 +22,24 @@ struct Scene {
 impl Scene {
     fn new(preset: CrackPreset, size: UVec2, seed: u64) -> Self {
         let frame = SurfaceFrame::new(size).unwrap();
-        let growth = CrackGrowth::new(preset.growth.clone(), frame.extent(), seed).unwrap();
+        let mut growth = CrackGrowth::new(preset.growth.clone(), frame.extent(), seed).unwrap();
         let replay = Replay::new(size, preset.profile);
-        Self { growth, field: DepthField::new(frame), replay, redrawn: Redrawn::default(), preset }
+        // Every other one has a bar that no crack enters.
+        let mut mask = CrackMask::default();
+        if seed.is_multiple_of(2) {
+            mask.forbidden = Grid::from_vec(UVec2::new(5, 1), vec![0.0, 0.0, 1.0, 0.0, 0.0]);
+        }
+        growth.set_mask(mask.clone());
+        let mut field = DepthField::new(frame);
+        field.forbid(&mask);
+        let untouched = field.clone();
+        Self { growth, field, untouched, replay, redrawn: Redrawn::default(), preset }
     }
 
     fn hit(&mut self, rng: &mut Rng) {
-        let pos = Vec2::new(rng.unit(), rng.unit()) * self.field.frame.extent();
-        self.growth.hit(pos, rng.range(0.2, 1.5));
+        // Some fall on one spot, which widens its cracks.
+        let uv = if rng.unit() < 0.4 { Vec2::new(0.6, 0.4) } else { Vec2::new(rng.unit(), rng.unit()) };
+        self.growth.hit(uv * self.field.frame.extent(), rng.range(0.2, 1.5));
     }
 
     fn grow(&mut self) {
@@ -47,7 +58,7 @@ impl Scene {
 
     /// The moment drawn once, on an untouched field.
     fn drawn(&self, moment: Moment) -> DepthField {
-        let mut field = DepthField::new(self.field.frame);
+        let mut field = self.untouched.clone();
         let (network, timeline) = (self.growth.network(), self.growth.timeline());
         for segment in network.segments() {
             if let Some(path) = timeline.path_at(network, segment, moment) {
@@ -130,7 +141,7 @@ fn any_moment_is_the_same_however_it_was_reached() {
                 assert_eq!(n_told == 0, changed.is_empty());
             }
             scene.show(Moment::START);
-            assert_eq!(scene.field, DepthField::new(scene.field.frame), "nothing is there at the start");
+            assert_eq!(scene.field, scene.untouched, "nothing is there at the start");
         }
     }
 }
@@ -177,7 +188,7 @@ fn the_end_is_the_finished_network() {
         }
         scene.show(Moment::nearest(7.3));
         scene.show(Moment::after(scene.end()));
-        let mut finished = DepthField::new(scene.field.frame);
+        let mut finished = scene.untouched.clone();
         let network = scene.growth.network();
         for segment in network.segments() {
             stamp_path(&mut finished, &scene.preset.profile, &network.path(segment).unwrap());
@@ -189,7 +200,7 @@ fn the_end_is_the_finished_network() {
         }
         assert!(finished == scene.field);
         // Time only ever adds, to within rounding.
-        let mut earlier = DepthField::new(scene.field.frame);
+        let mut earlier = scene.untouched.clone();
         for quarter in 0..=4 * scene.end() {
             let now = scene.drawn(Moment::nearest(f64::from(quarter) / 4.0));
             let lost = earlier.depth.as_slice().iter().zip(now.depth.as_slice()).map(|(a, b)| a.saturating_sub(*b));
@@ -283,6 +294,7 @@ fn strange_fields_are_drawn_anew() {
     scene.show(moment);
     assert!(scene.field == scene.drawn(moment));
     scene.field = DepthField::new(SurfaceFrame::new(UVec2::new(33, 41)).unwrap());
+    scene.untouched = scene.field.clone();
     scene.show(moment);
     assert!(scene.field == scene.drawn(moment));
 }
