@@ -93,7 +93,11 @@ fn cracks_of_a_brick_wall_run_in_the_mortar() {
     for name in ["brick", "concrete", "plaster"] {
         let preset = CrackPreset::named(name).unwrap();
         let (with, without) = (length_in_mortar(&preset, &own), length_in_mortar(&preset, &Arc::default()));
-        println!("{name}: {:.0} % of the length in the mortar with the mask, {:.0} % without", 100.0 * with, 100.0 * without);
+        println!(
+            "{name}: {:.0} % of the length in the mortar with the mask, {:.0} % without",
+            100.0 * with,
+            100.0 * without
+        );
         assert!(with >= 0.7 && without < 0.5, "{name}: {with} against {without}");
     }
 }
