@@ -9,7 +9,7 @@ use super::{
 use crate::{
     paint::{BaseTexels, PaintTargets, paint_rects},
     pattern::{Moment, NO_PARENT, SegmentId},
-    raster::{DOT_DEPTH, DepthField, Redrawn, TexelRect, stamp_dot, stamp_path, stamp_path_with},
+    raster::{DOT_DEPTH, Redrawn, TexelRect, stamp_dot, stamp_path, stamp_path_with},
 };
 use bevy::prelude::*;
 
