@@ -249,7 +249,8 @@ impl CrackGrowth {
         let to = to.clamp(Vec2::ZERO, extent);
         // The border is a crack too: none runs along it.
         let inward = Vec2::splat(0.3 * self.params.step_length).min(0.5 * extent);
-        let (low, high) = (node.pos.cmpeq(Vec2::ZERO) & to.cmpeq(Vec2::ZERO), node.pos.cmpeq(extent) & to.cmpeq(extent));
+        let (low, high) =
+            (node.pos.cmpeq(Vec2::ZERO) & to.cmpeq(Vec2::ZERO), node.pos.cmpeq(extent) & to.cmpeq(extent));
         let to = Vec2::select(low, inward, Vec2::select(high, extent - inward, to));
         match self.free_line(SegmentId::Branch(child), (from, u32::MAX), (node.pos, to)) {
             Ok((bend, path)) => {
