@@ -72,8 +72,9 @@ fn fly(
     let before = broken.time;
     let run = f64::from(speed) * f64::from(seconds);
     let run = if run.is_finite() { run } else { 0.0 };
-    let time = seek.map_or(before + run, |seek| f64::from(seek).clamp(0.0, MAX_TIME));
-    broken.time = time.clamp(0.0, MAX_TIME);
+    let time = seek.map_or(before + run, f64::from);
+    // Not `clamp`, which keeps what is not a number.
+    broken.time = time.max(0.0).min(MAX_TIME);
     if run < 0.0 && time <= 0.0 {
         active.broken = Some(broken);
         return Fate::Whole;
