@@ -73,7 +73,7 @@ fn setup(mut commands: Commands, assets: Res<AssetServer>, film: Res<Film>) {
         ShatterCracks {
             cut: ShatterParams { carry_on: true, ..ShatterParams::DEFAULT },
             anchor: Anchor::Nothing,
-            burst: BurstParams { hold: 0.25, ..BurstParams::DEFAULT },
+            burst: BurstParams { hold: 0.25, speed: 1.4, gravity: Vec2::new(0.0, -1.6), ..BurstParams::DEFAULT },
             ..default()
         },
         OnCanvas { picture: pane, size: Vec2::splat(SIDE) },
@@ -127,7 +127,7 @@ fn play(
     }
 }
 
-/// The scripted run, by shares of its length: two hits, a burst, slow motion, and back.
+/// The scripted run, by shares of its length: three hits, a burst, slow motion, and back.
 fn play_script(
     mut commands: Commands,
     mut frame: Local<u32>,
@@ -145,9 +145,12 @@ fn play_script(
     if is_at(0.16) {
         commands.trigger(CrackHit::uv(entity, Vec2::new(0.68, 0.62)).with_energy(1.5));
     }
+    if is_at(0.2) {
+        commands.trigger(CrackHit::uv(entity, Vec2::new(0.25, 0.75)).with_energy(1.5));
+    }
     if is_at(0.3) {
         let at = ShatterRequest::around(Vec2::new(0.4, 0.42), 64.0);
-        commands.entity(entity).shatter_cracks(at.with_energy(1.6));
+        commands.entity(entity).shatter_cracks(at.with_energy(3.0));
     }
     if is_at(0.38) {
         shatter.speed = SLOW;

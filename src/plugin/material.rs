@@ -151,7 +151,8 @@ fn locate<S: MaterialSlot>(world: &World, entity: Entity, local: Vec3) -> Result
 fn plane<S: MaterialSlot>(world: &World, entity: Entity, _: &Active) -> Result<Plane, &'static str> {
     let mesh_2d = world.get::<Mesh2d>(entity).map(|mesh| &mesh.0);
     let mesh = mesh_2d.or_else(|| world.get::<Mesh3d>(entity).map(|mesh| &mesh.0)).ok_or("there is no mesh")?;
-    let mesh = world.get_resource::<Assets<Mesh>>().and_then(|meshes| meshes.get(mesh)).ok_or("its mesh is not loaded")?;
+    let mesh =
+        world.get_resource::<Assets<Mesh>>().and_then(|meshes| meshes.get(mesh)).ok_or("its mesh is not loaded")?;
     let material = world.get::<S>(entity).ok_or("the material is gone")?;
     let materials = world.get_resource::<Assets<S::Material>>().ok_or("there are no materials")?;
     let transform = materials.get(material.material()).map_or(Affine2::IDENTITY, CrackMaterial::uv_transform);

@@ -77,9 +77,9 @@ use bevy::{
 pub mod prelude {
     pub use super::{
         CellClosed, CrackBudget, CrackClock, CrackCommandsExt, CrackDrive, CrackError, CrackFailed, CrackFinished,
-        CrackHit, CrackMaps, CrackMaskSource, CrackPlugin, CrackPlugins, CrackResolution, CrackState, CrackStats,
-        CrackShards, CrackStatus, CrackSurface, CrackSystems, CrackTextures, CrackTip, HitPoint, PresetSource, Reassembled,
-        Shard, ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen, Shattered,
+        CrackHit, CrackMaps, CrackMaskSource, CrackPlugin, CrackPlugins, CrackResolution, CrackShards, CrackState,
+        CrackStats, CrackStatus, CrackSurface, CrackSystems, CrackTextures, CrackTip, HitPoint, PresetSource,
+        Reassembled, Shard, ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen, Shattered,
     };
     #[cfg(feature = "2d")]
     pub use super::{CrackLight2d, CrackLitMaterial};

@@ -16,7 +16,7 @@ pub(super) use fly::fly_shards;
 pub(super) use plane::Plane;
 pub(super) use release::{any_requests, shatter_surfaces, shatter_when_due};
 
-use crate::shatter::{Anchor, BurstParams, ConvexPiece, ShatterError, ShatterParams, Shards};
+use crate::shatter::{Anchor, BurstParams, ConvexPiece, Shards, ShatterError, ShatterParams};
 use bevy::prelude::*;
 use std::sync::Arc;
 

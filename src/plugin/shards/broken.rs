@@ -114,7 +114,13 @@ impl Broken {
     }
 
     /// Material of shards of which `level` of [`LEVELS`] is there.
-    fn material(&mut self, world: &mut World, surface: Entity, carrier: &Carrier, level: usize) -> Option<UntypedHandle> {
+    fn material(
+        &mut self,
+        world: &mut World,
+        surface: Entity,
+        carrier: &Carrier,
+        level: usize,
+    ) -> Option<UntypedHandle> {
         if self.wear[level].is_none() {
             let opacity = level as f32 / LEVELS as f32;
             self.wear[level] = (carrier.kind.shard_material)(world, surface, carrier, &self.whole, opacity);
@@ -175,8 +181,12 @@ impl Broken {
     }
 
     /// Puts the entity of a piece where it belongs.
-    pub(super) fn pose(&mut self, world: &mut World, surface: Entity, carrier: &Carrier, index: usize, pose: Pose) {
+    pub(super) fn pose(&mut self, world: &mut World, surface: Entity, carrier: &Carrier, index: usize, mut pose: Pose) {
         let is_solid = carrier.kind.is_solid;
+        if !is_solid {
+            // In 2D, z is only for the order of drawing.
+            pose.offset.z = 0.0;
+        }
         let forward = if is_solid { 0.5 * self.thickness() } else { -IN_FRONT };
         let Some(piece) = self.pieces.get(index) else { return };
         let (Some(entity), Some(shard)) = (piece.entity, piece.cut.get(piece.number)) else { return };

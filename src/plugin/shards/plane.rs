@@ -27,7 +27,8 @@ impl Plane {
     pub(in crate::plugin) fn through(corners: [Vec3; 4], normal: Vec3) -> Result<Self, &'static str> {
         let [origin, right, down, last] = corners;
         let (x, y, diagonal) = (right - origin, down - origin, last.distance(origin));
-        if (right + down - origin).distance(last) > SLACK * diagonal || x.dot(y).abs() > SLACK * x.length() * y.length() {
+        if (right + down - origin).distance(last) > SLACK * diagonal || x.dot(y).abs() > SLACK * x.length() * y.length()
+        {
             return Err("its corners do not form a rectangle");
         }
         let (Some(side), Some(up)) = (x.try_normalize(), (-y).try_normalize()) else { return Err("it has no size") };

@@ -1,7 +1,7 @@
 //! From a surface to shards.
 
 use super::{
-    Broken, Shard, ShardsError, ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen, Shattered,
+    Broken, CrackShards, Shard, ShardsError, ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen, Shattered,
     broken::Piece,
     holes::{bounds, for_each_span},
 };
@@ -77,7 +77,8 @@ pub(in crate::plugin) fn shatter_surfaces(world: &mut World, mut scratch: Local<
         }
         make_room(world, &mut surfaces);
     });
-    for event in told {
+    for mut event in told {
+        event.shards.retain(|shard| world.get_entity(*shard).is_ok());
         world.trigger(event);
     }
     for event in failed {
@@ -90,13 +91,23 @@ pub(in crate::plugin) fn shatter_surfaces(world: &mut World, mut scratch: Local<
 fn make_room(world: &mut World, surfaces: &mut Surfaces) {
     surfaces.shards.retain(|shard| world.get_entity(*shard).is_ok());
     let excess = surfaces.shards.len().saturating_sub(world.resource::<CrackBudget>().max_shards);
+    let mut shortened = Vec::new();
     for entity in surfaces.shards.drain(..excess) {
-        let Some(Shard { surface, piece: id, .. }) = world.get::<Shard>(entity) else { continue };
-        if let Some(broken) = surfaces.active.get_mut(surface).and_then(|active| active.broken.as_mut())
-            && let Ok(index) = broken.pieces.binary_search_by_key(id, |piece| piece.id)
+        let Some(&Shard { surface, piece: id, .. }) = world.get::<Shard>(entity) else { continue };
+        if let Some(broken) = surfaces.active.get_mut(&surface).and_then(|active| active.broken.as_mut())
+            && let Ok(index) = broken.pieces.binary_search_by_key(&id, |piece| piece.id)
         {
             broken.pieces[index].is_spent = true;
             broken.hide(world, index);
+            shortened.push(surface);
+        }
+    }
+    shortened.dedup();
+    for surface in shortened {
+        if let Some(broken) = surfaces.active.get(&surface).and_then(|active| active.broken.as_ref())
+            && let Some(mut report) = world.get_mut::<CrackShards>(surface)
+        {
+            *report = broken.report();
         }
     }
 }
@@ -122,7 +133,8 @@ fn release(
         active.struck.map_or((0.5 * extent, 1.0, Vec3::ZERO), |struck| (struck.pos, struck.energy, struck.direction));
     let from = request.uv.map_or(pos, |uv| uv * extent);
     let plane = (active.carrier.kind.plane)(world, entity, active).map_err(|reason| ShardsError::NotFlat { reason })?;
-    let to_local = world.get::<GlobalTransform>(entity).map_or(Mat3::IDENTITY, |at| at.affine().matrix3.inverse().into());
+    let to_local =
+        world.get::<GlobalTransform>(entity).map_or(Mat3::IDENTITY, |at| at.affine().matrix3.inverse().into());
     let direction = plane.rotation.inverse() * (to_local * request.direction.unwrap_or(direction));
     let seed = active.surface.seed ^ u64::from(active.broken.as_ref().map_or(0, |broken| broken.next));
     let burst = Burst::new(settings.burst, from, direction, request.energy.unwrap_or(energy), seed)?;
