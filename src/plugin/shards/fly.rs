@@ -1,6 +1,6 @@
 //! Shards in motion.
 
-use super::{Broken, CrackShards, Reassembled, ShatterCracks, drop_shards, holes::bounds};
+use super::{Broken, CrackShards, Reassembled, ShatterCracks, drop_shards, holes::bounds, release::make_room};
 use crate::{
     plugin::{
         carrier::Carrier,
@@ -28,13 +28,13 @@ enum Fate {
 /// Lets time pass for all shards and puts them where they are then.
 pub(in crate::plugin) fn fly_shards(world: &mut World, mut scratch: Local<ShardMesh>) {
     let seconds = world.get_resource::<Time>().map_or(DEFAULT_FRAME, |time| time.delta_secs());
-    let mut whole = Vec::new();
+    let (mut whole, mut shown) = (Vec::new(), Vec::new());
     world.resource_scope(|world, mut surfaces: Mut<Surfaces>| {
         let mut broken = core::mem::take(&mut surfaces.broken);
         broken.retain(|&entity| {
             let Some(active) = surfaces.active.get_mut(&entity) else { return false };
             let Some(pieces) = active.broken.take() else { return false };
-            match fly(world, entity, active, pieces, seconds, &mut scratch) {
+            match fly(world, entity, active, pieces, seconds, &mut scratch, &mut shown) {
                 Fate::Broken => {}
                 Fate::Mended => {
                     active.mind_holes();
@@ -51,6 +51,10 @@ pub(in crate::plugin) fn fly_shards(world: &mut World, mut scratch: Local<ShardM
             true
         });
         surfaces.broken = broken;
+        if !shown.is_empty() {
+            surfaces.shards.extend(shown);
+            make_room(world, &mut surfaces);
+        }
     });
     for entity in whole {
         world.trigger(Reassembled { entity });
@@ -64,6 +68,7 @@ fn fly(
     mut broken: Box<Broken>,
     seconds: f32,
     scratch: &mut ShardMesh,
+    shown: &mut Vec<Entity>,
 ) -> Fate {
     let (speed, seek, is_flying) = match world.get_mut::<ShatterCracks>(surface) {
         Some(mut settings) => (settings.speed, settings.bypass_change_detection().seek.take(), settings.fly),
@@ -98,7 +103,7 @@ fn fly(
     let is_over = before > broken.end && now > broken.end;
     if is_flying && now != before && !is_over {
         for index in 0..broken.pieces.len() {
-            broken.show(world, surface, &active.carrier, index, scratch);
+            shown.extend(broken.show(world, surface, &active.carrier, index, scratch));
         }
     }
     if now != before
@@ -111,16 +116,24 @@ fn fly(
 }
 
 impl Broken {
-    /// Puts a piece where it is now, if it is anywhere.
-    fn show(&mut self, world: &mut World, surface: Entity, carrier: &Carrier, index: usize, scratch: &mut ShardMesh) {
+    /// Puts a piece where it is now, if it is anywhere. Returns its entity if that is new.
+    fn show(
+        &mut self,
+        world: &mut World,
+        surface: Entity,
+        carrier: &Carrier,
+        index: usize,
+        scratch: &mut ShardMesh,
+    ) -> Option<Entity> {
         let piece = &self.pieces[index];
         let pose = piece.flight.pose((self.time - piece.start) as f32);
         if pose.opacity <= 0.0 {
-            return self.hide(world, index);
+            self.hide(world, index);
+            return None;
         }
-        if piece.entity.is_none() && !piece.is_spent {
-            self.spawn(world, surface, carrier, index, scratch);
-        }
+        let is_new = piece.entity.is_none() && !piece.is_spent;
+        let shard = if is_new { self.spawn(world, surface, carrier, index, scratch) } else { None };
         self.pose(world, surface, carrier, index, pose);
+        shard
     }
 }

@@ -88,7 +88,7 @@ pub(in crate::plugin) fn shatter_surfaces(world: &mut World, mut scratch: Local<
 }
 
 /// The oldest shards go if there are too many.
-fn make_room(world: &mut World, surfaces: &mut Surfaces) {
+pub(super) fn make_room(world: &mut World, surfaces: &mut Surfaces) {
     surfaces.shards.retain(|shard| world.get_entity(*shard).is_ok());
     let excess = surfaces.shards.len().saturating_sub(world.resource::<CrackBudget>().max_shards);
     let mut shortened = Vec::new();
