@@ -44,7 +44,7 @@ impl Studio {
     }
 
     fn word(&self, text: &str) -> Done<Guide> {
-        Ok(Guide::new(draw_text(FONT, text, self.frame.size()).ok_or("the font cannot be read")?))
+        Ok(Guide::new(draw_text(FONT, text, self.frame.size(), f32::INFINITY).ok_or("the font cannot be read")?))
     }
 
     fn map(&self, params: VoronoiParams, guides: &[Guide]) -> Done<(VoronoiMap, Seams)> {

@@ -1,6 +1,6 @@
 //! `bake growth`: hits in, textures and the network out.
 
-use crate::picture::read_picture;
+use crate::{own::own_picture, pictures::read_picture};
 use bevy_crack::{
     CrackPreset,
     growth::{CrackGrowth, HitOutcome},
@@ -12,17 +12,11 @@ use clap::Args;
 use glam::{UVec2, Vec2};
 use image::{GrayImage, ImageBuffer, Luma, Rgba, RgbaImage, imageops::FilterType};
 use serde_json::json;
-use std::{
-    error::Error,
-    fs,
-    path::{Path, PathBuf},
-    sync::Arc,
-    time::Instant,
-};
+use std::{error::Error, fs, path::PathBuf, sync::Arc, time::Instant};
 
 #[derive(Args)]
 pub(crate) struct Options {
-    /// glass, concrete or clay
+    /// One of the presets: glass, concrete, clay and others
     #[arg(long, default_value = "concrete")]
     preset: String,
     /// Width and height in texels; by default those of the base picture, or 512x512
@@ -82,17 +76,6 @@ fn hit(text: &str) -> Result<(Vec2, f32), String> {
 pub(crate) fn setting(text: &str) -> Result<(String, String), String> {
     let (name, value) = text.split_once('=').ok_or("a setting is NAME=VALUE")?;
     Ok((name.into(), value.into()))
-}
-
-/// The pictures that ship with the crate.
-pub(crate) fn own_picture(preset: &str) -> PathBuf {
-    let file = match preset {
-        "glass" | "tempered_glass" | "laminated_glass" => "glass_pane",
-        "brick" => "brick_red",
-        "plaster" | "clay" | "mud" | "glaze" | "ice" | "toon" => preset,
-        _ => "concrete_fine",
-    };
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/textures").join(file).with_extension("png")
 }
 
 /// Writes the textures, and returns the network and the cracked picture.

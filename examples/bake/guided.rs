@@ -2,7 +2,8 @@
 
 use crate::{
     growth::size,
-    picture::{ink, lightness, read_picture},
+    ink::{ink, lightness},
+    pictures::read_picture,
     text::{FONT, draw_text},
 };
 use bevy_crack::{
@@ -139,7 +140,8 @@ fn guides(options: &Options) -> Result<Vec<Guide>, Box<dyn Error>> {
     }
     for text in &options.text {
         let text = text.replace("\\n", "\n");
-        let image = draw_text(font.as_deref().unwrap_or(FONT), &text, options.size).ok_or("the font cannot be read")?;
+        let image = draw_text(font.as_deref().unwrap_or(FONT), &text, options.size, f32::INFINITY)
+            .ok_or("the font cannot be read")?;
         guides.push(Guide { image, gamma: options.gamma });
     }
     Ok(guides)

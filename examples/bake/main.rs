@@ -12,13 +12,19 @@ mod figures;
 mod gallery;
 mod growth;
 mod guided;
-mod picture;
+mod ink;
+mod own;
+mod pictures;
 mod realism;
 mod shatter;
+mod sheet;
 mod text;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
+
+/// Pictures, fonts and presets that ship with the crate.
+pub(crate) const ASSETS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/assets");
 
 #[derive(Parser)]
 #[command(about = "Makes crack textures without an engine")]

@@ -10,16 +10,11 @@ pub(crate) const FONT: &[u8] = include_bytes!("../../assets/fonts/open_sans_extr
 /// Share of the surface that stays free on each side.
 const MARGIN: f32 = 0.06;
 
-/// The lines of `text` as large as they fit into `size` texels: 1 inside the letters, 0 outside; `None` if the font
+/// The lines of `text` as large as they fit into `size` texels, in letters of at most `most` texels: 1 inside the letters, 0 outside; `None` if the font
 /// cannot be read.
 ///
 /// Letters that the font lacks are drawn as its box; a text without letters gives an empty guide.
-pub(crate) fn draw_text(font: &[u8], text: &str, size: UVec2) -> Option<Grid<f32>> {
-    draw_text_up_to(font, text, size, f32::INFINITY)
-}
-
-/// The same, in letters of at most this size, texels.
-pub(crate) fn draw_text_up_to(font: &[u8], text: &str, size: UVec2, most: f32) -> Option<Grid<f32>> {
+pub(crate) fn draw_text(font: &[u8], text: &str, size: UVec2, most: f32) -> Option<Grid<f32>> {
     let font = FontRef::try_from_slice(font).ok()?;
     let mut grid = Grid::new(size, 0.0f32);
     // Laid out at a size of 100, then scaled.

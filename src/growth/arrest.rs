@@ -249,7 +249,8 @@ impl CrackGrowth {
         let to = to.clamp(Vec2::ZERO, extent);
         // The border is a crack too: none runs along it.
         let inward = Vec2::splat(0.3 * self.params.step_length).min(0.5 * extent);
-        let (low, high) = (node.pos.cmpeq(Vec2::ZERO) & to.cmpeq(Vec2::ZERO), node.pos.cmpeq(extent) & to.cmpeq(extent));
+        let (low, high) =
+            (node.pos.cmpeq(Vec2::ZERO) & to.cmpeq(Vec2::ZERO), node.pos.cmpeq(extent) & to.cmpeq(extent));
         let to = Vec2::select(low, inward, Vec2::select(high, extent - inward, to));
         match self.free_line(SegmentId::Branch(child), (from, u32::MAX), (node.pos, to)) {
             Ok((bend, path)) => {
@@ -258,6 +259,9 @@ impl CrackGrowth {
                 if let Some(arrest) = &mut self.arrest {
                     arrest.walls.add((from, child), &path);
                     arrest.sealed[child as usize] = is_sealed || on_border;
+                }
+                if on_border {
+                    self.widen_end(child);
                 }
                 Some(child)
             }
@@ -292,8 +296,16 @@ impl CrackGrowth {
 
     /// Links a tip to a node of another crack, unless a third is in the way; says whether it did.
     fn join(&mut self, node: u32, tip: u32) -> bool {
-        let (width, birth) = (self.network.nodes[tip as usize].width, self.steps);
-        self.link(Link { a: node, b: tip, width, birth, kind: LinkKind::Junction, bend: 1.0 })
+        let link = Link { a: node, b: tip, width: 0.0, birth: self.steps, kind: LinkKind::Junction, bend: 1.0 };
+        let joined = self.link(link);
+        if joined {
+            self.widen_end(tip);
+            let width = self.network.nodes[tip as usize].width;
+            if let Some(link) = self.network.links.last_mut() {
+                link.width = width;
+            }
+        }
+        joined
     }
 
     /// Adds a link, unless cracks must not cross and it would; says whether it did.

@@ -120,6 +120,8 @@ pub struct GrowthParams {
     /// The widest that what hangs on it makes a crack. Pattern units, at least `line_width`, at most 0.4. Hammering on the
     /// same spot makes it up to twice as wide.
     pub max_width: f32,
+    /// How much narrower free ends are, 0..=0.9, as a share; over the last few nodes.
+    pub tip_taper: f32,
     /// How much the width varies along a crack, 0..=0.9, as a share of it.
     pub unevenness: f32,
     /// How much a crack keeps its direction, against the pull of the markers: 0 = not at all, 1 = as much as it follows them.
@@ -153,9 +155,11 @@ pub struct GrowthParams {
     /// Cracks that begin by themselves where markers are out of every crack's reach: how many for each step of growth, 0..=64.
     /// They come late, so they end at the older ones.
     pub nucleation: f32,
-    /// How much one surface differs from the next, by its seed: widths, roughness, the spacing of markers, the number of starts and
+    /// How much one surface differs from the next, by its seed: roughness, the spacing of markers, the number of starts and
     /// of free ends, the axis. 0 = not at all; at 1 each differs by a factor of about 2 either way. 0..=1.
     pub variety: f32,
+    /// How much widths alone differ from one surface to the next; as [`variety`](Self::variety). 0..=1.
+    pub width_variety: f32,
     /// Whether the markers themselves are drawn.
     pub draw_markers: bool,
     /// The most nodes that a surface gets, 1..=1000000.
@@ -180,6 +184,7 @@ impl GrowthParams {
         line_growth: 0.4,
         murray: 3.0,
         max_width: 0.03,
+        tip_taper: 0.0,
         unevenness: 0.0,
         inertia: 0.0,
         axis: 0.0,
@@ -196,6 +201,7 @@ impl GrowthParams {
         arrest: 0.0,
         nucleation: 0.0,
         variety: 0.0,
+        width_variety: 0.0,
         draw_markers: false,
         max_nodes: 20_000,
     };
@@ -279,6 +285,7 @@ impl GrowthParams {
         line_growth: f32 = 0.0, 16.0;
         murray: f32 = 1.0, 8.0;
         max_width: f32 = 0.0005, 0.4;
+        tip_taper: f32 = 0.0, 0.9;
         unevenness: f32 = 0.0, 0.9;
         inertia: f32 = 0.0, 8.0;
         axis: f32 = -7.0, 7.0;
@@ -293,6 +300,7 @@ impl GrowthParams {
         arrest: f32 = 0.0, 1.0;
         nucleation: f32 = 0.0, 64.0;
         variety: f32 = 0.0, 1.0;
+        width_variety: f32 = 0.0, 1.0;
         max_nodes: u32 = 1.0, 1_000_000.0;
     }
 
@@ -438,12 +446,13 @@ impl GrowthParams {
     #[must_use]
     pub fn varied(&self, seed: u64) -> Self {
         let mut varied = self.clone();
-        if self.variety <= 0.0 {
+        if self.variety <= 0.0 && self.width_variety <= 0.0 {
             return varied;
         }
         let mut rng = Rng::new(seed).stream("variety");
-        let mut factor = || ops::exp(self.variety * 0.7 * (rng.signed() + rng.signed()));
-        let (width, rough, stray, spacing, starts, free) = (factor(), factor(), factor(), factor(), factor(), factor());
+        let mut factor = |variety: f32| ops::exp(variety * 0.7 * (rng.signed() + rng.signed()));
+        let width = factor(self.width_variety);
+        let [rough, stray, spacing, starts, free] = [self.variety; 5].map(factor);
         varied.line_width = (self.line_width * width).clamp(0.0005, 0.2);
         varied.max_width = (self.max_width * width).clamp(varied.line_width, 0.4);
         varied.roughness = (self.roughness * rough).min(0.5);
@@ -456,7 +465,12 @@ impl GrowthParams {
                 varied.num_lines_grid = count(self.num_lines_grid, 1.0 / spacing, 512);
                 varied.num_columns_grid = count(self.num_columns_grid, 1.0 / spacing, 512);
             }
-            MarkerLayout::DartThrowing { spacing: apart } => *apart = (*apart * spacing).clamp(0.002, 1.0),
+            MarkerLayout::DartThrowing { spacing: apart } => {
+                *apart = (*apart * spacing).clamp(0.002, 1.0);
+                // Markers further apart must be seen from further away.
+                let furthest = (256.0 * self.step_length).min(32.0);
+                varied.crack_radius = (self.crack_radius * spacing.max(1.0)).min(furthest).max(self.crack_radius);
+            }
             MarkerLayout::Polar { sectors, .. } => *sectors = count(*sectors, 1.0 / spacing, 360),
         }
         match &mut varied.starts {

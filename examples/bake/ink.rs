@@ -1,21 +1,7 @@
-//! Pictures from outside, and what can be read out of them.
+//! What can be read out of pictures.
 
 use bevy_crack::Grid;
-use image::{ImageReader, Limits, Rgba, RgbaImage};
-use std::{error::Error, path::Path};
-
-/// A picture of at most 8192 texels a side and 256 MiB; the header is checked before memory is taken.
-pub(crate) fn read_picture(path: &Path) -> Result<RgbaImage, Box<dyn Error>> {
-    let named = |error: &dyn std::fmt::Display| format!("{}: {error}", path.display());
-    let mut reader = ImageReader::open(path).map_err(|error| named(&error))?;
-    let mut limits = Limits::default();
-    limits.max_image_width = Some(8192);
-    limits.max_image_height = Some(8192);
-    limits.max_alloc = Some(256 << 20);
-    reader.limits(limits);
-    let picture = reader.with_guessed_format()?.decode().map_err(|error| named(&error))?;
-    Ok(picture.to_rgba8())
-}
+use image::{Rgba, RgbaImage};
 
 fn light(texel: &Rgba<u8>) -> f32 {
     (f32::from(texel[0]) * 0.299 + f32::from(texel[1]) * 0.587 + f32::from(texel[2]) * 0.114) / 255.0

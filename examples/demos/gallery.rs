@@ -1,0 +1,143 @@
+//! Every preset on its own picture: a wall of panes to click.
+//!
+//! Click to hit, H heals. Without a display (or with `--headless`) each pane is hit by a script, and pictures are written to
+//! `--out`: `gallery.png`, made without the engine, shows every preset at three moments; the others are of the wall.
+
+#[path = "../bake/own.rs"]
+mod own;
+#[path = "../bake/pictures.rs"]
+mod pictures;
+#[path = "../bake/sheet.rs"]
+mod sheet;
+#[path = "../bake/text.rs"]
+mod text;
+
+use bevy::prelude::*;
+use bevy_crack::prelude::*;
+use bevy_crack_demos::{DemoArguments, Film, FilmPlugin, OnCanvas, Output, demo_app};
+use clap::Parser;
+use std::{error::Error, fs, path::Path};
+
+/// Pictures, fonts and presets that ship with the crate.
+pub(crate) const ASSETS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets");
+
+/// Side of a pane in the world, and from the middle of one to the next.
+const SIDE: f32 = 204.0;
+const PITCH: Vec2 = Vec2::new(211.0, 270.0);
+const COLUMNS: usize = 6;
+
+/// Hits on each pane in the scripted run.
+const HITS: u32 = 2;
+
+#[derive(Parser)]
+#[command(about = "Every preset on its own picture: a wall of panes to click")]
+struct Arguments {
+    #[command(flatten)]
+    demo: DemoArguments,
+}
+
+#[derive(Component)]
+struct Pane;
+
+#[expect(clippy::print_stderr, reason = "a demo says what went wrong")]
+fn main() -> AppExit {
+    let arguments = Arguments::parse().demo;
+    let (mut app, output) = demo_app("bevy_crack: gallery", &arguments);
+    if output != Output::Window
+        && let Err(error) = write_sheet(&arguments.out)
+    {
+        eprintln!("gallery.png: {error}");
+        return AppExit::error();
+    }
+    app.add_plugins((CrackPlugins, FilmPlugin))
+        .insert_resource(ClearColor(Color::srgb(0.09, 0.1, 0.115)))
+        .add_systems(Startup, setup);
+    if output == Output::Window {
+        app.add_systems(Update, heal_on_h);
+    } else {
+        app.add_systems(Update, play_script);
+    }
+    app.run()
+}
+
+fn write_sheet(out: &Path) -> Result<(), Box<dyn Error>> {
+    fs::create_dir_all(out)?;
+    Ok(sheet::draw(&CrackPreset::NAMES, 1, sheet::SIDE)?.save(out.join("gallery.png"))?)
+}
+
+fn setup(mut commands: Commands, assets: Res<AssetServer>, film: Res<Film>) {
+    let mut camera = commands.spawn(Camera2d);
+    if let Some(target) = film.camera_target() {
+        camera.insert(target);
+    }
+    let size = Vec2::splat(SIDE);
+    let rows = CrackPreset::NAMES.len().div_ceil(COLUMNS);
+    let middle = Vec2::new(COLUMNS as f32 - 1.0, rows as f32 - 1.0) / 2.0;
+    for (i, name) in CrackPreset::NAMES.into_iter().enumerate() {
+        let Some(preset) = CrackPreset::named(name) else { continue };
+        let cell = Vec2::new((i % COLUMNS) as f32, (i / COLUMNS) as f32);
+        let at = (cell - middle) * PITCH * Vec2::new(1.0, -1.0);
+        let file = |name: &str| own::own_picture(name).file_name().map(|file| Path::new("textures").join(file));
+        let Some(picture) = file(name).map(|file| assets.load(file)) else { continue };
+        if name.contains("glass")
+            && let Some(behind) = file("clay").map(|file| assets.load(file))
+        {
+            // Panes stand before a picture, so that one sees they are glass.
+            let color = Color::srgb(0.5, 0.55, 0.6);
+            commands.spawn((
+                Sprite { image: behind.clone(), color, custom_size: Some(size), ..default() },
+                Transform::from_translation(at.extend(-1.0)),
+                OnCanvas { picture: behind, size },
+            ));
+        }
+        let mask = if name == "brick" { CrackMaskSource::FromPicture } else { CrackMaskSource::None };
+        commands
+            .spawn((
+                Pane,
+                Sprite { image: picture.clone(), custom_size: Some(size), ..default() },
+                Transform::from_translation(at.extend(0.0)),
+                CrackSurface::new(preset).with_seed(i as u64).with_mask(mask),
+                OnCanvas { picture, size },
+                Pickable::default(),
+            ))
+            .observe(|press: On<Pointer<Press>>, mut commands: Commands| {
+                if let Some(point) = press.hit.position {
+                    commands.trigger(CrackHit::world(press.entity, point));
+                }
+            });
+        commands.spawn((
+            Text2d::new(name.replace('_', " ")),
+            TextFont { font_size: FontSize::Px(16.0), ..default() },
+            TextColor(Color::srgb(0.7, 0.72, 0.75)),
+            Transform::from_translation((at - Vec2::Y * (SIDE / 2.0 + 16.0)).extend(1.0)),
+        ));
+    }
+}
+
+fn heal_on_h(mut commands: Commands, keys: Res<ButtonInput<KeyCode>>, panes: Query<Entity, With<Pane>>) {
+    if keys.just_pressed(KeyCode::KeyH) {
+        for pane in &panes {
+            commands.entity(pane).heal_cracks();
+        }
+    }
+}
+
+/// The scripted run: every pane is hit, one after the other, and again.
+fn play_script(
+    mut commands: Commands,
+    mut frame: Local<u32>,
+    mut hits: Local<u32>,
+    arguments: Res<DemoArguments>,
+    panes: Query<Entity, With<Pane>>,
+) {
+    *frame += 1;
+    let panes: Vec<_> = panes.iter().collect();
+    let all = HITS * panes.len() as u32;
+    let share = *frame as f32 / arguments.frames.max(1) as f32;
+    while *hits < (share / 0.8 * all as f32).ceil().min(all as f32) as u32 {
+        let (i, pane) = (*hits, panes[*hits as usize % panes.len()]);
+        *hits += 1;
+        let at = Vec2::new((0.45 + i as f32 * 0.618).fract(), (0.5 + i as f32 * 0.755).fract()) * 0.6 + 0.2;
+        commands.trigger(CrackHit::uv(pane, at));
+    }
+}
