@@ -1,6 +1,6 @@
 //! `bake growth`: hits in, textures and the network out.
 
-use crate::pictures::{own_picture, read_picture};
+use crate::{own::own_picture, pictures::read_picture};
 use bevy_crack::{
     CrackPreset,
     growth::{CrackGrowth, HitOutcome},

@@ -13,6 +13,7 @@ mod gallery;
 mod growth;
 mod guided;
 mod ink;
+mod own;
 mod pictures;
 mod realism;
 mod shatter;

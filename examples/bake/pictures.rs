@@ -1,21 +1,7 @@
-//! Pictures to crack.
+//! Pictures from outside.
 
 use image::{ImageReader, Limits, RgbaImage};
-use std::{
-    error::Error,
-    path::{Path, PathBuf},
-};
-
-/// The pictures that ship with the crate.
-pub(crate) fn own_picture(preset: &str) -> PathBuf {
-    let file = match preset {
-        "glass" | "tempered_glass" | "laminated_glass" => "glass_pane",
-        "brick" => "brick_red",
-        "plaster" | "clay" | "mud" | "glaze" | "ice" | "toon" => preset,
-        _ => "concrete_fine",
-    };
-    Path::new(crate::ASSETS).join("textures").join(file).with_extension("png")
-}
+use std::{error::Error, path::Path};
 
 /// A picture of at most 8192 texels a side and 256 MiB; the header is checked before memory is taken.
 pub(crate) fn read_picture(path: &Path) -> Result<RgbaImage, Box<dyn Error>> {

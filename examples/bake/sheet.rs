@@ -1,7 +1,8 @@
 //! Every preset on its own picture, at three moments after a hit, on one sheet; made without an engine.
 
 use crate::{
-    pictures::{own_picture, read_picture},
+    own::own_picture,
+    pictures::read_picture,
     text::{FONT, draw_text},
 };
 use bevy_crack::{

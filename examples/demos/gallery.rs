@@ -3,6 +3,8 @@
 //! Click to hit, H heals. Without a display (or with `--headless`) each pane is hit by a script, and pictures are written to
 //! `--out`: `gallery.png`, made without the engine, shows every preset at three moments; the others are of the wall.
 
+#[path = "../bake/own.rs"]
+mod own;
 #[path = "../bake/pictures.rs"]
 mod pictures;
 #[path = "../bake/sheet.rs"]
@@ -75,7 +77,7 @@ fn setup(mut commands: Commands, assets: Res<AssetServer>, film: Res<Film>) {
         let Some(preset) = CrackPreset::named(name) else { continue };
         let cell = Vec2::new((i % COLUMNS) as f32, (i / COLUMNS) as f32);
         let at = (cell - middle) * PITCH * Vec2::new(1.0, -1.0);
-        let file = |name: &str| pictures::own_picture(name).file_name().map(|file| Path::new("textures").join(file));
+        let file = |name: &str| own::own_picture(name).file_name().map(|file| Path::new("textures").join(file));
         let Some(picture) = file(name).map(|file| assets.load(file)) else { continue };
         if name.contains("glass")
             && let Some(behind) = file("clay").map(|file| assets.load(file))

@@ -266,6 +266,9 @@ impl CrackGrowth {
                     arrest.walls.add((from, child), &path);
                     arrest.sealed[child as usize] = is_sealed || on_border;
                 }
+                if on_border {
+                    self.widen_end(child);
+                }
                 Some(child)
             }
             Err(()) if self.params.arrest <= 0.0 => None,
@@ -299,8 +302,16 @@ impl CrackGrowth {
 
     /// Links a tip to a node of another crack, unless a third is in the way; says whether it did.
     fn join(&mut self, node: u32, tip: u32) -> bool {
-        let (width, birth) = (self.network.nodes[tip as usize].width, self.steps);
-        self.link(Link { a: node, b: tip, width, birth, kind: LinkKind::Junction, bend: 1.0 })
+        let link = Link { a: node, b: tip, width: 0.0, birth: self.steps, kind: LinkKind::Junction, bend: 1.0 };
+        let joined = self.link(link);
+        if joined {
+            self.widen_end(tip);
+            let width = self.network.nodes[tip as usize].width;
+            if let Some(link) = self.network.links.last_mut() {
+                link.width = width;
+            }
+        }
+        joined
     }
 
     /// Adds a link, unless cracks must not cross and it would; says whether it did.

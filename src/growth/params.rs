@@ -120,6 +120,8 @@ pub struct GrowthParams {
     /// The widest that what hangs on it makes a crack. Pattern units, at least `line_width`, at most 0.4. Hammering on the
     /// same spot makes it up to twice as wide.
     pub max_width: f32,
+    /// How much narrower free ends are, 0..=0.9, as a share; over the last few nodes.
+    pub tip_taper: f32,
     /// How much the width varies along a crack, 0..=0.9, as a share of it.
     pub unevenness: f32,
     /// How much a crack keeps its direction, against the pull of the markers: 0 = not at all, 1 = as much as it follows them.
@@ -180,6 +182,7 @@ impl GrowthParams {
         line_growth: 0.4,
         murray: 3.0,
         max_width: 0.03,
+        tip_taper: 0.0,
         unevenness: 0.0,
         inertia: 0.0,
         axis: 0.0,
@@ -279,6 +282,7 @@ impl GrowthParams {
         line_growth: f32 = 0.0, 16.0;
         murray: f32 = 1.0, 8.0;
         max_width: f32 = 0.0005, 0.4;
+        tip_taper: f32 = 0.0, 0.9;
         unevenness: f32 = 0.0, 0.9;
         inertia: f32 = 0.0, 8.0;
         axis: f32 = -7.0, 7.0;
@@ -456,7 +460,12 @@ impl GrowthParams {
                 varied.num_lines_grid = count(self.num_lines_grid, 1.0 / spacing, 512);
                 varied.num_columns_grid = count(self.num_columns_grid, 1.0 / spacing, 512);
             }
-            MarkerLayout::DartThrowing { spacing: apart } => *apart = (*apart * spacing).clamp(0.002, 1.0),
+            MarkerLayout::DartThrowing { spacing: apart } => {
+                *apart = (*apart * spacing).clamp(0.002, 1.0);
+                // Markers further apart must be seen from further away.
+                let furthest = (256.0 * self.step_length).min(32.0);
+                varied.crack_radius = (self.crack_radius * spacing.max(1.0)).min(furthest).max(self.crack_radius);
+            }
             MarkerLayout::Polar { sectors, .. } => *sectors = count(*sectors, 1.0 / spacing, 360),
         }
         match &mut varied.starts {

@@ -502,10 +502,21 @@ impl CrackGrowth {
         self.pull_of.push(NO_PULL);
         self.changes.push_node(parent);
         self.timeline.add_node(width);
-        let (changes, network) = (&mut self.changes, &mut self.network);
+        self.widen_with(|widths, nodes, widened| widths.push(nodes, widened));
+    }
+
+    /// A tip that has met a crack is as wide there as further back.
+    pub(super) fn widen_end(&mut self, tip: u32) {
+        if self.params.tip_taper > 0.0 {
+            self.widen_with(|widths, nodes, widened| widths.join(nodes, tip, widened));
+        }
+    }
+
+    /// Lets `act` widen nodes, and notes which became wider.
+    fn widen_with(&mut self, act: impl FnOnce(&mut Widths, &mut [Node], &mut dyn FnMut(u32))) {
         let mut widened = [NO_PARENT; 64];
         let mut n = 0;
-        self.widths.push(&mut network.nodes, |node| {
+        act(&mut self.widths, &mut self.network.nodes, &mut |node| {
             // Each node on the way up is wider than the one before, so there are no more than notches.
             if let Some(slot) = widened.get_mut(n) {
                 *slot = node;
@@ -513,8 +524,8 @@ impl CrackGrowth {
             }
         });
         for &node in &widened[..n] {
-            let widened = network.nodes[node as usize];
-            changes.widened(node, widened.parent != NO_PARENT);
+            let widened = self.network.nodes[node as usize];
+            self.changes.widened(node, widened.parent != NO_PARENT);
             self.timeline.widen(node, widened.width);
         }
     }
@@ -803,6 +814,7 @@ impl CrackGrowth {
             let nodes = &self.network.nodes;
             if a != b && nodes[a as usize].parent != b && nodes[b as usize].parent != a && !self.stays_open(b) {
                 let width = nodes[a as usize].width.min(nodes[b as usize].width);
+                self.widen_end(b);
                 self.link(Link { a, b, width, birth: self.steps, kind: LinkKind::Meeting, bend: 1.0 });
             }
         }

@@ -4,10 +4,12 @@ use super::{CrackGrowth, GrowthParams, HitOutcome, MAX_ENERGY, MarkerLayout, Rej
 use crate::{
     CrackPreset, Grid,
     math::{Rng, hash_unit, mix},
-    pattern::{LinkKind, Moment, NO_IMPACT, NO_PARENT, SegmentId},
+    pattern::{CrackMask, LinkKind, Moment, NO_IMPACT, NO_PARENT, SegmentId, SurfaceFrame},
+    raster::{DepthField, Profile, stamp_path},
     voronoi::{VoronoiBake, VoronoiParams},
 };
-use glam::Vec2;
+use glam::{UVec2, Vec2};
+use std::sync::Arc;
 
 /// Random parameters that validate; `small` keeps the numbers of markers and nodes low.
 fn random_params(rng: &mut Rng, small: bool) -> GrowthParams {
@@ -61,6 +63,7 @@ fn random_params(rng: &mut Rng, small: bool) -> GrowthParams {
         arrest: 0.0,
         venation: Venation::Open,
         nucleation: 0.0,
+        tip_taper: 0.0,
         unevenness: 0.0,
         inertia: 0.0,
         axis: 0.0,
@@ -718,6 +721,7 @@ fn random_arrest(rng: &mut Rng) -> GrowthParams {
         open_ends: if rng.unit() < 0.5 { 0.0 } else { rng.unit() },
         // A crack that strays by more at every node has no direction that another could meet steeply.
         wander: params.wander.min(0.5),
+        tip_taper: 0.9 * rng.unit(),
         unevenness: 0.9 * rng.unit(),
         axis: 3.0 * rng.signed(),
         directed: if rng.unit() < 0.5 { 0.0 } else { rng.unit() },
@@ -901,7 +905,8 @@ fn added_cracks_come_as_their_network_says() {
         let (network, timeline) = (growth.network(), growth.timeline());
         assert_eq!((timeline.end(), growth.steps()), (steps, steps));
         for (i, (node, seam)) in (0u32..).zip(network.nodes().iter().zip(seams.nodes())) {
-            assert!(node.pos.distance(seam.pos) < 1e-6 && node.width == seam.width && node.parent == seam.parent);
+            let place = seam.pos / seams.extent() * extent;
+            assert!(node.pos.distance(place) < 1e-5 && node.width == seam.width && node.parent == seam.parent);
             let on_border = |pos: Vec2, extent: Vec2| (pos.cmpeq(Vec2::ZERO) | pos.cmpeq(extent)).any();
             assert_eq!(on_border(node.pos, extent), on_border(seam.pos, seams.extent()), "{node:?}");
             let width = |step: u32| timeline.width_at(i, Moment::after(step)).unwrap();
@@ -925,5 +930,89 @@ fn added_cracks_come_as_their_network_says() {
         assert!(matches!(growth.hit(0.5 * extent, 4.0), HitOutcome::Started(_)));
         while growth.step().grew() {}
         assert_eq!(growth.network().nodes().len(), n + 50);
+    }
+}
+
+/// Forbidden texels hold no line, and, with the field that keeps them, no depth.
+#[test]
+fn forbidden_texels_hold_no_crack() {
+    let mut drawn = 0;
+    for case in 0..120u64 {
+        let mut rng = Rng::new(case).stream("forbidden");
+        let mut params = random_arrest(&mut rng);
+        if rng.unit() < 0.5 {
+            params.arrest = 0.0;
+        }
+        let side = 8 + rng.next_u32() % 40;
+        let mut forbidden = Grid::new(UVec2::splat(side), 0.0);
+        for texel in forbidden.as_mut_slice() {
+            *texel = if rng.unit() < 0.15 { 1.0 } else { 0.0 };
+        }
+        let mask = Arc::new(CrackMask { forbidden: Some(forbidden), ..CrackMask::default() });
+        let mut growth = CrackGrowth::new(params, Vec2::ONE, case).unwrap();
+        growth.set_mask(mask.clone());
+        for _ in 0..3 {
+            let at = Vec2::new(rng.unit(), rng.unit());
+            let outcome = growth.hit(at, 1.0);
+            assert_eq!(outcome == HitOutcome::Rejected(Rejected::Forbidden), mask.is_forbidden(at), "case {case}");
+            while growth.step().grew() {}
+        }
+        let mut field = DepthField::new(SurfaceFrame::new(UVec2::splat(160)).unwrap());
+        field.forbid(&mask);
+        for path in growth.network().segments().filter_map(|segment| growth.network().path(segment)) {
+            for pair in path.points().windows(2) {
+                // Far finer than a texel of the mask.
+                for i in 0..=50 {
+                    let at = pair[0].pos.lerp(pair[1].pos, i as f32 / 50.0);
+                    let inner = [Vec2::new(1e-5, 1e-5), Vec2::new(-1e-5, -1e-5)];
+                    let is_inside = inner.iter().all(|&nudge| mask.is_forbidden(at + nudge));
+                    assert!(!is_inside, "case {case}: a line enters a forbidden texel at {at}");
+                }
+            }
+            stamp_path(&mut field, &Profile::default(), &path);
+            drawn += 1;
+        }
+        for y in 0..160 {
+            for x in 0..160 {
+                let uv = (Vec2::new(x as f32, y as f32) + 0.5) / 160.0;
+                assert!(!mask.is_forbidden(uv) || field.depth.get(x, y) == Some(0), "case {case}: {x} {y} is cracked");
+            }
+        }
+    }
+    assert!(drawn > 3000, "only {drawn} segments");
+}
+
+/// Hammering on one spot widens what is there, by no more than twice, and makes no second crack beside it.
+#[test]
+fn later_hits_on_a_spot_widen() {
+    for preset in [CrackPreset::CONCRETE, CrackPreset::GLASS, CrackPreset::MUD] {
+        let mut growth = CrackGrowth::new(preset.growth, Vec2::ONE, 5).unwrap();
+        growth.hit(Vec2::splat(0.5), 1.0);
+        while growth.step().grew() {}
+        let (first, mut changed) = (growth.network().nodes().to_vec(), Vec::new());
+        growth.take_changed(&mut changed);
+        changed.clear();
+        for _ in 0..40 {
+            assert_eq!(growth.hit(Vec2::new(0.501, 0.5), 1.0), HitOutcome::Merged(0));
+            while growth.step().grew() {}
+        }
+        assert_eq!(growth.impacts().len(), 1);
+        let widened = growth.network().nodes();
+        let by: Vec<f32> = first.iter().zip(widened).map(|(before, after)| after.width / before.width).collect();
+        assert!(by.iter().all(|by| *by >= 1.0), "a crack has become narrower");
+        // Sixteen times the energy is as much as a spot takes: twice as wide.
+        assert!(by.iter().filter(|by| **by > 1.9).count() * 10 > 9 * by.len(), "{by:?}");
+        growth.take_changed(&mut changed);
+        let told: std::collections::BTreeSet<_> = changed.drain(..).collect();
+        for node in (0..first.len() as u32).filter(|&node| first[node as usize].parent != NO_PARENT) {
+            assert!(told.contains(&SegmentId::Branch(node)), "segment {node} is wider and not told of");
+        }
+        // No more than that: nothing changes any more.
+        let before = growth.network().clone();
+        for _ in 0..100 {
+            growth.hit(Vec2::new(0.5, 0.501), 16.0);
+            while growth.step().grew() {}
+        }
+        assert_eq!(growth.network(), &before);
     }
 }

@@ -9,6 +9,9 @@ use crate::{
 /// How many times more nodes must hang on a node for its width to grow by one notch.
 const NOTCH: f32 = 1.5;
 
+/// Free ends are narrower over so many nodes.
+const TAPERED: u32 = 5;
+
 /// Widths of nodes by the number of nodes behind them (`lw = line_growth * n_c'` of Couto et al., with the exponent of
 /// Murray's pipe model: `n` nodes are as wide as `n^(1/murray)` tips).
 ///
@@ -38,14 +41,17 @@ struct Pipe {
 
 impl Widths {
     pub(super) fn new(params: &GrowthParams) -> Self {
-        let mut notches = vec![(1u32, params.line_width)];
+        let taper = |count: u32| 1.0 - params.tip_taper * (1.0 - (count - 1) as f32 / TAPERED as f32).max(0.0);
+        let mut notches = vec![(1u32, params.line_width * taper(1))];
         while let Some(&(count, width)) = notches.last() {
-            if width >= params.max_width || params.line_growth <= 0.0 || notches.len() >= 40 {
+            let is_tapered = params.tip_taper > 0.0 && count <= TAPERED;
+            let is_widest = width >= params.max_width || params.line_growth <= 0.0;
+            if (is_widest && !is_tapered) || notches.len() >= 40 {
                 break;
             }
             let count = (count + 2).max((count as f32 * NOTCH) as u32);
             let pipes = ops::powf(count as f32, 1.0 / params.murray) - 1.0;
-            let width = (params.line_width * (1.0 + params.line_growth * pipes)).min(params.max_width);
+            let width = (params.line_width * (1.0 + params.line_growth * pipes)).min(params.max_width) * taper(count);
             notches.push((count, width));
         }
         Self { notches, unevenness: params.unevenness, pipes: Vec::new() }
@@ -88,10 +94,20 @@ impl Widths {
         self.pipes[node as usize].wider *= by;
     }
 
-    /// Widens what it hangs on; calls `widened` with each node that became wider.
-    pub(super) fn push(&mut self, nodes: &mut [Node], mut widened: impl FnMut(u32)) {
+    /// Takes up the newest node and widens what it hangs on; calls `widened` with each node that became wider.
+    pub(super) fn push(&mut self, nodes: &mut [Node], widened: impl FnMut(u32)) {
         let Some(newest) = nodes.last() else { return };
-        let (mut node, mut more) = (newest.parent, 1);
+        let parent = newest.parent;
+        self.add(nodes, parent, 1, widened);
+    }
+
+    /// An end that is free no longer: as if the crack ran on beyond it.
+    pub(super) fn join(&mut self, nodes: &mut [Node], tip: u32, widened: impl FnMut(u32)) {
+        self.add(nodes, tip, TAPERED, widened);
+    }
+
+    /// Adds `more` nodes behind a node.
+    fn add(&mut self, nodes: &mut [Node], mut node: u32, mut more: u32, mut widened: impl FnMut(u32)) {
         while node != NO_PARENT {
             let pipe = &mut self.pipes[node as usize];
             pipe.behind += more;

@@ -10,4 +10,4 @@ mod texel;
 
 pub use look::{ColorStop, Look, LookError, LookTable};
 pub use modulate::{Modulation, modulate};
-pub use texel::{BaseTexels, PaintTargets, paint_into};
+pub use texel::{BaseTexels, PaintTargets, paint_into, paint_rects};

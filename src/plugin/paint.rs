@@ -7,7 +7,7 @@ use super::{
     upload::Uploads,
 };
 use crate::{
-    paint::{BaseTexels, PaintTargets, paint_into},
+    paint::{BaseTexels, PaintTargets, paint_rects},
     pattern::{Moment, NO_PARENT, SegmentId},
     raster::{DOT_DEPTH, DepthField, Redrawn, TexelRect, stamp_dot, stamp_path, stamp_path_with},
 };
@@ -140,9 +140,9 @@ fn paint(active: &mut Active, images: &mut Assets<Image>, uploads: &mut Uploads,
         normal: normal_data.as_deref_mut(),
         depth: depth_data.as_deref_mut(),
     };
+    rects.iter_mut().for_each(|rect| *rect = rect.intersect(shown));
+    paint_rects(base, &active.field, &active.look, rects, origin, &mut targets);
     for rect in rects.drain(..) {
-        let rect = rect.intersect(shown);
-        paint_into(base, &active.field, &active.look, rect, origin, &mut targets);
         let rect = TexelRect { min: rect.min + origin, max: rect.max + origin }.intersect(TexelRect::whole(size));
         for texture in active.textures.handles() {
             uploads.push(texture.id(), rect);

@@ -33,6 +33,14 @@ pub struct CrackUploadStats {
 /// Copies between buffers and textures want rows that begin at multiples of this, bytes.
 const ROW_ALIGNMENT: usize = 256;
 
+/// Rows of a copy begin at multiples of this, bytes, beside those of others. Copies from elsewhere are slow or wrong on some
+/// devices.
+const COPY_ALIGNMENT: usize = 64;
+
+/// Up to this many copies lie side by side, if their rows are no longer than this, bytes: so less is lost to [`ROW_ALIGNMENT`].
+const SIDE_BY_SIDE: usize = 4;
+const SHORT_ROW: usize = 1024;
+
 /// Above this many rectangles of one image the one around them all is uploaded: nobody fetches them.
 const MAX_RECTS_PER_IMAGE: usize = 1024;
 
@@ -41,6 +49,9 @@ const FEW: usize = 4;
 
 /// No more than about this many bytes go up in a frame, so that no buffer is larger than a device allows; the rest waits.
 const MAX_STAGED: usize = 64 << 20;
+
+/// More memory than this is not kept for the next frame, bytes.
+const MAX_KEPT: usize = 16 << 20;
 
 /// Rectangles to upload.
 #[derive(Resource, Default)]
@@ -108,15 +119,49 @@ struct Copy {
     image: AssetId<Image>,
     rect: TexelRect,
     texel: usize,
+    /// Where the first row begins.
     offset: usize,
-    row: usize,
+    /// From row to row.
+    pitch: usize,
 }
 
 impl Copy {
-    /// Bytes that it takes in the staging buffer.
-    fn bytes(&self) -> usize {
-        self.row * self.rect.size().y as usize
+    /// Bytes of a row.
+    fn row(&self) -> usize {
+        self.rect.size().x as usize * self.texel
     }
+
+    fn height(&self) -> usize {
+        self.rect.size().y as usize
+    }
+
+    /// The most bytes that it takes in the staging buffer.
+    fn most_bytes(&self) -> usize {
+        self.row().next_multiple_of(ROW_ALIGNMENT) * self.height()
+    }
+
+    fn fits_beside(&self, other: &Self) -> bool {
+        self.height() == other.height() && self.row() <= SHORT_ROW && other.row() <= SHORT_ROW
+    }
+}
+
+/// Finds a place for each copy, side by side with its neighbours where they are equally high (the textures of a surface);
+/// returns the bytes they take.
+fn lay_out(copies: &mut [Copy]) -> usize {
+    let mut end = 0;
+    for equals in copies.chunk_by_mut(Copy::fits_beside) {
+        for shelf in equals.chunks_mut(SIDE_BY_SIDE) {
+            let mut pitch = 0;
+            for copy in &mut *shelf {
+                copy.offset = end + pitch;
+                pitch += copy.row().next_multiple_of(COPY_ALIGNMENT);
+            }
+            pitch = pitch.next_multiple_of(ROW_ALIGNMENT);
+            shelf.iter_mut().for_each(|copy| copy.pitch = pitch);
+            end += pitch * shelf[0].height();
+        }
+    }
+    end
 }
 
 /// Memory that is kept from frame to frame.
@@ -146,10 +191,11 @@ fn upload_rects(
         && let Some(images) = main.get_resource::<Assets<Image>>()
     {
         // What is not on the GPU yet stays in the list.
-        rects.retain(|(id, rect)| match plan(*id, *rect, images, &gpu_images, rows.len()) {
-            Plan::Copy(copy) if copy.offset > 0 && copy.offset + copy.bytes() > MAX_STAGED => true,
+        let mut most_bytes = 0;
+        rects.retain(|(id, rect)| match plan(*id, *rect, images, &gpu_images) {
+            Plan::Copy(copy) if most_bytes > 0 && most_bytes + copy.most_bytes() > MAX_STAGED => true,
             Plan::Copy(copy) => {
-                pack(&copy, images, rows);
+                most_bytes += copy.most_bytes();
                 stats.rects += 1;
                 stats.bytes += copy.rect.area() * copy.texel as u64;
                 copies.push(copy);
@@ -158,13 +204,20 @@ fn upload_rects(
             Plan::Wait => true,
             Plan::Drop => false,
         });
+        let size = lay_out(copies);
+        if rows.len() < size {
+            rows.resize(size, 0);
+        }
+        copies.iter().for_each(|copy| pack(copy, images, rows));
         if copies.len() <= FEW {
             write(copies, rows, &gpu_images, &queue);
         } else {
-            copy(copies, rows, buffer, &gpu_images, &device, &queue);
+            self::copy(copies, &rows[..size], buffer, &gpu_images, &device, &queue);
         }
         copies.clear();
-        rows.clear();
+        if rows.len() > MAX_KEPT {
+            *rows = Vec::new();
+        }
     }
     if !rects.is_empty() {
         main.resource_mut::<Uploads>().rects.append(rects);
@@ -179,13 +232,7 @@ enum Plan {
 }
 
 /// A copy out of bounds is a validation error, which ends the app: everything is compared first.
-fn plan(
-    id: AssetId<Image>,
-    rect: TexelRect,
-    images: &Assets<Image>,
-    gpu_images: &RenderAssets<GpuImage>,
-    offset: usize,
-) -> Plan {
+fn plan(id: AssetId<Image>, rect: TexelRect, images: &Assets<Image>, gpu_images: &RenderAssets<GpuImage>) -> Plan {
     let Some(image) = images.get(id) else { return Plan::Drop };
     let Some(gpu) = gpu_images.get(id) else { return Plan::Wait };
     let (cpu_texture, gpu_texture) = (&image.texture_descriptor, &gpu.texture_descriptor);
@@ -200,21 +247,22 @@ fn plan(
     if rect.is_empty() || image.data.as_ref().is_none_or(|data| data.len() < needed) {
         return Plan::Drop;
     }
-    let row = (rect.size().x * texel) as usize;
-    Plan::Copy(Copy { image: id, rect, texel: texel as usize, offset, row: row.next_multiple_of(ROW_ALIGNMENT) })
+    Plan::Copy(Copy { image: id, rect, texel: texel as usize, offset: 0, pitch: 0 })
 }
 
-/// Appends the texels of a rectangle, each row padded.
-fn pack(copy: &Copy, images: &Assets<Image>, rows: &mut Vec<u8>) {
+/// Copies the texels of a rectangle to their place.
+fn pack(copy: &Copy, images: &Assets<Image>, rows: &mut [u8]) {
     let Some((image, data)) = images.get(copy.image).and_then(|image| Some((image, image.data.as_ref()?))) else {
         return;
     };
     let stride = image.width() as usize * copy.texel;
-    let length = copy.rect.size().x as usize * copy.texel;
-    for y in copy.rect.min.y..copy.rect.max.y {
-        let start = y as usize * stride + copy.rect.min.x as usize * copy.texel;
-        rows.extend_from_slice(&data[start..start + length]);
-        rows.resize(rows.len() + copy.row - length, 0);
+    let length = copy.row();
+    let mut from = copy.rect.min.y as usize * stride + copy.rect.min.x as usize * copy.texel;
+    let mut to = copy.offset;
+    for _ in 0..copy.height() {
+        rows[to..to + length].copy_from_slice(&data[from..from + length]);
+        from += stride;
+        to += copy.pitch;
     }
 }
 
@@ -228,7 +276,7 @@ fn destination<'a>(gpu: &'a GpuImage, copy: &Copy) -> (TexelCopyTextureInfo<'a>,
 }
 
 fn layout(copy: &Copy, offset: u64) -> TexelCopyBufferLayout {
-    let bytes_per_row = u32::try_from(copy.row).ok();
+    let bytes_per_row = u32::try_from(copy.pitch).ok();
     TexelCopyBufferLayout { offset, bytes_per_row, rows_per_image: None }
 }
 

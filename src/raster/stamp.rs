@@ -28,6 +28,9 @@ const CENTRES: [f32; LANES] = [0.5, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5, 7.5];
 /// Changes are told for so many rows at once: those of a row of dirty tiles.
 const BAND: u32 = DirtyTiles::TILE;
 
+/// Texels that come from memory at once, or fewer.
+const CACHE_LINE: usize = 64 / size_of::<u16>();
+
 /// Half widths are cut to this many texels, far above the diagonal of the largest surface.
 const MAX_RADIUS: f32 = 1.0e6;
 
@@ -270,6 +273,9 @@ impl Capsule {
         rect: TexelRect,
         changed: &mut dyn FnMut(TexelRect),
     ) {
+        if TELL {
+            fetch(field, rect);
+        }
         let width = field.depth.width();
         let mut band = TexelRect::default();
         let (left, right) = (rect.min.x as f32, rect.max.x as f32);
@@ -354,6 +360,18 @@ impl Capsule {
         }
         change.as_flattened().first_chunk().map_or(0, |bytes| u128::from_le_bytes(*bytes))
     }
+}
+
+/// Reads a texel of each line of the cache, so that cold memory is waited for once and not block by block.
+fn fetch(field: &DepthField, rect: TexelRect) {
+    let mut sum = 0;
+    for y in rect.min.y..rect.max.y {
+        let row = &field.depth.row(y as usize)[rect.min.x as usize..rect.max.x as usize];
+        for line in row.chunks(CACHE_LINE) {
+            sum ^= line[0] ^ line[line.len() - 1];
+        }
+    }
+    std::hint::black_box(sum);
 }
 
 /// Rounds a value of 0..=65535. Adding 2^23 leaves the whole number in the low bits of the float: unlike a cast, which

@@ -3,8 +3,10 @@
 //! Reading needs `tesseract` (Debian's `tesseract-ocr`); without it the test passes and says so, unless
 //! `CRACK_REQUIRE_ALL=1` is set.
 
-#[path = "../../examples/bake/picture.rs"]
-mod picture;
+#[path = "../../examples/bake/ink.rs"]
+mod ink;
+#[path = "../../examples/bake/pictures.rs"]
+mod pictures;
 #[path = "../../examples/bake/text.rs"]
 mod text;
 
@@ -82,7 +84,7 @@ fn read(picture: &Path) -> String {
 /// strokes are covered.
 fn deep_cracks(word: &str, seed: u64) -> GrayImage {
     let size = UVec2::splat(400);
-    let guide = Guide::new(text::draw_text(text::FONT, word, size).unwrap());
+    let guide = Guide::new(text::draw_text(text::FONT, word, size, f32::INFINITY).unwrap());
     let params = VoronoiParams { layout: SiteLayout::Astride, ..VoronoiParams::DEFAULT };
     let (map, seams) = VoronoiBake::new(params, vec![guide], size, seed).unwrap().finish();
     assert_eq!(map.sites().len(), 175);
@@ -142,7 +144,7 @@ fn f2_bombs_are_refused() {
         let file = bomb(side);
         assert_eq!(file.len(), 68);
         fs::write(&path, file).unwrap();
-        let refused = picture::read_picture(&path).unwrap_err().to_string();
+        let refused = pictures::read_picture(&path).unwrap_err().to_string();
         assert!(refused.contains("bomb.png"), "{refused}");
         assert!(side == u32::MAX || refused.to_lowercase().contains("limit"), "{side}: {refused}");
     }
@@ -156,7 +158,7 @@ fn f1_broken_pictures_are_errors() {
     let path = folder.join("picture.png");
     RgbaImage::from_fn(9, 7, |x, y| Rgba([(x * 20) as u8, (y * 30) as u8, 99, 255])).save(&path).unwrap();
     let good = fs::read(&path).unwrap();
-    assert_eq!(picture::read_picture(&path).unwrap().dimensions(), (9, 7));
+    assert_eq!(pictures::read_picture(&path).unwrap().dimensions(), (9, 7));
     let mut refused = 0;
     let mut files: Vec<Vec<u8>> = (0..good.len()).map(|n| good[..n].to_vec()).collect();
     for bit in 0..8 * good.len() {
@@ -168,10 +170,10 @@ fn f1_broken_pictures_are_errors() {
     let n = files.len();
     for file in files {
         fs::write(&path, file).unwrap();
-        refused += usize::from(picture::read_picture(&path).is_err());
+        refused += usize::from(pictures::read_picture(&path).is_err());
     }
     assert!(refused > n / 2, "{refused} of {n}");
-    assert!(picture::read_picture(&folder.join("nothing.png")).is_err());
+    assert!(pictures::read_picture(&folder.join("nothing.png")).is_err());
     fs::remove_dir_all(folder).unwrap();
 }
 
@@ -200,13 +202,13 @@ fn g1_pictures_of_every_kind_are_guides() {
     for (i, kind) in kinds.iter().enumerate() {
         let path = folder.join(format!("{i}.png"));
         kind.save(&path).unwrap();
-        let picture = picture::read_picture(&path).unwrap();
-        let ink = picture::ink(&picture).unwrap();
+        let picture = pictures::read_picture(&path).unwrap();
+        let ink = ink::ink(&picture).unwrap();
         for x in 0..20 {
             let want = f32::from(u8::from((8..11).contains(&x)));
             assert!((ink.get(x, 5).unwrap() - want).abs() < 0.01, "kind {i} at {x}");
         }
-        assert!(picture::lightness(&picture).unwrap().as_slice().iter().all(|light| (0.0..=1.0).contains(light)));
+        assert!(ink::lightness(&picture).unwrap().as_slice().iter().all(|light| (0.0..=1.0).contains(light)));
     }
     fs::remove_dir_all(folder).unwrap();
 }
