@@ -75,6 +75,7 @@ impl CrackPreset {
             roughness: 0.1,
             arrest: 0.06,
             variety: 0.76,
+            width_variety: 0.76,
             ..GrowthParams::DEFAULT
         },
         profile: Profile {
@@ -109,6 +110,7 @@ impl CrackPreset {
             roughness: 0.13,
             arrest: 0.06,
             variety: 0.6,
+            width_variety: 0.6,
             ..GrowthParams::DEFAULT
         },
         profile: Profile { depth: 1.0, full_width: 0.008, wall: 0.3, rim_width: 0.008, rim_depth: 0.2, faintest: 0.6 },
@@ -138,6 +140,7 @@ impl CrackPreset {
             roughness: 0.08,
             arrest: 0.06,
             variety: 0.9,
+            width_variety: 0.9,
             ..GrowthParams::DEFAULT
         },
         profile: Profile { depth: 1.0, full_width: 0.016, wall: 0.3, rim_width: 0.006, rim_depth: 0.16, faintest: 0.6 },
@@ -172,6 +175,7 @@ impl CrackPreset {
             connection_every: 2,
             arrest: 0.04,
             variety: 0.32,
+            width_variety: 0.32,
             ..GrowthParams::DEFAULT
         },
         profile: Profile { depth: 1.0, full_width: 0.004, wall: 0.3, rim_width: 0.006, rim_depth: 0.3, faintest: 0.6 },
@@ -185,21 +189,24 @@ impl CrackPreset {
             kill_distance: 0.035,
             step_length: 0.018,
             crack_radius: 0.13,
-            markers: MarkerLayout::DartThrowing { spacing: 0.07 },
+            markers: MarkerLayout::DartThrowing { spacing: 0.0855 },
             venation: Venation::Closed,
             reach: 64.0,
             starts: StartLayout::Crushed { count: 12, radius: 0.02 },
-            line_width: 0.009,
+            line_width: 0.0096,
             line_growth: 0.1,
             murray: 3.0,
             max_width: 0.04,
-            unevenness: 0.3,
+            tip_taper: 0.32,
+            unevenness: 0.42,
+            directed: 0.25,
             wander: 0.1,
-            roughness: 0.1,
-            arrest: 0.04,
-            open_ends: 0.2,
-            nucleation: 0.3,
-            variety: 0.7,
+            roughness: 0.12,
+            arrest: 0.042,
+            open_ends: 0.32,
+            nucleation: 0.23,
+            variety: 0.96,
+            width_variety: 0.96,
             max_nodes: 40_000,
             ..GrowthParams::DEFAULT
         },
@@ -231,6 +238,7 @@ impl CrackPreset {
             connection_every: 1,
             arrest: 0.02,
             variety: 0.2,
+            width_variety: 0.2,
             ..GrowthParams::DEFAULT
         },
         profile: Profile { depth: 1.0, full_width: 0.004, wall: 0.3, rim_width: 0.006, rim_depth: 0.3, faintest: 0.6 },
@@ -264,6 +272,7 @@ impl CrackPreset {
             open_ends: 0.6,
             nucleation: 1.1,
             variety: 0.9,
+            width_variety: 0.9,
             ..GrowthParams::DEFAULT
         },
         profile: Profile { depth: 1.0, full_width: 0.014, wall: 0.5, rim_width: 0.012, rim_depth: 0.12, faintest: 0.6 },
@@ -292,6 +301,7 @@ impl CrackPreset {
             open_ends: 0.083,
             nucleation: 0.78,
             variety: 0.9,
+            width_variety: 0.9,
             ..GrowthParams::DEFAULT
         },
         profile: Profile { depth: 1.0, full_width: 0.016, wall: 0.6, rim_width: 0.014, rim_depth: 0.12, faintest: 0.6 },
@@ -323,6 +333,7 @@ impl CrackPreset {
             open_ends: 0.5,
             nucleation: 1.0,
             variety: 0.75,
+            width_variety: 0.75,
             ..GrowthParams::DEFAULT
         },
         profile: Profile { depth: 0.8, full_width: 0.006, wall: 0.4, rim_width: 0.0, rim_depth: 0.0, faintest: 0.6 },
@@ -353,6 +364,7 @@ impl CrackPreset {
             arrest: 0.06,
             open_ends: 0.5,
             variety: 0.5,
+            width_variety: 0.5,
             ..GrowthParams::DEFAULT
         },
         profile: Profile { depth: 1.0, full_width: 0.012, wall: 0.8, rim_width: 0.012, rim_depth: 0.3, faintest: 0.6 },
@@ -376,6 +388,7 @@ impl CrackPreset {
             roughness: 0.0,
             arrest: 0.05,
             variety: 0.2,
+            width_variety: 0.2,
             ..GrowthParams::DEFAULT
         },
         profile: Profile { depth: 1.0, full_width: 0.012, wall: 0.2, rim_width: 0.0, rim_depth: 0.0, faintest: 0.0 },

@@ -155,9 +155,11 @@ pub struct GrowthParams {
     /// Cracks that begin by themselves where markers are out of every crack's reach: how many for each step of growth, 0..=64.
     /// They come late, so they end at the older ones.
     pub nucleation: f32,
-    /// How much one surface differs from the next, by its seed: widths, roughness, the spacing of markers, the number of starts and
+    /// How much one surface differs from the next, by its seed: roughness, the spacing of markers, the number of starts and
     /// of free ends, the axis. 0 = not at all; at 1 each differs by a factor of about 2 either way. 0..=1.
     pub variety: f32,
+    /// How much widths alone differ from one surface to the next; as [`variety`](Self::variety). 0..=1.
+    pub width_variety: f32,
     /// Whether the markers themselves are drawn.
     pub draw_markers: bool,
     /// The most nodes that a surface gets, 1..=1000000.
@@ -199,6 +201,7 @@ impl GrowthParams {
         arrest: 0.0,
         nucleation: 0.0,
         variety: 0.0,
+        width_variety: 0.0,
         draw_markers: false,
         max_nodes: 20_000,
     };
@@ -297,6 +300,7 @@ impl GrowthParams {
         arrest: f32 = 0.0, 1.0;
         nucleation: f32 = 0.0, 64.0;
         variety: f32 = 0.0, 1.0;
+        width_variety: f32 = 0.0, 1.0;
         max_nodes: u32 = 1.0, 1_000_000.0;
     }
 
@@ -442,12 +446,13 @@ impl GrowthParams {
     #[must_use]
     pub fn varied(&self, seed: u64) -> Self {
         let mut varied = self.clone();
-        if self.variety <= 0.0 {
+        if self.variety <= 0.0 && self.width_variety <= 0.0 {
             return varied;
         }
         let mut rng = Rng::new(seed).stream("variety");
-        let mut factor = || ops::exp(self.variety * 0.7 * (rng.signed() + rng.signed()));
-        let (width, rough, stray, spacing, starts, free) = (factor(), factor(), factor(), factor(), factor(), factor());
+        let mut factor = |variety: f32| ops::exp(variety * 0.7 * (rng.signed() + rng.signed()));
+        let width = factor(self.width_variety);
+        let [rough, stray, spacing, starts, free] = [self.variety; 5].map(factor);
         varied.line_width = (self.line_width * width).clamp(0.0005, 0.2);
         varied.max_width = (self.max_width * width).clamp(varied.line_width, 0.4);
         varied.roughness = (self.roughness * rough).min(0.5);
