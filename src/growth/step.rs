@@ -418,7 +418,7 @@ impl CrackGrowth {
 
     /// Notes a node that has not grown.
     fn add(&mut self, node: Node) {
-        self.widths.add();
+        self.widths.admit();
         if let Some(arrest) = &mut self.arrest {
             arrest.push_node(false);
         }

@@ -85,7 +85,7 @@ impl Widths {
     }
 
     /// Prepares the place of a node that comes with a width of its own.
-    pub(super) fn add(&mut self) {
+    pub(super) fn admit(&mut self) {
         self.pipes.push(Pipe { behind: 1, told: 1, notch: 0, factor: 1.0, wider: 1.0 });
     }
 
