@@ -137,7 +137,7 @@ pub(super) fn fail(world: &mut World, entity: Entity, error: CrackError) {
 }
 
 /// Makes growth and textures for a surface that has none; `false` if its pictures are not there yet.
-fn make_ready(world: &mut World, entity: Entity) -> Result<bool, CrackError> {
+pub(super) fn make_ready(world: &mut World, entity: Entity) -> Result<bool, CrackError> {
     if world.resource::<Surfaces>().active.contains_key(&entity) {
         return Ok(true);
     }
@@ -183,6 +183,8 @@ fn make_ready(world: &mut World, entity: Entity) -> Result<bool, CrackError> {
         due: 0.0,
         clock: None,
         closing: None,
+        appearing: None,
+        added: None,
         playback: None,
         hits: 0,
         touched: Touched::new(frame.size()),

@@ -1,7 +1,7 @@
 //! Healing, and what happens when a surface goes.
 
 use super::{
-    CrackState, CrackStats, CrackTextures, ShatterRequest,
+    CrackState, CrackStats, CrackTextures, ShatterRequest, bake,
     carrier::{self, Found},
     queue::HitQueue,
     shards::drop_shards,
@@ -14,7 +14,8 @@ use bevy::{
 
 /// Commands for surfaces.
 pub trait CrackCommandsExt {
-    /// Takes all cracks away, and all shards and holes: the surface shows its own pictures again, its textures and its growth are dropped, hits
+    /// Takes all cracks away, those of [`GuidedCracks`](super::GuidedCracks) too, and all shards and holes: the surface shows its
+    /// own pictures again, its textures and its growth are dropped, hits
     /// that wait on it are refused. Does nothing on entities without cracks.
     fn heal_cracks(&mut self) -> &mut Self;
 
@@ -54,6 +55,7 @@ impl CrackCommandsExt for EntityCommands<'_> {
 
 fn close(world: &mut World, entity: Entity, seconds: f32) {
     purge(world, entity);
+    bake::cancel(world, entity);
     let is_closing = world.get_resource_mut::<Surfaces>().is_some_and(|mut surfaces| {
         let is_closing = surfaces.active.get_mut(&entity).is_some_and(|active| active.close(seconds));
         surfaces.wake(entity);
@@ -85,6 +87,7 @@ fn purge(world: &mut World, entity: Entity) {
 
 /// Drops growth and textures and gives the entity back what it showed before.
 fn forget(world: &mut World, entity: Entity) {
+    bake::cancel(world, entity);
     let Some(mut surfaces) = world.get_resource_mut::<Surfaces>() else { return };
     let Some(mut active) = surfaces.remove(entity) else { return };
     drop_shards(world, entity, &mut active);

@@ -17,11 +17,13 @@
 //! ```
 
 mod activate;
+mod bake;
 mod budget;
 mod carrier;
 mod clock;
 mod error;
 mod grow;
+mod guided;
 mod heal;
 mod hit;
 #[cfg(feature = "2d")]
@@ -50,6 +52,7 @@ mod watch;
 pub use budget::{CrackBudget, CrackStats};
 pub use clock::{CrackClock, CrackDrive};
 pub use error::CrackError;
+pub use guided::{BakeProgress, CrackBaked, CrackGuide, GuideSource, GuidedAppearance, GuidedCracks};
 pub use heal::CrackCommandsExt;
 pub use hit::{CrackHit, HitPoint};
 #[cfg(feature = "2d")]
@@ -76,10 +79,11 @@ use bevy::{
 /// What a game names.
 pub mod prelude {
     pub use super::{
-        CellClosed, CrackBudget, CrackClock, CrackCommandsExt, CrackDrive, CrackError, CrackFailed, CrackFinished,
-        CrackHit, CrackMaps, CrackMaskSource, CrackPlugin, CrackPlugins, CrackResolution, CrackShards, CrackState,
-        CrackStats, CrackStatus, CrackSurface, CrackSystems, CrackTextures, CrackTip, HitPoint, PresetSource,
-        Reassembled, Shard, ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen, Shattered,
+        BakeProgress, CellClosed, CrackBaked, CrackBudget, CrackClock, CrackCommandsExt, CrackDrive, CrackError,
+        CrackFailed, CrackFinished, CrackGuide, CrackHit, CrackMaps, CrackMaskSource, CrackPlugin, CrackPlugins,
+        CrackResolution, CrackShards, CrackState, CrackStats, CrackStatus, CrackSurface, CrackSystems, CrackTextures,
+        CrackTip, GuideSource, GuidedAppearance, GuidedCracks, HitPoint, PresetSource, Reassembled, Shard,
+        ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen, Shattered,
     };
     #[cfg(feature = "2d")]
     pub use super::{CrackLight2d, CrackLitMaterial};
@@ -123,6 +127,9 @@ impl Plugin for CrackPlugin {
         app.register_type::<CrackSurface>()
             .register_type::<CrackClock>()
             .register_type::<CrackState>()
+            .register_type::<GuidedCracks>()
+            .register_type::<BakeProgress>()
+            .register_type::<CrackBaked>()
             .register_type::<CrackTextures>()
             .register_type::<CrackHit>()
             .register_type::<CrackFinished>()
@@ -142,6 +149,7 @@ impl Plugin for CrackPlugin {
             .init_resource::<queue::HitQueue>()
             .init_resource::<mask::PictureMasks>()
             .init_resource::<surfaces::Surfaces>()
+            .init_resource::<bake::Bakes>()
             .add_message::<CrackHit>()
             .add_observer(hit::receive_hit)
             .configure_sets(
@@ -160,14 +168,22 @@ impl Plugin for CrackPlugin {
                         .chain()
                         .in_set(Shatter),
                     (
-                        (budget::start_frame, watch::watch_surfaces, watch::watch_pictures, preset::watch_presets),
+                        (
+                            budget::start_frame,
+                            watch::watch_surfaces,
+                            watch::watch_pictures,
+                            preset::watch_presets,
+                            guided::watch_guided,
+                        ),
                         watch::update_changed.run_if(watch::any_changed),
                         hit::collect_hits,
                         activate::apply_hits.run_if(queue::any_queued),
                     )
                         .chain()
                         .in_set(Hit),
-                    (clock::follow_clocks, grow::grow_surfaces).chain().in_set(Grow),
+                    (clock::follow_clocks, grow::grow_surfaces, bake::bake_guided.run_if(bake::any_baking))
+                        .chain()
+                        .in_set(Grow),
                     paint::paint_surfaces.in_set(Paint),
                     upload::drop_unwanted.in_set(Upload),
                 ),

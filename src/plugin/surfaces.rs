@@ -12,7 +12,7 @@ use crate::{
     CrackPreset,
     growth::CrackGrowth,
     paint::LookTable,
-    pattern::CellTracker,
+    pattern::{CellTracker, Network},
     raster::{DepthField, DirtyTiles, Profile, TexelRect},
 };
 use bevy::{asset::UntypedAssetId, ecs::entity::EntityHashMap, platform::collections::HashMap, prelude::*};
@@ -26,6 +26,15 @@ pub(super) struct View {
     pub(super) rect: TexelRect,
     /// What is stamped into the field but not painted here yet, in texels of the field.
     pub(super) dirty: DirtyTiles,
+}
+
+/// Cracks that have not grown: the result of a bake.
+pub(super) struct Added {
+    pub(super) network: Network,
+    /// See [`CrackGrowth::add_cracks`].
+    pub(super) opening: u32,
+    /// How many steps of growth they take.
+    pub(super) steps: u32,
 }
 
 /// A surface that has been hit.
@@ -56,6 +65,9 @@ pub(super) struct Active {
     pub(super) clock: Option<CrackClock>,
     /// While its cracks close: steps a second, backwards.
     pub(super) closing: Option<f64>,
+    /// While baked cracks appear without a clock: steps a second.
+    pub(super) appearing: Option<f64>,
+    pub(super) added: Option<Added>,
     /// Shows other times than the end; `None` = everything that has grown is shown.
     pub(super) playback: Option<Playback>,
     pub(super) hits: u32,

@@ -11,7 +11,7 @@ use super::{
     surfaces::{Active, Surfaces},
 };
 use crate::{
-    CrackPreset,
+    CrackPreset, Grid,
     growth::CrackGrowth,
     pattern::{CellTracker, CrackMask, SurfaceFrame},
     raster::{DepthField, TexelRect},
@@ -185,21 +185,38 @@ fn update_preset(active: &mut Active, preset: CrackPreset) -> Result<(), CrackEr
 
 /// On a picture of other proportions the same hits, in the same places, make other cracks: grown as far as they were.
 /// `None` if they may stay.
-fn regrow(active: &Active, frame: SurfaceFrame, mask: Arc<CrackMask>) -> Result<Option<CrackGrowth>, CrackError> {
+fn regrow(active: &mut Active, frame: SurfaceFrame, mask: Arc<CrackMask>) -> Result<Option<CrackGrowth>, CrackError> {
     let (before, extent) = (active.growth.network().extent(), frame.extent());
     if before == extent {
         return Ok(None);
     }
-    let mut growth = CrackGrowth::new(active.growth.params().clone(), extent, active.surface.seed)
+    let steps = active.added.as_ref().map_or(0, |added| added.steps);
+    grown_anew(active, steps, extent, mask, None).map(Some)
+}
+
+/// The same hits in the same places around what was baked, grown as far as they were after the first `added` steps.
+pub(super) fn grown_anew(
+    active: &mut Active,
+    added: u32,
+    extent: Vec2,
+    mask: Arc<CrackMask>,
+    density: Option<Grid<f32>>,
+) -> Result<CrackGrowth, CrackError> {
+    let mut growth = CrackGrowth::new(active.preset.growth.clone(), extent, active.surface.seed)
         .map_err(|error| CrackError::Preset { reason: error.to_string() })?;
     growth.set_mask(mask);
+    growth.set_density(density);
+    if let Some(added) = &mut active.added {
+        added.steps = growth.add_cracks(&added.network, added.opening);
+    }
+    let before = active.growth.network().extent();
     for impact in active.growth.impacts() {
         growth.hit((impact.pos / before * extent).min(extent), impact.energy);
     }
-    for _ in 0..active.growth.steps() {
+    for _ in added..active.growth.steps() {
         growth.step();
     }
-    Ok(Some(growth))
+    Ok(growth)
 }
 
 /// Reads the pictures anew and paints the cracks over them; `false` if they are not there yet.
