@@ -3,7 +3,7 @@
 use super::{
     BakeProgress, CrackBaked, CrackBudget, CrackError, CrackFailed, CrackStatus, GuideSource, GuidedAppearance,
     GuidedCracks,
-    activate::{make_ready, set_status},
+    activate::{density, make_ready, set_status},
     budget::FrameClock,
     picture::{self, Space},
     surfaces::{Added, Surfaces},
@@ -432,8 +432,10 @@ fn adopt(world: &mut World, entity: Entity, product: Product) -> Result<Option<O
         let before = active.added.replace(added);
         let (extent, mask) = (active.field.frame.extent(), active.growth.mask().clone());
         let rect = active.views.get(active.view).map_or(TexelRect::default(), |view| view.rect);
-        let density = if active.surface.alpha_mask { super::activate::density(&active.base, rect) } else { None };
+        let base = active.surface.alpha_mask.then_some(&active.base);
+        let density = base.and_then(|base| density(rect.size(), |texel| base.is_hole(rect.min + texel)));
         active.growth = grown_anew(active, before.map_or(0, |before| before.steps), extent, mask, density)?;
+        active.mind_holes();
     }
     let is_untouched = active.growth.impacts().is_empty();
     active.show_anew(is_untouched.then_some(seconds));
