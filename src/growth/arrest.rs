@@ -59,13 +59,19 @@ pub(super) enum Advance {
 
 impl Arrest {
     pub(super) fn new(network: &Network, length: f32) -> Self {
-        let mut walls = Walls::new(network.extent(), length);
-        for segment in network.segments() {
+        let walls = Walls::new(network.extent(), length);
+        let mut arrest = Self { walls, sealed: vec![false; network.nodes().len()], runners: Vec::new() };
+        arrest.add_walls(network, network.segments());
+        arrest
+    }
+
+    /// Adds the lines of segments.
+    pub(super) fn add_walls(&mut self, network: &Network, segments: impl Iterator<Item = SegmentId>) {
+        for segment in segments {
             if let (Some(ends), Some(path)) = (network.ends(segment), network.path(segment)) {
-                walls.add(ends, &path);
+                self.walls.add(ends, &path);
             }
         }
-        Self { walls, sealed: vec![false; network.nodes().len()], runners: Vec::new() }
     }
 
     pub(super) fn push_node(&mut self, is_sealed: bool) {
@@ -163,7 +169,7 @@ impl CrackGrowth {
         let Some(arrest) = &mut self.arrest else { return };
         let runners = std::mem::take(&mut arrest.runners);
         for runner in runners {
-            if self.network.nodes.len() >= self.params.max_nodes as usize {
+            if self.room() == 0 {
                 return;
             }
             if let Some(on) = self.advance_runner(runner) {
@@ -242,14 +248,15 @@ impl CrackGrowth {
     pub(super) fn extend(&mut self, from: u32, to: Vec2, is_sealed: bool) -> Option<u32> {
         let node = self.network.nodes[from as usize];
         let child = self.network.nodes.len() as u32;
-        if child >= self.params.max_nodes {
+        if self.room() == 0 {
             return None;
         }
         let extent = self.network.extent();
         let to = to.clamp(Vec2::ZERO, extent);
         // The border is a crack too: none runs along it.
         let inward = Vec2::splat(0.3 * self.params.step_length).min(0.5 * extent);
-        let (low, high) = (node.pos.cmpeq(Vec2::ZERO) & to.cmpeq(Vec2::ZERO), node.pos.cmpeq(extent) & to.cmpeq(extent));
+        let (low, high) =
+            (node.pos.cmpeq(Vec2::ZERO) & to.cmpeq(Vec2::ZERO), node.pos.cmpeq(extent) & to.cmpeq(extent));
         let to = Vec2::select(low, inward, Vec2::select(high, extent - inward, to));
         match self.free_line(SegmentId::Branch(child), (from, u32::MAX), (node.pos, to)) {
             Ok((bend, path)) => {

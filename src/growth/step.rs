@@ -13,7 +13,7 @@ use super::{
 use crate::{
     Grid,
     math::{hash_unit, mix},
-    pattern::{CrackMask, Dot, Link, LinkKind, NO_PARENT, Network, Node, SegmentId, Timeline},
+    pattern::{CrackMask, Dot, Link, LinkKind, NO_IMPACT, NO_PARENT, Network, Node, SegmentId, Timeline},
 };
 use glam::Vec2;
 use std::{ops::Range, sync::Arc};
@@ -145,6 +145,8 @@ pub struct CrackGrowth {
     /// Cracks that began by themselves, and markers that were tried for it.
     nucleated: u32,
     tried: u32,
+    /// Nodes that have not grown here.
+    added: usize,
     newborn: Range<u32>,
     /// Links that are among the changes.
     links_told: u32,
@@ -239,6 +241,7 @@ impl CrackGrowth {
             steps_left: 0,
             nucleated: 0,
             tried: 0,
+            added: 0,
             newborn: 0..0,
             links_told: 0,
             shown_markers: Vec::new(),
@@ -296,7 +299,7 @@ impl CrackGrowth {
         if self.mask.is_forbidden(pos / extent) {
             return HitOutcome::Rejected(Rejected::Forbidden);
         }
-        if self.network.nodes.len() >= self.params.max_nodes as usize {
+        if self.room() == 0 {
             return HitOutcome::Rejected(Rejected::Full);
         }
         self.timeline.begin(self.steps.saturating_add(1));
@@ -344,6 +347,96 @@ impl CrackGrowth {
         self.populate(index, pos, 0.0, reach);
         self.steps_left = self.params.num_iterations;
         HitOutcome::Started(index)
+    }
+
+    /// Adds cracks that have not grown here, say those of [`Seams::network`](crate::voronoi::Seams::network). To hits and steps
+    /// afterwards they are cracks of another hit: with [`arrest`](GrowthParams::arrest) new ones stop at them, and a hit on one starts from it.
+    ///
+    /// They come in the steps after those made so far, in order of their [`birth`](Node::birth), and each opens to its width within
+    /// `opening` further steps; returns how many steps all of that takes. Lines are straight from node to node; a network of another extent is
+    /// stretched over the surface. They do not count for [`max_nodes`](GrowthParams::max_nodes). Where they
+    /// cross what has grown already, they cross it.
+    ///
+    /// ```
+    /// use bevy_crack::{growth::{CrackGrowth, GrowthParams}, voronoi::{VoronoiBake, VoronoiParams}};
+    ///
+    /// let (_, seams) = VoronoiBake::new(VoronoiParams::DEFAULT, Vec::new(), [64, 64].into(), 7)?.finish();
+    /// let mut growth = CrackGrowth::new(GrowthParams { arrest: 0.05, ..GrowthParams::DEFAULT }, [1.0, 1.0].into(), 7)?;
+    /// let steps = growth.add_cracks(&seams.network([0.5, 0.5].into()), 0);
+    /// assert_eq!(growth.timeline().end(), steps);
+    /// growth.hit([0.5, 0.5].into(), 1.0);
+    /// while growth.step().grew() {}
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn add_cracks(&mut self, cracks: &Network, opening: u32) -> u32 {
+        let Some(last) = cracks.nodes.iter().map(|node| node.birth).chain(cracks.links.iter().map(|l| l.birth)).max()
+        else {
+            return 0;
+        };
+        let (extent, from) = (self.network.extent(), cracks.extent());
+        // Nothing leaves the border by rounding.
+        let place = |pos: Vec2| Vec2::select(pos.cmpeq(from), extent, (pos / from * extent).min(extent));
+        let (before, first) = (self.steps, self.network.nodes.len() as u32);
+        // Nodes and links that are there, and nodes that have opened.
+        let (mut node, mut link, mut opened) = (0, 0, 0);
+        for step in 0..=last.saturating_add(opening) {
+            self.steps = before.saturating_add(step).saturating_add(1);
+            self.timeline.begin(self.steps);
+            for (i, &Node { width, birth, .. }) in cracks.nodes.iter().enumerate().take(node).skip(opened) {
+                let share = (step - birth + 1) as f32 / (opening + 1) as f32;
+                self.timeline.widen(first + i as u32, width * share);
+                opened += usize::from(step - birth >= opening);
+            }
+            while let Some(&added) = cracks.nodes.get(node).filter(|added| added.birth <= step) {
+                let parent = if added.parent == NO_PARENT { NO_PARENT } else { added.parent + first };
+                let birth = self.steps;
+                self.add(Node { pos: place(added.pos), parent, birth, impact: NO_IMPACT, bend: 0.0, ..added });
+                self.timeline.add_node(added.width / (opening + 1) as f32);
+                node += 1;
+                opened += usize::from(opening == 0);
+            }
+            while let Some(&added) = cracks.links.get(link).filter(|added| added.birth <= step) {
+                let (a, b, birth) = (added.a + first, added.b + first, self.steps);
+                self.network.links.push(Link { a, b, birth, bend: 0.0, ..added });
+                self.timeline.add_link();
+                link += 1;
+            }
+        }
+        let told = std::mem::replace(&mut self.links_told, self.network.links.len() as u32);
+        self.changes.list.extend((told..self.links_told).map(SegmentId::Link));
+        self.newborn = first..self.network.nodes.len() as u32;
+        self.added += self.newborn.len();
+        for node in self.newborn.clone() {
+            self.field.visit(node, &self.network.nodes, &self.nodes);
+        }
+        if let Some(arrest) = &mut self.arrest {
+            let branches = self.newborn.clone().map(SegmentId::Branch);
+            arrest.add_walls(&self.network, branches.chain((told..self.links_told).map(SegmentId::Link)));
+        }
+        self.steps - before
+    }
+
+    /// Notes a node that has not grown.
+    fn add(&mut self, node: Node) {
+        self.widths.admit();
+        if let Some(arrest) = &mut self.arrest {
+            arrest.push_node(false);
+        }
+        self.nodes.push(node.pos);
+        self.pull_of.push(NO_PULL);
+        self.changes.push_node(node.parent);
+        self.network.nodes.push(node);
+    }
+
+    /// How many more nodes may grow.
+    pub(super) fn room(&self) -> usize {
+        (self.params.max_nodes as usize + self.added).saturating_sub(self.network.nodes.len())
+    }
+
+    /// Where cracks may run.
+    #[cfg(feature = "bevy")]
+    pub(crate) const fn mask(&self) -> &Arc<CrackMask> {
+        &self.mask
     }
 
     fn reach(&self, energy: f32) -> f32 {
@@ -459,7 +552,7 @@ impl CrackGrowth {
         self.gather_pulls();
         self.aim();
         let first = self.network.nodes.len() as u32;
-        let room = (self.params.max_nodes as usize).saturating_sub(self.network.nodes.len());
+        let room = self.room();
         // What comes when growth has ended takes a step of the timeline all the same.
         self.timeline.begin(self.steps.saturating_add(1));
         if !self.pulls.is_empty() || self.arrest.as_ref().is_some_and(Arrest::is_running) {
@@ -541,8 +634,7 @@ impl CrackGrowth {
     /// Begins new cracks where markers are out of reach of all others.
     fn nucleate(&mut self) {
         let due = self.params.nucleation * (self.steps + 1) as f32;
-        let room = (self.params.max_nodes as usize).saturating_sub(self.network.nodes.len());
-        for _ in 0..room {
+        for _ in 0..self.room() {
             if self.nucleated as f32 >= due {
                 break;
             }

@@ -4,8 +4,9 @@ use super::{CrackGrowth, GrowthParams, HitOutcome, MAX_ENERGY, MarkerLayout, Rej
 use crate::{
     CrackPreset, Grid,
     math::{Rng, hash_unit, mix},
-    pattern::{CrackMask, LinkKind, NO_PARENT, SegmentId, SurfaceFrame},
+    pattern::{CrackMask, LinkKind, Moment, NO_IMPACT, NO_PARENT, SegmentId, SurfaceFrame},
     raster::{DepthField, Profile, stamp_path},
+    voronoi::{VoronoiBake, VoronoiParams},
 };
 use glam::{UVec2, Vec2};
 use std::sync::Arc;
@@ -755,6 +756,37 @@ fn cross(one: (Vec2, Vec2), other: (Vec2, Vec2)) -> bool {
     side(a, b, c) * side(a, b, d) <= 0.0 && side(c, d, a) * side(c, d, b) <= 0.0
 }
 
+/// No two lines touch but at a shared node, and no two nodes are joined twice; returns how many pairs were compared.
+fn assert_planar(growth: &CrackGrowth, case: u64) -> u64 {
+    let mut pairs = 0;
+    let pieces = pieces(growth);
+    let mut ends = std::collections::BTreeSet::new();
+    for (a, b) in growth.network().segments().filter_map(|segment| growth.network().ends(segment)) {
+        assert!(ends.insert((a.min(b), a.max(b))), "case {case}: {a} and {b} are joined twice");
+    }
+    for (from, to, _) in &pieces {
+        assert!(from != to, "case {case}: a piece without length at {from}");
+    }
+    // By the left end, so that only what overlaps is compared.
+    let mut order: Vec<usize> = (0..pieces.len()).collect();
+    order.sort_by(|&a, &b| pieces[a].0.x.min(pieces[a].1.x).total_cmp(&pieces[b].0.x.min(pieces[b].1.x)));
+    for (k, &i) in order.iter().enumerate() {
+        let right = pieces[i].0.x.max(pieces[i].1.x);
+        for &j in order[k + 1..].iter().take_while(|&&j| pieces[j].0.x.min(pieces[j].1.x) <= right) {
+            let shares = |end: Option<u32>| end.is_some() && pieces[j].2.contains(&end);
+            // Pieces next to each other come one after the other; no two other pieces share a point.
+            let follow = i.abs_diff(j) == 1 && (pieces[i].0 == pieces[j].1 || pieces[i].1 == pieces[j].0);
+            if pieces[i].2.into_iter().any(shares) || follow {
+                continue;
+            }
+            pairs += 1;
+            let (one, other) = ((pieces[i].0, pieces[i].1), (pieces[j].0, pieces[j].1));
+            assert!(!cross(one, other), "case {case}: {one:?} crosses {other:?}");
+        }
+    }
+    pairs
+}
+
 #[test]
 fn no_two_cracks_cross_and_junctions_are_steep() {
     let mut angles = Vec::new();
@@ -771,31 +803,7 @@ fn no_two_cracks_cross_and_junctions_are_steep() {
             }
         }
         while growth.step().grew() {}
-        let pieces = pieces(&growth);
-        let mut ends = std::collections::BTreeSet::new();
-        for (a, b) in growth.network().segments().filter_map(|segment| growth.network().ends(segment)) {
-            assert!(ends.insert((a.min(b), a.max(b))), "case {case}: {a} and {b} are joined twice");
-        }
-        for (from, to, _) in &pieces {
-            assert!(from != to, "case {case}: a piece without length at {from}");
-        }
-        // By the left end, so that only what overlaps is compared.
-        let mut order: Vec<usize> = (0..pieces.len()).collect();
-        order.sort_by(|&a, &b| pieces[a].0.x.min(pieces[a].1.x).total_cmp(&pieces[b].0.x.min(pieces[b].1.x)));
-        for (k, &i) in order.iter().enumerate() {
-            let right = pieces[i].0.x.max(pieces[i].1.x);
-            for &j in order[k + 1..].iter().take_while(|&&j| pieces[j].0.x.min(pieces[j].1.x) <= right) {
-                let shares = |end: Option<u32>| end.is_some() && pieces[j].2.contains(&end);
-                // Pieces next to each other come one after the other; no two other pieces share a point.
-                let follow = i.abs_diff(j) == 1 && (pieces[i].0 == pieces[j].1 || pieces[i].1 == pieces[j].0);
-                if pieces[i].2.into_iter().any(shares) || follow {
-                    continue;
-                }
-                pairs += 1;
-                let (one, other) = ((pieces[i].0, pieces[i].1), (pieces[j].0, pieces[j].1));
-                assert!(!cross(one, other), "case {case}: {one:?} crosses {other:?}");
-            }
-        }
+        pairs += assert_planar(&growth, case);
         // T-junctions: a crack that ends at a node in the middle of another.
         let (nodes, mut around) = (growth.network().nodes(), vec![Vec::new(); growth.network().nodes().len()]);
         for (a, b) in growth.network().segments().filter_map(|segment| growth.network().ends(segment)) {
@@ -845,6 +853,84 @@ fn always_ends_with_arrest_and_closed_venation() {
         assert!(!growth.is_growing(), "case {case}");
         assert_eq!(census.attracting, 0, "case {case}: {params:?}");
         assert_eq!(census.killed + census.waiting, census.total, "case {case}: {census:?}");
+    }
+}
+
+/// Seams of a random map, as a network.
+fn random_seams(rng: &mut Rng, extent: Vec2, seed: u64) -> crate::pattern::Network {
+    let params = VoronoiParams { sites: 3 + rng.next_u32() % 30, ..VoronoiParams::DEFAULT };
+    let size = (extent * rng.range(40.0, 120.0)).as_uvec2();
+    let (_, seams) = VoronoiBake::new(params, Vec::new(), size, seed).unwrap().finish();
+    seams.network(Vec2::new(rng.unit(), rng.unit()) * extent)
+}
+
+#[test]
+fn added_cracks_are_walls() {
+    let (mut met, mut sprouted) = (0, 0);
+    for case in 0..150u64 {
+        let mut rng = Rng::new(case).stream("added");
+        let extent = Vec2::new(rng.range(1.0, 1.6), 1.0);
+        let mut growth = CrackGrowth::new(random_arrest(&mut rng), extent, case).unwrap();
+        let seams = random_seams(&mut rng, extent, case);
+        growth.add_cracks(&seams, rng.next_u32() % 4);
+        let n = growth.network().nodes().len();
+        assert_eq!(n, seams.nodes().len());
+        // Everywhere, and on a seam.
+        growth.hit(Vec2::new(rng.unit(), rng.unit()) * extent, rng.range(0.3, 2.0));
+        growth.hit(growth.network().nodes()[rng.next_u32() as usize % n].pos, 1.0);
+        while growth.step().grew() {}
+        assert_planar(&growth, case);
+        let nodes = growth.network().nodes();
+        let is_seam = |node: u32| (node as usize) < n;
+        met += growth.network().links().iter().filter(|link| is_seam(link.a) != is_seam(link.b)).count();
+        sprouted += nodes[n..].iter().filter(|node| node.parent != NO_PARENT && is_seam(node.parent)).count();
+        assert!(
+            nodes[n..].iter().all(|node| node.impact < 2) && nodes[..n].iter().all(|node| node.impact == NO_IMPACT)
+        );
+    }
+    assert!(met > 150 && sprouted > 50, "{met} cracks ended at seams, {sprouted} began there");
+}
+
+#[test]
+fn added_cracks_come_as_their_network_says() {
+    for case in 0..20u64 {
+        let mut rng = Rng::new(case).stream("added");
+        let extent = Vec2::new(rng.range(1.0, 1.6), 1.0);
+        let opening = rng.next_u32() % 20;
+        let mut growth =
+            CrackGrowth::new(GrowthParams { max_nodes: 50, ..GrowthParams::DEFAULT }, extent, case).unwrap();
+        let seams = random_seams(&mut rng, extent, case);
+        let steps = growth.add_cracks(&seams, opening);
+        let last = seams.nodes().iter().map(|node| node.birth).max().unwrap();
+        assert_eq!(steps, last + opening + 1);
+        let (network, timeline) = (growth.network(), growth.timeline());
+        assert_eq!((timeline.end(), growth.steps()), (steps, steps));
+        for (i, (node, seam)) in (0u32..).zip(network.nodes().iter().zip(seams.nodes())) {
+            let place = seam.pos / seams.extent() * extent;
+            assert!(node.pos.distance(place) < 1e-5 && node.width == seam.width && node.parent == seam.parent);
+            let on_border = |pos: Vec2, extent: Vec2| (pos.cmpeq(Vec2::ZERO) | pos.cmpeq(extent)).any();
+            assert_eq!(on_border(node.pos, extent), on_border(seam.pos, seams.extent()), "{node:?}");
+            let width = |step: u32| timeline.width_at(i, Moment::after(step)).unwrap();
+            assert_eq!(width(seam.birth + 1 + opening), seam.width);
+            for age in 0..opening {
+                let expected = seam.width * (age + 1) as f32 / (opening + 1) as f32;
+                assert!((width(seam.birth + 1 + age) - expected).abs() < 1e-6);
+            }
+            let segment = SegmentId::Branch(i);
+            if seam.parent != NO_PARENT {
+                assert!(timeline.path_at(network, segment, Moment::after(seam.birth)).is_none());
+                assert_eq!(timeline.path_at(network, segment, Moment::after(steps)), network.path(segment));
+            }
+        }
+        let mut changed = Vec::new();
+        growth.take_changed(&mut changed);
+        changed.sort_unstable();
+        assert_eq!(changed, growth.network().segments().collect::<Vec<_>>(), "each segment once");
+        // They leave room for as many nodes as before.
+        let n = growth.network().nodes().len();
+        assert!(matches!(growth.hit(0.5 * extent, 4.0), HitOutcome::Started(_)));
+        while growth.step().grew() {}
+        assert_eq!(growth.network().nodes().len(), n + 50);
     }
 }
 

@@ -84,6 +84,11 @@ impl Widths {
         self.notches[0].1 * factor * wider
     }
 
+    /// Prepares the place of a node that comes with a width of its own.
+    pub(super) fn admit(&mut self) {
+        self.pipes.push(Pipe { behind: 1, told: 1, notch: 0, factor: 1.0, wider: 1.0 });
+    }
+
     /// Makes a node wider for good.
     pub(super) fn scale(&mut self, node: u32, by: f32) {
         self.pipes[node as usize].wider *= by;

@@ -31,7 +31,7 @@ pub struct Cell {
     pub centroid: Vec2,
     /// Step at which the segment was born that closed it.
     pub birth: u32,
-    /// The later of the impacts of that segment's ends.
+    /// The later of the impacts of that segment's ends; [`NO_IMPACT`](super::NO_IMPACT) if one has none.
     pub impact: u32,
     /// A half-edge of its outer loop.
     start: u32,

@@ -6,6 +6,9 @@ use glam::Vec2;
 /// The [`Node::parent`] of a node at which a crack starts.
 pub const NO_PARENT: u32 = u32::MAX;
 
+/// The [`Node::impact`] of a node that no impact has brought forth.
+pub const NO_IMPACT: u32 = u32::MAX;
+
 /// A point of a crack.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Node {
@@ -19,7 +22,7 @@ pub struct Node {
     pub generation: u32,
     /// Step at which it was born.
     pub birth: u32,
-    /// Index of the impact it belongs to.
+    /// Index of the impact it belongs to, or [`NO_IMPACT`].
     pub impact: u32,
     /// How much of the network's roughness the line from its parent has, 0 (straight) to 1.
     pub bend: f32,

@@ -2,11 +2,11 @@
 
 use super::{
     CrackTextures,
-    surfaces::{Active, Surfaces},
+    surfaces::{Active, Surfaces, Touched},
 };
 use crate::{
-    pattern::{Moment, SurfaceFrame},
-    raster::{Profile, Replay},
+    pattern::{CellTracker, Moment, SurfaceFrame},
+    raster::{Profile, Replay, TexelRect},
 };
 use bevy::prelude::*;
 
@@ -82,6 +82,9 @@ impl CrackClock {
 /// The most steps that can be due: after a long pause a surface does not make up for all of it.
 const MAX_DUE: f64 = 64.0;
 
+/// The most steps a second that baked cracks appear in.
+const MOST_STEPS: f64 = 1e6;
+
 /// Shows a surface's cracks at times other than the end.
 pub(super) struct Playback {
     pub(super) replay: Replay,
@@ -113,6 +116,7 @@ enum Ruler {
     Speed(f64),
     Value(f64),
     Closing(f64),
+    Appearing(f64),
 }
 
 impl Active {
@@ -127,7 +131,7 @@ impl Active {
                 Ruler::Value(f64::from(value.clamp(0.0, 1.0)))
             }
             // The clock is gone: on to the end.
-            (None, None) => Ruler::Speed(1.0),
+            (None, None) => self.appearing.map_or(Ruler::Speed(1.0), Ruler::Appearing),
         }
     }
 
@@ -167,6 +171,7 @@ impl Active {
         let (ruler, end, is_growing) = (self.ruler(), self.end(), self.growth.is_growing());
         match (ruler, &mut self.playback) {
             (Ruler::Closing(rate), Some(playback)) => playback.advance(-rate * f64::from(seconds), end),
+            (Ruler::Appearing(rate), Some(playback)) => playback.advance(rate * f64::from(seconds), end),
             (Ruler::Speed(speed), Some(playback)) => playback.advance(speed * steps, end),
             _ => self.due = (self.due + steps).min(MAX_DUE),
         }
@@ -181,7 +186,7 @@ impl Active {
     /// Makes a step of growth if one is due.
     pub(super) fn step_if_due(&mut self) -> bool {
         let is_due = match (self.ruler(), &self.playback) {
-            (Ruler::Speed(_), Some(playback)) => playback.want > self.end(),
+            (Ruler::Speed(_) | Ruler::Appearing(_), Some(playback)) => playback.want > self.end(),
             (Ruler::Closing(_), _) => false,
             _ => self.due >= 1.0,
         };
@@ -202,6 +207,7 @@ impl Active {
             Ruler::Speed(speed) if speed < 0.0 => want <= 0.0,
             Ruler::Speed(_) => !is_growing || want <= self.end(),
             Ruler::Closing(_) => want <= 0.0,
+            Ruler::Appearing(_) => !is_growing && want >= self.end(),
         }
     }
 
@@ -257,6 +263,30 @@ impl Active {
         true
     }
 
+    /// Shows a network that has taken the place of another from its start: what is in the field is gone. Without a clock, and
+    /// with `seconds`, it appears within them, else all of it is there at once.
+    pub(super) fn show_anew(&mut self, seconds: Option<f32>) {
+        self.field.clear();
+        self.touched = Touched::new(self.field.frame.size());
+        self.mark(TexelRect::whole(self.field.frame.size()));
+        self.cells = CellTracker::new(self.field.frame.extent());
+        self.cells_told = 1;
+        self.tips_from = 0;
+        self.closing = None;
+        let seconds = seconds.filter(|seconds| *seconds > 0.0);
+        self.appearing = seconds.map(|seconds| (self.end() / f64::from(seconds)).min(MOST_STEPS));
+        if self.appearing.is_some() && self.clock.is_none() {
+            self.open_playback().want = 0.0;
+        } else if self.clock.is_none() {
+            self.playback = None;
+        }
+        let (frame, profile) = (self.field.frame, self.profile);
+        if let Some(playback) = &mut self.playback {
+            playback.start_over(frame, profile);
+            playback.shown = Moment::START;
+        }
+    }
+
     /// A hit: time runs forwards again. Returns the clock that it goes by if that is another one now.
     pub(super) fn turn_forwards(&mut self) -> Option<CrackClock> {
         self.closing = None;
@@ -279,6 +309,7 @@ impl Active {
         {
             self.due = (playback.want - end.steps()).clamp(0.0, MAX_DUE);
             self.playback = None;
+            self.appearing = None;
             // All of it is in the field.
             self.growth.take_changed(&mut Vec::new());
             self.growth.take_markers(&mut Vec::new());

@@ -66,6 +66,20 @@ pub enum CrackError {
         /// Bytes left.
         left: u64,
     },
+    /// A guide of [`GuidedCracks`](super::GuidedCracks) cannot be read.
+    #[error("guide number {index} cannot be used: {reason}")]
+    Guide {
+        /// Its index.
+        index: usize,
+        /// Why.
+        reason: String,
+    },
+    /// The bake of [`GuidedCracks`](super::GuidedCracks) failed, most likely by a parameter out of its range.
+    #[error("the bake failed: {reason}")]
+    Bake {
+        /// Which one and why.
+        reason: String,
+    },
     /// A parameter of the preset is out of its range.
     #[error("{reason}")]
     Preset {

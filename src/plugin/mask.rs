@@ -92,7 +92,7 @@ impl PictureMasks {
 }
 
 /// The texels in `rect` of RGBA rows.
-fn part(rgba: &[u8], size: UVec2, rect: TexelRect) -> Vec<u8> {
+pub(super) fn part(rgba: &[u8], size: UVec2, rect: TexelRect) -> Vec<u8> {
     if rect == TexelRect::whole(size) {
         return rgba.to_vec();
     }

@@ -17,11 +17,13 @@
 //! ```
 
 mod activate;
+mod bake;
 mod budget;
 mod carrier;
 mod clock;
 mod error;
 mod grow;
+mod guided;
 mod heal;
 mod hit;
 #[cfg(feature = "2d")]
@@ -37,6 +39,7 @@ mod picture;
 mod place;
 mod preset;
 mod queue;
+mod shards;
 #[cfg(feature = "2d")]
 mod sprite;
 mod state;
@@ -49,6 +52,7 @@ mod watch;
 pub use budget::{CrackBudget, CrackStats};
 pub use clock::{CrackClock, CrackDrive};
 pub use error::CrackError;
+pub use guided::{BakeProgress, CrackBaked, CrackGuide, GuideSource, GuidedAppearance, GuidedCracks};
 pub use heal::CrackCommandsExt;
 pub use hit::{CrackHit, HitPoint};
 #[cfg(feature = "2d")]
@@ -57,6 +61,9 @@ pub use mask::CrackMaskSource;
 #[cfg(any(feature = "2d", feature = "3d"))]
 pub use place::{CrackPlace, CrackPlaces};
 pub use preset::PresetSource;
+pub use shards::{
+    CrackShards, Reassembled, Shard, ShardsError, ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen, Shattered,
+};
 pub use state::{CellClosed, CrackFailed, CrackFinished, CrackState, CrackStatus, CrackTip};
 pub use surface::{CrackMaps, CrackResolution, CrackSurface};
 pub use textures::CrackTextures;
@@ -72,9 +79,11 @@ use bevy::{
 /// What a game names.
 pub mod prelude {
     pub use super::{
-        CellClosed, CrackBudget, CrackClock, CrackCommandsExt, CrackDrive, CrackError, CrackFailed, CrackFinished,
-        CrackHit, CrackMaps, CrackMaskSource, CrackPlugin, CrackPlugins, CrackResolution, CrackState, CrackStats,
-        CrackStatus, CrackSurface, CrackSystems, CrackTextures, CrackTip, HitPoint, PresetSource,
+        BakeProgress, CellClosed, CrackBaked, CrackBudget, CrackClock, CrackCommandsExt, CrackDrive, CrackError,
+        CrackFailed, CrackFinished, CrackGuide, CrackHit, CrackMaps, CrackMaskSource, CrackPlugin, CrackPlugins,
+        CrackResolution, CrackShards, CrackState, CrackStats, CrackStatus, CrackSurface, CrackSystems, CrackTextures,
+        CrackTip, GuideSource, GuidedAppearance, GuidedCracks, HitPoint, PresetSource, Reassembled, Shard,
+        ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen, Shattered,
     };
     #[cfg(feature = "2d")]
     pub use super::{CrackLight2d, CrackLitMaterial};
@@ -83,9 +92,11 @@ pub mod prelude {
     pub use crate::preset::CrackPreset;
 }
 
-/// The stages of a frame, in order, in `PostUpdate`, after transforms are propagated and before asset events.
+/// The stages of a frame, in order, in `PostUpdate`, all but the first after transforms are propagated and before asset events.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum CrackSystems {
+    /// After this set, which comes before transforms are propagated, shards are where they belong in this frame.
+    Shatter,
     /// After this set, every hit of this frame is queued, and as many as the budget allows are in their growths.
     Hit,
     /// After this set, networks have made the steps that are due, as many as the budget allows.
@@ -112,15 +123,21 @@ pub struct CrackPlugin;
 
 impl Plugin for CrackPlugin {
     fn build(&self, app: &mut App) {
-        use CrackSystems::{Grow, Hit, Paint, Upload};
+        use CrackSystems::{Grow, Hit, Paint, Shatter, Upload};
         app.register_type::<CrackSurface>()
             .register_type::<CrackClock>()
             .register_type::<CrackState>()
+            .register_type::<GuidedCracks>()
+            .register_type::<BakeProgress>()
+            .register_type::<CrackBaked>()
             .register_type::<CrackTextures>()
             .register_type::<CrackHit>()
             .register_type::<CrackFinished>()
             .register_type::<CrackFailed>()
             .register_type::<CellClosed>()
+            .register_type::<ShatterCracks>()
+            .register_type::<Shattered>()
+            .register_type::<Reassembled>()
             .register_type::<CrackBudget>()
             .register_type::<CrackStats>()
             .register_type::<CrackUploadStats>()
@@ -132,24 +149,41 @@ impl Plugin for CrackPlugin {
             .init_resource::<queue::HitQueue>()
             .init_resource::<mask::PictureMasks>()
             .init_resource::<surfaces::Surfaces>()
+            .init_resource::<bake::Bakes>()
             .add_message::<CrackHit>()
             .add_observer(hit::receive_hit)
             .configure_sets(
                 PostUpdate,
                 (Hit, Grow, Paint, Upload).chain().after(TransformSystems::Propagate).before(AssetEventSystems),
             )
+            .configure_sets(PostUpdate, Shatter.before(TransformSystems::Propagate))
             .add_systems(
                 PostUpdate,
                 (
                     (
-                        (budget::start_frame, watch::watch_surfaces, watch::watch_pictures, preset::watch_presets),
+                        shards::fly_shards,
+                        shards::shatter_when_due,
+                        shards::shatter_surfaces.run_if(shards::any_requests),
+                    )
+                        .chain()
+                        .in_set(Shatter),
+                    (
+                        (
+                            budget::start_frame,
+                            watch::watch_surfaces,
+                            watch::watch_pictures,
+                            preset::watch_presets,
+                            guided::watch_guided,
+                        ),
                         watch::update_changed.run_if(watch::any_changed),
                         hit::collect_hits,
                         activate::apply_hits.run_if(queue::any_queued),
                     )
                         .chain()
                         .in_set(Hit),
-                    (clock::follow_clocks, grow::grow_surfaces).chain().in_set(Grow),
+                    (clock::follow_clocks, grow::grow_surfaces, bake::bake_guided.run_if(bake::any_baking))
+                        .chain()
+                        .in_set(Grow),
                     paint::paint_surfaces.in_set(Paint),
                     upload::drop_unwanted.in_set(Upload),
                 ),

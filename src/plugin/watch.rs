@@ -7,10 +7,11 @@ use super::{
     mask::{self, PictureMasks},
     paint::stamp_anew,
     preset,
+    shards::drop_shards,
     surfaces::{Active, Surfaces},
 };
 use crate::{
-    CrackPreset,
+    CrackPreset, Grid,
     growth::CrackGrowth,
     pattern::{CellTracker, CrackMask, SurfaceFrame},
     raster::{DepthField, TexelRect},
@@ -184,21 +185,38 @@ fn update_preset(active: &mut Active, preset: CrackPreset) -> Result<(), CrackEr
 
 /// On a picture of other proportions the same hits, in the same places, make other cracks: grown as far as they were.
 /// `None` if they may stay.
-fn regrow(active: &Active, frame: SurfaceFrame, mask: Arc<CrackMask>) -> Result<Option<CrackGrowth>, CrackError> {
+fn regrow(active: &mut Active, frame: SurfaceFrame, mask: Arc<CrackMask>) -> Result<Option<CrackGrowth>, CrackError> {
     let (before, extent) = (active.growth.network().extent(), frame.extent());
     if before == extent {
         return Ok(None);
     }
-    let mut growth = CrackGrowth::new(active.growth.params().clone(), extent, active.surface.seed)
+    let steps = active.added.as_ref().map_or(0, |added| added.steps);
+    grown_anew(active, steps, extent, mask, None).map(Some)
+}
+
+/// The same hits in the same places around what was baked, grown as far as they were after the first `added` steps.
+pub(super) fn grown_anew(
+    active: &mut Active,
+    added: u32,
+    extent: Vec2,
+    mask: Arc<CrackMask>,
+    density: Option<Grid<f32>>,
+) -> Result<CrackGrowth, CrackError> {
+    let mut growth = CrackGrowth::new(active.preset.growth.clone(), extent, active.surface.seed)
         .map_err(|error| CrackError::Preset { reason: error.to_string() })?;
     growth.set_mask(mask);
+    growth.set_density(density);
+    if let Some(added) = &mut active.added {
+        added.steps = growth.add_cracks(&added.network, added.opening);
+    }
+    let before = active.growth.network().extent();
     for impact in active.growth.impacts() {
         growth.hit((impact.pos / before * extent).min(extent), impact.energy);
     }
-    for _ in 0..active.growth.steps() {
+    for _ in added..active.growth.steps() {
         growth.step();
     }
-    Ok(Some(growth))
+    Ok(growth)
 }
 
 /// Reads the pictures anew and paints the cracks over them; `false` if they are not there yet.
@@ -210,6 +228,9 @@ fn update_picture(world: &mut World, entity: Entity, active: &mut Active, shown:
     let look = look(&active.preset, frame)?;
     let regrown = regrow(active, frame, mask.clone())?;
     active.textures = make_textures(world, &draft, Some(&active.textures))?;
+    // Shards show the picture that was.
+    let bytes = drop_shards(world, entity, active);
+    world.resource_mut::<Surfaces>().bytes -= bytes;
     active.is_outdated = false;
     if let Some(growth) = regrown {
         active.cells = CellTracker::new(frame.extent());
@@ -218,7 +239,7 @@ fn update_picture(world: &mut World, entity: Entity, active: &mut Active, shown:
         active.growth = growth;
     }
     if active.surface.alpha_mask {
-        active.growth.set_density(density(&draft.base, draft.rect));
+        active.growth.set_density(density(draft.rect.size(), |texel| draft.base.is_hole(draft.rect.min + texel)));
     }
     active.growth.set_mask(mask.clone());
     world.resource_mut::<Surfaces>().bytes += draft.bytes;

@@ -34,6 +34,7 @@
 mod bake;
 mod edges;
 mod front;
+mod ink;
 mod lattice;
 mod level;
 mod noise;
@@ -49,6 +50,7 @@ mod tests;
 pub use bake::{BakeProgress, VoronoiBake, VoronoiMap};
 pub use edges::edges;
 pub use front::{FRONT_STEP, Front};
+pub use ink::{ink, lightness};
 pub use params::{Guide, MAX_LEVELS, MAX_SITES, SiteLayout, VoronoiError, VoronoiParams};
 pub use seams::{Seam, SeamVertex, Seams};
 pub use strokes::StrokeReport;

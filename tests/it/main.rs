@@ -10,6 +10,8 @@ mod clock;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod gpu;
 #[cfg(all(feature = "2d", feature = "3d"))]
+mod guided;
+#[cfg(all(feature = "2d", feature = "3d"))]
 mod hits;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod images;
@@ -22,6 +24,8 @@ mod plugin;
 #[cfg(feature = "serde")]
 mod presets;
 mod replay;
+#[cfg(all(feature = "2d", feature = "3d"))]
+mod shards;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod support;
 mod voronoi;

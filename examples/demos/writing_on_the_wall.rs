@@ -1,0 +1,218 @@
+//! Type a word; it appears in the cracks of a wall.
+//!
+//! Letters, space and backspace change the word, and each change starts another bake while the bar below runs. Click to hit the
+//! wall: new cracks start from those that are there and stop at them. Escape heals.
+//!
+//! Without a display (or with `--headless`) a script types, and pictures and a GIF are written to `--out`.
+
+#[path = "../bake/text.rs"]
+mod text;
+
+use bevy::{
+    asset::RenderAssetUsages,
+    input::keyboard::{Key, KeyboardInput},
+    prelude::*,
+    render::render_resource::{Extent3d, TextureDimension, TextureFormat},
+    window::PrimaryWindow,
+};
+use bevy_crack::{prelude::*, voronoi::VoronoiParams};
+use bevy_crack_demos::{DemoArguments, Film, FilmPlugin, OnCanvas, Output, demo_app};
+use clap::Parser;
+use std::{thread, time::Duration};
+use text::{FONT, draw_text};
+
+/// Size of the wall's picture, texels, and in the world.
+const TEXELS: UVec2 = UVec2::new(1024, 512);
+const SIZE: Vec2 = Vec2::new(1120.0, 560.0);
+
+/// Middle of the wall.
+const MIDDLE: Vec2 = Vec2::new(0.0, 40.0);
+
+/// Size of the bar when it is full.
+const BAR: Vec2 = Vec2::new(700.0, 10.0);
+
+/// The most letters.
+const MOST: usize = 14;
+
+/// Hits of the scripted run.
+const HITS: u32 = 6;
+
+#[derive(Parser)]
+#[command(about = "Type a word; it appears in the cracks of a wall")]
+struct Arguments {
+    #[command(flatten)]
+    demo: DemoArguments,
+    /// What the script types
+    #[arg(long, default_value = "HELLO")]
+    word: String,
+}
+
+#[derive(Resource, Default)]
+struct Word(String);
+
+/// What the script types.
+#[derive(Resource)]
+struct Script(Vec<char>);
+
+#[derive(Component)]
+struct Wall;
+
+#[derive(Component)]
+struct Bar;
+
+#[derive(Component)]
+struct Caption;
+
+fn main() -> AppExit {
+    let arguments = Arguments::parse();
+    let (mut app, output) = demo_app("bevy_crack: writing on the wall", &arguments.demo);
+    app.add_plugins((CrackPlugins, FilmPlugin))
+        .insert_resource(ClearColor(Color::srgb(0.09, 0.1, 0.115)))
+        .insert_resource(Script(arguments.word.chars().take(MOST).collect()))
+        .init_resource::<Word>()
+        .add_systems(Startup, setup)
+        .add_systems(Update, (write_word.run_if(resource_changed::<Word>), run_bar).chain());
+    if output == Output::Window {
+        app.add_systems(Update, (type_word, hit_on_click, heal_on_escape).before(write_word));
+    } else {
+        app.add_systems(Update, play_script.before(write_word));
+    }
+    app.run()
+}
+
+fn setup(mut commands: Commands, film: Res<Film>, mut images: ResMut<Assets<Image>>) -> Result {
+    let mut camera = commands.spawn(Camera2d);
+    if let Some(target) = film.camera_target() {
+        camera.insert(target);
+    }
+    // The wall is two pictures wide.
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets/textures");
+    let plaster = image::open(format!("{folder}/plaster.png"))?.to_rgba8();
+    let wall = image::RgbaImage::from_fn(TEXELS.x, TEXELS.y, |x, y| {
+        *plaster.get_pixel(x % plaster.width(), y % plaster.height())
+    });
+    let picture = images.add(image_of(TEXELS, wall.into_raw()));
+    commands.spawn((
+        Wall,
+        Sprite { image: picture.clone(), custom_size: Some(SIZE), ..default() },
+        Transform::from_translation(MIDDLE.extend(0.0)),
+        CrackSurface::new(CrackPreset::PLASTER).with_seed(4),
+        OnCanvas { picture, size: SIZE },
+    ));
+    let amber = images.add(image_of(UVec2::ONE, vec![235, 170, 70, 255]));
+    commands.spawn((
+        Bar,
+        Sprite { image: amber.clone(), custom_size: Some(Vec2::ONE), ..default() },
+        Transform::from_xyz(0.0, -275.0, 1.0).with_scale(Vec3::new(0.001, BAR.y, 1.0)),
+        OnCanvas { picture: amber, size: Vec2::ONE },
+    ));
+    commands.spawn((
+        Caption,
+        Text2d::new(""),
+        TextFont { font_size: FontSize::Px(20.0), ..default() },
+        TextColor(Color::srgb(0.75, 0.77, 0.8)),
+        Transform::from_xyz(0.0, -310.0, 1.0),
+    ));
+    Ok(())
+}
+
+fn image_of(size: UVec2, texels: Vec<u8>) -> Image {
+    let extent = Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 };
+    Image::new(extent, TextureDimension::D2, texels, TextureFormat::Rgba8UnormSrgb, RenderAssetUsages::default())
+}
+
+fn type_word(mut word: ResMut<Word>, mut keys: MessageReader<KeyboardInput>) {
+    for key in keys.read().filter(|key| key.state.is_pressed()) {
+        match &key.logical_key {
+            Key::Character(letters) if word.0.chars().count() < MOST => word.0.push_str(letters),
+            Key::Space if !word.0.is_empty() => word.0.push(' '),
+            Key::Backspace => _ = word.0.pop(),
+            _ => {}
+        }
+    }
+}
+
+/// Another word: another bake. An empty one: a whole wall.
+fn write_word(
+    mut commands: Commands,
+    word: Res<Word>,
+    wall: Single<Entity, With<Wall>>,
+    mut caption: Single<&mut Text2d, With<Caption>>,
+) {
+    caption.0 = if word.0.is_empty() {
+        "type a word      click: hit      escape: heal".into()
+    } else {
+        format!("{}      (click: hit, escape: heal)", word.0)
+    };
+    if word.0.trim().is_empty() {
+        commands.entity(*wall).remove::<GuidedCracks>().heal_cracks();
+        return;
+    }
+    let Some(letters) = draw_text(FONT, &word.0, TEXELS, f32::INFINITY) else { return };
+    let guided = GuidedCracks::new(CrackGuide::new(letters)).with_seed(word.0.len() as u64);
+    let from = Vec2::new(0.0, 0.5);
+    commands.entity(*wall).insert(GuidedCracks {
+        params: VoronoiParams { sites: 260, ..guided.params.clone() },
+        appearance: GuidedAppearance::Front { from, seconds: 2.0 },
+        ..guided
+    });
+}
+
+/// The bar grows with the bake, and is gone when it is done.
+fn run_bar(wall: Query<Option<&BakeProgress>, With<Wall>>, mut bar: Single<&mut Transform, With<Bar>>) {
+    let share = wall.iter().flatten().next().map_or(0.0, |progress| progress.0);
+    bar.scale.x = if share < 1.0 { (share * BAR.x).max(0.001) } else { 0.001 };
+    bar.translation.x = 0.5 * (bar.scale.x - BAR.x);
+}
+
+fn hit_on_click(
+    mut commands: Commands,
+    buttons: Res<ButtonInput<MouseButton>>,
+    window: Single<&Window, With<PrimaryWindow>>,
+    camera: Single<(&Camera, &GlobalTransform)>,
+    wall: Single<Entity, With<Wall>>,
+) {
+    let (camera, at) = *camera;
+    if buttons.just_pressed(MouseButton::Left)
+        && let Some(cursor) = window.cursor_position()
+        && let Ok(point) = camera.viewport_to_world_2d(at, cursor)
+        && (point - MIDDLE).abs().cmple(SIZE / 2.0).all()
+    {
+        commands.trigger(CrackHit::world(*wall, point.extend(0.0)));
+    }
+}
+
+fn heal_on_escape(keys: Res<ButtonInput<KeyCode>>, mut word: ResMut<Word>) {
+    if keys.just_pressed(KeyCode::Escape) {
+        word.0.clear();
+    }
+}
+
+/// The scripted run: the word letter by letter, time to appear, then hits.
+fn play_script(
+    mut commands: Commands,
+    mut frame: Local<u32>,
+    mut hits: Local<u32>,
+    script: Res<Script>,
+    arguments: Res<DemoArguments>,
+    mut word: ResMut<Word>,
+    wall: Single<(Entity, Option<&BakeProgress>), With<Wall>>,
+) {
+    let (wall, progress) = *wall;
+    // Without a window frames are short: a bake is given the time that it has in a game.
+    if progress.is_some_and(|progress| progress.0 < 1.0) {
+        thread::sleep(Duration::from_millis(20));
+    }
+    *frame += 1;
+    let share = *frame as f32 / arguments.frames.max(1) as f32;
+    let due = ((share / 0.3 * script.0.len() as f32).ceil() as usize).min(script.0.len());
+    if word.0.chars().count() < due {
+        word.0 = script.0[..due].iter().collect();
+    }
+    while share > 0.7 && *hits < (((share - 0.7) / 0.2 * HITS as f32) as u32).min(HITS) {
+        let i = *hits as f32;
+        *hits += 1;
+        let uv = Vec2::new((0.2 + 0.618 * i).fract(), (0.3 + 0.755 * i).fract()) * 0.8 + 0.1;
+        commands.trigger(CrackHit::uv(wall, uv));
+    }
+}
