@@ -314,6 +314,10 @@ fn i7_a_hundred_surfaces_show_it_on_the_gpu() {
     let image = add(&mut app, picture(UVec2::splat(32)));
     let surfaces: Vec<_> = (0..100).map(|seed| spawn_small(&mut app, &image, seed)).collect();
     hit_many(&mut app, &surfaces);
+    // Reading back takes frames, in which nothing must change.
+    for entity in &surfaces {
+        settle(&mut app, *entity);
+    }
     steps(&mut app, 10);
     assert_on_gpu(&mut app, &surfaces);
     let before = texels(&app, &image);

@@ -482,6 +482,7 @@ fn e7_clocks_that_stand_still_race_and_jump() {
 #[test]
 fn e7_a_long_frame_makes_a_bounded_number_of_steps() {
     let mut app = app();
+    single_threaded(&mut app);
     allow_long_frames(&mut app);
     // A crack that goes on for hundreds of steps.
     let mut preset = CrackPreset::CONCRETE;
@@ -502,12 +503,13 @@ fn e7_a_long_frame_makes_a_bounded_number_of_steps() {
         assert!(state(&app, entity).nodes > last);
         last = state(&app, entity).nodes;
     }
-    // Rates that are none.
+    // Rates that are none are refused, and the pace stays; a rate of zero is one.
     set_frame(&mut app, FRAME);
-    for rate in [f32::NAN, f32::INFINITY, -5.0, 0.0] {
+    for (rate, is_refused) in [(0.0, false), (f32::NAN, true), (f32::INFINITY, true), (-5.0, true)] {
         app.world_mut().get_mut::<CrackSurface>(entity).unwrap().preset.as_mut().unwrap().steps_per_second = rate;
+        let heard = warnings(|| steps(&mut app, 5));
+        assert_eq!(heard.len(), usize::from(is_refused), "{rate} steps a second: {heard:?}");
         // What was due before.
-        steps(&mut app, 5);
         let before = state(&app, entity).nodes;
         steps(&mut app, 5);
         assert_eq!(state(&app, entity).nodes, before, "{rate} steps a second");
