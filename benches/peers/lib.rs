@@ -1,1 +1,1 @@
-//! Nothing but benches: `cargo bench -p bevy_crack_peers`.
+//! Nothing but benches: `cargo bench --manifest-path benches/peers/Cargo.toml`.

@@ -99,18 +99,17 @@ fn setup(
         camera.insert(target);
     }
     // A preset of a file each: change one while this runs, and the next cracks follow it.
-    for (x, name, picture, dust, mask) in [
-        (-290.0, "plaster", "plaster", Color::srgb(0.8, 0.77, 0.7), CrackMaskSource::None),
-        (290.0, "clay", "clay", Color::srgb(0.66, 0.5, 0.37), CrackMaskSource::None),
-    ] {
-        let picture = assets.load(format!("textures/{picture}.png"));
+    for (x, name, dust) in
+        [(-290.0, "plaster", Color::srgb(0.6, 0.57, 0.52)), (290.0, "clay", Color::srgb(0.93, 0.8, 0.64))]
+    {
+        let picture = assets.load(format!("textures/{name}.png"));
         let preset: Handle<CrackPreset> = assets.load(format!("presets/{name}.crack.ron"));
         commands
             .spawn((
                 Wall { dust: colors.add(dust) },
                 Sprite { image: picture.clone(), custom_size: Some(Vec2::splat(SIDE)), ..default() },
                 Transform::from_xyz(x, 20.0, 0.0),
-                CrackSurface::new(preset).with_mask(mask),
+                CrackSurface::new(preset),
                 OnCanvas { picture, size: Vec2::splat(SIDE) },
                 Pickable::default(),
             ))
@@ -124,7 +123,7 @@ fn setup(
         Text2d::new("click: hit      H: heal      sound:"),
         TextFont { font_size: FontSize::Px(18.0), ..default() },
         TextColor(Color::srgb(0.6, 0.63, 0.67)),
-        Transform::from_xyz(-60.0, -325.0, 3.0),
+        Transform::from_xyz(-100.0, -325.0, 3.0),
     ));
     commands.spawn((
         Meter { loudness: 0.0 },
@@ -133,7 +132,7 @@ fn setup(
         Transform::from_xyz(100.0, -325.0, 3.0),
     ));
     commands.insert_resource(Shapes {
-        speck: meshes.add(Circle::new(2.2)),
+        speck: meshes.add(Circle::new(2.6)),
         grain: meshes.add(RegularPolygon::new(4.5, 5)),
     });
 }

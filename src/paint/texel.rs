@@ -600,7 +600,7 @@ mod tests {
         math::Rng,
         paint::{ColorStop, Look},
         pattern::{PathPoint, SegmentPath, SurfaceFrame},
-        raster::{DirtyTiles, Profile, stamp_dot, stamp_path},
+        raster::{DirtyTiles, Profile, stamp_dot, stamp_path_with},
     };
     use glam::Vec2;
 
@@ -659,24 +659,39 @@ mod tests {
         }
 
         fn paint(&self, field: &DepthField, look: &LookTable, rect: TexelRect, origin: UVec2, out: &mut [Vec<u8>; 3]) {
+            self.paint_all(field, look, &[rect], origin, out);
+        }
+
+        fn paint_all(
+            &self,
+            field: &DepthField,
+            look: &LookTable,
+            rects: &[TexelRect],
+            origin: UVec2,
+            out: &mut [Vec<u8>; 3],
+        ) {
             let [diffuse, normal, depth] = out;
             let mut targets = PaintTargets { diffuse: Some(diffuse), normal: Some(normal), depth: Some(depth) };
-            paint_into(self.base(), field, look, rect, origin, &mut targets);
+            paint_rects(self.base(), field, look, rects, origin, &mut targets);
         }
     }
 
-    fn random_stamp(rng: &mut Rng, field: &mut DepthField) -> TexelRect {
+    /// Returns what has changed.
+    fn random_stamp(rng: &mut Rng, field: &mut DepthField) -> Vec<TexelRect> {
         let extent = field.frame.extent();
         let mut place = || Vec2::new(rng.unit(), rng.unit()) * extent;
         let (from, to) = (place(), place());
         let to = from + (to - from).clamp_length_max(0.3);
         let width = 0.06 * rng.unit();
         if below(rng, 5) == 0 {
-            return stamp_dot(field, from, width, rng.unit());
+            return vec![stamp_dot(field, from, width, rng.unit())];
         }
         let profile = Profile { rim_width: 0.02, rim_depth: 0.2, ..Profile::DEFAULT };
         let point = |pos, width| PathPoint { pos, width };
-        stamp_path(field, &profile, &SegmentPath::straight(point(from, width), point(to, 0.5 * width)))
+        let path = SegmentPath::straight(point(from, width), point(to, 0.5 * width));
+        let mut changed = Vec::new();
+        stamp_path_with(field, &profile, &path, &mut |rect| changed.push(rect));
+        changed
     }
 
     #[test]
@@ -702,13 +717,11 @@ mod tests {
                 }
                 for _ in 0..=below(&mut rng, 3) {
                     let changed = random_stamp(&mut rng, &mut field);
-                    dirty.mark(changed.grow(1, size));
+                    changed.iter().for_each(|rect| dirty.mark(rect.grow(1, size)));
                 }
                 rects.clear();
                 dirty.take_rects(&mut rects);
-                for &rect in &rects {
-                    canvas.paint(&field, &look, rect, origin, &mut painted);
-                }
+                canvas.paint_all(&field, &look, &rects, origin, &mut painted);
                 let mut whole = canvas.untouched();
                 canvas.paint(&field, &look, TexelRect::whole(size), origin, &mut whole);
                 assert!(painted == whole, "size {size}, step {step}");

@@ -9,6 +9,7 @@ use super::{
     picture::{self, BasePicture, Space},
     preset,
     queue::{HitQueue, QueuedHit},
+    shards::Struck,
     surfaces::{Active, Surfaces, Touched},
     textures,
     upload::Uploads,
@@ -83,6 +84,10 @@ fn apply(world: &mut World, entity: Entity, hit: QueuedHit) -> Result<HitOutcome
     };
     let mut surfaces = world.resource_mut::<Surfaces>();
     let active = surfaces.active.get_mut(&entity).ok_or(GONE)?;
+    let texel = active.field.frame.to_texel(active.field.frame.uv_to_pos(uv)).max(Vec2::ZERO).as_uvec2();
+    if active.broken.as_ref().is_some_and(|broken| broken.holes.contains(texel)) {
+        return Err("a shard has left the surface there");
+    }
     if active.surface.alpha_mask
         && let Some(view) = active.views.get(active.view)
         // What lies off the surface is the growth's to refuse.
@@ -92,8 +97,10 @@ fn apply(world: &mut World, entity: Entity, hit: QueuedHit) -> Result<HitOutcome
     {
         return Err("the surface is transparent there");
     }
-    let outcome = active.growth.hit(uv * active.growth.network().extent(), hit.energy);
+    let pos = uv * active.growth.network().extent();
+    let outcome = active.growth.hit(pos, hit.energy);
     if matches!(outcome, HitOutcome::Started(_) | HitOutcome::Merged(_)) {
+        active.struck = Some(Struck { pos, energy: hit.energy, direction: hit.direction });
         active.hits += 1;
         surfaces.start_growing(entity);
         // The nodes it starts with show at once.
@@ -154,7 +161,7 @@ pub(super) fn make_ready(world: &mut World, entity: Entity) -> Result<bool, Crac
         .map_err(|error| CrackError::Preset { reason: error.to_string() })?;
     let look = look(&preset, frame)?;
     if surface.alpha_mask {
-        growth.set_density(density(&draft.base, draft.rect));
+        growth.set_density(density(draft.rect.size(), |texel| draft.base.is_hole(draft.rect.min + texel)));
     }
     let mut field = DepthField::new(frame);
     field.forbid(&mask);
@@ -188,6 +195,9 @@ pub(super) fn make_ready(world: &mut World, entity: Entity) -> Result<bool, Crac
         tips_from: 0,
         cells: CellTracker::new(frame.extent()),
         cells_told: 1,
+        struck: None,
+        fell_at: (0, 1),
+        broken: None,
         surface,
         preset,
         has_new_settings: false,
@@ -357,10 +367,8 @@ pub(super) fn make_textures(
 }
 
 /// Where cracks may go: not over holes. `None` if there are none.
-pub(super) fn density(base: &BasePicture, rect: TexelRect) -> Option<Grid<f32>> {
-    let size = rect.size();
-    let is_hole = |x, y| base.is_hole(rect.min + UVec2::new(x, y));
-    if !(0..size.y).any(|y| (0..size.x).any(|x| is_hole(x, y))) {
+pub(super) fn density(size: UVec2, is_hole: impl Fn(UVec2) -> bool) -> Option<Grid<f32>> {
+    if !(0..size.y).any(|y| (0..size.x).any(|x| is_hole(UVec2::new(x, y)))) {
         return None;
     }
     let side = size.max_element().max(MASK_SIDE);
@@ -369,7 +377,7 @@ pub(super) fn density(base: &BasePicture, rect: TexelRect) -> Option<Grid<f32>> 
     for y in 0..mask_size.y {
         for (x, value) in (0..mask_size.x).zip(mask.row_mut(y as usize)) {
             let texel = (UVec2::new(2 * x + 1, 2 * y + 1) * size) / (2 * mask_size);
-            *value = if is_hole(texel.x, texel.y) { 0.0 } else { 1.0 };
+            *value = if is_hole(texel) { 0.0 } else { 1.0 };
         }
     }
     Some(mask)

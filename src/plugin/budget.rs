@@ -21,6 +21,8 @@ pub struct CrackBudget {
     pub max_texture_bytes: u64,
     /// Longest side of a texture, texels; default 8192. The device's own limit holds as well.
     pub max_side: u32,
+    /// Shards that are shown at once, of all surfaces together; default 4096. The oldest make room for new ones.
+    pub max_shards: usize,
 }
 
 impl Default for CrackBudget {
@@ -31,6 +33,7 @@ impl Default for CrackBudget {
             max_growing: 1024,
             max_texture_bytes: 1 << 30,
             max_side: 8192,
+            max_shards: 4096,
         }
     }
 }

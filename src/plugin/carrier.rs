@@ -1,6 +1,6 @@
 //! [`Carrier`]: what shows a surface's pictures, a sprite or a material.
 
-use super::{CrackError, CrackMaps, CrackTextures};
+use super::{CrackError, CrackMaps, CrackTextures, shards::Plane, surfaces::Active};
 use bevy::{
     asset::{UntypedAssetId, UntypedHandle},
     prelude::*,
@@ -48,6 +48,18 @@ pub(super) struct Kind {
     pub(super) detach: fn(&mut World, Entity, &Carrier),
     /// Texture coordinates in the shown part of a point in the entity's own space.
     pub(super) locate: fn(&World, Entity, Vec3) -> Result<Vec2, &'static str>,
+    /// Whether its shards have thickness.
+    pub(super) is_solid: bool,
+    /// Where its picture lies in the entity's own space, if that is flat.
+    pub(super) plane: fn(&World, Entity, &Active) -> Result<Plane, &'static str>,
+    /// Makes what it shows transparent where its texture is.
+    pub(super) open: fn(&mut World, &Carrier),
+    /// The material of its shards, with the picture given, so much of it being there (0..=1).
+    pub(super) shard_material: fn(&mut World, Entity, &Carrier, &Handle<Image>, f32) -> Option<UntypedHandle>,
+    /// The material of their sides, if they have any, of a picture of this mean colour (sRGB).
+    pub(super) inside: fn(&mut World, &Carrier, [f32; 3]) -> Option<UntypedHandle>,
+    /// Gives a shard its mesh, if that is new, and its material.
+    pub(super) dress: fn(&mut EntityWorldMut, Option<Handle<Mesh>>, &UntypedHandle),
 }
 
 /// All kinds, the first that fits is taken.

@@ -1,9 +1,10 @@
 //! Healing, and what happens when a surface goes.
 
 use super::{
-    CrackState, CrackStats, CrackTextures, bake,
+    CrackState, CrackStats, CrackTextures, ShatterRequest, bake,
     carrier::{self, Found},
     queue::HitQueue,
+    shards::drop_shards,
     surfaces::Surfaces,
 };
 use bevy::{
@@ -13,7 +14,8 @@ use bevy::{
 
 /// Commands for surfaces.
 pub trait CrackCommandsExt {
-    /// Takes all cracks away, those of [`GuidedCracks`](super::GuidedCracks) too: the surface shows its own pictures again, its textures and its growth are dropped, hits
+    /// Takes all cracks away, those of [`GuidedCracks`](super::GuidedCracks) too, and all shards and holes: the surface shows its
+    /// own pictures again, its textures and its growth are dropped, hits
     /// that wait on it are refused. Does nothing on entities without cracks.
     fn heal_cracks(&mut self) -> &mut Self;
 
@@ -21,6 +23,10 @@ pub trait CrackCommandsExt {
     /// says, and are healed as by [`heal_cracks`](Self::heal_cracks) then. Hits that wait on the surface are refused; one that comes
     /// while they close makes them grow on from where they are. Not a number, zero or below: at once.
     fn close_cracks(&mut self, seconds: f32) -> &mut Self;
+
+    /// Knocks shards out of a cracked surface, in this frame, along the cracks it has. Nothing happens to an entity without cracks; one
+    /// that cannot shatter says so with [`ShatterFailed`](super::ShatterFailed). See [`ShatterCracks`](super::ShatterCracks).
+    fn shatter_cracks(&mut self, request: ShatterRequest) -> &mut Self;
 }
 
 impl CrackCommandsExt for EntityCommands<'_> {
@@ -33,6 +39,16 @@ impl CrackCommandsExt for EntityCommands<'_> {
     fn close_cracks(&mut self, seconds: f32) -> &mut Self {
         let entity = self.id();
         self.commands().queue(move |world: &mut World| close(world, entity, seconds));
+        self
+    }
+
+    fn shatter_cracks(&mut self, request: ShatterRequest) -> &mut Self {
+        let entity = self.id();
+        self.commands().queue(move |world: &mut World| {
+            if let Some(mut surfaces) = world.get_resource_mut::<Surfaces>() {
+                surfaces.requests.push((entity, request));
+            }
+        });
         self
     }
 }
@@ -73,7 +89,8 @@ fn purge(world: &mut World, entity: Entity) {
 fn forget(world: &mut World, entity: Entity) {
     bake::cancel(world, entity);
     let Some(mut surfaces) = world.get_resource_mut::<Surfaces>() else { return };
-    let Some(active) = surfaces.remove(entity) else { return };
+    let Some(mut active) = surfaces.remove(entity) else { return };
+    drop_shards(world, entity, &mut active);
     (active.carrier.kind.detach)(world, entity, &active.carrier);
     if let Ok(mut entity) = world.get_entity_mut(entity) {
         entity.remove::<CrackTextures>();

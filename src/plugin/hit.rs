@@ -1,6 +1,10 @@
 //! [`CrackHit`]: something strikes a surface.
 
-use super::{CrackBudget, CrackStats, CrackSurface, budget::FrameClock, queue::HitQueue};
+use super::{
+    CrackBudget, CrackStats, CrackSurface,
+    budget::FrameClock,
+    queue::{HitQueue, QueuedHit},
+};
 use bevy::prelude::*;
 
 /// One hit on a [`CrackSurface`]: trigger it as an entity event, or write it as a message when there are many.
@@ -24,7 +28,7 @@ pub struct CrackHit {
     pub at: HitPoint,
     /// How hard: 0 = nothing happens, 1 = as the preset says, 4 = twice as far; capped at 16.
     pub energy: f32,
-    /// Direction of the blow in the world; zero = straight. Kept for those who read hits; cracks do not depend on it.
+    /// Direction of the blow in the world; zero = straight. Shards fly that way; cracks do not depend on it.
     pub direction: Vec3,
 }
 
@@ -111,7 +115,10 @@ pub(super) fn collect_hits(
         match localize(hit, &surfaces) {
             Err(reason) => queue.reject(hit.entity, reason, &mut stats),
             Ok(_) if hit.energy == 0.0 => stats.ignored += 1,
-            Ok(at) => queue.push(hit.entity, at, hit.energy, budget.max_queued_per_surface, &mut stats),
+            Ok(at) => {
+                let waiting = QueuedHit { at, energy: hit.energy, direction: hit.direction };
+                queue.push(hit.entity, waiting, budget.max_queued_per_surface, &mut stats);
+            }
         }
     }
     inbox.clear();

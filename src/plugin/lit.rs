@@ -96,6 +96,18 @@ impl CrackMaterial for CrackLitMaterial {
             self.normal = Some(normal.clone());
         }
     }
+
+    /// It blends anyway.
+    fn open(&mut self) {}
+
+    fn for_shards(&mut self, picture: &Handle<Image>, opacity: f32) {
+        self.diffuse = Some(picture.clone());
+        self.lit.tint.w *= opacity;
+    }
+
+    fn for_sides(&self, _mean: [f32; 3]) -> Option<Self> {
+        None
+    }
 }
 
 impl MaterialSlot for MeshMaterial2d<CrackLitMaterial> {
@@ -107,6 +119,13 @@ impl MaterialSlot for MeshMaterial2d<CrackLitMaterial> {
 
     fn set_material(&mut self, material: Handle<CrackLitMaterial>) {
         self.0 = material;
+    }
+
+    fn wear(entity: &mut EntityWorldMut, mesh: Option<Handle<Mesh>>, material: Handle<CrackLitMaterial>) {
+        entity.insert(Self(material));
+        if let Some(mesh) = mesh {
+            entity.insert(Mesh2d(mesh));
+        }
     }
 }
 

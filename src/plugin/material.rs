@@ -3,9 +3,11 @@
 use super::{
     CrackError, CrackMaps, CrackTextures,
     carrier::{Carrier, Found, Kind, Shown},
-    mesh::{closest_uv, wrap},
+    mesh::{closest_uv, place_of, wrap},
+    shards::Plane,
+    surfaces::Active,
 };
-use bevy::{ecs::component::Mutable, math::Affine2, prelude::*};
+use bevy::{asset::UntypedHandle, ecs::component::Mutable, math::Affine2, prelude::*};
 
 /// A material that can show cracks.
 pub(super) trait CrackMaterial: Asset + Clone {
@@ -19,6 +21,12 @@ pub(super) trait CrackMaterial: Asset + Clone {
     fn uv_transform(&self) -> Affine2 {
         Affine2::IDENTITY
     }
+    /// Becomes transparent where its picture is.
+    fn open(&mut self);
+    /// The same for shards: with this picture, the mesh's texture coordinates being the picture's, and so much of it there (0..=1).
+    fn for_shards(&mut self, picture: &Handle<Image>, opacity: f32);
+    /// The same for the sides of shards of a picture of this mean colour (sRGB), if they have any.
+    fn for_sides(&self, mean: [f32; 3]) -> Option<Self>;
 }
 
 /// The component that holds a material.
@@ -26,11 +34,24 @@ pub(super) trait MaterialSlot: Component<Mutability = Mutable> {
     type Material: CrackMaterial;
     fn material(&self) -> &Handle<Self::Material>;
     fn set_material(&mut self, material: Handle<Self::Material>);
+    /// The components that show a material, and a mesh if given.
+    fn wear(entity: &mut EntityWorldMut, mesh: Option<Handle<Mesh>>, material: Handle<Self::Material>);
 }
 
 /// How to deal with meshes whose material is in the component `S`.
 pub(super) const fn kind<S: MaterialSlot>() -> Kind {
-    Kind { inspect: inspect::<S>, attach: attach::<S>, detach: detach::<S>, locate: locate::<S> }
+    Kind {
+        inspect: inspect::<S>,
+        attach: attach::<S>,
+        detach: detach::<S>,
+        locate: locate::<S>,
+        is_solid: S::Material::MAPS.depth,
+        plane: plane::<S>,
+        open: open::<S>,
+        shard_material: shard_material::<S>,
+        inside: inside::<S>,
+        dress: dress::<S>,
+    }
 }
 
 fn inspect<S: MaterialSlot>(world: &World, entity: Entity) -> Found {
@@ -127,10 +148,68 @@ fn locate<S: MaterialSlot>(world: &World, entity: Entity, local: Vec3) -> Result
     Ok(wrap(transform.transform_point2(uv)))
 }
 
+fn plane<S: MaterialSlot>(world: &World, entity: Entity, _: &Active) -> Result<Plane, &'static str> {
+    let mesh_2d = world.get::<Mesh2d>(entity).map(|mesh| &mesh.0);
+    let mesh = mesh_2d.or_else(|| world.get::<Mesh3d>(entity).map(|mesh| &mesh.0)).ok_or("there is no mesh")?;
+    let mesh =
+        world.get_resource::<Assets<Mesh>>().and_then(|meshes| meshes.get(mesh)).ok_or("its mesh is not loaded")?;
+    let material = world.get::<S>(entity).ok_or("the material is gone")?;
+    let materials = world.get_resource::<Assets<S::Material>>().ok_or("there are no materials")?;
+    let transform = materials.get(material.material()).map_or(Affine2::IDENTITY, CrackMaterial::uv_transform);
+    if transform.matrix2.determinant() == 0.0 {
+        return Err("its material shows one line of the picture only");
+    }
+    let to_mesh = transform.inverse();
+    let corner = |u, v| place_of(mesh, to_mesh.transform_point2(Vec2::new(u, v))).ok_or("its mesh lacks a corner");
+    let (first, normal) = corner(0.0, 0.0)?;
+    Plane::through([first, corner(1.0, 0.0)?.0, corner(0.0, 1.0)?.0, corner(1.0, 1.0)?.0], normal)
+}
+
+fn open<S: MaterialSlot>(world: &mut World, carrier: &Carrier) {
+    let (Some(own), Some(mut materials)) = (&carrier.own, world.get_resource_mut::<Assets<S::Material>>()) else {
+        return;
+    };
+    if let Some(mut material) = materials.get_mut(&own.clone().typed()) {
+        material.open();
+    }
+}
+
+fn shard_material<S: MaterialSlot>(
+    world: &mut World,
+    _entity: Entity,
+    carrier: &Carrier,
+    picture: &Handle<Image>,
+    opacity: f32,
+) -> Option<UntypedHandle> {
+    let mut materials = world.get_resource_mut::<Assets<S::Material>>()?;
+    let own = carrier.own.as_ref().unwrap_or(&carrier.shown.asset).clone().typed();
+    let mut material = materials.get(&own)?.clone();
+    material.for_shards(picture, opacity);
+    Some(materials.add(material).untyped())
+}
+
+fn inside<S: MaterialSlot>(world: &mut World, carrier: &Carrier, mean: [f32; 3]) -> Option<UntypedHandle> {
+    let mut materials = world.get_resource_mut::<Assets<S::Material>>()?;
+    let inside = materials.get(&carrier.shown.asset.clone().typed())?.for_sides(mean)?;
+    Some(materials.add(inside).untyped())
+}
+
+/// Gives a shard its mesh, if that is new, and its material.
+pub(super) fn dress<S: MaterialSlot>(
+    entity: &mut EntityWorldMut,
+    mesh: Option<Handle<Mesh>>,
+    material: &UntypedHandle,
+) {
+    S::wear(entity, mesh, material.clone().typed());
+}
+
 #[cfg(feature = "2d")]
 mod flat {
     use super::{Affine2, CrackMaps, CrackMaterial, CrackTextures, Handle, Image, MaterialSlot};
-    use bevy::prelude::{ColorMaterial, MeshMaterial2d};
+    use bevy::{
+        prelude::{Alpha, ColorMaterial, EntityWorldMut, Mesh, Mesh2d, MeshMaterial2d},
+        sprite_render::AlphaMode2d,
+    };
 
     impl CrackMaterial for ColorMaterial {
         const MAPS: CrackMaps = CrackMaps { diffuse: true, normal: true, depth: false };
@@ -148,6 +227,23 @@ mod flat {
         fn uv_transform(&self) -> Affine2 {
             self.uv_transform
         }
+
+        fn open(&mut self) {
+            if self.alpha_mode == AlphaMode2d::Opaque {
+                self.alpha_mode = AlphaMode2d::Mask(0.5);
+            }
+        }
+
+        fn for_shards(&mut self, picture: &Handle<Image>, opacity: f32) {
+            self.texture = Some(picture.clone());
+            self.uv_transform = Affine2::IDENTITY;
+            self.alpha_mode = AlphaMode2d::Blend;
+            self.color = self.color.with_alpha(self.color.alpha() * opacity);
+        }
+
+        fn for_sides(&self, _mean: [f32; 3]) -> Option<Self> {
+            None
+        }
     }
 
     impl MaterialSlot for MeshMaterial2d<ColorMaterial> {
@@ -160,6 +256,13 @@ mod flat {
         fn set_material(&mut self, material: Handle<ColorMaterial>) {
             self.0 = material;
         }
+
+        fn wear(entity: &mut EntityWorldMut, mesh: Option<Handle<Mesh>>, material: Handle<ColorMaterial>) {
+            entity.insert(Self(material));
+            if let Some(mesh) = mesh {
+                entity.insert(Mesh2d(mesh));
+            }
+        }
     }
 }
 
@@ -168,7 +271,7 @@ mod standard {
     use super::{Affine2, CrackMaps, CrackMaterial, CrackTextures, Handle, Image, MaterialSlot};
     use bevy::{
         pbr::ParallaxMappingMethod,
-        prelude::{MeshMaterial3d, StandardMaterial},
+        prelude::{AlphaMode, Color, EntityWorldMut, Mesh, Mesh3d, MeshMaterial3d, StandardMaterial},
     };
 
     impl CrackMaterial for StandardMaterial {
@@ -198,7 +301,33 @@ mod standard {
         fn uv_transform(&self) -> Affine2 {
             self.uv_transform
         }
+
+        fn open(&mut self) {
+            if self.alpha_mode == AlphaMode::Opaque {
+                self.alpha_mode = AlphaMode::Mask(0.5);
+            }
+        }
+
+        /// Shards in 3D shrink instead of fading.
+        fn for_shards(&mut self, picture: &Handle<Image>, _opacity: f32) {
+            self.base_color_texture = Some(picture.clone());
+            self.uv_transform = Affine2::IDENTITY;
+        }
+
+        fn for_sides(&self, mean: [f32; 3]) -> Option<Self> {
+            let [red, green, blue] = mean.map(|channel| DARKER * channel);
+            Some(Self {
+                base_color: Color::srgb(red, green, blue),
+                base_color_texture: None,
+                normal_map_texture: None,
+                depth_map: None,
+                ..self.clone()
+            })
+        }
     }
+
+    /// How much darker than its picture a wall is inside, sRGB.
+    const DARKER: f32 = 0.55;
 
     impl MaterialSlot for MeshMaterial3d<StandardMaterial> {
         type Material = StandardMaterial;
@@ -209,6 +338,13 @@ mod standard {
 
         fn set_material(&mut self, material: Handle<StandardMaterial>) {
             self.0 = material;
+        }
+
+        fn wear(entity: &mut EntityWorldMut, mesh: Option<Handle<Mesh>>, material: Handle<StandardMaterial>) {
+            entity.insert(Self(material));
+            if let Some(mesh) = mesh {
+                entity.insert(Mesh3d(mesh));
+            }
         }
     }
 }

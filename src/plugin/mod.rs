@@ -39,6 +39,7 @@ mod picture;
 mod place;
 mod preset;
 mod queue;
+mod shards;
 #[cfg(feature = "2d")]
 mod sprite;
 mod state;
@@ -60,6 +61,9 @@ pub use mask::CrackMaskSource;
 #[cfg(any(feature = "2d", feature = "3d"))]
 pub use place::{CrackPlace, CrackPlaces};
 pub use preset::PresetSource;
+pub use shards::{
+    CrackShards, Reassembled, Shard, ShardsError, ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen, Shattered,
+};
 pub use state::{CellClosed, CrackFailed, CrackFinished, CrackState, CrackStatus, CrackTip};
 pub use surface::{CrackMaps, CrackResolution, CrackSurface};
 pub use textures::CrackTextures;
@@ -77,8 +81,9 @@ pub mod prelude {
     pub use super::{
         BakeProgress, CellClosed, CrackBaked, CrackBudget, CrackClock, CrackCommandsExt, CrackDrive, CrackError,
         CrackFailed, CrackFinished, CrackGuide, CrackHit, CrackMaps, CrackMaskSource, CrackPlugin, CrackPlugins,
-        CrackResolution, CrackState, CrackStats, CrackStatus, CrackSurface, CrackSystems, CrackTextures, CrackTip,
-        GuideSource, GuidedAppearance, GuidedCracks, HitPoint, PresetSource,
+        CrackResolution, CrackShards, CrackState, CrackStats, CrackStatus, CrackSurface, CrackSystems, CrackTextures,
+        CrackTip, GuideSource, GuidedAppearance, GuidedCracks, HitPoint, PresetSource, Reassembled, Shard,
+        ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen, Shattered,
     };
     #[cfg(feature = "2d")]
     pub use super::{CrackLight2d, CrackLitMaterial};
@@ -87,9 +92,11 @@ pub mod prelude {
     pub use crate::preset::CrackPreset;
 }
 
-/// The stages of a frame, in order, in `PostUpdate`, after transforms are propagated and before asset events.
+/// The stages of a frame, in order, in `PostUpdate`, all but the first after transforms are propagated and before asset events.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum CrackSystems {
+    /// After this set, which comes before transforms are propagated, shards are where they belong in this frame.
+    Shatter,
     /// After this set, every hit of this frame is queued, and as many as the budget allows are in their growths.
     Hit,
     /// After this set, networks have made the steps that are due, as many as the budget allows.
@@ -116,7 +123,7 @@ pub struct CrackPlugin;
 
 impl Plugin for CrackPlugin {
     fn build(&self, app: &mut App) {
-        use CrackSystems::{Grow, Hit, Paint, Upload};
+        use CrackSystems::{Grow, Hit, Paint, Shatter, Upload};
         app.register_type::<CrackSurface>()
             .register_type::<CrackClock>()
             .register_type::<CrackState>()
@@ -128,6 +135,9 @@ impl Plugin for CrackPlugin {
             .register_type::<CrackFinished>()
             .register_type::<CrackFailed>()
             .register_type::<CellClosed>()
+            .register_type::<ShatterCracks>()
+            .register_type::<Shattered>()
+            .register_type::<Reassembled>()
             .register_type::<CrackBudget>()
             .register_type::<CrackStats>()
             .register_type::<CrackUploadStats>()
@@ -146,9 +156,17 @@ impl Plugin for CrackPlugin {
                 PostUpdate,
                 (Hit, Grow, Paint, Upload).chain().after(TransformSystems::Propagate).before(AssetEventSystems),
             )
+            .configure_sets(PostUpdate, Shatter.before(TransformSystems::Propagate))
             .add_systems(
                 PostUpdate,
                 (
+                    (
+                        shards::fly_shards,
+                        shards::shatter_when_due,
+                        shards::shatter_surfaces.run_if(shards::any_requests),
+                    )
+                        .chain()
+                        .in_set(Shatter),
                     (
                         (
                             budget::start_frame,

@@ -9,7 +9,7 @@ use super::{
 use crate::{
     paint::{BaseTexels, PaintTargets, paint_rects},
     pattern::{Moment, NO_PARENT, SegmentId},
-    raster::{DOT_DEPTH, DepthField, Redrawn, TexelRect, stamp_dot, stamp_path, stamp_path_with},
+    raster::{DOT_DEPTH, Redrawn, TexelRect, stamp_dot, stamp_path, stamp_path_with},
 };
 use bevy::prelude::*;
 
@@ -143,6 +143,9 @@ fn paint(active: &mut Active, images: &mut Assets<Image>, uploads: &mut Uploads,
     rects.iter_mut().for_each(|rect| *rect = rect.intersect(shown));
     paint_rects(base, &active.field, &active.look, rects, origin, &mut targets);
     for rect in rects.drain(..) {
+        if let (Some(broken), Some(diffuse)) = (&active.broken, targets.diffuse.as_deref_mut()) {
+            broken.holes.cut_out(diffuse, size, origin, rect);
+        }
         let rect = TexelRect { min: rect.min + origin, max: rect.max + origin }.intersect(TexelRect::whole(size));
         for texture in active.textures.handles() {
             uploads.push(texture.id(), rect);

@@ -31,6 +31,25 @@ impl BasePicture {
     }
 }
 
+/// Texels of which the mean colour is taken.
+const SAMPLES: usize = 4096;
+
+impl BasePicture {
+    /// Its mean colour where it is opaque, sRGB; grey if it is nowhere.
+    pub(super) fn mean(&self) -> [f32; 3] {
+        let texels = self.diffuse.as_chunks::<4>().0;
+        let stride = (texels.len() / SAMPLES).max(1);
+        let (mut sum, mut n) = ([0.0; 3], 0.0);
+        for [red, green, blue, alpha] in texels.iter().step_by(stride) {
+            if *alpha >= OPAQUE {
+                n += 255.0;
+                sum = [sum[0] + f32::from(*red), sum[1] + f32::from(*green), sum[2] + f32::from(*blue)];
+            }
+        }
+        if n > 0.0 { sum.map(|channel| channel / n) } else { [0.5; 3] }
+    }
+}
+
 /// How the numbers of a picture are meant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Space {

@@ -18,6 +18,8 @@ const MAX_WARNED: usize = 1024;
 pub(super) struct QueuedHit {
     pub(super) at: HitPoint,
     pub(super) energy: f32,
+    /// In the world.
+    pub(super) direction: Vec3,
 }
 
 /// Hits that wait, first come first served within a surface, in turns between surfaces.
@@ -34,22 +36,22 @@ pub(super) struct HitQueue {
 }
 
 impl HitQueue {
-    pub(super) fn push(&mut self, entity: Entity, at: HitPoint, energy: f32, cap: usize, stats: &mut CrackStats) {
+    pub(super) fn push(&mut self, entity: Entity, hit: QueuedHit, cap: usize, stats: &mut CrackStats) {
         let hits = self.hits.entry(entity).or_insert_with(|| {
             self.turns.push_back(entity);
             VecDeque::new()
         });
         if hits.len() < cap.max(1) {
-            hits.push_back(QueuedHit { at, energy });
+            hits.push_back(hit);
             stats.queued += 1;
             return;
         }
         let stride = hits.len().div_ceil(MERGE_CANDIDATES);
-        let candidates = (0..hits.len()).step_by(stride).filter_map(|i| Some((distance(hits.get(i)?.at, at), i)));
+        let candidates = (0..hits.len()).step_by(stride).filter_map(|i| Some((distance(hits.get(i)?.at, hit.at), i)));
         if let Some((_, nearest)) = candidates.min_by(|a, b| a.0.total_cmp(&b.0))
             && let Some(nearest) = hits.get_mut(nearest)
         {
-            nearest.energy = (nearest.energy + energy).min(f32::MAX);
+            nearest.energy = (nearest.energy + hit.energy).min(f32::MAX);
             stats.merged += 1;
         }
     }
@@ -125,7 +127,8 @@ mod tests {
         let (mut queue, mut stats) = (HitQueue::default(), CrackStats::default());
         let surfaces = [Entity::from_bits(1), Entity::from_bits(2)];
         for i in 0..10 {
-            queue.push(surfaces[usize::from(i > 6)], HitPoint::Uv(Vec2::splat(i as f32)), 1.0, 5, &mut stats);
+            let hit = QueuedHit { at: HitPoint::Uv(Vec2::splat(i as f32)), energy: 1.0, direction: Vec3::ZERO };
+            queue.push(surfaces[usize::from(i > 6)], hit, 5, &mut stats);
         }
         assert_eq!((stats.queued, stats.merged), (8, 2), "two of seven hits do not fit");
         let mut turns = Vec::new();

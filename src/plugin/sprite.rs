@@ -3,10 +3,24 @@
 use super::{
     CrackError, CrackMaps, CrackTextures,
     carrier::{Carrier, Found, Kind, Shown},
+    material,
+    shards::Plane,
+    surfaces::Active,
 };
-use bevy::{prelude::*, sprite::Anchor};
+use bevy::{asset::UntypedHandle, prelude::*, sprite::Anchor};
 
-pub(super) const KIND: Kind = Kind { inspect, attach, detach, locate };
+pub(super) const KIND: Kind = Kind {
+    inspect,
+    attach,
+    detach,
+    locate,
+    is_solid: false,
+    plane,
+    open: |_, _| {},
+    shard_material,
+    inside: |_, _, _| None,
+    dress: material::dress::<MeshMaterial2d<ColorMaterial>>,
+};
 
 fn inspect(world: &World, entity: Entity) -> Found {
     let Some(sprite) = world.get::<Sprite>(entity) else { return Found::Other };
@@ -87,4 +101,32 @@ fn locate(world: &World, entity: Entity, local: Vec3) -> Result<Vec2, &'static s
         None => Rect { min: Vec2::ZERO, max: images.get(&sprite.image).ok_or("the picture is gone")?.size_f32() },
     };
     Ok((texel - rect.min) / rect.size())
+}
+
+fn plane(world: &World, entity: Entity, active: &Active) -> Result<Plane, &'static str> {
+    let sprite = world.get::<Sprite>(entity).ok_or("the sprite is gone")?;
+    let texels = active.views.get(active.view).ok_or("it shows nothing")?.rect.size();
+    let size = sprite.custom_size.unwrap_or(texels.as_vec2());
+    if !(size.is_finite() && size.min_element() > 0.0) {
+        return Err("the sprite has no size");
+    }
+    let anchor = world.get::<Anchor>(entity).copied().unwrap_or_default();
+    let flip = BVec2::new(sprite.flip_x, sprite.flip_y);
+    let middle = (-anchor.as_vec() * size).extend(0.0);
+    Ok(Plane { middle, rotation: Quat::IDENTITY, size: Vec2::select(flip, -size, size) })
+}
+
+/// Shards of sprites are meshes: a material that looks as the sprite does.
+fn shard_material(
+    world: &mut World,
+    entity: Entity,
+    _carrier: &Carrier,
+    picture: &Handle<Image>,
+    opacity: f32,
+) -> Option<UntypedHandle> {
+    let color = world.get::<Sprite>(entity)?.color;
+    let color = color.with_alpha(color.alpha() * opacity);
+    let mut materials = world.get_resource_mut::<Assets<ColorMaterial>>()?;
+    let material = ColorMaterial { color, texture: Some(picture.clone()), ..ColorMaterial::default() };
+    Some(materials.add(material).untyped())
 }

@@ -1,6 +1,13 @@
 //! [`Surfaces`]: the surfaces that have been hit.
 
-use super::{CrackClock, CrackSurface, CrackTextures, carrier::Carrier, clock::Playback, picture::BasePicture};
+use super::{
+    CrackClock, CrackSurface, CrackTextures, ShatterRequest,
+    activate::density,
+    carrier::Carrier,
+    clock::Playback,
+    picture::BasePicture,
+    shards::{Broken, Struck},
+};
 use crate::{
     CrackPreset,
     growth::CrackGrowth,
@@ -79,6 +86,12 @@ pub(super) struct Active {
     pub(super) cells: CellTracker,
     /// Cells whose closing has been told, with the one that is there from the start.
     pub(super) cells_told: usize,
+    /// The last hit.
+    pub(super) struck: Option<Struck>,
+    /// Nodes of the network and closed cells when shards last fell by themselves.
+    pub(super) fell_at: (usize, usize),
+    /// Its shards and holes; `None` = it is whole.
+    pub(super) broken: Option<Box<Broken>>,
 }
 
 impl Active {
@@ -89,6 +102,17 @@ impl Active {
         for view in &mut self.views {
             view.dirty.mark(rect);
         }
+    }
+
+    /// Keeps what grows from now on out of the holes of the picture and of shards.
+    pub(super) fn mind_holes(&mut self) {
+        let Some(rect) = self.views.get(self.view).map(|view| view.rect) else { return };
+        let holes = self.broken.as_ref().map(|broken| &broken.holes);
+        let base = self.surface.alpha_mask.then_some(&self.base);
+        let is_hole = |texel| {
+            holes.is_some_and(|holes| holes.contains(texel)) || base.is_some_and(|base| base.is_hole(rect.min + texel))
+        };
+        self.growth.set_density(density(rect.size(), is_hole));
     }
 
     /// Shows the cracks in `rect` of the image from now on.
@@ -164,6 +188,12 @@ pub(super) struct Surfaces {
     pub(super) dirty: VecDeque<Entity>,
     /// Surfaces whose components or pictures have changed.
     pub(super) changed: Vec<Entity>,
+    /// Surfaces that have shattered.
+    pub(super) broken: Vec<Entity>,
+    /// Surfaces that are to shatter, in order.
+    pub(super) requests: Vec<(Entity, ShatterRequest)>,
+    /// All shards that are shown, the oldest first, and some that are not any more.
+    pub(super) shards: VecDeque<Entity>,
     /// Who owns a private image, material or mesh.
     pub(super) owners: HashMap<UntypedAssetId, Entity>,
     /// Which surfaces were made from a picture.

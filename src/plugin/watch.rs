@@ -7,6 +7,7 @@ use super::{
     mask::{self, PictureMasks},
     paint::stamp_anew,
     preset,
+    shards::drop_shards,
     surfaces::{Active, Surfaces},
 };
 use crate::{
@@ -227,6 +228,9 @@ fn update_picture(world: &mut World, entity: Entity, active: &mut Active, shown:
     let look = look(&active.preset, frame)?;
     let regrown = regrow(active, frame, mask.clone())?;
     active.textures = make_textures(world, &draft, Some(&active.textures))?;
+    // Shards show the picture that was.
+    let bytes = drop_shards(world, entity, active);
+    world.resource_mut::<Surfaces>().bytes -= bytes;
     active.is_outdated = false;
     if let Some(growth) = regrown {
         active.cells = CellTracker::new(frame.extent());
@@ -235,7 +239,7 @@ fn update_picture(world: &mut World, entity: Entity, active: &mut Active, shown:
         active.growth = growth;
     }
     if active.surface.alpha_mask {
-        active.growth.set_density(density(&draft.base, draft.rect));
+        active.growth.set_density(density(draft.rect.size(), |texel| draft.base.is_hole(draft.rect.min + texel)));
     }
     active.growth.set_mask(mask.clone());
     world.resource_mut::<Surfaces>().bytes += draft.bytes;

@@ -103,6 +103,13 @@ impl Support {
         self.gone.fill(false);
     }
 
+    /// Puts one shard back.
+    pub fn put_back(&mut self, shard: u32) {
+        if let Some(gone) = self.gone.get_mut(shard as usize) {
+            *gone = false;
+        }
+    }
+
     /// Takes one shard out, and returns what nothing holds any more.
     pub fn take(&mut self, shards: &Shards, shard: u32) -> Vec<u32> {
         if let Some(gone) = self.gone.get_mut(shard as usize) {

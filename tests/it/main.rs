@@ -25,5 +25,7 @@ mod plugin;
 mod presets;
 mod replay;
 #[cfg(all(feature = "2d", feature = "3d"))]
+mod shards;
+#[cfg(all(feature = "2d", feature = "3d"))]
 mod support;
 mod voronoi;

@@ -1,6 +1,6 @@
 //! Lines to finished shard meshes, beside what `bevy_shatter` does for the same shards; flights; grown networks.
 //!
-//! `cargo bench -p bevy_crack_peers`. The scene: a pane cut into the Voronoi cells of a jittered grid. The
+//! `cargo bench --manifest-path benches/peers/Cargo.toml`. The scene: a pane cut into the Voronoi cells of a jittered grid. The
 //! peer is given its diagram, and triangulates each cell by Delaunay and hashes its edges to find the rim, without the
 //! hull for the collider (a third of its time); ours begins with bare lines, and makes 3D meshes with flat sides.
 

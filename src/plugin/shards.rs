@@ -1,0 +1,256 @@
+//! Shards in the world: [`ShatterCracks`] says how a surface shatters, [`shatter_cracks`](super::CrackCommandsExt::shatter_cracks)
+//! does it.
+//!
+//! What falls out is an entity each, a child of its surface, in the mesh of [`Shards::flat_mesh`] or [`Shards::solid_mesh`]. The
+//! surface's diffuse texture is transparent where it was (`holes`); the shards show a copy without holes. Where a shard is, is a
+//! function of the time since the surface broke first (`fly`), so time may run at any speed, backwards, or jump.
+
+mod broken;
+mod fly;
+mod holes;
+mod plane;
+mod release;
+
+pub(super) use broken::{Broken, Struck, drop_shards};
+pub(super) use fly::fly_shards;
+pub(super) use plane::Plane;
+pub(super) use release::{any_requests, shatter_surfaces, shatter_when_due};
+
+use crate::shatter::{Anchor, BurstParams, ConvexPiece, Shards, ShatterError, ShatterParams};
+use bevy::prelude::*;
+use std::sync::Arc;
+
+/// How a surface shatters, and when by itself. Without it, [`shatter_cracks`](super::CrackCommandsExt::shatter_cracks) goes by the
+/// defaults.
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_crack::prelude::*;
+///
+/// fn pane(mut commands: Commands, assets: Res<AssetServer>) {
+///     commands.spawn((
+///         Sprite::from_image(assets.load("pane.png")),
+///         CrackSurface::new(CrackPreset::GLASS),
+///         // What does not touch the frame falls when the cracks of a hit have come to their end.
+///         ShatterCracks { when: ShatterWhen::AtDamage(0.1), ..default() },
+///     ));
+/// }
+///
+/// /// Time runs backwards: every shard returns to its place, and the pane is whole.
+/// fn mend(mut panes: Query<&mut ShatterCracks>) {
+///     for mut pane in &mut panes {
+///         pane.speed = -1.0;
+///     }
+/// }
+/// ```
+#[derive(Component, Reflect, Clone, Debug, PartialEq)]
+#[reflect(Component, Default)]
+pub struct ShatterCracks {
+    /// When shards fall by themselves.
+    pub when: ShatterWhen,
+    /// How far around the hit shards are knocked out when they fall by themselves, pattern units, 0..=64 (the surface's shorter side is
+    /// 1). Default: 64, everywhere.
+    pub reach: f32,
+    /// How lines become shards.
+    pub cut: ShatterParams,
+    /// What holds the surface: shards along it stay unless they are hit themselves. Default: the border, as a pane in its frame.
+    pub anchor: Anchor,
+    /// How shards fly.
+    pub burst: BurstParams,
+    /// Whether the crate moves the shards, lets them fade and takes them away; default true. Else they stay where they are, for a
+    /// physics engine: see [`Shard`].
+    pub fly: bool,
+    /// Seconds of the shards for each second of the app's [`Time`]; default 1. 0 = they stand still; below zero time runs backwards,
+    /// each shard returns to its place and is part of the surface again. Not a number = 0.
+    pub speed: f32,
+    /// Where the shards' time is to jump to, seconds since the surface broke; `None` again when it has. Below zero and not a number
+    /// = 0.
+    pub seek: Option<f32>,
+    /// How thick shards of 3D surfaces are, pattern units, 0..=10; default 0.03.
+    pub thickness: f32,
+    /// What the sides of 3D shards look like; `None` = the mean colour of the picture, darker.
+    #[cfg(feature = "3d")]
+    pub inside: Option<Handle<StandardMaterial>>,
+}
+
+impl Default for ShatterCracks {
+    fn default() -> Self {
+        Self {
+            when: ShatterWhen::Never,
+            reach: 64.0,
+            cut: ShatterParams::DEFAULT,
+            anchor: Anchor::Border,
+            burst: BurstParams::DEFAULT,
+            fly: true,
+            speed: 1.0,
+            seek: None,
+            thickness: 0.03,
+            #[cfg(feature = "3d")]
+            inside: None,
+        }
+    }
+}
+
+/// When shards fall by themselves.
+#[derive(Reflect, Clone, Copy, Debug, Default, PartialEq)]
+#[reflect(Default)]
+pub enum ShatterWhen {
+    /// Only on [`shatter_cracks`](super::CrackCommandsExt::shatter_cracks).
+    #[default]
+    Never,
+    /// When the cracks of a hit have come to their end and [`CrackState::damage`](super::CrackState::damage) is at least this.
+    AtDamage(f32),
+    /// Each cell when cracks have closed it, unless it touches what is anchored.
+    CellsAsTheyClose,
+}
+
+/// What [`shatter_cracks`](super::CrackCommandsExt::shatter_cracks) is to knock out of a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ShatterRequest {
+    /// Where the blow lands, texture coordinates of the surface's picture or sprite frame, 0..=1, v down; `None` = where it was hit
+    /// last.
+    pub uv: Option<Vec2>,
+    /// How far around it shards are knocked out, pattern units, 0..=64.
+    pub reach: f32,
+    /// How hard, 0..=1000; `None` = as the last hit.
+    pub energy: Option<f32>,
+    /// Direction of the blow in the world; zero = straight on; `None` = as the last hit.
+    pub direction: Option<Vec3>,
+}
+
+impl ShatterRequest {
+    /// Everything that is not held, as a burst from the last hit.
+    pub const ALL: Self = Self { uv: None, reach: 64.0, energy: None, direction: None };
+
+    /// What lies within `reach` (pattern units) of `uv` (0..=1, v down), and what nothing holds then.
+    #[must_use]
+    pub const fn around(uv: Vec2, reach: f32) -> Self {
+        Self { uv: Some(uv), reach, ..Self::ALL }
+    }
+
+    /// The same with another energy.
+    #[must_use]
+    pub const fn with_energy(mut self, energy: f32) -> Self {
+        self.energy = Some(energy);
+        self
+    }
+}
+
+impl Default for ShatterRequest {
+    fn default() -> Self {
+        Self::ALL
+    }
+}
+
+/// A piece of a surface that has left it. Its entity is a child of the surface, its origin the shard's centre.
+///
+/// With [`ShatterCracks::fly`] off, this is what a physics engine needs: colliders, mass and the velocity of the blow.
+#[derive(Component, Clone, Debug)]
+#[component(clone_behavior = Ignore)]
+pub struct Shard {
+    /// The surface that it is a piece of.
+    pub surface: Entity,
+    /// The pieces that it was cut with.
+    pub pieces: Arc<Shards>,
+    /// Its number among them.
+    pub number: u32,
+    /// Velocity from the blow, in the surface's own space and units a second.
+    pub velocity: Vec3,
+    /// Angular velocity from the blow, in the surface's own space, radians a second.
+    pub spin: Vec3,
+    /// Units of the surface's own space to a pattern unit, along x and y of the shard; below zero where the picture is mirrored.
+    pub scale: Vec2,
+    /// Which of the released pieces of its surface it is.
+    pub(super) piece: u32,
+}
+
+impl Shard {
+    /// Its area in the units of the surface's own space, squared.
+    #[must_use]
+    pub fn area(&self) -> f32 {
+        self.pieces.get(self.number).map_or(0.0, |shard| shard.area * (self.scale.x * self.scale.y).abs())
+    }
+
+    /// Convex polygons that make it up, in its own space, y up, for colliders; `tolerance` as in [`Shards::convex_pieces`].
+    #[must_use]
+    pub fn convex_pieces(&self, tolerance: f32) -> Vec<ConvexPiece> {
+        let mut pieces = self.pieces.convex_pieces(self.number, tolerance);
+        for corner in pieces.iter_mut().flatten() {
+            *corner *= Vec2::new(self.scale.x, -self.scale.y);
+        }
+        pieces
+    }
+}
+
+/// What has become of a surface that has shattered. Written by the crate, gone when it is whole again.
+#[derive(Component, Clone, Debug)]
+#[component(clone_behavior = Ignore)]
+pub struct CrackShards {
+    /// The pieces into which the surface was cut last.
+    pub pieces: Arc<Shards>,
+    /// Number of pieces that are out of their places, shown or not.
+    pub gone: u32,
+    /// Number of those that are entities now.
+    pub shown: u32,
+    /// Seconds since the surface broke, as [`ShatterCracks::speed`] has let them pass.
+    pub time: f32,
+}
+
+/// Shards have left a surface.
+#[derive(EntityEvent, Reflect, Clone, Debug, PartialEq)]
+#[reflect(Event)]
+pub struct Shattered {
+    /// The surface.
+    pub entity: Entity,
+    /// The shards that have just left.
+    pub shards: Vec<Entity>,
+}
+
+/// All shards of a surface have returned to their places, time having run backwards.
+#[derive(EntityEvent, Reflect, Clone, Copy, Debug, PartialEq)]
+#[reflect(Event)]
+pub struct Reassembled {
+    /// The surface.
+    pub entity: Entity,
+}
+
+/// A surface was to shatter and could not; it stays as it is.
+#[derive(EntityEvent, Clone, Debug, PartialEq)]
+pub struct ShatterFailed {
+    /// The surface.
+    pub entity: Entity,
+    /// Why.
+    pub error: ShardsError,
+}
+
+/// Why a surface cannot shatter.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ShardsError {
+    /// A parameter of [`ShatterCracks`] or [`ShatterRequest`] is out of its range.
+    #[error(transparent)]
+    Parameter(#[from] ShatterError),
+    /// Only sprites and flat meshes that show their picture once can shatter.
+    #[error("only sprites and flat meshes that show the whole picture can shatter: {reason}")]
+    NotFlat {
+        /// What is wrong with it.
+        reason: &'static str,
+    },
+    /// Something that shards are made of is missing.
+    #[error("there are no assets of {name}: add the plugin that brings them")]
+    NoAssets {
+        /// Of what.
+        name: &'static str,
+    },
+    /// [`CrackMaps::diffuse`](super::CrackMaps::diffuse) is off, so that holes could not be seen.
+    #[error("the surface has no diffuse texture of its own: `write.diffuse` is off")]
+    NoDiffuse,
+    /// Not enough of [`CrackBudget::max_texture_bytes`](super::CrackBudget::max_texture_bytes) is left.
+    #[error("the picture on its shards needs {needed} bytes, the budget has {left} left")]
+    TextureBudget {
+        /// Bytes needed.
+        needed: u64,
+        /// Bytes left.
+        left: u64,
+    },
+}
