@@ -470,8 +470,14 @@ mod tests {
         use crate::plugin::prelude::*;
         use bevy::image::TextureAtlasLayout;
         let mut app = App::new();
-        app.add_plugins((MinimalPlugins, TransformPlugin, AssetPlugin::default(), ImagePlugin::default(), CrackPlugins))
-            .init_asset::<TextureAtlasLayout>();
+        app.add_plugins((
+            MinimalPlugins,
+            TransformPlugin,
+            AssetPlugin::default(),
+            ImagePlugin::default(),
+            CrackPlugins,
+        ))
+        .init_asset::<TextureAtlasLayout>();
         app.finish();
         app.cleanup();
         // No more than a slice a frame.
