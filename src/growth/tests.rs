@@ -505,7 +505,8 @@ fn parameters_out_of_range_are_named() {
 /// The patterns of a seed are part of the contract: a change here changes every user's cracks and goes into the changelog.
 #[test]
 fn patterns_are_frozen() {
-    let print = |name: &&str| format!("{name} {:016x}", fingerprint(&preset_run(&CrackPreset::named(name).unwrap(), 1)));
+    let print =
+        |name: &&str| format!("{name} {:016x}", fingerprint(&preset_run(&CrackPreset::named(name).unwrap(), 1)));
     let found: Vec<String> = CrackPreset::NAMES.iter().map(print).collect();
     let stored = include_str!("../../tests/golden/growth_fingerprints.txt");
     assert_eq!(found, stored.lines().collect::<Vec<_>>(), "the pattern of a seed has changed");
