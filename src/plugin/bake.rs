@@ -3,10 +3,11 @@
 use super::{
     BakeProgress, CrackBaked, CrackBudget, CrackError, CrackFailed, CrackStatus, GuideSource, GuidedAppearance,
     GuidedCracks,
-    activate::{density, make_ready, set_status},
+    activate::{make_ready, set_status},
     budget::FrameClock,
     picture::{self, Space},
-    surfaces::{Added, Surfaces},
+    shards::drop_shards,
+    surfaces::{Active, Added, Surfaces},
     watch::grown_anew,
 };
 use crate::{
@@ -420,29 +421,41 @@ fn adopt(world: &mut World, entity: Entity, product: Product) -> Result<Option<O
     }) else {
         return Ok(None);
     };
+    let Some(mut active) = world.resource_mut::<Surfaces>().active.remove(&entity) else { return Ok(None) };
+    let outcome = put(world, entity, &mut active, product, seconds);
     let mut surfaces = world.resource_mut::<Surfaces>();
-    let Some(active) = surfaces.active.get_mut(&entity) else { return Ok(None) };
-    let is_first = active.added.is_none() && active.growth.network().nodes().is_empty();
-    let Product { network, opening, covered } = product;
-    let mut added = Added { network, opening, steps: 0 };
-    if is_first {
-        added.steps = active.growth.add_cracks(&added.network, added.opening);
-        active.added = Some(added);
-    } else {
-        let before = active.added.replace(added);
-        let (extent, mask) = (active.field.frame.extent(), active.growth.mask().clone());
-        let rect = active.views.get(active.view).map_or(TexelRect::default(), |view| view.rect);
-        let base = active.surface.alpha_mask.then_some(&active.base);
-        let density = base.and_then(|base| density(rect.size(), |texel| base.is_hole(rect.min + texel)));
-        active.growth = grown_anew(active, before.map_or(0, |before| before.steps), extent, mask, density)?;
-        active.mind_holes();
-    }
-    let is_untouched = active.growth.impacts().is_empty();
-    active.show_anew(is_untouched.then_some(seconds));
+    surfaces.active.insert(entity, active);
+    let (bytes, covered) = outcome?;
+    surfaces.bytes -= bytes;
     surfaces.start_growing(entity);
     surfaces.soil(entity);
     set_status(world, entity, CrackStatus::Growing);
     Ok(Some(covered))
+}
+
+/// The same for a surface that is taken out of the others; returns the bytes that it no longer needs and the share that is covered.
+fn put(
+    world: &mut World,
+    entity: Entity,
+    active: &mut Active,
+    product: Product,
+    seconds: f32,
+) -> Result<(u64, Option<f32>), CrackError> {
+    let Product { network, opening, covered } = product;
+    let mut added = Added { network, opening, steps: 0 };
+    // Shards are of the cells that were.
+    let bytes = drop_shards(world, entity, active);
+    if active.added.is_none() && active.growth.network().nodes().is_empty() {
+        added.steps = active.growth.add_cracks(&added.network, added.opening);
+        active.added = Some(added);
+    } else {
+        let before = active.added.replace(added).map_or(0, |before| before.steps);
+        let (extent, mask, density) = (active.field.frame.extent(), active.growth.mask().clone(), active.density());
+        active.growth = grown_anew(active, before, extent, mask, density)?;
+    }
+    let is_untouched = active.growth.impacts().is_empty();
+    active.show_anew(is_untouched.then_some(seconds));
+    Ok((bytes, covered))
 }
 
 #[cfg(test)]

@@ -271,6 +271,7 @@ impl Active {
         self.mark(TexelRect::whole(self.field.frame.size()));
         self.cells = CellTracker::new(self.field.frame.extent());
         self.cells_told = 1;
+        self.fell_at = (0, 1);
         self.tips_from = 0;
         self.closing = None;
         let seconds = seconds.filter(|seconds| *seconds > 0.0);

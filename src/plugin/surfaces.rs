@@ -9,7 +9,7 @@ use super::{
     shards::{Broken, Struck},
 };
 use crate::{
-    CrackPreset,
+    CrackPreset, Grid,
     growth::CrackGrowth,
     paint::LookTable,
     pattern::{CellTracker, Network},
@@ -106,13 +106,18 @@ impl Active {
 
     /// Keeps what grows from now on out of the holes of the picture and of shards.
     pub(super) fn mind_holes(&mut self) {
-        let Some(rect) = self.views.get(self.view).map(|view| view.rect) else { return };
+        self.growth.set_density(self.density());
+    }
+
+    /// Where cracks may go: not over holes.
+    pub(super) fn density(&self) -> Option<Grid<f32>> {
+        let rect = self.views.get(self.view)?.rect;
         let holes = self.broken.as_ref().map(|broken| &broken.holes);
         let base = self.surface.alpha_mask.then_some(&self.base);
         let is_hole = |texel| {
             holes.is_some_and(|holes| holes.contains(texel)) || base.is_some_and(|base| base.is_hole(rect.min + texel))
         };
-        self.growth.set_density(density(rect.size(), is_hole));
+        density(rect.size(), is_hole)
     }
 
     /// Shows the cracks in `rect` of the image from now on.
