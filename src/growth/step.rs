@@ -145,6 +145,8 @@ pub struct CrackGrowth {
     /// Cracks that began by themselves, and markers that were tried for it.
     nucleated: u32,
     tried: u32,
+    /// First nodes of hits whose growth has not ended.
+    unshown: Vec<u32>,
     /// Nodes that have not grown here.
     added: usize,
     newborn: Range<u32>,
@@ -241,6 +243,7 @@ impl CrackGrowth {
             steps_left: 0,
             nucleated: 0,
             tried: 0,
+            unshown: Vec::new(),
             added: 0,
             newborn: 0..0,
             links_told: 0,
@@ -343,6 +346,9 @@ impl CrackGrowth {
             self.field.visit(node, &self.network.nodes, &self.nodes);
         }
         self.newborn = first..self.network.nodes.len() as u32;
+        if self.arrest.is_some() {
+            self.unshown.push(first);
+        }
         self.join_newborn();
         self.populate(index, pos, 0.0, reach);
         self.steps_left = self.params.num_iterations;
@@ -543,6 +549,9 @@ impl CrackGrowth {
         while self.steps_left > 0 && self.newborn.is_empty() {
             self.make_step();
         }
+        if self.steps_left == 0 && self.arrest.is_some() {
+            self.show_hits();
+        }
         StepReport { born: self.newborn.len() as u32 }
     }
 
@@ -656,6 +665,26 @@ impl CrackGrowth {
     /// The last child of a node, or [`NO_PARENT`].
     pub(super) fn child_of(&self, node: u32) -> u32 {
         self.changes.child[node as usize]
+    }
+
+    /// A hit from which nothing could grow, so narrow is its place, leaves a short crack all the same.
+    fn show_hits(&mut self) {
+        while let Some(start) = self.unshown.pop() {
+            let born = self.network.nodes.len();
+            let Some(&node) = self.network.nodes.get(start as usize) else { continue };
+            let of_hit = |other: &Node| other.impact == node.impact && other.parent != NO_PARENT;
+            if self.network.nodes[start as usize..].iter().any(of_hit) {
+                continue;
+            }
+            let length = self.params.step_length;
+            for way in [Vec2::X, Vec2::NEG_X, Vec2::Y, Vec2::NEG_Y] {
+                let to = (node.pos + way * length).clamp(Vec2::ZERO, self.network.extent());
+                if to.distance(node.pos) > 0.25 * length && self.extend(start, to, true).is_some() {
+                    break;
+                }
+            }
+            self.newborn = born as u32..self.network.nodes.len() as u32;
+        }
     }
 
     /// Whether a place lies on a crack, or as good as.

@@ -124,10 +124,10 @@ pub fn paint_rects(
     if all <= MAX_FETCHED {
         job.fetch(rects.clone());
     }
-    match most {
-        0 => {}
-        ..=LITTLE => job.paint::<LITTLE>(rects),
-        _ => job.paint::<MUCH>(rects),
+    if most <= LITTLE {
+        job.paint::<LITTLE>(rects);
+    } else {
+        job.paint::<MUCH>(rects);
     }
 }
 
@@ -514,19 +514,17 @@ impl Block<'_> {
     fn paint<const OPAQUE: bool>(&self, frame: &Frame<'_>, look: &LookTable, at: UVec2) -> [u32; BLOCK] {
         // Channel by channel, so that each loop works on many texels at once.
         let mut over = [[0.0; BLOCK]; 4];
-        for i in 0..BLOCK {
-            let [r, g, b, cover] = look.layer(self.depth[i]);
+        for (i, &depth) in self.depth.iter().enumerate() {
+            let [r, g, b, cover] = look.layer(depth);
             (over[0][i], over[1][i], over[2][i], over[3][i]) = (r, g, b, cover);
         }
         if look.grain > 0.0 {
             let mut share = [0.0; BLOCK];
-            for i in 0..BLOCK {
-                share[i] = 1.0 - look.grain * noise(at.x.wrapping_add(i as u32), at.y);
+            for (i, share) in share.iter_mut().enumerate() {
+                *share = 1.0 - look.grain * noise(at.x.wrapping_add(i as u32), at.y);
             }
             for over in &mut over {
-                for i in 0..BLOCK {
-                    over[i] *= share[i];
-                }
+                over.iter_mut().zip(&share).for_each(|(over, share)| *over *= share);
             }
         }
         let under = self.picture(frame, look, at);
@@ -558,10 +556,10 @@ impl Block<'_> {
                 painted[i] |= round(if lit < 255.0 { lit } else { 255.0 }).wrapping_shl(8 * c as u32);
             }
         }
-        for i in 0..BLOCK {
+        for (i, painted) in painted.iter_mut().enumerate() {
             let untouched = (self.depth[i] == 0) & (self.x[i] == 0.0) & (self.y[i] == 0.0);
             if untouched | (self.base[i] >> 24 == 0) {
-                painted[i] = self.base[i];
+                *painted = self.base[i];
             }
         }
         painted
@@ -571,9 +569,9 @@ impl Block<'_> {
     #[inline(always)]
     fn picture(&self, frame: &Frame<'_>, look: &LookTable, at: UVec2) -> [[f32; BLOCK]; 3] {
         let mut under = [[0.0; BLOCK]; 3];
-        for c in 0..3 {
-            for i in 0..BLOCK {
-                under[c][i] = channel(self.base[i], c as u32);
+        for (c, under) in (0..).zip(&mut under) {
+            for (under, &base) in under.iter_mut().zip(&self.base) {
+                *under = channel(base, c);
             }
         }
         if look.shift > 0.0 {

@@ -3,7 +3,7 @@
 use super::{
     BakeProgress, CrackBaked, CrackBudget, CrackError, CrackFailed, CrackStatus, GuideSource, GuidedAppearance,
     GuidedCracks,
-    activate::{make_ready, set_status},
+    activate::{density, make_ready, set_status},
     budget::FrameClock,
     picture::{self, Space},
     surfaces::{Added, Surfaces},
@@ -262,8 +262,8 @@ fn decode(file: &[u8]) -> Result<Image, String> {
     let header = file.strip_prefix(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR").and_then(|rest| rest.first_chunk::<10>());
     let &[a, b, c, d, e, f, g, h, bits, _] = header.ok_or("it is no PNG file")?;
     let (width, height) = (u32::from_be_bytes([a, b, c, d]), u32::from_be_bytes([e, f, g, h]));
-    let bytes = u64::from(width) * u64::from(height) * 4 * u64::from(bits.div_ceil(8));
-    if width.max(height) > MAX_SIDE || bytes > MAX_BYTES {
+    let texel = 4 * u64::from(bits.div_ceil(8));
+    if width.max(height) > MAX_SIDE || u64::from(width) * u64::from(height) * texel > MAX_BYTES {
         return Err(format!("{width} x {height} texels are beyond the limit of {MAX_SIDE} a side and 256 MiB"));
     }
     let (kind, sampler) = (ImageType::MimeType("image/png"), ImageSampler::Default);
@@ -432,8 +432,10 @@ fn adopt(world: &mut World, entity: Entity, product: Product) -> Result<Option<O
         let before = active.added.replace(added);
         let (extent, mask) = (active.field.frame.extent(), active.growth.mask().clone());
         let rect = active.views.get(active.view).map_or(TexelRect::default(), |view| view.rect);
-        let density = if active.surface.alpha_mask { super::activate::density(&active.base, rect) } else { None };
+        let base = active.surface.alpha_mask.then_some(&active.base);
+        let density = base.and_then(|base| density(rect.size(), |texel| base.is_hole(rect.min + texel)));
         active.growth = grown_anew(active, before.map_or(0, |before| before.steps), extent, mask, density)?;
+        active.mind_holes();
     }
     let is_untouched = active.growth.impacts().is_empty();
     active.show_anew(is_untouched.then_some(seconds));
@@ -452,5 +454,62 @@ mod tests {
         let outcome = guarded(|| -> Result<(), CrackError> { panic!("no {}", "luck") });
         assert_eq!(outcome, Err(CrackError::Bake { reason: "it panicked: no luck".into() }));
         assert_eq!(guarded(|| Ok(7)), Ok(7));
+    }
+
+    #[cfg(feature = "2d")]
+    fn blank(size: UVec2) -> Image {
+        use bevy::render::render_resource::{Extent3d, TextureDimension, TextureFormat};
+        let extent = Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 };
+        let format = TextureFormat::Rgba8UnormSrgb;
+        Image::new_fill(extent, TextureDimension::D2, &[200, 200, 200, 255], format, RenderAssetUsages::default())
+    }
+
+    /// Frames until the bake has ended, and the progress after each.
+    #[cfg(feature = "2d")]
+    fn frames(no_threads: bool) -> (Vec<f32>, Vec<u8>) {
+        use crate::plugin::prelude::*;
+        use bevy::image::TextureAtlasLayout;
+        let mut app = App::new();
+        app.add_plugins((
+            MinimalPlugins,
+            TransformPlugin,
+            AssetPlugin::default(),
+            ImagePlugin::default(),
+            CrackPlugins,
+        ))
+        .init_asset::<TextureAtlasLayout>();
+        app.finish();
+        app.cleanup();
+        // No more than a slice a frame.
+        app.insert_resource(CrackBudget { milliseconds: 0.0, ..default() });
+        app.world_mut().resource_mut::<Bakes>().no_threads = no_threads;
+        let image = app.world_mut().resource_mut::<Assets<Image>>().add(blank(UVec2::new(300, 200)));
+        let guide = CrackGuide::new(Grid::new(UVec2::new(3, 1), 0.5));
+        let guided = GuidedCracks { max_side: 4096, ..GuidedCracks::new(guide) };
+        let entity = app.world_mut().spawn((Sprite::from_image(image), CrackSurface::default(), guided)).id();
+        let mut told = Vec::new();
+        while told.last() != Some(&1.0) {
+            app.update();
+            told.extend(app.world().get::<BakeProgress>(entity).map(|progress| progress.0));
+            assert!(told.len() < 1_000_000, "it never ends");
+        }
+        while app.world().get::<CrackState>(entity).is_some_and(|state| state.status != CrackStatus::Done) {
+            app.update();
+        }
+        let image = app.world().get::<Sprite>(entity).map(|sprite| sprite.image.clone()).unwrap_or_default();
+        let images = app.world().resource::<Assets<Image>>();
+        (told, images.get(&image).and_then(|image| image.data.clone()).unwrap_or_default())
+    }
+
+    /// M9: where tasks run in place, a bake goes on in slices of frames, and makes the same cracks.
+    #[cfg(feature = "2d")]
+    #[test]
+    fn e12_slices_make_what_tasks_make() {
+        let (slices, cracked) = frames(true);
+        assert!(slices.len() > 8 && slices.is_sorted(), "{slices:?}");
+        let (task, same) = frames(false);
+        assert!(task.is_sorted());
+        assert!(cracked.iter().any(|&value| value < 100), "cracks show");
+        assert!(cracked == same, "the same cracks");
     }
 }

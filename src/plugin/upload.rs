@@ -212,7 +212,7 @@ fn upload_rects(
         if copies.len() <= FEW {
             write(copies, rows, &gpu_images, &queue);
         } else {
-            self::copy(copies, &rows[..size], buffer, &gpu_images, &device, &queue);
+            copy(copies, &rows[..size], buffer, &gpu_images, &device, &queue);
         }
         copies.clear();
         if rows.len() > MAX_KEPT {

@@ -78,8 +78,7 @@ fn fly(
     let run = f64::from(speed) * f64::from(seconds);
     let run = if run.is_finite() { run } else { 0.0 };
     let time = seek.map_or(before + run, f64::from);
-    // Not `clamp`, which keeps what is not a number.
-    broken.time = time.max(0.0).min(MAX_TIME);
+    broken.time = if time.is_nan() { 0.0 } else { time.clamp(0.0, MAX_TIME) };
     if run < 0.0 && time <= 0.0 {
         active.broken = Some(broken);
         return Fate::Whole;

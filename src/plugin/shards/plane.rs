@@ -89,7 +89,7 @@ pub(super) fn to_mesh(shard: &ShardMesh, faces: Faces, is_mirrored: bool, with_t
         // u runs along x; the normal map's green points up.
         let across = if is_mirrored { -1.0 } else { 1.0 };
         let tangent = |normal: &[f32; 3]| match *normal {
-            [x, y, z] if z == 0.0 => [y, -x, 0.0, 1.0],
+            [x, y, 0.0] => [y, -x, 0.0, 1.0],
             [.., z] => [across, 0.0, 0.0, across * z],
         };
         mesh.insert_attribute(Mesh::ATTRIBUTE_TANGENT, normals.iter().map(tangent).collect::<Vec<_>>());

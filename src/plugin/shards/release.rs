@@ -141,12 +141,12 @@ fn release(
 
     // What has been cut stays cut, unless there is more to cut along.
     let grown = (network.nodes().len(), network.links().len());
-    let same = |broken: &&Box<Broken>| {
+    let same = |broken: &Broken| {
         let before = &broken.settings;
         broken.grown == grown && before.cut == settings.cut && before.anchor == settings.anchor
     };
     let (cut, mut support) = match &active.broken {
-        Some(broken) if same(&broken) => (broken.cut.clone(), broken.support.clone()),
+        Some(broken) if same(broken) => (broken.cut.clone(), broken.support.clone()),
         broken => {
             let cut = Arc::new(shatter(Cuts::from_network(network)?, &settings.cut)?);
             let support = match broken {
