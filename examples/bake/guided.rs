@@ -208,8 +208,14 @@ pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
                     [first, second, ..] => vec![first * (1.0 - t), second * t],
                     _ => return Err("`--animate morph` needs two guides".into()),
                 },
-                Animation::Width => return Ok(seams.stamp_share(field, &PROFILE, t)),
-                Animation::Front => return Ok(seams.stamp_front(field, &PROFILE, &front, t * front.reach())),
+                Animation::Width => {
+                    seams.stamp_share(field, &PROFILE, t);
+                    return Ok(());
+                }
+                Animation::Front => {
+                    seams.stamp_front(field, &PROFILE, &front, t * front.reach());
+                    return Ok(());
+                }
             };
             map.set_gammas(&weights)?;
             map.seams().stamp(field, &PROFILE);

@@ -185,7 +185,7 @@ fn explode(
         };
         for (shift, shade) in [(2.5 * thickness, [0, 0, 0, 90]), (thickness, [92, 96, 104, 255])] {
             let [r, g, b, a] = shade;
-            layer.set_color_rgba8(r, g, b, (f32::from(a as u8) * opacity) as u8);
+            layer.set_color_rgba8(r, g, b, (f32::from(a) * opacity) as u8);
             fill(&mut canvas, &layer, transform.post_translate(0.7 * shift, shift));
         }
         layer.shader = Pattern::new(
