@@ -676,6 +676,9 @@ impl CrackGrowth {
             if self.network.nodes[start as usize..].iter().any(of_hit) {
                 continue;
             }
+            // It takes a step of its own.
+            self.steps = self.steps.saturating_add(1);
+            self.timeline.begin(self.steps);
             let length = self.params.step_length;
             for way in [Vec2::X, Vec2::NEG_X, Vec2::Y, Vec2::NEG_Y] {
                 let to = (node.pos + way * length).clamp(Vec2::ZERO, self.network.extent());
