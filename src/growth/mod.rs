@@ -34,6 +34,7 @@
 mod arrest;
 mod closed;
 mod field;
+mod forget;
 mod links;
 mod markers;
 mod nodes;

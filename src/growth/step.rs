@@ -135,9 +135,9 @@ pub struct CrackGrowth {
     pub(super) nodes: NodeGrid,
     /// Only where cracks must not cross.
     pub(super) arrest: Option<Arrest>,
-    widths: Widths,
-    linker: Linker,
-    impacts: Vec<Impact>,
+    pub(super) widths: Widths,
+    pub(super) linker: Linker,
+    pub(super) impacts: Vec<Impact>,
     density: Option<Grid<f32>>,
     pub(super) mask: Arc<CrackMask>,
     pub(super) steps: u32,
@@ -146,26 +146,26 @@ pub struct CrackGrowth {
     nucleated: u32,
     tried: u32,
     /// First nodes of hits whose growth has not ended.
-    unshown: Vec<u32>,
+    pub(super) unshown: Vec<u32>,
     /// Nodes that have not grown here.
-    added: usize,
-    newborn: Range<u32>,
+    pub(super) added: usize,
+    pub(super) newborn: Range<u32>,
     /// Links that are among the changes.
-    links_told: u32,
+    pub(super) links_told: u32,
     /// Places of markers made since they were last asked for.
     shown_markers: Vec<Vec2>,
-    changes: Changes,
-    timeline: Timeline,
+    pub(super) changes: Changes,
+    pub(super) timeline: Timeline,
     pulls: Vec<Pull>,
     /// Node and entry in `pulls`, in order of the nodes.
     order: Vec<(u32, u32)>,
     /// Per node: its entry in `pulls` during a step.
-    pull_of: Vec<u32>,
+    pub(super) pull_of: Vec<u32>,
 }
 
 /// Segments that are new or wider, each once.
 #[derive(Clone, Debug, Default)]
-struct Changes {
+pub(super) struct Changes {
     list: Vec<SegmentId>,
     /// Per node: whether its branch is on the list.
     listed: Vec<bool>,
@@ -180,6 +180,23 @@ impl Changes {
         self.listed.reserve(nodes);
         self.child.reserve(nodes);
         self.sibling.reserve(nodes);
+    }
+
+    /// Forgets nodes and links; `nodes` are those that are left, `number` says what a segment is called now.
+    pub(super) fn forget(&mut self, nodes: &[Node], number: impl Fn(SegmentId) -> Option<SegmentId>) {
+        let before = std::mem::take(self);
+        for node in nodes {
+            self.push_node(node.parent);
+        }
+        self.list.clear();
+        self.listed.fill(false);
+        for segment in before.list.into_iter().filter_map(number) {
+            match segment {
+                SegmentId::Branch(node) if nodes[node as usize].parent != NO_PARENT => self.list_branch(node),
+                SegmentId::Branch(_) => {}
+                SegmentId::Link(_) => self.list.push(segment),
+            }
+        }
     }
 
     fn push_node(&mut self, parent: u32) {

@@ -98,6 +98,7 @@ fn apply(world: &mut World, entity: Entity, hit: QueuedHit) -> Result<HitOutcome
         return Err("the surface is transparent there");
     }
     let pos = uv * active.growth.network().extent();
+    active.freeze_if_full();
     let outcome = active.growth.hit(pos, hit.energy);
     if matches!(outcome, HitOutcome::Started(_) | HitOutcome::Merged(_)) {
         active.struck = Some(Struck { pos, energy: hit.energy, direction: hit.direction });
@@ -192,6 +193,7 @@ pub(super) fn make_ready(world: &mut World, entity: Entity) -> Result<bool, Crac
         is_dirty: false,
         is_open: false,
         is_outdated: false,
+        frozen: None,
         tips_from: 0,
         cells: CellTracker::new(frame.extent()),
         cells_told: 1,

@@ -2,6 +2,7 @@
 
 use super::{
     CrackTextures,
+    paint::stamp_anew,
     surfaces::{Active, Surfaces, Touched},
 };
 use crate::{
@@ -218,6 +219,10 @@ impl Active {
 
     /// Makes times other than the end possible.
     fn open_playback(&mut self) -> &mut Playback {
+        if self.frozen.take().is_some() {
+            stamp_anew(self);
+            self.mark(TexelRect::whole(self.field.frame.size()));
+        }
         let (size, profile, end) = (self.field.frame.size(), self.profile, self.growth.timeline().end());
         self.playback.get_or_insert_with(|| Playback {
             // A growth without steps has left no trace yet.
@@ -267,6 +272,7 @@ impl Active {
     /// with `seconds`, it appears within them, else all of it is there at once.
     pub(super) fn show_anew(&mut self, seconds: Option<f32>) {
         self.field.clear();
+        self.frozen = None;
         self.touched = Touched::new(self.field.frame.size());
         self.mark(TexelRect::whole(self.field.frame.size()));
         self.cells = CellTracker::new(self.field.frame.extent());

@@ -22,6 +22,7 @@ mod budget;
 mod carrier;
 mod clock;
 mod error;
+mod freeze;
 mod grow;
 mod guided;
 mod heal;

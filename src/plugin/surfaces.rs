@@ -5,6 +5,7 @@ use super::{
     activate::density,
     carrier::Carrier,
     clock::Playback,
+    freeze::Frozen,
     picture::BasePicture,
     shards::{Broken, Struck},
 };
@@ -71,6 +72,8 @@ pub(super) struct Active {
     /// Shows other times than the end; `None` = everything that has grown is shown.
     pub(super) playback: Option<Playback>,
     pub(super) hits: u32,
+    /// What it has forgotten and still shows.
+    pub(super) frozen: Option<Frozen>,
     /// Tiles that a crack has touched.
     pub(super) touched: Touched,
     /// Whether it is in a growing list: it grows, or its time passes.
