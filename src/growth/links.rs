@@ -1,6 +1,6 @@
 //! Segments across branches: the rings of glass (`draw_connections`) and the cells of clay (`draw_islands`).
 
-use super::{nodes::NodeGrid, params::GrowthParams, step::Impact};
+use super::{impact::Impact, nodes::NodeGrid, params::GrowthParams};
 use crate::{
     math::{hash_unit, ops},
     pattern::{Link, LinkKind, NO_PARENT, Network},
