@@ -54,14 +54,18 @@ struct View {
 
 const fn view(preset: &str) -> View {
     let (hits, energy, scale, spread) = match preset.as_bytes() {
-        b"concrete" => ((1, 4), (0.3, 1.5), 1.0, 0.0),
-        b"plaster" => ((1, 3), (0.1, 1.0), 1.0, 0.0),
-        b"brick" => ((1, 3), (0.1, 1.0), 1.0, 0.0),
+        b"concrete" => ((1, 4), (0.3, 1.5), 1.4, 0.5),
+        b"plaster" => ((1, 3), (0.1, 1.0), 1.2, 0.8),
+        b"brick" => ((1, 3), (0.02, 0.2), 3.0, 0.8),
         // Weak ones: flying stones, not hammers.
-        b"glass" | b"laminated_glass" => ((1, 4), (0.02, 0.5), 1.0, 0.0),
+        b"glass" => ((1, 4), (0.0046, 0.114), 1.86, 0.88),
+        b"laminated_glass" => ((1, 4), (0.02, 0.5), 1.0, 0.5),
         // One hit cracks the whole surface.
-        b"tempered_glass" | b"mud" | b"glaze" => ((1, 1), (1.0, 1.0), 1.0, 0.0),
-        _ => ((1, 3), (0.5, 1.5), 1.0, 0.0),
+        b"tempered_glass" => ((1, 1), (1.0, 1.0), 2.6, 0.8),
+        b"mud" => ((1, 1), (1.0, 1.0), 1.7, 1.0),
+        b"glaze" => ((1, 1), (1.0, 1.0), 1.4, 0.8),
+        b"clay" => ((1, 3), (0.5, 1.5), 1.0, 1.0),
+        _ => ((1, 3), (0.5, 1.5), 1.0, 0.5),
     };
     View { hits, energy, scale, spread }
 }

@@ -483,7 +483,7 @@ impl GrowthParams {
             | StartLayout::Crushed { radius, .. }
             | StartLayout::Disc { radius, .. } => length(radius, 0.0, 1.0),
         }
-        scaled.nucleation = (self.nucleation / (by * by)).min(64.0);
+        scaled.nucleation = (self.nucleation / by).min(64.0);
         scaled
     }
 
