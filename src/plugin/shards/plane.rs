@@ -1,6 +1,6 @@
 //! [`Plane`]: where a flat surface lies in its own space, and meshes for its shards.
 
-use crate::shatter::{MeshFrame, Pose, ShardMesh};
+use crate::shatter::{MeshFrame, Pose, RimLook, ShardMesh};
 use bevy::{
     asset::RenderAssetUsages,
     mesh::{Indices, PrimitiveTopology},
@@ -50,7 +50,7 @@ impl Plane {
 
     /// How shards become meshes, `uv` being the part of the texture that the surface shows.
     pub(super) const fn frame(&self, uv: [Vec2; 2]) -> MeshFrame {
-        MeshFrame { size: self.size, uv, centred: true }
+        MeshFrame { size: self.size, uv, centred: true, rim: RimLook::PLAIN, seed: 0 }
     }
 
     /// Whether the picture is mirrored.
