@@ -275,6 +275,7 @@ impl Active {
         self.frozen = None;
         self.touched = Touched::new(self.field.frame.size());
         self.mark(TexelRect::whole(self.field.frame.size()));
+        self.stamp_carried();
         self.cells = CellTracker::new(self.field.frame.extent());
         self.cells_told = 1;
         self.fell_at = (0, 1);

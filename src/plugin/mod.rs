@@ -146,6 +146,7 @@ impl Plugin for CrackPlugin {
             .init_resource::<CrackStats>()
             .init_resource::<CrackUploadStats>()
             .init_resource::<upload::Uploads>()
+            .init_resource::<shards::Spares>()
             .init_resource::<budget::FrameClock>()
             .init_resource::<queue::HitQueue>()
             .init_resource::<mask::PictureMasks>()

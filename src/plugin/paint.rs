@@ -72,6 +72,9 @@ pub(super) fn stamp(active: &mut Active, scratch: &mut Scratch) {
         redrawn.cleared.iter().for_each(|tile| active.touched.unmark(*tile));
         redrawn.stamped.iter().for_each(|rect| active.touched.mark(*rect));
         redrawn.changed.iter().for_each(|rect| active.mark(*rect));
+        if !redrawn.changed.is_empty() {
+            active.stamp_carried();
+        }
         return;
     }
     active.growth.take_changed(&mut scratch.segments);
@@ -115,6 +118,14 @@ pub(super) fn stamp_anew(active: &mut Active) {
             active.touched.mark(rect);
         }
     }
+    active.stamp_carried();
+}
+
+/// Paints in the middle of a frame what is dirty.
+pub(super) fn paint_now(world: &mut World, active: &mut Active) {
+    world.resource_scope(|world, mut images: Mut<Assets<Image>>| {
+        paint(active, &mut images, &mut world.resource_mut::<Uploads>(), &mut Vec::new());
+    });
 }
 
 /// Paints the dirty texels of the view that is shown and asks for their upload.

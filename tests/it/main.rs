@@ -29,5 +29,7 @@ mod replay;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod shards;
 #[cfg(all(feature = "2d", feature = "3d"))]
+mod shards_life;
+#[cfg(all(feature = "2d", feature = "3d"))]
 mod support;
 mod voronoi;
