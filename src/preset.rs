@@ -62,20 +62,20 @@ impl CrackPreset {
             crack_radius: 0.4,
             num_lines_grid: 7,
             num_columns_grid: 5,
-            markers: MarkerLayout::PseudoGrid { occupancy: 0.3, jitter: 1.0 },
+            markers: MarkerLayout::PseudoGrid { occupancy: 0.5, jitter: 1.0 },
             focus: 0.3,
             reach: 0.78,
-            line_width: 0.0074,
+            line_width: 0.0052,
             line_growth: 2.0,
             murray: 3.7,
-            max_width: 0.05,
+            max_width: 0.036,
             unevenness: 0.36,
             inertia: 2.4,
             wander: 0.39,
             roughness: 0.1,
             arrest: 0.06,
-            variety: 0.76,
-            width_variety: 0.76,
+            variety: 0.3,
+            width_variety: 0.4,
             ..GrowthParams::DEFAULT
         },
         profile: Profile {
@@ -109,8 +109,8 @@ impl CrackPreset {
             wander: 0.4,
             roughness: 0.13,
             arrest: 0.06,
-            variety: 0.6,
-            width_variety: 0.6,
+            variety: 0.35,
+            width_variety: 0.4,
             ..GrowthParams::DEFAULT
         },
         profile: Profile { depth: 1.0, full_width: 0.008, wall: 0.3, rim_width: 0.008, rim_depth: 0.2, faintest: 0.6 },
@@ -121,29 +121,29 @@ impl CrackPreset {
     /// Brick: wide cracks, one or two, that keep to the mortar where a [mask](crate::growth::CrackGrowth::set_mask) shows it.
     pub const BRICK: Self = Self {
         growth: GrowthParams {
-            kill_distance: 0.1,
+            kill_distance: 0.06,
             step_length: 0.022,
-            crack_radius: 0.5,
-            num_lines_grid: 4,
-            num_columns_grid: 4,
-            markers: MarkerLayout::PseudoGrid { occupancy: 0.3, jitter: 1.0 },
+            crack_radius: 0.4,
+            num_lines_grid: 7,
+            num_columns_grid: 7,
+            markers: MarkerLayout::PseudoGrid { occupancy: 0.35, jitter: 1.0 },
             reach: 0.75,
-            line_width: 0.02,
+            line_width: 0.009,
             line_growth: 0.4,
             murray: 3.0,
-            max_width: 0.1,
+            max_width: 0.05,
             unevenness: 0.5,
-            inertia: 3.0,
+            inertia: 1.0,
             axis: 0.6,
-            directed: 0.7,
+            directed: 0.5,
             wander: 0.3,
             roughness: 0.08,
             arrest: 0.06,
-            variety: 0.9,
-            width_variety: 0.9,
+            variety: 0.4,
+            width_variety: 0.5,
             ..GrowthParams::DEFAULT
         },
-        profile: Profile { depth: 1.0, full_width: 0.016, wall: 0.3, rim_width: 0.006, rim_depth: 0.16, faintest: 0.6 },
+        profile: Profile { depth: 1.0, full_width: 0.01, wall: 0.3, rim_width: 0.006, rim_depth: 0.16, faintest: 0.6 },
         look: Look::GROOVE,
         steps_per_second: 60.0,
     };
@@ -154,31 +154,32 @@ impl CrackPreset {
     /// `draw_connections` and `line_growth` 0.5 for the white lines, in a unit that they do not give.
     pub const GLASS: Self = Self {
         growth: GrowthParams {
-            kill_distance: 0.036,
-            step_length: 0.02,
-            crack_radius: 0.2,
+            kill_distance: 0.02,
+            step_length: 0.0115,
+            crack_radius: 0.12,
             num_iterations: 120,
-            markers: MarkerLayout::Polar { sectors: 5, rings: 12, ring_growth: 1.12, jitter: 0.83, occupancy: 1.0 },
-            reach: 0.84,
-            starts: StartLayout::Crushed { count: 7, radius: 0.014 },
-            line_width: 0.0106,
+            markers: MarkerLayout::Polar { sectors: 14, rings: 12, ring_growth: 1.12, jitter: 0.83, occupancy: 1.0 },
+            reach: 1.05,
+            starts: StartLayout::Crushed { count: 14, radius: 0.014 },
+            line_width: 0.006,
             line_growth: 0.12,
             murray: 2.6,
-            max_width: 0.03,
-            unevenness: 0.34,
+            max_width: 0.017,
+            unevenness: 0.18,
             directed: 0.4,
-            wander: 0.175,
-            roughness: 0.066,
+            wander: 0.11,
+            roughness: 0.064,
             draw_connections: true,
-            connection_gaps: 0.74,
+            connection_gaps: 0.237,
             chips: 0.25,
-            connection_every: 2,
-            arrest: 0.04,
-            variety: 0.32,
-            width_variety: 0.32,
+            connection_every: 3,
+            arrest: 0.03,
+            variety: 0.2,
+            width_variety: 0.25,
+            tip_taper: 0.22,
             ..GrowthParams::DEFAULT
         },
-        profile: Profile { depth: 1.0, full_width: 0.004, wall: 0.3, rim_width: 0.006, rim_depth: 0.3, faintest: 0.6 },
+        profile: Profile { depth: 1.0, full_width: 0.003, wall: 0.3, rim_width: 0.004, rim_depth: 0.3, faintest: 0.6 },
         look: Look { relief: 0.004, glint: 0.5, ..Look::FROSTED },
         steps_per_second: 120.0,
     };
@@ -186,31 +187,31 @@ impl CrackPreset {
     /// Tempered glass: the whole pane goes to small dice, from the hit outward.
     pub const TEMPERED_GLASS: Self = Self {
         growth: GrowthParams {
-            kill_distance: 0.035,
-            step_length: 0.018,
-            crack_radius: 0.13,
-            markers: MarkerLayout::DartThrowing { spacing: 0.0855 },
+            kill_distance: 0.0145,
+            step_length: 0.0075,
+            crack_radius: 0.055,
+            markers: MarkerLayout::DartThrowing { spacing: 0.034 },
             venation: Venation::Closed,
             reach: 64.0,
-            starts: StartLayout::Crushed { count: 12, radius: 0.02 },
-            line_width: 0.0096,
+            starts: StartLayout::Crushed { count: 14, radius: 0.011 },
+            line_width: 0.004,
             line_growth: 0.1,
             murray: 3.0,
-            max_width: 0.04,
+            max_width: 0.016,
             tip_taper: 0.32,
-            unevenness: 0.42,
+            unevenness: 0.38,
             directed: 0.25,
-            wander: 0.1,
-            roughness: 0.12,
-            arrest: 0.042,
-            open_ends: 0.32,
-            nucleation: 0.23,
-            variety: 0.96,
-            width_variety: 0.96,
+            wander: 0.05,
+            roughness: 0.1,
+            arrest: 0.019,
+            open_ends: 0.1,
+            nucleation: 0.6,
+            variety: 0.2,
+            width_variety: 0.25,
             max_nodes: 40_000,
             ..GrowthParams::DEFAULT
         },
-        profile: Profile { depth: 1.0, full_width: 0.006, wall: 0.3, rim_width: 0.005, rim_depth: 0.3, faintest: 0.6 },
+        profile: Profile { depth: 1.0, full_width: 0.0035, wall: 0.3, rim_width: 0.003, rim_depth: 0.3, faintest: 0.6 },
         look: Look { relief: 0.004, glint: 0.5, ..Look::FROSTED },
         steps_per_second: 240.0,
     };
@@ -258,10 +259,10 @@ impl CrackPreset {
             markers: MarkerLayout::DartThrowing { spacing: 0.025 },
             reach: 2.0,
             starts: StartLayout::Points { count: 12 },
-            line_width: 0.0118,
+            line_width: 0.0085,
             line_growth: 0.5,
             murray: 2.5,
-            max_width: 0.05,
+            max_width: 0.04,
             tip_taper: 0.2,
             unevenness: 0.11,
             directed: 0.24,
@@ -273,8 +274,8 @@ impl CrackPreset {
             arrest: 0.08,
             open_ends: 0.3,
             nucleation: 1.03,
-            variety: 0.98,
-            width_variety: 0.9,
+            variety: 0.45,
+            width_variety: 0.4,
             ..GrowthParams::DEFAULT
         },
         profile: Profile { depth: 1.0, full_width: 0.014, wall: 0.5, rim_width: 0.012, rim_depth: 0.12, faintest: 0.6 },
@@ -285,27 +286,27 @@ impl CrackPreset {
     /// Mud: wide cracks that close into rounded cells.
     pub const MUD: Self = Self {
         growth: GrowthParams {
-            kill_distance: 0.037,
-            step_length: 0.02,
-            crack_radius: 0.111,
-            markers: MarkerLayout::DartThrowing { spacing: 0.072 },
+            kill_distance: 0.0285,
+            step_length: 0.0154,
+            crack_radius: 0.086,
+            markers: MarkerLayout::DartThrowing { spacing: 0.056 },
             venation: Venation::Closed,
             reach: 3.0,
             starts: StartLayout::Points { count: 3 },
-            line_width: 0.0095,
+            line_width: 0.0078,
             line_growth: 0.157,
             murray: 2.28,
-            max_width: 0.05,
+            max_width: 0.04,
             tip_taper: 0.25,
             unevenness: 0.25,
             directed: 0.25,
             wander: 0.06,
             roughness: 0.1,
-            arrest: 0.045,
+            arrest: 0.035,
             open_ends: 0.2,
-            nucleation: 0.6,
-            variety: 0.98,
-            width_variety: 0.9,
+            nucleation: 1.0,
+            variety: 0.35,
+            width_variety: 0.3,
             ..GrowthParams::DEFAULT
         },
         profile: Profile { depth: 1.0, full_width: 0.016, wall: 0.6, rim_width: 0.014, rim_depth: 0.12, faintest: 0.6 },
@@ -322,7 +323,7 @@ impl CrackPreset {
             markers: MarkerLayout::DartThrowing { spacing: 0.042 },
             reach: 3.0,
             starts: StartLayout::Points { count: 4 },
-            line_width: 0.0088,
+            line_width: 0.005,
             line_growth: 0.25,
             murray: 2.5,
             max_width: 0.05,
@@ -331,13 +332,13 @@ impl CrackPreset {
             inertia: 5.0,
             directed: 0.25,
             wander: 0.04,
-            roughness: 0.07,
+            roughness: 0.08,
             draw_islands: true,
             island_distance: 0.09,
             arrest: 0.12,
             open_ends: 0.4,
             nucleation: 0.6,
-            variety: 0.98,
+            variety: 0.5,
             width_variety: 0.2,
             ..GrowthParams::DEFAULT
         },
@@ -368,8 +369,8 @@ impl CrackPreset {
             island_distance: 0.14,
             arrest: 0.06,
             open_ends: 0.5,
-            variety: 0.5,
-            width_variety: 0.5,
+            variety: 0.3,
+            width_variety: 0.3,
             ..GrowthParams::DEFAULT
         },
         profile: Profile { depth: 1.0, full_width: 0.012, wall: 0.8, rim_width: 0.012, rim_depth: 0.3, faintest: 0.6 },
@@ -400,6 +401,28 @@ impl CrackPreset {
         look: Look::TOON,
         steps_per_second: 30.0,
     };
+
+    /// The same material seen from nearer (`by` above 1) or further away: every length times `by`, as
+    /// [`GrowthParams::scaled`].
+    ///
+    /// Lengths are shares of the surface's shorter side, so on a wall four times as long as another the same preset looks four times as
+    /// coarse: `CrackPreset::MUD.scaled(0.25)` there.
+    ///
+    /// ```
+    /// use bevy_crack::CrackPreset;
+    ///
+    /// let fine = CrackPreset::MUD.scaled(0.25);
+    /// assert_eq!(fine.growth.line_width, 0.25 * CrackPreset::MUD.growth.line_width);
+    /// assert_eq!(fine.validate(), Ok(()));
+    /// ```
+    #[must_use]
+    pub fn scaled(&self, by: f32) -> Self {
+        let growth = self.growth.scaled(by);
+        let by = growth.step_length / self.growth.step_length;
+        let Profile { full_width, rim_width, .. } = self.profile;
+        let profile = Profile { full_width: full_width * by, rim_width: rim_width * by, ..self.profile };
+        Self { growth, profile, look: self.look.clone(), steps_per_second: self.steps_per_second }
+    }
 
     /// The preset of this name (lower case), see [`NAMES`](Self::NAMES).
     #[must_use]

@@ -1,7 +1,9 @@
 //! `bake figures-mould`: the figures of Mould 2005 made again, but for those that need image analogies (6 and 7).
 
 use crate::{
-    guided::{PROFILE, Paint, base_picture, deep, regions},
+    guided::regions,
+    ocr::{PROFILE, SIDE, deep},
+    painting::{Paint, base_picture},
     text::{FONT, draw_text},
 };
 use bevy_crack::{
@@ -22,9 +24,6 @@ pub(crate) struct Options {
     #[arg(long, default_value_t = 1)]
     seed: u64,
 }
-
-/// Side of the paper's pictures, texels.
-const SIDE: u32 = 400;
 
 /// Free space between panels.
 const GAP: u32 = 8;

@@ -1,16 +1,20 @@
 //! `bake growth`: hits in, textures and the network out.
 
-use crate::{own::own_picture, pictures::read_picture};
+use crate::{
+    own::own_picture,
+    painting::{fitted, paint, write_maps},
+    pictures::read_picture,
+};
 use bevy_crack::{
     CrackPreset,
     growth::{CrackGrowth, HitOutcome},
-    paint::{BaseTexels, Look, LookTable, PaintTargets, paint_into},
+    paint::{Look, LookTable},
     pattern::{CrackMask, LinkKind, NO_PARENT, Network, SurfaceFrame},
-    raster::{DepthField, TexelRect, stamp_dot, stamp_path},
+    raster::{DepthField, stamp_dot, stamp_path},
 };
 use clap::Args;
 use glam::{UVec2, Vec2};
-use image::{GrayImage, ImageBuffer, Luma, Rgba, RgbaImage, imageops::FilterType};
+use image::{Rgba, RgbaImage};
 use serde_json::json;
 use std::{error::Error, fs, path::PathBuf, sync::Arc, time::Instant};
 
@@ -96,8 +100,7 @@ pub(crate) fn bake(options: &Options) -> Result<(Network, RgbaImage), Box<dyn Er
     };
     let size = options.size.or(picture.as_ref().map(|p| p.dimensions().into())).unwrap_or(UVec2::splat(512));
     let base = match picture {
-        Some(picture) if UVec2::from(picture.dimensions()) == size => picture,
-        Some(picture) => image::imageops::resize(&picture, size.x, size.y, FilterType::CatmullRom),
+        Some(picture) => fitted(picture, size),
         None => RgbaImage::from_pixel(size.x, size.y, Rgba([150, 150, 146, 255])),
     };
 
@@ -145,24 +148,10 @@ pub(crate) fn bake(options: &Options) -> Result<(Network, RgbaImage), Box<dyn Er
 
     let clock = Instant::now();
     let table = LookTable::new(&preset.look, frame.texels_per_unit())?;
-    let (mut diffuse, mut normal) = (RgbaImage::new(size.x, size.y), RgbaImage::new(size.x, size.y));
-    paint_into(
-        BaseTexels { size, diffuse: base.as_raw(), normal: None, depth: None },
-        &field,
-        &table,
-        TexelRect::whole(size),
-        UVec2::ZERO,
-        &mut PaintTargets { diffuse: Some(&mut diffuse), normal: Some(&mut normal), depth: None },
-    );
+    let maps = paint(&base, &field, &table);
     let painted = clock.elapsed();
 
-    fs::create_dir_all(&options.out)?;
-    diffuse.save(options.out.join("diffuse.png"))?;
-    normal.save(options.out.join("normal.png"))?;
-    let texels = field.depth.as_slice().to_vec();
-    let depth = ImageBuffer::<Luma<u16>, _>::from_raw(size.x, size.y, texels).ok_or("depth size")?;
-    depth.save(options.out.join("depth.png"))?;
-    mask(&field).save(options.out.join("mask.png"))?;
+    write_maps(&options.out, &maps, &field)?;
     let network = growth.network();
     fs::write(options.out.join("network.json"), serde_json::to_string(&describe(network, options))?)?;
 
@@ -176,16 +165,8 @@ pub(crate) fn bake(options: &Options) -> Result<(Network, RgbaImage), Box<dyn Er
         painted.as_secs_f64() * 1e3,
         options.out.display()
     );
+    let [diffuse, _] = maps;
     Ok((network.clone(), diffuse))
-}
-
-/// White where a person would mark a crack: not on the chipped rim.
-pub(crate) fn mask(field: &DepthField) -> GrayImage {
-    let size = field.frame.size();
-    GrayImage::from_fn(size.x, size.y, |x, y| {
-        let depth = field.depth.get(x, y).unwrap_or(0);
-        Luma([if depth > u16::MAX / 3 { 255 } else { 0 }])
-    })
 }
 
 /// The network in pattern units (the shorter side is 1), with the rough line of each segment.

@@ -3,27 +3,27 @@
 use crate::{
     growth::size,
     ink::{ink, lightness},
+    ocr::{PROFILE, deep},
+    painting::{Paint, base_picture, write_maps},
     pictures::read_picture,
     text::{FONT, draw_text},
 };
 use bevy_crack::{
-    paint::{BaseTexels, Look, LookTable, Modulation, PaintTargets, modulate, paint_into},
     pattern::{NO_PARENT, SurfaceFrame},
-    raster::{DepthField, Profile, TexelRect},
+    raster::DepthField,
     voronoi::{Front, Guide, Seams, SiteLayout, VoronoiBake, VoronoiMap, VoronoiParams, edges},
 };
 use clap::{Args, ValueEnum};
 use glam::{UVec2, Vec2};
 use image::{
-    Delay, Frame, GrayImage, ImageBuffer, Luma, Rgba, RgbaImage,
+    Delay, Frame, Rgba, RgbaImage,
     codecs::gif::{GifEncoder, Repeat},
-    imageops::FilterType,
 };
 use serde_json::json;
 use std::{
     error::Error,
     fs::{self, File},
-    path::{Path, PathBuf},
+    path::PathBuf,
     time::Instant,
 };
 
@@ -108,12 +108,6 @@ enum Animation {
 /// The weight that the paper gives its guides.
 const GAMMA: f32 = 28.0;
 
-/// Deeper than this are the cracks that draw.
-const DEEP: u16 = u16::MAX / 2;
-
-/// The cross-section of the cracks.
-pub(crate) const PROFILE: Profile = Profile { full_width: 0.014, wall: 0.4, faintest: 0.5, ..Profile::DEFAULT };
-
 fn guide(text: &str) -> Result<(PathBuf, f32), String> {
     match text.rsplit_once(':').map(|(path, gamma)| (path, gamma.parse::<f32>())) {
         Some((path, Ok(gamma))) if !path.is_empty() => Ok((path.into(), gamma)),
@@ -180,16 +174,8 @@ pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
     seams.stamp(&mut field, &PROFILE);
     let base = base_picture(options.base.as_deref(), options.size)?;
     let paint = Paint::new(&options.look, &frame)?;
-    fs::create_dir_all(&options.out)?;
-    let [diffuse, normal] = paint.paint(&base, &field)?;
-    diffuse.save(options.out.join("diffuse.png"))?;
-    normal.save(options.out.join("normal.png"))?;
-    let texels = field.depth.as_slice().to_vec();
-    let depth = ImageBuffer::<Luma<u16>, _>::from_raw(options.size.x, options.size.y, texels).ok_or("depth size")?;
-    depth.save(options.out.join("depth.png"))?;
-    // What a person would mark as crack, white as in `bake growth`; and the cracks that draw, black on white.
-    let mask: Vec<u8> = field.depth.as_slice().iter().map(|&d| if d > u16::MAX / 3 { 255 } else { 0 }).collect();
-    GrayImage::from_raw(options.size.x, options.size.y, mask).ok_or("mask size")?.save(options.out.join("mask.png"))?;
+    write_maps(&options.out, &paint.paint(&base, &field)?, &field)?;
+    // The cracks that draw alone, black on white.
     deep(&field).ok_or("mask size")?.save(options.out.join("deep.png"))?;
     regions(&map).save(options.out.join("regions.png"))?;
     let at = frame.uv_to_pos(options.at);
@@ -255,59 +241,6 @@ fn animate(
         gif.encode_frame(Frame::from_parts(diffuse, 0, 0, Delay::from_numer_denom_ms(70, 1)))?;
     }
     Ok(())
-}
-
-/// The picture at `path`, or concrete, stretched to `size`.
-pub(crate) fn base_picture(path: Option<&Path>, size: UVec2) -> Result<RgbaImage, Box<dyn Error>> {
-    let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/textures/concrete_fine.png");
-    let picture = read_picture(path.unwrap_or(&own))?;
-    Ok(image::imageops::resize(&picture, size.x, size.y, FilterType::CatmullRom))
-}
-
-/// How cracks are shown.
-pub(crate) enum Paint {
-    Look(Box<LookTable>),
-    Modulation(Modulation),
-}
-
-impl Paint {
-    pub(crate) fn new(name: &str, frame: &SurfaceFrame) -> Result<Self, Box<dyn Error>> {
-        match name {
-            "dark" => Ok(Self::Modulation(Modulation::DARK)),
-            "bright" => Ok(Self::Modulation(Modulation::BRIGHT)),
-            _ => {
-                let names = Look::NAMES.join(", ");
-                let look = Look::named(name).ok_or(format!("no look `{name}`; there are {names}, dark, bright"))?;
-                Ok(Self::Look(Box::new(LookTable::new(&look, frame.texels_per_unit())?)))
-            }
-        }
-    }
-
-    /// Diffuse and normal.
-    pub(crate) fn paint(&self, base: &RgbaImage, field: &DepthField) -> Result<[RgbaImage; 2], Box<dyn Error>> {
-        let size: UVec2 = base.dimensions().into();
-        let (mut diffuse, mut normal) = (base.clone(), RgbaImage::new(size.x, size.y));
-        let plain = LookTable::new(&Look::GROOVE, field.frame.texels_per_unit())?;
-        let (table, with_diffuse) = match self {
-            Self::Look(table) => (&**table, true),
-            Self::Modulation(modulation) => {
-                modulate(&mut diffuse, field, modulation)?;
-                (&plain, false)
-            }
-        };
-        let texels = BaseTexels { size, diffuse: base.as_raw(), normal: None, depth: None };
-        let diffuse_target = with_diffuse.then_some(&mut *diffuse);
-        let mut targets = PaintTargets { diffuse: diffuse_target, normal: Some(&mut normal), depth: None };
-        paint_into(texels, field, table, TexelRect::whole(size), UVec2::ZERO, &mut targets);
-        Ok([diffuse, normal])
-    }
-}
-
-/// The cracks that draw, black on white.
-pub(crate) fn deep(field: &DepthField) -> Option<GrayImage> {
-    let size = field.depth.size();
-    let mask = field.depth.as_slice().iter().map(|&depth| if depth > DEEP { 0 } else { 255 }).collect();
-    GrayImage::from_raw(size.x, size.y, mask)
 }
 
 /// A colour for each region, darker with path cost; sites are white.

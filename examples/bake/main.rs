@@ -13,7 +13,10 @@ mod gallery;
 mod growth;
 mod guided;
 mod ink;
+mod legible;
+mod ocr;
 mod own;
+mod painting;
 mod pictures;
 mod realism;
 mod shatter;
@@ -43,6 +46,8 @@ enum Method {
     Guided(Box<guided::Options>),
     /// The figures of the paper on image-guided fracture, made again.
     FiguresMould(figures::Options),
+    /// Words drawn by cracks and read back, to see how legible they are.
+    Legible(legible::Options),
     /// Masks of every preset with random hits, to be measured against photographs.
     Realism(realism::Options),
     /// Shards: the pieces into which the cracks cut the picture.
@@ -55,6 +60,7 @@ fn main() -> ExitCode {
         Method::Growth(options) => growth::bake(&options).map(drop),
         Method::Guided(options) => guided::bake(&options),
         Method::FiguresMould(options) => figures::bake(&options),
+        Method::Legible(options) => legible::bake(&options),
         Method::Realism(options) => realism::bake(&options),
         Method::Shatter(options) => shatter::bake(&options),
     };

@@ -1,10 +1,10 @@
 //! `bake realism`: masks of every preset, to be measured against masks of real cracks.
 
-use crate::growth::mask;
+use crate::painting::mask;
 use bevy_crack::{
     CrackPreset,
     growth::CrackGrowth,
-    math::Rng,
+    math::{Rng, ops},
     pattern::SurfaceFrame,
     raster::{DepthField, stamp_path},
 };
@@ -26,23 +26,48 @@ pub(crate) struct Options {
     /// A growth parameter, as in `kill_distance=0.02`; may be given many times
     #[arg(long, value_parser = crate::growth::setting)]
     set: Vec<(String, String)>,
+    /// How many times larger than on a surface of a game the cracks are, instead of what each preset has
+    #[arg(long)]
+    scale: Option<f32>,
+    /// How much that differs between masks, 0..1, instead of what each preset has
+    #[arg(long)]
+    spread: Option<f32>,
+    /// How hard hits are, times what each preset has
+    #[arg(long, default_value_t = 1.0)]
+    energy: f32,
     /// Folder to write to: a folder for each preset in it
     #[arg(long, default_value = "out/realism")]
     out: PathBuf,
 }
 
-/// How many hits, and how hard: least and most.
-const fn hits(preset: &str) -> ((u32, u32), (f32, f32)) {
-    match preset.as_bytes() {
-        b"concrete" => ((1, 4), (0.3, 1.5)),
-        b"plaster" => ((1, 3), (0.1, 1.0)),
-        b"brick" => ((1, 3), (0.1, 1.0)),
+/// What the photographs of a material have in common.
+struct View {
+    /// How many hits: least and most.
+    hits: (u32, u32),
+    /// How hard they are: least and most.
+    energy: (f32, f32),
+    /// How many times larger than on a surface of a game the cracks are in the middle one: photographs are taken from nearby.
+    scale: f32,
+    /// How much the distances differ: 0 = not at all, 1 = by a factor of about 2 either way.
+    spread: f32,
+}
+
+const fn view(preset: &str) -> View {
+    let (hits, energy, scale, spread) = match preset.as_bytes() {
+        b"concrete" => ((1, 4), (0.3, 1.5), 1.4, 0.5),
+        b"plaster" => ((1, 3), (0.1, 1.0), 1.2, 0.8),
+        b"brick" => ((1, 3), (0.02, 0.2), 3.0, 0.8),
         // Weak ones: flying stones, not hammers.
-        b"glass" | b"laminated_glass" => ((1, 4), (0.02, 0.5)),
+        b"glass" => ((1, 4), (0.0046, 0.114), 1.86, 0.88),
+        b"laminated_glass" => ((1, 4), (0.02, 0.5), 1.0, 0.5),
         // One hit cracks the whole surface.
-        b"tempered_glass" | b"mud" | b"glaze" => ((1, 1), (1.0, 1.0)),
-        _ => ((1, 3), (0.5, 1.5)),
-    }
+        b"tempered_glass" => ((1, 1), (1.0, 1.0), 2.6, 0.8),
+        b"mud" => ((1, 1), (1.0, 1.0), 1.7, 1.0),
+        b"glaze" => ((1, 1), (1.0, 1.0), 1.4, 0.8),
+        b"clay" => ((1, 3), (0.5, 1.5), 1.0, 1.0),
+        _ => ((1, 3), (0.5, 1.5), 1.0, 0.5),
+    };
+    View { hits, energy, scale, spread }
 }
 
 pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
@@ -50,6 +75,8 @@ pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
     let names = if options.preset.is_empty() { &all[..] } else { &options.preset };
     let frame = SurfaceFrame::new(UVec2::splat(options.size))?;
     for name in names {
+        let View { hits: (fewest, most), energy: (weakest, hardest), scale, spread } = view(name);
+        let (scale, spread) = (options.scale.unwrap_or(scale), options.spread.unwrap_or(spread));
         let mut preset = CrackPreset::named(name).ok_or_else(|| format!("no preset `{name}`"))?;
         for (name, value) in &options.set {
             preset.growth.set(name, value)?;
@@ -57,17 +84,18 @@ pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
         let folder = options.out.join(name);
         fs::create_dir_all(&folder)?;
         for seed in 1..=options.masks {
-            let mut growth = CrackGrowth::new(preset.growth.clone(), frame.extent(), seed)?;
             let mut rng = Rng::new(seed).stream("realism");
-            let ((fewest, most), (weakest, hardest)) = hits(name);
+            let distance = spread * 0.7 * (rng.signed() + rng.signed());
+            let seen = preset.scaled(scale * ops::exp(distance));
+            let mut growth = CrackGrowth::new(seen.growth, frame.extent(), seed)?;
             for _ in 0..fewest + rng.next_u32() % (most - fewest + 1) {
                 let place = Vec2::new(rng.range(0.1, 0.9), rng.range(0.1, 0.9));
-                growth.hit(frame.uv_to_pos(place), rng.range(weakest, hardest));
+                growth.hit(frame.uv_to_pos(place), options.energy * rng.range(weakest, hardest));
                 while growth.step().grew() {}
             }
             let mut field = DepthField::new(frame);
             for path in growth.network().segments().filter_map(|segment| growth.network().path(segment)) {
-                stamp_path(&mut field, &preset.profile, &path);
+                stamp_path(&mut field, &seen.profile, &path);
             }
             mask(&field).save(folder.join(format!("seed_{seed:02}.png")))?;
         }

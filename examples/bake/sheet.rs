@@ -2,15 +2,16 @@
 
 use crate::{
     own::own_picture,
+    painting::{fitted, paint},
     pictures::read_picture,
     text::{FONT, draw_text},
 };
 use bevy_crack::{
     CrackPreset,
     growth::CrackGrowth,
-    paint::{BaseTexels, LookTable, PaintTargets, paint_into},
+    paint::LookTable,
     pattern::{CrackMask, Moment, SurfaceFrame},
-    raster::{DepthField, TexelRect, stamp_path},
+    raster::{DepthField, stamp_path},
 };
 use glam::{UVec2, Vec2};
 use image::{
@@ -59,9 +60,8 @@ pub(crate) fn draw(names: &[&str], seed: u64, side: u32) -> Result<RgbaImage, Bo
 fn moments(preset: &CrackPreset, name: &str, seed: u64, side: u32) -> Result<Vec<RgbaImage>, Box<dyn Error>> {
     // Painted twice as large: cracks are finer than texels.
     let (small, side) = (side, UVec2::splat(2 * side));
-    let resize = |picture: &RgbaImage| imageops::resize(picture, side.x, side.y, FilterType::CatmullRom);
-    let base = resize(&read_picture(&own_picture(name))?);
-    let behind = resize(&read_picture(&own_picture("clay"))?);
+    let base = fitted(read_picture(&own_picture(name))?, side);
+    let behind = fitted(read_picture(&own_picture("clay"))?, side);
     let mask = match name {
         "brick" => CrackMask::from_picture(side, base.as_raw())?,
         _ => CrackMask::default(),
@@ -83,15 +83,7 @@ fn moments(preset: &CrackPreset, name: &str, seed: u64, side: u32) -> Result<Vec
                 stamp_path(&mut field, &preset.profile, &path);
             }
         }
-        let mut cracked = RgbaImage::new(side.x, side.y);
-        paint_into(
-            BaseTexels { size: side, diffuse: base.as_raw(), normal: None, depth: None },
-            &field,
-            &table,
-            TexelRect::whole(side),
-            UVec2::ZERO,
-            &mut PaintTargets { diffuse: Some(&mut cracked), normal: None, depth: None },
-        );
+        let [cracked, _] = paint(&base, &field, &table);
         // What one sees through panes of glass.
         let mut picture = behind.clone();
         picture.pixels_mut().for_each(|Rgba([r, g, b, _])| {

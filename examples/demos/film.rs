@@ -24,11 +24,11 @@ const SIZE: UVec2 = UVec2::new(1280, 720);
 const GIF_WIDTH: u32 = 480;
 
 /// Takes pictures where there is no window, writes them, and ends the app.
-pub struct FilmPlugin;
+pub(crate) struct FilmPlugin;
 
 /// The pictures of a run without a window.
 #[derive(Resource, Default)]
-pub struct Film {
+pub(crate) struct Film {
     /// Where the camera draws to.
     target: Option<Handle<Image>>,
     frame: u32,
@@ -39,9 +39,9 @@ pub struct Film {
 }
 
 impl Film {
-    /// What the camera of the demo needs so that it draws into the film; nothing where there is a window.
-    pub fn camera_target(&self) -> Option<RenderTarget> {
-        self.target.clone().map(|target| RenderTarget::Image(target.into()))
+    /// Frames that are over.
+    pub(crate) fn frame(&self) -> u32 {
+        self.frame
     }
 }
 
@@ -58,6 +58,7 @@ impl Plugin for FilmPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<Film>()
             .add_systems(PreStartup, open_film)
+            .add_observer(aim_camera)
             .add_systems(First, draw_when_due)
             .add_systems(Last, (take_picture, end).chain());
     }
@@ -67,6 +68,13 @@ fn open_film(mut film: ResMut<Film>, output: Res<Output>, mut images: ResMut<Ass
     if *output == Output::Offscreen {
         let target = Image::new_target_texture(SIZE.x, SIZE.y, TextureFormat::Rgba8UnormSrgb, None);
         film.target = Some(images.add(target));
+    }
+}
+
+/// Where there is no window, cameras draw into the film.
+fn aim_camera(camera: On<Add, Camera>, film: Res<Film>, mut commands: Commands) {
+    if let Some(target) = film.target.clone() {
+        commands.entity(camera.entity).insert(RenderTarget::Image(target.into()));
     }
 }
 
@@ -177,7 +185,7 @@ fn end(mut film: ResMut<Film>, output: Res<Output>, arguments: Res<DemoArguments
 }
 
 /// Lays the CPU copies of the surfaces' pictures out as they stand in the world, seen from the front.
-pub fn composite<'a>(
+fn composite<'a>(
     images: &Assets<Image>,
     shown: impl Iterator<Item = (&'a GlobalTransform, &'a OnCanvas, Option<&'a CrackTextures>)>,
 ) -> RgbaImage {

@@ -14,8 +14,7 @@ mod text;
 
 use bevy::prelude::*;
 use bevy_crack::prelude::*;
-use bevy_crack_demos::{DemoArguments, Film, FilmPlugin, OnCanvas, Output, demo_app};
-use clap::Parser;
+use bevy_crack_demos::{DemoArguments, OnCanvas, Output, Script, demo_app, heal_on_h, hit_on_press, play};
 use std::{error::Error, fs, path::Path};
 
 /// Pictures, fonts and presets that ship with the crate.
@@ -29,35 +28,21 @@ const COLUMNS: usize = 6;
 /// Hits on each pane in the scripted run.
 const HITS: u32 = 2;
 
-#[derive(Parser)]
-#[command(about = "Every preset on its own picture: a wall of panes to click")]
-struct Arguments {
-    #[command(flatten)]
-    demo: DemoArguments,
-}
-
 #[derive(Component)]
 struct Pane;
 
 #[expect(clippy::print_stderr, reason = "a demo says what went wrong")]
 fn main() -> AppExit {
-    let arguments = Arguments::parse().demo;
-    let (mut app, output) = demo_app("bevy_crack: gallery", &arguments);
-    if output != Output::Window
+    let arguments = DemoArguments::given("Every preset on its own picture: a wall of panes to click");
+    let mut app = demo_app("bevy_crack: gallery", &arguments);
+    if *app.world().resource::<Output>() != Output::Window
         && let Err(error) = write_sheet(&arguments.out)
     {
         eprintln!("gallery.png: {error}");
         return AppExit::error();
     }
-    app.add_plugins((CrackPlugins, FilmPlugin))
-        .insert_resource(ClearColor(Color::srgb(0.09, 0.1, 0.115)))
-        .add_systems(Startup, setup);
-    if output == Output::Window {
-        app.add_systems(Update, heal_on_h);
-    } else {
-        app.add_systems(Update, play_script);
-    }
-    app.run()
+    app.insert_resource(ClearColor(Color::srgb(0.09, 0.1, 0.115))).add_systems(Startup, setup);
+    play(app, heal_on_h, play_script)
 }
 
 fn write_sheet(out: &Path) -> Result<(), Box<dyn Error>> {
@@ -65,11 +50,8 @@ fn write_sheet(out: &Path) -> Result<(), Box<dyn Error>> {
     Ok(sheet::draw(&CrackPreset::NAMES, 1, sheet::SIDE)?.save(out.join("gallery.png"))?)
 }
 
-fn setup(mut commands: Commands, assets: Res<AssetServer>, film: Res<Film>) {
-    let mut camera = commands.spawn(Camera2d);
-    if let Some(target) = film.camera_target() {
-        camera.insert(target);
-    }
+fn setup(mut commands: Commands, assets: Res<AssetServer>) {
+    commands.spawn(Camera2d);
     let size = Vec2::splat(SIDE);
     let rows = CrackPreset::NAMES.len().div_ceil(COLUMNS);
     let middle = Vec2::new(COLUMNS as f32 - 1.0, rows as f32 - 1.0) / 2.0;
@@ -100,11 +82,7 @@ fn setup(mut commands: Commands, assets: Res<AssetServer>, film: Res<Film>) {
                 OnCanvas { picture, size },
                 Pickable::default(),
             ))
-            .observe(|press: On<Pointer<Press>>, mut commands: Commands| {
-                if let Some(point) = press.hit.position {
-                    commands.trigger(CrackHit::world(press.entity, point));
-                }
-            });
+            .observe(hit_on_press);
         commands.spawn((
             Text2d::new(name.replace('_', " ")),
             TextFont { font_size: FontSize::Px(16.0), ..default() },
@@ -114,29 +92,11 @@ fn setup(mut commands: Commands, assets: Res<AssetServer>, film: Res<Film>) {
     }
 }
 
-fn heal_on_h(mut commands: Commands, keys: Res<ButtonInput<KeyCode>>, panes: Query<Entity, With<Pane>>) {
-    if keys.just_pressed(KeyCode::KeyH) {
-        for pane in &panes {
-            commands.entity(pane).heal_cracks();
-        }
-    }
-}
-
 /// The scripted run: every pane is hit, one after the other, and again.
-fn play_script(
-    mut commands: Commands,
-    mut frame: Local<u32>,
-    mut hits: Local<u32>,
-    arguments: Res<DemoArguments>,
-    panes: Query<Entity, With<Pane>>,
-) {
-    *frame += 1;
+fn play_script(mut commands: Commands, script: Script, panes: Query<Entity, With<Pane>>) {
     let panes: Vec<_> = panes.iter().collect();
-    let all = HITS * panes.len() as u32;
-    let share = *frame as f32 / arguments.frames.max(1) as f32;
-    while *hits < (share / 0.8 * all as f32).ceil().min(all as f32) as u32 {
-        let (i, pane) = (*hits, panes[*hits as usize % panes.len()]);
-        *hits += 1;
+    for i in script.due(HITS * panes.len() as u32, 0.0..0.8) {
+        let pane = panes[i as usize % panes.len()];
         let at = Vec2::new((0.45 + i as f32 * 0.618).fract(), (0.5 + i as f32 * 0.755).fract()) * 0.6 + 0.2;
         commands.trigger(CrackHit::uv(pane, at));
     }

@@ -5,13 +5,12 @@
 //! Without a display (or with `--headless`) a script plays, and pictures and a GIF are written to `--out`.
 //! Try `--frames 300 --out film`.
 
-use bevy::{prelude::*, window::PrimaryWindow};
+use bevy::prelude::*;
 use bevy_crack::{
     prelude::*,
     shatter::{Anchor, BurstParams, ShatterParams},
 };
-use bevy_crack_demos::{DemoArguments, Film, FilmPlugin, OnCanvas, Output, demo_app};
-use clap::Parser;
+use bevy_crack_demos::{Cursor, DemoArguments, OnCanvas, Script, caption, demo_app, heal_on_h, play};
 
 /// Size of the pane in the world.
 const SIDE: f32 = 460.0;
@@ -23,35 +22,18 @@ const BACKWARDS: f32 = -1.5;
 /// Seconds in which the cracks close when the pane is whole again.
 const CLOSE: f32 = 1.0;
 
-#[derive(Parser)]
-#[command(about = "A pane of glass that bursts, and becomes whole again")]
-struct Arguments {
-    #[command(flatten)]
-    demo: DemoArguments,
-}
-
 #[derive(Component)]
 struct Pane;
 
 fn main() -> AppExit {
-    let (mut app, output) = demo_app("bevy_crack: glass", &Arguments::parse().demo);
-    app.add_plugins((CrackPlugins, FilmPlugin))
-        .insert_resource(ClearColor(Color::srgb(0.09, 0.1, 0.12)))
-        .add_systems(Startup, setup)
-        .add_observer(mend);
-    if output == Output::Window {
-        app.add_systems(Update, play);
-    } else {
-        app.add_systems(Update, play_script);
-    }
-    app.run()
+    let mut app =
+        demo_app("bevy_crack: glass", &DemoArguments::given("A pane of glass that bursts, and becomes whole again"));
+    app.insert_resource(ClearColor(Color::srgb(0.09, 0.1, 0.12))).add_systems(Startup, setup).add_observer(mend);
+    play(app, (play_by_hand, heal_on_h), play_script)
 }
 
-fn setup(mut commands: Commands, assets: Res<AssetServer>, film: Res<Film>) {
-    let mut camera = commands.spawn(Camera2d);
-    if let Some(target) = film.camera_target() {
-        camera.insert(target);
-    }
+fn setup(mut commands: Commands, assets: Res<AssetServer>) {
+    commands.spawn(Camera2d);
     // The pane stands before a wall, so that one sees it is glass.
     let behind = assets.load("textures/brick_red.png");
     commands.spawn((
@@ -78,11 +60,9 @@ fn setup(mut commands: Commands, assets: Res<AssetServer>, film: Res<Film>) {
         },
         OnCanvas { picture: pane, size: Vec2::splat(SIDE) },
     ));
-    commands.spawn((
-        Text2d::new("click: hit      Space: burst      S: slow motion      R: turn time around      H: heal"),
-        TextFont { font_size: FontSize::Px(18.0), ..default() },
-        TextColor(Color::srgb(0.6, 0.63, 0.67)),
-        Transform::from_xyz(0.0, -335.0, 3.0),
+    commands.spawn(caption(
+        "click: hit      Space: burst      S: slow motion      R: turn time around      H: heal",
+        Vec2::new(0.0, -335.0),
     ));
 }
 
@@ -94,18 +74,16 @@ fn mend(whole: On<Reassembled>, mut commands: Commands, mut panes: Query<&mut Sh
     }
 }
 
-fn play(
+fn play_by_hand(
     mut commands: Commands,
     keys: Res<ButtonInput<KeyCode>>,
     buttons: Res<ButtonInput<MouseButton>>,
-    window: Query<&Window, With<PrimaryWindow>>,
-    camera: Query<(&Camera, &GlobalTransform)>,
+    cursor: Cursor,
     pane: Single<(Entity, &mut ShatterCracks), With<Pane>>,
 ) {
     let (entity, mut shatter) = pane.into_inner();
     if buttons.just_pressed(MouseButton::Left)
-        && let (Ok(window), Ok((camera, camera_at))) = (window.single(), camera.single())
-        && let Some(at) = window.cursor_position().and_then(|at| camera.viewport_to_world_2d(camera_at, at).ok())
+        && let Some(at) = cursor.point()
     {
         commands.trigger(CrackHit::world(entity, at.extend(0.0)).with_energy(2.0));
     }
@@ -122,43 +100,31 @@ fn play(
     if keys.just_pressed(KeyCode::KeyR) {
         shatter.speed = -shatter.speed;
     }
-    if keys.just_pressed(KeyCode::KeyH) {
-        commands.entity(entity).heal_cracks();
-    }
 }
 
 /// The scripted run, by shares of its length: three hits, a burst, slow motion, and back.
-fn play_script(
-    mut commands: Commands,
-    mut frame: Local<u32>,
-    arguments: Res<DemoArguments>,
-    pane: Single<(Entity, &mut ShatterCracks), With<Pane>>,
-) {
+fn play_script(mut commands: Commands, script: Script, pane: Single<(Entity, &mut ShatterCracks), With<Pane>>) {
     let (entity, mut shatter) = pane.into_inner();
-    let total = arguments.frames.max(1) as f32;
-    let (before, now) = (*frame as f32 / total, (*frame + 1) as f32 / total);
-    *frame += 1;
-    let is_at = |share: f32| (before..now).contains(&share);
-    if is_at(0.05) {
+    if script.is_at(0.05) {
         commands.trigger(CrackHit::uv(entity, Vec2::new(0.4, 0.42)).with_energy(3.0));
     }
-    if is_at(0.16) {
+    if script.is_at(0.16) {
         commands.trigger(CrackHit::uv(entity, Vec2::new(0.68, 0.62)).with_energy(1.5));
     }
-    if is_at(0.2) {
+    if script.is_at(0.2) {
         commands.trigger(CrackHit::uv(entity, Vec2::new(0.25, 0.75)).with_energy(1.5));
     }
-    if is_at(0.3) {
+    if script.is_at(0.3) {
         let at = ShatterRequest::around(Vec2::new(0.4, 0.42), 64.0);
         commands.entity(entity).shatter_cracks(at.with_energy(3.0));
     }
-    if is_at(0.38) {
+    if script.is_at(0.38) {
         shatter.speed = SLOW;
     }
-    if is_at(0.6) {
+    if script.is_at(0.6) {
         shatter.speed = 1.0;
     }
-    if is_at(0.66) {
+    if script.is_at(0.66) {
         shatter.speed = BACKWARDS;
     }
 }

@@ -1,8 +1,11 @@
-//! What the demos share: finding out what this machine can show, and writing pictures where there is no window.
+//! What the demos share: finding out what this machine can show, playing by hand or by a script, and writing pictures where there
+//! is no window.
 #![cfg(feature = "engine")]
 
 mod film;
 mod machine;
+mod play;
 
-pub use film::{Film, FilmPlugin, OnCanvas, composite};
+pub use film::OnCanvas;
 pub use machine::{DemoArguments, Output, demo_app};
+pub use play::{Cursor, Script, caption, heal_on_h, hit_on_press, play, with_normals};

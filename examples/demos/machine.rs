@@ -1,8 +1,10 @@
 //! A window, an off-screen picture, or the CPU alone: what this machine can do, found out before the app starts.
 
+use crate::film::FilmPlugin;
 use bevy::{
     app::ScheduleRunnerPlugin,
     asset::AssetPlugin,
+    picking::mesh_picking::MeshPickingPlugin,
     prelude::*,
     render::{
         RenderPlugin,
@@ -13,10 +15,12 @@ use bevy::{
     window::ExitCondition,
     winit::WinitPlugin,
 };
+use bevy_crack::prelude::CrackPlugins;
+use clap::{CommandFactory, FromArgMatches, Parser};
 use std::{panic, path::PathBuf, time::Duration};
 
 /// What every demo takes on its command line.
-#[derive(clap::Args, Resource, Clone, Debug)]
+#[derive(Parser, Resource, Clone, Debug)]
 pub struct DemoArguments {
     /// Open no window, even where there is a display
     #[arg(long)]
@@ -32,6 +36,15 @@ pub struct DemoArguments {
     pub exit_after: Option<u32>,
 }
 
+impl DemoArguments {
+    /// Those that this process was given; `about` is what `--help` says of the demo.
+    #[must_use]
+    pub fn given(about: &'static str) -> Self {
+        let matches = Self::command().about(about).get_matches();
+        Self::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
+    }
+}
+
 /// How the demo is shown.
 #[derive(Resource, Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Output {
@@ -43,11 +56,12 @@ pub enum Output {
     CpuOnly,
 }
 
-/// An app with the plugins that this machine can run, and how it is shown.
+/// An app with cracks and all plugins that this machine can run; [`Output`] tells how it is shown.
 ///
 /// `--frames`, `--out` given together with `--headless`, or no display, mean a scripted run without a window.
 #[expect(clippy::print_stdout, reason = "a demo says how it runs")]
-pub fn demo_app(title: &str, arguments: &DemoArguments) -> (App, Output) {
+#[must_use]
+pub fn demo_app(title: &str, arguments: &DemoArguments) -> App {
     let renderer = try_renderer();
     let forced = arguments.headless || std::env::args().any(|a| a.starts_with("--frames") || a.starts_with("--out"));
     let output = match &renderer {
@@ -87,7 +101,11 @@ pub fn demo_app(title: &str, arguments: &DemoArguments) -> (App, Output) {
         app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs(1) / 30));
     }
     app.add_plugins(plugins).insert_resource(output).insert_resource(arguments.clone());
-    (app, output)
+    if output == Output::Window {
+        app.add_plugins(MeshPickingPlugin);
+    }
+    app.add_plugins((CrackPlugins, FilmPlugin));
+    app
 }
 
 /// Whether a window system answers. Opening a window where none does panics, and can be tried only once a process.

@@ -6,10 +6,9 @@
 //! Without a display (or with `--headless`) a script plays a minute, and pictures and a GIF are written to `--out`.
 //! Without any GPU adapter the same happens on the CPU. Try `--frames 300 --out film`.
 
-use bevy::{math::ops, prelude::*, window::PrimaryWindow};
+use bevy::{math::ops, prelude::*};
 use bevy_crack::prelude::*;
-use bevy_crack_demos::{DemoArguments, Film, FilmPlugin, OnCanvas, Output, demo_app};
-use clap::Parser;
+use bevy_crack_demos::{Cursor, DemoArguments, OnCanvas, Script, caption, demo_app, heal_on_h, play, with_normals};
 
 /// Side of an exhibit in the world.
 const SIDE: f32 = 380.0;
@@ -23,13 +22,6 @@ const FLIGHT: f32 = 0.35;
 /// Shots of the scripted run, and when everything is healed in it, as shares of its length.
 const SHOTS: u32 = 26;
 const HEAL_AT: f32 = 0.72;
-
-#[derive(Parser)]
-#[command(about = "A turret shoots at a brick wall, a concrete slab and a pane of glass")]
-struct Arguments {
-    #[command(flatten)]
-    demo: DemoArguments,
-}
 
 /// Something to shoot at.
 #[derive(Component)]
@@ -63,32 +55,26 @@ struct Shapes {
 struct Charge(Option<f32>);
 
 fn main() -> AppExit {
-    let (mut app, output) = demo_app("bevy_crack: projectile wall", &Arguments::parse().demo);
-    app.add_plugins((CrackPlugins, FilmPlugin))
-        .insert_resource(ClearColor(Color::srgb(0.11, 0.12, 0.14)))
+    let mut app = demo_app(
+        "bevy_crack: projectile wall",
+        &DemoArguments::given("A turret shoots at a brick wall, a concrete slab and a pane of glass"),
+    );
+    app.insert_resource(ClearColor(Color::srgb(0.11, 0.12, 0.14)))
         .init_resource::<Charge>()
         .add_systems(Startup, setup)
         .add_systems(Update, (move_lamp, fly, fade).chain());
-    if output == Output::Window {
-        app.add_systems(Update, (aim_and_fire, heal_on_h).before(move_lamp));
-    } else {
-        app.add_systems(Update, play_script.before(move_lamp));
-    }
-    app.run()
+    play(app, (aim_and_fire, heal_on_h).before(move_lamp), play_script.before(move_lamp))
 }
 
 fn setup(
     mut commands: Commands,
     assets: Res<AssetServer>,
-    film: Res<Film>,
+
     mut meshes: ResMut<Assets<Mesh>>,
     mut lit: ResMut<Assets<CrackLitMaterial>>,
     mut colors: ResMut<Assets<ColorMaterial>>,
 ) {
-    let mut camera = commands.spawn(Camera2d);
-    if let Some(target) = film.camera_target() {
-        camera.insert(target);
-    }
+    commands.spawn(Camera2d);
     let quad = meshes.add(Rectangle::new(SIDE, SIDE));
     let concrete = CrackPreset::CONCRETE;
     // Bricks crack as concrete does, more often and less far.
@@ -97,11 +83,7 @@ fn setup(
     brick.growth.num_columns_grid = 12;
     brick.growth.reach = 0.4;
     for (x, name, preset, seed) in [(-430.0, "brick_red", brick, 1), (0.0, "concrete_fine", concrete, 2)] {
-        let picture = assets.load(format!("textures/{name}.png"));
-        let normal = assets
-            .load_builder()
-            .with_settings(|settings: &mut bevy::image::ImageLoaderSettings| settings.is_srgb = false)
-            .load(format!("textures/{name}_normal.png"));
+        let (picture, normal) = with_normals(&assets, name);
         commands.spawn((
             Exhibit,
             Mesh2d(quad.clone()),
@@ -153,12 +135,7 @@ fn setup(
         MeshMaterial2d(steel),
         Transform::from_translation(MUZZLE.extend(3.0)),
     ));
-    commands.spawn((
-        Text2d::new("click: fire, hold for a harder shot      H: heal"),
-        TextFont { font_size: FontSize::Px(18.0), ..default() },
-        TextColor(Color::srgb(0.6, 0.63, 0.67)),
-        Transform::from_xyz(0.0, 325.0, 3.0),
-    ));
+    commands.spawn(caption("click: fire, hold for a harder shot      H: heal", Vec2::new(0.0, 325.0)));
     commands
         .insert_resource(Shapes { ball: meshes.add(Circle::new(9.0)), hot: colors.add(Color::srgb(1.0, 0.75, 0.35)) });
 }
@@ -169,15 +146,11 @@ fn aim_and_fire(
     mut charge: ResMut<Charge>,
     time: Res<Time>,
     buttons: Res<ButtonInput<MouseButton>>,
-    window: Query<&Window, With<PrimaryWindow>>,
-    camera: Query<(&Camera, &GlobalTransform)>,
+    cursor: Cursor,
     mut barrel: Query<&mut Transform, With<Barrel>>,
     shapes: Res<Shapes>,
 ) {
-    let (Ok(window), Ok((camera, camera_at))) = (window.single(), camera.single()) else { return };
-    let Some(target) = window.cursor_position().and_then(|at| camera.viewport_to_world_2d(camera_at, at).ok()) else {
-        return;
-    };
+    let Some(target) = cursor.point() else { return };
     turn_barrel(&mut barrel, target);
     if buttons.just_pressed(MouseButton::Left) {
         charge.0 = Some(0.0);
@@ -254,18 +227,6 @@ fn fade(mut commands: Commands, time: Res<Time>, mut flashes: Query<(Entity, &mu
     }
 }
 
-fn heal_on_h(mut commands: Commands, keys: Res<ButtonInput<KeyCode>>, exhibits: Query<Entity, With<Exhibit>>) {
-    if keys.just_pressed(KeyCode::KeyH) {
-        heal_all(&mut commands, &exhibits);
-    }
-}
-
-fn heal_all(commands: &mut Commands, exhibits: &Query<Entity, With<Exhibit>>) {
-    for exhibit in exhibits {
-        commands.entity(exhibit).heal_cracks();
-    }
-}
-
 fn move_lamp(time: Res<Time>, mut lamp: Query<&mut Transform, With<Lamp>>) {
     let t = time.elapsed_secs();
     for mut transform in &mut lamp {
@@ -276,24 +237,18 @@ fn move_lamp(time: Res<Time>, mut lamp: Query<&mut Transform, With<Lamp>>) {
 /// The scripted run: shots at all three, harder as it goes on, everything healed once, and hit again.
 fn play_script(
     mut commands: Commands,
-    mut frame: Local<u32>,
-    mut fired: Local<u32>,
-    mut healed: Local<bool>,
-    arguments: Res<DemoArguments>,
+    script: Script,
     mut barrel: Query<&mut Transform, With<Barrel>>,
     exhibits: Query<Entity, With<Exhibit>>,
     shapes: Res<Shapes>,
 ) {
-    *frame += 1;
-    let share = *frame as f32 / arguments.frames.max(1) as f32;
-    if share > HEAL_AT && !*healed {
-        *healed = true;
-        heal_all(&mut commands, &exhibits);
+    if script.is_at(HEAL_AT) {
+        for exhibit in &exhibits {
+            commands.entity(exhibit).heal_cracks();
+        }
     }
     // The last shots have time to crack what they hit.
-    while *fired < (share / 0.9 * SHOTS as f32) as u32 && *fired < SHOTS {
-        let i = *fired;
-        *fired += 1;
+    for i in script.due(SHOTS, 0.0..0.9) {
         let golden = |k: f32| (i as f32 * k).fract() - 0.5;
         let middle = Vec2::new([-430.0, 0.0, 430.0][i as usize % 3], 60.0);
         let target = middle + Vec2::new(golden(0.618), golden(0.755)) * SIDE * 0.75;

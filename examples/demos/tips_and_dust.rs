@@ -5,8 +5,7 @@
 
 use bevy::{platform::collections::HashMap, prelude::*};
 use bevy_crack::{math::Rng, prelude::*};
-use bevy_crack_demos::{DemoArguments, Film, FilmPlugin, OnCanvas, Output, demo_app};
-use clap::Parser;
+use bevy_crack_demos::{DemoArguments, OnCanvas, Script, caption, demo_app, heal_on_h, hit_on_press, play};
 
 /// Side of a wall in the world.
 const SIDE: f32 = 520.0;
@@ -22,12 +21,8 @@ const MAX_PARTICLES: usize = 1500;
 
 const GRAVITY: f32 = -520.0;
 
-#[derive(Parser)]
-#[command(about = "Dust falls from the tips of cracks, grains fly where a cell closes")]
-struct Arguments {
-    #[command(flatten)]
-    demo: DemoArguments,
-}
+/// Hits of the scripted run.
+const HITS: u32 = 6;
 
 /// A wall, and the colour of its dust.
 #[derive(Component)]
@@ -70,34 +65,28 @@ struct Meter {
 }
 
 fn main() -> AppExit {
-    let (mut app, output) = demo_app("bevy_crack: tips and dust", &Arguments::parse().demo);
-    app.add_plugins((CrackPlugins, FilmPlugin))
-        .insert_resource(ClearColor(Color::srgb(0.09, 0.1, 0.115)))
+    let mut app = demo_app(
+        "bevy_crack: tips and dust",
+        &DemoArguments::given("Dust falls from the tips of cracks, grains fly where a cell closes"),
+    );
+    app.insert_resource(ClearColor(Color::srgb(0.09, 0.1, 0.115)))
         .insert_resource(Chance(Rng::new(1)))
         .init_resource::<Due>()
         .add_message::<Crackle>()
         .add_systems(Startup, setup)
         .add_systems(Update, (raise_dust, fall, listen).chain())
         .add_observer(throw_grains);
-    if output == Output::Window {
-        app.add_systems(Update, heal_on_h);
-    } else {
-        app.add_systems(Update, play_script);
-    }
-    app.run()
+    play(app, heal_on_h, play_script)
 }
 
 fn setup(
     mut commands: Commands,
     assets: Res<AssetServer>,
-    film: Res<Film>,
+
     mut meshes: ResMut<Assets<Mesh>>,
     mut colors: ResMut<Assets<ColorMaterial>>,
 ) {
-    let mut camera = commands.spawn(Camera2d);
-    if let Some(target) = film.camera_target() {
-        camera.insert(target);
-    }
+    commands.spawn(Camera2d);
     // A preset of a file each: change one while this runs, and the next cracks follow it.
     for (x, name, dust) in
         [(-290.0, "plaster", Color::srgb(0.6, 0.57, 0.52)), (290.0, "clay", Color::srgb(0.93, 0.8, 0.64))]
@@ -113,18 +102,9 @@ fn setup(
                 OnCanvas { picture, size: Vec2::splat(SIDE) },
                 Pickable::default(),
             ))
-            .observe(|press: On<Pointer<Press>>, mut commands: Commands| {
-                if let Some(point) = press.hit.position {
-                    commands.trigger(CrackHit::world(press.entity, point));
-                }
-            });
+            .observe(hit_on_press);
     }
-    commands.spawn((
-        Text2d::new("click: hit      H: heal      sound:"),
-        TextFont { font_size: FontSize::Px(18.0), ..default() },
-        TextColor(Color::srgb(0.6, 0.63, 0.67)),
-        Transform::from_xyz(-100.0, -325.0, 3.0),
-    ));
+    commands.spawn(caption("click: hit      H: heal      sound:", Vec2::new(-100.0, -325.0)));
     commands.spawn((
         Meter { loudness: 0.0 },
         Mesh2d(meshes.add(Rectangle::new(1.0, 12.0))),
@@ -231,27 +211,10 @@ fn listen(mut crackles: MessageReader<Crackle>, mut meter: Query<(&mut Meter, &m
     }
 }
 
-fn heal_on_h(mut commands: Commands, keys: Res<ButtonInput<KeyCode>>, walls: Query<Entity, With<Wall>>) {
-    if keys.just_pressed(KeyCode::KeyH) {
-        for wall in &walls {
-            commands.entity(wall).heal_cracks();
-        }
-    }
-}
-
 /// The scripted run: each wall is hit a few times.
-fn play_script(
-    mut commands: Commands,
-    mut frame: Local<u32>,
-    mut hits: Local<u32>,
-    arguments: Res<DemoArguments>,
-    walls: Query<Entity, With<Wall>>,
-) {
-    *frame += 1;
-    let share = *frame as f32 / arguments.frames.max(1) as f32;
-    while *hits < (share / 0.8 * 6.0).ceil().min(6.0) as u32 {
-        let (i, wall) = (*hits, walls.iter().nth(*hits as usize % 2));
-        *hits += 1;
+fn play_script(mut commands: Commands, script: Script, walls: Query<Entity, With<Wall>>) {
+    for i in script.due(HITS, 0.0..0.8) {
+        let wall = walls.iter().nth(i as usize % 2);
         let at = Vec2::new((0.31 + i as f32 * 0.618).fract(), (0.42 + i as f32 * 0.755).fract()) * 0.7 + 0.15;
         if let Some(wall) = wall {
             commands.trigger(CrackHit::uv(wall, at).with_energy(1.0 + 0.3 * i as f32));

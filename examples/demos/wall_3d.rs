@@ -5,26 +5,15 @@
 //! Without a display (or with `--headless`) a script plays, and pictures and a GIF are written to `--out`.
 //! Try `--frames 120 --out film`.
 
-use bevy::{
-    camera::Hdr, core_pipeline::tonemapping::Tonemapping, image::ImageLoaderSettings, math::ops,
-    picking::mesh_picking::MeshPickingPlugin, prelude::*,
-};
+use bevy::{camera::Hdr, core_pipeline::tonemapping::Tonemapping, math::ops, prelude::*};
 use bevy_crack::prelude::*;
-use bevy_crack_demos::{DemoArguments, Film, FilmPlugin, Output, demo_app};
-use clap::Parser;
+use bevy_crack_demos::{DemoArguments, Script, demo_app, heal_on_h, hit_on_press, play, with_normals};
 
 /// Half the width of the room, metres.
 const HALF: f32 = 2.0;
 
 /// Shots of the scripted run.
 const SHOTS: u32 = 12;
-
-#[derive(Parser)]
-#[command(about = "A room of brick and concrete to shoot at")]
-struct Arguments {
-    #[command(flatten)]
-    demo: DemoArguments,
-}
 
 #[derive(Component)]
 struct Wall;
@@ -33,24 +22,20 @@ struct Wall;
 struct Lamp;
 
 fn main() -> AppExit {
-    let (mut app, output) = demo_app("bevy_crack: walls in 3D", &Arguments::parse().demo);
-    app.add_plugins((CrackPlugins, FilmPlugin)).add_systems(Startup, setup).add_systems(Update, (sway, move_lamp));
-    if output == Output::Window {
-        app.add_plugins(MeshPickingPlugin).add_systems(Update, heal_on_h);
-    } else {
-        app.add_systems(Update, play_script);
-    }
-    app.run()
+    let mut app =
+        demo_app("bevy_crack: walls in 3D", &DemoArguments::given("A room of brick and concrete to shoot at"));
+    app.add_systems(Startup, setup).add_systems(Update, (sway, move_lamp));
+    play(app, heal_on_h, play_script)
 }
 
 fn setup(
     mut commands: Commands,
     assets: Res<AssetServer>,
-    film: Res<Film>,
+
     mut meshes: ResMut<Assets<Mesh>>,
     mut materials: ResMut<Assets<StandardMaterial>>,
 ) {
-    let mut camera = commands.spawn((
+    commands.spawn((
         Camera3d::default(),
         Hdr,
         // Needs no lookup table.
@@ -58,18 +43,11 @@ fn setup(
         AmbientLight { brightness: 420.0, ..default() },
         Transform::default(),
     ));
-    if let Some(target) = film.camera_target() {
-        camera.insert(target);
-    }
     let mut material = |name: &str| {
+        let (picture, normals) = with_normals(&assets, name);
         materials.add(StandardMaterial {
-            base_color_texture: Some(assets.load(format!("textures/{name}.png"))),
-            normal_map_texture: Some(
-                assets
-                    .load_builder()
-                    .with_settings(|settings: &mut ImageLoaderSettings| settings.is_srgb = false)
-                    .load(format!("textures/{name}_normal.png")),
-            ),
+            base_color_texture: Some(picture),
+            normal_map_texture: Some(normals),
             perceptual_roughness: 0.9,
             ..default()
         })
@@ -93,11 +71,7 @@ fn setup(
                 transform,
                 CrackSurface::new(CrackPreset::CONCRETE).with_seed(seed),
             ))
-            .observe(|press: On<Pointer<Press>>, mut commands: Commands| {
-                if let Some(point) = press.hit.position {
-                    commands.trigger(CrackHit::world(press.entity, point).with_energy(1.5));
-                }
-            });
+            .observe(hit_on_press);
     }
     commands.spawn((
         Lamp,
@@ -121,27 +95,9 @@ fn move_lamp(time: Res<Time>, mut lamp: Query<&mut Transform, With<Lamp>>) {
     }
 }
 
-fn heal_on_h(mut commands: Commands, keys: Res<ButtonInput<KeyCode>>, walls: Query<Entity, With<Wall>>) {
-    if keys.just_pressed(KeyCode::KeyH) {
-        for wall in &walls {
-            commands.entity(wall).heal_cracks();
-        }
-    }
-}
-
 /// The scripted run: shots at all sides in turn.
-fn play_script(
-    mut commands: Commands,
-    mut frame: Local<u32>,
-    mut fired: Local<u32>,
-    arguments: Res<DemoArguments>,
-    walls: Query<(Entity, &GlobalTransform), With<Wall>>,
-) {
-    *frame += 1;
-    let share = *frame as f32 / arguments.frames.max(1) as f32;
-    while *fired < (share / 0.7 * SHOTS as f32) as u32 && *fired < SHOTS {
-        let i = *fired;
-        *fired += 1;
+fn play_script(mut commands: Commands, script: Script, walls: Query<(Entity, &GlobalTransform), With<Wall>>) {
+    for i in script.due(SHOTS, 0.0..0.7) {
         let golden = |k: f32| ((i as f32 * k).fract() - 0.5) * 2.4;
         let Some((wall, at)) = walls.iter().nth(i as usize % 4) else { continue };
         let point = at.transform_point(Vec3::new(golden(0.618), golden(0.755), 0.0));

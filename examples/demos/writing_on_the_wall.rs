@@ -13,10 +13,9 @@ use bevy::{
     input::keyboard::{Key, KeyboardInput},
     prelude::*,
     render::render_resource::{Extent3d, TextureDimension, TextureFormat},
-    window::PrimaryWindow,
 };
 use bevy_crack::{prelude::*, voronoi::VoronoiParams};
-use bevy_crack_demos::{DemoArguments, Film, FilmPlugin, OnCanvas, Output, demo_app};
+use bevy_crack_demos::{Cursor, DemoArguments, OnCanvas, Script, demo_app, play};
 use clap::Parser;
 use std::{thread, time::Duration};
 use text::{FONT, draw_text};
@@ -52,7 +51,7 @@ struct Word(String);
 
 /// What the script types.
 #[derive(Resource)]
-struct Script(Vec<char>);
+struct Letters(Vec<char>);
 
 #[derive(Component)]
 struct Wall;
@@ -65,26 +64,17 @@ struct Caption;
 
 fn main() -> AppExit {
     let arguments = Arguments::parse();
-    let (mut app, output) = demo_app("bevy_crack: writing on the wall", &arguments.demo);
-    app.add_plugins((CrackPlugins, FilmPlugin))
-        .insert_resource(ClearColor(Color::srgb(0.09, 0.1, 0.115)))
-        .insert_resource(Script(arguments.word.chars().take(MOST).collect()))
+    let mut app = demo_app("bevy_crack: writing on the wall", &arguments.demo);
+    app.insert_resource(ClearColor(Color::srgb(0.09, 0.1, 0.115)))
+        .insert_resource(Letters(arguments.word.chars().take(MOST).collect()))
         .init_resource::<Word>()
         .add_systems(Startup, setup)
         .add_systems(Update, (write_word.run_if(resource_changed::<Word>), run_bar).chain());
-    if output == Output::Window {
-        app.add_systems(Update, (type_word, hit_on_click, heal_on_escape).before(write_word));
-    } else {
-        app.add_systems(Update, play_script.before(write_word));
-    }
-    app.run()
+    play(app, (type_word, hit_on_click, heal_on_escape).before(write_word), play_script.before(write_word))
 }
 
-fn setup(mut commands: Commands, film: Res<Film>, mut images: ResMut<Assets<Image>>) -> Result {
-    let mut camera = commands.spawn(Camera2d);
-    if let Some(target) = film.camera_target() {
-        camera.insert(target);
-    }
+fn setup(mut commands: Commands, mut images: ResMut<Assets<Image>>) -> Result {
+    commands.spawn(Camera2d);
     // The wall is two pictures wide.
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets/textures");
     let plaster = image::open(format!("{folder}/plaster.png"))?.to_rgba8();
@@ -168,14 +158,11 @@ fn run_bar(wall: Query<Option<&BakeProgress>, With<Wall>>, mut bar: Single<&mut 
 fn hit_on_click(
     mut commands: Commands,
     buttons: Res<ButtonInput<MouseButton>>,
-    window: Single<&Window, With<PrimaryWindow>>,
-    camera: Single<(&Camera, &GlobalTransform)>,
+    cursor: Cursor,
     wall: Single<Entity, With<Wall>>,
 ) {
-    let (camera, at) = *camera;
     if buttons.just_pressed(MouseButton::Left)
-        && let Some(cursor) = window.cursor_position()
-        && let Ok(point) = camera.viewport_to_world_2d(at, cursor)
+        && let Some(point) = cursor.point()
         && (point - MIDDLE).abs().cmple(SIZE / 2.0).all()
     {
         commands.trigger(CrackHit::world(*wall, point.extend(0.0)));
@@ -191,10 +178,8 @@ fn heal_on_escape(keys: Res<ButtonInput<KeyCode>>, mut word: ResMut<Word>) {
 /// The scripted run: the word letter by letter, time to appear, then hits.
 fn play_script(
     mut commands: Commands,
-    mut frame: Local<u32>,
-    mut hits: Local<u32>,
-    script: Res<Script>,
-    arguments: Res<DemoArguments>,
+    script: Script,
+    letters: Res<Letters>,
     mut word: ResMut<Word>,
     wall: Single<(Entity, Option<&BakeProgress>), With<Wall>>,
 ) {
@@ -203,15 +188,12 @@ fn play_script(
     if progress.is_some_and(|progress| progress.0 < 1.0) {
         thread::sleep(Duration::from_millis(20));
     }
-    *frame += 1;
-    let share = *frame as f32 / arguments.frames.max(1) as f32;
-    let due = ((share / 0.3 * script.0.len() as f32).ceil() as usize).min(script.0.len());
-    if word.0.chars().count() < due {
-        word.0 = script.0[..due].iter().collect();
+    let due = script.due(letters.0.len() as u32, 0.0..0.3);
+    if !due.is_empty() {
+        word.0 = letters.0[..due.end as usize].iter().collect();
     }
-    while share > 0.7 && *hits < (((share - 0.7) / 0.2 * HITS as f32) as u32).min(HITS) {
-        let i = *hits as f32;
-        *hits += 1;
+    for i in script.due(HITS, 0.7..0.9) {
+        let i = i as f32;
         let uv = Vec2::new((0.2 + 0.618 * i).fract(), (0.3 + 0.755 * i).fract()) * 0.8 + 0.1;
         commands.trigger(CrackHit::uv(wall, uv));
     }

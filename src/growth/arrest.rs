@@ -65,6 +65,23 @@ impl Arrest {
         arrest
     }
 
+    /// The same without the first nodes; `network` is what is left.
+    pub(super) fn after(before: Self, network: &Network, length: f32, first: u32) -> Self {
+        let mut arrest = Self::new(network, length);
+        for (sealed, was_sealed) in arrest.sealed.iter_mut().zip(before.sealed.iter().skip(first as usize)) {
+            *sealed = *was_sealed;
+        }
+        let left = |runner: Runner| {
+            let goal = match runner.goal {
+                Goal::Node(node) => Goal::Node(node.checked_sub(first)?),
+                goal @ Goal::Border(_) => goal,
+            };
+            Some(Runner { tip: runner.tip.checked_sub(first)?, goal, ..runner })
+        };
+        arrest.runners = before.runners.into_iter().filter_map(left).collect();
+        arrest
+    }
+
     /// Adds the lines of segments.
     pub(super) fn add_walls(&mut self, network: &Network, segments: impl Iterator<Item = SegmentId>) {
         for segment in segments {

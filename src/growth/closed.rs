@@ -58,6 +58,11 @@ impl Relations {
         self.of.push(Relation::default());
     }
 
+    /// Forgets all but the first markers.
+    pub(super) fn keep(&mut self, markers: usize) {
+        self.of.truncate(markers);
+    }
+
     /// The nodes that a marker attracts.
     pub(super) fn neighbours(&self, id: u32) -> &[u32] {
         &self.of[id as usize].neighbours

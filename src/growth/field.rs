@@ -72,6 +72,8 @@ pub(super) struct MarkerField {
     /// Markers that attract a node; may hold dead ones until the next sweep.
     pub(super) active: Vec<u32>,
     pub(super) made: u32,
+    /// Number for the next marker.
+    next: u32,
     pub(super) killed: u32,
 }
 
@@ -95,6 +97,7 @@ impl MarkerField {
             first: vec![0, 0],
             active: Vec::new(),
             made: 0,
+            next: 0,
             killed: 0,
         }
     }
@@ -105,12 +108,28 @@ impl MarkerField {
         self.kill_sq = params.kill_distance * params.kill_distance;
         self.relations = (params.venation == Venation::Closed).then(|| {
             let mut relations = Relations::new(params);
-            (0..self.made).for_each(|_| relations.add());
+            (0..self.next).for_each(|_| relations.add());
             relations
         });
         let mut living = self.take_living();
         living.append(&mut self.newborn);
         self.newborn = living;
+    }
+
+    /// Forgets the dead and those that `is_lost` says can never be won, so that the others may be numbered anew.
+    pub(super) fn forget_dead(&mut self, params: &GrowthParams, is_lost: impl Fn(u32) -> bool) {
+        self.set_params(params);
+        let before = self.newborn.len();
+        self.newborn.retain(|marker| !is_lost(marker.loyal));
+        self.killed += (before - self.newborn.len()) as u32;
+        self.newborn.sort_unstable_by_key(|marker| marker.id);
+        for (id, marker) in (0..).zip(&mut self.newborn) {
+            marker.id = id;
+        }
+        self.next = self.newborn.len() as u32;
+        if let Some(relations) = &mut self.relations {
+            relations.keep(self.newborn.len());
+        }
     }
 
     /// Empties the field of its settled markers and returns the living.
@@ -136,7 +155,8 @@ impl MarkerField {
     }
 
     pub(super) fn add(&mut self, pos: Vec2, loyal: u32) {
-        self.newborn.push(Newborn { pos, id: self.made, loyal, given_up: 0 });
+        self.newborn.push(Newborn { pos, id: self.next, loyal, given_up: 0 });
+        self.next += 1;
         self.made += 1;
         if let Some(relations) = &mut self.relations {
             relations.add();

@@ -1,6 +1,6 @@
 //! Segments across branches: the rings of glass (`draw_connections`) and the cells of clay (`draw_islands`).
 
-use super::{nodes::NodeGrid, params::GrowthParams, step::Impact};
+use super::{impact::Impact, nodes::NodeGrid, params::GrowthParams};
 use crate::{
     math::{hash_unit, ops},
     pattern::{Link, LinkKind, NO_PARENT, Network},
@@ -66,8 +66,7 @@ impl Linker {
                 // A soft hit makes fewer of them.
                 let few = (out * (2.0 - out)).max(1.0 - impact.energy.sqrt());
                 let gaps = params.connection_gaps + (1.0 - params.connection_gaps) * few;
-                let apart =
-                    generation != network.nodes()[b as usize].generation || from.distance(beside) > 0.75 * radius;
+                let apart = generation != network.nodes()[b as usize].generation || from.distance(beside) > radius;
                 if apart || draw(0xC0) < gaps {
                     continue;
                 }
@@ -91,6 +90,14 @@ impl Linker {
     /// The links found since the last call.
     pub(super) fn take_links(&mut self) -> Vec<Link> {
         std::mem::take(&mut self.links)
+    }
+
+    /// Forgets the first nodes.
+    pub(super) fn forget(&mut self, first: u32) {
+        self.parents.drain(..self.parents.len().min(first as usize));
+        for nodes in &mut self.waiting {
+            *nodes = nodes.start.saturating_sub(first)..nodes.end.saturating_sub(first);
+        }
     }
 
     /// Tips that have come to rest: nodes without a child two steps after their birth; when growth has ended, all of them.

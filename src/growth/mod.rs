@@ -32,17 +32,23 @@
 //! ```
 
 mod arrest;
+mod changes;
 mod closed;
 mod field;
+mod foreign;
+mod forget;
+mod impact;
 mod links;
 mod markers;
 mod nodes;
 mod params;
+mod pull;
 mod step;
 #[cfg(test)]
 mod tests;
 mod walls;
 mod width;
 
+pub use impact::{HitOutcome, Impact, MAX_ENERGY, Rejected};
 pub use params::{GrowthParams, MAX_MARKERS, MarkerLayout, ParamError, StartLayout, Venation};
-pub use step::{Census, CrackGrowth, HitOutcome, Impact, MAX_ENERGY, Rejected, StepReport};
+pub use step::{Census, CrackGrowth, StepReport};

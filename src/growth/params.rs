@@ -162,7 +162,8 @@ pub struct GrowthParams {
     pub width_variety: f32,
     /// Whether the markers themselves are drawn.
     pub draw_markers: bool,
-    /// The most nodes that a surface gets, 1..=1000000.
+    /// The most nodes that a surface has at once, 1..=1000000. In the engine a hit for which less than a quarter of them is left freezes
+    /// the oldest: see [`CrackGrowth::forget_oldest`](super::CrackGrowth::forget_oldest).
     pub max_nodes: u32,
 }
 
@@ -440,6 +441,50 @@ impl GrowthParams {
         let axis = ops::unit(self.axis);
         let along = axis * axis.dot(direction);
         (along + (direction - along) * (1.0 - self.directed)).normalize_or(direction)
+    }
+
+    /// The same material seen from nearer (`by` above 1) or further away: every length times `by`. Lengths stay within their
+    /// ranges; a `by` that is not within 0.01..=100 counts as the nearest that is, not a number as 1.
+    ///
+    /// ```
+    /// use bevy_crack::growth::GrowthParams;
+    ///
+    /// let near = GrowthParams::DEFAULT.scaled(2.0);
+    /// assert_eq!(near.step_length, 2.0 * GrowthParams::DEFAULT.step_length);
+    /// near.validate()?;
+    /// # Ok::<(), bevy_crack::growth::ParamError>(())
+    /// ```
+    #[must_use]
+    pub fn scaled(&self, by: f32) -> Self {
+        let by = if by.is_nan() { 1.0 } else { by.clamp(0.01, 100.0) };
+        let mut scaled = self.clone();
+        let length = |length: &mut f32, min: f32, max: f32| *length = (*length * by).clamp(min, max);
+        length(&mut scaled.step_length, 0.001, 4.0);
+        length(&mut scaled.crack_radius, 0.001, 256.0 * scaled.step_length.min(0.125));
+        length(&mut scaled.kill_distance, 0.0005, scaled.crack_radius.min(4.0));
+        length(&mut scaled.reach, 0.01, 64.0);
+        length(&mut scaled.line_width, 0.0005, 0.2);
+        length(&mut scaled.max_width, scaled.line_width, 0.4);
+        length(&mut scaled.island_distance, 0.0, 1.0);
+        length(&mut scaled.arrest, 0.0, 1.0);
+        // So many on the same surface.
+        let count = |count: u32| ((count as f32 / by).round() as u32).clamp(1, 512);
+        match &mut scaled.markers {
+            MarkerLayout::PseudoGrid { .. } => {
+                scaled.num_lines_grid = count(self.num_lines_grid);
+                scaled.num_columns_grid = count(self.num_columns_grid);
+            }
+            MarkerLayout::DartThrowing { spacing } => length(spacing, 0.002, 1.0),
+            MarkerLayout::Polar { .. } => {}
+        }
+        match &mut scaled.starts {
+            StartLayout::Point | StartLayout::Points { .. } => {}
+            StartLayout::Ring { radius, .. }
+            | StartLayout::Crushed { radius, .. }
+            | StartLayout::Disc { radius, .. } => length(radius, 0.0, 1.0),
+        }
+        scaled.nucleation = (self.nucleation / by).min(64.0);
+        scaled
     }
 
     /// The parameters of the surface with this seed: what [`variety`](Self::variety) makes of them. Valid if these are.

@@ -1,72 +1,22 @@
-//! The growth itself: hits, steps, and what they leave behind.
+//! The growth itself, step by step.
 
 use super::{
-    GrowthParams, MarkerLayout, ParamError, StartLayout,
+    GrowthParams, Impact, ParamError,
     arrest::{Advance, Arrest},
+    changes::Changes,
     field::{ANY_IMPACT, MarkerField},
     links::{self, Linker},
-    markers::{self, Region},
     nodes::NodeGrid,
-    params::{MAX_MARKERS, PROGRESS},
+    pull::{NO_PULL, Pull},
     width::Widths,
 };
 use crate::{
     Grid,
     math::{hash_unit, mix},
-    pattern::{CrackMask, Dot, Link, LinkKind, NO_IMPACT, NO_PARENT, Network, Node, SegmentId, Timeline},
+    pattern::{CrackMask, Link, LinkKind, NO_PARENT, Network, Node, SegmentId, Timeline},
 };
 use glam::Vec2;
 use std::{ops::Range, sync::Arc};
-
-/// The most energy that an impact gathers.
-pub const MAX_ENERGY: f32 = 16.0;
-
-/// One impact on a growth.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Impact {
-    /// Where, pattern units.
-    pub pos: Vec2,
-    /// Sum of the energies of all hits merged into it, at most [`MAX_ENERGY`].
-    pub energy: f32,
-    /// Energy of the first of them.
-    pub first_energy: f32,
-    /// How many times wider its cracks are, for the hits merged into it.
-    pub widening: f32,
-}
-
-/// Why a hit was refused.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum Rejected {
-    /// A coordinate or the energy is NaN or infinite.
-    #[error("a coordinate or the energy is not finite")]
-    NotFinite,
-    /// The energy is negative.
-    #[error("the energy is negative")]
-    NegativeEnergy,
-    /// It lies off the surface.
-    #[error("it lies off the surface")]
-    OffSurface,
-    /// Cracks are forbidden there.
-    #[error("cracks are forbidden there")]
-    Forbidden,
-    /// The surface has all the nodes it may have.
-    #[error("the surface has all the nodes it may have")]
-    Full,
-}
-
-/// What became of a hit.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum HitOutcome {
-    /// It became the impact with this index.
-    Started(u32),
-    /// It fell on the impact with this index and added its energy to it.
-    Merged(u32),
-    /// Its energy is zero: nothing happens.
-    Nothing,
-    /// It was refused.
-    Rejected(Rejected),
-}
 
 /// What one step did.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -96,24 +46,6 @@ pub struct Census {
     pub waiting: u32,
 }
 
-/// The markers that attract one node: `S(c)` of Couto et al.
-#[derive(Clone, Copy, Debug)]
-struct Pull {
-    node: u32,
-    /// Sum of the unit vectors to the markers, in units of 2⁻²⁴: whole numbers, so that the order does not matter.
-    sum: [i64; 2],
-    closest: u32,
-    closest_sq: f32,
-    closest_id: u32,
-    child: Vec2,
-    serves: bool,
-    /// Where nothing grows from the node any more: its markers on that side are given up.
-    stopped: Option<Vec2>,
-}
-
-const FIXED: f32 = 16_777_216.0;
-const NO_PULL: u32 = u32::MAX;
-
 /// A growing crack pattern on one surface.
 ///
 /// ```
@@ -135,83 +67,32 @@ pub struct CrackGrowth {
     pub(super) nodes: NodeGrid,
     /// Only where cracks must not cross.
     pub(super) arrest: Option<Arrest>,
-    widths: Widths,
-    linker: Linker,
-    impacts: Vec<Impact>,
-    density: Option<Grid<f32>>,
+    pub(super) widths: Widths,
+    pub(super) linker: Linker,
+    pub(super) impacts: Vec<Impact>,
+    pub(super) density: Option<Grid<f32>>,
     pub(super) mask: Arc<CrackMask>,
     pub(super) steps: u32,
-    steps_left: u32,
+    pub(super) steps_left: u32,
     /// Cracks that began by themselves, and markers that were tried for it.
-    nucleated: u32,
-    tried: u32,
+    pub(super) nucleated: u32,
+    pub(super) tried: u32,
     /// First nodes of hits whose growth has not ended.
-    unshown: Vec<u32>,
+    pub(super) unshown: Vec<u32>,
     /// Nodes that have not grown here.
-    added: usize,
-    newborn: Range<u32>,
+    pub(super) added: usize,
+    pub(super) newborn: Range<u32>,
     /// Links that are among the changes.
-    links_told: u32,
+    pub(super) links_told: u32,
     /// Places of markers made since they were last asked for.
-    shown_markers: Vec<Vec2>,
-    changes: Changes,
-    timeline: Timeline,
-    pulls: Vec<Pull>,
+    pub(super) shown_markers: Vec<Vec2>,
+    pub(super) changes: Changes,
+    pub(super) timeline: Timeline,
+    pub(super) pulls: Vec<Pull>,
     /// Node and entry in `pulls`, in order of the nodes.
-    order: Vec<(u32, u32)>,
+    pub(super) order: Vec<(u32, u32)>,
     /// Per node: its entry in `pulls` during a step.
-    pull_of: Vec<u32>,
-}
-
-/// Segments that are new or wider, each once.
-#[derive(Clone, Debug, Default)]
-struct Changes {
-    list: Vec<SegmentId>,
-    /// Per node: whether its branch is on the list.
-    listed: Vec<bool>,
-    /// First child and next sibling of each node: a branch tapers between two widths, so it changes with either.
-    child: Vec<u32>,
-    sibling: Vec<u32>,
-}
-
-impl Changes {
-    fn reserve(&mut self, nodes: usize) {
-        self.list.reserve(nodes);
-        self.listed.reserve(nodes);
-        self.child.reserve(nodes);
-        self.sibling.reserve(nodes);
-    }
-
-    fn push_node(&mut self, parent: u32) {
-        let node = self.listed.len() as u32;
-        self.listed.push(false);
-        self.child.push(NO_PARENT);
-        let sibling = match self.child.get_mut(parent as usize) {
-            Some(child) => std::mem::replace(child, node),
-            None => NO_PARENT,
-        };
-        self.sibling.push(sibling);
-        if parent != NO_PARENT {
-            self.list_branch(node);
-        }
-    }
-
-    fn list_branch(&mut self, node: u32) {
-        if !std::mem::replace(&mut self.listed[node as usize], true) {
-            self.list.push(SegmentId::Branch(node));
-        }
-    }
-
-    fn widened(&mut self, node: u32, has_parent: bool) {
-        if has_parent {
-            self.list_branch(node);
-        }
-        let mut child = self.child[node as usize];
-        while child != NO_PARENT {
-            self.list_branch(child);
-            child = self.sibling[child as usize];
-        }
-    }
+    pub(super) pull_of: Vec<u32>,
 }
 
 impl CrackGrowth {
@@ -281,159 +162,6 @@ impl CrackGrowth {
         }
     }
 
-    /// Hits the surface at `pos` (pattern units) with `energy` (1 = an ordinary hit; 4 reaches twice as far).
-    ///
-    /// Lays out starts and markers; growth happens in [`step`](Self::step). A hit as good as on top of an earlier one adds
-    /// its energy to that one, so hammering on one spot costs no more than one hard hit.
-    pub fn hit(&mut self, pos: Vec2, energy: f32) -> HitOutcome {
-        if !pos.is_finite() || !energy.is_finite() {
-            return HitOutcome::Rejected(Rejected::NotFinite);
-        }
-        if energy < 0.0 {
-            return HitOutcome::Rejected(Rejected::NegativeEnergy);
-        }
-        let extent = self.network.extent();
-        if pos.cmplt(Vec2::ZERO).any() || pos.cmpgt(extent).any() {
-            return HitOutcome::Rejected(Rejected::OffSurface);
-        }
-        if energy == 0.0 {
-            return HitOutcome::Nothing;
-        }
-        if self.mask.is_forbidden(pos / extent) {
-            return HitOutcome::Rejected(Rejected::Forbidden);
-        }
-        if self.room() == 0 {
-            return HitOutcome::Rejected(Rejected::Full);
-        }
-        self.timeline.begin(self.steps.saturating_add(1));
-        let merge = self.params.step_length.max(self.params.kill_distance).min(0.05);
-        let nearest = (0u32..)
-            .zip(&self.impacts)
-            .map(|(i, impact)| (impact.pos.distance_squared(pos), i))
-            .min_by(|a, b| a.0.total_cmp(&b.0));
-        if let Some((distance_sq, index)) = nearest
-            && distance_sq <= merge * merge
-        {
-            let impact = &mut self.impacts[index as usize];
-            let before = impact.energy;
-            impact.energy = (before + energy).min(MAX_ENERGY);
-            let (center, after) = (impact.pos, impact.energy);
-            if after > before {
-                self.widen(index);
-                self.populate(index, center, self.reach(before), self.reach(after));
-                self.steps_left = self.params.num_iterations;
-            }
-            return HitOutcome::Merged(index);
-        }
-        let index = self.impacts.len() as u32;
-        let energy = energy.min(MAX_ENERGY);
-        self.impacts.push(Impact { pos, energy, first_energy: energy, widening: 1.0 });
-        let reach = self.reach(energy);
-        let first = self.network.nodes.len() as u32;
-        let seed = mix(self.seed ^ mix(u64::from(index)));
-        for place in markers::starts(self.params.starts, (pos, energy), reach, extent, seed) {
-            let is_free = !self.nodes.any_within(place, 1e-4) && !self.is_on_crack(place);
-            if is_free && !self.mask.is_forbidden(place / extent) {
-                self.bear(place, NO_PARENT, 0, index, 1.0);
-            }
-        }
-        if first == self.network.nodes.len() as u32 {
-            self.sprout(pos, index);
-        } else if matches!(self.params.starts, StartLayout::Crushed { .. }) {
-            self.crush(first);
-        }
-        for node in first..self.network.nodes.len() as u32 {
-            self.field.visit(node, &self.network.nodes, &self.nodes);
-        }
-        self.newborn = first..self.network.nodes.len() as u32;
-        if self.arrest.is_some() {
-            self.unshown.push(first);
-        }
-        self.join_newborn();
-        self.populate(index, pos, 0.0, reach);
-        self.steps_left = self.params.num_iterations;
-        HitOutcome::Started(index)
-    }
-
-    /// Adds cracks that have not grown here, say those of [`Seams::network`](crate::voronoi::Seams::network). To hits and steps
-    /// afterwards they are cracks of another hit: with [`arrest`](GrowthParams::arrest) new ones stop at them, and a hit on one starts from it.
-    ///
-    /// They come in the steps after those made so far, in order of their [`birth`](Node::birth), and each opens to its width within
-    /// `opening` further steps; returns how many steps all of that takes. Lines are straight from node to node; a network of another extent is
-    /// stretched over the surface. They do not count for [`max_nodes`](GrowthParams::max_nodes). Where they
-    /// cross what has grown already, they cross it.
-    ///
-    /// ```
-    /// use bevy_crack::{growth::{CrackGrowth, GrowthParams}, voronoi::{VoronoiBake, VoronoiParams}};
-    ///
-    /// let (_, seams) = VoronoiBake::new(VoronoiParams::DEFAULT, Vec::new(), [64, 64].into(), 7)?.finish();
-    /// let mut growth = CrackGrowth::new(GrowthParams { arrest: 0.05, ..GrowthParams::DEFAULT }, [1.0, 1.0].into(), 7)?;
-    /// let steps = growth.add_cracks(&seams.network([0.5, 0.5].into()), 0);
-    /// assert_eq!(growth.timeline().end(), steps);
-    /// growth.hit([0.5, 0.5].into(), 1.0);
-    /// while growth.step().grew() {}
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    pub fn add_cracks(&mut self, cracks: &Network, opening: u32) -> u32 {
-        let Some(last) = cracks.nodes.iter().map(|node| node.birth).chain(cracks.links.iter().map(|l| l.birth)).max()
-        else {
-            return 0;
-        };
-        let (extent, from) = (self.network.extent(), cracks.extent());
-        // Nothing leaves the border by rounding.
-        let place = |pos: Vec2| Vec2::select(pos.cmpeq(from), extent, (pos / from * extent).min(extent));
-        let (before, first) = (self.steps, self.network.nodes.len() as u32);
-        // Nodes and links that are there, and nodes that have opened.
-        let (mut node, mut link, mut opened) = (0, 0, 0);
-        for step in 0..=last.saturating_add(opening) {
-            self.steps = before.saturating_add(step).saturating_add(1);
-            self.timeline.begin(self.steps);
-            for (i, &Node { width, birth, .. }) in cracks.nodes.iter().enumerate().take(node).skip(opened) {
-                let share = (step - birth + 1) as f32 / (opening + 1) as f32;
-                self.timeline.widen(first + i as u32, width * share);
-                opened += usize::from(step - birth >= opening);
-            }
-            while let Some(&added) = cracks.nodes.get(node).filter(|added| added.birth <= step) {
-                let parent = if added.parent == NO_PARENT { NO_PARENT } else { added.parent + first };
-                let birth = self.steps;
-                self.add(Node { pos: place(added.pos), parent, birth, impact: NO_IMPACT, bend: 0.0, ..added });
-                self.timeline.add_node(added.width / (opening + 1) as f32);
-                node += 1;
-                opened += usize::from(opening == 0);
-            }
-            while let Some(&added) = cracks.links.get(link).filter(|added| added.birth <= step) {
-                let (a, b, birth) = (added.a + first, added.b + first, self.steps);
-                self.network.links.push(Link { a, b, birth, bend: 0.0, ..added });
-                self.timeline.add_link();
-                link += 1;
-            }
-        }
-        let told = std::mem::replace(&mut self.links_told, self.network.links.len() as u32);
-        self.changes.list.extend((told..self.links_told).map(SegmentId::Link));
-        self.newborn = first..self.network.nodes.len() as u32;
-        self.added += self.newborn.len();
-        for node in self.newborn.clone() {
-            self.field.visit(node, &self.network.nodes, &self.nodes);
-        }
-        if let Some(arrest) = &mut self.arrest {
-            let branches = self.newborn.clone().map(SegmentId::Branch);
-            arrest.add_walls(&self.network, branches.chain((told..self.links_told).map(SegmentId::Link)));
-        }
-        self.steps - before
-    }
-
-    /// Notes a node that has not grown.
-    fn add(&mut self, node: Node) {
-        self.widths.admit();
-        if let Some(arrest) = &mut self.arrest {
-            arrest.push_node(false);
-        }
-        self.nodes.push(node.pos);
-        self.pull_of.push(NO_PULL);
-        self.changes.push_node(node.parent);
-        self.network.nodes.push(node);
-    }
-
     /// How many more nodes may grow.
     pub(super) fn room(&self) -> usize {
         (self.params.max_nodes as usize + self.added).saturating_sub(self.network.nodes.len())
@@ -443,56 +171,6 @@ impl CrackGrowth {
     #[cfg(feature = "bevy")]
     pub(crate) const fn mask(&self) -> &Arc<CrackMask> {
         &self.mask
-    }
-
-    fn reach(&self, energy: f32) -> f32 {
-        self.params.reach * energy.sqrt()
-    }
-
-    fn populate(&mut self, impact: u32, center: Vec2, inner: f32, outer: f32) {
-        let extent = self.network.extent();
-        let energy = self.impacts[impact as usize].first_energy;
-        let region = Region { center, energy, inner, outer, extent };
-        let seed = mix(self.seed ^ mix(u64::from(impact) | 1 << 40));
-        // Darts keep their distance from each other, and from the markers of hits that no step has taken up yet.
-        let mut darts = None;
-        if let MarkerLayout::DartThrowing { spacing } = self.params.markers {
-            self.field.settle(&self.network.nodes, &self.nodes);
-            darts = Some(NodeGrid::new(extent, spacing));
-        }
-        let (field, nodes, shown) = (&mut self.field, &self.nodes, &mut self.shown_markers);
-        let (timeline, radius) = (&mut self.timeline, self.params.line_width);
-        let show = self.params.draw_markers;
-        // The rays of a hit are its own: older cracks do not sprout towards them.
-        let is_loyal = self.params.arrest > 0.0 || matches!(self.params.markers, MarkerLayout::Polar { .. });
-        let loyal = if is_loyal { impact } else { ANY_IMPACT };
-        let wishes = (self.density.as_ref(), &*self.mask);
-        markers::lay_out(&self.params, region, wishes, seed, |pos, spacing| {
-            if field.living_at_most() >= MAX_MARKERS {
-                return;
-            }
-            if let (Some(spacing), Some(darts)) = (spacing, &mut darts) {
-                if darts.any_within(pos, spacing) || field.any_within(pos, spacing) || nodes.any_within(pos, spacing) {
-                    return;
-                }
-                darts.push(pos);
-            }
-            field.add(pos, loyal);
-            if show {
-                shown.push(pos);
-                timeline.add_dot(Dot { pos, radius });
-            }
-        });
-        // A large growth makes about two nodes a marker: room for them now, so that no step pauses to move them all.
-        let expected = (2 * self.field.living_at_most()).min(self.params.max_nodes as usize);
-        if expected > 4096 {
-            self.network.nodes.reserve(expected);
-            self.nodes.reserve(expected);
-            self.widths.reserve(expected);
-            self.pull_of.reserve(expected);
-            self.changes.reserve(expected);
-            self.timeline.reserve(expected);
-        }
     }
 
     /// Adds a node; the caller lets it visit the markers.
@@ -667,179 +345,7 @@ impl CrackGrowth {
         self.changes.child[node as usize]
     }
 
-    /// A hit from which nothing could grow, so narrow is its place, leaves a short crack all the same.
-    fn show_hits(&mut self) {
-        while let Some(start) = self.unshown.pop() {
-            let born = self.network.nodes.len();
-            let Some(&node) = self.network.nodes.get(start as usize) else { continue };
-            let of_hit = |other: &Node| other.impact == node.impact && other.parent != NO_PARENT;
-            if self.network.nodes[start as usize..].iter().any(of_hit) {
-                continue;
-            }
-            // It takes a step of its own.
-            self.steps = self.steps.saturating_add(1);
-            self.timeline.begin(self.steps);
-            let length = self.params.step_length;
-            for way in [Vec2::X, Vec2::NEG_X, Vec2::Y, Vec2::NEG_Y] {
-                let to = (node.pos + way * length).clamp(Vec2::ZERO, self.network.extent());
-                if to.distance(node.pos) > 0.25 * length && self.extend(start, to, true).is_some() {
-                    break;
-                }
-            }
-            self.newborn = born as u32..self.network.nodes.len() as u32;
-        }
-    }
-
-    /// Whether a place lies on a crack, or as good as.
-    fn is_on_crack(&self, place: Vec2) -> bool {
-        let close = 0.3 * self.params.step_length;
-        self.params.arrest > 0.0 && self.arrest.as_ref().is_some_and(|arrest| arrest.walls.any_within(place, close))
-    }
-
-    /// Joins the nodes of a crushed core, from `first` on: each to the nearest before it, and most to the one after it.
-    fn crush(&mut self, first: u32) {
-        let last = self.network.nodes.len() as u32;
-        for node in first + 1..last {
-            let pos = self.network.nodes[node as usize].pos;
-            let to = |other: u32| self.network.nodes[other as usize].pos.distance_squared(pos);
-            // The node before it is on its own ring.
-            let inner = (first..node.saturating_sub(1).max(first + 1)).min_by(|&a, &b| to(a).total_cmp(&to(b)));
-            let draw = hash_unit(self.seed ^ 0xC3, u64::from(node));
-            for other in [inner.filter(|_| draw < 0.8), Some(node - 1).filter(|_| draw > 0.15)].into_iter().flatten() {
-                let width = self.params.line_width;
-                let (birth, kind) = (self.steps, LinkKind::Connection);
-                self.link(Link { a: other, b: node, width, birth, kind, bend: 1.0 });
-            }
-        }
-    }
-
-    /// Widens the cracks of an impact that was hit again: by the fourth root of the energy that it has gathered, up to twice.
-    fn widen(&mut self, impact: u32) {
-        let Impact { energy, first_energy, widening, .. } = self.impacts[impact as usize];
-        let wider = (energy / first_energy).sqrt().sqrt().min(2.0);
-        // In steps that can be seen, so that a thousand little hits do not repaint it all a thousand times.
-        if wider < 1.05 * widening {
-            return;
-        }
-        self.impacts[impact as usize].widening = wider;
-        for node in 0..self.network.nodes.len() as u32 {
-            let this = &mut self.network.nodes[node as usize];
-            if this.impact == impact {
-                this.width = (this.width * (wider / widening)).min(0.4);
-                self.widths.scale(node, wider / widening);
-                let (width, parent) = (this.width, this.parent);
-                self.changes.widened(node, parent != NO_PARENT);
-                self.timeline.widen(node, width);
-            }
-        }
-    }
-
-    /// A hit on a crack: new cracks start from it to either side.
-    fn sprout(&mut self, pos: Vec2, impact: u32) {
-        let length = self.params.step_length;
-        let mut nearest = (f32::INFINITY, u32::MAX);
-        self.nodes.within(pos, 2.0 * length, |node, distance_sq| {
-            if (distance_sq, node) < nearest {
-                nearest = (distance_sq, node);
-            }
-        });
-        let Some(&node) = self.network.nodes.get(nearest.1 as usize) else { return };
-        let Some(&parent) = self.network.nodes.get(node.parent as usize) else { return };
-        let across = (node.pos - parent.pos).perp().normalize_or_zero();
-        for way in [across, -across] {
-            let born = self.network.nodes.len();
-            self.extend(nearest.1, node.pos + way * length, false);
-            if let Some(child) = self.network.nodes.get_mut(born) {
-                child.impact = impact;
-            }
-        }
-    }
-
-    /// Collects `S(c)` of every node, and the order of the nodes.
-    fn gather_pulls(&mut self) {
-        self.field.grow_older();
-        self.field.sweep();
-        let Self { field, network, pulls, pull_of, .. } = self;
-        field.each_pull(&network.nodes, |index, node, distance_sq| {
-            let slot = &mut pull_of[node as usize];
-            if *slot == NO_PULL {
-                *slot = pulls.len() as u32;
-                pulls.push(Pull {
-                    node,
-                    sum: [0, 0],
-                    closest: index,
-                    closest_sq: f32::INFINITY,
-                    closest_id: u32::MAX,
-                    child: Vec2::ZERO,
-                    serves: false,
-                    stopped: None,
-                });
-            }
-            let pull = &mut pulls[*slot as usize];
-            let marker = field.marker(index);
-            let towards = (marker.pos - network.nodes[node as usize].pos) * (FIXED / distance_sq.sqrt());
-            pull.sum[0] += i64::from(towards.x as i32);
-            pull.sum[1] += i64::from(towards.y as i32);
-            if (distance_sq, marker.id) < (pull.closest_sq, pull.closest_id) {
-                (pull.closest, pull.closest_sq, pull.closest_id) = (index, distance_sq, marker.id);
-            }
-        });
-        self.order.clear();
-        self.order.extend((0u32..).zip(&self.pulls).map(|(slot, pull)| (pull.node, slot)));
-        self.order.sort_unstable();
-    }
-
-    /// Finds the place of every child.
-    fn aim(&mut self) {
-        let extent = self.network.extent();
-        let (length, kill) = (self.params.step_length, self.params.kill_distance);
-        let next = self.network.nodes.len() as u64;
-        for (child, &(_, slot)) in (next..).zip(&self.order) {
-            let pull = &mut self.pulls[slot as usize];
-            let from = self.network.nodes[pull.node as usize].pos;
-            let mut direction = Vec2::new(pull.sum[0] as f32, pull.sum[1] as f32).normalize_or_zero();
-            if self.params.inertia > 0.0
-                && let Some(before) = self.network.nodes.get(self.network.nodes[pull.node as usize].parent as usize)
-            {
-                let heading = (from - before.pos).normalize_or_zero();
-                // A side branch has left that heading already.
-                if heading.dot(direction) > 0.0 {
-                    direction = (direction + heading * self.params.inertia).normalize_or_zero();
-                }
-            }
-            direction = self.params.direct(direction);
-            if self.params.wander > 0.0 {
-                // A draw per child, frozen by its index.
-                let stray = self.params.wander * (2.0 * hash_unit(self.seed ^ 0x57A6, child) - 1.0);
-                direction = (direction + direction.perp() * stray).normalize_or_zero();
-            }
-            if !self.mask.is_empty() {
-                direction = steer(from, direction, length, &self.mask, extent);
-            }
-            pull.child = up_to_border(from, direction, length, kill, extent);
-        }
-        let Self { field, network, pulls, pull_of, .. } = self;
-        field.each_pull(&network.nodes, |index, node, distance_sq| {
-            let pull = &mut pulls[pull_of[node as usize] as usize];
-            if !pull.serves {
-                let left_sq = field.marker(index).pos.distance_squared(pull.child);
-                pull.serves = left_sq <= kill * kill || left_sq <= distance_sq - PROGRESS * length * length;
-            }
-        });
-        // A crack does not turn on its heel: what it cannot serve on its way is left to others.
-        let keeps_on = self.arrest.is_some() && (self.params.inertia > 0.0 || !self.mask.is_empty());
-        for pull in &mut self.pulls {
-            let is_start = self.network.nodes[pull.node as usize].parent == NO_PARENT;
-            if !pull.serves && (is_start || !keeps_on) {
-                let (from, to) = (self.network.nodes[pull.node as usize].pos, self.field.marker(pull.closest).pos);
-                let distance = pull.closest_sq.sqrt();
-                pull.child = if distance <= length { to } else { from + (to - from) * (length / distance) };
-                pull.serves = true;
-            }
-        }
-    }
-
-    fn join_newborn(&mut self) {
+    pub(super) fn join_newborn(&mut self) {
         let newborn = self.newborn.clone();
         let met = self.field.relations.as_mut().map(|relations| std::mem::take(&mut relations.met));
         for (a, b) in met.into_iter().flatten() {
@@ -951,53 +457,4 @@ impl CrackGrowth {
         self.mind_others();
         Ok(())
     }
-}
-
-/// Turns `direction` by up to 80 degrees towards what is weak and away from what is strong or forbidden.
-fn steer(from: Vec2, direction: Vec2, length: f32, mask: &CrackMask, extent: Vec2) -> Vec2 {
-    // Cosine and sine of 0, 10, ... 80 degrees.
-    const TURNS: [(f32, f32); 9] = [
-        (1.0, 0.0),
-        (0.984_807_8, 0.173_648_18),
-        (0.939_692_6, 0.342_020_15),
-        (0.866_025_4, 0.5),
-        (0.766_044_4, 0.642_787_6),
-        (0.642_787_6, 0.766_044_4),
-        (0.5, 0.866_025_4),
-        (0.342_020_15, 0.939_692_6),
-        (0.173_648_18, 0.984_807_8),
-    ];
-    let mut best = (f32::NEG_INFINITY, direction);
-    for (cos, sin) in TURNS.into_iter().flat_map(|(cos, sin)| [(cos, sin), (cos, -sin)]) {
-        let way = direction * cos + direction.perp() * sin;
-        let mut liking = 0.35 * cos;
-        for share in [0.5, 1.0, 1.5] {
-            let uv = (from + way * (share * length)) / extent;
-            liking += mask.weak_at(uv) - mask.strong_at(uv);
-        }
-        if mask.blocks(from / extent, (from + way * length) / extent) {
-            liking -= 100.0;
-        }
-        if liking > best.0 {
-            best = (liking, way);
-        }
-    }
-    best.1
-}
-
-/// The end of a segment of `length`; where the border of the surface is no further than `margin` beyond, the border.
-///
-/// So cracks run into the border instead of ending just before it, and never leave the surface.
-fn up_to_border(from: Vec2, direction: Vec2, length: f32, margin: f32, extent: Vec2) -> Vec2 {
-    let far = from + direction * (length + margin);
-    let mut share = 1.0f32;
-    for axis in 0..2 {
-        let way = far[axis] - from[axis];
-        if far[axis] < 0.0 {
-            share = share.min(-from[axis] / way);
-        } else if far[axis] > extent[axis] {
-            share = share.min((extent[axis] - from[axis]) / way);
-        }
-    }
-    if share < 1.0 { (from + (far - from) * share).clamp(Vec2::ZERO, extent) } else { from + direction * length }
 }

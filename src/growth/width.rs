@@ -89,6 +89,11 @@ impl Widths {
         self.pipes.push(Pipe { behind: 1, told: 1, notch: 0, factor: 1.0, wider: 1.0 });
     }
 
+    /// Forgets the first nodes.
+    pub(super) fn forget(&mut self, first: usize) {
+        self.pipes.drain(..first);
+    }
+
     /// Makes a node wider for good.
     pub(super) fn scale(&mut self, node: u32, by: f32) {
         self.pipes[node as usize].wider *= by;

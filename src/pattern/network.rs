@@ -78,6 +78,10 @@ pub struct Network {
     seed: u64,
     pub(crate) nodes: Vec<Node>,
     pub(crate) links: Vec<Link>,
+    /// Nodes and links that came before those that are left: lines go by the numbers that segments had at first.
+    forgotten: (u64, u64),
+    /// First numbers of the links that were there when others were forgotten.
+    numbers: Vec<u64>,
 }
 
 impl Network {
@@ -87,7 +91,7 @@ impl Network {
     /// `seed` fixes the paths.
     #[must_use]
     pub const fn new(extent: Vec2, roughness: f32, seed: u64) -> Self {
-        Self { extent, roughness, seed, nodes: Vec::new(), links: Vec::new() }
+        Self { extent, roughness, seed, nodes: Vec::new(), links: Vec::new(), forgotten: (0, 0), numbers: Vec::new() }
     }
 
     /// Size of the surface, pattern units.
@@ -154,9 +158,39 @@ impl Network {
     /// The rough line that `segment` would have between two places.
     pub(crate) fn draft(&self, segment: SegmentId, ends: (Vec2, Vec2), widths: (f32, f32), bend: f32) -> SegmentPath {
         let salt = match segment {
-            SegmentId::Branch(child) => u64::from(child),
-            SegmentId::Link(link) => u64::from(link) | 1 << 32,
+            SegmentId::Branch(child) => u64::from(child) + self.forgotten.0,
+            SegmentId::Link(link) => self.number(link) | 1 << 32,
         };
         rough_path(ends, widths, self.roughness * bend, self.extent, self.seed, salt)
+    }
+
+    /// The number that a link had at first.
+    fn number(&self, link: u32) -> u64 {
+        self.numbers.get(link as usize).copied().unwrap_or(u64::from(link) + self.forgotten.1)
+    }
+
+    /// Takes the first nodes out, with all segments that have an end among them. Returns the numbers that the links that are left had.
+    pub(crate) fn forget(&mut self, first: u32) -> Vec<u32> {
+        let left: Vec<u32> = (0u32..)
+            .zip(&self.links)
+            .filter(|(_, link)| link.a.min(link.b) >= first)
+            .map(|(number, _)| number)
+            .collect();
+        self.numbers = left.iter().map(|&link| self.number(link)).collect();
+        self.forgotten =
+            (self.forgotten.0 + u64::from(first), self.forgotten.1 + (self.links.len() - left.len()) as u64);
+        self.nodes.drain(..first as usize);
+        for node in &mut self.nodes {
+            // Of a branch whose start is gone the rest stays.
+            node.parent = node.parent.checked_sub(first).filter(|_| node.parent != NO_PARENT).unwrap_or(NO_PARENT);
+        }
+        self.links.retain_mut(|link| {
+            let is_left = link.a.min(link.b) >= first;
+            if is_left {
+                (link.a, link.b) = (link.a - first, link.b - first);
+            }
+            is_left
+        });
+        left
     }
 }

@@ -166,6 +166,24 @@ impl Timeline {
         self.dots.push((self.now, dot));
     }
 
+    /// Forgets the first nodes, and all links but those with the numbers `left`.
+    pub(crate) fn forget(&mut self, first: u32, left: &[u32]) {
+        self.nodes.drain(..first as usize);
+        self.links = left.iter().filter_map(|&link| self.links.get(link as usize).copied()).collect();
+        self.nodes.iter_mut().for_each(|birth| birth.latest = NONE);
+        let since = self.nodes.first().map_or(u32::MAX, |birth| birth.step);
+        self.dots.retain(|dot| dot.0 >= since);
+        let before = std::mem::take(&mut self.widenings);
+        for widening in before {
+            if let Some(node) = widening.node.checked_sub(first)
+                && let Some(birth) = self.nodes.get_mut(node as usize)
+            {
+                let before = std::mem::replace(&mut birth.latest, self.widenings.len() as u32);
+                self.widenings.push(Widening { node, before, ..widening });
+            }
+        }
+    }
+
     /// The step after which all is there, 0 if there is nothing.
     #[must_use]
     pub fn end(&self) -> u32 {

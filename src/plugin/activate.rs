@@ -96,6 +96,7 @@ fn apply(world: &mut World, entity: Entity, hit: QueuedHit) -> Result<HitOutcome
         return Err("the surface is transparent there");
     }
     let pos = uv * active.growth.network().extent();
+    active.freeze_if_full();
     let outcome = active.growth.hit(pos, hit.energy);
     if matches!(outcome, HitOutcome::Started(_) | HitOutcome::Merged(_)) {
         active.struck = Some(Struck { pos, energy: hit.energy, direction: hit.direction });

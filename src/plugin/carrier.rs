@@ -57,9 +57,11 @@ pub(super) struct Kind {
     /// The material of its shards, with the picture given, so much of it being there (0..=1).
     pub(super) shard_material: fn(&mut World, Entity, &Carrier, &Handle<Image>, f32) -> Option<UntypedHandle>,
     /// The material of their sides, if they have any, of a picture of this mean colour (sRGB).
-    pub(super) inside: fn(&mut World, &Carrier, [f32; 3]) -> Option<UntypedHandle>,
+    pub(super) inside: fn(&mut World, &Carrier, [f32; 3], f32) -> Option<UntypedHandle>,
     /// Gives a shard its mesh, if that is new, and its material.
     pub(super) dress: fn(&mut EntityWorldMut, Option<Handle<Mesh>>, &UntypedHandle),
+    /// Takes the material away.
+    pub(super) undress: fn(&mut EntityWorldMut),
 }
 
 /// All kinds, the first that fits is taken.

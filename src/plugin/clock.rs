@@ -2,11 +2,12 @@
 
 use super::{
     CrackTextures,
+    paint::stamp_anew,
     surfaces::{Active, Surfaces},
 };
 use crate::{
     pattern::{Moment, SurfaceFrame},
-    raster::{Profile, Replay},
+    raster::{Profile, Replay, TexelRect},
 };
 use bevy::prelude::*;
 
@@ -218,6 +219,10 @@ impl Active {
 
     /// Makes times other than the end possible.
     fn open_playback(&mut self) -> &mut Playback {
+        if self.frozen.take().is_some() {
+            stamp_anew(self);
+            self.mark(TexelRect::whole(self.field.frame.size()));
+        }
         let (size, profile, end) = (self.field.frame.size(), self.profile, self.growth.timeline().end());
         self.playback.get_or_insert_with(|| Playback {
             // A growth without steps has left no trace yet.
@@ -267,6 +272,7 @@ impl Active {
     /// `seconds`, it appears within them. Returns the playback of the other one.
     pub(super) fn show_made(&mut self, replay: Option<(Replay, Moment)>, seconds: Option<f32>) -> Option<Playback> {
         self.closing = None;
+        self.frozen = None;
         self.appearing = seconds.map(|seconds| (self.end() / f64::from(seconds)).min(MOST_STEPS));
         let want =
             if self.clock.is_some() { self.playback.as_ref().map_or(0.0, |playback| playback.want) } else { 0.0 };

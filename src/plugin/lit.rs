@@ -105,7 +105,7 @@ impl CrackMaterial for CrackLitMaterial {
         self.lit.tint.w *= opacity;
     }
 
-    fn for_sides(&self, _mean: [f32; 3]) -> Option<Self> {
+    fn for_sides(&self, _mean: [f32; 3], _bright: f32) -> Option<Self> {
         None
     }
 }
@@ -122,10 +122,10 @@ impl MaterialSlot for MeshMaterial2d<CrackLitMaterial> {
     }
 
     fn wear(entity: &mut EntityWorldMut, mesh: Option<Handle<Mesh>>, material: Handle<CrackLitMaterial>) {
-        entity.insert(Self(material));
-        if let Some(mesh) = mesh {
-            entity.insert(Mesh2d(mesh));
-        }
+        match mesh {
+            Some(mesh) => entity.insert((Mesh2d(mesh), Self(material))),
+            None => entity.insert(Self(material)),
+        };
     }
 }
 

@@ -19,7 +19,10 @@ struct CrackLit {
 
 @fragment
 fn fragment(in: VertexOutput) -> @location(0) vec4<f32> {
-    let albedo = textureSample(diffuse_texture, diffuse_sampler, in.uv) * lit.tint;
+    var albedo = textureSample(diffuse_texture, diffuse_sampler, in.uv) * lit.tint;
+#ifdef VERTEX_COLORS
+    albedo *= in.color;
+#endif
     let texel = textureSample(normal_texture, normal_sampler, in.uv);
 
     // Where u and v run in the world, from the screen: right for turned, mirrored and skewed quads alike.

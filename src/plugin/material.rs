@@ -25,8 +25,9 @@ pub(super) trait CrackMaterial: Asset + Clone {
     fn open(&mut self);
     /// The same for shards: with this picture, the mesh's texture coordinates being the picture's, and so much of it there (0..=1).
     fn for_shards(&mut self, picture: &Handle<Image>, opacity: f32);
-    /// The same for the sides of shards of a picture of this mean colour (sRGB), if they have any.
-    fn for_sides(&self, mean: [f32; 3]) -> Option<Self>;
+    /// The same for the sides of shards of a picture of this mean colour (sRGB), if they have any; see
+    /// [`RimLook::bright`](crate::shatter::RimLook::bright).
+    fn for_sides(&self, mean: [f32; 3], bright: f32) -> Option<Self>;
 }
 
 /// The component that holds a material.
@@ -51,6 +52,7 @@ pub(super) const fn kind<S: MaterialSlot>() -> Kind {
         shard_material: shard_material::<S>,
         inside: inside::<S>,
         dress: dress::<S>,
+        undress: undress::<S>,
     }
 }
 
@@ -188,9 +190,9 @@ fn shard_material<S: MaterialSlot>(
     Some(materials.add(material).untyped())
 }
 
-fn inside<S: MaterialSlot>(world: &mut World, carrier: &Carrier, mean: [f32; 3]) -> Option<UntypedHandle> {
+fn inside<S: MaterialSlot>(world: &mut World, carrier: &Carrier, mean: [f32; 3], bright: f32) -> Option<UntypedHandle> {
     let mut materials = world.get_resource_mut::<Assets<S::Material>>()?;
-    let inside = materials.get(&carrier.shown.asset.clone().typed())?.for_sides(mean)?;
+    let inside = materials.get(&carrier.shown.asset.clone().typed())?.for_sides(mean, bright)?;
     Some(materials.add(inside).untyped())
 }
 
@@ -201,6 +203,11 @@ pub(super) fn dress<S: MaterialSlot>(
     material: &UntypedHandle,
 ) {
     S::wear(entity, mesh, material.clone().typed());
+}
+
+/// Takes the material of a shard away.
+pub(super) fn undress<S: MaterialSlot>(entity: &mut EntityWorldMut) {
+    entity.remove::<S>();
 }
 
 #[cfg(feature = "2d")]
@@ -241,7 +248,7 @@ mod flat {
             self.color = self.color.with_alpha(self.color.alpha() * opacity);
         }
 
-        fn for_sides(&self, _mean: [f32; 3]) -> Option<Self> {
+        fn for_sides(&self, _mean: [f32; 3], _bright: f32) -> Option<Self> {
             None
         }
     }
@@ -258,10 +265,10 @@ mod flat {
         }
 
         fn wear(entity: &mut EntityWorldMut, mesh: Option<Handle<Mesh>>, material: Handle<ColorMaterial>) {
-            entity.insert(Self(material));
-            if let Some(mesh) = mesh {
-                entity.insert(Mesh2d(mesh));
-            }
+            match mesh {
+                Some(mesh) => entity.insert((Mesh2d(mesh), Self(material))),
+                None => entity.insert(Self(material)),
+            };
         }
     }
 }
@@ -314,10 +321,15 @@ mod standard {
             self.uv_transform = Affine2::IDENTITY;
         }
 
-        fn for_sides(&self, mean: [f32; 3]) -> Option<Self> {
-            let [red, green, blue] = mean.map(|channel| DARKER * channel);
+        fn for_sides(&self, mean: [f32; 3], bright: f32) -> Option<Self> {
+            let share = bright.clamp(0.0, 1.0);
+            let [red, green, blue] =
+                [0, 1, 2].map(|i| DARKER * mean[i] * (1.0 - share) + (0.4 * mean[i] + 0.6 * EDGE[i]) * share);
+            let color = Color::srgb(red, green, blue);
             Some(Self {
-                base_color: Color::srgb(red, green, blue),
+                base_color: color,
+                // Light that has entered elsewhere leaves through the edges of glass.
+                emissive: color.to_linear() * (GLOW * share),
                 base_color_texture: None,
                 normal_map_texture: None,
                 depth_map: None,
@@ -328,6 +340,10 @@ mod standard {
 
     /// How much darker than its picture a wall is inside, sRGB.
     const DARKER: f32 = 0.55;
+
+    /// The edge of a pane of glass, sRGB, and how much it glows.
+    const EDGE: [f32; 3] = [0.72, 0.94, 0.88];
+    const GLOW: f32 = 0.35;
 
     impl MaterialSlot for MeshMaterial3d<StandardMaterial> {
         type Material = StandardMaterial;
@@ -341,10 +357,10 @@ mod standard {
         }
 
         fn wear(entity: &mut EntityWorldMut, mesh: Option<Handle<Mesh>>, material: Handle<StandardMaterial>) {
-            entity.insert(Self(material));
-            if let Some(mesh) = mesh {
-                entity.insert(Mesh3d(mesh));
-            }
+            match mesh {
+                Some(mesh) => entity.insert((Mesh3d(mesh), Self(material))),
+                None => entity.insert(Self(material)),
+            };
         }
     }
 }

@@ -22,6 +22,7 @@ mod budget;
 mod carrier;
 mod clock;
 mod error;
+mod freeze;
 mod grow;
 mod guided;
 mod heal;
@@ -145,6 +146,7 @@ impl Plugin for CrackPlugin {
             .init_resource::<CrackStats>()
             .init_resource::<CrackUploadStats>()
             .init_resource::<upload::Uploads>()
+            .init_resource::<shards::Spares>()
             .init_resource::<budget::FrameClock>()
             .init_resource::<queue::HitQueue>()
             .init_resource::<mask::PictureMasks>()

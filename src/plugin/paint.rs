@@ -64,7 +64,7 @@ pub(super) fn paint_surfaces(
 }
 
 /// Stamps what has grown since the last time into the field, or whatever is to be shown.
-fn stamp(active: &mut Active, scratch: &mut Scratch) {
+pub(super) fn stamp(active: &mut Active, scratch: &mut Scratch) {
     let moment = active.moment();
     if let Some(playback) = &mut active.playback {
         let (growth, redrawn) = (&active.growth, &mut scratch.redrawn);
@@ -73,6 +73,9 @@ fn stamp(active: &mut Active, scratch: &mut Scratch) {
         redrawn.cleared.iter().for_each(|tile| active.touched.unmark(*tile));
         redrawn.stamped.iter().for_each(|rect| active.touched.mark(*rect));
         redrawn.changed.iter().for_each(|rect| active.mark(*rect));
+        if !redrawn.changed.is_empty() {
+            active.stamp_carried();
+        }
         return;
     }
     active.growth.take_changed(&mut scratch.segments);
@@ -98,11 +101,15 @@ pub(super) fn stamp_anew(active: &mut Active) {
     let frame = active.field.frame;
     active.field.clear();
     active.touched = Touched::new(frame.size());
+    if let Some(frozen) = &active.frozen {
+        frozen.draw(&mut active.field);
+    }
     if let Some(playback) = &mut active.playback {
         playback.start_over(frame, active.profile);
         return;
     }
     stamp_all(&active.growth, &active.profile, &mut active.field, &mut active.touched);
+    active.stamp_carried();
 }
 
 /// Stamps the end of a growth into an untouched field.
@@ -117,6 +124,13 @@ pub(super) fn stamp_all(growth: &CrackGrowth, profile: &Profile, field: &mut Dep
             touched.mark(stamp_path(field, profile, &path));
         }
     }
+}
+
+/// Paints in the middle of a frame what is dirty.
+pub(super) fn paint_now(world: &mut World, active: &mut Active) {
+    world.resource_scope(|world, mut images: Mut<Assets<Image>>| {
+        paint(active, &mut images, &mut world.resource_mut::<Uploads>(), &mut Vec::new());
+    });
 }
 
 /// Paints the dirty texels of the view that is shown and asks for their upload.
@@ -174,7 +188,8 @@ fn tell_cells(active: &mut Active, entity: Entity, commands: &mut Commands) {
     let now = active.shown().whole();
     while let Some(cell) = active.cells.cells().get(active.cells_told).filter(|cell| cell.birth <= now) {
         let uv = active.field.frame.pos_to_uv(cell.centroid);
-        commands.trigger(CellClosed { entity, cell: active.cells_told as u32, area: cell.area, uv });
+        let frozen = active.frozen.as_ref().map_or(0, |frozen| frozen.cells);
+        commands.trigger(CellClosed { entity, cell: active.cells_told as u32 + frozen, area: cell.area, uv });
         active.cells_told += 1;
     }
 }
@@ -186,10 +201,12 @@ fn tell(active: &mut Active, state: &mut CrackState, before: Option<Moment>, is_
     state.damage = active.touched.share();
     state.nodes = u32::try_from(nodes.len()).unwrap_or(u32::MAX);
     state.hits = active.hits;
+    let (frozen, closed) = active.frozen.as_ref().map_or((0, 0), |frozen| (frozen.nodes, frozen.cells));
+    state.frozen = frozen;
     let moment = active.shown();
     // In order of birth; the first is no piece.
     let cells = active.cells.cells().get(1..).unwrap_or_default();
-    state.cells = cells.partition_point(|cell| cell.birth <= moment.whole()) as u32;
+    state.cells = closed + cells.partition_point(|cell| cell.birth <= moment.whole()) as u32;
     state.time = moment.steps() as f32;
     state.end = active.growth.timeline().end() as f32;
     state.tips.clear();

@@ -3,20 +3,24 @@
 //!
 //! What falls out is an entity each, a child of its surface, in the mesh of [`Shards::flat_mesh`] or [`Shards::solid_mesh`]. The
 //! surface's diffuse texture is transparent where it was (`holes`); the shards show a copy without holes. Where a shard is, is a
-//! function of the time since the surface broke first (`fly`), so time may run at any speed, backwards, or jump.
+//! function of the time since the surface broke first (`fly`), so time may run at any speed, backwards, or jump. Entities and
+//! meshes of shards that are gone serve for others (`body`).
 
+mod body;
 mod broken;
+mod drawn;
 mod fly;
 mod holes;
 mod plane;
 mod release;
 
+pub(super) use body::Spares;
 pub(super) use broken::{Broken, Struck, drop_shards};
 pub(super) use fly::fly_shards;
 pub(super) use plane::Plane;
 pub(super) use release::{any_requests, shatter_surfaces, shatter_when_due};
 
-use crate::shatter::{Anchor, BurstParams, ConvexPiece, Shards, ShatterError, ShatterParams};
+use crate::shatter::{Anchor, BreakAgain, BurstParams, ConvexPiece, RimLook, Shards, ShatterError, ShatterParams};
 use bevy::prelude::*;
 use std::sync::Arc;
 
@@ -66,9 +70,16 @@ pub struct ShatterCracks {
     /// Where the shards' time is to jump to, seconds since the surface broke; `None` again when it has. Below zero and not a number
     /// = 0.
     pub seek: Option<f32>,
+    /// How pieces break again on their way, where the crate moves them; `None` (default) = they stay whole. Fragments are shards as all
+    /// others; time that runs backwards puts them together again.
+    pub again: Option<BreakAgain>,
     /// How thick shards of 3D surfaces are, pattern units, 0..=10; default 0.03.
     pub thickness: f32,
-    /// What the sides of 3D shards look like; `None` = the mean colour of the picture, darker.
+    /// How their rims look; `None` (default) = as befits the preset: [`RimLook::GLASS`] where cracks are frosted,
+    /// [`RimLook::PLAIN`] where they are drawn as in a cartoon, else [`RimLook::STONE`].
+    pub rim: Option<RimLook>,
+    /// What the sides of 3D shards look like; `None` = the mean colour of the picture, darker, or like the edge of a pane where the rim
+    /// is bright.
     #[cfg(feature = "3d")]
     pub inside: Option<Handle<StandardMaterial>>,
 }
@@ -84,7 +95,9 @@ impl Default for ShatterCracks {
             fly: true,
             speed: 1.0,
             seek: None,
+            again: None,
             thickness: 0.03,
+            rim: None,
             #[cfg(feature = "3d")]
             inside: None,
         }

@@ -18,8 +18,9 @@ pub(super) const KIND: Kind = Kind {
     plane,
     open: |_, _| {},
     shard_material,
-    inside: |_, _, _| None,
+    inside: |_, _, _, _| None,
     dress: material::dress::<MeshMaterial2d<ColorMaterial>>,
+    undress: material::undress::<MeshMaterial2d<ColorMaterial>>,
 };
 
 fn inspect(world: &World, entity: Entity) -> Found {

@@ -12,8 +12,11 @@ pub struct CrackState {
     pub status: CrackStatus,
     /// Share of the surface's tiles of 8 x 8 texels that a crack has touched, 0..=1.
     pub damage: f32,
-    /// Nodes of the crack network.
+    /// Nodes of the crack network, at most [`max_nodes`](crate::growth::GrowthParams::max_nodes).
     pub nodes: u32,
+    /// Nodes that were taken out of it to make room for the cracks of later hits: the oldest cracks stay in the picture, but nothing
+    /// grows from them any more or stops at them, and they go when time is turned back.
+    pub frozen: u32,
     /// Hits that started or fed a crack.
     pub hits: u32,
     /// What of the cracks is shown: as they were after this many steps, with fractions; below [`end`](Self::end) only under a

@@ -4,6 +4,7 @@ use super::{
     CrackClock, CrackSurface, CrackTextures, ShatterRequest,
     carrier::Carrier,
     clock::Playback,
+    freeze::Frozen,
     picture::{BasePicture, density},
     shards::{Broken, Struck},
 };
@@ -70,6 +71,8 @@ pub(super) struct Active {
     /// Shows other times than the end; `None` = everything that has grown is shown.
     pub(super) playback: Option<Playback>,
     pub(super) hits: u32,
+    /// What it has forgotten and still shows.
+    pub(super) frozen: Option<Frozen>,
     /// Tiles that a crack has touched.
     pub(super) touched: Touched,
     /// Whether it is in a growing list: it grows, or its time passes.
@@ -134,6 +137,7 @@ impl Active {
             is_dirty: false,
             is_open: false,
             is_outdated: false,
+            frozen: None,
             tips_from: 0,
             cells: CellTracker::new(frame.extent()),
             cells_told: 1,
@@ -251,8 +255,8 @@ pub(super) struct Surfaces {
     pub(super) broken: Vec<Entity>,
     /// Surfaces that are to shatter, in order.
     pub(super) requests: Vec<(Entity, ShatterRequest)>,
-    /// All shards that are shown, the oldest first, and some that are not any more.
-    pub(super) shards: VecDeque<Entity>,
+    /// All shards that are shown, the oldest first: entity, surface, and which of its pieces; and some that are not any more.
+    pub(super) shards: VecDeque<(Entity, Entity, u32)>,
     /// Who owns a private image, material or mesh.
     pub(super) owners: HashMap<UntypedAssetId, Entity>,
     /// Which surfaces were made from a picture.

@@ -256,6 +256,7 @@ fn update_picture(world: &mut World, entity: Entity, active: &mut Active, shown:
     world.resource_mut::<Surfaces>().bytes -= bytes;
     active.is_outdated = false;
     if let Some(growth) = regrown {
+        active.frozen = None;
         active.cells = CellTracker::new(frame.extent());
         active.cells.update(growth.network());
         active.cells_told = active.cells.cells().len();

@@ -29,40 +29,49 @@ const BLOCK: usize = 32;
 #[must_use]
 pub fn crack_distance(field: &DepthField, depth: u16, reach: u8) -> Grid<f32> {
     let reach = reach.min(MAX_DISTANCE);
-    let (w, h) = (field.depth.width(), field.depth.height());
-    let (mut columns, mut near) = (vec![reach + 1; w], vec![false; h]);
-    // How far the nearest crack is in each column, 0..=reach + 1: first from above, then from below too.
-    let mut vertical = Grid::new(field.depth.size(), 0u8);
-    for (y, near) in near.iter_mut().enumerate() {
-        // Three loops, each of one width of numbers.
+    let (size, w, h) = (field.depth.size(), field.depth.width(), field.depth.height());
+    // How far the nearest crack is in each column, 0..=reach + 1: first from below, then from above too.
+    let mut vertical = Grid::new(size, 0u8);
+    let mut columns = vec![reach + 1; w];
+    for y in (0..h).rev() {
         let out = vertical.row_mut(y);
-        for (out, &texel) in out.iter_mut().zip(field.depth.row(y)) {
-            *out = if texel >= depth { 0 } else { reach + 1 };
-        }
-        for (column, out) in columns.iter_mut().zip(out.iter_mut()) {
-            *out = (*column + 1).min(*out);
-            *column = *out;
-        }
-        *near = out.iter().fold(u8::MAX, |least, &value| least.min(value)) <= reach;
+        begin(out, field.depth.row(y), depth, reach + 1);
+        carry_on(&mut columns, out);
+        out.copy_from_slice(&columns);
     }
     columns.fill(reach + 1);
-    let mut distance = Grid::new(field.depth.size(), f32::INFINITY);
     let margin = usize::from(reach);
     // Squares of a row with a margin on either side, and to whole blocks.
     let mut squares = vec![far_square(reach); w.next_multiple_of(BLOCK) + 2 * margin];
-    for y in (0..h).rev() {
-        for (column, &above) in columns.iter_mut().zip(vertical.row(y)) {
-            *column = (*column + 1).min(above);
-        }
+    let mut distance = Vec::with_capacity(w * h);
+    for y in 0..h {
+        carry_on(&mut columns, vertical.row(y));
         for (square, &column) in squares[margin..].iter_mut().zip(&columns) {
             *square = i16::from(column) * i16::from(column);
         }
-        let least = columns.iter().fold(u8::MAX, |least, &value| least.min(value));
-        if near[y] || least <= reach {
-            across(&squares, reach, distance.row_mut(y));
+        for x in (0..w).step_by(BLOCK) {
+            let block = across(&squares[x..x + BLOCK + 2 * margin], reach);
+            distance.extend_from_slice(&block[..BLOCK.min(w - x)]);
         }
     }
-    distance
+    Grid::from_vec(size, distance).unwrap_or_else(|| Grid::new(size, f32::INFINITY))
+}
+
+/// 0 where a texel is at least `depth` deep, `far` elsewhere.
+// Where it is inlined the compiler forgets that its slices do not overlap, and takes texel by texel.
+#[inline(never)]
+fn begin(out: &mut [u8], row: &[u16], depth: u16, far: u8) {
+    for (out, &texel) in out.iter_mut().zip(row) {
+        *out = if texel < depth { far } else { 0 };
+    }
+}
+
+/// One row further: a step more, or what is nearer in this row.
+#[inline(never)]
+fn carry_on(columns: &mut [u8], row: &[u8]) {
+    for (column, &here) in columns.iter_mut().zip(row) {
+        *column = (*column + 1).min(here);
+    }
 }
 
 /// Square of a distance out of reach.
@@ -70,31 +79,41 @@ fn far_square(reach: u8) -> i16 {
     (i16::from(reach) + 1) * (i16::from(reach) + 1)
 }
 
-/// The least of `squares + dx²` over all `dx` within reach, as distances. `squares` has a margin of `reach`.
-fn across(squares: &[i16], reach: u8, out: &mut [f32]) {
-    let (margin, limit) = (usize::from(reach), i16::from(reach) * i16::from(reach));
-    for (i, out) in out.chunks_mut(BLOCK).enumerate() {
-        let window = &squares[i * BLOCK..(i + 1) * BLOCK + 2 * margin];
-        let lowest = window.iter().fold(i16::MAX, |least, &square| if square < least { square } else { least });
-        if lowest > limit {
-            continue;
+/// Steps to the side between two looks at how far it is worth going.
+const STRIDE: usize = 4;
+
+/// The least of `squares + dx²` over all `dx` within reach, as distances, for the texels between two margins of `reach`.
+fn across(squares: &[i16], reach: u8) -> [f32; BLOCK] {
+    let margin = usize::from(reach);
+    let limit = i16::from(reach) * i16::from(reach);
+    let lowest = squares.iter().fold(i16::MAX, |least, &square| least.min(square));
+    let middle = squares[margin..].first_chunk::<BLOCK>().filter(|_| lowest <= limit);
+    let Some(mut best) = middle.copied() else { return [f32::INFINITY; BLOCK] };
+    let mut dx = 1;
+    while dx <= margin {
+        // Further away nothing can be less than what every texel has, or within reach.
+        let highest = best.iter().fold(0, |most, &square| most.max(square)).min(limit);
+        if lowest + (dx * dx) as i16 > highest {
+            break;
         }
-        // Left and right at once; `off` cannot overflow, as squares are at most 2¹⁴.
-        let mut best = [i16::MAX; BLOCK];
-        let shifted = |k: usize| window[k..].first_chunk::<BLOCK>();
-        for dx in 0..=margin {
+        let end = (dx + STRIDE).min(margin + 1);
+        for dx in dx..end {
+            // Left and right at once; the sum cannot overflow, as squares are at most 2¹⁴.
             let off = (dx * dx) as i16;
+            let shifted = |k: usize| squares[k..].first_chunk::<BLOCK>();
             if let (Some(left), Some(right)) = (shifted(margin - dx), shifted(margin + dx)) {
                 for ((best, &left), &right) in best.iter_mut().zip(left).zip(right) {
-                    let square = if left < right { left } else { right } + off;
-                    *best = if square < *best { square } else { *best };
+                    *best = (left.min(right) + off).min(*best);
                 }
             }
         }
-        for (out, &best) in out.iter_mut().zip(&best) {
-            *out = if best <= limit { f32::from(best).sqrt() } else { f32::INFINITY };
-        }
+        dx = end;
     }
+    let mut distances = [0.0; BLOCK];
+    for (distance, &best) in distances.iter_mut().zip(&best) {
+        *distance = if best <= limit { f32::from(best).sqrt() } else { f32::INFINITY };
+    }
+    distances
 }
 
 #[cfg(test)]

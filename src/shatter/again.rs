@@ -35,6 +35,49 @@ impl Default for SizeClasses {
     }
 }
 
+/// How pieces break again in the air.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
+pub struct BreakAgain {
+    /// Which pieces break, and how small.
+    pub classes: SizeClasses,
+    /// How long after it was released, or has itself broken off, a piece breaks, seconds, give or take a third. 0.01..=600; default: 0.35.
+    pub after: f32,
+    /// How fast the fragments part, pattern units a second, 0..=100. Default: 0.15.
+    pub apart: f32,
+}
+
+impl BreakAgain {
+    /// The default.
+    pub const DEFAULT: Self = Self { classes: SizeClasses::DEFAULT, after: 0.35, apart: 0.15 };
+
+    /// `Ok` if every field lies in its range.
+    ///
+    /// # Errors
+    /// [`ShatterError::OutOfRange`] for the first that does not.
+    pub fn validate(&self) -> Result<(), ShatterError> {
+        for largest in self.classes.largest {
+            in_range("classes", largest, 1e-6, 4096.0)?;
+        }
+        in_range("after", self.after, 0.01, 600.0)?;
+        in_range("apart", self.apart, 0.0, 100.0)
+    }
+
+    /// Seconds from a piece's release to its breaking; `None` if a piece of this area does not break.
+    #[must_use]
+    pub fn due(&self, area: f32, seed: u64) -> Option<f32> {
+        let uneven = || 1.0 + Rng::new(seed).stream("due").signed() / 3.0;
+        self.classes.next(area).map(|_| self.after * uneven())
+    }
+}
+
+impl Default for BreakAgain {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
+}
+
 /// A piece is halved at most so often.
 const ROUNDS: u32 = 12;
 

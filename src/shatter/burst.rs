@@ -116,6 +116,9 @@ pub struct Flight {
     drag: f32,
     fade_after: f32,
     fade: f32,
+    /// Where it begins: a fragment that has parted from its piece in the air does not begin in its place.
+    offset: Vec3,
+    rotation: Quat,
 }
 
 /// Where a piece is.
@@ -194,6 +197,8 @@ impl Burst {
             drag,
             fade_after: fade_after * (0.8 + 0.4 * rng.unit()),
             fade,
+            offset: Vec3::ZERO,
+            rotation: Quat::IDENTITY,
         }
     }
 }
@@ -209,17 +214,9 @@ impl Flight {
     pub fn pose(&self, seconds: f32) -> Pose {
         let time = seconds - self.delay;
         if time.is_nan() || time <= 0.0 {
-            return Pose::AT_REST;
+            return Pose { offset: self.offset, rotation: self.rotation, opacity: 1.0 };
         }
-        // The integral of exp(-drag t), and the integral of that; by their series where the formula would lose digits.
-        let x = self.drag * time;
-        let (run, fallen) = if x > 0.05 {
-            let run = (1.0 - ops::exp(-x)) / self.drag;
-            (run, (time - run) / self.drag)
-        } else {
-            let run = time * (1.0 - x / 2.0 * (1.0 - x / 3.0 * (1.0 - x / 4.0)));
-            (run, time * time / 2.0 * (1.0 - x / 3.0 * (1.0 - x / 4.0 * (1.0 - x / 5.0))))
-        };
+        let (run, fallen) = self.runs(time);
         let half_turn = 0.5 * self.spin * run;
         let rotation = (self.axis * ops::sin(half_turn)).extend(ops::cos(half_turn));
         let faded = if self.fade > 0.0 {
@@ -228,9 +225,50 @@ impl Flight {
             f32::from(u8::from(time > self.fade_after))
         };
         Pose {
-            offset: self.velocity * run + self.gravity * fallen,
-            rotation: Quat::from_vec4(rotation),
+            offset: self.offset + self.velocity * run + self.gravity * fallen,
+            rotation: Quat::from_vec4(rotation) * self.rotation,
             opacity: 1.0 - faded,
+        }
+    }
+
+    /// The integral of exp(-drag t), and the integral of that; by their series where the formula would lose digits.
+    fn runs(&self, time: f32) -> (f32, f32) {
+        let x = self.drag * time;
+        if x > 0.05 {
+            let run = (1.0 - ops::exp(-x)) / self.drag;
+            (run, (time - run) / self.drag)
+        } else {
+            let run = time * (1.0 - x / 2.0 * (1.0 - x / 3.0 * (1.0 - x / 4.0)));
+            (run, time * time / 2.0 * (1.0 - x / 3.0 * (1.0 - x / 4.0 * (1.0 - x / 5.0))))
+        }
+    }
+
+    /// The flight of a fragment that parts from this piece `seconds` after the hit, on its way: from where it is then, and as fast as
+    /// that part of the turning piece moves, it goes on by itself, `apart` (pattern units a second) faster away from the middle.
+    /// It fades when the piece would have. `seed` fixes how it tumbles.
+    #[must_use]
+    pub fn fragment(&self, seconds: f32, piece: &Shard, fragment: &Shard, apart: f32, seed: u64) -> Self {
+        let time = (seconds - self.delay).max(0.0);
+        let Pose { offset, rotation, .. } = self.pose(seconds);
+        let (run, _) = self.runs(time);
+        let decay = ops::exp(-self.drag * time);
+        let turning = self.axis * (self.spin * decay);
+        let way = fragment.centroid - piece.centroid;
+        let at_rest = Vec3::new(way.x, -way.y, 0.0);
+        let arm = rotation * at_rest;
+        let mut rng = Rng::new(seed).stream("fragment");
+        let mut noise = || Vec3::new(rng.signed(), rng.signed(), rng.signed());
+        let own = turning * 1.3 + noise() * (0.5 * self.spin * decay);
+        let out = (arm.normalize_or_zero() + 0.4 * noise()) * apart;
+        Self {
+            delay: seconds.max(self.delay),
+            velocity: self.velocity * decay + self.gravity * run + turning.cross(arm) + out,
+            axis: own.normalize_or(self.axis),
+            spin: own.length(),
+            fade_after: self.fade_after - time,
+            offset: offset + arm - at_rest,
+            rotation,
+            ..*self
         }
     }
 

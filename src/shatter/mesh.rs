@@ -1,7 +1,7 @@
 //! Shards as meshes: plain arrays.
 
-use super::Shards;
-use glam::Vec2;
+use super::{RimLook, Shards, rim::Bevel};
+use glam::{Vec2, Vec3};
 
 /// How a surface becomes meshes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -12,13 +12,17 @@ pub struct MeshFrame {
     pub uv: [Vec2; 2],
     /// Whether positions are relative to the shard's centroid; else to the middle of the surface.
     pub centred: bool,
+    /// How rims look.
+    pub rim: RimLook,
+    /// Fixes which way the picture is shifted in each shard, if it is.
+    pub seed: u64,
 }
 
 impl MeshFrame {
     /// A surface of `size` that shows a whole texture, for shards that move one by one.
     #[must_use]
     pub const fn new(size: Vec2) -> Self {
-        Self { size, uv: [Vec2::ZERO, Vec2::ONE], centred: true }
+        Self { size, uv: [Vec2::ZERO, Vec2::ONE], centred: true, rim: RimLook::PLAIN, seed: 0 }
     }
 }
 
@@ -31,6 +35,9 @@ pub struct ShardMesh {
     pub normals: Vec<[f32; 3]>,
     /// Texture coordinates, v down.
     pub uvs: Vec<[f32; 2]>,
+    /// What the picture's colour is multiplied by (red, green, blue, opacity), for the vertices that show it; empty where there
+    /// is no rim.
+    pub colors: Vec<[f32; 4]>,
     /// Three a triangle.
     pub indices: Vec<u32>,
     /// Where in `indices` the side faces begin: what comes before carries the picture, what follows the inside.
@@ -43,13 +50,15 @@ impl ShardMesh {
         self.positions.clear();
         self.normals.clear();
         self.uvs.clear();
+        self.colors.clear();
         self.indices.clear();
         self.sides = 0;
     }
 }
 
 impl Shards {
-    /// A shard as a flat mesh at z = 0 that faces +z, as for a sprite. Its places are the [`corners`](Self::corners), in order.
+    /// A shard as a flat mesh at z = 0 that faces +z, as for a sprite. Its places are the [`corners`](Self::corners), in order, and
+    /// then, where there is a rim, where that ends inside.
     #[must_use]
     pub fn flat_mesh(&self, shard: u32, frame: &MeshFrame) -> ShardMesh {
         let mut mesh = ShardMesh::default();
@@ -59,11 +68,11 @@ impl Shards {
 
     /// [`flat_mesh`](Self::flat_mesh), added to a mesh: to use memory again, or for many shards in one mesh.
     pub fn flat_mesh_into(&self, shard: u32, frame: &MeshFrame, mesh: &mut ShardMesh) {
-        self.cap(shard, frame, 0.0, mesh);
+        self.cap(shard, frame, [0.0; 2], &self.bevels_for(shard, frame), mesh);
         mesh.sides = mesh.indices.len();
     }
 
-    /// A shard with `thickness`, half of it on either side of z = 0: front, back, and a side face for every edge.
+    /// A shard with `thickness`, half of it on either side of z = 0: front, back, and a side face for every edge. Rims slope.
     ///
     /// The back shows the picture as seen through the shard. Texture coordinates of the sides are lengths in the mesh's units:
     /// along the outline, and from the front. The mesh is closed: every edge has a triangle on either side.
@@ -78,13 +87,16 @@ impl Shards {
     pub fn solid_mesh_into(&self, shard: u32, frame: &MeshFrame, thickness: f32, mesh: &mut ShardMesh) {
         mesh.clear();
         let half = 0.5 * thickness;
-        let corners = self.corners(shard).len();
-        mesh.positions.reserve(6 * corners);
-        mesh.normals.reserve(6 * corners);
-        mesh.uvs.reserve(6 * corners);
-        mesh.indices.reserve(6 * self.triangles(shard).len() + 6 * corners);
-        self.cap(shard, frame, half, mesh);
-        self.cap(shard, frame, -half, mesh);
+        let bevels = self.bevels_for(shard, frame);
+        let slope = (frame.rim.width * frame.size.y.abs() / self.extent().y).min(MOST_SLOPE * thickness);
+        let edge = if bevels.is_empty() { half } else { half - slope };
+        let (corners, inner) = (self.corners(shard).len(), bevels.len());
+        mesh.positions.reserve(6 * corners + 2 * inner);
+        mesh.normals.reserve(6 * corners + 2 * inner);
+        mesh.uvs.reserve(6 * corners + 2 * inner);
+        mesh.indices.reserve(6 * self.triangles(shard).len() + 6 * corners + 12 * inner);
+        self.cap(shard, frame, [edge, half], &bevels, mesh);
+        self.cap(shard, frame, [-edge, -half], &bevels, mesh);
         mesh.sides = mesh.indices.len();
         let mut first = 0;
         for ring in self.rings_of(shard) {
@@ -97,14 +109,14 @@ impl Shards {
                 let normal = if length > 0.0 { [-way.y / length, way.x / length, 0.0] } else { [1.0, 0.0, 0.0] };
                 let start = mesh.positions.len() as u32;
                 mesh.positions.extend([
-                    [a[0], a[1], half],
-                    [b[0], b[1], half],
-                    [b[0], b[1], -half],
-                    [a[0], a[1], -half],
+                    [a[0], a[1], edge],
+                    [b[0], b[1], edge],
+                    [b[0], b[1], -edge],
+                    [a[0], a[1], -edge],
                 ]);
                 mesh.normals.extend([normal; 4]);
                 let end = along + length;
-                mesh.uvs.extend([[along, 0.0], [end, 0.0], [end, thickness], [along, thickness]]);
+                mesh.uvs.extend([[along, 0.0], [end, 0.0], [end, 2.0 * edge], [along, 2.0 * edge]]);
                 mesh.indices.extend([0, 1, 2, 0, 2, 3].map(|corner| start + corner));
                 along = end;
             }
@@ -112,26 +124,68 @@ impl Shards {
         }
     }
 
-    /// The picture's side of a shard at height `z`; seen from below if that is negative.
-    fn cap(&self, shard: u32, frame: &MeshFrame, z: f32, mesh: &mut ShardMesh) {
+    fn bevels_for(&self, shard: u32, frame: &MeshFrame) -> Vec<Bevel> {
+        let mut bevels = Vec::new();
+        if frame.rim.width > 0.0 {
+            self.bevels(shard, frame.rim.width, &mut bevels);
+        }
+        bevels
+    }
+
+    /// The picture's side of a shard: its outline at the height `edge`, what lies within the bevel at `z`; seen from below if they are
+    /// negative.
+    fn cap(&self, shard: u32, frame: &MeshFrame, [edge, z]: [f32; 2], bevels: &[Bevel], mesh: &mut ShardMesh) {
         let Some(centroid) = self.get(shard).map(|shard| shard.centroid) else { return };
         let middle = if frame.centred { centroid } else { 0.5 * self.extent() };
         let scale = frame.size / self.extent();
         let [uv_start, uv_end] = frame.uv;
         let uv_scale = (uv_end - uv_start) / self.extent();
+        let shift = self.shift(shard, frame.rim.shift, frame.seed);
+        let to_mesh = |pos: Vec2, z: f32| {
+            let at = (pos - middle) * scale;
+            [at.x, -at.y, z]
+        };
+        let to_uv = |pos: Vec2| (uv_start + (pos + shift) * uv_scale).to_array();
         let start = mesh.positions.len() as u32;
         let corners = self.corners(shard);
         let places = corners.iter().map(|&corner| self.positions()[corner as usize]);
-        mesh.positions.extend(places.clone().map(|pos| {
-            let at = (pos - middle) * scale;
-            [at.x, -at.y, z]
-        }));
-        mesh.uvs.extend(places.map(|pos| (uv_start + pos * uv_scale).to_array()));
-        let normal = [0.0, 0.0, if z < 0.0 { -1.0 } else { 1.0 }];
-        mesh.normals.extend(std::iter::repeat_n(normal, corners.len()));
+        mesh.positions.extend(places.clone().map(|pos| to_mesh(pos, edge)));
+        mesh.uvs.extend(places.map(to_uv));
+        let up = if z < 0.0 { -1.0 } else { 1.0 };
         // From x to y is clockwise when y is up.
         let order = if z < 0.0 { [0, 1, 2] } else { [0, 2, 1] };
         let triangles = self.triangles(shard).iter();
-        mesh.indices.extend(triangles.flat_map(|triangle| order.map(|i| start + triangle[i])));
+        if bevels.is_empty() {
+            mesh.normals.extend(std::iter::repeat_n([0.0, 0.0, up], corners.len()));
+            mesh.indices.extend(triangles.flat_map(|triangle| order.map(|i| start + triangle[i])));
+            return;
+        }
+        let inner = start + corners.len() as u32;
+        mesh.positions.extend(bevels.iter().map(|bevel| to_mesh(bevel.inner.as_vec2(), z)));
+        mesh.uvs.extend(bevels.iter().map(|bevel| to_uv(bevel.inner.as_vec2())));
+        let tilted = bevels.iter().map(|bevel| {
+            // As all normals do, it looks inward where the picture is mirrored, and with it the order of corners.
+            let out = bevel.outward / scale * (scale.x * scale.y).signum();
+            Vec3::new(out.x, -out.y, 0.0).normalize_or_zero() + up * Vec3::Z
+        });
+        mesh.normals.extend(tilted.map(|normal| normal.normalize().to_array()));
+        mesh.normals.extend(std::iter::repeat_n([0.0, 0.0, up], corners.len()));
+        mesh.colors.extend(bevels.iter().map(|bevel| frame.rim.gain(bevel.outward)));
+        mesh.colors.extend(std::iter::repeat_n([1.0; 4], corners.len()));
+        mesh.indices.extend(triangles.flat_map(|triangle| order.map(|i| inner + triangle[i])));
+        let mut first = 0;
+        for ring in self.rings_of(shard) {
+            let n = ring.len() as u32;
+            for i in 0..n {
+                let [a, b] = [first + i, first + (i + 1) % n];
+                for triangle in [[start + a, start + b, inner + b], [start + a, inner + b, inner + a]] {
+                    mesh.indices.extend(order.map(|i| triangle[i]));
+                }
+            }
+            first += n;
+        }
     }
 }
+
+/// Rims of solid shards slope down by at most this share of the thickness.
+const MOST_SLOPE: f32 = 0.3;

@@ -30,15 +30,17 @@ mod drawing;
 mod faces;
 mod lattice;
 mod mesh;
+mod rim;
 mod shards;
 mod support;
 #[cfg(test)]
 mod tests;
 mod triangulate;
 
-pub use again::SizeClasses;
+pub use again::{BreakAgain, SizeClasses};
 pub use burst::{Burst, BurstParams, Flight, Pose};
 pub use cuts::{Cuts, ShatterError, ShatterParams, shatter};
 pub use mesh::{MeshFrame, ShardMesh};
+pub use rim::RimLook;
 pub use shards::{ConvexPiece, Neighbour, Shard, Shards};
 pub use support::{Anchor, Fallen, Support};

@@ -8,7 +8,7 @@ use super::{
     params::MAX_LEVELS,
     resample::Resampler,
     seams::{Guidance, Seams, Tracer},
-    search::{BLOCK, Dearer},
+    search::BLOCK,
     sites::{sites, texel},
     strokes::Astride,
 };
@@ -462,82 +462,56 @@ impl VoronoiMap {
             layer.set_weight(guide.gamma / beta);
         }
         for i in 0..self.levels.len() {
-            let change = if i == 0 { self.change_base() } else { self.change_walls(i) };
-            if change.len() * MOST_CHANGES > self.lattices[i].n_texels() {
+            let n_changed = if i == 0 { self.change_base() } else { self.change_walls(i) };
+            if n_changed * MOST_CHANGES > self.lattices[i].n_texels() {
                 self.search_level_again(i);
                 continue;
             }
             let level = &mut self.levels[i];
-            level.reconsider(&self.lattices[i], &change.dearer, &change.cheaper);
+            level.reconsider(&self.lattices[i]);
             let n = level.n_sites();
             while level.advance(&self.lattices[i], &self.sites[..n], usize::MAX) {}
         }
         Ok(())
     }
 
-    /// Brings the first lattice up to date where a guide has anything.
-    fn change_base(&mut self) -> Change {
+    /// Brings the first lattice up to date where a guide has anything; says how many edges have changed.
+    fn change_base(&mut self) -> usize {
         let (width, height) = (self.frame.size().x as usize, self.height());
         let blocks = width.div_ceil(BLOCK);
         let (lattice, layers) = (&mut self.lattices[0], &self.layers[..]);
-        let mut change = Change::default();
+        let Some(level) = self.levels.first_mut() else { return 0 };
+        let mut n_changed = 0;
         let mut new = [0; BLOCK];
         for (block, _) in self.guided.iter().enumerate().filter(|(_, guided)| **guided) {
             let (y, x0) = (block / blocks, block % blocks * BLOCK);
             let x1 = (x0 + BLOCK).min(width);
             let new = &mut new[..x1 - x0];
             edges_across(new, layers, y, x0);
-            change.apply(&mut lattice.across_mut(y)[x0..x1], new, y * width + x0, 1);
+            n_changed += level.take_over(&mut lattice.across_mut(y)[x0..x1], new, x0, y, false);
             if y + 1 < height {
                 edges_down(new, layers, y, x0);
-                change.apply(&mut lattice.down_mut(y)[x0..x1], new, y * width + x0, width);
+                n_changed += level.take_over(&mut lattice.down_mut(y)[x0..x1], new, x0, y, true);
             }
         }
-        change
+        n_changed
     }
 
     /// Brings the lattice of level `i` up to date after the level before has changed.
-    fn change_walls(&mut self, i: usize) -> Change {
-        let (width, height) = (self.frame.size().x as usize, self.height());
+    fn change_walls(&mut self, i: usize) -> usize {
+        let width = self.frame.size().x as usize;
         let mut new = self.lattices[0].clone();
         let (mut row, mut below) = (vec![0; width], vec![0; width]);
-        let mut change = Change::default();
+        let mut n_changed = 0;
         let lattice = &mut self.lattices[i];
-        for y in 0..height {
+        for y in 0..self.frame.size().y as usize {
             self.levels[i - 1].wall_row(&mut new, y, &mut row, &mut below);
-            change.apply(lattice.across_mut(y), new.across(y), y * width, 1);
-            change.apply(lattice.down_mut(y), new.down(y), y * width, width);
+            n_changed += self.levels[i].take_over(lattice.across_mut(y), new.across(y), 0, y, false);
+            n_changed += self.levels[i].take_over(lattice.down_mut(y), new.down(y), 0, y, true);
         }
-        change
+        n_changed
     }
-}
-
-/// Changed edges: those that have become dearer, and the texels on either side of those that have become cheaper.
-#[derive(Default)]
-struct Change {
-    dearer: Vec<Dearer>,
-    cheaper: Vec<u32>,
 }
 
 /// If more than this part of the edges has changed, a new search is faster.
 const MOST_CHANGES: usize = 8;
-
-impl Change {
-    /// How many edges have changed.
-    fn len(&self) -> usize {
-        self.dearer.len() + self.cheaper.len() / 2
-    }
-
-    /// Overwrites `edges`, which lead from the texels `first..` each `to` further.
-    fn apply(&mut self, edges: &mut [u16], new: &[u16], first: usize, to: usize) {
-        for (i, (edge, &new)) in edges.iter_mut().zip(new).enumerate() {
-            let ends = [(first + i) as u32, (first + i + to) as u32];
-            if new > *edge {
-                self.dearer.push(Dearer { ends, before: *edge });
-            } else if new < *edge {
-                self.cheaper.extend(ends);
-            }
-            *edge = new;
-        }
-    }
-}

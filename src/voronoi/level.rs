@@ -2,7 +2,7 @@
 
 use super::{
     lattice::{Lattice, UNIT, WALL},
-    search::{Dearer, Packed, Search},
+    search::{Packed, Search},
 };
 use glam::UVec2;
 
@@ -73,10 +73,9 @@ impl Level {
             return true;
         }
         // A cost that does not fit: all over again with larger numbers.
-        let too_far = |search: &Search<i32>| search.field().iter().any(|&p| p >= <i32 as Packed>::FAR);
         if self.n_sites > 0
-            && let Paths::Narrow(search) = &self.paths
-            && too_far(search)
+            && let Paths::Narrow(search) = &mut self.paths
+            && search.overflows()
         {
             self.paths = Paths::Wide(Search::new(lattice.size()));
             self.n_sites = 0;
@@ -94,9 +93,14 @@ impl Level {
         paths!(&self.paths, search => search.progress())
     }
 
-    /// Takes over changed costs of edges, see [`Search::reconsider`].
-    pub(super) fn reconsider(&mut self, lattice: &Lattice, dearer: &[Dearer], cheaper: &[u32]) {
-        paths!(&mut self.paths, search => search.reconsider(lattice, dearer, cheaper));
+    /// Overwrites the costs of edges, see [`Search::take_over`].
+    pub(super) fn take_over(&mut self, edges: &mut [u16], new: &[u16], x0: usize, y: usize, down: bool) -> usize {
+        paths!(&mut self.paths, search => search.take_over(edges, new, x0, y, down))
+    }
+
+    /// After edges have changed, see [`Search::reconsider`].
+    pub(super) fn reconsider(&mut self, lattice: &Lattice) {
+        paths!(&mut self.paths, search => search.reconsider(lattice));
     }
 
     /// The region of a texel. Not to be asked before there are sites.

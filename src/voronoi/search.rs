@@ -10,7 +10,7 @@ use super::lattice::{Lattice, WALL};
 use glam::UVec2;
 
 /// Texels of a block.
-pub(super) const BLOCK: usize = 128;
+pub(super) const BLOCK: usize = 64;
 
 /// Cost and site of a texel in one number.
 pub(super) trait Packed: Copy + Ord {
@@ -96,15 +96,6 @@ struct Stamps {
     stirred: bool,
 }
 
-/// An edge that has become dearer.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Dearer {
-    /// Its texels.
-    pub ends: [u32; 2],
-    /// What it cost.
-    pub before: u16,
-}
-
 /// The state of a search, which can stand still between any two rows.
 #[derive(Clone, Debug)]
 pub(super) struct Search<P> {
@@ -123,6 +114,10 @@ pub(super) struct Search<P> {
     quiet: u32,
     /// Sweeps begun since the search was last at rest.
     sweeps: u32,
+    /// Texels whose path may have led over an edge that has become dearer.
+    suspects: Vec<u32>,
+    /// The clock when costs were last looked at by [`overflows`](Self::overflows).
+    checked: u32,
 }
 
 impl<P: Packed> Search<P> {
@@ -141,6 +136,8 @@ impl<P: Packed> Search<P> {
             moved: false,
             quiet: 2,
             sweeps: 0,
+            suspects: Vec::new(),
+            checked: 0,
         }
     }
 
@@ -161,48 +158,77 @@ impl<P: Packed> Search<P> {
         self.quiet = 0;
     }
 
-    /// Takes over changed costs of edges: the search is at rest again, after further sweeps, where a new one would be.
-    ///
-    /// `cheaper` are the texels on either side of edges that have become cheaper. A texel whose path led over a dearer
-    /// edge is forgotten, and with it every texel that may have come by it; the others stay. No texel holds itself up,
-    /// since each step costs something.
-    pub(super) fn reconsider(&mut self, lattice: &Lattice, dearer: &[Dearer], cheaper: &[u32]) {
-        let (w, n) = (self.size.x as usize, self.field.len());
-        // Divisions of 32 bits take a third of the time of those of 64.
-        let width = self.size.x;
-        for &texel in cheaper {
-            self.stir((texel % width) as usize, (texel / width) as usize);
-        }
-        let mut suspects = Vec::new();
-        for &Dearer { ends, before } in dearer {
+    /// Overwrites the costs of edges of row `y`, which lead from its texels `x0..` to the right or `down`; says how many have
+    /// changed. [`reconsider`](Self::reconsider) has to follow.
+    pub(super) fn take_over(&mut self, edges: &mut [u16], new: &[u16], x0: usize, y: usize, down: bool) -> usize {
+        let w = self.size.x as usize;
+        let mut n_changed = 0;
+        for (x, (edge, &new)) in (x0..).zip(edges.iter_mut().zip(new)) {
+            let before = std::mem::replace(edge, new);
+            if new == before {
+                continue;
+            }
+            n_changed += 1;
+            let (right, below) = if down { (x, y + 1) } else { (x + 1, y) };
+            if new < before {
+                self.stir(x, y);
+                self.stir(right, below);
+                continue;
+            }
+            let ends = [y * w + x, below * w + right];
             for [from, to] in [ends, [ends[1], ends[0]]] {
-                if step::<P, true>(self.field[from as usize], before) <= self.field[to as usize] {
-                    suspects.push(to);
+                if step::<P, true>(self.field[from], before) <= self.field[to] {
+                    self.suspects.push(to as u32);
                 }
             }
         }
-        while let Some(suspect) = suspects.pop() {
+        n_changed
+    }
+
+    /// After edges have changed: the search is at rest again, after further sweeps, where a new one would be.
+    ///
+    /// A texel whose path led over a dearer edge is forgotten, and with it every texel that may have come by it; the
+    /// others stay. No texel holds itself up, since each step costs something.
+    pub(super) fn reconsider(&mut self, lattice: &Lattice) {
+        let w = self.size.x as usize;
+        while let Some(suspect) = self.suspects.pop() {
             let i = suspect as usize;
             let here = self.field[i];
             if here >= P::FAR || here.cost() == 0 {
                 continue;
             }
-            let x = (suspect % width) as usize;
+            // Beyond the border there are walls, also from the end of a row to the beginning of the next.
             let around = [
-                (x + 1 < w).then(|| (i + 1, lattice.edges(i).0)),
-                (x > 0).then(|| (i - 1, lattice.edges(i - 1).0)),
-                (i + w < n).then(|| (i + w, lattice.edges(i).1)),
-                (i >= w).then(|| (i - w, lattice.edges(i - w).1)),
+                (i + 1, lattice.edges(i).0),
+                (i.wrapping_sub(1), if i > 0 { lattice.edges(i - 1).0 } else { WALL }),
+                (i + w, lattice.edges(i).1),
+                (i.wrapping_sub(w), if i >= w { lattice.edges(i - w).1 } else { WALL }),
             ];
-            let mut neighbours = around.into_iter().flatten();
-            if neighbours.clone().any(|(from, edge)| step::<P, true>(self.field[from], edge) <= here) {
+            let near = around.map(|(j, _)| self.field.get(j).copied().unwrap_or(P::FAR));
+            if around.iter().zip(near).any(|(&(_, edge), from)| step::<P, true>(from, edge) <= here) {
                 continue;
             }
-            let leads_to = |&(to, edge): &(usize, u16)| step::<P, true>(here, edge) <= self.field[to];
-            suspects.extend(neighbours.by_ref().filter(leads_to).map(|(to, _)| to as u32));
+            for ((j, edge), there) in around.into_iter().zip(near) {
+                if there < P::FAR && step::<P, true>(here, edge) <= there {
+                    self.suspects.push(j as u32);
+                }
+            }
             self.field[i] = P::FAR;
-            self.stir(x, (suspect / width) as usize);
+            // Divisions of 32 bits take a third of the time of those of 64.
+            self.stir((suspect % self.size.x) as usize, (suspect / self.size.x) as usize);
         }
+    }
+
+    /// Whether there is a cost too large for `P`, or a texel that nothing reaches, since the last call.
+    pub(super) fn overflows(&mut self) -> bool {
+        let (w, blocks) = (self.size.x as usize, self.blocks);
+        let since = std::mem::replace(&mut self.checked, self.clock);
+        let too_far = |(i, stamps): (usize, &Stamps)| {
+            let x0 = i % blocks * BLOCK;
+            let block = i / blocks * w + x0..i / blocks * w + (x0 + BLOCK).min(w);
+            (stamps.changed > since || since == 0) && self.field[block].iter().any(|&p| p >= P::FAR)
+        };
+        self.stamps.iter().enumerate().any(too_far)
     }
 
     /// Whether every texel has its cost.
@@ -284,44 +310,64 @@ impl<P: Packed> Search<P> {
         }
     }
 
-    /// Along row `y`, to the right and then to the left; blocks that nothing enters are left out.
+    /// Along row `y`: within the active blocks, then from block to block as far as that is cheaper.
     fn pass_on<const WALLS: bool>(&mut self, lattice: &Lattice, y: usize) {
         let w = self.size.x as usize;
         let row = &mut self.field[y * w..(y + 1) * w];
         let edges = lattice.across(y);
-        for b in 0..self.blocks {
-            let (x0, x1) = (b * BLOCK, ((b + 1) * BLOCK).min(w));
-            let mut from = P::FAR;
-            if b > 0 {
-                from = step::<P, WALLS>(row[x0 - 1], edges[x0 - 1]);
-                self.active[b] |= from < row[x0];
-            }
-            if self.active[b] {
-                for (texel, &edge) in row[x0..x1].iter_mut().zip(&edges[x0..x1]) {
-                    *texel = min(*texel, from);
-                    from = step::<P, WALLS>(*texel, edge);
+        let ends = |b: usize| (b * BLOCK, ((b + 1) * BLOCK).min(w));
+        for (b, _) in self.active.iter().enumerate().filter(|(_, active)| **active) {
+            let (x0, x1) = ends(b);
+            both_ways::<P, WALLS>(&mut row[x0..x1], &edges[x0..x1]);
+        }
+        // Every block is at rest in itself now, so that a path that comes in ends where it is not the cheaper one.
+        for b in 1..self.blocks {
+            let (x0, x1) = ends(b);
+            let mut from = step::<P, WALLS>(row[x0 - 1], edges[x0 - 1]);
+            for (texel, &edge) in row[x0..x1].iter_mut().zip(&edges[x0..x1]) {
+                if from >= *texel {
+                    break;
                 }
+                *texel = from;
+                self.active[b] = true;
+                from = step::<P, WALLS>(from, edge);
             }
         }
-        for b in (0..self.blocks).rev() {
-            let (x0, x1) = (b * BLOCK, ((b + 1) * BLOCK).min(w));
-            let mut from = row[x1 - 1];
-            if x1 < w {
-                from = step::<P, WALLS>(row[x1], edges[x1 - 1]);
-                self.active[b] |= from < row[x1 - 1];
-            }
-            if self.active[b] {
-                row[x1 - 1] = min(row[x1 - 1], from);
-                from = row[x1 - 1];
-                for (texel, &edge) in row[x0..x1 - 1].iter_mut().zip(&edges[x0..x1 - 1]).rev() {
-                    *texel = min(*texel, step::<P, WALLS>(from, edge));
-                    from = *texel;
+        for b in (1..self.blocks).rev() {
+            let (x0, x1) = ends(b - 1);
+            let mut from = row[x1];
+            for (texel, &edge) in row[x0..x1].iter_mut().zip(&edges[x0..x1]).rev() {
+                from = step::<P, WALLS>(from, edge);
+                if from >= *texel {
+                    break;
                 }
-                let stamps = &mut self.stamps[y * self.blocks + b];
-                stamps.changed = self.clock;
-                stamps.stirred = false;
+                *texel = from;
+                self.active[b - 1] = true;
             }
         }
+        for (b, _) in self.active.iter().enumerate().filter(|(_, active)| **active) {
+            let stamps = &mut self.stamps[y * self.blocks + b];
+            stamps.changed = self.clock;
+            stamps.stirred = false;
+        }
+    }
+}
+
+/// Brings the texels of a block to rest along their row; `edges` lead from each to the next.
+///
+/// No cheapest path turns round within a row, so neither way needs the other's result. Each is a chain of steps that wait for
+/// one another: both at once take hardly longer than one.
+fn both_ways<P: Packed, const WALLS: bool>(row: &mut [P], edges: &[u16]) {
+    let n = row.len().min(edges.len());
+    let (row, edges) = (&mut row[..n], &edges[..n]);
+    let (mut right, mut left) = (P::FAR, P::FAR);
+    for i in 0..n {
+        let j = n - 1 - i;
+        left = min(row[j], if i > 0 { step::<P, WALLS>(left, edges[j]) } else { left });
+        row[j] = left;
+        right = min(row[i], right);
+        row[i] = right;
+        right = step::<P, WALLS>(right, edges[i]);
     }
 }
 

@@ -8,6 +8,8 @@ mod cells;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod clock;
 #[cfg(all(feature = "2d", feature = "3d"))]
+mod freeze;
+#[cfg(all(feature = "2d", feature = "3d"))]
 mod gpu;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod guided;
@@ -26,6 +28,8 @@ mod presets;
 mod replay;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod shards;
+#[cfg(all(feature = "2d", feature = "3d"))]
+mod shards_life;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod support;
 mod voronoi;

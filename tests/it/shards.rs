@@ -10,7 +10,7 @@ use bevy::{
 use bevy_crack::{
     plugin::ShardsError,
     prelude::*,
-    shatter::{Anchor, BurstParams, ShatterError, ShatterParams},
+    shatter::{Anchor, BreakAgain, BurstParams, RimLook, ShatterError, ShatterParams},
 };
 use std::collections::HashMap;
 
@@ -28,43 +28,44 @@ fn heard<E: Event + Clone>(app: &mut App) -> Vec<E> {
 }
 
 /// Everything may fall, lines go on to the next one, nothing moves.
-fn loose() -> ShatterCracks {
+pub(crate) fn loose() -> ShatterCracks {
     ShatterCracks {
         cut: ShatterParams { carry_on: true, ..ShatterParams::DEFAULT },
         anchor: Anchor::Nothing,
+        rim: Some(RimLook::PLAIN),
         speed: 0.0,
         ..default()
     }
 }
 
 /// A sprite with a cracked picture, ready to shatter.
-fn cracked(app: &mut App, size: UVec2, settings: ShatterCracks) -> Entity {
+pub(crate) fn cracked(app: &mut App, size: UVec2, settings: ShatterCracks) -> Entity {
     let image = add(app, picture(size));
     let entity = app.world_mut().spawn((Sprite::from_image(image), surface(), settings)).id();
     crack(app, entity);
     entity
 }
 
-fn surface() -> CrackSurface {
+pub(crate) fn surface() -> CrackSurface {
     CrackSurface::new(CrackPreset::GLASS).with_seed(4)
 }
 
-fn crack(app: &mut App, entity: Entity) {
+pub(crate) fn crack(app: &mut App, entity: Entity) {
     hit(app, CrackHit::uv(entity, Vec2::new(0.4, 0.6)).with_energy(3.0));
     settle(app, entity);
 }
 
-fn shatter(app: &mut App, entity: Entity, request: ShatterRequest) {
+pub(crate) fn shatter(app: &mut App, entity: Entity, request: ShatterRequest) {
     app.world_mut().commands().entity(entity).shatter_cracks(request);
     step(app);
 }
 
-fn shards(app: &mut App) -> Vec<Entity> {
+pub(crate) fn shards(app: &mut App) -> Vec<Entity> {
     app.world_mut().query_filtered::<Entity, With<Shard>>().iter(app.world()).collect()
 }
 
 /// Entities, meshes, images, 2D and 3D materials.
-fn stock(app: &App) -> [usize; 5] {
+pub(crate) fn stock(app: &App) -> [usize; 5] {
     let world = app.world();
     [
         world.entities().count_spawned() as usize,
@@ -76,7 +77,7 @@ fn stock(app: &App) -> [usize; 5] {
 }
 
 /// Places of a mesh's vertices and their texture coordinates.
-fn vertices(app: &App, mesh: &Handle<Mesh>) -> Vec<(Vec3, Vec2)> {
+pub(crate) fn vertices(app: &App, mesh: &Handle<Mesh>) -> Vec<(Vec3, Vec2)> {
     let mesh = app.world().resource::<Assets<Mesh>>().get(mesh).expect("the mesh");
     let Some(VertexAttributeValues::Float32x3(places)) = mesh.attribute(Mesh::ATTRIBUTE_POSITION) else { panic!() };
     let Some(VertexAttributeValues::Float32x2(uvs)) = mesh.attribute(Mesh::ATTRIBUTE_UV_0) else { panic!() };
@@ -96,6 +97,7 @@ fn a_hole_is_where_a_shard_was_and_the_shards_show_what_was_there() {
     let entity = cracked(&mut app, size, ShatterCracks { anchor: Anchor::Border, ..loose() });
     let before = shown(&app, entity);
     shatter(&mut app, entity, ShatterRequest::ALL);
+    let drawn = get::<CrackShards>(&app, entity).pieces.carried().to_vec();
     let told = heard::<Shattered>(&mut app);
     assert_eq!(told.len(), 1);
     assert_eq!(told[0].shards.len(), shards(&mut app).len());
@@ -110,7 +112,8 @@ fn a_hole_is_where_a_shard_was_and_the_shards_show_what_was_there() {
             let at = (Vec2::new(x as f32, y as f32) + 0.5) / 64.0;
             let is_gone = report.pieces.at(at).is_some_and(|piece| gone.contains(&piece));
             let i = 4 * (y * size.x + x) as usize;
-            assert_eq!(after[i..i + 3], before[i..i + 3], "colours stay, for those who blend: {x} {y}");
+            let is_drawn = drawn.iter().flat_map(|line| line.windows(2)).any(|pair| is_near(at, [pair[0], pair[1]]));
+            assert!(is_drawn || after[i..i + 3] == before[i..i + 3], "colours stay, for those who blend: {x} {y}");
             assert_eq!(after[i + 3], if is_gone { 0 } else { 255 }, "{x} {y}");
             n_holes += u32::from(is_gone);
         }
@@ -118,7 +121,15 @@ fn a_hole_is_where_a_shard_was_and_the_shards_show_what_was_there() {
     assert!(n_holes > 500, "{n_holes}");
     let material = get::<MeshMaterial2d<ColorMaterial>>(&app, told[0].shards[0]).0;
     let texture = app.world().resource::<Assets<ColorMaterial>>().get(&material).unwrap().texture.clone().unwrap();
-    assert!(texels(&app, &texture) == before, "the shards show the picture as it was");
+    let opaque: Vec<u8> =
+        after.as_chunks::<4>().0.iter().flat_map(|texel| [texel[0], texel[1], texel[2], 255]).collect();
+    assert!(texels(&app, &texture) == opaque, "the shards show the picture without holes");
+}
+
+/// Whether a place lies within some texels of a picture of 64 (pattern units) of a line.
+fn is_near(at: Vec2, [from, to]: [Vec2; 2]) -> bool {
+    let share = (at - from).dot(to - from) / (to - from).length_squared().max(1e-12);
+    at.distance(from + (to - from) * share.clamp(0.0, 1.0)) < 4.0 / 64.0
 }
 
 #[test]
@@ -355,7 +366,7 @@ fn a_surface_with_a_hole_goes_on_being_hit_and_shattered() {
     let mut n_new = 0;
     for (i, texel) in after.as_chunks::<4>().0.iter().enumerate() {
         if texel[3] == 0 && before[4 * i + 3] != 0 {
-            assert_eq!(copy[4 * i..4 * i + 4], before[4 * i..4 * i + 4]);
+            assert_eq!(copy[4 * i..4 * i + 3], texel[..3]);
             n_new += 1;
         }
         assert_ne!(copy[4 * i + 3], 0, "a shard with a hole");
@@ -365,32 +376,6 @@ fn a_surface_with_a_hole_goes_on_being_hit_and_shattered() {
     // What is gone is gone.
     shatter(&mut app, entity, ShatterRequest::ALL);
     assert!(heard::<Shattered>(&mut app).is_empty());
-}
-
-#[test]
-fn two_hundred_times_leave_nothing_behind() {
-    let mut app = app();
-    let image = add(&mut app, picture(UVec2::splat(48)));
-    let settings = ShatterCracks { speed: 1.0, ..loose() };
-    let entity = app.world_mut().spawn((Sprite::from_image(image), surface(), settings)).id();
-    steps(&mut app, 2);
-    let (before, picture) = (stock(&app), shown(&app, entity));
-    for i in 0..200 {
-        crack(&mut app, entity);
-        shatter(&mut app, entity, ShatterRequest::ALL);
-        assert!(shards(&mut app).len() > 3);
-        steps(&mut app, i % 7 * 10);
-        app.world_mut().commands().entity(entity).heal_cracks();
-        steps(&mut app, 2);
-        assert_eq!(stock(&app), before, "after {i}");
-        assert!(shown(&app, entity) == picture);
-    }
-    // Nothing of the budget is lost either.
-    let tight = CrackBudget { milliseconds: 1e6, max_texture_bytes: 48 * 48 * (22 + 8), ..default() };
-    app.insert_resource(tight);
-    crack(&mut app, entity);
-    shatter(&mut app, entity, ShatterRequest::ALL);
-    assert!(!shards(&mut app).is_empty());
 }
 
 #[test]
@@ -502,11 +487,13 @@ fn what_cannot_shatter_says_so_and_stays_whole() {
     assert_eq!(name(fails(&mut app, entity, all.with_energy(f32::INFINITY))), "energy");
     assert_eq!(name(fails(&mut app, entity, ShatterRequest::around(Vec2::NAN, 1.0))), "not finite");
     assert_eq!(name(fails(&mut app, entity, ShatterRequest { direction: Some(Vec3::NAN), ..all })), "not finite");
-    let broken: [(&str, fn(&mut ShatterCracks)); 4] = [
+    let broken: [(&str, fn(&mut ShatterCracks)); 6] = [
         ("thickness", |settings| settings.thickness = f32::NAN),
         ("min_area", |settings| settings.cut.min_area = -1.0),
         ("max_shards", |settings| settings.cut.max_shards = 0),
         ("drag", |settings| settings.burst.drag = f32::NAN),
+        ("bright", |settings| settings.rim = Some(RimLook { bright: f32::NAN, ..RimLook::GLASS })),
+        ("after", |settings| settings.again = Some(BreakAgain { after: 0.0, ..BreakAgain::DEFAULT })),
     ];
     for (expected, change) in broken {
         change(&mut app.world_mut().get_mut::<ShatterCracks>(entity).unwrap());
@@ -569,6 +556,8 @@ fn shards_in_their_places_look_as_the_surface_did() {
     let sprite = Sprite { flip_x: true, ..Sprite::from_image(image) };
     let entity = app.world_mut().spawn((sprite, surface(), loose())).id();
     crack(&mut app, entity);
+    // What is carried on is drawn with the first shard.
+    shatter(&mut app, entity, ShatterRequest::around(Vec2::new(0.98, 0.02), 0.0));
     let before = drawn(&mut app, &target);
     shatter(&mut app, entity, ShatterRequest::around(Vec2::new(0.4, 0.6), 0.3));
     let after = drawn(&mut app, &target);

@@ -1,7 +1,10 @@
 //! Shards in motion.
 
-use super::{Broken, CrackShards, Reassembled, ShatterCracks, drop_shards, holes::bounds, release::make_room};
+use super::{
+    Broken, Reassembled, ShatterCracks, Spares, broken::Piece, drop_shards, holes::bounds, release::make_room,
+};
 use crate::{
+    math::mix,
     plugin::{
         carrier::Carrier,
         surfaces::{Active, Surfaces},
@@ -9,6 +12,7 @@ use crate::{
     shatter::ShardMesh,
 };
 use bevy::prelude::*;
+use std::sync::Arc;
 
 /// Length of a frame where there is no clock, seconds.
 const DEFAULT_FRAME: f32 = 1.0 / 60.0;
@@ -24,6 +28,9 @@ enum Fate {
     /// The last shard has come back.
     Whole,
 }
+
+/// Shards that are shown from this frame on: entity, surface, and which of its pieces.
+type Shown = Vec<(Entity, Entity, u32)>;
 
 /// Lets time pass for all shards and puts them where they are then.
 pub(in crate::plugin) fn fly_shards(world: &mut World, mut scratch: Local<ShardMesh>) {
@@ -50,6 +57,9 @@ pub(in crate::plugin) fn fly_shards(world: &mut World, mut scratch: Local<ShardM
             }
             true
         });
+        if broken.is_empty() {
+            Spares::clear(world);
+        }
         surfaces.broken = broken;
         if !shown.is_empty() {
             surfaces.shards.extend(shown);
@@ -68,7 +78,7 @@ fn fly(
     mut broken: Box<Broken>,
     seconds: f32,
     scratch: &mut ShardMesh,
-    shown: &mut Vec<Entity>,
+    shown: &mut Shown,
 ) -> Fate {
     let (speed, seek, is_flying) = match world.get_mut::<ShatterCracks>(surface) {
         Some(mut settings) => (settings.speed, settings.bypass_change_detection().seek.take(), settings.fly),
@@ -83,33 +93,42 @@ fn fly(
         active.broken = Some(broken);
         return Fate::Whole;
     }
-    // What was released later than now is in its place.
     let now = broken.time;
+    if now == before {
+        active.broken = Some(broken);
+        return Fate::Broken;
+    }
     let mut fate = Fate::Broken;
-    let mut index = 0;
-    while let Some(piece) = broken.pieces.get(index) {
-        if piece.start <= now {
-            index += 1;
+    // What was released later than now is in its place, and what parted later is one.
+    let early: Vec<Piece> =
+        if now < before { broken.pieces.extract_if(.., |piece| piece.born > now).collect() } else { Vec::new() };
+    for mut piece in early {
+        if let Some(body) = piece.body.take() {
+            body.park(world, &active.carrier);
+        }
+        if let Some(whole) = piece.part_of {
+            if let Some(index) = broken.index_of(whole) {
+                broken.pieces[index].is_broken = false;
+            }
             continue;
         }
-        broken.hide(world, index);
-        let piece = broken.pieces.remove(index);
         broken.holes.set(&piece.cut, piece.number, active.field.frame, false);
         broken.put_back(&piece);
         active.mark(bounds(&piece.cut, piece.number, active.field.frame));
         fate = Fate::Mended;
     }
     let is_over = before > broken.end && now > broken.end;
-    if is_flying && now != before && !is_over {
-        for index in 0..broken.pieces.len() {
-            shown.extend(broken.show(world, surface, &active.carrier, index, scratch));
+    if is_flying && !is_over {
+        let mut index = 0;
+        while index < broken.pieces.len() {
+            broken.break_if_due(index);
+            if let Some(entity) = broken.show(world, surface, &active.carrier, index, scratch) {
+                shown.push((entity, surface, broken.pieces[index].id));
+            }
+            index += 1;
         }
     }
-    if now != before
-        && let Some(mut report) = world.get_mut::<CrackShards>(surface)
-    {
-        *report = broken.report();
-    }
+    broken.tell(world, surface);
     active.broken = Some(broken);
     fate
 }
@@ -126,13 +145,50 @@ impl Broken {
     ) -> Option<Entity> {
         let piece = &self.pieces[index];
         let pose = piece.flight.pose((self.time - piece.start) as f32);
-        if pose.opacity <= 0.0 {
-            self.hide(world, index);
+        if pose.opacity <= 0.0 || piece.is_broken {
+            self.hide(world, carrier, index);
             return None;
         }
-        let is_new = piece.entity.is_none() && !piece.is_spent;
-        let shard = if is_new { self.spawn(world, surface, carrier, index, scratch) } else { None };
+        if piece.body.is_none() && !piece.is_spent {
+            return self.spawn(world, surface, carrier, index, pose, scratch);
+        }
         self.pose(world, surface, carrier, index, pose);
-        shard
+        None
+    }
+
+    /// Lets fragments take the place of a piece if its time has come. They are always the same.
+    fn break_if_due(&mut self, index: usize) {
+        let piece = &self.pieces[index];
+        let Some((again, due)) = piece.again.filter(|_| !piece.is_broken) else { return };
+        let born = piece.start + f64::from(due);
+        let end = piece.start + f64::from(piece.flight.end());
+        let is_due = born <= self.time && born < end && self.time < end;
+        let Some(whole) = piece.cut.get(piece.number).filter(|_| is_due) else { return };
+        let Some(largest) = again.classes.next(whole.area) else { return };
+        let Ok(fragments) = piece.cut.break_again(piece.number, largest, piece.seed) else { return };
+        let fragments = Arc::new(fragments);
+        let mut parts = Vec::with_capacity(fragments.len());
+        for (number, fragment) in (0u32..).zip(fragments.iter()) {
+            let seed = mix(piece.seed ^ mix(u64::from(number)));
+            parts.push(Piece {
+                cut: fragments.clone(),
+                number,
+                id: self.next + number,
+                seed,
+                start: piece.start,
+                born,
+                flight: piece.flight.fragment(due, whole, fragment, again.apart, seed),
+                again: again.due(fragment.area, seed).map(|more| (again, due + more)),
+                is_broken: false,
+                part_of: Some(piece.id),
+                uv: piece.uv,
+                is_spent: piece.is_spent,
+                body: None,
+                level: 0,
+            });
+        }
+        self.next += parts.len() as u32;
+        self.pieces[index].is_broken = true;
+        self.pieces.append(&mut parts);
     }
 }

@@ -1,13 +1,15 @@
 //! From a surface to shards.
 
 use super::{
-    Broken, CrackShards, Shard, ShardsError, ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen, Shattered,
+    Broken, Shard, ShardsError, ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen, Shattered,
     broken::Piece,
     holes::{bounds, for_each_span},
 };
 use crate::{
+    math::mix,
     plugin::{
         CrackBudget, CrackState, CrackStatus,
+        paint::paint_now,
         surfaces::{Active, Surfaces},
         upload::Uploads,
     },
@@ -69,8 +71,8 @@ pub(in crate::plugin) fn shatter_surfaces(world: &mut World, mut scratch: Local<
                 Ok(shards) if shards.is_empty() => {}
                 Ok(shards) => {
                     surfaces.soil(entity);
-                    surfaces.shards.extend(&shards);
-                    told.push(Shattered { entity, shards });
+                    surfaces.shards.extend(shards.iter().map(|(shard, piece)| (*shard, entity, *piece)));
+                    told.push(Shattered { entity, shards: shards.into_iter().map(|(shard, _)| shard).collect() });
                 }
                 Err(error) => failed.push(ShatterFailed { entity, error }),
             }
@@ -78,7 +80,7 @@ pub(in crate::plugin) fn shatter_surfaces(world: &mut World, mut scratch: Local<
         make_room(world, &mut surfaces);
     });
     for mut event in told {
-        event.shards.retain(|shard| world.get_entity(*shard).is_ok());
+        event.shards.retain(|shard| world.get::<Shard>(*shard).is_some());
         world.trigger(event);
     }
     for event in failed {
@@ -89,25 +91,26 @@ pub(in crate::plugin) fn shatter_surfaces(world: &mut World, mut scratch: Local<
 
 /// The oldest shards go if there are too many.
 pub(super) fn make_room(world: &mut World, surfaces: &mut Surfaces) {
-    surfaces.shards.retain(|shard| world.get_entity(*shard).is_ok());
+    // Entities are used again: only those count that still are the same piece.
+    surfaces.shards.retain(|&(entity, of, piece)| {
+        world.get::<Shard>(entity).is_some_and(|shard| shard.surface == of && shard.piece == piece)
+    });
     let excess = surfaces.shards.len().saturating_sub(world.resource::<CrackBudget>().max_shards);
     let mut shortened = Vec::new();
-    for entity in surfaces.shards.drain(..excess) {
-        let Some(&Shard { surface, piece: id, .. }) = world.get::<Shard>(entity) else { continue };
-        if let Some(broken) = surfaces.active.get_mut(&surface).and_then(|active| active.broken.as_mut())
-            && let Ok(index) = broken.pieces.binary_search_by_key(&id, |piece| piece.id)
+    for (_, surface, piece) in surfaces.shards.drain(..excess) {
+        let Some(active) = surfaces.active.get_mut(&surface) else { continue };
+        if let Some(broken) = &mut active.broken
+            && let Some(index) = broken.index_of(piece)
         {
             broken.pieces[index].is_spent = true;
-            broken.hide(world, index);
+            broken.hide(world, &active.carrier, index);
             shortened.push(surface);
         }
     }
     shortened.dedup();
     for surface in shortened {
-        if let Some(broken) = surfaces.active.get(&surface).and_then(|active| active.broken.as_ref())
-            && let Some(mut report) = world.get_mut::<CrackShards>(surface)
-        {
-            *report = broken.report();
+        if let Some(broken) = surfaces.active.get(&surface).and_then(|active| active.broken.as_ref()) {
+            broken.tell(world, surface);
         }
     }
 }
@@ -120,12 +123,17 @@ fn release(
     request: &ShatterRequest,
     left: u64,
     scratch: &mut ShardMesh,
-) -> Result<Vec<Entity>, ShardsError> {
+) -> Result<Vec<(Entity, u32)>, ShardsError> {
     let settings = world.get::<ShatterCracks>(entity).cloned().unwrap_or_default();
     if !(0.0..=10.0).contains(&settings.thickness) {
         let value = f64::from(settings.thickness);
         let name = "thickness";
         return Err(ShatterError::OutOfRange { name, value, min: 0.0, max: 10.0 }.into());
+    }
+    let rim = active.rim(&settings);
+    rim.validate()?;
+    if let Some(again) = settings.again {
+        again.validate()?;
     }
     let network = active.growth.network();
     let extent = network.extent();
@@ -136,7 +144,7 @@ fn release(
     let to_local =
         world.get::<GlobalTransform>(entity).map_or(Mat3::IDENTITY, |at| at.affine().matrix3.inverse().into());
     let direction = plane.rotation.inverse() * (to_local * request.direction.unwrap_or(direction));
-    let seed = active.surface.seed ^ u64::from(active.broken.as_ref().map_or(0, |broken| broken.next));
+    let seed = active.surface.seed ^ u64::from(active.broken.as_ref().map_or(0, |broken| broken.released));
     let burst = Burst::new(settings.burst, from, direction, request.energy.unwrap_or(energy), seed)?;
 
     // What has been cut stays cut, unless there is more to cut along.
@@ -148,7 +156,11 @@ fn release(
     let (cut, mut support) = match &active.broken {
         Some(broken) if same(broken) => (broken.cut.clone(), broken.support.clone()),
         broken => {
-            let cut = Arc::new(shatter(Cuts::from_network(network)?, &settings.cut)?);
+            let mut cuts = Cuts::from_network(network)?;
+            for line in broken.iter().flat_map(|broken| &broken.carried) {
+                cuts.add_line(line)?;
+            }
+            let cut = Arc::new(shatter(cuts, &settings.cut)?);
             let support = match broken {
                 Some(broken) => broken.support.renewed(&broken.cut, &cut, settings.anchor),
                 None => Support::new(&cut, settings.anchor),
@@ -161,15 +173,28 @@ fn release(
         return Ok(Vec::new());
     }
     let is_first = active.broken.is_none();
+    let is_new = active.broken.as_ref().is_none_or(|broken| !Arc::ptr_eq(&broken.cut, &cut));
+    if is_first {
+        can_copy_picture(world, active, left)?;
+    }
+    if is_new && !cut.carried().is_empty() {
+        active.stamp_lines(cut.carried());
+        paint_now(world, active);
+    }
     let mut broken = match active.broken.take() {
         Some(broken) => broken,
         None => {
-            let picture = copy_picture(world, active, left)?;
+            let picture = copy_picture(world, active)?;
             (active.carrier.kind.open)(world, &active.carrier);
             Box::new(Broken::new((cut.clone(), support.clone()), grown, settings.clone(), picture, plane, active))
         }
     };
-    broken.inside = inside(world, active, &settings, broken.inside.take());
+    if is_new {
+        broken.carried.extend_from_slice(cut.carried());
+    }
+    broken.rim = rim;
+    let again = settings.again;
+    broken.inside = inside(world, active, &settings, rim.bright, broken.inside.take());
     (broken.cut, broken.support, broken.grown, broken.settings, broken.plane) = (cut, support, grown, settings, plane);
     if !is_first {
         let pieces = fallen.hit.iter().chain(&fallen.loose);
@@ -180,55 +205,69 @@ fn release(
     let mut shards = Vec::new();
     for (&number, is_falling) in fallen.hit.iter().chain(&fallen.loose).zip(falls) {
         let Some(shard) = broken.cut.get(number) else { continue };
-        let id = broken.next;
-        broken.next += 1;
-        let flight = if is_falling { burst.fall(id, shard) } else { burst.flight(id, shard) };
+        let (id, nth) = (broken.next, broken.released);
+        (broken.next, broken.released) = (id + 1, nth + 1);
+        let flight = if is_falling { burst.fall(nth, shard) } else { burst.flight(nth, shard) };
+        let seed = mix(active.surface.seed ^ mix(u64::from(nth)));
+        let again = again.and_then(|again| Some((again, flight.delay + again.due(shard.area, seed)?)));
         broken.end = broken.end.max(broken.time + f64::from(flight.end()));
-        let piece = Piece {
+        let is_spent = is_transparent(active, &broken.cut, number);
+        broken.pieces.push(Piece {
             cut: broken.cut.clone(),
             number,
             id,
+            seed,
             start: broken.time,
+            born: broken.time,
             flight,
+            again,
+            is_broken: false,
+            part_of: None,
             uv: shown_uv(active),
-            is_spent: is_transparent(active, &broken.cut, number),
-            entity: None,
+            is_spent,
+            body: None,
             level: 0,
-        };
-        let is_spent = piece.is_spent;
-        broken.pieces.push(piece);
+        });
         broken.holes.set(&broken.cut, number, active.field.frame, true);
         active.mark(bounds(&broken.cut, number, active.field.frame));
         let index = broken.pieces.len() - 1;
-        if !is_spent && let Some(shard) = broken.spawn(world, entity, &active.carrier, index, scratch) {
-            broken.pose(world, entity, &active.carrier, index, Pose::AT_REST);
-            shards.push(shard);
+        if !is_spent && let Some(shard) = broken.spawn(world, entity, &active.carrier, index, Pose::AT_REST, scratch) {
+            shards.push((shard, id));
         }
     }
     if is_first {
         active.bytes += broken.bytes;
     }
-    let report = broken.report();
+    broken.tell(world, entity);
     active.broken = Some(broken);
     active.mind_holes();
-    if let Ok(mut entity) = world.get_entity_mut(entity) {
-        entity.insert(report);
-    }
     Ok(shards)
 }
 
-/// A copy of the surface's picture, and its bytes on the CPU and the GPU.
-fn copy_picture(world: &mut World, active: &Active, left: u64) -> Result<(Handle<Image>, u64), ShardsError> {
+/// Bytes of a copy of the surface's picture on the CPU and the GPU.
+fn copy_bytes(active: &Active) -> u64 {
+    8 * u64::from(active.base.size.x) * u64::from(active.base.size.y)
+}
+
+/// Whether the surface's picture can be copied.
+fn can_copy_picture(world: &World, active: &Active, left: u64) -> Result<(), ShardsError> {
     let diffuse = active.textures.diffuse.as_ref().ok_or(ShardsError::NoDiffuse)?;
-    let needed = 8 * u64::from(active.base.size.x) * u64::from(active.base.size.y);
+    let needed = copy_bytes(active);
     if needed > left {
         return Err(ShardsError::TextureBudget { needed, left });
     }
+    let images = world.get_resource::<Assets<Image>>().ok_or(ShardsError::NoAssets { name: "Image" })?;
+    images.get(diffuse).map(|_| ()).ok_or(ShardsError::NoDiffuse)
+}
+
+/// A copy of the surface's picture, and its bytes.
+fn copy_picture(world: &mut World, active: &Active) -> Result<(Handle<Image>, u64), ShardsError> {
+    let diffuse = active.textures.diffuse.as_ref().ok_or(ShardsError::NoDiffuse)?;
     let mut images = world.get_resource_mut::<Assets<Image>>().ok_or(ShardsError::NoAssets { name: "Image" })?;
     let copy = images.get(diffuse).cloned().ok_or(ShardsError::NoDiffuse)?;
     let copy = images.add(copy);
     world.resource_mut::<Uploads>().expect_whole();
-    Ok((copy, needed))
+    Ok((copy, copy_bytes(active)))
 }
 
 /// Brings what is about to leave up to date in the copy of the picture: more cracks have grown since.
@@ -280,11 +319,12 @@ fn inside(
     world: &mut World,
     active: &Active,
     settings: &ShatterCracks,
+    bright: f32,
     before: Option<UntypedHandle>,
 ) -> Option<UntypedHandle> {
     #[cfg(feature = "3d")]
     if let Some(inside) = &settings.inside {
         return active.carrier.kind.is_solid.then(|| inside.clone().untyped());
     }
-    before.or_else(|| (active.carrier.kind.inside)(world, &active.carrier, active.base.mean()))
+    before.or_else(|| (active.carrier.kind.inside)(world, &active.carrier, active.base.mean(), bright))
 }

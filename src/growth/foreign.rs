@@ -1,0 +1,86 @@
+//! Cracks that have not grown: those of a picture, say.
+
+use super::{CrackGrowth, pull::NO_PULL};
+use crate::pattern::{Link, NO_IMPACT, NO_PARENT, Network, Node, SegmentId};
+use glam::Vec2;
+
+impl CrackGrowth {
+    /// Adds cracks that have not grown here, say those of [`Seams::network`](crate::voronoi::Seams::network). To hits and steps
+    /// afterwards they are cracks of another hit: with [`arrest`](GrowthParams::arrest) new ones stop at them, and a hit on one starts from it.
+    ///
+    /// They come in the steps after those made so far, in order of their [`birth`](Node::birth), and each opens to its width within
+    /// `opening` further steps; returns how many steps all of that takes. Lines are straight from node to node; a network of another extent is
+    /// stretched over the surface. They do not count for [`max_nodes`](GrowthParams::max_nodes). Where they
+    /// cross what has grown already, they cross it.
+    ///
+    /// ```
+    /// use bevy_crack::{growth::{CrackGrowth, GrowthParams}, voronoi::{VoronoiBake, VoronoiParams}};
+    ///
+    /// let (_, seams) = VoronoiBake::new(VoronoiParams::DEFAULT, Vec::new(), [64, 64].into(), 7)?.finish();
+    /// let mut growth = CrackGrowth::new(GrowthParams { arrest: 0.05, ..GrowthParams::DEFAULT }, [1.0, 1.0].into(), 7)?;
+    /// let steps = growth.add_cracks(&seams.network([0.5, 0.5].into()), 0);
+    /// assert_eq!(growth.timeline().end(), steps);
+    /// growth.hit([0.5, 0.5].into(), 1.0);
+    /// while growth.step().grew() {}
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn add_cracks(&mut self, cracks: &Network, opening: u32) -> u32 {
+        let Some(last) = cracks.nodes.iter().map(|node| node.birth).chain(cracks.links.iter().map(|l| l.birth)).max()
+        else {
+            return 0;
+        };
+        let (extent, from) = (self.network.extent(), cracks.extent());
+        // Nothing leaves the border by rounding.
+        let place = |pos: Vec2| Vec2::select(pos.cmpeq(from), extent, (pos / from * extent).min(extent));
+        let (before, first) = (self.steps, self.network.nodes.len() as u32);
+        // Nodes and links that are there, and nodes that have opened.
+        let (mut node, mut link, mut opened) = (0, 0, 0);
+        for step in 0..=last.saturating_add(opening) {
+            self.steps = before.saturating_add(step).saturating_add(1);
+            self.timeline.begin(self.steps);
+            for (i, &Node { width, birth, .. }) in cracks.nodes.iter().enumerate().take(node).skip(opened) {
+                let share = (step - birth + 1) as f32 / (opening + 1) as f32;
+                self.timeline.widen(first + i as u32, width * share);
+                opened += usize::from(step - birth >= opening);
+            }
+            while let Some(&added) = cracks.nodes.get(node).filter(|added| added.birth <= step) {
+                let parent = if added.parent == NO_PARENT { NO_PARENT } else { added.parent + first };
+                let birth = self.steps;
+                self.add(Node { pos: place(added.pos), parent, birth, impact: NO_IMPACT, bend: 0.0, ..added });
+                self.timeline.add_node(added.width / (opening + 1) as f32);
+                node += 1;
+                opened += usize::from(opening == 0);
+            }
+            while let Some(&added) = cracks.links.get(link).filter(|added| added.birth <= step) {
+                let (a, b, birth) = (added.a + first, added.b + first, self.steps);
+                self.network.links.push(Link { a, b, birth, bend: 0.0, ..added });
+                self.timeline.add_link();
+                link += 1;
+            }
+        }
+        let told = std::mem::replace(&mut self.links_told, self.network.links.len() as u32);
+        self.changes.list.extend((told..self.links_told).map(SegmentId::Link));
+        self.newborn = first..self.network.nodes.len() as u32;
+        self.added += self.newborn.len();
+        for node in self.newborn.clone() {
+            self.field.visit(node, &self.network.nodes, &self.nodes);
+        }
+        if let Some(arrest) = &mut self.arrest {
+            let branches = self.newborn.clone().map(SegmentId::Branch);
+            arrest.add_walls(&self.network, branches.chain((told..self.links_told).map(SegmentId::Link)));
+        }
+        self.steps - before
+    }
+
+    /// Notes a node that has not grown.
+    fn add(&mut self, node: Node) {
+        self.widths.admit();
+        if let Some(arrest) = &mut self.arrest {
+            arrest.push_node(false);
+        }
+        self.nodes.push(node.pos);
+        self.pull_of.push(NO_PULL);
+        self.changes.push_node(node.parent);
+        self.network.nodes.push(node);
+    }
+}

@@ -1,0 +1,278 @@
+//! Hits: where cracks begin, and what a hit on older cracks does.
+
+use super::{
+    CrackGrowth, MarkerLayout, StartLayout,
+    field::ANY_IMPACT,
+    markers::{self, Region},
+    nodes::NodeGrid,
+    params::MAX_MARKERS,
+};
+use crate::{
+    math::{hash_unit, mix},
+    pattern::{Dot, Link, LinkKind, NO_PARENT, Node},
+};
+use glam::Vec2;
+
+/// The most energy that an impact gathers.
+pub const MAX_ENERGY: f32 = 16.0;
+
+/// One impact on a growth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Impact {
+    /// Where, pattern units.
+    pub pos: Vec2,
+    /// Sum of the energies of all hits merged into it, at most [`MAX_ENERGY`].
+    pub energy: f32,
+    /// Energy of the first of them.
+    pub first_energy: f32,
+    /// How many times wider its cracks are, for the hits merged into it.
+    pub widening: f32,
+}
+
+/// Why a hit was refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Rejected {
+    /// A coordinate or the energy is NaN or infinite.
+    #[error("a coordinate or the energy is not finite")]
+    NotFinite,
+    /// The energy is negative.
+    #[error("the energy is negative")]
+    NegativeEnergy,
+    /// It lies off the surface.
+    #[error("it lies off the surface")]
+    OffSurface,
+    /// Cracks are forbidden there.
+    #[error("cracks are forbidden there")]
+    Forbidden,
+    /// The surface has all the nodes it may have.
+    #[error("the surface has all the nodes it may have")]
+    Full,
+}
+
+/// What became of a hit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum HitOutcome {
+    /// It became the impact with this index.
+    Started(u32),
+    /// It fell on the impact with this index and added its energy to it.
+    Merged(u32),
+    /// Its energy is zero: nothing happens.
+    Nothing,
+    /// It was refused.
+    Rejected(Rejected),
+}
+
+impl CrackGrowth {
+    /// Hits the surface at `pos` (pattern units) with `energy` (1 = an ordinary hit; 4 reaches twice as far).
+    ///
+    /// Lays out starts and markers; growth happens in [`step`](Self::step). A hit as good as on top of an earlier one adds
+    /// its energy to that one, so hammering on one spot costs no more than one hard hit.
+    pub fn hit(&mut self, pos: Vec2, energy: f32) -> HitOutcome {
+        if !pos.is_finite() || !energy.is_finite() {
+            return HitOutcome::Rejected(Rejected::NotFinite);
+        }
+        if energy < 0.0 {
+            return HitOutcome::Rejected(Rejected::NegativeEnergy);
+        }
+        let extent = self.network.extent();
+        if pos.cmplt(Vec2::ZERO).any() || pos.cmpgt(extent).any() {
+            return HitOutcome::Rejected(Rejected::OffSurface);
+        }
+        if energy == 0.0 {
+            return HitOutcome::Nothing;
+        }
+        if self.mask.is_forbidden(pos / extent) {
+            return HitOutcome::Rejected(Rejected::Forbidden);
+        }
+        if self.room() == 0 {
+            return HitOutcome::Rejected(Rejected::Full);
+        }
+        self.timeline.begin(self.steps.saturating_add(1));
+        let merge = self.params.step_length.max(self.params.kill_distance).min(0.05);
+        let nearest = (0u32..)
+            .zip(&self.impacts)
+            .map(|(i, impact)| (impact.pos.distance_squared(pos), i))
+            .min_by(|a, b| a.0.total_cmp(&b.0));
+        if let Some((distance_sq, index)) = nearest
+            && distance_sq <= merge * merge
+        {
+            let impact = &mut self.impacts[index as usize];
+            let before = impact.energy;
+            impact.energy = (before + energy).min(MAX_ENERGY);
+            let (center, after) = (impact.pos, impact.energy);
+            if after > before {
+                self.widen(index);
+                self.populate(index, center, self.reach(before), self.reach(after));
+                self.steps_left = self.params.num_iterations;
+            }
+            return HitOutcome::Merged(index);
+        }
+        let index = self.impacts.len() as u32;
+        let energy = energy.min(MAX_ENERGY);
+        self.impacts.push(Impact { pos, energy, first_energy: energy, widening: 1.0 });
+        let reach = self.reach(energy);
+        let first = self.network.nodes.len() as u32;
+        let seed = mix(self.seed ^ mix(u64::from(index)));
+        for place in markers::starts(self.params.starts, (pos, energy), reach, extent, seed) {
+            let is_free = !self.nodes.any_within(place, 1e-4) && !self.is_on_crack(place);
+            if is_free && !self.mask.is_forbidden(place / extent) {
+                self.bear(place, NO_PARENT, 0, index, 1.0);
+            }
+        }
+        if first == self.network.nodes.len() as u32 {
+            self.sprout(pos, index);
+        } else if matches!(self.params.starts, StartLayout::Crushed { .. }) {
+            self.crush(first);
+        }
+        for node in first..self.network.nodes.len() as u32 {
+            self.field.visit(node, &self.network.nodes, &self.nodes);
+        }
+        self.newborn = first..self.network.nodes.len() as u32;
+        if self.arrest.is_some() {
+            self.unshown.push(first);
+        }
+        self.join_newborn();
+        self.populate(index, pos, 0.0, reach);
+        self.steps_left = self.params.num_iterations;
+        HitOutcome::Started(index)
+    }
+
+    fn reach(&self, energy: f32) -> f32 {
+        self.params.reach * energy.sqrt()
+    }
+
+    fn populate(&mut self, impact: u32, center: Vec2, inner: f32, outer: f32) {
+        let extent = self.network.extent();
+        let energy = self.impacts[impact as usize].first_energy;
+        let region = Region { center, energy, inner, outer, extent };
+        let seed = mix(self.seed ^ mix(u64::from(impact) | 1 << 40));
+        // Darts keep their distance from each other, and from the markers of hits that no step has taken up yet.
+        let mut darts = None;
+        if let MarkerLayout::DartThrowing { spacing } = self.params.markers {
+            self.field.settle(&self.network.nodes, &self.nodes);
+            darts = Some(NodeGrid::new(extent, spacing));
+        }
+        let (field, nodes, shown) = (&mut self.field, &self.nodes, &mut self.shown_markers);
+        let (timeline, radius) = (&mut self.timeline, self.params.line_width);
+        let show = self.params.draw_markers;
+        // The rays of a hit are its own: older cracks do not sprout towards them.
+        let is_loyal = self.params.arrest > 0.0 || matches!(self.params.markers, MarkerLayout::Polar { .. });
+        let loyal = if is_loyal { impact } else { ANY_IMPACT };
+        let wishes = (self.density.as_ref(), &*self.mask);
+        markers::lay_out(&self.params, region, wishes, seed, |pos, spacing| {
+            if field.living_at_most() >= MAX_MARKERS {
+                return;
+            }
+            if let (Some(spacing), Some(darts)) = (spacing, &mut darts) {
+                if darts.any_within(pos, spacing) || field.any_within(pos, spacing) || nodes.any_within(pos, spacing) {
+                    return;
+                }
+                darts.push(pos);
+            }
+            field.add(pos, loyal);
+            if show {
+                shown.push(pos);
+                timeline.add_dot(Dot { pos, radius });
+            }
+        });
+        // A large growth makes about two nodes a marker: room for them now, so that no step pauses to move them all.
+        let expected = (2 * self.field.living_at_most()).min(self.params.max_nodes as usize);
+        if expected > 4096 {
+            self.network.nodes.reserve(expected);
+            self.nodes.reserve(expected);
+            self.widths.reserve(expected);
+            self.pull_of.reserve(expected);
+            self.changes.reserve(expected);
+            self.timeline.reserve(expected);
+        }
+    }
+
+    /// A hit from which nothing could grow, so narrow is its place, leaves a short crack all the same.
+    pub(super) fn show_hits(&mut self) {
+        while let Some(start) = self.unshown.pop() {
+            let born = self.network.nodes.len();
+            let Some(&node) = self.network.nodes.get(start as usize) else { continue };
+            let of_hit = |other: &Node| other.impact == node.impact && other.parent != NO_PARENT;
+            if self.network.nodes[start as usize..].iter().any(of_hit) {
+                continue;
+            }
+            // It takes a step of its own.
+            self.steps = self.steps.saturating_add(1);
+            self.timeline.begin(self.steps);
+            let length = self.params.step_length;
+            for way in [Vec2::X, Vec2::NEG_X, Vec2::Y, Vec2::NEG_Y] {
+                let to = (node.pos + way * length).clamp(Vec2::ZERO, self.network.extent());
+                if to.distance(node.pos) > 0.25 * length && self.extend(start, to, true).is_some() {
+                    break;
+                }
+            }
+            self.newborn = born as u32..self.network.nodes.len() as u32;
+        }
+    }
+
+    /// Whether a place lies on a crack, or as good as.
+    fn is_on_crack(&self, place: Vec2) -> bool {
+        let close = 0.3 * self.params.step_length;
+        self.params.arrest > 0.0 && self.arrest.as_ref().is_some_and(|arrest| arrest.walls.any_within(place, close))
+    }
+
+    /// Joins the nodes of a crushed core, from `first` on: each to the nearest before it, and most to the one after it.
+    fn crush(&mut self, first: u32) {
+        let last = self.network.nodes.len() as u32;
+        for node in first + 1..last {
+            let pos = self.network.nodes[node as usize].pos;
+            let to = |other: u32| self.network.nodes[other as usize].pos.distance_squared(pos);
+            // The node before it is on its own ring.
+            let inner = (first..node.saturating_sub(1).max(first + 1)).min_by(|&a, &b| to(a).total_cmp(&to(b)));
+            let draw = hash_unit(self.seed ^ 0xC3, u64::from(node));
+            for other in [inner.filter(|_| draw < 0.8), Some(node - 1).filter(|_| draw > 0.15)].into_iter().flatten() {
+                let width = self.params.line_width;
+                let (birth, kind) = (self.steps, LinkKind::Connection);
+                self.link(Link { a: other, b: node, width, birth, kind, bend: 1.0 });
+            }
+        }
+    }
+
+    /// Widens the cracks of an impact that was hit again: by the fourth root of the energy that it has gathered, up to twice.
+    fn widen(&mut self, impact: u32) {
+        let Impact { energy, first_energy, widening, .. } = self.impacts[impact as usize];
+        let wider = (energy / first_energy).sqrt().sqrt().min(2.0);
+        // In steps that can be seen, so that a thousand little hits do not repaint it all a thousand times.
+        if wider < 1.05 * widening {
+            return;
+        }
+        self.impacts[impact as usize].widening = wider;
+        for node in 0..self.network.nodes.len() as u32 {
+            let this = &mut self.network.nodes[node as usize];
+            if this.impact == impact {
+                this.width = (this.width * (wider / widening)).min(0.4);
+                self.widths.scale(node, wider / widening);
+                let (width, parent) = (this.width, this.parent);
+                self.changes.widened(node, parent != NO_PARENT);
+                self.timeline.widen(node, width);
+            }
+        }
+    }
+
+    /// A hit on a crack: new cracks start from it to either side.
+    fn sprout(&mut self, pos: Vec2, impact: u32) {
+        let length = self.params.step_length;
+        let mut nearest = (f32::INFINITY, u32::MAX);
+        self.nodes.within(pos, 2.0 * length, |node, distance_sq| {
+            if (distance_sq, node) < nearest {
+                nearest = (distance_sq, node);
+            }
+        });
+        let Some(&node) = self.network.nodes.get(nearest.1 as usize) else { return };
+        let Some(&parent) = self.network.nodes.get(node.parent as usize) else { return };
+        let across = (node.pos - parent.pos).perp().normalize_or_zero();
+        for way in [across, -across] {
+            let born = self.network.nodes.len();
+            self.extend(nearest.1, node.pos + way * length, false);
+            if let Some(child) = self.network.nodes.get_mut(born) {
+                child.impact = impact;
+            }
+        }
+    }
+}

@@ -1,0 +1,139 @@
+//! The rims of shards: a bevel along the outline, which catches the light.
+
+use super::{Shards, ShatterError, cuts::in_range};
+use crate::math::Rng;
+use glam::{DVec2, Vec2};
+
+/// How the rims of shards look, and what they show.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
+pub struct RimLook {
+    /// Width of the bevel along the outline, pattern units, 0..=0.1; 0 = none, and the two fields that follow do nothing. It is
+    /// narrower where a shard is.
+    pub width: f32,
+    /// How much brighter and less see-through the outer edge is than the picture, as a share of it, -1..=8; below zero darker.
+    pub bright: f32,
+    /// How much brighter edges are that face the upper left of the picture, and darker those that face away, 0..=1.
+    pub relief: f32,
+    /// How far the picture is shifted in each shard, another way in every one (refraction), pattern units, 0..=0.1. With any, shards
+    /// in their places do not show quite what the surface did.
+    pub shift: f32,
+}
+
+impl RimLook {
+    /// No rim: shards in their places look as the surface did, to the last bit.
+    pub const PLAIN: Self = Self { width: 0.0, bright: 0.0, relief: 0.0, shift: 0.0 };
+    /// Glass: bright edges.
+    pub const GLASS: Self = Self { width: 0.009, bright: 0.9, relief: 0.45, shift: 0.004 };
+    /// Stone, clay, plaster: worn, darker edges.
+    pub const STONE: Self = Self { width: 0.007, bright: -0.3, relief: 0.25, shift: 0.0 };
+
+    /// `Ok` if every field lies in its range.
+    ///
+    /// # Errors
+    /// [`ShatterError::OutOfRange`] for the first that does not.
+    pub fn validate(&self) -> Result<(), ShatterError> {
+        in_range("width", self.width, 0.0, 0.1)?;
+        in_range("bright", self.bright, -1.0, 8.0)?;
+        in_range("relief", self.relief, 0.0, 1.0)?;
+        in_range("shift", self.shift, 0.0, 0.1)
+    }
+
+    /// What the colour at an outer edge is multiplied by that looks `outward` (unit vector, y down): red, green, blue, opacity.
+    pub(super) fn gain(&self, outward: Vec2) -> [f32; 4] {
+        const LIGHT: Vec2 = Vec2::new(-0.6, -0.8);
+        let light = (1.0 + self.bright + self.relief * outward.dot(LIGHT)).max(0.0);
+        [light, light, light, 1.0 + self.bright.max(0.0)]
+    }
+}
+
+/// A corner of a bevel.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bevel {
+    /// Where the corner's inner counterpart lies, pattern units.
+    pub(super) inner: DVec2,
+    /// Away from the shard, a unit vector.
+    pub(super) outward: Vec2,
+}
+
+/// Where there is no room for the full width, it is halved so often, and then there is no bevel.
+const HALVINGS: u32 = 5;
+
+impl Shards {
+    /// The bevel of a shard: an inner counterpart for each of its [`corners`](Self::corners), into `bevels`.
+    ///
+    /// Triangles of the counterparts, and of the bands between them and the outline, have positive areas wherever the bevel
+    /// has width. They have the topology of the shard's own triangulation and the same rim, so they fill the shard, and none lies
+    /// upon another.
+    pub(super) fn bevels(&self, shard: u32, width: f32, bevels: &mut Vec<Bevel>) {
+        bevels.clear();
+        let at = |corner: u32| self.positions()[corner as usize].as_dvec2();
+        let mut shares = Vec::with_capacity(self.corners(shard).len());
+        for ring in self.rings_of(shard) {
+            let n = ring.len();
+            for (i, &corner) in ring.iter().enumerate() {
+                let [before, here, after] = [at(ring[(i + n - 1) % n]), at(corner), at(ring[(i + 1) % n])];
+                let [first, second] = [here - before, after - here].map(|way| way.normalize_or_zero().perp());
+                let sum = first + second;
+                // Sharp corners would reach far inside, and spikes to infinity.
+                let way = sum / (1.0 + first.dot(second)).max(0.5);
+                bevels.push(Bevel { inner: way * f64::from(width), outward: -sum.normalize_or_zero().as_vec2() });
+                shares.push(1.0);
+            }
+        }
+        let corners = self.corners(shard);
+        for round in 0.. {
+            let inner = |i: usize, shares: &[f64]| at(corners[i]) + shares[i] * bevels[i].inner;
+            let mut bad = Vec::new();
+            for triangle in self.triangles(shard) {
+                let [a, b, c] = triangle.map(|i| i as usize);
+                if is_folded([a, b, c].map(|i| inner(i, &shares))) {
+                    bad.extend([a, b, c]);
+                }
+            }
+            let mut first = 0;
+            for ring in self.rings_of(shard) {
+                for i in 0..ring.len() {
+                    let [a, b] = [first + i, first + (i + 1) % ring.len()];
+                    let [outer_a, outer_b, inner_a, inner_b] =
+                        [at(corners[a]), at(corners[b]), inner(a, &shares), inner(b, &shares)];
+                    if is_folded([outer_a, outer_b, inner_b]) || is_folded([outer_a, inner_b, inner_a]) {
+                        bad.extend([a, b]);
+                    }
+                }
+                first += ring.len();
+            }
+            bad.retain(|&i| shares[i] > 0.0);
+            if bad.is_empty() {
+                break;
+            }
+            bad.sort_unstable();
+            bad.dedup();
+            for i in bad {
+                shares[i] = if round < HALVINGS { 0.5 * shares[i] } else { 0.0 };
+            }
+        }
+        for (i, (bevel, share)) in bevels.iter_mut().zip(shares).enumerate() {
+            bevel.inner = at(corners[i]) + share * bevel.inner;
+        }
+    }
+
+    /// How far the picture is shifted in a shard, pattern units; it shows nothing from beyond the surface.
+    pub(super) fn shift(&self, shard: u32, shift: f32, seed: u64) -> Vec2 {
+        if shift == 0.0 {
+            return Vec2::ZERO;
+        }
+        let mut rng = Rng::new(seed).stream("shift").nth(u64::from(shard));
+        let way = Vec2::new(rng.signed(), rng.signed()).normalize_or(Vec2::X) * shift;
+        let places = self.outline(shard).iter().map(|&corner| self.positions()[corner as usize]);
+        let (low, high) =
+            places.fold((Vec2::INFINITY, Vec2::NEG_INFINITY), |(low, high), at| (low.min(at), high.max(at)));
+        way.max(-low).min(self.extent() - high)
+    }
+}
+
+/// Whether the corners of a triangle, from x to y, have changed their order.
+fn is_folded([a, b, c]: [DVec2; 3]) -> bool {
+    (b - a).perp_dot(c - a) < 0.0
+}

@@ -1,0 +1,255 @@
+//! Shards tile the surface, whatever it was cut along.
+
+use super::*;
+
+#[test]
+fn random_lines_tile() {
+    let mut rng = Rng::new(21);
+    let (mut shards_in_all, mut holes, mut carried) = (0, 0, 0);
+    for i in 0..10_000 {
+        let (cuts, params) = (random_cuts(&mut rng), random_params(&mut rng));
+        let shards = shatter(cuts.clone(), &params).unwrap();
+        check_tiling(&shards);
+        assert!(shards.len() <= params.max_shards as usize);
+        if shards.len() > 1 {
+            assert!(shards.iter().all(|shard| shard.area > 0.999 * params.min_area));
+        }
+        if i % 20 == 0 {
+            check_meshes(&shards, &mut rng);
+        }
+        shards_in_all += shards.len();
+        holes += (0..shards.len() as u32).map(|shard| shards.holes(shard).count()).sum::<usize>();
+        carried += shards.carried().len();
+    }
+    assert!(shards_in_all > 50_000 && holes > 100 && carried > 1000, "{shards_in_all} {holes} {carried}");
+}
+
+#[test]
+fn presets_tile() {
+    for name in CrackPreset::NAMES {
+        for seed in 0..4 {
+            let network = grown(&CrackPreset::named(name).unwrap(), 1 + seed as u32 % 3, seed);
+            let cuts = Cuts::from_network(&network).unwrap();
+            for carry_on in [false, true] {
+                let shards =
+                    shatter(cuts.clone(), &ShatterParams { carry_on, seed, ..ShatterParams::DEFAULT }).unwrap();
+                check_tiling(&shards);
+                if seed == 0 {
+                    check_meshes(&shards, &mut Rng::new(1));
+                }
+            }
+        }
+    }
+}
+
+/// Half a texel of the largest surface.
+#[test]
+fn edges_lie_on_drawn_lines() {
+    let network = grown(&CrackPreset::GLASS, 2, 5);
+    let shards =
+        shatter(Cuts::from_network(&network).unwrap(), &ShatterParams { carry_on: true, ..ShatterParams::DEFAULT })
+            .unwrap();
+    let mut lines: Vec<(Vec2, Vec2)> = network
+        .segments()
+        .filter_map(|segment| network.path(segment))
+        .flat_map(|path| path.points().windows(2).map(|pair| (pair[0].pos, pair[1].pos)).collect::<Vec<_>>())
+        .collect();
+    lines.extend(shards.carried().iter().flat_map(|line| line.windows(2).map(|pair| (pair[0], pair[1]))));
+    let mut checked = 0;
+    for shard in 0..shards.len() as u32 {
+        for [a, b] in edges(shards.outline(shard)) {
+            if shards.lattice.side_of(shards.places[a as usize], shards.places[b as usize]).is_some() {
+                continue;
+            }
+            let middle = 0.5 * (shards.positions()[a as usize] + shards.positions()[b as usize]);
+            let nearest = lines
+                .iter()
+                .filter(|(a, b)| a.min(*b).cmple(middle + 1e-4).all() && a.max(*b).cmpge(middle - 1e-4).all())
+                .map(|&(a, b)| shards::distance_to_line(middle, a, b))
+                .fold(f32::INFINITY, f32::min);
+            assert!(nearest < 0.5 / 16_384.0, "{nearest} at {middle}");
+            checked += 1;
+        }
+    }
+    assert!(checked > 200, "{checked}");
+}
+
+#[test]
+fn degenerate_lines_are_survived() {
+    let corner = Vec2::new(1.0, 1.0);
+    let cases: [(&str, &[&[Vec2]], usize); 9] = [
+        ("nothing", &[], 1),
+        ("a point", &[&[Vec2::splat(0.5)], &[Vec2::splat(0.25), Vec2::splat(0.25)]], 1),
+        ("along the border", &[&[Vec2::ZERO, Vec2::X, corner]], 1),
+        ("off the surface", &[&[Vec2::new(-5.0, -5.0), Vec2::new(9.0, -1.0)]], 1),
+        ("a diagonal twice", &[&[Vec2::ZERO, corner], &[corner, Vec2::ZERO]], 2),
+        ("a way and back", &[&[Vec2::new(0.5, 0.0), Vec2::new(0.5, 0.9), Vec2::new(0.5, 0.0)]], 1),
+        ("zero area", &[&[Vec2::splat(0.2), Vec2::splat(0.4), Vec2::splat(0.3), Vec2::splat(0.2)]], 1),
+        (
+            "a bow tie",
+            &[&[Vec2::splat(0.2), Vec2::splat(0.8), Vec2::new(0.8, 0.2), Vec2::new(0.2, 0.8), Vec2::splat(0.2)]],
+            3,
+        ),
+        (
+            "a speck",
+            &[&[Vec2::splat(0.5), Vec2::new(0.5 + 1e-7, 0.5), Vec2::new(0.5, 0.5 + 1e-7), Vec2::splat(0.5)]],
+            2,
+        ),
+    ];
+    for (name, lines, pieces) in cases {
+        let mut cuts = Cuts::new(Vec2::ONE).unwrap();
+        for line in lines {
+            cuts.add_line(line).unwrap();
+        }
+        let shards = shatter(cuts.clone(), &EVERYTHING).unwrap();
+        check_tiling(&shards);
+        assert_eq!(shards.len(), pieces, "{name}");
+        let whole =
+            shatter(cuts.clone(), &ShatterParams { carry_on: true, max_shards: 1, ..ShatterParams::DEFAULT }).unwrap();
+        assert_eq!(whole.len(), 1);
+        check_tiling(&whole);
+    }
+    // One texel, a ribbon, a giant and a dwarf.
+    for extent in [Vec2::splat(1e-3), Vec2::new(64.0, 1.0), Vec2::splat(1e30), Vec2::splat(1e-30)] {
+        let mut cuts = Cuts::new(extent).unwrap();
+        cuts.add_line(&[Vec2::ZERO, extent]).unwrap();
+        let shards = shatter(cuts.clone(), &EVERYTHING).unwrap();
+        assert_eq!(shards.len(), 2);
+        check_pieces_count(&shards);
+    }
+}
+
+fn check_pieces_count(shards: &Shards) {
+    let [w, h] = shards.lattice.corner.map(i64::from);
+    let sum: i64 = (0..shards.len() as u32).map(|shard| twice_area(shards, shards.outline(shard))).sum();
+    assert_eq!(sum, 2 * w * h);
+}
+
+#[test]
+fn what_is_not_a_number_is_refused() {
+    for extent in [Vec2::ZERO, Vec2::NAN, Vec2::INFINITY, Vec2::new(1.0, -1.0), Vec2::new(1e-9, 1.0)] {
+        assert!(matches!(Cuts::new(extent), Err(ShatterError::Extent { .. })));
+    }
+    let mut cuts = Cuts::new(Vec2::ONE).unwrap();
+    assert_eq!(cuts.add_line(&[Vec2::ZERO, Vec2::NAN]), Err(ShatterError::NotFinite { index: 1 }));
+    assert_eq!(cuts.add_line(&[Vec2::INFINITY, Vec2::ZERO]), Err(ShatterError::NotFinite { index: 0 }));
+    cuts.add_line(&[Vec2::MAX, Vec2::MIN]).unwrap();
+    let shards = shatter(cuts.clone(), &EVERYTHING).unwrap();
+    check_tiling(&shards);
+    for min_area in [f32::NAN, -1.0, f32::INFINITY] {
+        assert!(shatter(cuts.clone(), &ShatterParams { min_area, ..EVERYTHING }).is_err());
+    }
+    assert!(shatter(cuts.clone(), &ShatterParams { max_shards: 0, ..EVERYTHING }).is_err());
+    let mut support = Support::new(&shards, Anchor::Border);
+    assert!(support.hit(&shards, Vec2::NAN, 0.1).is_err() && support.hit(&shards, Vec2::ONE, f32::NAN).is_err());
+    assert!(shards.break_again(0, f32::NAN, 0).is_err() && shards.break_again(77, 0.1, 0).is_err());
+    assert!(
+        Burst::new(BurstParams { drag: f32::NAN, ..BurstParams::DEFAULT }, Vec2::ZERO, Vec3::ZERO, 1.0, 0).is_err()
+    );
+    assert!(Burst::new(BurstParams::DEFAULT, Vec2::NAN, Vec3::ZERO, 1.0, 0).is_err());
+}
+
+/// Every open end is carried on: nothing that was drawn is left out of the outlines, but for what was too small.
+#[test]
+fn open_cracks_are_carried_on() {
+    let mut cuts = Cuts::new(Vec2::ONE).unwrap();
+    cuts.add_line(&[Vec2::new(0.2, 0.5), Vec2::new(0.6, 0.5)]).unwrap();
+    assert_eq!(shatter(cuts.clone(), &EVERYTHING).unwrap().len(), 1);
+    let shards = shatter(cuts.clone(), &ShatterParams { carry_on: true, ..EVERYTHING }).unwrap();
+    assert_eq!((shards.len(), shards.carried().len()), (2, 2));
+    check_tiling(&shards);
+
+    let mut rng = Rng::new(22);
+    for _ in 0..200 {
+        let network = planar_network(30, Vec2::ONE, &mut rng);
+        let cuts = Cuts::from_network(&network).unwrap();
+        let mut drawing = cuts.drawing.clone();
+        drawing.make_planar();
+        drawing.carry_on(1);
+        let mut degree = vec![0; drawing.places.len()];
+        drawing.edges.iter().flatten().for_each(|&end| degree[end as usize] += 1);
+        let on_border = |place| drawing.lattice.sides(place).contains(&true);
+        for (&place, degree) in drawing.places.iter().zip(degree) {
+            assert!(degree != 1 || on_border(place), "the crack at {place:?} ends nowhere");
+        }
+    }
+}
+
+#[test]
+fn the_shard_at_a_place_is_the_only_one() {
+    let mut rng = Rng::new(23);
+    for _ in 0..100 {
+        let shards = shatter(random_cuts(&mut rng), &EVERYTHING).unwrap();
+        for _ in 0..20 {
+            let place = Vec2::new(rng.unit(), rng.unit()) * shards.extent();
+            let around: Vec<u32> = (0..shards.len() as u32).filter(|&shard| shards.contains(shard, place)).collect();
+            assert_eq!(around.len(), 1);
+            assert_eq!(shards.at(place), Some(around[0]));
+            assert_eq!(shards.distance(around[0], place), 0.0);
+        }
+        for shard in 0..shards.len() as u32 {
+            // A splinter may be thinner than single precision can tell.
+            assert!(shards.contains_place(shard, shards.inner_place(shard).unwrap()));
+        }
+        assert_eq!(shards.at(Vec2::splat(-0.1)), None);
+        assert!(shards.at(shards.extent()).is_some() && shards.at(Vec2::NAN).is_none());
+    }
+}
+
+/// Two ways to the same cells: found one by one as they close, and all at once.
+#[test]
+fn shards_are_the_closed_cells() {
+    let mut rng = Rng::new(27);
+    for _ in 0..300 {
+        let network = planar_network(60, Vec2::new(2.0, 1.0), &mut rng);
+        let mut tracker = CellTracker::new(network.extent());
+        tracker.update(&network);
+        let mut cuts = Cuts::new(network.extent()).unwrap();
+        for segment in network.segments() {
+            let (a, b) = network.ends(segment).unwrap();
+            cuts.add_line(&[a, b].map(|node| network.nodes()[node as usize].pos)).unwrap();
+        }
+        let shards = shatter(cuts, &EVERYTHING).unwrap();
+        assert_eq!(shards.len(), tracker.cells().len());
+        let mut areas = [
+            tracker.cells().iter().map(|cell| cell.area).collect::<Vec<f32>>(),
+            shards.iter().map(|shard| shard.area).collect(),
+        ];
+        areas.iter_mut().for_each(|areas| areas.sort_by(f32::total_cmp));
+        assert!(areas[0].iter().zip(&areas[1]).all(|(a, b)| (a - b).abs() < 1e-6));
+        for number in 0..shards.len() as u32 {
+            let cell = tracker.cell_at(shards.inner_point(number).unwrap()).unwrap();
+            let centre = tracker.cells()[cell as usize].centroid;
+            assert!(centre.distance(shards.get(number).unwrap().centroid) < 1e-4);
+        }
+    }
+}
+
+/// Frozen: what a player has seen break must break the same way after an update.
+#[test]
+fn shards_are_the_same_every_time() {
+    let network = grown(&CrackPreset::GLASS, 2, 1);
+    let params = ShatterParams { carry_on: true, ..ShatterParams::DEFAULT };
+    let once = shatter(Cuts::from_network(&network).unwrap(), &params).unwrap();
+    let again = shatter(Cuts::from_network(&network).unwrap(), &params).unwrap();
+    assert_eq!(once, again);
+    assert!(once.len() > 4, "{}", once.len());
+}
+
+#[test]
+fn crossings_are_cut_where_they_are() {
+    let mut rng = Rng::new(26);
+    for _ in 0..1000 {
+        let mut cuts = random_cuts(&mut rng);
+        cuts.drawing.make_planar();
+        let edges: Vec<_> =
+            cuts.drawing.edges.iter().map(|edge| edge.map(|v| cuts.drawing.places[v as usize])).collect();
+        for (i, &[a, b]) in edges.iter().enumerate() {
+            for &[c, d] in &edges[i + 1..] {
+                let sides = [orient(a, b, c), orient(a, b, d), orient(c, d, a), orient(c, d, b)].map(i64::signum);
+                assert!(sides[0] * sides[1] >= 0 || sides[2] * sides[3] >= 0, "{a:?} {b:?} cross {c:?} {d:?}");
+                assert!(a != b && [a, b] != [c, d] && [a, b] != [d, c]);
+            }
+        }
+    }
+}
