@@ -87,6 +87,8 @@ pub struct CrackGrowth {
     /// Places of markers made since they were last asked for.
     pub(super) shown_markers: Vec<Vec2>,
     pub(super) changes: Changes,
+    /// Empty but for its memory.
+    pub(super) widened: Vec<u32>,
     pub(super) timeline: Timeline,
     pub(super) pulls: Vec<Pull>,
     /// Node and entry in `pulls`, in order of the nodes.
@@ -130,6 +132,7 @@ impl CrackGrowth {
             links_told: 0,
             shown_markers: Vec::new(),
             changes: Changes::default(),
+            widened: Vec::new(),
             timeline: Timeline::default(),
             pulls: Vec::new(),
             order: Vec::new(),
@@ -198,20 +201,14 @@ impl CrackGrowth {
 
     /// Lets `act` widen nodes, and notes which became wider.
     fn widen_with(&mut self, act: impl FnOnce(&mut Widths, &mut [Node], &mut dyn FnMut(u32))) {
-        let mut widened = [NO_PARENT; 64];
-        let mut n = 0;
-        act(&mut self.widths, &mut self.network.nodes, &mut |node| {
-            // Each node on the way up is wider than the one before, so there are no more than notches.
-            if let Some(slot) = widened.get_mut(n) {
-                *slot = node;
-                n += 1;
-            }
-        });
-        for &node in &widened[..n] {
-            let widened = self.network.nodes[node as usize];
-            self.changes.widened(node, widened.parent != NO_PARENT);
-            self.timeline.widen(node, widened.width);
+        let mut widened = std::mem::take(&mut self.widened);
+        act(&mut self.widths, &mut self.network.nodes, &mut |node| widened.push(node));
+        for node in widened.drain(..) {
+            let wider = self.network.nodes[node as usize];
+            self.changes.widened(node, wider.parent != NO_PARENT);
+            self.timeline.widen(node, wider.width);
         }
+        self.widened = widened;
     }
 
     /// One step of growth (Couto et al., eq. 2): every node that attracts markers grows one node at
