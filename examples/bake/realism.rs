@@ -61,7 +61,7 @@ const fn view(preset: &str) -> View {
         b"glass" => ((1, 4), (0.0046, 0.114), 1.86, 0.88),
         b"laminated_glass" => ((1, 4), (0.02, 0.5), 1.0, 0.5),
         // One hit cracks the whole surface.
-        b"tempered_glass" => ((1, 1), (1.0, 1.0), 2.6, 0.8),
+        b"tempered_glass" => ((1, 1), (1.0, 1.0), 2.7, 0.8),
         b"mud" => ((1, 1), (1.0, 1.0), 1.7, 1.0),
         b"glaze" => ((1, 1), (1.0, 1.0), 1.4, 0.8),
         b"clay" => ((1, 3), (0.5, 1.5), 1.0, 1.0),
