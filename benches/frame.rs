@@ -3,7 +3,9 @@
 //! `cargo bench --profile dev --bench frame`: the build that `cargo test` uses.
 //! `growing/*`: 100 surfaces of 512 x 512 that were hit at once, one step a frame each; the time of an idle frame of the same
 //! app is taken off. `finished/*`: a frame with 10,000 cracked surfaces of 32 x 32 that have come to an end, beside one with
-//! 10,000 plain sprites. With a Vulkan driver (software will do) uploads are part of it; without, it says so.
+//! 10,000 plain sprites. `baking`: what of each frame the crate's systems take while guided cracks are baked and appear, 60 frames
+//! a second, from the first frame to ten after the last crack. With a Vulkan driver (software will do) uploads are part of it;
+//! without, it says so.
 
 #![expect(clippy::print_stdout, clippy::expect_used, reason = "a benchmark")]
 
@@ -15,6 +17,7 @@ use bevy::{
     time::TimeUpdateStrategy,
 };
 use bevy_crack::{
+    Grid,
     growth::CrackGrowth,
     paint::{BaseTexels, LookTable, PaintTargets, paint_into},
     pattern::SurfaceFrame,
@@ -27,6 +30,8 @@ use std::time::{Duration, Instant};
 
 const SURFACES: usize = 100;
 const SIDE: u32 = 512;
+/// Bakes of each size that are measured.
+const BAKES: usize = 8;
 /// Growing frames that are measured, after the one in which the textures are made.
 const FRAMES: u32 = 12;
 
@@ -238,7 +243,44 @@ fn many(cracked: bool) -> App {
     app
 }
 
+/// Time of the crate's systems in each frame of some bakes, each on a new surface.
+fn baking_frames(side: u32) -> Vec<Duration> {
+    let mut app = app();
+    measure_systems(&mut app);
+    app.insert_resource(CrackBudget { max_texture_bytes: 1 << 34, ..default() });
+    let cross = |at: UVec2| f32::from(u8::from((24..40).contains(&at.x) || (24..40).contains(&at.y)));
+    let texels = (0..64 * 64).map(|i| cross(UVec2::new(i % 64, i / 64))).collect();
+    let guide = Grid::from_vec(UVec2::splat(64), texels).expect("the size fits");
+    let mut times = Vec::new();
+    for seed in 0..BAKES as u64 {
+        let entity = with_sprites(&mut app, 1, side, false)[0];
+        let guided = GuidedCracks { max_side: side, ..GuidedCracks::new(CrackGuide::new(guide.clone())) };
+        app.world_mut().entity_mut(entity).insert((CrackSurface::new(CrackPreset::CONCRETE), guided.with_seed(seed)));
+        let mut after = 0;
+        while after < 10 {
+            app.insert_resource(OurSystems::default());
+            let frame = time_of(|| app.update());
+            times.push(app.world().resource::<OurSystems>().1);
+            let state = app.world().get::<CrackState>(entity);
+            after += u32::from(state.is_some_and(|state| state.status == CrackStatus::Done));
+            std::thread::sleep((Duration::from_secs(1) / 60).saturating_sub(frame));
+        }
+        app.world_mut().despawn(entity);
+        (0..3).for_each(|_| app.update());
+    }
+    times
+}
+
+fn baking(side: u32) {
+    let mut times = baking_frames(side);
+    times.sort();
+    let at = |share: f64| times[((times.len() - 1) as f64 * share) as usize].as_secs_f64() * 1e3;
+    let (half, most, all) = (at(0.5), at(0.99), at(1.0));
+    println!("baking {side} x {side}: {} frames, p50 {half:.3} ms, p99 {most:.3} ms, max {all:.3} ms", times.len());
+}
+
 fn frame(c: &mut Criterion) {
+    [1024, 2048].into_iter().for_each(baking);
     let (_, systems, bytes) = growing_frames();
     println!("the main world's systems: {:.2} ms a frame", systems.as_secs_f64() * 1e3);
     let whole = SURFACES as u64 * u64::from(SIDE * SIDE) * 8;

@@ -4,8 +4,13 @@
 //! dirty rectangle painted alone equals the whole painted anew, bit for bit. Where the field is untouched, the
 //! painted texel is the base texel.
 
+mod diffuse;
 mod look;
 mod modulate;
+mod patch;
+mod rows;
+#[cfg(test)]
+mod tests;
 mod texel;
 
 pub use look::{ColorStop, Look, LookError, LookTable};

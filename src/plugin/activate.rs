@@ -1,7 +1,7 @@
 //! From hits to cracks: a surface gets its growth and textures at its first hit.
 
 use super::{
-    CrackBudget, CrackClock, CrackError, CrackFailed, CrackResolution, CrackState, CrackStats, CrackStatus,
+    CrackBudget, CrackClock, CrackError, CrackFailed, CrackMaps, CrackResolution, CrackState, CrackStats, CrackStatus,
     CrackSurface, CrackTextures, HitPoint,
     budget::FrameClock,
     carrier::{self, Carrier, Found, Shown},
@@ -10,18 +10,19 @@ use super::{
     preset,
     queue::{HitQueue, QueuedHit},
     shards::Struck,
-    surfaces::{Active, Surfaces, Touched},
-    textures,
+    surfaces::{Active, Ground, Surfaces},
+    textures::{self, TextureKind},
     upload::Uploads,
 };
 use crate::{
-    CrackPreset, Grid,
+    CrackPreset,
     growth::{CrackGrowth, HitOutcome},
     paint::LookTable,
-    pattern::{CellTracker, SurfaceFrame},
+    pattern::SurfaceFrame,
     raster::{DepthField, TexelRect},
 };
 use bevy::{image::ImageSampler, prelude::*, render::renderer::RenderDevice};
+use std::sync::Arc;
 
 /// Share of the frame's budget after which no further hit is applied.
 const SHARE: f32 = 0.4;
@@ -31,9 +32,6 @@ const DEFAULT_SIDE: f32 = 512.0;
 
 /// Textures are not made coarser than this to fit the budget, texels.
 const MIN_SIDE: u32 = 64;
-
-/// Longer side of the mask that keeps cracks off transparent texels: a tenth of the distance between markers.
-const MASK_SIDE: u32 = 256;
 
 /// The largest depth of parallax that still looks like depth, in units of the texture.
 const MAX_PARALLAX: f32 = 0.1;
@@ -157,65 +155,37 @@ pub(super) fn make_ready(world: &mut World, entity: Entity) -> Result<bool, Crac
     let Some(preset) = preset::resolve(world, &surface.preset)? else { return Ok(false) };
     let Some(draft) = draft(world, &surface, &shown, 0)? else { return Ok(false) };
     let Some(mask) = mask::resolve(world, &surface, &shown, &draft)? else { return Ok(false) };
-    let frame = frame(draft.rect)?;
+    let frame = frame(draft.plan.rect)?;
     let mut growth = CrackGrowth::new(preset.growth.clone(), frame.extent(), surface.seed)
         .map_err(|error| CrackError::Preset { reason: error.to_string() })?;
     let look = look(&preset, frame)?;
     if surface.alpha_mask {
-        growth.set_density(density(draft.rect.size(), |texel| draft.base.is_hole(draft.rect.min + texel)));
+        growth.set_density(draft.base.density(draft.plan.rect));
     }
     let mut field = DepthField::new(frame);
     field.forbid(&mask);
     growth.set_mask(mask);
-
-    let carrier = Carrier { kind, shown, own: None, mesh: None, is_sized: false };
-    let mut active = Active {
+    let textures = make_textures(world, &draft, None)?;
+    let Draft { base, plan: PicturePlan { rect, bytes, .. } } = draft;
+    let active = Active::new(
+        Ground { surface, preset, look, base, textures, carrier: Carrier::new(kind, shown), bytes, rect },
         growth,
         field,
-        profile: preset.profile,
-        look,
-        textures: make_textures(world, &draft, None)?,
-        base: draft.base,
-        carrier,
-        bytes: draft.bytes,
-        views: Vec::new(),
-        view: 0,
-        rate: preset.steps_per_second,
-        due: 0.0,
-        clock: None,
-        closing: None,
-        appearing: None,
-        added: None,
-        playback: None,
-        hits: 0,
-        touched: Touched::new(frame.size()),
-        is_growing: false,
-        is_dirty: false,
-        is_open: false,
-        is_outdated: false,
-        frozen: None,
-        tips_from: 0,
-        cells: CellTracker::new(frame.extent()),
-        cells_told: 1,
-        struck: None,
-        fell_at: (0, 1),
-        broken: None,
-        surface,
-        preset,
-        has_new_settings: false,
-    };
+    );
+    install(world, entity, active);
+    Ok(true)
+}
+
+/// Puts a surface among those that crack.
+pub(super) fn install(world: &mut World, entity: Entity, mut active: Active) {
     if let Some(mut clock) = world.get_mut::<CrackClock>(entity) {
         active.follow(clock.bypass_change_detection());
     }
-    active.show(draft.rect);
-    // The textures begin as the base: nothing is dirty.
-    active.views[0].dirty.clear();
     attach(world, entity, &mut active);
     let mut surfaces = world.resource_mut::<Surfaces>();
     surfaces.bytes += active.bytes;
     surfaces.own(entity, &active);
     surfaces.active.insert(entity, active);
-    Ok(true)
 }
 
 /// Makes the entity show the surface's textures.
@@ -229,54 +199,82 @@ pub(super) fn attach(world: &mut World, entity: Entity, active: &mut Active) {
 
 /// The pictures of a surface, ready to be cracked.
 pub(super) struct Draft {
-    pub(super) base: BasePicture,
+    pub(super) base: Arc<BasePicture>,
+    pub(super) plan: PicturePlan,
+}
+
+/// What the pictures of a surface will be.
+#[derive(Clone)]
+pub(super) struct PicturePlan {
+    pub(super) size: UVec2,
     /// The part of the image that is shown.
     pub(super) rect: TexelRect,
     /// Bytes of the textures and of what belongs to them.
     pub(super) bytes: u64,
-    sampler: ImageSampler,
-    maps: super::CrackMaps,
+    pub(super) sampler: ImageSampler,
+    pub(super) maps: CrackMaps,
 }
 
-/// Reads the pictures of a surface; `None` if they are not there yet. `owned` bytes of the budget are its own already.
-pub(super) fn draft(
+impl PicturePlan {
+    /// The pictures, read.
+    pub(super) fn read(&self, [diffuse, normal, depth]: [Option<&Image>; 3]) -> Result<BasePicture, CrackError> {
+        let n = self.size.x as usize * self.size.y as usize;
+        let read =
+            |image: Option<&Image>| image.map(|image| picture::read(image, Space::Linear, self.size)).transpose();
+        Ok(BasePicture {
+            size: self.size,
+            diffuse: match diffuse {
+                Some(image) => picture::read_shown(image, self.size)?,
+                None => vec![255; n * 4],
+            },
+            normal: if self.maps.normal { read(normal)? } else { None },
+            depth: if self.maps.depth { read(depth)?.map(|rgba| picture::red(&rgba)) } else { None },
+        })
+    }
+}
+
+/// Plans the pictures of a surface; `None` if they are not there yet. `owned` bytes of the budget are its own already.
+pub(super) fn plan_pictures(
     world: &World,
     surface: &CrackSurface,
     shown: &Shown,
     owned: u64,
-) -> Result<Option<Draft>, CrackError> {
+) -> Result<Option<PicturePlan>, CrackError> {
     let images = world.get_resource::<Assets<Image>>().ok_or(CrackError::NoImages)?;
     for picture in shown.pictures() {
         if !picture::is_loaded(world, picture)? {
             return Ok(None);
         }
     }
-    let maps = super::CrackMaps {
+    let maps = CrackMaps {
         diffuse: surface.write.diffuse && shown.maps.diffuse,
         normal: surface.write.normal && shown.maps.normal,
         depth: surface.write.depth && shown.maps.depth,
     };
     let image = shown.diffuse.as_ref().and_then(|picture| images.get(picture));
     let size = size(world, surface, shown, image, maps, owned)?;
-    let read = |picture: &Option<Handle<Image>>, space| -> Result<Option<Vec<u8>>, CrackError> {
-        let image = picture.as_ref().and_then(|picture| images.get(picture));
-        image.map(|image| picture::read(image, space, size)).transpose()
-    };
-    let n = size.x as usize * size.y as usize;
-    let base = BasePicture {
-        size,
-        diffuse: read(&shown.diffuse, Space::Srgb)?.unwrap_or_else(|| vec![255; n * 4]),
-        normal: if maps.normal { read(&shown.normal, Space::Linear)? } else { None },
-        depth: if maps.depth { read(&shown.depth, Space::Linear)?.map(|rgba| picture::red(&rgba)) } else { None },
-    };
     let whole = TexelRect::whole(size);
     let rect = shown.rect.map_or(whole, |rect| TexelRect { min: rect.min, max: rect.max }.intersect(whole));
     let sampler = image.map_or(ImageSampler::Default, |image| image.sampler.clone());
-    Ok(Some(Draft { base, rect, bytes: bytes(size, maps), sampler, maps }))
+    Ok(Some(PicturePlan { size, rect, bytes: bytes(size, maps), sampler, maps }))
+}
+
+/// Reads the pictures of a surface; `None` if they are not there yet. `owned` as in [`plan_pictures`].
+pub(super) fn draft(
+    world: &World,
+    surface: &CrackSurface,
+    shown: &Shown,
+    owned: u64,
+) -> Result<Option<Draft>, CrackError> {
+    let Some(plan) = plan_pictures(world, surface, shown, owned)? else { return Ok(None) };
+    let images = world.get_resource::<Assets<Image>>().ok_or(CrackError::NoImages)?;
+    let image = |picture: &Option<Handle<Image>>| picture.as_ref().and_then(|picture| images.get(picture));
+    let base = plan.read([&shown.diffuse, &shown.normal, &shown.depth].map(image))?;
+    Ok(Some(Draft { base: Arc::new(base), plan }))
 }
 
 /// Bytes of the textures on the CPU and the GPU, the base picture and the depth field.
-fn bytes(size: UVec2, maps: super::CrackMaps) -> u64 {
+fn bytes(size: UVec2, maps: CrackMaps) -> u64 {
     let texel = 4 + 2 + 8 * u64::from(maps.diffuse) + 8 * u64::from(maps.normal) + 2 * u64::from(maps.depth);
     u64::from(size.x) * u64::from(size.y) * texel
 }
@@ -287,7 +285,7 @@ fn size(
     surface: &CrackSurface,
     shown: &Shown,
     image: Option<&Image>,
-    maps: super::CrackMaps,
+    maps: CrackMaps,
     owned: u64,
 ) -> Result<UVec2, CrackError> {
     let own_size = match image {
@@ -344,15 +342,14 @@ pub(super) fn make_textures(
 ) -> Result<CrackTextures, CrackError> {
     world.resource_mut::<Uploads>().expect_whole();
     let mut images = world.get_resource_mut::<Assets<Image>>().ok_or(CrackError::NoImages)?;
-    let mut add = |wanted: bool,
-                   make: fn(&BasePicture, &ImageSampler) -> Option<Image>,
-                   old: Option<&Option<Handle<Image>>>|
-     -> Result<Option<Handle<Image>>, CrackError> {
-        if !wanted {
+    let Draft { base, plan } = draft;
+    let mut add = |kind: &TextureKind, old: Option<&Option<Handle<Image>>>| -> Result<_, CrackError> {
+        if !(kind.is_wanted)(plan.maps) {
             return Ok(None);
         }
-        let UVec2 { x: width, y: height } = draft.base.size;
-        let image = make(&draft.base, &draft.sampler).ok_or(CrackError::Size { width, height })?;
+        let UVec2 { x: width, y: height } = base.size;
+        let image =
+            kind.image(base.size, (kind.texels)(base), &plan.sampler).ok_or(CrackError::Size { width, height })?;
         if let Some(Some(old)) = old
             && let Some(mut place) = images.get_mut(old)
         {
@@ -362,25 +359,8 @@ pub(super) fn make_textures(
         Ok(Some(images.add(image)))
     };
     Ok(CrackTextures {
-        diffuse: add(draft.maps.diffuse, textures::diffuse, reuse.map(|t| &t.diffuse))?,
-        normal: add(draft.maps.normal, textures::normal, reuse.map(|t| &t.normal))?,
-        depth: add(draft.maps.depth, textures::depth, reuse.map(|t| &t.depth))?,
+        diffuse: add(&textures::DIFFUSE, reuse.map(|t| &t.diffuse))?,
+        normal: add(&textures::NORMAL, reuse.map(|t| &t.normal))?,
+        depth: add(&textures::DEPTH, reuse.map(|t| &t.depth))?,
     })
-}
-
-/// Where cracks may go: not over holes. `None` if there are none.
-pub(super) fn density(size: UVec2, is_hole: impl Fn(UVec2) -> bool) -> Option<Grid<f32>> {
-    if !(0..size.y).any(|y| (0..size.x).any(|x| is_hole(UVec2::new(x, y)))) {
-        return None;
-    }
-    let side = size.max_element().max(MASK_SIDE);
-    let mask_size = UVec2::new((size.x * MASK_SIDE).div_ceil(side), (size.y * MASK_SIDE).div_ceil(side));
-    let mut mask = Grid::new(mask_size, 0.0);
-    for y in 0..mask_size.y {
-        for (x, value) in (0..mask_size.x).zip(mask.row_mut(y as usize)) {
-            let texel = (UVec2::new(2 * x + 1, 2 * y + 1) * size) / (2 * mask_size);
-            *value = if is_hole(texel) { 0.0 } else { 1.0 };
-        }
-    }
-    Some(mask)
 }

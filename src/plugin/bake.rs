@@ -1,27 +1,29 @@
-//! Bakes: from guides to a network, on a task or in slices of frames.
+//! Bakes: from guides to cracks on a surface, on tasks or in slices of frames. A frame only hands over what is ready.
+
+mod finish;
+mod job;
+mod land;
+mod read;
 
 use super::{
-    BakeProgress, CrackBaked, CrackBudget, CrackError, CrackFailed, CrackStatus, GuideSource, GuidedAppearance,
-    GuidedCracks,
-    activate::{make_ready, set_status},
+    BakeProgress, CrackBaked, CrackBudget, CrackError, CrackFailed, CrackMaskSource, CrackSurface, CrackTextures,
+    GuideSource, GuidedCracks,
+    activate::{PicturePlan, plan_pictures},
     budget::FrameClock,
-    picture::{self, Space},
-    shards::drop_shards,
-    surfaces::{Active, Added, Surfaces},
-    watch::grown_anew,
+    carrier::{self, Found, Kind, Shown},
+    mask::{Key, PictureMasks},
+    picture, preset,
+    surfaces::Surfaces,
 };
-use crate::{
-    Grid,
-    pattern::Network,
-    raster::TexelRect,
-    voronoi::{self, Guide, Seams, VoronoiBake},
-};
+use crate::CrackPreset;
 use bevy::{
-    asset::RenderAssetUsages,
-    image::{CompressedImageFormats, ImageSampler, ImageType},
     prelude::*,
     tasks::{AsyncComputeTaskPool, Task, futures::check_ready},
 };
+use finish::{Finish, Finished, Next};
+use job::{Lines, MAPPED, MAX_SIDE, MapJob, RawMask, RawSurface, Source, Surface};
+use land::{land, order};
+use read::{Read, Reading};
 use std::{
     panic::{AssertUnwindSafe, catch_unwind},
     sync::{
@@ -29,48 +31,41 @@ use std::{
         atomic::{AtomicBool, AtomicU32, Ordering},
     },
     thread::{self, ThreadId},
-    vec,
 };
 
 /// Share of the frame's budget after which no further slice is made.
 const SHARE: f32 = 0.9;
 
-/// Texels of a slice: well below a millisecond.
-const SLICE: u32 = 1 << 14;
-
-/// Longest side of a guide, texels.
-const MAX_SIDE: u32 = 8192;
-
-/// The most bytes of a guide.
-const MAX_BYTES: u64 = 256 << 20;
-
-/// Steps in which the cracks of a front open behind its tip.
-const FRONT_OPENING: u32 = 12;
-
-/// Steps in which cracks open that widen all at once.
-const WIDE_OPENING: u32 = 32;
-
-/// Shares of the whole that reading the guides and drawing the lines are told to be.
-const READ: f32 = 0.1;
-const MAPPED: f32 = 0.95;
-
 /// The bakes that go on, in order.
 #[derive(Resource, Default)]
 pub(super) struct Bakes {
-    list: Vec<(Entity, Work)>,
+    list: Vec<(Entity, Bake)>,
     /// Bakes were cancelled while the list was worked on.
     cancelled: Vec<Entity>,
     /// Whether tasks turned out to run in place.
     no_threads: bool,
 }
 
+/// A bake that goes on.
+struct Bake {
+    work: Work,
+    /// The surface, if it has not cracked when the bake began.
+    plan: Option<Box<Plan>>,
+    /// How often its surface has changed too late.
+    rounds: u32,
+}
+
 enum Work {
     /// Its pictures may not be there yet.
     Wanted,
+    /// Pictures are copied.
+    Reading(Reading, Box<MapJob>),
     /// Others come first.
-    Ready(Box<Job>),
+    Ready(Job),
     Task(Run),
-    Slices(Box<Job>),
+    Slices(Job),
+    /// Textures are on their way to the renderer, for so many frames.
+    Landing(Box<Finished>, u32),
 }
 
 impl Work {
@@ -79,18 +74,50 @@ impl Work {
     }
 }
 
+/// A surface that has not cracked, as it was when its pictures were read.
+struct Plan {
+    surface: CrackSurface,
+    preset: CrackPreset,
+    kind: &'static Kind,
+    shown: Shown,
+    pictures: PicturePlan,
+    /// Its textures, without texels.
+    textures: Option<CrackTextures>,
+    /// Whether a picture has changed since.
+    is_outdated: bool,
+}
+
+impl Plan {
+    /// Whether the entity still shows what it showed.
+    fn is_current(&self, world: &World, entity: Entity) -> bool {
+        world.get::<CrackSurface>(entity) == Some(&self.surface)
+            && matches!(carrier::inspect(world, entity), (_, Found::Shown(shown)) if *shown == self.shown)
+    }
+}
+
 impl Bakes {
     /// Begins a bake anew.
     pub(super) fn want(&mut self, entity: Entity) {
         self.cancel(entity);
         self.cancelled.retain(|cancelled| *cancelled != entity);
-        self.list.push((entity, Work::Wanted));
+        self.list.push((entity, Bake { work: Work::Wanted, plan: None, rounds: 0 }));
     }
 
     /// Ends a bake without a word.
     pub(super) fn cancel(&mut self, entity: Entity) {
         self.list.retain(|(baked, _)| *baked != entity);
         self.cancelled.push(entity);
+    }
+
+    /// The picture is another one now.
+    pub(super) fn forget_picture(&mut self, picture: AssetId<Image>) {
+        for plan in self.list.iter_mut().filter_map(|(_, bake)| bake.plan.as_mut()) {
+            plan.is_outdated = plan.is_outdated || plan.shown.pictures().any(|shown| shown.id() == picture);
+        }
+    }
+
+    fn pool(&self) -> Option<&'static AsyncComputeTaskPool> {
+        AsyncComputeTaskPool::try_get().filter(|_| !self.no_threads)
     }
 }
 
@@ -121,7 +148,6 @@ struct Run {
 }
 
 /// What a task and its surface tell one another.
-#[derive(Default)]
 struct Line {
     cancelled: AtomicBool,
     /// The bits of the progress.
@@ -137,20 +163,21 @@ impl Drop for Run {
 /// What comes back from a task.
 enum Outcome {
     /// It runs where it was started, which would stand still meanwhile.
-    NoThread(Box<Job>),
-    Ended(Result<Product, CrackError>),
+    NoThread(Job),
+    Ended(Result<Made, CrackError>),
 }
 
 impl Run {
-    fn start(pool: &AsyncComputeTaskPool, job: Box<Job>) -> Self {
-        let line = Arc::new(Line::default());
+    fn start(pool: &AsyncComputeTaskPool, job: Job) -> Self {
+        let progress = AtomicU32::new(job.progress().to_bits());
+        let line = Arc::new(Line { cancelled: AtomicBool::new(false), progress });
         let (lined, home) = (line.clone(), thread::current().id());
         Self { task: pool.spawn(async move { work(job, &lined, home) }), line }
     }
 }
 
 /// The work of a task.
-fn work(mut job: Box<Job>, line: &Line, home: ThreadId) -> Outcome {
+fn work(mut job: Job, line: &Line, home: ThreadId) -> Outcome {
     if thread::current().id() == home {
         return Outcome::NoThread(job);
     }
@@ -158,11 +185,12 @@ fn work(mut job: Box<Job>, line: &Line, home: ThreadId) -> Outcome {
         if line.cancelled.load(Ordering::Relaxed) {
             return Outcome::Ended(Err(CrackError::Bake { reason: "cancelled".into() }));
         }
-        match guarded(|| job.step()) {
-            Ok(None) => line.progress.store(job.progress.to_bits(), Ordering::Relaxed),
-            Ok(Some(product)) => return Outcome::Ended(Ok(product)),
+        line.progress.store(job.progress().to_bits(), Ordering::Relaxed);
+        job = match guarded(|| job.step()) {
+            Ok(Step::More(job)) => job,
+            Ok(Step::Made(made)) => return Outcome::Ended(Ok(made)),
             Err(error) => return Outcome::Ended(Err(error)),
-        }
+        };
     }
 }
 
@@ -174,103 +202,43 @@ fn guarded<T>(run: impl FnOnce() -> Result<T, CrackError>) -> Result<T, CrackErr
     })
 }
 
-/// A bake as a machine that is stepped; depends on nothing but itself.
-struct Job {
-    sources: vec::IntoIter<(Source, f32)>,
-    n_sources: usize,
-    guides: Vec<Guide>,
-    guided: GuidedCracks,
-    size: UVec2,
-    map: Option<VoronoiBake>,
-    progress: f32,
+/// The two parts of a bake, machines that are stepped: between them it is seen what has become of the surface.
+enum Job {
+    Map(Box<MapJob>),
+    Finish(Box<Finish>),
 }
 
-/// A guide that is not read yet.
-enum Source {
-    Image(Box<Image>),
-    Grid(Arc<Grid<f32>>),
-    Png(Arc<[u8]>),
-    /// The surface's own picture.
-    Own(UVec2, Vec<u8>),
+enum Made {
+    Lines(Lines),
+    Surface(Box<Finished>),
 }
 
-/// What a bake makes.
-struct Product {
-    network: Network,
-    opening: u32,
-    covered: Option<f32>,
+enum Step {
+    More(Job),
+    Made(Made),
 }
 
 impl Job {
     /// A slice of the work.
-    fn step(&mut self) -> Result<Option<Product>, CrackError> {
-        if let Some((source, gamma)) = self.sources.next() {
-            let index = self.guides.len();
-            let image = source.read().map_err(|reason| CrackError::Guide { index, reason })?;
-            self.guides.push(Guide { image, gamma });
-            self.progress = READ * self.guides.len() as f32 / self.n_sources as f32;
-            return Ok(None);
+    fn step(self) -> Result<Step, CrackError> {
+        Ok(match self {
+            Self::Map(mut map) => match map.step()? {
+                Some(lines) => Step::Made(Made::Lines(lines)),
+                None => Step::More(Self::Map(map)),
+            },
+            Self::Finish(finish) => match finish.step()? {
+                Next::More(finish) => Step::More(Self::Finish(finish)),
+                Next::Done(finished) => Step::Made(Made::Surface(finished)),
+            },
+        })
+    }
+
+    fn progress(&self) -> f32 {
+        match self {
+            Self::Map(map) => map.progress,
+            Self::Finish(_) => MAPPED,
         }
-        let Some(map) = &mut self.map else {
-            let (params, guides) = (self.guided.params.clone(), core::mem::take(&mut self.guides));
-            let map = VoronoiBake::new(params, guides, self.size, self.guided.seed);
-            self.map = Some(map.map_err(|error| CrackError::Bake { reason: error.to_string() })?);
-            return Ok(None);
-        };
-        if let voronoi::BakeProgress::Working(share) = map.step((SLICE / self.size.x).max(1) as usize) {
-            self.progress = READ + (MAPPED - READ) * share;
-            return Ok(None);
-        }
-        let Some((map, seams)) = self.map.take().map(VoronoiBake::finish) else { return Ok(None) };
-        let covered = map.strokes().map(|strokes| strokes.covered);
-        drop(map);
-        let (network, opening) = lines(&seams, self.guided.appearance);
-        Ok(Some(Product { network, opening, covered }))
     }
-}
-
-/// The seams in the order in which they come, and the steps in which each opens.
-fn lines(seams: &Seams, appearance: GuidedAppearance) -> (Network, u32) {
-    if let GuidedAppearance::Front { from, .. } = appearance {
-        return (seams.network(from * seams.extent), FRONT_OPENING);
-    }
-    let mut network = seams.network(Vec2::ZERO);
-    network.nodes.iter_mut().for_each(|node| node.birth = 0);
-    network.links.iter_mut().for_each(|link| link.birth = 0);
-    (network, if matches!(appearance, GuidedAppearance::AtOnce) { 0 } else { WIDE_OPENING })
-}
-
-impl Source {
-    fn read(self) -> Result<Grid<f32>, String> {
-        let image = match self {
-            Self::Grid(grid) => return Ok(Arc::unwrap_or_clone(grid)),
-            Self::Own(size, rgba) => {
-                let picture = voronoi::lightness(size, &rgba).ok_or("its size is wrong")?;
-                return Ok(voronoi::edges(&picture));
-            }
-            Self::Image(image) => *image,
-            Self::Png(file) => decode(&file)?,
-        };
-        let size = picture::readable_size(&image).map_err(|error| error.to_string())?;
-        let rgba = picture::read(&image, Space::Srgb, size).map_err(|error| error.to_string())?;
-        Ok(voronoi::ink(size, &rgba).ok_or("its size is wrong")?)
-    }
-}
-
-/// A PNG file as an image; what is too large is refused before memory is taken.
-fn decode(file: &[u8]) -> Result<Image, String> {
-    // Signature, length of the header, its name; width, height, bits, kind of colour.
-    let header = file.strip_prefix(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR").and_then(|rest| rest.first_chunk::<10>());
-    let &[a, b, c, d, e, f, g, h, bits, _] = header.ok_or("it is no PNG file")?;
-    let (width, height) = (u32::from_be_bytes([a, b, c, d]), u32::from_be_bytes([e, f, g, h]));
-    let texel = 4 * u64::from(bits.div_ceil(8));
-    if width.max(height) > MAX_SIDE || u64::from(width) * u64::from(height) * texel > MAX_BYTES {
-        return Err(format!("{width} x {height} texels are beyond the limit of {MAX_SIDE} a side and 256 MiB"));
-    }
-    let (kind, sampler) = (ImageType::MimeType("image/png"), ImageSampler::Default);
-    let usage = RenderAssetUsages::MAIN_WORLD;
-    Image::from_buffer(file, kind, CompressedImageFormats::NONE, true, sampler, usage)
-        .map_err(|error| error.to_string().lines().next().unwrap_or_default().to_owned())
 }
 
 /// Works on all bakes: starts those that can start, asks those on tasks, and makes slices of those that have none.
@@ -279,52 +247,90 @@ pub(super) fn bake_guided(world: &mut World) {
     let mut bakes = world.resource_mut::<Bakes>();
     bakes.cancelled.clear();
     let mut list = core::mem::take(&mut bakes.list);
-    let pool = AsyncComputeTaskPool::try_get().filter(|_| !bakes.no_threads);
+    let pool = bakes.pool();
     let mut room = pool.map_or(1, |pool| pool.thread_num().max(1));
-    room = room.saturating_sub(list.iter().filter(|(_, work)| work.is_running()).count());
+    room = room.saturating_sub(list.iter().filter(|(_, bake)| bake.work.is_running()).count());
+    let mut left = read::MAX_BYTES;
     let mut ended = Vec::new();
-    list.retain_mut(|(entity, work)| {
+    list.retain_mut(|(entity, bake)| {
         let result = loop {
-            match work {
-                Work::Wanted => match job(world, *entity) {
-                    Ok(Some(job)) => *work = Work::Ready(Box::new(job)),
+            match core::mem::replace(&mut bake.work, Work::Wanted) {
+                Work::Wanted => match begin(world, *entity, bake) {
+                    Ok(Some(work)) => bake.work = work,
                     Ok(None) => {
                         tell(world, *entity, 0.0);
                         return true;
                     }
                     Err(error) => break Err(error),
                 },
-                Work::Ready(_) => {
+                Work::Reading(mut reading, mut job) => {
                     tell(world, *entity, 0.0);
+                    let Some(images) = world.get_resource::<Assets<Image>>() else { break Err(CrackError::NoImages) };
+                    match reading.step(images, &mut left) {
+                        Read::More => {
+                            bake.work = Work::Reading(reading, job);
+                            return true;
+                        }
+                        // From the start.
+                        Read::Changed => return true,
+                        Read::Done => {
+                            job.copies = reading.finish();
+                            bake.work = Work::Ready(Job::Map(job));
+                        }
+                    }
+                }
+                Work::Ready(job) => {
+                    tell(world, *entity, job.progress());
                     if room == 0 {
+                        bake.work = Work::Ready(job);
                         return true;
                     }
                     room -= 1;
-                    let Work::Ready(job) = core::mem::replace(work, Work::Wanted) else { return true };
-                    *work = match pool {
+                    bake.work = match pool {
                         Some(pool) => Work::Task(Run::start(pool, job)),
                         None => Work::Slices(job),
                     };
                 }
-                Work::Task(run) => match check_ready(&mut run.task) {
+                Work::Task(mut run) => match check_ready(&mut run.task) {
                     None => {
                         tell(world, *entity, f32::from_bits(run.line.progress.load(Ordering::Relaxed)));
+                        bake.work = Work::Task(run);
                         return true;
                     }
                     Some(Outcome::NoThread(job)) => {
                         world.resource_mut::<Bakes>().no_threads = true;
-                        *work = Work::Slices(job);
+                        bake.work = Work::Slices(job);
                     }
-                    Some(Outcome::Ended(result)) => break result,
+                    Some(Outcome::Ended(result)) => match result.and_then(|made| go_on(world, *entity, bake, made)) {
+                        Ok(()) => room += 1,
+                        Err(error) => break Err(error),
+                    },
                 },
-                Work::Slices(job) => match guarded(|| job.step()).transpose() {
-                    None => {
-                        tell(world, *entity, job.progress);
-                        if timer.is_over() {
+                Work::Slices(job) => {
+                    match guarded(|| job.step()) {
+                        Ok(Step::More(job)) => {
+                            tell(world, *entity, job.progress());
+                            bake.work = Work::Slices(job);
+                        }
+                        Ok(Step::Made(made)) => match go_on(world, *entity, bake, made) {
+                            Ok(()) => room += 1,
+                            Err(error) => break Err(error),
+                        },
+                        Err(error) => break Err(error),
+                    }
+                    if timer.is_over() {
+                        return true;
+                    }
+                }
+                Work::Landing(finished, frames) => match land(world, *entity, bake, finished, frames) {
+                    Ok(Some(covered)) => break Ok(covered),
+                    // It waits for the renderer, or has to be made anew.
+                    Ok(None) => {
+                        if !matches!(bake.work, Work::Ready(_)) {
                             return true;
                         }
                     }
-                    Some(result) => break result,
+                    Err(error) => break Err(error),
                 },
             }
         };
@@ -350,15 +356,13 @@ fn tell(world: &mut World, entity: Entity, progress: f32) {
     }
 }
 
-/// Takes up the result of a bake.
-fn end(world: &mut World, entity: Entity, result: Result<Product, CrackError>) {
-    match result.and_then(|product| adopt(world, entity, product)) {
-        Ok(Some(covered)) => {
+/// Tells of the end of a bake.
+fn end(world: &mut World, entity: Entity, result: Result<Option<f32>, CrackError>) {
+    match result {
+        Ok(covered) => {
             tell(world, entity, 1.0);
             world.trigger(CrackBaked { entity, covered });
         }
-        // Healed in the same moment.
-        Ok(None) => {}
         Err(error) => {
             warn!("the guided cracks of {entity} are not made: {error}");
             world.trigger(CrackFailed { entity, error });
@@ -366,101 +370,127 @@ fn end(world: &mut World, entity: Entity, result: Result<Product, CrackError>) {
     }
 }
 
-/// All that a bake needs; `None` if its pictures are not there yet.
-fn job(world: &mut World, entity: Entity) -> Result<Option<Job>, CrackError> {
-    let Some(guided) = world.get::<GuidedCracks>(entity).cloned() else { return Ok(None) };
-    if !make_ready(world, entity)? {
-        return Ok(None);
+/// The pictures that a bake needs a copy of, each once.
+#[derive(Default)]
+struct Pictures(Vec<Handle<Image>>);
+
+impl Pictures {
+    fn add(&mut self, picture: &Handle<Image>) -> usize {
+        self.0.iter().position(|known| known == picture).unwrap_or_else(|| {
+            self.0.push(picture.clone());
+            self.0.len() - 1
+        })
     }
+}
+
+/// All that a bake needs; `None` if its pictures are not there yet.
+fn begin(world: &mut World, entity: Entity, bake: &mut Bake) -> Result<Option<Work>, CrackError> {
+    let Some(guided) = world.get::<GuidedCracks>(entity).cloned() else { return Ok(None) };
+    let mut pictures = Pictures::default();
+    let known = world.resource::<Surfaces>().active.get(&entity).and_then(|active| {
+        let rect = active.views.get(active.view)?.rect;
+        Some(Surface::Known(active.base.clone(), rect))
+    });
+    let surface = match known {
+        Some(surface) => surface,
+        None => {
+            let Some((plan, mask)) = plan(world, entity, &mut pictures)? else { return Ok(None) };
+            let Shown { diffuse, normal, depth, .. } = &plan.shown;
+            let maps = plan.pictures.maps;
+            let needed = [(diffuse, true), (normal, maps.normal), (depth, maps.depth)];
+            let needed = needed.map(|(map, is_needed)| map.as_ref().filter(|_| is_needed).map(|map| pictures.add(map)));
+            let raw = RawSurface { plan: plan.pictures.clone(), pictures: needed, mask };
+            bake.plan = Some(Box::new(plan));
+            Surface::Raw(Box::new(raw))
+        }
+    };
     let images = world.get_resource::<Assets<Image>>().ok_or(CrackError::NoImages)?;
-    let Some(active) = world.resource::<Surfaces>().active.get(&entity) else { return Ok(None) };
     let mut sources = Vec::with_capacity(guided.guides.len());
     for (index, guide) in guided.guides.iter().enumerate() {
         let named = |error: CrackError| CrackError::Guide { index, reason: error.to_string() };
         let source = match &guide.source {
             GuideSource::Grid(grid) => Source::Grid(grid.clone()),
             GuideSource::Png(file) => Source::Png(file.clone()),
-            GuideSource::OwnEdges => {
-                let rect = active.views.get(active.view).map_or(TexelRect::default(), |view| view.rect);
-                Source::Own(rect.size(), super::mask::part(&active.base.diffuse, active.base.size, rect))
-            }
-            GuideSource::Image(image) => {
-                if !picture::is_loaded(world, image).map_err(named)? {
+            GuideSource::OwnEdges => Source::Own,
+            GuideSource::Image(picture) => {
+                if !picture::is_loaded(world, picture).map_err(named)? {
                     return Ok(None);
                 }
-                let Some(image) = images.get(image) else { return Ok(None) };
+                let Some(image) = images.get(picture) else { return Ok(None) };
                 let size = picture::readable_size(image).map_err(named)?;
                 if size.max_element() > MAX_SIDE {
                     return Err(named(CrackError::Size { width: size.x, height: size.y }));
                 }
-                Source::Image(Box::new(image.clone()))
+                Source::Image(pictures.add(picture))
             }
         };
         sources.push((source, guide.gamma));
     }
-    let size = active.field.frame.size();
-    let side = size.max_element();
-    let scale = f64::from(guided.max_side.clamp(1, side)) / f64::from(side);
-    let size = (size.as_dvec2() * scale).round().as_uvec2().max(UVec2::ONE);
-    Ok(Some(Job {
-        n_sources: sources.len(),
-        sources: sources.into_iter(),
-        guides: Vec::new(),
-        guided,
-        size,
-        map: None,
-        progress: 0.0,
-    }))
-}
-
-/// Puts baked cracks on their surface; `None` if it is gone.
-fn adopt(world: &mut World, entity: Entity, product: Product) -> Result<Option<Option<f32>>, CrackError> {
-    let Some(seconds) = world.get::<GuidedCracks>(entity).map(|guided| match guided.appearance {
-        GuidedAppearance::AtOnce => 0.0,
-        GuidedAppearance::Front { seconds, .. } | GuidedAppearance::Widen { seconds } => seconds,
-    }) else {
-        return Ok(None);
+    let size = match &surface {
+        Surface::Known(_, rect) | Surface::Read(_, rect) => rect.size(),
+        Surface::Raw(raw) => raw.plan.rect.size(),
     };
-    let Some(mut active) = world.resource_mut::<Surfaces>().active.remove(&entity) else { return Ok(None) };
-    let outcome = put(world, entity, &mut active, product, seconds);
-    let mut surfaces = world.resource_mut::<Surfaces>();
-    surfaces.active.insert(entity, active);
-    let (bytes, covered) = outcome?;
-    surfaces.bytes -= bytes;
-    surfaces.start_growing(entity);
-    surfaces.soil(entity);
-    set_status(world, entity, CrackStatus::Growing);
-    Ok(Some(covered))
+    let side = size.max_element();
+    let scale = f64::from(guided.max_side.clamp(1, side.max(1))) / f64::from(side.max(1));
+    let size = (size.as_dvec2() * scale).round().as_uvec2().max(UVec2::ONE);
+    let has_threads = world.resource::<Bakes>().pool().is_some();
+    let Some(reading) = Reading::new(pictures.0, images, has_threads) else { return Ok(None) };
+    Ok(Some(Work::Reading(reading, Box::new(MapJob::new(guided, size, surface, sources)))))
 }
 
-/// The same for a surface that is taken out of the others; returns the bytes that it no longer needs and the share that is covered.
-fn put(
-    world: &mut World,
-    entity: Entity,
-    active: &mut Active,
-    product: Product,
-    seconds: f32,
-) -> Result<(u64, Option<f32>), CrackError> {
-    let Product { network, opening, covered } = product;
-    let mut added = Added { network, opening, steps: 0 };
-    // Shards are of the cells that were.
-    let bytes = drop_shards(world, entity, active);
-    if active.added.is_none() && active.growth.network().nodes().is_empty() {
-        added.steps = active.growth.add_cracks(&added.network, added.opening);
-        active.added = Some(added);
-    } else {
-        let before = active.added.replace(added).map_or(0, |before| before.steps);
-        let (extent, mask, density) = (active.field.frame.extent(), active.growth.mask().clone(), active.density());
-        active.growth = grown_anew(active, before, extent, mask, density)?;
+/// What a surface will be that has not cracked yet, and its mask; `None` if its pictures are not there yet.
+fn plan(world: &World, entity: Entity, pictures: &mut Pictures) -> Result<Option<(Plan, RawMask)>, CrackError> {
+    let Some(surface) = world.get::<CrackSurface>(entity).cloned() else { return Err(CrackError::NothingToCrack) };
+    if !world.contains_resource::<Assets<Image>>() {
+        return Err(CrackError::NoImages);
     }
-    let is_untouched = active.growth.impacts().is_empty();
-    active.show_anew(is_untouched.then_some(seconds));
-    Ok((bytes, covered))
+    let (kind, shown) = match carrier::inspect(world, entity) {
+        (Some(kind), Found::Shown(shown)) => (kind, *shown),
+        (_, Found::Waiting) => return Ok(None),
+        (_, Found::Unusable(error)) => return Err(error),
+        _ => return Err(CrackError::NothingToCrack),
+    };
+    let Some(preset) = preset::resolve(world, &surface.preset)? else { return Ok(None) };
+    let Some(plan) = plan_pictures(world, &surface, &shown, 0)? else { return Ok(None) };
+    let mask = match &surface.mask {
+        CrackMaskSource::FromPicture => match &shown.diffuse {
+            Some(picture) => {
+                let key = Key::new(picture, &plan);
+                world.resource::<PictureMasks>().find(key).map_or(RawMask::FromPicture(key), RawMask::Made)
+            }
+            None => RawMask::Made(Arc::default()),
+        },
+        CrackMaskSource::None => RawMask::Made(Arc::default()),
+        CrackMaskSource::Images { weak, strong, forbidden } => {
+            for image in [weak, strong, forbidden].into_iter().flatten() {
+                if !picture::is_loaded(world, image)? {
+                    return Ok(None);
+                }
+            }
+            RawMask::Images([weak, strong, forbidden].map(|image| image.as_ref().map(|image| pictures.add(image))))
+        }
+    };
+    Ok(Some((Plan { surface, preset, kind, shown, pictures: plan, textures: None, is_outdated: false }, mask)))
+}
+
+/// The next part of a bake, from what has been made: work that is ready, or again from the start.
+fn go_on(world: &mut World, entity: Entity, bake: &mut Bake, made: Made) -> Result<(), CrackError> {
+    match made {
+        Made::Lines(lines) => order(world, entity, bake, lines),
+        Made::Surface(finished) => {
+            bake.work = Work::Landing(finished, 0);
+            Ok(())
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    #[cfg(feature = "2d")]
+    use crate::Grid;
+    #[cfg(feature = "2d")]
+    use bevy::asset::RenderAssetUsages;
 
     #[test]
     fn e11_a_panic_is_an_error() {
@@ -477,10 +507,9 @@ mod tests {
         Image::new_fill(extent, TextureDimension::D2, &[200, 200, 200, 255], format, RenderAssetUsages::default())
     }
 
-    /// Frames until the bake has ended, and the progress after each.
+    /// Assets and time, but no renderer; no more than a slice a frame.
     #[cfg(feature = "2d")]
-    fn frames(no_threads: bool) -> (Vec<f32>, Vec<u8>) {
-        use crate::plugin::prelude::*;
+    fn app() -> App {
         use bevy::image::TextureAtlasLayout;
         let mut app = App::new();
         app.add_plugins((
@@ -488,13 +517,28 @@ mod tests {
             TransformPlugin,
             AssetPlugin::default(),
             ImagePlugin::default(),
-            CrackPlugins,
+            crate::plugin::CrackPlugins,
         ))
         .init_asset::<TextureAtlasLayout>();
         app.finish();
         app.cleanup();
-        // No more than a slice a frame.
         app.insert_resource(CrackBudget { milliseconds: 0.0, ..default() });
+        app
+    }
+
+    /// What the sprite shows.
+    #[cfg(feature = "2d")]
+    fn shown(app: &App, entity: Entity) -> Vec<u8> {
+        let image = app.world().get::<Sprite>(entity).map(|sprite| sprite.image.clone()).unwrap_or_default();
+        let images = app.world().resource::<Assets<Image>>();
+        images.get(&image).and_then(|image| image.data.clone()).unwrap_or_default()
+    }
+
+    /// Frames until the bake has ended, and the progress after each.
+    #[cfg(feature = "2d")]
+    fn frames(no_threads: bool) -> (Vec<f32>, Vec<u8>) {
+        use crate::plugin::prelude::*;
+        let mut app = app();
         app.world_mut().resource_mut::<Bakes>().no_threads = no_threads;
         let image = app.world_mut().resource_mut::<Assets<Image>>().add(blank(UVec2::new(300, 200)));
         let guide = CrackGuide::new(Grid::new(UVec2::new(3, 1), 0.5));
@@ -509,9 +553,7 @@ mod tests {
         while app.world().get::<CrackState>(entity).is_some_and(|state| state.status != CrackStatus::Done) {
             app.update();
         }
-        let image = app.world().get::<Sprite>(entity).map(|sprite| sprite.image.clone()).unwrap_or_default();
-        let images = app.world().resource::<Assets<Image>>();
-        (told, images.get(&image).and_then(|image| image.data.clone()).unwrap_or_default())
+        (told, shown(&app, entity))
     }
 
     /// M9: where tasks run in place, a bake goes on in slices of frames, and makes the same cracks.
@@ -524,5 +566,55 @@ mod tests {
         assert!(task.is_sorted());
         assert!(cracked.iter().any(|&value| value < 100), "cracks show");
         assert!(cracked == same, "the same cracks");
+    }
+
+    /// What a frame takes up is ready: all of it is stamped and painted when its end is told.
+    #[cfg(feature = "2d")]
+    #[test]
+    fn no_frame_stamps_or_paints_what_was_baked() {
+        use crate::plugin::prelude::*;
+
+        /// Segments to stamp, whether texels are dirty, and the picture, when the bake ends.
+        #[derive(Resource, Default)]
+        struct Seen(Vec<(usize, bool, Vec<u8>)>);
+
+        let mut app = app();
+        app.init_resource::<Seen>().add_observer(
+            |baked: On<CrackBaked>,
+             mut surfaces: ResMut<Surfaces>,
+             images: Res<Assets<Image>>,
+             sprites: Query<&Sprite>,
+             mut seen: ResMut<Seen>| {
+                let Some(active) = surfaces.active.get_mut(&baked.entity) else { return };
+                let mut changed = Vec::new();
+                active.growth.take_changed(&mut changed);
+                let is_dirty = active.views.iter().any(|view| !view.dirty.is_empty());
+                let image = sprites.get(baked.entity).ok().and_then(|sprite| images.get(&sprite.image));
+                let texels = image.and_then(|image| image.data.clone()).unwrap_or_default();
+                seen.0.push((changed.len(), is_dirty, texels));
+            },
+        );
+        let image = app.world_mut().resource_mut::<Assets<Image>>().add(blank(UVec2::new(300, 200)));
+        let guided = GuidedCracks::new(CrackGuide::new(Grid::new(UVec2::new(3, 1), 0.5)));
+        let entity = app.world_mut().spawn((Sprite::from_image(image), CrackSurface::default(), guided)).id();
+        // A new surface, and one that has cracked.
+        for seed in 0..2 {
+            if let Some(mut guided) = app.world_mut().get_mut::<GuidedCracks>(entity) {
+                guided.seed = seed;
+            }
+            while app.world().resource::<Seen>().0.len() <= seed as usize {
+                app.update();
+            }
+            while app.world().get::<CrackState>(entity).is_some_and(|state| state.status != CrackStatus::Done) {
+                app.update();
+            }
+            let shown = shown(&app, entity);
+            let (to_stamp, is_dirty, texels) = &app.world().resource::<Seen>().0[seed as usize];
+            assert_eq!((*to_stamp, *is_dirty), (0, false), "bake {seed}");
+            assert!(
+                *texels == shown && shown.iter().any(|&value| value < 100),
+                "bake {seed}: all of it is there at once"
+            );
+        }
     }
 }

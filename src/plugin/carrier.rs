@@ -7,7 +7,7 @@ use bevy::{
 };
 
 /// What an entity shows.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Shown {
     /// The sprite's image, or the material.
     pub(super) asset: UntypedHandle,
@@ -90,6 +90,11 @@ pub(super) struct Carrier {
 }
 
 impl Carrier {
+    /// It still shows what it showed.
+    pub(super) fn new(kind: &'static Kind, shown: Shown) -> Self {
+        Self { kind, shown, own: None, mesh: None, is_sized: false }
+    }
+
     /// Ids of the pictures it was made from.
     pub(super) fn sources(&self) -> impl Iterator<Item = AssetId<Image>> + '_ {
         self.shown.pictures().map(Handle::id)

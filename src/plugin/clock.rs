@@ -3,10 +3,10 @@
 use super::{
     CrackTextures,
     paint::stamp_anew,
-    surfaces::{Active, Surfaces, Touched},
+    surfaces::{Active, Surfaces},
 };
 use crate::{
-    pattern::{CellTracker, Moment, SurfaceFrame},
+    pattern::{Moment, SurfaceFrame},
     raster::{Profile, Replay, TexelRect},
 };
 use bevy::prelude::*;
@@ -268,31 +268,20 @@ impl Active {
         true
     }
 
-    /// Shows a network that has taken the place of another from its start: what is in the field is gone. Without a clock, and
-    /// with `seconds`, it appears within them, else all of it is there at once.
-    pub(super) fn show_anew(&mut self, seconds: Option<f32>) {
-        self.field.clear();
-        self.frozen = None;
-        self.touched = Touched::new(self.field.frame.size());
-        self.mark(TexelRect::whole(self.field.frame.size()));
-        self.stamp_carried();
-        self.cells = CellTracker::new(self.field.frame.extent());
-        self.cells_told = 1;
-        self.fell_at = (0, 1);
-        self.tips_from = 0;
+    /// Shows a network that has taken the place of another, as it was made to be shown `first`: without a clock, and with
+    /// `seconds`, it appears within them. Returns the playback of the other one.
+    pub(super) fn show_made(&mut self, replay: Option<(Replay, Moment)>, seconds: Option<f32>) -> Option<Playback> {
         self.closing = None;
-        let seconds = seconds.filter(|seconds| *seconds > 0.0);
+        self.frozen = None;
         self.appearing = seconds.map(|seconds| (self.end() / f64::from(seconds)).min(MOST_STEPS));
-        if self.appearing.is_some() && self.clock.is_none() {
-            self.open_playback().want = 0.0;
-        } else if self.clock.is_none() {
-            self.playback = None;
-        }
-        let (frame, profile) = (self.field.frame, self.profile);
-        if let Some(playback) = &mut self.playback {
-            playback.start_over(frame, profile);
-            playback.shown = Moment::START;
-        }
+        let want =
+            if self.clock.is_some() { self.playback.as_ref().map_or(0.0, |playback| playback.want) } else { 0.0 };
+        core::mem::replace(&mut self.playback, replay.map(|(replay, shown)| Playback { replay, want, shown }))
+    }
+
+    /// What a network is to show first that takes the place of this one.
+    pub(super) fn first(&self, seconds: Option<f32>) -> First {
+        First::of(self.clock, self.playback.as_ref().map_or(0.0, |playback| playback.want), seconds)
     }
 
     /// A hit: time runs forwards again. Returns the clock that it goes by if that is another one now.
@@ -321,6 +310,42 @@ impl Active {
             // All of it is in the field.
             self.growth.take_changed(&mut Vec::new());
             self.growth.take_markers(&mut Vec::new());
+        }
+    }
+}
+
+/// What a network shows first that is made beside the frames.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum First {
+    /// All of it, for good.
+    End,
+    /// So many steps.
+    Steps(f64),
+    /// This share of its steps.
+    Share(f64),
+}
+
+impl First {
+    /// Under a clock that shows `steps`; without one it appears if there are `seconds`.
+    pub(super) fn of(clock: Option<CrackClock>, steps: f64, seconds: Option<f32>) -> Self {
+        match clock {
+            Some(CrackClock { drive: CrackDrive::Value(value), paused: false, .. }) if !value.is_nan() => {
+                Self::Share(f64::from(value.clamp(0.0, 1.0)))
+            }
+            Some(clock) => {
+                Self::Steps(clock.seek.filter(|seek| !seek.is_nan()).map_or(steps, |s| f64::from(s.max(0.0))))
+            }
+            None if seconds.is_some() => Self::Steps(0.0),
+            None => Self::End,
+        }
+    }
+
+    /// The moment that it is in a network of so many steps; `None` = the end, for good.
+    pub(super) fn moment(self, end: u32) -> Option<Moment> {
+        match self {
+            Self::End => None,
+            Self::Steps(steps) => Some(Moment::nearest(steps.min(f64::from(end)))),
+            Self::Share(share) => Some(Moment::nearest(share * f64::from(end))),
         }
     }
 }

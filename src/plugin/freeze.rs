@@ -5,7 +5,6 @@ use super::{
     surfaces::Active,
 };
 use crate::{Grid, pattern::CellTracker, raster::DepthField};
-use bevy::prelude::*;
 
 /// What a surface has forgotten of its cracks, and still shows.
 pub(super) struct Frozen {

@@ -2,9 +2,9 @@
 
 use super::{
     CrackError, CrackSurface,
-    activate::Draft,
+    activate::{Draft, PicturePlan},
     carrier::Shown,
-    picture::{self, Space},
+    picture::{self, BasePicture, Space},
 };
 use crate::{
     Grid,
@@ -48,23 +48,43 @@ pub(super) struct PictureMasks {
 
 /// A part of a picture, at the size at which it is cracked.
 #[derive(Clone, Copy, PartialEq)]
-struct Key {
+pub(super) struct Key {
     picture: AssetId<Image>,
     size: UVec2,
     rect: TexelRect,
 }
 
+impl Key {
+    pub(super) fn new(picture: &Handle<Image>, plan: &PicturePlan) -> Self {
+        Self { picture: picture.id(), size: plan.size, rect: plan.rect }
+    }
+
+    /// The mask of the picture.
+    pub(super) fn make(self, base: &[u8]) -> Arc<CrackMask> {
+        let part = part(base, self.size, self.rect);
+        Arc::new(CrackMask::from_picture(self.rect.size(), &part).unwrap_or_default())
+    }
+}
+
 impl PictureMasks {
+    /// The mask of a picture, if it is made.
+    pub(super) fn find(&self, key: Key) -> Option<Arc<CrackMask>> {
+        self.made.iter().find(|(known, _)| *known == key).and_then(|(_, mask)| mask.upgrade())
+    }
+
+    pub(super) fn remember(&mut self, key: Key, mask: &Arc<CrackMask>) {
+        self.made.retain(|(known, mask)| *known != key && mask.strong_count() > 0);
+        self.made.push((key, Arc::downgrade(mask)));
+    }
+
     /// The picture is another one now.
     pub(super) fn forget(&mut self, picture: AssetId<Image>) {
         self.made.retain(|(key, _)| key.picture != picture);
         self.in_work.retain(|(key, _)| key.picture != picture);
     }
 
-    fn get(&mut self, key: Key, base: &[u8]) -> Option<Arc<CrackMask>> {
-        if let Some((_, mask)) = self.made.iter().find(|(known, _)| *known == key)
-            && let Some(mask) = mask.upgrade()
-        {
+    fn get(&mut self, key: Key, base: &Arc<BasePicture>) -> Option<Arc<CrackMask>> {
+        if let Some(mask) = self.find(key) {
             return Some(mask);
         }
         let mask = match self.in_work.iter().position(|(known, _)| *known == key) {
@@ -73,20 +93,16 @@ impl PictureMasks {
                 drop(self.in_work.swap_remove(index));
                 mask
             }
-            None => {
-                let part = part(base, key.size, key.rect);
-                let make = move || Arc::new(CrackMask::from_picture(key.rect.size(), &part).unwrap_or_default());
-                match AsyncComputeTaskPool::try_get() {
-                    Some(pool) => {
-                        self.in_work.push((key, pool.spawn(async move { make() })));
-                        return None;
-                    }
-                    None => make(),
+            None => match AsyncComputeTaskPool::try_get() {
+                Some(pool) => {
+                    let base = base.clone();
+                    self.in_work.push((key, pool.spawn(async move { key.make(&base.diffuse) })));
+                    return None;
                 }
-            }
+                None => key.make(&base.diffuse),
+            },
         };
-        self.made.retain(|(known, mask)| *known != key && mask.strong_count() > 0);
-        self.made.push((key, Arc::downgrade(&mask)));
+        self.remember(key, &mask);
         Some(mask)
     }
 }
@@ -115,8 +131,8 @@ pub(super) fn resolve(
         CrackMaskSource::FromPicture => {
             // Without a picture there is nothing to go by.
             let Some(picture) = &shown.diffuse else { return Ok(Some(Arc::default())) };
-            let key = Key { picture: picture.id(), size: draft.base.size, rect: draft.rect };
-            Ok(world.resource_mut::<PictureMasks>().get(key, &draft.base.diffuse))
+            let key = Key::new(picture, &draft.plan);
+            Ok(world.resource_mut::<PictureMasks>().get(key, &draft.base))
         }
         CrackMaskSource::Images { weak, strong, forbidden } => {
             for image in [weak, strong, forbidden].into_iter().flatten() {
@@ -135,7 +151,7 @@ pub(super) fn resolve(
 }
 
 /// The values of an image as they are stored.
-fn layer(image: &Image) -> Result<Grid<f32>, CrackError> {
+pub(super) fn layer(image: &Image) -> Result<Grid<f32>, CrackError> {
     let size = picture::readable_size(image)?;
     let space = if image.texture_descriptor.format.is_srgb() { Space::Srgb } else { Space::Linear };
     let too_large = |MaskError { width, height, .. }| CrackError::Size { width, height };

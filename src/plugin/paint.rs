@@ -7,9 +7,10 @@ use super::{
     upload::Uploads,
 };
 use crate::{
-    paint::{BaseTexels, PaintTargets, paint_rects},
+    growth::CrackGrowth,
+    paint::{PaintTargets, paint_rects},
     pattern::{Moment, NO_PARENT, SegmentId},
-    raster::{DOT_DEPTH, Redrawn, TexelRect, stamp_dot, stamp_path, stamp_path_with},
+    raster::{DOT_DEPTH, DepthField, Profile, Redrawn, TexelRect, stamp_dot, stamp_path, stamp_path_with},
 };
 use bevy::prelude::*;
 
@@ -107,18 +108,22 @@ pub(super) fn stamp_anew(active: &mut Active) {
         playback.start_over(frame, active.profile);
         return;
     }
-    let (network, timeline) = (active.growth.network(), active.growth.timeline());
+    stamp_all(&active.growth, &active.profile, &mut active.field, &mut active.touched);
+    active.stamp_carried();
+}
+
+/// Stamps the end of a growth into an untouched field.
+pub(super) fn stamp_all(growth: &CrackGrowth, profile: &Profile, field: &mut DepthField, touched: &mut Touched) {
+    let (network, timeline) = (growth.network(), growth.timeline());
     let end = Moment::after(timeline.end());
     for dot in (0..).map_while(|dot| timeline.dot_at(dot, end)) {
-        stamp_dot(&mut active.field, dot.pos, dot.radius, DOT_DEPTH);
+        stamp_dot(field, dot.pos, dot.radius, DOT_DEPTH);
     }
     for segment in network.segments() {
         if let Some(path) = network.path(segment) {
-            let rect = stamp_path(&mut active.field, &active.profile, &path);
-            active.touched.mark(rect);
+            touched.mark(stamp_path(field, profile, &path));
         }
     }
-    active.stamp_carried();
 }
 
 /// Paints in the middle of a frame what is dirty.
@@ -143,19 +148,13 @@ fn paint(active: &mut Active, images: &mut Assets<Image>, uploads: &mut Uploads,
     let mut diffuse_data = take_data(images, diffuse.as_ref());
     let mut normal_data = take_data(images, normal.as_ref());
     let mut depth_data = take_data(images, depth.as_ref());
-    let base = BaseTexels {
-        size,
-        diffuse: &active.base.diffuse,
-        normal: active.base.normal.as_deref(),
-        depth: active.base.depth.as_deref(),
-    };
     let mut targets = PaintTargets {
         diffuse: diffuse_data.as_deref_mut(),
         normal: normal_data.as_deref_mut(),
         depth: depth_data.as_deref_mut(),
     };
     rects.iter_mut().for_each(|rect| *rect = rect.intersect(shown));
-    paint_rects(base, &active.field, &active.look, rects, origin, &mut targets);
+    paint_rects(active.base.texels(), &active.field, &active.look, rects, origin, &mut targets);
     for rect in rects.drain(..) {
         if let (Some(broken), Some(diffuse)) = (&active.broken, targets.diffuse.as_deref_mut()) {
             broken.holes.cut_out(diffuse, size, origin, rect);

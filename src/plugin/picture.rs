@@ -1,6 +1,7 @@
 //! Reading pictures: [`BasePicture`].
 
 use super::CrackError;
+use crate::{Grid, paint::BaseTexels, raster::TexelRect};
 use bevy::{
     asset::{AssetServer, LoadState},
     prelude::*,
@@ -29,7 +30,26 @@ impl BasePicture {
         let i = (texel.y as usize * self.size.x as usize + texel.x as usize) * 4 + 3;
         self.diffuse.get(i).is_some_and(|alpha| *alpha < OPAQUE)
     }
+
+    /// To paint on.
+    pub(super) fn texels(&self) -> BaseTexels<'_> {
+        let Self { size, diffuse, normal, depth } = self;
+        BaseTexels { size: *size, diffuse, normal: normal.as_deref(), depth: depth.as_deref() }
+    }
+
+    /// Number of texels.
+    pub(super) fn area(&self) -> usize {
+        self.size.x as usize * self.size.y as usize
+    }
+
+    /// Where cracks may go in `rect`: not over holes. `None` if there are none.
+    pub(super) fn density(&self, rect: TexelRect) -> Option<Grid<f32>> {
+        density(rect.size(), |texel| self.is_hole(rect.min + texel))
+    }
 }
+
+/// Longer side of the mask that keeps cracks off transparent texels: a tenth of the distance between markers.
+const MASK_SIDE: u32 = 256;
 
 /// Texels of which the mean colour is taken.
 const SAMPLES: usize = 4096;
@@ -55,6 +75,23 @@ impl BasePicture {
 pub(super) enum Space {
     Srgb,
     Linear,
+}
+
+/// Where cracks may go: not over holes. `None` if there are none.
+pub(super) fn density(size: UVec2, is_hole: impl Fn(UVec2) -> bool) -> Option<Grid<f32>> {
+    if !(0..size.y).any(|y| (0..size.x).any(|x| is_hole(UVec2::new(x, y)))) {
+        return None;
+    }
+    let side = size.max_element().max(MASK_SIDE);
+    let mask_size = UVec2::new((size.x * MASK_SIDE).div_ceil(side), (size.y * MASK_SIDE).div_ceil(side));
+    let mut mask = Grid::new(mask_size, 0.0);
+    for y in 0..mask_size.y {
+        for (x, value) in (0..mask_size.x).zip(mask.row_mut(y as usize)) {
+            let texel = (UVec2::new(2 * x + 1, 2 * y + 1) * size) / (2 * mask_size);
+            *value = if is_hole(texel) { 0.0 } else { 1.0 };
+        }
+    }
+    Some(mask)
 }
 
 /// Whether a picture is there; an error if it never will be.
@@ -125,6 +162,15 @@ pub(super) fn read(image: &Image, space: Space, size: UVec2) -> Result<Vec<u8>, 
         }
     };
     Ok(if size == own_size { texels } else { resample(&texels, own_size, size) })
+}
+
+/// As [`read`] in sRGB, as the renderer shows the picture: one channel is red, not grey.
+pub(super) fn read_shown(image: &Image, size: UVec2) -> Result<Vec<u8>, CrackError> {
+    let mut texels = read(image, Space::Srgb, size)?;
+    if image.texture_descriptor.format.components() == 1 {
+        texels.as_chunks_mut::<4>().0.iter_mut().for_each(|texel| (texel[1], texel[2]) = (0, 0));
+    }
+    Ok(texels)
 }
 
 /// The red channel alone.

@@ -2,11 +2,10 @@
 
 use super::{
     CrackClock, CrackSurface, CrackTextures, ShatterRequest,
-    activate::density,
     carrier::Carrier,
     clock::Playback,
     freeze::Frozen,
-    picture::BasePicture,
+    picture::{BasePicture, density},
     shards::{Broken, Struck},
 };
 use crate::{
@@ -17,7 +16,7 @@ use crate::{
     raster::{DepthField, DirtyTiles, Profile, TexelRect},
 };
 use bevy::{asset::UntypedAssetId, ecs::entity::EntityHashMap, platform::collections::HashMap, prelude::*};
-use std::collections::VecDeque;
+use std::{collections::VecDeque, sync::Arc};
 
 /// The most parts of an image that are remembered; one that is forgotten is painted anew when it is shown again.
 const MAX_VIEWS: usize = 256;
@@ -50,7 +49,7 @@ pub(super) struct Active {
     pub(super) field: DepthField,
     pub(super) profile: Profile,
     pub(super) look: LookTable,
-    pub(super) base: BasePicture,
+    pub(super) base: Arc<BasePicture>,
     pub(super) textures: CrackTextures,
     pub(super) carrier: Carrier,
     /// Bytes counted against the budget.
@@ -97,7 +96,63 @@ pub(super) struct Active {
     pub(super) broken: Option<Box<Broken>>,
 }
 
+/// What a surface is made of before it cracks.
+pub(super) struct Ground {
+    pub(super) surface: CrackSurface,
+    pub(super) preset: CrackPreset,
+    pub(super) look: LookTable,
+    pub(super) base: Arc<BasePicture>,
+    pub(super) textures: CrackTextures,
+    pub(super) carrier: Carrier,
+    pub(super) bytes: u64,
+    pub(super) rect: TexelRect,
+}
+
 impl Active {
+    /// A surface whose textures show what is in the field.
+    pub(super) fn new(ground: Ground, growth: CrackGrowth, field: DepthField) -> Self {
+        let Ground { surface, preset, look, base, textures, carrier, bytes, rect } = ground;
+        let frame = field.frame;
+        let mut active = Self {
+            growth,
+            field,
+            profile: preset.profile,
+            look,
+            textures,
+            base,
+            carrier,
+            bytes,
+            views: Vec::new(),
+            view: 0,
+            rate: preset.steps_per_second,
+            due: 0.0,
+            clock: None,
+            closing: None,
+            appearing: None,
+            added: None,
+            playback: None,
+            hits: 0,
+            touched: Touched::new(frame.size()),
+            is_growing: false,
+            is_dirty: false,
+            is_open: false,
+            is_outdated: false,
+            frozen: None,
+            tips_from: 0,
+            cells: CellTracker::new(frame.extent()),
+            cells_told: 1,
+            struck: None,
+            fell_at: (0, 1),
+            broken: None,
+            surface,
+            preset,
+            has_new_settings: false,
+        };
+        active.show(rect);
+        active.views[0].dirty.clear();
+        active
+    }
+
     /// Marks texels of the field as changed, in all views.
     pub(super) fn mark(&mut self, rect: TexelRect) {
         // A normal depends on the texels around it.
@@ -116,7 +171,7 @@ impl Active {
     pub(super) fn density(&self) -> Option<Grid<f32>> {
         let rect = self.views.get(self.view)?.rect;
         let holes = self.broken.as_ref().map(|broken| &broken.holes);
-        let base = self.surface.alpha_mask.then_some(&self.base);
+        let base = self.surface.alpha_mask.then_some(&*self.base);
         let is_hole = |texel| {
             holes.is_some_and(|holes| holes.contains(texel)) || base.is_some_and(|base| base.is_hole(rect.min + texel))
         };

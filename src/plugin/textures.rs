@@ -1,6 +1,6 @@
 //! [`CrackTextures`]: a surface's own pictures.
 
-use super::picture::BasePicture;
+use super::{CrackMaps, picture::BasePicture};
 use bevy::{
     asset::RenderAssetUsages,
     image::ImageSampler,
@@ -28,35 +28,55 @@ impl CrackTextures {
     }
 }
 
-/// The only place where textures are made. `None` if the data has not the length that size and format need, or there
-/// is no texel: the renderer ends the app over such an image.
-fn texture(size: UVec2, data: Vec<u8>, format: TextureFormat, sampler: &ImageSampler) -> Option<Image> {
-    let texel = format.block_copy_size(None)? as usize;
-    let length = (size.x as usize).checked_mul(size.y as usize)?.checked_mul(texel)?;
-    if length == 0 || data.len() != length {
-        return None;
+/// One of the pictures of a surface.
+pub(super) struct TextureKind {
+    pub(super) is_wanted: fn(CrackMaps) -> bool,
+    /// The texels of an uncracked surface.
+    pub(super) texels: fn(&BasePicture) -> Vec<u8>,
+    format: TextureFormat,
+}
+
+pub(super) const DIFFUSE: TextureKind = TextureKind {
+    is_wanted: |maps| maps.diffuse,
+    texels: |base| base.diffuse.clone(),
+    format: TextureFormat::Rgba8UnormSrgb,
+};
+
+pub(super) const NORMAL: TextureKind = TextureKind {
+    is_wanted: |maps| maps.normal,
+    texels: |base| base.normal.clone().unwrap_or_else(|| [128, 128, 255, 255].repeat(base.area())),
+    format: TextureFormat::Rgba8Unorm,
+};
+
+pub(super) const DEPTH: TextureKind = TextureKind {
+    is_wanted: |maps| maps.depth,
+    texels: |base| base.depth.clone().unwrap_or_else(|| vec![0; base.area()]),
+    format: TextureFormat::R8Unorm,
+};
+
+/// In the order of [`CrackTextures`].
+pub(super) const KINDS: [TextureKind; 3] = [DIFFUSE, NORMAL, DEPTH];
+
+impl TextureKind {
+    /// Bytes of a texel.
+    pub(super) fn texel(&self) -> usize {
+        self.format.block_copy_size(None).map_or(0, |size| size as usize)
     }
-    let extent = Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 };
-    let mut image = Image::new(extent, TextureDimension::D2, data, format, RenderAssetUsages::default());
-    image.sampler = sampler.clone();
-    Some(image)
-}
 
-/// The diffuse texture of an uncracked surface.
-pub(super) fn diffuse(base: &BasePicture, sampler: &ImageSampler) -> Option<Image> {
-    texture(base.size, base.diffuse.clone(), TextureFormat::Rgba8UnormSrgb, sampler)
-}
+    /// The only place where textures are made. `None` if the data has not the length that size and format need, or there
+    /// is no texel: the renderer ends the app over such an image.
+    pub(super) fn image(&self, size: UVec2, data: Vec<u8>, sampler: &ImageSampler) -> Option<Image> {
+        let length = (size.x as usize).checked_mul(size.y as usize)?.checked_mul(self.texel())?;
+        let mut image = self.empty(size, sampler).filter(|_| data.len() == length)?;
+        image.data = Some(data);
+        Some(image)
+    }
 
-/// The normal map of an uncracked surface.
-pub(super) fn normal(base: &BasePicture, sampler: &ImageSampler) -> Option<Image> {
-    let n = base.size.x as usize * base.size.y as usize;
-    let data = base.normal.clone().unwrap_or_else(|| [128, 128, 255, 255].repeat(n));
-    texture(base.size, data, TextureFormat::Rgba8Unorm, sampler)
-}
-
-/// The depth map of an uncracked surface.
-pub(super) fn depth(base: &BasePicture, sampler: &ImageSampler) -> Option<Image> {
-    let n = base.size.x as usize * base.size.y as usize;
-    let data = base.depth.clone().unwrap_or_else(|| vec![0; n]);
-    texture(base.size, data, TextureFormat::R8Unorm, sampler)
+    /// The same without texels yet; the renderer makes room for them.
+    pub(super) fn empty(&self, size: UVec2, sampler: &ImageSampler) -> Option<Image> {
+        let extent = Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 };
+        let mut image = Image::new_uninit(extent, TextureDimension::D2, self.format, RenderAssetUsages::default());
+        image.sampler = sampler.clone();
+        (size.min_element() > 0).then_some(image)
+    }
 }

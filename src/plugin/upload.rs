@@ -12,8 +12,8 @@ use bevy::{
         ExtractSchedule, MainWorld, RenderApp,
         render_asset::{RenderAssetBytesPerFrameLimiter, RenderAssets, extract_render_asset_bytes_per_frame},
         render_resource::{
-            Buffer, BufferDescriptor, BufferUsages, CommandEncoderDescriptor, Extent3d, Origin3d, TexelCopyBufferInfo,
-            TexelCopyBufferLayout, TexelCopyTextureInfo, TextureAspect,
+            Buffer, BufferDescriptor, BufferUsages, CommandEncoder, CommandEncoderDescriptor, Extent3d, Origin3d,
+            TexelCopyBufferInfo, TexelCopyBufferLayout, TexelCopyTextureInfo, TextureAspect,
         },
         renderer::{RenderDevice, RenderQueue},
         texture::GpuImage,
@@ -63,6 +63,44 @@ pub(super) struct Uploads {
     limit: usize,
     /// Whether whole textures are on their way.
     has_whole: bool,
+    /// Whole pictures that come before the rectangles.
+    staged: Vec<(AssetId<Image>, Staged)>,
+}
+
+/// Brings whole pictures to where the GPU can read them, on any thread.
+#[derive(Clone)]
+pub(super) struct Stager(RenderDevice);
+
+/// A whole picture where the GPU can read it.
+pub(super) struct Staged {
+    buffer: Buffer,
+    /// From row to row, bytes.
+    pitch: usize,
+}
+
+impl Stager {
+    /// `None` if rows have no texels, or the device has no buffer so large.
+    pub(super) fn stage(&self, texels: &[u8], row: usize) -> Option<Staged> {
+        let pitch = row.next_multiple_of(ROW_ALIGNMENT);
+        let height = texels.len().checked_div(row).filter(|height| *height > 0)?;
+        let size = (pitch * height) as u64;
+        if size > self.0.limits().max_buffer_size {
+            return None;
+        }
+        let buffer = self.0.create_buffer(&BufferDescriptor {
+            label: Some("crack_picture"),
+            size,
+            usage: BufferUsages::MAP_WRITE | BufferUsages::COPY_SRC,
+            mapped_at_creation: true,
+        });
+        let mut memory = buffer.slice(..).get_mapped_range_mut();
+        for (y, texels) in texels.chunks_exact(row).enumerate() {
+            memory.slice(y * pitch..y * pitch + row).copy_from_slice(texels);
+        }
+        drop(memory);
+        buffer.unmap();
+        Some(Staged { buffer, pitch })
+    }
 }
 
 impl Uploads {
@@ -78,6 +116,26 @@ impl Uploads {
         if self.is_wanted && !rect.is_empty() {
             self.rects.push((image, rect));
         }
+    }
+
+    /// What brings whole pictures to the renderer, if there is one.
+    pub(super) fn stager(&self, device: Option<&RenderDevice>) -> Option<Stager> {
+        // In a browser the device stays on its thread.
+        device.filter(|_| self.is_wanted && !cfg!(target_arch = "wasm32")).map(|device| Stager(device.clone()))
+    }
+
+    /// Notes that all of an image has changed to what is staged, if it is.
+    pub(super) fn push_whole(&mut self, image: AssetId<Image>, size: UVec2, staged: Option<Staged>) {
+        self.staged.retain(|(other, _)| *other != image);
+        match staged {
+            Some(staged) if self.is_wanted => self.staged.push((image, staged)),
+            _ => self.push(image, TexelRect::whole(size)),
+        }
+    }
+
+    /// Whether all of an image waits for its upload.
+    pub(super) fn is_staged(&self, image: AssetId<Image>) -> bool {
+        self.staged.iter().any(|(other, _)| *other == image)
     }
 
     /// Replaces the rectangles of each image by the one around them.
@@ -184,9 +242,16 @@ fn upload_rects(
     if core::mem::take(&mut main.resource_mut::<Uploads>().has_whole) {
         limiter.max_bytes = None;
     }
+    let mut stats = CrackUploadStats::default();
+    let mut whole = core::mem::take(&mut main.resource_mut::<Uploads>().staged);
+    if !whole.is_empty()
+        && let Some(images) = main.get_resource::<Assets<Image>>()
+    {
+        copy_whole(&mut whole, images, &gpu_images, &device, &queue, &mut stats);
+        main.resource_mut::<Uploads>().staged = whole;
+    }
     let Staging { rects, copies, rows, buffer } = &mut *staging;
     core::mem::swap(rects, &mut main.resource_mut::<Uploads>().rects);
-    let mut stats = CrackUploadStats::default();
     if !rects.is_empty()
         && let Some(images) = main.get_resource::<Assets<Image>>()
     {
@@ -223,6 +288,44 @@ fn upload_rects(
         main.resource_mut::<Uploads>().rects.append(rects);
     }
     *main.resource_mut::<CrackUploadStats>() = stats;
+}
+
+/// Copies the pictures that are staged, and takes them off the list.
+fn copy_whole(
+    staged: &mut Vec<(AssetId<Image>, Staged)>,
+    images: &Assets<Image>,
+    gpu_images: &RenderAssets<GpuImage>,
+    device: &RenderDevice,
+    queue: &RenderQueue,
+    stats: &mut CrackUploadStats,
+) {
+    let mut encoder = device.create_command_encoder(&CommandEncoderDescriptor { label: Some("crack_pictures") });
+    staged.retain(|(id, staged)| {
+        let whole = TexelRect::whole(images.get(*id).map_or(UVec2::ZERO, Image::size));
+        match plan(*id, whole, images, gpu_images) {
+            Plan::Copy(copy) => {
+                let copy = Copy { pitch: staged.pitch, ..copy };
+                let size = (copy.pitch * copy.height()) as u64;
+                if let Some(gpu) = gpu_images.get(*id)
+                    && copy.row() <= copy.pitch
+                    && size == staged.buffer.size()
+                {
+                    copy_one(&mut encoder, &copy, &staged.buffer, gpu);
+                    stats.rects += 1;
+                    stats.bytes += copy.rect.area() * copy.texel as u64;
+                }
+                false
+            }
+            Plan::Wait => true,
+            Plan::Drop => false,
+        }
+    });
+    queue.submit([encoder.finish()]);
+}
+
+fn copy_one(encoder: &mut CommandEncoder, copy: &Copy, buffer: &Buffer, gpu: &GpuImage) {
+    let (to, size) = destination(gpu, copy);
+    encoder.copy_buffer_to_texture(TexelCopyBufferInfo { buffer, layout: layout(copy, copy.offset as u64) }, to, size);
 }
 
 enum Plan {
@@ -312,9 +415,7 @@ fn copy(
     let mut encoder = device.create_command_encoder(&CommandEncoderDescriptor { label: Some("crack_texels") });
     for copy in copies {
         let Some(gpu) = gpu_images.get(copy.image) else { continue };
-        let (to, size) = destination(gpu, copy);
-        let from = TexelCopyBufferInfo { buffer, layout: layout(copy, copy.offset as u64) };
-        encoder.copy_buffer_to_texture(from, to, size);
+        copy_one(&mut encoder, copy, buffer, gpu);
     }
     queue.submit([encoder.finish()]);
 }

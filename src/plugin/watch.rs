@@ -2,13 +2,14 @@
 
 use super::{
     CrackError, CrackMaskSource, CrackState, CrackStatus, CrackSurface, CrackTextures,
-    activate::{attach, density, draft, fail, frame, look, make_textures, set_status},
+    activate::{attach, draft, fail, frame, look, make_textures, set_status},
+    bake::Bakes,
     carrier::{self, Carrier, Found, Shown},
     mask::{self, PictureMasks},
     paint::stamp_anew,
     preset,
     shards::drop_shards,
-    surfaces::{Active, Surfaces},
+    surfaces::{Active, Added, Surfaces},
 };
 use crate::{
     CrackPreset, Grid,
@@ -41,12 +42,14 @@ pub(super) fn watch_pictures(
     events: Option<MessageReader<AssetEvent<Image>>>,
     mut surfaces: ResMut<Surfaces>,
     mut masks: ResMut<PictureMasks>,
+    mut bakes: ResMut<Bakes>,
 ) {
     let Some(mut events) = events else { return };
     let Surfaces { active, changed, sources, .. } = &mut *surfaces;
     for event in events.read() {
         if let AssetEvent::Modified { id } | AssetEvent::Added { id } = event {
             masks.forget(*id);
+            bakes.forget_picture(*id);
             for entity in sources.get(id).into_iter().flatten() {
                 changed.push(*entity);
                 if let Some(active) = active.get_mut(entity) {
@@ -137,7 +140,8 @@ fn update(world: &mut World, entity: Entity, active: &mut Active) -> Result<bool
     // Somebody gave it another picture.
     let Some(kind) = kind else { return Ok(true) };
     let is_sized = active.carrier.is_sized;
-    active.carrier = Carrier { kind, shown: shown.clone(), own: None, mesh: active.carrier.mesh.take(), is_sized };
+    let mesh = active.carrier.mesh.take();
+    active.carrier = Carrier { mesh, is_sized, ..Carrier::new(kind, shown.clone()) };
     update_picture(world, entity, active, shown)
 }
 
@@ -186,34 +190,53 @@ fn update_preset(active: &mut Active, preset: CrackPreset) -> Result<(), CrackEr
 /// On a picture of other proportions the same hits, in the same places, make other cracks: grown as far as they were.
 /// `None` if they may stay.
 fn regrow(active: &mut Active, frame: SurfaceFrame, mask: Arc<CrackMask>) -> Result<Option<CrackGrowth>, CrackError> {
-    let (before, extent) = (active.growth.network().extent(), frame.extent());
-    if before == extent {
+    if active.growth.network().extent() == frame.extent() {
         return Ok(None);
     }
-    let steps = active.added.as_ref().map_or(0, |added| added.steps);
-    grown_anew(active, steps, extent, mask, None).map(Some)
+    let past = Past::of(active);
+    let Active { preset, surface, added, .. } = active;
+    grown_anew(preset, frame.extent(), surface.seed, mask, None, added.as_mut(), &past).map(Some)
 }
 
-/// The same hits in the same places around what was baked, grown as far as they were after the first `added` steps.
+/// What has happened to a surface.
+pub(super) struct Past {
+    /// Places (texture coordinates) and energies of its hits.
+    pub(super) hits: Vec<(Vec2, f32)>,
+    /// Steps of growth after those of what was added.
+    pub(super) steps: u32,
+}
+
+impl Past {
+    pub(super) fn of(active: &Active) -> Self {
+        let extent = active.growth.network().extent();
+        Self {
+            hits: active.growth.impacts().iter().map(|impact| (impact.pos / extent, impact.energy)).collect(),
+            steps: active.growth.steps() - active.added.as_ref().map_or(0, |added| added.steps),
+        }
+    }
+}
+
+/// The same hits in the same places, around what is added, grown as far as they were.
 pub(super) fn grown_anew(
-    active: &mut Active,
-    added: u32,
+    preset: &CrackPreset,
     extent: Vec2,
+    seed: u64,
     mask: Arc<CrackMask>,
     density: Option<Grid<f32>>,
+    added: Option<&mut Added>,
+    past: &Past,
 ) -> Result<CrackGrowth, CrackError> {
-    let mut growth = CrackGrowth::new(active.preset.growth.clone(), extent, active.surface.seed)
+    let mut growth = CrackGrowth::new(preset.growth.clone(), extent, seed)
         .map_err(|error| CrackError::Preset { reason: error.to_string() })?;
     growth.set_mask(mask);
     growth.set_density(density);
-    if let Some(added) = &mut active.added {
+    if let Some(added) = added {
         added.steps = growth.add_cracks(&added.network, added.opening);
     }
-    let before = active.growth.network().extent();
-    for impact in active.growth.impacts() {
-        growth.hit((impact.pos / before * extent).min(extent), impact.energy);
+    for (uv, energy) in &past.hits {
+        growth.hit((*uv * extent).min(extent), *energy);
     }
-    for _ in added..active.growth.steps() {
+    for _ in 0..past.steps {
         growth.step();
     }
     Ok(growth)
@@ -224,7 +247,7 @@ fn update_picture(world: &mut World, entity: Entity, active: &mut Active, shown:
     active.is_outdated = true;
     let Some(draft) = draft(world, &active.surface, &shown, active.bytes)? else { return Ok(false) };
     let Some(mask) = mask::resolve(world, &active.surface, &shown, &draft)? else { return Ok(false) };
-    let frame = frame(draft.rect)?;
+    let frame = frame(draft.plan.rect)?;
     let look = look(&active.preset, frame)?;
     let regrown = regrow(active, frame, mask.clone())?;
     active.textures = make_textures(world, &draft, Some(&active.textures))?;
@@ -240,12 +263,12 @@ fn update_picture(world: &mut World, entity: Entity, active: &mut Active, shown:
         active.growth = growth;
     }
     if active.surface.alpha_mask {
-        active.growth.set_density(density(draft.rect.size(), |texel| draft.base.is_hole(draft.rect.min + texel)));
+        active.growth.set_density(draft.base.density(draft.plan.rect));
     }
     active.growth.set_mask(mask.clone());
-    world.resource_mut::<Surfaces>().bytes += draft.bytes;
+    world.resource_mut::<Surfaces>().bytes += draft.plan.bytes;
     world.resource_mut::<Surfaces>().bytes -= active.bytes;
-    active.bytes = draft.bytes;
+    active.bytes = draft.plan.bytes;
     active.base = draft.base;
     // What the mask forbids may be elsewhere now.
     if frame != active.field.frame || active.surface.mask != CrackMaskSource::None {
@@ -255,7 +278,7 @@ fn update_picture(world: &mut World, entity: Entity, active: &mut Active, shown:
         stamp_anew(active);
     }
     active.views.clear();
-    active.show(draft.rect);
+    active.show(draft.plan.rect);
     active.carrier.shown = shown;
     // The material is made anew: one that exists keeps showing a texture of the old size.
     attach(world, entity, active);

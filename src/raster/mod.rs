@@ -7,6 +7,7 @@ mod dirty;
 mod distance;
 mod rect;
 mod replay;
+mod section;
 mod stamp;
 
 pub use dirty::DirtyTiles;
@@ -36,7 +37,10 @@ impl DepthField {
     /// An untouched field.
     #[must_use]
     pub fn new(frame: SurfaceFrame) -> Self {
-        Self { frame, depth: Grid::new(frame.size(), 0), forbidden: None }
+        // Written twice: new memory is dear at the first write of each page, which else comes when cracks grow.
+        let mut depth = Grid::new(frame.size(), u16::MAX);
+        std::hint::black_box(&mut depth).as_mut_slice().fill(0);
+        Self { frame, depth, forbidden: None }
     }
 
     /// Makes all of it untouched. What is forbidden stays so.

@@ -15,7 +15,10 @@
 //!
 //! The value depends on the texel and the capsule alone, and grows with `r`: stamps may come in any order.
 
-use super::{DepthField, DirtyTiles, Profile, TexelRect};
+use super::{
+    DepthField, DirtyTiles, Profile, TexelRect,
+    section::{MAX_RADIUS, Section, at_door, clamp01, max, min},
+};
 use crate::pattern::{PathPoint, SegmentPath, SurfaceFrame};
 use glam::{DVec2, UVec2, Vec2};
 
@@ -30,9 +33,6 @@ const BAND: u32 = DirtyTiles::TILE;
 
 /// Texels that come from memory at once, or fewer.
 const CACHE_LINE: usize = 64 / size_of::<u16>();
-
-/// Half widths are cut to this many texels, far above the diagonal of the largest surface.
-const MAX_RADIUS: f32 = 1.0e6;
 
 /// How far outside the reach of a capsule a rounding error can still leave a trace, texels.
 const MARGIN: f32 = 0.0625;
@@ -92,99 +92,6 @@ pub fn stamp_dot(field: &mut DepthField, pos: Vec2, radius: f32, depth: f32) -> 
             changed
         }
         None => TexelRect::default(),
-    }
-}
-
-/// The larger one; unlike `f32::max` without regard to NaN, so that it is one instruction on every machine.
-fn max(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
-}
-
-/// The smaller one; as [`max`].
-fn min(a: f32, b: f32) -> f32 {
-    if a < b { a } else { b }
-}
-
-fn clamp01(x: f32) -> f32 {
-    min(max(x, 0.0), 1.0)
-}
-
-/// `x` within `0..=top`, zero if not a number.
-fn at_door(x: f32, top: f32) -> f32 {
-    clamp01(x / top) * top
-}
-
-/// A [`Profile`] in texels.
-#[derive(Clone, Copy)]
-struct Section {
-    depth: f32,
-    /// What a texel of half width adds to the 40 % of depth that the thinnest cracks have.
-    gain: f32,
-    wall: f32,
-    rim: f32,
-    rim_depth: f32,
-    inv_rim: f32,
-    /// The least share of its depth that a thin line keeps.
-    faintest: f32,
-}
-
-/// The cross-section where the half width is known.
-#[derive(Clone, Copy)]
-struct Cut {
-    peak: f32,
-    /// Distance at which the core ends.
-    reach: f32,
-    inv_wall: f32,
-    /// Distance at which the rim ends.
-    rim_reach: f32,
-    /// 65535, less for lines thinner than a texel.
-    scale: f32,
-}
-
-impl Section {
-    fn new(profile: &Profile, texels_per_unit: f32) -> Self {
-        let full_width = max(at_door(profile.full_width * texels_per_unit, MAX_RADIUS), 1.0e-6);
-        let rim = at_door(profile.rim_width * texels_per_unit, MAX_RADIUS);
-        Self {
-            depth: at_door(profile.depth, 1.0),
-            gain: 1.2 / full_width,
-            wall: at_door(profile.wall, 1.0),
-            rim,
-            rim_depth: if rim > 0.0 { at_door(profile.rim_depth, 1.0) } else { 0.0 },
-            inv_rim: 1.0 / max(rim, 1.0),
-            faintest: at_door(profile.faintest, 1.0),
-        }
-    }
-
-    fn upright(depth: f32) -> Self {
-        Self {
-            depth: at_door(depth, 1.0),
-            gain: MAX_RADIUS,
-            wall: 0.0,
-            rim: 0.0,
-            rim_depth: 0.0,
-            inv_rim: 1.0,
-            faintest: 0.0,
-        }
-    }
-
-    /// The cut at half width `r`. Each of the stamping loops calls it, so that both give the same bits.
-    #[inline(always)]
-    fn cut(&self, r: f32) -> Cut {
-        let core = max(r, 0.5);
-        Cut {
-            peak: self.depth * min(0.4 + self.gain * r, 1.0),
-            reach: core + 0.5,
-            inv_wall: 1.0 / (1.0 + self.wall * core),
-            rim_reach: r + self.rim,
-            scale: 65535.0 * min(max(2.0 * r, self.faintest), 1.0),
-        }
-    }
-
-    /// Distance from the centre line at which nothing is left.
-    fn reach(&self, r: f32) -> f32 {
-        let rim = if self.rim_depth > 0.0 { r + self.rim } else { 0.0 };
-        max(max(r, 0.5) + 0.5, rim)
     }
 }
 

@@ -5,6 +5,7 @@ use bevy::{prelude::*, render::render_resource::TextureFormat};
 use bevy_crack::{
     Grid,
     math::Rng,
+    plugin::CrackUploadStats,
     prelude::*,
     voronoi::{MAX_SITES, SiteLayout},
 };
@@ -22,7 +23,10 @@ struct Told {
 }
 
 fn guided_app() -> App {
-    let mut app = app();
+    listening(app())
+}
+
+fn listening(mut app: App) -> App {
     app.init_resource::<Told>()
         .add_observer(|baked: On<CrackBaked>, mut told: ResMut<Told>| told.baked.push((baked.entity, baked.covered)))
         .add_observer(|failed: On<CrackFailed>, mut told: ResMut<Told>| {
@@ -455,4 +459,29 @@ fn a_changed_picture_keeps_the_cracks() {
         assert_sound(&app, entity);
     }
     assert_eq!(told(&app).baked.len(), 1);
+}
+
+/// What was baked comes to the GPU whole, by one copy for each texture, and what is painted afterwards comes on top.
+#[test]
+fn baked_pictures_reach_the_gpu_in_one_copy_each() {
+    let Some((_one, app)) = gpu_app() else { return };
+    let mut app = listening(app);
+    let entity = spawn(&mut app, guided());
+    for seed in 0..3 {
+        app.world_mut().get_mut::<GuidedCracks>(entity).unwrap().seed = seed;
+        let mut most = CrackUploadStats::default();
+        wait_for(&mut app, "the end", |app| {
+            let stats = app.world().resource::<CrackUploadStats>();
+            most = CrackUploadStats { bytes: most.bytes.max(stats.bytes), rects: most.rects.max(stats.rects) };
+            told(app).baked.len() > seed as usize && state(app, entity).status == CrackStatus::Done
+        });
+        assert_eq!(most, CrackUploadStats { bytes: 2 * 4 * 128 * 128, rects: 2 }, "diffuse and normals, bake {seed}");
+        assert_on_gpu(&mut app, &[entity]);
+    }
+    hit(&mut app, center(entity));
+    for _ in 0..10 {
+        step(&mut app);
+        assert_on_gpu(&mut app, &[entity]);
+    }
+    assert_eq!(told(&app).failed, []);
 }

@@ -1,0 +1,90 @@
+//! The depths of some texels, and their slopes.
+
+use crate::{Grid, raster::TexelRect};
+use std::ops::Range;
+
+/// The depths of a patch and of the texels around it, and what is made of them.
+///
+/// All texels lie in one line, row after row, so that the loops over them are long whatever the shape: the texel in column
+/// `x` of row `y` is at `y * stride + x`, and what is computed for the two last places of a row is of no use.
+pub(super) struct Patch<const ROOM: usize> {
+    /// Width of the patch.
+    width: usize,
+    /// Width with the texels around.
+    pub(super) stride: usize,
+    /// Places in all rows of the patch.
+    len: usize,
+    /// The depth of the texel above and to the left, repeated at the border of the field.
+    pub(super) depth: [u16; ROOM],
+    /// Zero where the texel and those around it are untouched.
+    pub(super) touch: [u16; ROOM],
+    /// Slope of the surface, to the right.
+    pub(super) x: [f32; ROOM],
+    /// Slope of the surface, **down** the picture.
+    pub(super) y: [f32; ROOM],
+    /// One over the length of `(x, y, 1)`.
+    pub(super) inv_len: [f32; ROOM],
+}
+
+impl<const ROOM: usize> Patch<ROOM> {
+    pub(super) const EMPTY: Self = Self {
+        width: 0,
+        stride: 0,
+        len: 0,
+        depth: [0; ROOM],
+        touch: [0; ROOM],
+        x: [0.0; ROOM],
+        y: [0.0; ROOM],
+        inv_len: [0.0; ROOM],
+    };
+
+    /// Reads the depths; false if they are all zero.
+    pub(super) fn load(&mut self, depth: &Grid<u16>, rect: TexelRect) -> bool {
+        let (min, max) = (rect.min.as_usizevec2(), rect.max.as_usizevec2());
+        self.width = max.x - min.x;
+        self.stride = self.width + 2;
+        self.len = self.stride * (max.y - min.y);
+        let (left, right) = (min.x.saturating_sub(1), (max.x + 1).min(depth.width()));
+        let mut touched = false;
+        for (to, y) in self.depth.chunks_exact_mut(self.stride).zip(min.y..max.y + 2) {
+            let row = depth.row(y.saturating_sub(1).min(depth.height() - 1));
+            let (inner, outer) = (&mut to[1..=self.width], &row[min.x..max.x]);
+            inner.copy_from_slice(outer);
+            to[0] = row[left];
+            to[self.width + 1] = row[right - 1];
+            touched = touched || to.iter().fold(0, |any, &depth| any | depth) != 0;
+        }
+        touched
+    }
+
+    /// Finds what is touched, and the slopes by Sobel's operator; a wall that goes down to the right leans to the right.
+    pub(super) fn measure(&mut self, scale: f32) {
+        let n = self.len;
+        let place = |row: usize, column: usize| &self.depth[row * self.stride + column..][..n];
+        let [[a, b, c], [d, e, f], [g, h, i]] = [0, 1, 2].map(|row| [0, 1, 2].map(|column| place(row, column)));
+        let (touch, x, y, inv_len) = (&mut self.touch[..n], &mut self.x[..n], &mut self.y[..n], &mut self.inv_len[..n]);
+        for k in 0..n {
+            touch[k] = a[k] | b[k] | c[k] | d[k] | e[k] | f[k] | g[k] | h[k] | i[k];
+        }
+        let gain = |low: u16, high: u16| i32::from(high).wrapping_sub(i32::from(low));
+        for k in 0..n {
+            let right = gain(a[k], c[k]).wrapping_add(gain(d[k], f[k]) << 1).wrapping_add(gain(g[k], i[k]));
+            let down = gain(a[k], g[k]).wrapping_add(gain(b[k], h[k]) << 1).wrapping_add(gain(c[k], i[k]));
+            let (right, down) = (right as f32 * scale, down as f32 * scale);
+            x[k] = right;
+            y[k] = down;
+            inv_len[k] = 1.0 / (right * right + down * down + 1.0).sqrt();
+        }
+    }
+
+    /// The places of a row.
+    pub(super) fn row(&self, row: usize) -> Range<usize> {
+        let first = row * self.stride;
+        first..first + self.width
+    }
+
+    /// The depths of a row.
+    pub(super) fn depths(&self, row: usize) -> &[u16] {
+        &self.depth[self.stride + 1..][self.row(row)]
+    }
+}

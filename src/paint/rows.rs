@@ -1,0 +1,65 @@
+//! What depths and slopes make of a row of normals or depths, and the arithmetic of bytes.
+
+use super::patch::Patch;
+
+/// A texel of four bytes.
+pub(super) type Rgba = [u8; 4];
+
+/// Rounds a value of 0..=255 (plus less than a half on either side); see the stamps for why not by a cast.
+#[inline(always)]
+pub(super) fn round(value: f32) -> u32 {
+    (value + 8_388_608.0).to_bits() & 255
+}
+
+#[inline(always)]
+fn normal_bytes(x: f32, y: f32, z: f32, alpha: u32) -> u32 {
+    let byte = |v: f32| round(v * 127.5 + 127.5);
+    byte(x) | byte(y) << 8 | byte(z) << 16 | alpha << 24
+}
+
+/// Normals over an even base.
+pub(super) fn flat_row<const ROOM: usize>(out: &mut [Rgba], patch: &Patch<ROOM>, row: usize) {
+    let (x, y, inv_len) = (&patch.x[patch.row(row)], &patch.y[patch.row(row)], &patch.inv_len[patch.row(row)]);
+    for (((out, &x), &y), &inv_len) in out.iter_mut().zip(x).zip(y).zip(inv_len) {
+        *out = normal_bytes(x * inv_len, -y * inv_len, inv_len, 255).to_le_bytes();
+    }
+}
+
+/// Normals over base normals: the slopes of base and crack add up, which is exact for heights that add up.
+pub(super) fn tilted_row<const ROOM: usize>(out: &mut [Rgba], base: &[Rgba], patch: &Patch<ROOM>, row: usize) {
+    let (x, y) = (&patch.x[patch.row(row)], &patch.y[patch.row(row)]);
+    for (((out, &base), &x), &y) in out.iter_mut().zip(base).zip(x).zip(y) {
+        let bytes = u32::from_le_bytes(base);
+        let part = |c: u32| (channel(bytes, c) - 127.5) * (1.0 / 127.5);
+        let (base_x, base_y, base_z) = (part(0), part(1), part(2));
+        // A normal that points into the surface is no normal; it counts as nearly level.
+        let z = if base_z > 0.05 { base_z } else { 0.05 };
+        let (sum_x, sum_y) = (base_x + x * z, base_y - y * z);
+        let inv_len = 1.0 / (sum_x * sum_x + sum_y * sum_y + z * z).sqrt();
+        let painted = normal_bytes(sum_x * inv_len, sum_y * inv_len, z * inv_len, bytes >> 24);
+        let level = (x == 0.0) & (y == 0.0);
+        *out = if level { bytes } else { painted }.to_le_bytes();
+    }
+}
+
+pub(super) fn depth_row(out: &mut [u8], base: Option<&[u8]>, depths: &[u16]) {
+    let byte = |depth: u16| (u32::from(depth).wrapping_mul(255).wrapping_add(32_895) >> 16) as u8;
+    match base {
+        Some(base) => {
+            for ((out, &base), &depth) in out.iter_mut().zip(base).zip(depths) {
+                *out = base.max(byte(depth));
+            }
+        }
+        None => {
+            for (out, &depth) in out.iter_mut().zip(depths) {
+                *out = byte(depth);
+            }
+        }
+    }
+}
+
+/// Byte `i` of a texel.
+#[inline(always)]
+pub(super) fn channel(texel: u32, i: u32) -> f32 {
+    (texel.wrapping_shr(8 * i) & 255) as i32 as f32
+}

@@ -1,0 +1,320 @@
+//! The painted texels, all of them.
+
+use super::{BaseTexels, ColorStop, Look, LookTable, PaintTargets, paint_into, paint_rects, texel::FLAT};
+use crate::{
+    math::Rng,
+    pattern::{PathPoint, SegmentPath, SurfaceFrame},
+    raster::{DepthField, DirtyTiles, Profile, TexelRect, stamp_dot, stamp_path_with},
+};
+use glam::{UVec2, Vec2};
+
+fn below(rng: &mut Rng, n: u32) -> u32 {
+    rng.next_u32() % n
+}
+
+fn field(size: UVec2) -> DepthField {
+    DepthField::new(SurfaceFrame::new(size).unwrap())
+}
+
+fn noise_bytes(rng: &mut Rng, n: usize) -> Vec<u8> {
+    (0..n).map(|_| rng.next_u32() as u8).collect()
+}
+
+fn looks() -> [Look; 4] {
+    let wild = Look { glint: 4.0, grain: 1.0, shift: 16.0, relief: 1.0, opaque: true, ..Look::GROOVE };
+    [Look::GROOVE, Look::FROSTED, Look::TOON, wild]
+}
+
+fn table(look: &Look, field: &DepthField) -> LookTable {
+    LookTable::new(look, field.frame.texels_per_unit()).unwrap()
+}
+
+/// A picture with room for targets of its own.
+struct Canvas {
+    size: UVec2,
+    base: [Vec<u8>; 3],
+    tilted: bool,
+    deep: bool,
+}
+
+impl Canvas {
+    fn new(rng: &mut Rng, size: UVec2) -> Self {
+        let n = (size.x * size.y) as usize;
+        let base = [noise_bytes(rng, 4 * n), noise_bytes(rng, 4 * n), noise_bytes(rng, n)];
+        Self { size, base, tilted: below(rng, 2) == 0, deep: below(rng, 2) == 0 }
+    }
+
+    fn base(&self) -> BaseTexels<'_> {
+        let [diffuse, normal, depth] = &self.base;
+        BaseTexels {
+            size: self.size,
+            diffuse,
+            normal: self.tilted.then_some(normal),
+            depth: self.deep.then_some(depth),
+        }
+    }
+
+    /// What an untouched picture looks like.
+    fn untouched(&self) -> [Vec<u8>; 3] {
+        let [diffuse, normal, depth] = self.base.clone();
+        let normal = if self.tilted { normal } else { FLAT.repeat(depth.len()) };
+        let depth = if self.deep { depth } else { vec![0; depth.len()] };
+        [diffuse, normal, depth]
+    }
+
+    fn paint(&self, field: &DepthField, look: &LookTable, rect: TexelRect, origin: UVec2, out: &mut [Vec<u8>; 3]) {
+        self.paint_all(field, look, &[rect], origin, out);
+    }
+
+    fn paint_all(
+        &self,
+        field: &DepthField,
+        look: &LookTable,
+        rects: &[TexelRect],
+        origin: UVec2,
+        out: &mut [Vec<u8>; 3],
+    ) {
+        let [diffuse, normal, depth] = out;
+        let mut targets = PaintTargets { diffuse: Some(diffuse), normal: Some(normal), depth: Some(depth) };
+        paint_rects(self.base(), field, look, rects, origin, &mut targets);
+    }
+}
+
+/// Returns what has changed.
+fn random_stamp(rng: &mut Rng, field: &mut DepthField) -> Vec<TexelRect> {
+    let extent = field.frame.extent();
+    let mut place = || Vec2::new(rng.unit(), rng.unit()) * extent;
+    let (from, to) = (place(), place());
+    let to = from + (to - from).clamp_length_max(0.3);
+    let width = 0.06 * rng.unit();
+    if below(rng, 5) == 0 {
+        return vec![stamp_dot(field, from, width, rng.unit())];
+    }
+    let profile = Profile { rim_width: 0.02, rim_depth: 0.2, ..Profile::DEFAULT };
+    let point = |pos, width| PathPoint { pos, width };
+    let path = SegmentPath::straight(point(from, width), point(to, 0.5 * width));
+    let mut changed = Vec::new();
+    stamp_path_with(field, &profile, &path, &mut |rect| changed.push(rect));
+    changed
+}
+
+#[test]
+fn dirty_painting_equals_full_painting() {
+    let mut rng = Rng::new(11);
+    let sizes = [[1, 1], [1, 4096], [4096, 1], [3, 5], [31, 37], [64, 64], [65, 127], [130, 66], [211, 17], [2, 300]];
+    for (i, size) in sizes.into_iter().enumerate() {
+        let mut field = field(size.into());
+        let size = UVec2::from(size);
+        let look = table(&looks()[i % 4], &field);
+        // The image is the field, or an atlas around it, or cuts the field off.
+        let origin = if i % 3 == 0 { UVec2::ZERO } else { UVec2::new(below(&mut rng, 9), below(&mut rng, 9)) };
+        let room = if i % 3 == 2 { origin + size - size.min(UVec2::splat(7)) + 1 } else { origin + size + 5 };
+        let canvas = Canvas::new(&mut rng, room);
+        let mut dirty = DirtyTiles::new(size);
+        let mut painted = canvas.untouched();
+        let mut rects = Vec::new();
+        for step in 0..100 {
+            if below(&mut rng, 20) == 0 {
+                field.depth.as_mut_slice().fill(0);
+                dirty.mark(TexelRect::whole(size));
+            }
+            for _ in 0..=below(&mut rng, 3) {
+                let changed = random_stamp(&mut rng, &mut field);
+                changed.iter().for_each(|rect| dirty.mark(rect.grow(1, size)));
+            }
+            rects.clear();
+            dirty.take_rects(&mut rects);
+            canvas.paint_all(&field, &look, &rects, origin, &mut painted);
+            let mut whole = canvas.untouched();
+            canvas.paint(&field, &look, TexelRect::whole(size), origin, &mut whole);
+            assert!(painted == whole, "size {size}, step {step}");
+        }
+    }
+}
+
+#[test]
+fn every_texel_alone_equals_the_whole() {
+    let mut rng = Rng::new(12);
+    let size = UVec2::new(83, 29);
+    let mut field = field(size);
+    for _ in 0..12 {
+        random_stamp(&mut rng, &mut field);
+    }
+    for look in looks() {
+        let (look, canvas) = (table(&look, &field), Canvas::new(&mut rng, size));
+        let (mut whole, mut single) = (canvas.untouched(), canvas.untouched());
+        canvas.paint(&field, &look, TexelRect::whole(size), UVec2::ZERO, &mut whole);
+        for y in 0..size.y {
+            for x in 0..size.x {
+                let min = UVec2::new(x, y);
+                canvas.paint(&field, &look, TexelRect { min, max: min + 1 }, UVec2::ZERO, &mut single);
+            }
+        }
+        assert!(whole == single, "{look:?}");
+    }
+}
+
+#[test]
+fn untouched_texels_are_the_base_and_the_silhouette_stays() {
+    let mut rng = Rng::new(13);
+    for look in looks() {
+        let size = UVec2::new(150, 90);
+        let mut field = field(size);
+        for _ in 0..4 {
+            random_stamp(&mut rng, &mut field);
+        }
+        let mut canvas = Canvas::new(&mut rng, size);
+        canvas.base[0].as_chunks_mut::<4>().0.iter_mut().step_by(3).for_each(|texel| texel[3] = 0);
+        let untouched = canvas.untouched();
+        let mut out = untouched.clone();
+        canvas.paint(&field, &table(&look, &field), TexelRect::whole(size), UVec2::ZERO, &mut out);
+        for y in 0..size.y {
+            for x in 0..size.x {
+                let at = (y * size.x + x) as usize;
+                let rgba = |bytes: &Vec<u8>| bytes.as_chunks::<4>().0[at];
+                let (before, after) = (rgba(&untouched[0]), rgba(&out[0]));
+                let near = TexelRect { min: UVec2::new(x, y), max: UVec2::new(x + 1, y + 1) }.grow(1, size);
+                let touched = (near.min.y..near.max.y)
+                    .any(|y| (near.min.x..near.max.x).any(|x| field.depth.get(x, y) != Some(0)));
+                if !touched {
+                    assert_eq!((before, rgba(&untouched[1])), (after, rgba(&out[1])));
+                }
+                if field.depth.get(x, y) == Some(0) {
+                    assert_eq!(out[2][at], untouched[2][at]);
+                }
+                assert!(out[2][at] >= untouched[2][at], "depth only sinks");
+                assert_eq!(before[3] == 0, after[3] == 0, "silhouette at {x} {y}");
+                assert!(after[3] == before[3] || look.opaque && after[3] > before[3], "alpha at {x} {y}");
+                if canvas.tilted {
+                    assert_eq!(rgba(&untouched[1])[3], rgba(&out[1])[3], "alpha of the normal");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn an_opaque_crack_covers_glass() {
+    let mut field = field(UVec2::splat(8));
+    field.depth.as_mut_slice().fill(65535);
+    let black = [ColorStop { depth: 1.0, color: [0.0; 3], cover: 1.0 }];
+    let look = Look { ramp: black.to_vec().into(), grain: 0.0, ..Look::FROSTED };
+    let canvas = Canvas {
+        size: UVec2::splat(8),
+        base: [[200, 100, 50, 60].repeat(64), vec![], vec![]],
+        tilted: false,
+        deep: false,
+    };
+    let mut out = vec![0; 256];
+    let mut targets = PaintTargets { diffuse: Some(&mut out), normal: None, depth: None };
+    paint_into(canvas.base(), &field, &table(&look, &field), TexelRect::whole(canvas.size), UVec2::ZERO, &mut targets);
+    assert_eq!(out, [0, 0, 0, 255].repeat(64));
+}
+
+#[test]
+fn normals_equal_a_sobel_in_f64() {
+    let mut rng = Rng::new(14);
+    for (round, relief) in [0.0, 0.001, 0.02, 0.3, 1.0].into_iter().enumerate() {
+        let size = UVec2::new(70, 41);
+        let mut field = field(size);
+        if round % 2 == 0 {
+            field.depth.as_mut_slice().fill_with(|| rng.next_u32() as u16);
+        } else {
+            (0..10).for_each(|_| _ = random_stamp(&mut rng, &mut field));
+        }
+        let canvas = Canvas { tilted: false, ..Canvas::new(&mut rng, size) };
+        let mut out = canvas.untouched();
+        let look = table(&Look { relief, ..Look::GROOVE }, &field);
+        canvas.paint(&field, &look, TexelRect::whole(size), UVec2::ZERO, &mut out);
+        let height = |x: i32, y: i32| {
+            let inside = |v: i32, n: u32| v.clamp(0, n as i32 - 1) as u32;
+            let depth = field.depth.get(inside(x, size.x), inside(y, size.y)).unwrap();
+            -f64::from(depth) / 65535.0 * f64::from(relief) * f64::from(field.frame.texels_per_unit())
+        };
+        for (i, got) in out[1].as_chunks::<4>().0.iter().enumerate() {
+            let (x, y) = ((i as u32 % size.x) as i32, (i as u32 / size.x) as i32);
+            let across = |k: i32| height(x + 1, y + k) - height(x - 1, y + k);
+            let down = |k: i32| height(x + k, y + 1) - height(x + k, y - 1);
+            let u = (across(-1) + 2.0 * across(0) + across(1)) / 8.0;
+            let v = (down(-1) + 2.0 * down(0) + down(1)) / 8.0;
+            let len = (u * u + v * v + 1.0).sqrt();
+            for (byte, want) in got.iter().zip([-u / len, v / len, 1.0 / len]) {
+                let got = f64::from(*byte) / 255.0 * 2.0 - 1.0;
+                assert!((got - want).abs() <= 1.0 / 127.0, "{x} {y}: {got} {want}");
+            }
+        }
+    }
+}
+
+#[test]
+fn green_is_up_and_light_comes_from_the_upper_left() {
+    // A ditch from left to right: its upper wall goes down the picture, so it leans down; the lower one leans up.
+    let mut field = field(UVec2::splat(9));
+    field.depth.row_mut(4).fill(65535);
+    let grey = [128, 128, 128, 255].repeat(81);
+    let (mut diffuse, mut normal) = (grey.clone(), grey.clone());
+    let look = Look { ramp: vec![].into(), ..Look::GROOVE };
+    let mut targets = PaintTargets { diffuse: Some(&mut diffuse), normal: Some(&mut normal), depth: None };
+    let base = BaseTexels { size: UVec2::splat(9), diffuse: &grey, normal: None, depth: None };
+    paint_into(base, &field, &table(&look, &field), TexelRect::whole(base.size), UVec2::ZERO, &mut targets);
+    let texel = |bytes: &[u8], y: usize| bytes.as_chunks::<4>().0[y * 9 + 4];
+    assert!(texel(&normal, 3)[1] < 120 && texel(&normal, 5)[1] > 136, "{normal:?}");
+    assert!(texel(&diffuse, 3)[0] < 128 && texel(&diffuse, 5)[0] > 128, "{diffuse:?}");
+    assert_eq!(texel(&normal, 4), FLAT);
+}
+
+#[test]
+fn a_slow_ramp_has_no_steps() {
+    let size = UVec2::new(4096, 1);
+    let mut field = field(size);
+    for (x, depth) in field.depth.as_mut_slice().iter_mut().enumerate() {
+        *depth = 30_000 + x as u16;
+    }
+    let ramp =
+        [ColorStop { depth: 0.0, color: [0.0; 3], cover: 1.0 }, ColorStop { depth: 1.0, color: [1.0; 3], cover: 1.0 }];
+    let look = Look { ramp: ramp.to_vec().into(), glint: 0.0, grain: 0.0, ..Look::GROOVE };
+    let base = [7, 7, 7, 255].repeat(4096);
+    let mut out = base.clone();
+    let mut targets = PaintTargets { diffuse: Some(&mut out), normal: None, depth: None };
+    let texels = BaseTexels { size, diffuse: &base, normal: None, depth: None };
+    paint_into(texels, &field, &table(&look, &field), TexelRect::whole(size), UVec2::ZERO, &mut targets);
+    for (x, texel) in out.as_chunks::<4>().0.iter().enumerate() {
+        let want = f64::from(30_000 + x as u32) / 65536.0 * 255.0;
+        assert!((f64::from(texel[0]) - want).abs() <= 0.51, "{x}: {texel:?} {want}");
+    }
+}
+
+#[test]
+fn wrong_slices_and_places_are_left_alone() {
+    let mut field = field(UVec2::splat(20));
+    field.depth.as_mut_slice().fill(40_000);
+    let look = table(&Look::FROSTED, &field);
+    let size = UVec2::splat(20);
+    let (full, short) = (vec![9; 1600], vec![9; 1599]);
+    let whole = TexelRect::whole(size);
+    let try_it = |size: UVec2, diffuse: &[u8], normal: &[u8], rect: TexelRect, origin: UVec2, n: usize| {
+        let mut out = [vec![9; n], vec![9; n], vec![9; n.div_ceil(4)]];
+        let [d, m, e] = &mut out;
+        let mut targets = PaintTargets { diffuse: Some(d), normal: Some(m), depth: Some(e) };
+        let base = BaseTexels { size, diffuse, normal: Some(normal), depth: None };
+        paint_into(base, &field, &look, rect, origin, &mut targets);
+        out.map(|out| out.iter().any(|&byte| byte != 9))
+    };
+    assert_eq!(
+        try_it(size, &full, &full, whole, UVec2::ZERO, 1600),
+        [true, false, true],
+        "an even field has no slopes"
+    );
+    assert_eq!(try_it(size, &short, &full, whole, UVec2::ZERO, 1600), [false, false, true]);
+    assert_eq!(try_it(size, &full, &short, whole, UVec2::ZERO, 1596), [false; 3]);
+    assert_eq!(try_it(size, &[], &[], whole, UVec2::ZERO, 0), [false; 3]);
+    assert_eq!(try_it(UVec2::MAX, &full, &full, whole, UVec2::ZERO, 1600), [false; 3]);
+    assert_eq!(try_it(size, &full, &full, whole, UVec2::splat(20), 1600), [false; 3]);
+    assert_eq!(try_it(size, &full, &full, whole, UVec2::MAX, 1600), [false; 3]);
+    assert_eq!(
+        try_it(size, &full, &full, TexelRect { min: UVec2::MAX, max: UVec2::MAX }, UVec2::ZERO, 1600),
+        [false; 3]
+    );
+    let from_corner = TexelRect { min: UVec2::ZERO, max: UVec2::MAX };
+    assert!(try_it(size, &full, &full, from_corner, UVec2::splat(19), 1600)[0], "one texel lies inside");
+}

@@ -1,0 +1,230 @@
+//! From a network to a surface that shows it: growth, depth field and textures are made beside the frames, and a frame takes them up
+//! by handing them over.
+
+use super::{
+    super::{
+        CrackError, CrackMaps, CrackSurface,
+        activate::{frame, look},
+        clock::First,
+        paint::stamp_all,
+        picture::BasePicture,
+        surfaces::{Active, Added, Touched},
+        textures::{self, TextureKind},
+        upload::{Staged, Stager},
+        watch::{Past, grown_anew},
+    },
+    job::{Lines, SLICE},
+};
+use crate::{
+    CrackPreset,
+    growth::CrackGrowth,
+    paint::{LookTable, PaintTargets, paint_rects},
+    pattern::{CellTracker, CrackMask, Moment},
+    raster::{DepthField, Redrawn, Replay, TexelRect},
+};
+use bevy::prelude::*;
+use std::sync::Arc;
+
+/// All that the outcome depends on, beside the cracks.
+pub(super) struct Order {
+    pub(super) surface: CrackSurface,
+    pub(super) preset: CrackPreset,
+    pub(super) base: Arc<BasePicture>,
+    pub(super) mask: Arc<CrackMask>,
+    pub(super) rect: TexelRect,
+    pub(super) maps: CrackMaps,
+    pub(super) past: Past,
+    pub(super) hits: u32,
+    pub(super) first: First,
+    pub(super) has_clock: bool,
+    /// Whether the surface has not cracked yet.
+    pub(super) is_new: bool,
+    pub(super) stager: Option<Stager>,
+}
+
+impl Order {
+    /// For a surface that has cracked.
+    pub(super) fn of(active: &Active, seconds: Option<f32>, stager: Option<Stager>) -> Option<Self> {
+        let past = Past::of(active);
+        let seconds = seconds.filter(|_| past.hits.is_empty());
+        let [diffuse, normal, depth] =
+            [&active.textures.diffuse, &active.textures.normal, &active.textures.depth].map(Option::is_some);
+        Some(Self {
+            surface: active.surface.clone(),
+            preset: active.preset.clone(),
+            base: active.base.clone(),
+            mask: active.growth.mask().clone(),
+            rect: active.views.get(active.view)?.rect,
+            maps: CrackMaps { diffuse, normal, depth },
+            past,
+            hits: active.hits,
+            first: active.first(seconds),
+            has_clock: active.clock.is_some(),
+            is_new: false,
+            stager,
+        })
+    }
+
+    /// Whether the outcome is good for a surface as it is now; steps that it has grown since can be made up for.
+    pub(super) fn fits(&self, active: &Active) -> bool {
+        let view = active.views.get(active.view);
+        !self.is_new
+            && self.hits == active.hits
+            && self.past.hits.len() == active.growth.impacts().len()
+            && Arc::ptr_eq(&self.base, &active.base)
+            && Arc::ptr_eq(&self.mask, active.growth.mask())
+            && view.is_some_and(|view| view.rect == self.rect)
+            && self.has_clock == active.clock.is_some()
+            && self.surface == active.surface
+            && self.preset == active.preset
+    }
+}
+
+/// The way there, as a machine that is stepped.
+pub(super) struct Finish {
+    order: Order,
+    added: Added,
+    covered: Option<f32>,
+    stage: Stage,
+}
+
+enum Stage {
+    Grow,
+    Draw(CrackGrowth, CellTracker),
+    Paint {
+        growth: CrackGrowth,
+        cells: CellTracker,
+        drawn: Box<Drawn>,
+        texels: [Option<Vec<u8>>; 3],
+        /// The first row that is not painted yet.
+        row: u32,
+    },
+}
+
+struct Drawn {
+    field: DepthField,
+    touched: Touched,
+    look: LookTable,
+    replay: Option<(Replay, Moment)>,
+}
+
+/// What a frame takes up.
+pub(super) struct Finished {
+    pub(super) order: Order,
+    pub(super) added: Added,
+    pub(super) covered: Option<f32>,
+    pub(super) growth: CrackGrowth,
+    pub(super) cells: CellTracker,
+    pub(super) field: DepthField,
+    pub(super) touched: Touched,
+    pub(super) look: LookTable,
+    pub(super) replay: Option<(Replay, Moment)>,
+    /// The texels of each texture, and the same where the renderer can read them.
+    pub(super) pictures: [Option<Picture>; 3],
+}
+
+pub(super) struct Picture {
+    pub(super) texels: Vec<u8>,
+    pub(super) staged: Option<Staged>,
+}
+
+/// A slice further.
+pub(super) enum Next {
+    More(Box<Finish>),
+    Done(Box<Finished>),
+}
+
+impl Finish {
+    pub(super) fn new(order: Order, lines: Lines) -> Self {
+        let Lines { network, opening, covered, .. } = lines;
+        Self { order, added: Added { network, opening, steps: 0 }, covered, stage: Stage::Grow }
+    }
+
+    /// A slice of the work.
+    pub(super) fn step(self: Box<Self>) -> Result<Next, CrackError> {
+        let Self { order, mut added, covered, stage } = *self;
+        let stage = match stage {
+            Stage::Grow => order.grow(&mut added)?,
+            Stage::Draw(growth, cells) => order.draw(growth, cells)?,
+            Stage::Paint { growth, cells, drawn, mut texels, row } if row < order.rect.size().y => {
+                let row = order.paint(&drawn, &mut texels, row);
+                Stage::Paint { growth, cells, drawn, texels, row }
+            }
+            Stage::Paint { growth, cells, drawn, texels, .. } => {
+                let Drawn { field, touched, look, replay } = *drawn;
+                let pictures = order.stage(texels);
+                return Ok(Next::Done(Box::new(Finished {
+                    order,
+                    added,
+                    covered,
+                    growth,
+                    cells,
+                    field,
+                    touched,
+                    look,
+                    replay,
+                    pictures,
+                })));
+            }
+        };
+        Ok(Next::More(Box::new(Self { order, added, covered, stage })))
+    }
+}
+
+impl Order {
+    fn grow(&self, added: &mut Added) -> Result<Stage, CrackError> {
+        let extent = frame(self.rect)?.extent();
+        let density = if self.surface.alpha_mask { self.base.density(self.rect) } else { None };
+        let (mask, seed) = (self.mask.clone(), self.surface.seed);
+        let mut growth = grown_anew(&self.preset, extent, seed, mask, density, Some(added), &self.past)?;
+        // All of it is drawn.
+        growth.take_changed(&mut Vec::new());
+        growth.take_markers(&mut Vec::new());
+        let mut cells = CellTracker::new(extent);
+        cells.update(growth.network());
+        Ok(Stage::Draw(growth, cells))
+    }
+
+    fn draw(&self, growth: CrackGrowth, cells: CellTracker) -> Result<Stage, CrackError> {
+        let frame = frame(self.rect)?;
+        let (mut field, mut touched) = (DepthField::new(frame), Touched::new(frame.size()));
+        field.forbid(&self.mask);
+        let profile = self.preset.profile;
+        let replay = match self.first.moment(growth.timeline().end()) {
+            None => {
+                stamp_all(&growth, &profile, &mut field, &mut touched);
+                None
+            }
+            Some(moment) => {
+                let (mut replay, mut redrawn) = (Replay::new(frame.size(), profile), Redrawn::default());
+                replay.show(&mut field, growth.network(), growth.timeline(), moment, &mut redrawn);
+                redrawn.stamped.iter().for_each(|rect| touched.mark(*rect));
+                Some((replay, moment))
+            }
+        };
+        let drawn = Box::new(Drawn { field, touched, look: look(&self.preset, frame)?, replay });
+        let texels = |kind: &TextureKind| (kind.is_wanted)(self.maps).then(|| (kind.texels)(&self.base));
+        Ok(Stage::Paint { growth, cells, drawn, texels: textures::KINDS.each_ref().map(texels), row: 0 })
+    }
+
+    /// Paints some rows from `row` on; returns the next one.
+    fn paint(&self, drawn: &Drawn, texels: &mut [Option<Vec<u8>>; 3], row: u32) -> u32 {
+        let size = self.rect.size();
+        let end = size.y.min(row + (SLICE / size.x).max(1));
+        let band = TexelRect { min: UVec2::new(0, row), max: UVec2::new(size.x, end) };
+        let [diffuse, normal, depth] = texels.each_mut().map(Option::as_deref_mut);
+        let mut targets = PaintTargets { diffuse, normal, depth };
+        paint_rects(self.base.texels(), &drawn.field, &drawn.look, &[band], self.rect.min, &mut targets);
+        end
+    }
+
+    fn stage(&self, texels: [Option<Vec<u8>>; 3]) -> [Option<Picture>; 3] {
+        let mut kinds = textures::KINDS.iter();
+        texels.map(|texels| {
+            let row = self.base.size.x as usize * kinds.next().map_or(0, TextureKind::texel);
+            let texels = texels?;
+            let staged = self.stager.as_ref().and_then(|stager| stager.stage(&texels, row));
+            Some(Picture { texels, staged })
+        })
+    }
+}

@@ -1,0 +1,260 @@
+//! What the frames do of a bake: they order a surface, and take up what was made.
+
+use super::{
+    super::{
+        CrackBudget, CrackClock, CrackError, CrackMaskSource, CrackStatus, CrackTextures, GuidedAppearance,
+        GuidedCracks,
+        activate::{install, make_ready, set_status},
+        carrier::Carrier,
+        clock::First,
+        mask::{Key, PictureMasks},
+        shards::drop_shards,
+        surfaces,
+        surfaces::{Active, Surfaces},
+        textures::{self, TextureKind},
+        upload::Uploads,
+        watch::Past,
+    },
+    Bake, Bakes, Job, Plan, Work,
+    finish::{Finish, Finished, Next, Order},
+    job::{Ground, Lines},
+};
+use crate::raster::TexelRect;
+use bevy::{prelude::*, render::renderer::RenderDevice};
+
+/// So often the surface may change while its cracks are made beside the frames; then they are made between two of them.
+const MAX_ROUNDS: u32 = 8;
+
+/// Frames that a picture on its way to the renderer is waited for: it may have stopped to draw.
+const MAX_LANDING: u32 = 16;
+
+/// The seconds in which cracks appear; `None` = at once.
+fn seconds(world: &World, entity: Entity) -> Option<f32> {
+    match world.get::<GuidedCracks>(entity)?.appearance {
+        GuidedAppearance::AtOnce => None,
+        GuidedAppearance::Front { seconds, .. } | GuidedAppearance::Widen { seconds } => Some(seconds),
+    }
+    .filter(|seconds| *seconds > 0.0)
+}
+
+/// Has the surface made with these cracks, as it is now; from the start if it is another one.
+pub(super) fn order(world: &mut World, entity: Entity, bake: &mut Bake, lines: Lines) -> Result<(), CrackError> {
+    let seconds = seconds(world, entity);
+    let stager = world.resource::<Uploads>().stager(world.get_resource::<RenderDevice>());
+    if !world.resource::<Surfaces>().active.contains_key(&entity) {
+        let (Some(plan), Some(ground)) = (&mut bake.plan, &lines.ground) else { return Ok(()) };
+        if !plan.is_current(world, entity) {
+            return Ok(());
+        }
+        if has_room(world, plan) {
+            let clock = world.get::<CrackClock>(entity).copied();
+            let order = Order {
+                surface: plan.surface.clone(),
+                preset: plan.preset.clone(),
+                base: ground.base.clone(),
+                mask: ground.mask.clone(),
+                rect: plan.pictures.rect,
+                maps: plan.pictures.maps,
+                past: Past { hits: Vec::new(), steps: 0 },
+                hits: 0,
+                first: First::of(clock, 0.0, seconds),
+                has_clock: clock.is_some(),
+                is_new: true,
+                stager,
+            };
+            if plan.textures.is_none() {
+                plan.textures = Some(make_room(world, plan)?);
+            }
+            bake.work = Work::Ready(Job::Finish(Box::new(Finish::new(order, lines))));
+            return Ok(());
+        }
+        // Coarser textures, or an error.
+        if !make_ready(world, entity)? {
+            return Ok(());
+        }
+    }
+    let active = world.resource::<Surfaces>().active.get(&entity);
+    if let Some(order) = active.and_then(|active| Order::of(active, seconds, stager)) {
+        bake.work = Work::Ready(Job::Finish(Box::new(Finish::new(order, lines))));
+    }
+    Ok(())
+}
+
+/// Whether the textures of a surface have room in the budget.
+fn has_room(world: &World, plan: &Plan) -> bool {
+    let left = world.resource::<CrackBudget>().max_texture_bytes.saturating_sub(world.resource::<Surfaces>().bytes);
+    plan.pictures.bytes <= left
+}
+
+/// Makes textures without texels, so that the renderer has room for them when they come.
+fn make_room(world: &mut World, plan: &Plan) -> Result<CrackTextures, CrackError> {
+    let mut images = world.get_resource_mut::<Assets<Image>>().ok_or(CrackError::NoImages)?;
+    let UVec2 { x: width, y: height } = plan.pictures.size;
+    let mut add = |kind: &TextureKind| -> Result<Option<Handle<Image>>, CrackError> {
+        if !(kind.is_wanted)(plan.pictures.maps) {
+            return Ok(None);
+        }
+        let image = kind.empty(plan.pictures.size, &plan.pictures.sampler).ok_or(CrackError::Size { width, height })?;
+        Ok(Some(images.add(image)))
+    };
+    let [diffuse, normal, depth] = textures::KINDS.each_ref().map(&mut add);
+    Ok(CrackTextures { diffuse: diffuse?, normal: normal?, depth: depth? })
+}
+
+/// Takes up what was made; `None` if it has to wait for the renderer, or be made anew.
+pub(super) fn land(
+    world: &mut World,
+    entity: Entity,
+    bake: &mut Bake,
+    mut finished: Box<Finished>,
+    frames: u32,
+) -> Result<Option<Option<f32>>, CrackError> {
+    let covered = finished.covered;
+    match (world.resource_mut::<Surfaces>().active.remove(&entity), bake.plan.take()) {
+        (Some(active), plan) => {
+            bake.plan = plan;
+            if finished.order.fits(&active) {
+                replace(world, entity, active, *finished);
+                return Ok(Some(covered));
+            }
+            world.resource_mut::<Surfaces>().active.insert(entity, active);
+        }
+        (None, Some(mut plan))
+            if finished.order.is_new
+                && finished.order.has_clock == world.get::<CrackClock>(entity).is_some()
+                && has_room(world, &plan)
+                && plan.is_current(world, entity) =>
+        {
+            let textures = plan.textures.take().unwrap_or_default();
+            if frames == 0 {
+                fill(world, &textures, &mut finished);
+            }
+            let uploads = world.resource::<Uploads>();
+            if frames < MAX_LANDING && textures.handles().any(|texture| uploads.is_staged(texture.id())) {
+                plan.textures = Some(textures);
+                bake.plan = Some(plan);
+                bake.work = Work::Landing(finished, frames + 1);
+                return Ok(None);
+            }
+            settle(world, entity, *plan, textures, *finished);
+            return Ok(Some(covered));
+        }
+        (None, plan) => bake.plan = plan,
+    }
+    again(world, entity, bake, *finished)?;
+    Ok(None)
+}
+
+/// Has a surface made anew that has changed meanwhile.
+fn again(world: &mut World, entity: Entity, bake: &mut Bake, finished: Finished) -> Result<(), CrackError> {
+    let Finished { order: past, added, covered, growth, cells, field, pictures, replay, .. } = finished;
+    throw_away(world, (growth, cells, field, pictures, replay));
+    let ground = Ground { base: past.base, mask: past.mask };
+    let ground = past.is_new.then_some(ground);
+    order(world, entity, bake, Lines { network: added.network, opening: added.opening, covered, ground })?;
+    bake.rounds += 1;
+    if bake.rounds < MAX_ROUNDS {
+        return Ok(());
+    }
+    match core::mem::replace(&mut bake.work, Work::Wanted) {
+        Work::Ready(Job::Finish(mut finish)) => loop {
+            match finish.step()? {
+                Next::More(more) => finish = more,
+                Next::Done(finished) => {
+                    bake.work = Work::Landing(finished, 0);
+                    return Ok(());
+                }
+            }
+        },
+        work => bake.work = work,
+    }
+    Ok(())
+}
+
+/// Gives textures their texels, and the renderer; what they had before is in `finished` then.
+fn fill(world: &mut World, textures: &CrackTextures, finished: &mut Finished) {
+    world.resource_scope(|world, mut uploads: Mut<Uploads>| {
+        let Some(mut images) = world.get_resource_mut::<Assets<Image>>() else { return };
+        let CrackTextures { diffuse, normal, depth } = textures;
+        for (texture, picture) in [diffuse, normal, depth].into_iter().zip(&mut finished.pictures) {
+            // Without an asset event, which would upload the whole image once more.
+            if let (Some(texture), Some(picture)) = (texture, picture)
+                && let Some(image) = images.get_mut_untracked(texture)
+            {
+                let before = image.data.replace(core::mem::take(&mut picture.texels));
+                picture.texels = before.unwrap_or_default();
+                uploads.push_whole(texture.id(), image.size(), picture.staged.take());
+            }
+        }
+    });
+}
+
+/// Makes a surface of one that has not cracked before, whose textures are where they are shown from.
+fn settle(world: &mut World, entity: Entity, plan: Plan, textures: CrackTextures, finished: Finished) {
+    let seconds = seconds(world, entity);
+    let Plan { surface, preset, kind, shown, pictures, is_outdated, .. } = plan;
+    let Finished { order, added, growth, cells, field, touched, look, replay, .. } = finished;
+    if let (CrackMaskSource::FromPicture, Some(picture)) = (&surface.mask, &shown.diffuse) {
+        world.resource_mut::<PictureMasks>().remember(Key::new(picture, &pictures), &order.mask);
+    }
+    let carrier = Carrier::new(kind, shown);
+    let (bytes, rect) = (pictures.bytes, pictures.rect);
+    let ground = surfaces::Ground { surface, preset, look, base: order.base, textures, carrier, bytes, rect };
+    let mut active = Active::new(ground, growth, field);
+    (active.touched, active.cells, active.added, active.is_outdated) = (touched, cells, Some(added), is_outdated);
+    active.show_made(replay, seconds);
+    install(world, entity, active);
+    if is_outdated {
+        world.resource_mut::<Surfaces>().changed.push(entity);
+    }
+    begin_to_show(world, entity);
+}
+
+/// Puts baked cracks on a surface that has cracked before and is taken out of the others.
+fn replace(world: &mut World, entity: Entity, mut active: Active, mut finished: Finished) {
+    let seconds = seconds(world, entity);
+    // Shards are of the cells that were.
+    let bytes = drop_shards(world, entity, &mut active);
+    fill(world, &active.textures, &mut finished);
+    let Finished { order, added, growth, cells, field, touched, look, replay, pictures, .. } = finished;
+    // Steps that it has grown since are made up for.
+    active.due += f64::from(Past::of(&active).steps.saturating_sub(order.past.steps));
+    let before = (
+        core::mem::replace(&mut active.growth, growth),
+        core::mem::replace(&mut active.cells, cells),
+        core::mem::replace(&mut active.field, field),
+        core::mem::replace(&mut active.touched, touched),
+        core::mem::replace(&mut active.look, look),
+        active.added.replace(added),
+        pictures,
+    );
+    let is_untouched = order.past.hits.is_empty();
+    let shown_before = active.show_made(replay, seconds.filter(|_| is_untouched));
+    active.cells_told = 1;
+    active.fell_at = (0, 1);
+    active.tips_from = 0;
+    active.mark(TexelRect::whole(active.field.frame.size()));
+    // All that is shown is painted.
+    if let Some(view) = active.views.get_mut(active.view) {
+        view.dirty.clear();
+    }
+    let mut surfaces = world.resource_mut::<Surfaces>();
+    surfaces.active.insert(entity, active);
+    surfaces.bytes -= bytes;
+    begin_to_show(world, entity);
+    throw_away(world, (before, shown_before));
+}
+
+fn begin_to_show(world: &mut World, entity: Entity) {
+    let mut surfaces = world.resource_mut::<Surfaces>();
+    surfaces.start_growing(entity);
+    surfaces.soil(entity);
+    set_status(world, entity, CrackStatus::Growing);
+}
+
+/// Gives back memory where no frame waits for it.
+fn throw_away(world: &World, rubbish: impl Send + 'static) {
+    if let Some(pool) = world.resource::<Bakes>().pool() {
+        pool.spawn(async move { drop(rubbish) }).detach();
+    }
+}

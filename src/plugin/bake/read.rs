@@ -1,0 +1,147 @@
+//! Copies of pictures that are made beside the frames, as far as that goes: the engine's images are where the frames are, so they are
+//! copied there, a little in each frame, into memory that a task has got ready.
+
+use bevy::{
+    prelude::*,
+    tasks::{AsyncComputeTaskPool, Task, futures::check_ready},
+};
+
+/// The most bytes that are copied in a frame, of all bakes together.
+pub(super) const MAX_BYTES: usize = 1 << 19;
+
+/// Pictures of which some is copied.
+pub(super) struct Reading {
+    copies: Vec<Copy>,
+    /// The memory for the copies, in order.
+    memory: Option<Task<Vec<Vec<u8>>>>,
+}
+
+struct Copy {
+    picture: Handle<Image>,
+    image: Image,
+    data: Vec<u8>,
+    length: usize,
+}
+
+/// How far it is.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) enum Read {
+    More,
+    Done,
+    /// A picture has another shape now, or is gone.
+    Changed,
+}
+
+impl Reading {
+    /// `None` if a picture is not there.
+    pub(super) fn new(pictures: Vec<Handle<Image>>, images: &Assets<Image>, has_threads: bool) -> Option<Self> {
+        let copies: Option<Vec<Copy>> = pictures.into_iter().map(|picture| Copy::new(picture, images)).collect();
+        let copies = copies?;
+        let lengths: Vec<usize> = copies.iter().map(|copy| copy.length).collect();
+        // Written once: the first write to memory is the dear one.
+        let get_ready = move || lengths.into_iter().map(|length| vec![1; length]).collect();
+        let pool = AsyncComputeTaskPool::try_get().filter(|_| has_threads);
+        Some(Self { copies, memory: pool.map(|pool| pool.spawn(async move { get_ready() })) })
+    }
+
+    /// Copies what there is to copy, no more bytes than are `left` of this frame.
+    pub(super) fn step(&mut self, images: &Assets<Image>, left: &mut usize) -> Read {
+        if let Some(task) = &mut self.memory {
+            let Some(memory) = check_ready(task) else { return Read::More };
+            self.memory = None;
+            for (copy, mut memory) in self.copies.iter_mut().zip(memory) {
+                memory.clear();
+                copy.data = memory;
+            }
+        }
+        for copy in &mut self.copies {
+            if !copy.step(images, left) {
+                return Read::Changed;
+            }
+        }
+        if self.copies.iter().all(|copy| copy.data.len() == copy.length) { Read::Done } else { Read::More }
+    }
+
+    /// The pictures, wholly copied.
+    pub(super) fn finish(self) -> Vec<Image> {
+        self.copies.into_iter().map(|Copy { image, data, .. }| Image { data: Some(data), ..image }).collect()
+    }
+}
+
+impl Copy {
+    fn new(picture: Handle<Image>, images: &Assets<Image>) -> Option<Self> {
+        let image = images.get(&picture)?;
+        let Image { data, texture_descriptor, asset_usage, .. } = image;
+        let (length, format) = (data.as_ref()?.len(), texture_descriptor.format);
+        let mut copy = Image::new_uninit(texture_descriptor.size, texture_descriptor.dimension, format, *asset_usage);
+        copy.texture_descriptor.mip_level_count = texture_descriptor.mip_level_count;
+        Some(Self { picture, image: copy, data: Vec::new(), length })
+    }
+
+    /// False if it cannot be copied as it was to be.
+    fn step(&mut self, images: &Assets<Image>, left: &mut usize) -> bool {
+        let Some(image) = images.get(&self.picture) else { return false };
+        let (now, then) = (&image.texture_descriptor, &self.image.texture_descriptor);
+        let Some(data) = image.data.as_ref().filter(|data| data.len() == self.length) else { return false };
+        if (now.size, now.format, now.dimension) != (then.size, then.format, then.dimension) {
+            return false;
+        }
+        self.data.reserve_exact(self.length - self.data.len());
+        let from = self.data.len();
+        let to = self.length.min(from + *left);
+        self.data.extend_from_slice(&data[from..to]);
+        *left -= to - from;
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bevy::{
+        asset::RenderAssetUsages,
+        render::render_resource::{Extent3d, TextureDimension, TextureFormat},
+    };
+
+    fn picture(side: u32) -> Image {
+        let extent = Extent3d { width: side, height: side, depth_or_array_layers: 1 };
+        let data = (0..side * side * 4).map(|i| (i * 7 % 251) as u8).collect();
+        Image::new(extent, TextureDimension::D2, data, TextureFormat::Rgba8UnormSrgb, RenderAssetUsages::default())
+    }
+
+    #[test]
+    fn no_frame_copies_more_than_is_left() {
+        let mut images = Assets::<Image>::default();
+        let pictures = [600, 3, 400].map(|side| images.add(picture(side)));
+        let mut reading = Reading::new(pictures.to_vec(), &images, false).expect("they are there");
+        let copied = |reading: &Reading| reading.copies.iter().map(|copy| copy.data.len()).sum::<usize>();
+        let mut frames = 0;
+        loop {
+            let (before, mut left) = (copied(&reading), MAX_BYTES);
+            let read = reading.step(&images, &mut left);
+            assert!(copied(&reading) - before == MAX_BYTES - left, "what is copied is counted");
+            frames += 1;
+            if read == Read::Done {
+                break;
+            }
+            assert_eq!((read, left), (Read::More, 0));
+        }
+        assert_eq!(frames, (4 * (600 * 600 + 9 + 400 * 400usize)).div_ceil(MAX_BYTES));
+        for (copy, picture) in reading.finish().iter().zip(&pictures) {
+            assert!(images.get(picture).is_some_and(|image| image.data == copy.data), "a copy equals its picture");
+        }
+    }
+
+    #[test]
+    fn a_picture_that_changes_its_shape_is_told() {
+        let mut images = Assets::<Image>::default();
+        let handle = images.add(picture(600));
+        let mut reading = Reading::new(vec![handle.clone()], &images, false).expect("it is there");
+        assert_eq!(reading.step(&images, &mut 1000), Read::More);
+        images.insert(&handle, picture(599)).expect("the handle is good");
+        assert_eq!(reading.step(&images, &mut 1000), Read::Changed);
+        images.remove(&handle);
+        assert_eq!(reading.step(&images, &mut 1000), Read::Changed);
+        assert!(Reading::new(vec![handle], &images, false).is_none());
+    }
+}
