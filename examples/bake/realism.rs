@@ -56,7 +56,7 @@ const fn view(preset: &str) -> View {
     let (hits, energy, scale, spread) = match preset.as_bytes() {
         b"concrete" => ((1, 4), (0.3, 1.5), 1.4, 0.5),
         b"plaster" => ((1, 3), (0.1, 1.0), 1.2, 0.8),
-        b"brick" => ((1, 3), (0.02, 0.2), 3.0, 0.8),
+        b"brick" => ((1, 3), (0.0134, 0.134), 3.57, 0.817),
         // Weak ones: flying stones, not hammers.
         b"glass" => ((1, 4), (0.0046, 0.114), 1.86, 0.88),
         b"laminated_glass" => ((1, 4), (0.02, 0.5), 1.0, 0.5),

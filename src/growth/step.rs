@@ -93,6 +93,8 @@ pub struct CrackGrowth {
     pub(super) order: Vec<(u32, u32)>,
     /// Per node: its entry in `pulls` during a step.
     pub(super) pull_of: Vec<u32>,
+    /// Nodes that one birth has made wider; empty in between.
+    pub(super) widened: Vec<u32>,
 }
 
 impl CrackGrowth {
@@ -134,6 +136,7 @@ impl CrackGrowth {
             pulls: Vec::new(),
             order: Vec::new(),
             pull_of: Vec::new(),
+            widened: Vec::new(),
             params,
             seed,
         })
@@ -198,20 +201,14 @@ impl CrackGrowth {
 
     /// Lets `act` widen nodes, and notes which became wider.
     fn widen_with(&mut self, act: impl FnOnce(&mut Widths, &mut [Node], &mut dyn FnMut(u32))) {
-        let mut widened = [NO_PARENT; 64];
-        let mut n = 0;
-        act(&mut self.widths, &mut self.network.nodes, &mut |node| {
-            // Each node on the way up is wider than the one before, so there are no more than notches.
-            if let Some(slot) = widened.get_mut(n) {
-                *slot = node;
-                n += 1;
-            }
-        });
-        for &node in &widened[..n] {
-            let widened = self.network.nodes[node as usize];
-            self.changes.widened(node, widened.parent != NO_PARENT);
-            self.timeline.widen(node, widened.width);
+        let mut widened = std::mem::take(&mut self.widened);
+        act(&mut self.widths, &mut self.network.nodes, &mut |node| widened.push(node));
+        for node in widened.drain(..) {
+            let wider = self.network.nodes[node as usize];
+            self.changes.widened(node, wider.parent != NO_PARENT);
+            self.timeline.widen(node, wider.width);
         }
+        self.widened = widened;
     }
 
     /// One step of growth (Couto et al., eq. 2): every node that attracts markers grows one node at
