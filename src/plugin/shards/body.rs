@@ -3,7 +3,7 @@
 use super::{
     Broken, Shard,
     broken::Piece,
-    plane::{Faces, write_mesh},
+    plane::{Faces, empty_mesh, write_mesh},
 };
 use crate::{
     plugin::carrier::Carrier,
@@ -60,7 +60,7 @@ impl Spares {
 
 impl Body {
     /// Hides a body and keeps it for another shard.
-    pub(super) fn park(self, world: &mut World, carrier: &Carrier) {
+    fn park(self, world: &mut World, carrier: &Carrier) {
         let Ok(mut entity) = world.get_entity_mut(self.entity) else { return };
         entity.remove::<Shard>();
         // Materials and their pictures are the surface's.
@@ -101,7 +101,7 @@ impl Clothes<'_> {
                 write_mesh(&mut old, mesh, faces, is_mirrored, is_solid);
                 return Some(kept.clone());
             }
-            let mut new = super::plane::empty_mesh();
+            let mut new = empty_mesh();
             write_mesh(&mut new, mesh, faces, is_mirrored, is_solid);
             Some(meshes.add(new))
         };
@@ -240,7 +240,16 @@ impl Broken {
     /// Takes the entity of a piece away.
     pub(super) fn hide(&mut self, world: &mut World, carrier: &Carrier, index: usize) {
         if let Some(body) = self.pieces.get_mut(index).and_then(|piece| piece.body.take()) {
+            self.put_away(world, carrier, body);
+        }
+    }
+
+    /// Takes a body away, for another shard if nobody else has made something of it.
+    pub(super) fn put_away(&self, world: &mut World, carrier: &Carrier, body: Body) {
+        if self.settings.fly {
             body.park(world, carrier);
+        } else {
+            world.try_despawn(body.entity).ok();
         }
     }
 }

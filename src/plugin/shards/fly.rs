@@ -104,7 +104,7 @@ fn fly(
         if now < before { broken.pieces.extract_if(.., |piece| piece.born > now).collect() } else { Vec::new() };
     for mut piece in early {
         if let Some(body) = piece.body.take() {
-            body.park(world, &active.carrier);
+            broken.put_away(world, &active.carrier, body);
         }
         if let Some(whole) = piece.part_of {
             if let Some(index) = broken.index_of(whole) {
