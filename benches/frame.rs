@@ -372,7 +372,7 @@ fn shards(c: &mut Criterion) {
     // To and fro, so that none fades.
     let mut fly = |app: &mut App| {
         frame += 1;
-        let speed = if frame % 60 < 30 { 1.0 } else { -0.98 };
+        let speed = if frame % 60 < 30 { 1.0 } else { -0.9 };
         for pane in &panes {
             set(app, *pane, |pane| pane.speed = speed);
         }

@@ -176,8 +176,8 @@ pub struct Shard {
     pub spin: Vec3,
     /// Units of the surface's own space to a pattern unit, along x and y of the shard; below zero where the picture is mirrored.
     pub scale: Vec2,
-    /// Which of the released pieces of its surface it is.
-    pub(super) piece: u32,
+    /// Which of the released pieces of its surface it is, and for how many times that is shown.
+    pub(super) piece: [u32; 2],
 }
 
 impl Shard {

@@ -158,7 +158,7 @@ impl Broken {
         index: usize,
         pose: Pose,
         scratch: &mut ShardMesh,
-    ) -> Option<Entity> {
+    ) -> Option<(Entity, [u32; 2])> {
         let level = self.level(carrier, pose);
         let material = self.material(world, surface, carrier, level)?;
         let place = self.place(carrier, index, pose)?;
@@ -179,7 +179,7 @@ impl Broken {
             velocity: self.plane.rotation * (flight.velocity * scale.extend(scale.y.abs())),
             spin: self.plane.rotation * (flight.axis * flight.spin),
             scale,
-            piece: piece.id,
+            piece: [piece.id, piece.times + 1],
         };
         let is_mirrored = self.plane.is_mirrored();
         let clothes = Clothes { carrier, material: &material, inside: self.inside.as_ref(), is_mirrored };
@@ -187,7 +187,8 @@ impl Broken {
         let entity = body.entity;
         let piece = self.pieces.get_mut(index)?;
         (piece.body, piece.level) = (Some(body), level);
-        Some(entity)
+        piece.times += 1;
+        Some((entity, [piece.id, piece.times]))
     }
 
     /// Thickness of shards in the entity's units.
