@@ -86,7 +86,7 @@ pub struct VoronoiParams {
     /// width where it is dearest. 0..=8; default 2. 0 makes all cracks equally wide.
     pub taper: f32,
     /// How wide a crack down the middle of a guide's stroke is at least, as a share of the stroke's own width; 0..=1, default
-    /// 0.45; no more than three times [`width`](Self::width).
+    /// 0.45; at most about twice [`width`](Self::width).
     ///
     /// So large letters have wide cracks, and thin parts of a letter are not lost. 0 = as the paper, all cracks by path
     /// cost alone.

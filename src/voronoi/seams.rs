@@ -336,8 +336,8 @@ impl Tracer {
             let inside = 0.5 * (a + b);
             let noise = self.beside(crossing).map(|texel| guides.noise_at(texel)).iter().sum::<f32>();
             let uneven = 1.0 + UNEVEN * (noise - 1.0);
-            let stroke = 2.0 * inside * uneven * guides.texels(cost);
-            Cost { cost: cost * (1.0 - ASIDE * share * (1.0 - inside)), stroke }
+            let stroke = 2.0 * inside * guides.texels(cost);
+            Cost { cost: cost * (1.0 - ASIDE * share * (1.0 - inside)), stroke, uneven }
         };
         costs.into_iter().zip(&line.crossings).map(weigh).collect()
     }
@@ -350,6 +350,8 @@ struct Cost {
     cost: f32,
     /// Width of the stroke of which this is the middle, texels.
     stroke: f32,
+    /// How much wider the crack is here in a stroke.
+    uneven: f32,
 }
 
 /// What the widths of cracks have to know of the guides.
@@ -432,9 +434,9 @@ fn least_within(values: &[f32], reach: usize) -> Vec<f32> {
 /// letters cannot be read.
 const UNEVEN: f32 = 0.3;
 
-/// The most by which a crack in a stroke exceeds full width. With 2 short words are too thin to be read; without a limit the
-/// middles of broad surfaces gape.
-const MOST: f32 = 3.0;
+/// By how much a crack in a stroke exceeds full width at most. With 1 short words, whose letters are large, are not read as well;
+/// without a limit the middles of broad surfaces gape.
+const MOST: f32 = 2.0;
 
 /// Path cost to width (Mould 2005, section 3.2: "the further the site, the wider").
 struct Widths {
@@ -448,9 +450,9 @@ struct Widths {
 }
 
 impl Widths {
-    fn of(&self, Cost { cost, stroke }: Cost) -> f32 {
+    fn of(&self, Cost { cost, stroke, uneven }: Cost) -> f32 {
         let width = self.least + self.gain * ops::powf((cost / self.full).min(1.0), self.taper);
-        width.max((self.of_stroke * stroke).min(MOST * (self.least + self.gain)))
+        width.max((self.of_stroke * stroke).min(MOST * (self.least + self.gain)) * uneven)
     }
 }
 
