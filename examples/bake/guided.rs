@@ -3,8 +3,8 @@
 use crate::{
     growth::size,
     ink::{ink, lightness},
+    maps::{Paint, base_picture, write_maps},
     ocr::{PROFILE, deep},
-    painting::{Paint, base_picture, write_maps},
     pictures::read_picture,
     text::{FONT, draw_text},
 };

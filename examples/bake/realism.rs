@@ -1,6 +1,6 @@
 //! `bake realism`: masks of every preset, to be measured against masks of real cracks.
 
-use crate::painting::mask;
+use crate::maps::mask;
 use bevy_crack::{
     CrackPreset,
     growth::CrackGrowth,
