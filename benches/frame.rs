@@ -3,9 +3,11 @@
 //! `cargo bench --profile dev --bench frame`: the build that `cargo test` uses.
 //! `growing/*`: 100 surfaces of 512 x 512 that were hit at once, one step a frame each; the time of an idle frame of the same
 //! app is taken off. `finished/*`: a frame with 10,000 cracked surfaces of 32 x 32 that have come to an end, beside one with
-//! 10,000 plain sprites. "only ...": parts of the first that no program could do without. `baking`: what of each frame the crate's systems take while guided cracks are baked and appear, 60 frames
-//! a second, from the first frame to ten after the last crack. With a Vulkan driver (software will do) uploads are part of it;
-//! without, it says so.
+//! 10,000 plain sprites. "only ...": parts of the first that no program could do without. `baking`: what of each frame the
+//! crate's systems take while guided cracks are baked and appear, 60 frames a second, from the first frame to ten after the last
+//! crack. `shards/*`: what the crate's own systems take of the main thread in the
+//! frame in which a pane becomes 500 shards, for the first time and with bodies that are there from before, and in each frame in which
+//! 5,000 fly. With a Vulkan driver (software will do) uploads are part of it; without, it says so.
 
 #![expect(clippy::print_stdout, clippy::expect_used, reason = "a benchmark")]
 
@@ -31,6 +33,7 @@ use bevy_crack::{
     plugin::CrackUploadStats,
     prelude::*,
     raster::{DepthField, DirtyTiles, TexelRect, stamp_path, stamp_path_with},
+    shatter::{Anchor, ShatterParams},
 };
 use criterion::{Criterion, criterion_group, criterion_main};
 use std::time::{Duration, Instant};
@@ -67,19 +70,32 @@ fn app() -> App {
 #[derive(Resource, Default)]
 struct OurSystems(Option<Instant>, Duration);
 
+fn start_watch(mut time: ResMut<OurSystems>) {
+    time.0 = Some(Instant::now());
+}
+
+fn stop_watch(mut time: ResMut<OurSystems>) {
+    let elapsed = time.0.take().map_or(Duration::ZERO, |start| start.elapsed());
+    time.1 += elapsed;
+}
+
 fn measure_systems(app: &mut App) {
     app.init_resource::<OurSystems>().add_systems(
         PostUpdate,
         (
-            (|mut time: ResMut<OurSystems>| time.0 = Some(Instant::now()))
-                .after(TransformSystems::Propagate)
-                .before(CrackSystems::Hit),
-            (|mut time: ResMut<OurSystems>| {
-                let elapsed = time.0.take().map_or(Duration::ZERO, |start| start.elapsed());
-                time.1 += elapsed;
-            })
-            .after(CrackSystems::Upload)
-            .before(bevy::asset::AssetEventSystems),
+            start_watch.after(TransformSystems::Propagate).before(CrackSystems::Hit),
+            stop_watch.after(CrackSystems::Upload).before(bevy::asset::AssetEventSystems),
+        ),
+    );
+}
+
+/// The same for the systems that make and move shards.
+fn measure_shards(app: &mut App) {
+    app.init_resource::<OurSystems>().add_systems(
+        PostUpdate,
+        (
+            start_watch.before(CrackSystems::Shatter),
+            stop_watch.after(CrackSystems::Shatter).before(TransformSystems::Propagate),
         ),
     );
 }
@@ -374,6 +390,105 @@ fn baking(side: u32) {
     println!("baking {side} x {side}: {} frames, p50 {half:.3} ms, p99 {most:.3} ms, max {all:.3} ms", times.len());
 }
 
+/// Panes that are cracked all over, and become at most 500 shards each.
+fn panes(count: usize) -> (App, Vec<Entity>) {
+    let mut app = app();
+    measure_shards(&mut app);
+    app.world_mut().resource_mut::<CrackBudget>().max_shards = 10_000;
+    let panes: Vec<Entity> = (0..count as u64)
+        .map(|seed| {
+            let image = app.world_mut().resource_mut::<Assets<Image>>().add(picture(256));
+            let settings = ShatterCracks {
+                cut: ShatterParams { carry_on: true, max_shards: 500, ..ShatterParams::DEFAULT },
+                anchor: Anchor::Nothing,
+                speed: 0.0,
+                ..default()
+            };
+            let surface = CrackSurface::new(CrackPreset::GLASS).with_seed(seed);
+            app.world_mut().spawn((Sprite::from_image(image), surface, settings)).id()
+        })
+        .collect();
+    for i in 0..64 {
+        let at = Vec2::new(0.06 + 0.125 * (i % 8) as f32, 0.07 + 0.123 * (i / 8) as f32);
+        for pane in &panes {
+            app.world_mut().trigger(CrackHit::uv(*pane, at).with_energy(2.0));
+        }
+    }
+    for _ in 0..400 {
+        app.update();
+    }
+    for pane in &panes {
+        app.world_mut().commands().entity(*pane).shatter_cracks(ShatterRequest::around(Vec2::ZERO, 0.0));
+    }
+    app.update();
+    (app, panes)
+}
+
+fn set(app: &mut App, pane: Entity, change: impl FnOnce(&mut ShatterCracks)) {
+    change(&mut app.world_mut().get_mut::<ShatterCracks>(pane).expect("the settings"));
+}
+
+/// Time of the systems in one frame.
+fn systems_of(app: &mut App) -> Duration {
+    app.insert_resource(OurSystems::default());
+    app.update();
+    app.world().resource::<OurSystems>().1
+}
+
+/// The least and the median time of some, in milliseconds: a busy machine pauses a run, it never speeds one up.
+fn least_and_median(mut times: Vec<Duration>) -> String {
+    times.sort();
+    format!(
+        "{:.2} ms at best, median {:.2} ms",
+        times[0].as_secs_f64() * 1e3,
+        times[times.len() / 2].as_secs_f64() * 1e3
+    )
+}
+
+fn shards(c: &mut Criterion) {
+    let (mut app, panes) = panes(10);
+    let burst = |pane: &Entity| {
+        app.world_mut().commands().entity(*pane).shatter_cracks(ShatterRequest::ALL);
+        systems_of(&mut app)
+    };
+    println!("500 shards for the first time: {}", least_and_median(panes.iter().map(burst).collect()));
+    let shown = app.world_mut().query::<&Shard>().iter(app.world()).count();
+    println!("{shown} shards in all");
+    let mut again = Vec::new();
+    for pane in panes.iter().cycle().take(100) {
+        set(&mut app, *pane, |pane| pane.seek = Some(1000.0));
+        app.update();
+        set(&mut app, *pane, |pane| pane.seek = Some(0.0));
+        again.push(systems_of(&mut app));
+    }
+    println!("500 shards with bodies that are there: {}", least_and_median(again));
+    let still = (0..40).map(|_| time_of(|| app.update())).collect();
+    println!("a frame in which they stand still: {}", least_and_median(still));
+    let mut frame = 0;
+    // To and fro, so that none fades.
+    let mut fly = |app: &mut App| {
+        frame += 1;
+        let speed = if frame % 60 < 30 { 1.0 } else { -0.9 };
+        for pane in &panes {
+            set(app, *pane, |pane| pane.speed = speed);
+        }
+    };
+    let moved = (0..80).map(|_| {
+        fly(&mut app);
+        systems_of(&mut app)
+    });
+    println!("5,000 fly, the systems: {}", least_and_median(moved.collect()));
+    let mut group = c.benchmark_group("shards");
+    group.sample_size(20);
+    group.bench_function("5,000 fly, the frame", |b| {
+        b.iter(|| {
+            fly(&mut app);
+            app.update();
+        });
+    });
+    group.finish();
+}
+
 fn frame(c: &mut Criterion) {
     [1024, 2048].into_iter().for_each(baking);
     floors();
@@ -392,11 +507,13 @@ fn frame(c: &mut Criterion) {
     let mut group = c.benchmark_group("finished");
     group.sample_size(20);
     for (name, cracked) in [("10,000 cracked surfaces", true), ("10,000 plain sprites", false)] {
-        let mut app = many(cracked);
-        group.bench_function(name, |b| b.iter(|| app.update()));
+        group.bench_function(name, |b| {
+            let mut app = many(cracked);
+            b.iter(|| app.update());
+        });
     }
     group.finish();
 }
 
-criterion_group!(benches, frame);
+criterion_group!(benches, shards, frame);
 criterion_main!(benches);

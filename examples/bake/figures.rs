@@ -2,8 +2,8 @@
 
 use crate::{
     guided::regions,
+    maps::{Paint, base_picture},
     ocr::{PROFILE, SIDE, deep},
-    painting::{Paint, base_picture},
     text::{FONT, draw_text},
 };
 use bevy_crack::{

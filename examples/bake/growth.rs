@@ -1,8 +1,9 @@
 //! `bake growth`: hits in, textures and the network out.
 
 use crate::{
+    maps::write_maps,
     own::own_picture,
-    painting::{fitted, paint, write_maps},
+    painting::{fitted, paint},
     pictures::read_picture,
 };
 use bevy_crack::{

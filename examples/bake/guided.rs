@@ -3,8 +3,8 @@
 use crate::{
     growth::size,
     ink::{ink, lightness},
+    maps::{Paint, base_picture, write_maps},
     ocr::{PROFILE, deep},
-    painting::{Paint, base_picture, write_maps},
     pictures::read_picture,
     text::{FONT, draw_text},
 };
@@ -62,6 +62,9 @@ pub(crate) struct Options {
     /// Width of the widest crack, in shares of the shorter side
     #[arg(long)]
     width: Option<f32>,
+    /// Least width of a crack in a stroke, in shares of the stroke's
+    #[arg(long, default_value_t = VoronoiParams::DEFAULT.stroke_width)]
+    stroke_width: f32,
     /// Width and height in texels
     #[arg(long, value_parser = size, default_value = "400x400")]
     size: UVec2,
@@ -152,8 +155,8 @@ fn params(options: &Options, guides: &[Guide], frame: &SurfaceFrame) -> Result<V
             SiteLayout::Density(guides.first().ok_or("`--layout image` needs a `--guide`")?.image.clone())
         }
     };
-    let (sites, levels, alpha) = (options.sites, options.levels, options.alpha);
-    let mut params = VoronoiParams { sites, layout, levels, alpha, ..VoronoiParams::DEFAULT };
+    let &Options { sites, levels, alpha, stroke_width, .. } = options;
+    let mut params = VoronoiParams { sites, layout, levels, alpha, stroke_width, ..VoronoiParams::DEFAULT };
     if let Some(width) = options.width {
         params.width = width;
         params.least_width = params.least_width.min(width);

@@ -1,6 +1,7 @@
 //! `bake legible`: draws words by cracks and has them read back.
 
 use crate::ocr;
+use bevy_crack::voronoi::VoronoiParams;
 use clap::Args;
 use image::GrayImage;
 use std::{
@@ -23,6 +24,9 @@ pub(crate) struct Options {
     /// Have the letters themselves read instead of their cracks: the most that can be reached
     #[arg(long)]
     plain: bool,
+    /// Least width of cracks in strokes, as a share of the stroke's
+    #[arg(long, default_value_t = VoronoiParams::DEFAULT.stroke_width)]
+    stroke_width: f32,
     /// Seed of the first word; each further one has the next
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -73,7 +77,8 @@ fn draw(
             let texels = guide.as_slice().iter().map(|ink| 255 - (ink * 255.0) as u8).collect();
             GrayImage::from_raw(ocr::SIDE, ocr::SIDE, texels).ok_or("picture size")?
         } else {
-            let (picture, strokes) = ocr::draw(guide, seed)?;
+            let params = VoronoiParams { stroke_width: options.stroke_width, ..VoronoiParams::DEFAULT };
+            let (picture, strokes) = ocr::draw(guide, seed, params)?;
             *uncovered += usize::from(strokes.covered < 0.95);
             picture
         };

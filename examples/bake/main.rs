@@ -14,6 +14,7 @@ mod growth;
 mod guided;
 mod ink;
 mod legible;
+mod maps;
 mod ocr;
 mod own;
 mod painting;

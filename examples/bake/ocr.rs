@@ -1,6 +1,6 @@
 //! Words drawn by cracks, as Tesseract reads them.
 
-use crate::text::draw_text;
+use super::text::draw_text;
 use bevy_crack::{
     Grid,
     pattern::SurfaceFrame,
@@ -49,9 +49,13 @@ pub(crate) fn word(font: &[u8], word: &str) -> Result<Grid<f32>, Box<dyn Error>>
 }
 
 /// The deep cracks of a word at the paper's size with the paper's number of sites, black on white.
-pub(crate) fn draw(image: Grid<f32>, seed: u64) -> Result<(GrayImage, StrokeReport), Box<dyn Error>> {
+pub(crate) fn draw(
+    image: Grid<f32>,
+    seed: u64,
+    params: VoronoiParams,
+) -> Result<(GrayImage, StrokeReport), Box<dyn Error>> {
     let size = image.size();
-    let params = VoronoiParams { layout: SiteLayout::Astride, ..VoronoiParams::DEFAULT };
+    let params = VoronoiParams { layout: SiteLayout::Astride, ..params };
     let (map, seams) = VoronoiBake::new(params, vec![Guide::new(image)], size, seed)?.finish();
     let mut field = DepthField::new(SurfaceFrame::new(size)?);
     seams.stamp(&mut field, &PROFILE);

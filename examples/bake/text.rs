@@ -34,7 +34,7 @@ pub(crate) fn draw_text(font: &[u8], text: &str, size: UVec2, most: f32) -> Opti
             let at = (corner.x + x as f32, corner.y + y as f32);
             if at.0 >= 0.0 && at.1 >= 0.0 && (at.0 as u32) < size.x && (at.1 as u32) < size.y {
                 let value = &mut grid.row_mut(at.1 as usize)[at.0 as usize];
-                *value = value.max(cover);
+                *value = value.max(cover.min(1.0));
             }
         });
     }

@@ -21,7 +21,7 @@ use std::{fs, fs::File, path::Path};
 const SIZE: UVec2 = UVec2::new(1280, 720);
 
 /// Width of the GIF.
-const GIF_WIDTH: u32 = 480;
+const GIF_WIDTH: u32 = 400;
 
 /// Takes pictures where there is no window, writes them, and ends the app.
 pub(crate) struct FilmPlugin;

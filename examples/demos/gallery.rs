@@ -5,6 +5,8 @@
 
 #[path = "../bake/own.rs"]
 mod own;
+#[path = "../bake/painting.rs"]
+mod painting;
 #[path = "../bake/pictures.rs"]
 mod pictures;
 #[path = "../bake/sheet.rs"]

@@ -8,7 +8,7 @@
 use bevy::prelude::*;
 use bevy_crack::{
     prelude::*,
-    shatter::{Anchor, BurstParams, ShatterParams},
+    shatter::{Anchor, BreakAgain, BurstParams, ShatterParams},
 };
 use bevy_crack_demos::{Cursor, DemoArguments, OnCanvas, Script, caption, demo_app, heal_on_h, play};
 
@@ -55,6 +55,7 @@ fn setup(mut commands: Commands, assets: Res<AssetServer>) {
         ShatterCracks {
             cut: ShatterParams { carry_on: true, ..ShatterParams::DEFAULT },
             anchor: Anchor::Nothing,
+            again: Some(BreakAgain { after: 0.5, ..BreakAgain::DEFAULT }),
             burst: BurstParams { hold: 0.25, speed: 1.4, gravity: Vec2::new(0.0, -1.6), ..BurstParams::DEFAULT },
             ..default()
         },

@@ -60,7 +60,6 @@ pub enum Output {
 ///
 /// `--frames`, `--out` given together with `--headless`, or no display, mean a scripted run without a window.
 #[expect(clippy::print_stdout, reason = "a demo says how it runs")]
-#[must_use]
 pub fn demo_app(title: &str, arguments: &DemoArguments) -> App {
     let renderer = try_renderer();
     let forced = arguments.headless || std::env::args().any(|a| a.starts_with("--frames") || a.starts_with("--out"));

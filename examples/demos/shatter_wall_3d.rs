@@ -19,13 +19,22 @@ const BEAM: f32 = 0.16;
 /// Speed of a bullet, metres a second.
 const SPEED: f32 = 14.0;
 
+/// How hard a shot hits.
+const ENERGY: f32 = 1.8;
+
 /// How far around a shot glass is knocked out, in heights of the pane.
 const REACH: f32 = 0.34;
 
 /// The scripted run: when a shot is fired (share of its length) and where it lands (metres from the middle of the pane), and when
 /// time turns around.
-const SHOTS: [(f32, Vec2); 3] =
-    [(0.04, Vec2::new(-0.42, 0.2)), (0.27, Vec2::new(0.62, -0.28)), (0.5, Vec2::new(0.1, 0.5))];
+const SHOTS: [(f32, Vec2); 6] = [
+    (0.03, Vec2::new(-0.42, 0.2)),
+    (0.14, Vec2::new(0.45, -0.2)),
+    (0.25, Vec2::new(0.1, 0.4)),
+    (0.36, Vec2::new(-0.3, -0.35)),
+    (0.47, Vec2::new(0.75, 0.3)),
+    (0.56, Vec2::new(-0.75, -0.1)),
+];
 const TURN_AT: f32 = 0.78;
 
 #[derive(Component)]
@@ -64,12 +73,23 @@ fn setup(
         Hdr,
         // Needs no lookup table.
         Tonemapping::AcesFitted,
-        AmbientLight { brightness: 260.0, ..default() },
+        AmbientLight { brightness: 700.0, ..default() },
         Transform::default(),
     ));
     commands.spawn((
-        PointLight { intensity: 500_000.0, range: 14.0, shadow_maps_enabled: false, ..default() },
+        PointLight { intensity: 700_000.0, range: 16.0, shadow_maps_enabled: false, ..default() },
         Transform::from_xyz(-1.6, 2.0, 2.2),
+    ));
+    // Behind the pane, on the wall.
+    commands.spawn((
+        PointLight {
+            color: Color::srgb(1.0, 0.86, 0.68),
+            intensity: 500_000.0,
+            range: 9.0,
+            shadow_maps_enabled: false,
+            ..default()
+        },
+        Transform::from_xyz(1.4, 1.5, -0.9),
     ));
     let (brick, normals) = with_normals(&assets, "brick_red");
     let wall = materials.add(StandardMaterial {
@@ -78,16 +98,19 @@ fn setup(
         perceptual_roughness: 0.95,
         ..default()
     });
-    let wall_mesh = Mesh::from(Rectangle::new(6.0, 6.0)).with_generated_tangents();
-    if let Ok(mesh) = wall_mesh {
-        commands.spawn((Mesh3d(meshes.add(mesh)), MeshMaterial3d(wall), Transform::from_xyz(0.0, 0.6, -2.2)));
+    if let Ok(mesh) = Mesh::from(Rectangle::new(4.0, 4.0)).with_generated_tangents() {
+        let mesh = meshes.add(mesh);
+        for i in -2..=2 {
+            let at = Transform::from_xyz(4.0 * i as f32, 0.9, -2.2);
+            commands.spawn((Mesh3d(mesh.clone()), MeshMaterial3d(wall.clone()), at));
+        }
     }
     let stone = materials.add(StandardMaterial {
         base_color: Color::srgb(0.3, 0.3, 0.32),
         perceptual_roughness: 0.9,
         ..default()
     });
-    let floor = meshes.add(Rectangle::new(9.0, 7.0));
+    let floor = meshes.add(Rectangle::new(12.0, 7.0));
     let flat = Quat::from_rotation_x(-std::f32::consts::FRAC_PI_2);
     commands.spawn((Mesh3d(floor), MeshMaterial3d(stone), Transform::from_xyz(0.0, -1.1, 0.5).with_rotation(flat)));
 
@@ -183,7 +206,7 @@ fn fly(
         if before.z > 0.0 && after.z <= 0.0 {
             let at = before.lerp(after, before.z / (before.z - after.z));
             if (at.truncate().abs() * 2.0).cmplt(PANE).all() {
-                let hit = CrackHit::world(*pane, at).with_energy(1.6).with_direction(*bullet.way);
+                let hit = CrackHit::world(*pane, at).with_energy(ENERGY).with_direction(*bullet.way);
                 commands.trigger(hit);
             }
         }

@@ -403,11 +403,17 @@ impl MarkerField {
         }
     }
 
-    /// Takes a living marker that no node attracts, the first from a place that `draw` chooses; its place and its impact.
-    pub(super) fn take_waiting(&mut self, draw: u64) -> Option<(Vec2, u32)> {
+    /// Takes a living marker that no node attracts: of those found first from `draws.len()` places that are chosen by draws the nearest to
+    /// `center`. Returns its place and its impact.
+    pub(super) fn take_waiting(&mut self, draws: &[u64], center: Vec2) -> Option<(Vec2, u32)> {
         let n = self.made_settled();
-        let from = (draw % n.max(1) as u64) as usize;
-        let i = (from..n).chain(0..from).find(|&i| self.near_sq[i] > DEAD && self.node[i] == NO_NODE)?;
+        let is_waiting = |i: &usize| self.near_sq[*i] > DEAD && self.node[*i] == NO_NODE;
+        let found = draws.iter().filter_map(|draw| {
+            let from = (draw % n.max(1) as u64) as usize;
+            (from..n).chain(0..from).find(is_waiting)
+        });
+        let away = |i: &usize| Vec2::new(self.x[*i], self.y[*i]).distance_squared(center);
+        let i = found.min_by(|a, b| away(a).total_cmp(&away(b)))?;
         self.near_sq[i] = DEAD;
         self.killed += 1;
         Some((Vec2::new(self.x[i], self.y[i]), self.loyal[i]))

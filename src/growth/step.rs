@@ -1,7 +1,7 @@
 //! The growth itself, step by step.
 
 use super::{
-    GrowthParams, Impact, ParamError,
+    GrowthParams, Impact, ParamError, StartLayout,
     arrest::{Advance, Arrest},
     changes::Changes,
     field::{ANY_IMPACT, MarkerField},
@@ -87,14 +87,14 @@ pub struct CrackGrowth {
     /// Places of markers made since they were last asked for.
     pub(super) shown_markers: Vec<Vec2>,
     pub(super) changes: Changes,
-    /// Empty but for its memory.
-    pub(super) widened: Vec<u32>,
     pub(super) timeline: Timeline,
     pub(super) pulls: Vec<Pull>,
     /// Node and entry in `pulls`, in order of the nodes.
     pub(super) order: Vec<(u32, u32)>,
     /// Per node: its entry in `pulls` during a step.
     pub(super) pull_of: Vec<u32>,
+    /// Nodes that one birth has made wider; empty in between.
+    pub(super) widened: Vec<u32>,
 }
 
 impl CrackGrowth {
@@ -132,11 +132,11 @@ impl CrackGrowth {
             links_told: 0,
             shown_markers: Vec::new(),
             changes: Changes::default(),
-            widened: Vec::new(),
             timeline: Timeline::default(),
             pulls: Vec::new(),
             order: Vec::new(),
             pull_of: Vec::new(),
+            widened: Vec::new(),
             params,
             seed,
         })
@@ -318,14 +318,16 @@ impl CrackGrowth {
     /// Begins new cracks where markers are out of reach of all others.
     fn nucleate(&mut self) {
         let due = self.params.nucleation * (self.steps + 1) as f32;
+        // What springs from a blow breaks ahead of its cracks, what dries breaks anywhere.
+        let center = self.impacts.last().map_or(Vec2::ZERO, |impact| impact.pos);
+        let is_blow = matches!(self.params.starts, StartLayout::Crushed { .. });
         for _ in 0..self.room() {
             if self.nucleated as f32 >= due {
                 break;
             }
-            let Some((place, loyal)) = self.field.take_waiting(mix(self.seed ^ 0x0C ^ u64::from(self.tried) << 8))
-            else {
-                break;
-            };
+            let draws = [0, 1, 2, 3, 4, 5].map(|i| mix(self.seed ^ 0x0C ^ u64::from(self.tried) << 8 ^ i << 48));
+            let draws = if is_blow { &draws[..] } else { &draws[..1] };
+            let Some((place, loyal)) = self.field.take_waiting(draws, center) else { break };
             self.tried += 1;
             let impact = if loyal == ANY_IMPACT { self.impacts.len().saturating_sub(1) as u32 } else { loyal };
             let is_free = !self.nodes.any_within(place, 2.0 * self.params.step_length)

@@ -16,17 +16,17 @@ use crate::{
 /// bright cracks, as in ice or mirrors. (The paper prints `exp(τ d)`, which rises with the distance only for a negative `τ`.)
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Modulation {
-    /// `τ`, pattern units, 0.0001..=0.2: after so much the crack's influence has fallen to a third. Default 0.008.
+    /// `τ`, pattern units, 0.0001..=0.2: after so much the crack's influence has fallen to a third. Default 0.005.
     pub fade: f32,
     /// Colour of the crack itself, sRGB 0..=1; default black.
     pub tone: [f32; 3],
-    /// Depth from which a texel is crack, 0..=1; default 0.2.
+    /// Depth from which a texel is crack, 0..=1; default 0.08: thin cracks are not torn.
     pub depth: f32,
 }
 
 impl Modulation {
     /// Dark cracks.
-    pub const DARK: Self = Self { fade: 0.008, tone: [0.0; 3], depth: 0.2 };
+    pub const DARK: Self = Self { fade: 0.005, tone: [0.0; 3], depth: 0.08 };
 
     /// Bright cracks, as in ice.
     pub const BRIGHT: Self = Self { tone: [0.93, 0.97, 1.0], ..Self::DARK };

@@ -62,7 +62,7 @@ pub struct ShatterCracks {
     /// How shards fly.
     pub burst: BurstParams,
     /// Whether the crate moves the shards, lets them fade and takes them away; default true. Else they stay where they are, for a
-    /// physics engine: see [`Shard`].
+    /// physics engine: see [`Shard`]. Counts when a surface shatters.
     pub fly: bool,
     /// Seconds of the shards for each second of the app's [`Time`]; default 1. 0 = they stand still; below zero time runs backwards,
     /// each shard returns to its place and is part of the surface again. Not a number = 0.
@@ -157,6 +157,9 @@ impl Default for ShatterRequest {
 
 /// A piece of a surface that has left it. Its entity is a child of the surface, its origin the shard's centre.
 ///
+/// Where the crate moves shards, their entities serve for others when they are gone, without this component meanwhile: take off again
+/// what you put on (observe `Remove` of `Shard`).
+///
 /// With [`ShatterCracks::fly`] off, this is what a physics engine needs: colliders, mass and the velocity of the blow.
 #[derive(Component, Clone, Debug)]
 #[component(clone_behavior = Ignore)]
@@ -173,8 +176,8 @@ pub struct Shard {
     pub spin: Vec3,
     /// Units of the surface's own space to a pattern unit, along x and y of the shard; below zero where the picture is mirrored.
     pub scale: Vec2,
-    /// Which of the released pieces of its surface it is.
-    pub(super) piece: u32,
+    /// Which of the released pieces of its surface it is, and for how many times that is shown.
+    pub(super) piece: [u32; 2],
 }
 
 impl Shard {

@@ -255,8 +255,9 @@ pub(super) struct Surfaces {
     pub(super) broken: Vec<Entity>,
     /// Surfaces that are to shatter, in order.
     pub(super) requests: Vec<(Entity, ShatterRequest)>,
-    /// All shards that are shown, the oldest first: entity, surface, and which of its pieces; and some that are not any more.
-    pub(super) shards: VecDeque<(Entity, Entity, u32)>,
+    /// All shards that are shown, the oldest first: entity, surface, and which of its pieces for which time; and some that are not
+    /// any more.
+    pub(super) shards: VecDeque<(Entity, Entity, [u32; 2])>,
     /// Who owns a private image, material or mesh.
     pub(super) owners: HashMap<UntypedAssetId, Entity>,
     /// Which surfaces were made from a picture.

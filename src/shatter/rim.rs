@@ -68,54 +68,58 @@ impl Shards {
     /// upon another.
     pub(super) fn bevels(&self, shard: u32, width: f32, bevels: &mut Vec<Bevel>) {
         bevels.clear();
-        let at = |corner: u32| self.positions()[corner as usize].as_dvec2();
-        let mut shares = Vec::with_capacity(self.corners(shard).len());
-        for ring in self.rings_of(shard) {
-            let n = ring.len();
-            for (i, &corner) in ring.iter().enumerate() {
-                let [before, here, after] = [at(ring[(i + n - 1) % n]), at(corner), at(ring[(i + 1) % n])];
-                let [first, second] = [here - before, after - here].map(|way| way.normalize_or_zero().perp());
-                let sum = first + second;
+        let places: Vec<DVec2> =
+            self.corners(shard).iter().map(|&corner| self.positions()[corner as usize].as_dvec2()).collect();
+        // Which corner follows each.
+        let mut following: Vec<u32> = (1..=places.len() as u32).collect();
+        bevels.reserve(places.len());
+        let mut first = 0;
+        for ring in self.rings_of(shard).map(<[u32]>::len) {
+            let end = first + ring;
+            following[end - 1] = first as u32;
+            let normal = |from: DVec2, to: DVec2| (to - from).normalize_or_zero().perp();
+            let mut before = normal(places[end - 1], places[first]);
+            for i in first..end {
+                let after = normal(places[i], places[following[i] as usize]);
+                let sum = before + after;
                 // Sharp corners would reach far inside, and spikes to infinity.
-                let way = sum / (1.0 + first.dot(second)).max(0.5);
-                bevels.push(Bevel { inner: way * f64::from(width), outward: -sum.normalize_or_zero().as_vec2() });
-                shares.push(1.0);
+                let way = sum / (1.0 + before.dot(after)).max(0.5);
+                let inner = places[i] + way * f64::from(width);
+                bevels.push(Bevel { inner, outward: -sum.normalize_or_zero().as_vec2() });
+                before = after;
             }
+            first = end;
         }
-        let corners = self.corners(shard);
+        // Corners that have moved: only what they are part of can have folded.
+        let mut moved = vec![true; places.len()];
+        let mut bad = Vec::new();
         for round in 0.. {
-            let inner = |i: usize, shares: &[f64]| at(corners[i]) + shares[i] * bevels[i].inner;
-            let mut bad = Vec::new();
             for triangle in self.triangles(shard) {
-                let [a, b, c] = triangle.map(|i| i as usize);
-                if is_folded([a, b, c].map(|i| inner(i, &shares))) {
-                    bad.extend([a, b, c]);
+                let corners = triangle.map(|i| i as usize);
+                if corners.iter().any(|&i| moved[i]) && is_folded(corners.map(|i| bevels[i].inner)) {
+                    bad.extend(corners);
                 }
             }
-            let mut first = 0;
-            for ring in self.rings_of(shard) {
-                for i in 0..ring.len() {
-                    let [a, b] = [first + i, first + (i + 1) % ring.len()];
-                    let [outer_a, outer_b, inner_a, inner_b] =
-                        [at(corners[a]), at(corners[b]), inner(a, &shares), inner(b, &shares)];
-                    if is_folded([outer_a, outer_b, inner_b]) || is_folded([outer_a, inner_b, inner_a]) {
-                        bad.extend([a, b]);
-                    }
+            for (a, &b) in following.iter().enumerate() {
+                let b = b as usize;
+                let [inner_a, inner_b] = [bevels[a].inner, bevels[b].inner];
+                let is_band_folded =
+                    || is_folded([places[a], places[b], inner_b]) || is_folded([places[a], inner_b, inner_a]);
+                if (moved[a] || moved[b]) && is_band_folded() {
+                    bad.extend([a, b]);
                 }
-                first += ring.len();
             }
-            bad.retain(|&i| shares[i] > 0.0);
-            if bad.is_empty() {
+            moved.fill(false);
+            for i in bad.drain(..) {
+                let (inner, place) = (&mut bevels[i].inner, places[i]);
+                if !moved[i] && *inner != place {
+                    *inner = if round < HALVINGS { 0.5 * (*inner + place) } else { place };
+                    moved[i] = true;
+                }
+            }
+            if !moved.contains(&true) {
                 break;
             }
-            bad.sort_unstable();
-            bad.dedup();
-            for i in bad {
-                shares[i] = if round < HALVINGS { 0.5 * shares[i] } else { 0.0 };
-            }
-        }
-        for (i, (bevel, share)) in bevels.iter_mut().zip(shares).enumerate() {
-            bevel.inner = at(corners[i]) + share * bevel.inner;
         }
     }
 

@@ -394,8 +394,9 @@ impl VoronoiMap {
 
     /// The seams that a tracer has found, and the cost of full width.
     fn follow(&self, tracer: Tracer) -> (Seams, f32) {
-        let layers = &self.layers[1..];
+        let (noise, layers) = (&self.layers[0], &self.layers[1..]);
         let guides = Guidance {
+            noise,
             ground: self.params.alpha / self.params.beta + 1.0,
             weight: layers.iter().map(Layer::weight_in_beta).fold(0.0, f32::max),
             layers,

@@ -77,13 +77,20 @@ pub struct VoronoiParams {
     pub levels: u32,
     /// Size of the largest features of the noise, pattern units, 0.01..=1; default 0.12. Five more octaves follow.
     pub noise_scale: f32,
-    /// Width of the widest cracks, pattern units, 0..=0.2; default 0.014.
+    /// Width of the widest cracks, pattern units, 0..=0.2; default 0.014. In broad strokes of guides they are wider, see
+    /// [`stroke_width`](Self::stroke_width).
     pub width: f32,
     /// Width of the thinnest ones, pattern units, 0..=[`width`](Self::width); default 0.0015.
     pub least_width: f32,
     /// How cracks taper: their width grows with this power of the path cost from the sites (section 3.2), up to full
     /// width where it is dearest. 0..=8; default 2. 0 makes all cracks equally wide.
     pub taper: f32,
+    /// How wide a crack down the middle of a guide's stroke is at least, as a share of the stroke's own width; 0..=1, default
+    /// 0.45; at most about twice [`width`](Self::width).
+    ///
+    /// So large letters have wide cracks, and thin parts of a letter are not lost. 0 = as the paper, all cracks by path
+    /// cost alone.
+    pub stroke_width: f32,
 }
 
 impl VoronoiParams {
@@ -98,6 +105,7 @@ impl VoronoiParams {
         width: 0.014,
         least_width: 0.0015,
         taper: 2.0,
+        stroke_width: 0.45,
     };
 
     /// Checks every parameter, and the weights of `guides`, against their ranges.
@@ -121,6 +129,7 @@ impl VoronoiParams {
             ("width", self.width, 0.0, 0.2),
             ("least_width", self.least_width, 0.0, self.width),
             ("taper", self.taper, 0.0, 8.0),
+            ("stroke_width", self.stroke_width, 0.0, 1.0),
             ("layout.focus", focus, 1.0, 8.0),
             ("layout.at", at, 0.0, 0.0),
         ];

@@ -12,6 +12,7 @@ use crate::{
     pattern::{PathPoint, SurfaceFrame},
 };
 use glam::{IVec2, UVec2, Vec2};
+use std::collections::VecDeque;
 
 /// How often the threads are tautened. Once leaves stairs, twenty times rounds off what the noise has made.
 const ROUNDS: usize = 6;
@@ -275,12 +276,13 @@ impl Tracer {
         let (mut joints, mut lines) = self.lines(finest);
         tauten(&mut joints, &mut lines);
         let births: Vec<usize> = lines.iter().map(|line| self.birth(line, levels)).collect();
-        let costs: Vec<Vec<f32>> =
+        let costs: Vec<Vec<Cost>> =
             lines.iter().zip(&births).map(|(line, &birth)| self.costs(line, &levels[birth], guides)).collect();
         let full = full.unwrap_or_else(|| dearest(&costs));
         let (least, gain) = (params.least_width, params.width - params.least_width);
-        let widths = Widths { least, gain, taper: params.taper, full };
-        let to_seam = |((line, costs), birth): ((&Line, &Vec<f32>), usize)| {
+        let of_stroke = params.stroke_width / frame.texels_per_unit();
+        let widths = Widths { least, gain, taper: params.taper, full, of_stroke };
+        let to_seam = |((line, costs), birth): ((&Line, &Vec<Cost>), usize)| {
             let first = line.crossings.first()?;
             let places: Vec<Vec2> = std::iter::once(joints[line.ends[0]].pos)
                 .chain(line.crossings.iter().map(Crossing::pos))
@@ -322,19 +324,34 @@ impl Tracer {
         levels.iter().position(|level| level.region(a) != level.region(b)).unwrap_or(0)
     }
 
-    /// Path costs along a line, in β.
-    fn costs(&self, line: &Line, level: &Level, guides: &Guidance<'_>) -> Vec<f32> {
+    /// Path costs along a line.
+    fn costs(&self, line: &Line, level: &Level, guides: &Guidance<'_>) -> Vec<Cost> {
         let cost = |crossing: &Crossing| self.beside(crossing).map(|texel| level.cost(texel)).iter().sum::<f32>() * 0.5;
         let mut costs: Vec<f32> = line.crossings.iter().map(cost).collect();
         smooth(&mut costs);
-        lower_thorns(&mut costs, guides);
+        let costs = without_thorns(&costs, guides);
         let share = guides.share();
-        for (cost, crossing) in costs.iter_mut().zip(&line.crossings) {
+        let weigh = |(cost, crossing): (f32, &Crossing)| {
             let [a, b] = self.beside(crossing).map(|texel| guides.at(texel));
-            *cost *= 1.0 - ASIDE * share * (1.0 - 0.5 * (a + b));
-        }
-        costs
+            let inside = 0.5 * (a + b);
+            let noise = self.beside(crossing).map(|texel| guides.noise_at(texel)).iter().sum::<f32>();
+            let uneven = 1.0 + UNEVEN * (noise - 1.0);
+            let stroke = 2.0 * inside * guides.texels(cost);
+            Cost { cost: cost * (1.0 - ASIDE * share * (1.0 - inside)), stroke, uneven }
+        };
+        costs.into_iter().zip(&line.crossings).map(weigh).collect()
     }
+}
+
+/// What the width of a crack follows at one of its crossings.
+#[derive(Clone, Copy)]
+struct Cost {
+    /// Path cost, in β; less beside the guides.
+    cost: f32,
+    /// Width of the stroke of which this is the middle, texels.
+    stroke: f32,
+    /// How much wider the crack is here in a stroke.
+    uneven: f32,
 }
 
 /// What the widths of cracks have to know of the guides.
@@ -345,12 +362,25 @@ pub(super) struct Guidance<'a> {
     pub weight: f32,
     /// The guides.
     pub layers: &'a [Layer],
+    /// The noise.
+    pub noise: &'a Layer,
 }
 
 impl Guidance<'_> {
     /// How much of the cost of the dearest edge is the guides', 0..1.
     fn share(&self) -> f32 {
         self.weight / (self.ground + self.weight)
+    }
+
+    /// How many texels a path of this cost leads through a stroke, in β: what it costs on the way there counts as well, but
+    /// is little where there is a site beside the stroke.
+    fn texels(&self, cost: f32) -> f32 {
+        cost * self.share() / (self.ground + self.weight)
+    }
+
+    /// The noise at a texel, 0..=1.
+    fn noise_at(&self, texel: usize) -> f32 {
+        f32::from(self.noise.values.as_slice()[texel]) / 65535.0
     }
 
     /// The largest value of a guide at a texel, 0..=1; guides count by their weight.
@@ -364,21 +394,49 @@ impl Guidance<'_> {
 /// draw the picture; with 1 the picture stands alone.
 const ASIDE: f32 = 0.55;
 
-/// Of the distance from the edge of a stroke to its middle, how much of a crack that comes in from the side stays thin.
-/// Below a half such cracks show as thorns on the letters; above one the ends of strokes get lost.
-const THORN: f32 = 0.8;
+/// Cracks along a stroke that are shorter than twice this part of half its width stay thin. With 1 those that come in from
+/// the side show as thorns on the letters; with 2 the cross-bars of small letters get lost.
+const THORN: f32 = 1.6;
 
-/// Lowers each cost to the least one nearby, where a guide is: what runs along the middle of a stroke stays, what runs
-/// into it from the side, with costs that rise all the way, becomes what it was at the edge.
-fn lower_thorns(costs: &mut [f32], guides: &Guidance<'_>) {
-    let reach_per_cost = THORN * guides.share() / (guides.ground + guides.weight);
-    let before = costs.to_vec();
-    for (i, cost) in costs.iter_mut().enumerate() {
-        let reach = (*cost * reach_per_cost) as usize;
-        let near = &before[i.saturating_sub(reach)..(i + reach + 1).min(before.len())];
-        *cost = near.iter().copied().fold(*cost, f32::min);
-    }
+/// Cuts off the rise of the costs where a crack comes into a stroke from the side, and where it runs out into the corners
+/// of a stroke's end; what runs along the middle of a stroke keeps its costs.
+///
+/// The opening of mathematical morphology: what is not at least so long as the stroke is broad goes.
+fn without_thorns(costs: &[f32], guides: &Guidance<'_>) -> Vec<f32> {
+    let most = costs.iter().copied().fold(0.0, f32::max);
+    let reach = (THORN * guides.texels(most)) as usize;
+    let negative = |costs: Vec<f32>| costs.into_iter().map(|cost| -cost).collect::<Vec<f32>>();
+    negative(least_within(&negative(least_within(costs, reach)), reach))
 }
+
+/// The least value within `reach` of each.
+fn least_within(values: &[f32], reach: usize) -> Vec<f32> {
+    // Those that no later one undercuts, in order.
+    let mut ahead = VecDeque::new();
+    let mut next = 0;
+    let least = |i: usize| {
+        while next < values.len().min(i + reach + 1) {
+            while ahead.back().is_some_and(|&last: &usize| values[last] >= values[next]) {
+                ahead.pop_back();
+            }
+            ahead.push_back(next);
+            next += 1;
+        }
+        while ahead.front().is_some_and(|&first| first + reach < i) {
+            ahead.pop_front();
+        }
+        ahead.front().map_or(0.0, |&first| values[first])
+    };
+    (0..values.len()).map(least).collect()
+}
+
+/// By how much the noise widens and narrows cracks in strokes, as a share of their width. With 0 they look cut, with 0.7 small
+/// letters cannot be read.
+const UNEVEN: f32 = 0.3;
+
+/// By how much a crack in a stroke exceeds full width at most. With 1 short words, whose letters are large, are not read as well;
+/// without a limit the middles of broad surfaces gape.
+const MOST: f32 = 2.0;
 
 /// Path cost to width (Mould 2005, section 3.2: "the further the site, the wider").
 struct Widths {
@@ -387,11 +445,14 @@ struct Widths {
     taper: f32,
     /// Full cost, in β.
     full: f32,
+    /// Pattern units for each texel of a stroke's width.
+    of_stroke: f32,
 }
 
 impl Widths {
-    fn of(&self, cost: f32) -> f32 {
-        self.least + self.gain * ops::powf((cost / self.full).min(1.0), self.taper)
+    fn of(&self, Cost { cost, stroke, uneven }: Cost) -> f32 {
+        let width = self.least + self.gain * ops::powf((cost / self.full).min(1.0), self.taper);
+        width.max((self.of_stroke * stroke).min(MOST * (self.least + self.gain)) * uneven)
     }
 }
 
@@ -399,8 +460,8 @@ impl Widths {
 const USUAL: f32 = 0.97;
 
 /// Cost of the dearest crossings.
-fn dearest(costs: &[Vec<f32>]) -> f32 {
-    let mut all: Vec<f32> = costs.iter().flatten().copied().collect();
+fn dearest(costs: &[Vec<Cost>]) -> f32 {
+    let mut all: Vec<f32> = costs.iter().flatten().map(|cost| cost.cost).collect();
     let n = ((all.len() as f32 * USUAL) as usize).min(all.len().saturating_sub(1));
     if all.is_empty() { 1.0 } else { all.select_nth_unstable_by(n, f32::total_cmp).1.max(1.0e-3) }
 }

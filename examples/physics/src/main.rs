@@ -48,21 +48,23 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut surfaces = app.world_mut().query_filtered::<Entity, With<CrackSurface>>();
     app.update();
     let pane = surfaces.single(app.world())?;
-    app.world_mut().trigger(CrackHit::uv(pane, Vec2::new(0.4, 0.45)).with_energy(3.0).with_direction(Vec3::X));
+    for at in [Vec2::new(0.4, 0.45), Vec2::new(0.7, 0.6), Vec2::new(0.25, 0.75)] {
+        app.world_mut().trigger(CrackHit::uv(pane, at).with_energy(2.0).with_direction(Vec3::X));
+    }
     app.update();
     let done = |app: &App| app.world().get::<CrackState>(pane).is_none_or(|state| state.status == CrackStatus::Done);
     while !done(&app) {
         app.update();
     }
     app.world_mut().commands().entity(pane).shatter_cracks(ShatterRequest::ALL);
-    let mut bodies = app.world_mut().query_filtered::<(&Transform, &LinearVelocity), With<Shard>>();
+    let mut bodies = app.world_mut().query_filtered::<(&GlobalTransform, &LinearVelocity), With<Shard>>();
     for step in 0..STEPS {
         app.update();
         let moving = bodies.iter(app.world()).filter(|(_, velocity)| velocity.length() > REST).count();
         if step > 60 && moving == 0 {
             let seconds = f64::from(step) / 60.0;
             println!("{} shards came to rest after {seconds:.1} s", bodies.iter(app.world()).count());
-            let fallen = bodies.iter(app.world()).filter(|(at, _)| at.translation.y < FLOOR).count();
+            let fallen = bodies.iter(app.world()).filter(|(at, _)| at.translation().y < FLOOR).count();
             if fallen > 0 {
                 return Err(format!("{fallen} shards fell through the floor").into());
             }

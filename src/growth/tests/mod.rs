@@ -245,19 +245,23 @@ fn invariants_of_the_network() {
 
 #[test]
 fn widening_a_branch_lists_its_children() {
-    let mut growth = CrackGrowth::new(GrowthParams { line_growth: 2.0, ..Default::default() }, Vec2::ONE, 5).unwrap();
-    growth.hit(Vec2::splat(0.5), 1.0);
-    let mut changed = Vec::new();
-    let mut widths: std::collections::BTreeMap<SegmentId, (u32, u32)> = Default::default();
-    while growth.step().grew() {
-        changed.clear();
-        growth.take_changed(&mut changed);
-        for segment in growth.network().segments() {
-            let (a, b) = growth.network().ends(segment).unwrap();
-            let now = [a, b].map(|i| growth.network().nodes()[i as usize].width.to_bits());
-            let before = widths.insert(segment, (now[0], now[1]));
-            if before != Some((now[0], now[1])) && matches!(segment, SegmentId::Branch(_)) {
-                assert!(changed.contains(&segment), "{segment:?} changed from {before:?} and was not listed");
+    let all = CrackPreset::NAMES.into_iter().filter_map(CrackPreset::named).map(|preset| preset.growth);
+    for params in all.chain([GrowthParams { line_growth: 2.0, ..Default::default() }]) {
+        let mut growth = CrackGrowth::new(params, Vec2::ONE, 5).unwrap();
+        growth.hit(Vec2::splat(0.5), 1.0);
+        let mut changed = Vec::new();
+        let mut widths: std::collections::BTreeMap<SegmentId, (u32, u32)> = Default::default();
+        while growth.step().grew() {
+            changed.clear();
+            growth.take_changed(&mut changed);
+            let changed: std::collections::BTreeSet<_> = changed.iter().copied().collect();
+            for segment in growth.network().segments() {
+                let (a, b) = growth.network().ends(segment).unwrap();
+                let now = [a, b].map(|i| growth.network().nodes()[i as usize].width.to_bits());
+                let before = widths.insert(segment, (now[0], now[1]));
+                if before != Some((now[0], now[1])) && matches!(segment, SegmentId::Branch(_)) {
+                    assert!(changed.contains(&segment), "{segment:?} changed from {before:?} and was not listed");
+                }
             }
         }
     }

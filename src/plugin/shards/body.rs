@@ -3,7 +3,7 @@
 use super::{
     Broken, Shard,
     broken::Piece,
-    plane::{Faces, write_mesh},
+    plane::{Faces, empty_mesh, write_mesh},
 };
 use crate::{
     plugin::carrier::Carrier,
@@ -60,7 +60,7 @@ impl Spares {
 
 impl Body {
     /// Hides a body and keeps it for another shard.
-    pub(super) fn park(self, world: &mut World, carrier: &Carrier) {
+    fn park(self, world: &mut World, carrier: &Carrier) {
         let Ok(mut entity) = world.get_entity_mut(self.entity) else { return };
         entity.remove::<Shard>();
         // Materials and their pictures are the surface's.
@@ -101,7 +101,7 @@ impl Clothes<'_> {
                 write_mesh(&mut old, mesh, faces, is_mirrored, is_solid);
                 return Some(kept.clone());
             }
-            let mut new = super::plane::empty_mesh();
+            let mut new = empty_mesh();
             write_mesh(&mut new, mesh, faces, is_mirrored, is_solid);
             Some(meshes.add(new))
         };
@@ -158,7 +158,7 @@ impl Broken {
         index: usize,
         pose: Pose,
         scratch: &mut ShardMesh,
-    ) -> Option<Entity> {
+    ) -> Option<(Entity, [u32; 2])> {
         let level = self.level(carrier, pose);
         let material = self.material(world, surface, carrier, level)?;
         let place = self.place(carrier, index, pose)?;
@@ -179,7 +179,7 @@ impl Broken {
             velocity: self.plane.rotation * (flight.velocity * scale.extend(scale.y.abs())),
             spin: self.plane.rotation * (flight.axis * flight.spin),
             scale,
-            piece: piece.id,
+            piece: [piece.id, piece.times + 1],
         };
         let is_mirrored = self.plane.is_mirrored();
         let clothes = Clothes { carrier, material: &material, inside: self.inside.as_ref(), is_mirrored };
@@ -187,7 +187,8 @@ impl Broken {
         let entity = body.entity;
         let piece = self.pieces.get_mut(index)?;
         (piece.body, piece.level) = (Some(body), level);
-        Some(entity)
+        piece.times += 1;
+        Some((entity, [piece.id, piece.times]))
     }
 
     /// Thickness of shards in the entity's units.
@@ -240,7 +241,16 @@ impl Broken {
     /// Takes the entity of a piece away.
     pub(super) fn hide(&mut self, world: &mut World, carrier: &Carrier, index: usize) {
         if let Some(body) = self.pieces.get_mut(index).and_then(|piece| piece.body.take()) {
+            self.put_away(world, carrier, body);
+        }
+    }
+
+    /// Takes a body away, for another shard if nobody else has made something of it.
+    pub(super) fn put_away(&self, world: &mut World, carrier: &Carrier, body: Body) {
+        if self.settings.fly {
             body.park(world, carrier);
+        } else {
+            world.try_despawn(body.entity).ok();
         }
     }
 }

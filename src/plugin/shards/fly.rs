@@ -29,8 +29,8 @@ enum Fate {
     Whole,
 }
 
-/// Shards that are shown from this frame on: entity, surface, and which of its pieces.
-type Shown = Vec<(Entity, Entity, u32)>;
+/// Shards that are shown from this frame on: entity, surface, and which of its pieces for which time.
+type Shown = Vec<(Entity, Entity, [u32; 2])>;
 
 /// Lets time pass for all shards and puts them where they are then.
 pub(in crate::plugin) fn fly_shards(world: &mut World, mut scratch: Local<ShardMesh>) {
@@ -104,7 +104,7 @@ fn fly(
         if now < before { broken.pieces.extract_if(.., |piece| piece.born > now).collect() } else { Vec::new() };
     for mut piece in early {
         if let Some(body) = piece.body.take() {
-            body.park(world, &active.carrier);
+            broken.put_away(world, &active.carrier, body);
         }
         if let Some(whole) = piece.part_of {
             if let Some(index) = broken.index_of(whole) {
@@ -122,8 +122,8 @@ fn fly(
         let mut index = 0;
         while index < broken.pieces.len() {
             broken.break_if_due(index);
-            if let Some(entity) = broken.show(world, surface, &active.carrier, index, scratch) {
-                shown.push((entity, surface, broken.pieces[index].id));
+            if let Some((entity, piece)) = broken.show(world, surface, &active.carrier, index, scratch) {
+                shown.push((entity, surface, piece));
             }
             index += 1;
         }
@@ -134,7 +134,7 @@ fn fly(
 }
 
 impl Broken {
-    /// Puts a piece where it is now, if it is anywhere. Returns its entity if that is new.
+    /// Puts a piece where it is now, if it is anywhere. Returns its entity, and which piece that is, if it is shown from now on.
     fn show(
         &mut self,
         world: &mut World,
@@ -142,7 +142,7 @@ impl Broken {
         carrier: &Carrier,
         index: usize,
         scratch: &mut ShardMesh,
-    ) -> Option<Entity> {
+    ) -> Option<(Entity, [u32; 2])> {
         let piece = &self.pieces[index];
         let pose = piece.flight.pose((self.time - piece.start) as f32);
         if pose.opacity <= 0.0 || piece.is_broken {
@@ -184,6 +184,7 @@ impl Broken {
                 uv: piece.uv,
                 is_spent: piece.is_spent,
                 body: None,
+                times: 0,
                 level: 0,
             });
         }

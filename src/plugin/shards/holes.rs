@@ -71,30 +71,32 @@ fn index(size: UVec2, texel: UVec2) -> usize {
 /// The texels whose centres lie in a shard, row by row: y, first x, and the x after the last. Each texel lies in exactly one of the
 /// shards that tile a surface.
 pub(super) fn for_each_span(shards: &Shards, shard: u32, frame: SurfaceFrame, mut span: impl FnMut(u32, u32, u32)) {
-    let rings = || core::iter::once(shards.outline(shard)).chain(shards.holes(shard));
     let texel = |corner: u32| frame.to_texel(shards.positions()[corner as usize]).as_dvec2();
-    let rect = bounds(shards, shard, frame);
+    let size = frame.size();
+    // Where outlines cross the middles of rows.
     let mut crossings = Vec::new();
-    for y in rect.min.y..rect.max.y {
-        let height = f64::from(y) + 0.5;
-        crossings.clear();
-        for ring in rings() {
-            for (i, &corner) in ring.iter().enumerate() {
-                let (a, b) = (texel(corner), texel(ring[(i + 1) % ring.len()]));
-                // From above to below, so that both shards of an edge find the same crossing.
-                let (low, high) = if a.y < b.y { (a, b) } else { (b, a) };
-                if (low.y <= height) != (high.y <= height) {
-                    crossings.push(low.x + (height - low.y) / (high.y - low.y) * (high.x - low.x));
-                }
-            }
+    for ring in core::iter::once(shards.outline(shard)).chain(shards.holes(shard)) {
+        let Some(&last) = ring.last() else { continue };
+        let mut a = texel(last);
+        for &corner in ring {
+            let b = texel(corner);
+            // From above to below, so that both shards of an edge find the same crossing.
+            let (low, high) = if a.y < b.y { (a, b) } else { (b, a) };
+            let rows = [low.y, high.y].map(|y| (y - 0.5).ceil().clamp(0.0, f64::from(size.y)) as u32);
+            crossings.extend((rows[0]..rows[1]).map(|y| {
+                let height = f64::from(y) + 0.5;
+                (y, low.x + (height - low.y) / (high.y - low.y) * (high.x - low.x))
+            }));
+            a = b;
         }
-        crossings.sort_unstable_by(f64::total_cmp);
-        for pair in crossings.as_chunks::<2>().0 {
-            // The first centre at or beyond the crossing.
-            let [from, to] = pair.map(|x| (x - 0.5).ceil().clamp(0.0, f64::from(rect.max.x)) as u32);
-            if from < to {
-                span(y, from, to);
-            }
+    }
+    crossings.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    // Of each row an even number.
+    for [from, to] in crossings.as_chunks::<2>().0 {
+        // The first centre at or beyond the crossing.
+        let columns = [from.1, to.1].map(|x| (x - 0.5).ceil().clamp(0.0, f64::from(size.x)) as u32);
+        if columns[0] < columns[1] {
+            span(from.0, columns[0], columns[1]);
         }
     }
 }

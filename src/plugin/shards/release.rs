@@ -97,7 +97,7 @@ pub(super) fn make_room(world: &mut World, surfaces: &mut Surfaces) {
     });
     let excess = surfaces.shards.len().saturating_sub(world.resource::<CrackBudget>().max_shards);
     let mut shortened = Vec::new();
-    for (_, surface, piece) in surfaces.shards.drain(..excess) {
+    for (_, surface, [piece, _]) in surfaces.shards.drain(..excess) {
         let Some(active) = surfaces.active.get_mut(&surface) else { continue };
         if let Some(broken) = &mut active.broken
             && let Some(index) = broken.index_of(piece)
@@ -123,7 +123,7 @@ fn release(
     request: &ShatterRequest,
     left: u64,
     scratch: &mut ShardMesh,
-) -> Result<Vec<(Entity, u32)>, ShardsError> {
+) -> Result<Vec<(Entity, [u32; 2])>, ShardsError> {
     let settings = world.get::<ShatterCracks>(entity).cloned().unwrap_or_default();
     if !(0.0..=10.0).contains(&settings.thickness) {
         let value = f64::from(settings.thickness);
@@ -226,13 +226,14 @@ fn release(
             uv: shown_uv(active),
             is_spent,
             body: None,
+            times: 0,
             level: 0,
         });
         broken.holes.set(&broken.cut, number, active.field.frame, true);
         active.mark(bounds(&broken.cut, number, active.field.frame));
         let index = broken.pieces.len() - 1;
         if !is_spent && let Some(shard) = broken.spawn(world, entity, &active.carrier, index, Pose::AT_REST, scratch) {
-            shards.push((shard, id));
+            shards.push(shard);
         }
     }
     if is_first {

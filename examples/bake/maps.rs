@@ -1,0 +1,81 @@
+//! How cracks are shown, and the files that every command writes.
+
+use crate::{
+    own::own_picture,
+    painting::{fitted, paint},
+    pictures::read_picture,
+};
+use bevy_crack::{
+    paint::{Look, LookTable, Modulation, modulate},
+    pattern::SurfaceFrame,
+    raster::DepthField,
+};
+use glam::UVec2;
+use image::{GrayImage, ImageBuffer, Luma, RgbaImage};
+use std::{error::Error, fs, path::Path};
+
+/// The picture at `path`, or concrete, stretched to `size`.
+pub(crate) fn base_picture(path: Option<&Path>, size: UVec2) -> Result<RgbaImage, Box<dyn Error>> {
+    let own = own_picture("concrete");
+    Ok(fitted(read_picture(path.unwrap_or(&own))?, size))
+}
+
+/// How cracks are shown.
+pub(crate) enum Paint {
+    Look(Box<LookTable>),
+    Modulation(Modulation),
+}
+
+impl Paint {
+    /// A look of the crate, or the plain modulation of Mould 2005: `dark` or `bright`.
+    pub(crate) fn new(name: &str, frame: &SurfaceFrame) -> Result<Self, Box<dyn Error>> {
+        match name {
+            "dark" => Ok(Self::Modulation(Modulation::DARK)),
+            "bright" => Ok(Self::Modulation(Modulation::BRIGHT)),
+            _ => {
+                let names = Look::NAMES.join(", ");
+                let look = Look::named(name).ok_or(format!("no look `{name}`; there are {names}, dark, bright"))?;
+                Ok(Self::Look(Box::new(LookTable::new(&look, frame.texels_per_unit())?)))
+            }
+        }
+    }
+
+    /// Diffuse and normal.
+    pub(crate) fn paint(&self, base: &RgbaImage, field: &DepthField) -> Result<[RgbaImage; 2], Box<dyn Error>> {
+        match self {
+            Self::Look(table) => Ok(paint(base, field, table)),
+            Self::Modulation(modulation) => {
+                let groove = LookTable::new(&Look::GROOVE, field.frame.texels_per_unit())?;
+                let [_, normal] = paint(base, field, &groove);
+                let mut diffuse = base.clone();
+                modulate(&mut diffuse, field, modulation)?;
+                Ok([diffuse, normal])
+            }
+        }
+    }
+}
+
+/// White where a person would mark a crack: not on the chipped rim.
+pub(crate) fn mask(field: &DepthField) -> GrayImage {
+    let size = field.frame.size();
+    GrayImage::from_fn(size.x, size.y, |x, y| {
+        let depth = field.depth.get(x, y).unwrap_or(0);
+        Luma([if depth > u16::MAX / 3 { 255 } else { 0 }])
+    })
+}
+
+/// Writes `diffuse.png`, `normal.png`, `depth.png` (16 bit) and `mask.png` to a folder, which is made if it is not there.
+pub(crate) fn write_maps(
+    folder: &Path,
+    [diffuse, normal]: &[RgbaImage; 2],
+    field: &DepthField,
+) -> Result<(), Box<dyn Error>> {
+    fs::create_dir_all(folder)?;
+    diffuse.save(folder.join("diffuse.png"))?;
+    normal.save(folder.join("normal.png"))?;
+    let (size, texels) = (field.frame.size(), field.depth.as_slice().to_vec());
+    let depth = ImageBuffer::<Luma<u16>, _>::from_raw(size.x, size.y, texels).ok_or("depth size")?;
+    depth.save(folder.join("depth.png"))?;
+    mask(field).save(folder.join("mask.png"))?;
+    Ok(())
+}
