@@ -3,10 +3,11 @@
 //! `cargo bench --profile dev --bench frame`: the build that `cargo test` uses.
 //! `growing/*`: 100 surfaces of 512 x 512 that were hit at once, one step a frame each; the time of an idle frame of the same
 //! app is taken off. `finished/*`: a frame with 10,000 cracked surfaces of 32 x 32 that have come to an end, beside one with
-//! 10,000 plain sprites. `baking`: what of each frame the crate's systems take while guided cracks are baked and appear, 60 frames
-//! a second, from the first frame to ten after the last crack. `shards/*`: what the crate's own systems take of the main thread in the
-//! frame in which a pane becomes 500 shards, for the first time and with bodies that are there from before, and in each frame in which
-//! 5,000 fly. With a Vulkan driver (software will do) uploads are part of it; without, it says so.
+//! 10,000 plain sprites. "only ...": parts of the first that no program could do without. `baking`: what of each frame the crate's systems
+//! take while guided cracks are baked and appear, 60 frames a second, from the first frame to ten after the last crack. `shards/*`: what
+//! the crate's own systems take of the main thread in the frame in which a pane becomes 500 shards, for the first time and with
+//! bodies that are there from before, and in each frame in which 5,000 fly. With a Vulkan driver (software will do) uploads are part
+//! of it; without, it says so.
 
 #![expect(clippy::print_stdout, clippy::expect_used, reason = "a benchmark")]
 
@@ -14,7 +15,14 @@ use bevy::{
     app::{App, PluginsState},
     asset::RenderAssetUsages,
     prelude::*,
-    render::render_resource::{Extent3d, TextureDimension, TextureFormat},
+    render::{
+        render_resource::{
+            BufferDescriptor, BufferUsages, CommandEncoderDescriptor, Extent3d, Origin3d, PollType,
+            TexelCopyBufferInfo, TexelCopyBufferLayout, TexelCopyTextureInfo, TextureAspect, TextureDimension,
+            TextureFormat,
+        },
+        renderer::{RenderDevice, RenderQueue},
+    },
     time::TimeUpdateStrategy,
 };
 use bevy_crack::{
@@ -24,7 +32,7 @@ use bevy_crack::{
     pattern::SurfaceFrame,
     plugin::CrackUploadStats,
     prelude::*,
-    raster::{DepthField, TexelRect, stamp_path},
+    raster::{DepthField, DirtyTiles, TexelRect, stamp_path, stamp_path_with},
     shatter::{Anchor, ShatterParams},
 };
 use criterion::{Criterion, criterion_group, criterion_main};
@@ -240,6 +248,94 @@ fn naive_frames() -> Duration {
     time.saturating_sub(idle * FRAMES) / FRAMES
 }
 
+/// The rectangles that a growing frame paints, of each surface and frame.
+fn growing_rects() -> Vec<Vec<Vec<TexelRect>>> {
+    let size = UVec2::splat(SIDE);
+    let frame = SurfaceFrame::new(size).expect("the size is valid");
+    let preset = CrackPreset::CONCRETE;
+    let rects_of = |seed: usize| {
+        let mut growth = CrackGrowth::new(preset.growth.clone(), frame.extent(), seed as u64).expect("it is valid");
+        growth.hit(Vec2::splat(0.5), 1.0);
+        let (mut field, mut dirty) = (DepthField::new(frame), DirtyTiles::new(size));
+        let (mut changed, mut frames) = (Vec::new(), Vec::new());
+        for _ in 0..FRAMES + 2 {
+            growth.step();
+            growth.take_changed(&mut changed);
+            for path in changed.drain(..).filter_map(|segment| growth.network().path(segment)) {
+                stamp_path_with(&mut field, &preset.profile, &path, &mut |rect| dirty.mark(rect.grow(1, size)));
+            }
+            let mut rects = Vec::new();
+            dirty.take_rects(&mut rects);
+            frames.push(rects);
+        }
+        frames.split_off(2)
+    };
+    (0..SURFACES).map(rects_of).collect()
+}
+
+/// What no program can do without: the same texels copied from a picture to two others, at the same places, a frame; then two
+/// textures a surface filled from a buffer that is ready, at the same places.
+fn floors() {
+    let rects = growing_rects();
+    let n = (SIDE * SIDE * 4) as usize;
+    let mut pictures: Vec<[Vec<u8>; 3]> = (0..SURFACES).map(|i| [1u8, 2, 3].map(|k| vec![k + i as u8; n])).collect();
+    let copy = time_of(|| {
+        for frame in 0..FRAMES as usize {
+            for ([from, diffuse, normal], rects) in pictures.iter_mut().zip(&rects) {
+                for rect in &rects[frame] {
+                    for y in rect.min.y..rect.max.y {
+                        let row = ((y * SIDE + rect.min.x) * 4) as usize..((y * SIDE + rect.max.x) * 4) as usize;
+                        diffuse[row.clone()].copy_from_slice(&from[row.clone()]);
+                        normal[row.clone()].copy_from_slice(&from[row]);
+                    }
+                }
+            }
+        }
+    });
+    println!("only to copy its texels: {:.2} ms a frame", (copy / FRAMES).as_secs_f64() * 1e3);
+
+    let app = app();
+    let (Some(device), Some(queue)) =
+        (app.world().get_resource::<RenderDevice>(), app.world().get_resource::<RenderQueue>())
+    else {
+        return;
+    };
+    let image = picture(SIDE);
+    let textures: Vec<_> = (0..2 * SURFACES).map(|_| device.create_texture(&image.texture_descriptor)).collect();
+    let buffer = device.create_buffer(&BufferDescriptor {
+        label: None,
+        size: 8 << 20,
+        usage: BufferUsages::COPY_SRC | BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    });
+    let ready = vec![7; 2 << 20];
+    let mut n_copies = 0;
+    let mut frame = |frame: usize| {
+        queue.write_buffer(&buffer, 0, &ready);
+        let mut encoder = device.create_command_encoder(&CommandEncoderDescriptor::default());
+        for (pair, rects) in textures.chunks(2).zip(&rects) {
+            for (rect, texture) in rects[frame].iter().flat_map(|rect| pair.iter().map(move |texture| (rect, texture)))
+            {
+                let size = rect.size();
+                let layout = TexelCopyBufferLayout { bytes_per_row: Some(4 * SIDE), ..default() };
+                let origin = Origin3d { x: rect.min.x, y: rect.min.y, z: 0 };
+                encoder.copy_buffer_to_texture(
+                    TexelCopyBufferInfo { buffer: &buffer, layout },
+                    TexelCopyTextureInfo { texture, mip_level: 0, origin, aspect: TextureAspect::All },
+                    Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 },
+                );
+                n_copies += 1;
+            }
+        }
+        queue.submit([encoder.finish()]);
+        device.poll(PollType::wait_indefinitely()).expect("the device waits");
+    };
+    (0..FRAMES as usize).for_each(&mut frame);
+    let time = time_of(|| (0..FRAMES as usize).for_each(&mut frame)) / FRAMES;
+    let per_frame = n_copies / 2 / FRAMES;
+    println!("only {per_frame} copies to textures: {:.2} ms a frame", time.as_secs_f64() * 1e3);
+}
+
 /// A frame with many sprites, cracked to their end or not surfaces at all.
 fn many(cracked: bool) -> App {
     let mut app = app();
@@ -395,6 +491,7 @@ fn shards(c: &mut Criterion) {
 
 fn frame(c: &mut Criterion) {
     [1024, 2048].into_iter().for_each(baking);
+    floors();
     let (_, systems, bytes) = growing_frames();
     println!("the main world's systems: {:.2} ms a frame", systems.as_secs_f64() * 1e3);
     let whole = SURFACES as u64 * u64::from(SIDE * SIDE) * 8;

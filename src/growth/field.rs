@@ -163,6 +163,18 @@ impl MarkerField {
         }
     }
 
+    /// Gets memory ready for the markers that were added, so that no step pauses to do it.
+    pub(super) fn reserve(&mut self) {
+        let n = self.x.len() + self.newborn.len() + LANES;
+        for plane in [&mut self.x, &mut self.y, &mut self.near_sq] {
+            get_ready(plane, n);
+        }
+        for plane in [&mut self.node, &mut self.id, &mut self.loyal] {
+            get_ready(plane, n);
+        }
+        get_ready(&mut self.given_up, n);
+    }
+
     #[inline]
     pub(super) fn marker(&self, index: u32) -> Marker {
         let i = index as usize;
@@ -176,7 +188,12 @@ impl MarkerField {
             return;
         }
         let mut all = self.take_living();
-        all.append(&mut self.newborn);
+        if all.is_empty() {
+            // Not copied: a first hit makes thousands.
+            all = std::mem::take(&mut self.newborn);
+        } else {
+            all.append(&mut self.newborn);
+        }
         // Cells of half the radius, but with a few markers to each.
         let per_cell = (self.extent.x * self.extent.y * 3.0 / all.len() as f32).sqrt();
         let side = (0.5 * self.radius).max(per_cell).max(self.extent.max_element() / 1024.0);
@@ -436,6 +453,13 @@ impl MarkerField {
             (from..to).any(|i| distance_sq(self.x[i], self.y[i], pos) < distance * distance)
         })
     }
+}
+
+/// Room for `n` values, written once: the first write to memory is the dear one.
+fn get_ready<T: Copy + Default>(plane: &mut Vec<T>, n: usize) {
+    let length = plane.len();
+    plane.resize(n.max(length), T::default());
+    plane.truncate(length);
 }
 
 /// As `Vec2::distance_squared`, spelled out for whole lanes.

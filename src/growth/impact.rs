@@ -179,6 +179,7 @@ impl CrackGrowth {
         // A large growth makes about two nodes a marker: room for them now, so that no step pauses to move them all.
         let expected = (2 * self.field.living_at_most()).min(self.params.max_nodes as usize);
         if expected > 4096 {
+            self.field.reserve();
             self.network.nodes.reserve(expected);
             self.nodes.reserve(expected);
             self.widths.reserve(expected);

@@ -2,7 +2,7 @@
 //! and pass, unless `CRACK_REQUIRE_ALL=1` is set.
 
 use crate::support::*;
-use bevy::prelude::*;
+use bevy::{prelude::*, render::render_resource::TextureFormat};
 use bevy_crack::{math::Rng, plugin::CrackUploadStats, prelude::*};
 
 /// The acceptance test: after each of 200 frames of hits the textures on the GPU equal the CPU copy.
@@ -40,4 +40,26 @@ fn textures_on_the_gpu_equal_the_cpu_copy() {
     }
     assert!(surfaces.into_iter().all(|entity| state(&app, entity).nodes > 100));
     assert!(bytes > 0, "rectangles were uploaded");
+}
+
+/// A picture of one or two channels is shown red, or red and green, and so is its cracked copy where no crack is.
+#[test]
+fn channels_that_are_missing_stay_dark() {
+    let Some((_one, mut app)) = gpu_app() else { return };
+    let size = UVec2::splat(64);
+    let target = spawn_camera(&mut app, size);
+    for format in [TextureFormat::R8Unorm, TextureFormat::Rg8Unorm] {
+        let image = add(&mut app, picture_of(size, format));
+        let entity = spawn_sprite(&mut app, &image);
+        steps(&mut app, 3);
+        let before = drawn(&mut app, &target);
+        hit(&mut app, center(entity).with_energy(0.05));
+        settle(&mut app, entity);
+        let after = drawn(&mut app, &target);
+        let corner = |film: &[u8]| film[..4 * 64 * 4].to_vec();
+        assert!(corner(&before).iter().step_by(4).all(|&red| red > 40), "{format:?} is shown");
+        assert!(difference(&corner(&before), &corner(&after)) <= 1, "{format:?}");
+        assert!(before != after, "it has cracked");
+        app.world_mut().despawn(entity);
+    }
 }
