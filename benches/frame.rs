@@ -3,11 +3,11 @@
 //! `cargo bench --profile dev --bench frame`: the build that `cargo test` uses.
 //! `growing/*`: 100 surfaces of 512 x 512 that were hit at once, one step a frame each; the time of an idle frame of the same
 //! app is taken off. `finished/*`: a frame with 10,000 cracked surfaces of 32 x 32 that have come to an end, beside one with
-//! 10,000 plain sprites. "only ...": parts of the first that no program could do without. `baking`: what of each frame the
-//! crate's systems take while guided cracks are baked and appear, 60 frames a second, from the first frame to ten after the last
-//! crack. `shards/*`: what the crate's own systems take of the main thread in the
-//! frame in which a pane becomes 500 shards, for the first time and with bodies that are there from before, and in each frame in which
-//! 5,000 fly. With a Vulkan driver (software will do) uploads are part of it; without, it says so.
+//! 10,000 plain sprites. "only ...": parts of the first that no program could do without. `baking`: what of each frame the crate's systems
+//! take while guided cracks are baked and appear, 60 frames a second, from the first frame to ten after the last crack. `shards/*`: what
+//! the crate's own systems take of the main thread in the frame in which a pane becomes 500 shards, for the first time and with
+//! bodies that are there from before, and in each frame in which 5,000 fly. With a Vulkan driver (software will do) uploads are part
+//! of it; without, it says so.
 
 #![expect(clippy::print_stdout, clippy::expect_used, reason = "a benchmark")]
 

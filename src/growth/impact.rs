@@ -256,23 +256,27 @@ impl CrackGrowth {
         }
     }
 
-    /// A hit on a crack: new cracks start from it to either side.
+    /// A hit on a crack: new cracks start from it to either side; where there is no room, from the nearest place where there is.
     fn sprout(&mut self, pos: Vec2, impact: u32) {
         let length = self.params.step_length;
-        let mut nearest = (f32::INFINITY, u32::MAX);
-        self.nodes.within(pos, 2.0 * length, |node, distance_sq| {
-            if (distance_sq, node) < nearest {
-                nearest = (distance_sq, node);
+        let mut near = Vec::new();
+        self.nodes.within(pos, 3.0 * length, |node, distance_sq| near.push((distance_sq, node)));
+        near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let first = self.network.nodes.len();
+        for (_, index) in near.into_iter().take(12) {
+            let nodes = &self.network.nodes;
+            let node = nodes[index as usize];
+            let beside = nodes.get(node.parent as usize).or_else(|| nodes.get(self.child_of(index) as usize));
+            let across = beside.map_or(Vec2::X, |other| (node.pos - other.pos).perp().normalize_or(Vec2::X));
+            for way in [across, -across] {
+                let born = self.network.nodes.len();
+                self.extend(index, node.pos + way * length, false);
+                if let Some(child) = self.network.nodes.get_mut(born) {
+                    child.impact = impact;
+                }
             }
-        });
-        let Some(&node) = self.network.nodes.get(nearest.1 as usize) else { return };
-        let Some(&parent) = self.network.nodes.get(node.parent as usize) else { return };
-        let across = (node.pos - parent.pos).perp().normalize_or_zero();
-        for way in [across, -across] {
-            let born = self.network.nodes.len();
-            self.extend(nearest.1, node.pos + way * length, false);
-            if let Some(child) = self.network.nodes.get_mut(born) {
-                child.impact = impact;
+            if self.network.nodes.len() > first {
+                break;
             }
         }
     }
