@@ -16,6 +16,9 @@ use glam::Vec2;
 /// The most energy that an impact gathers.
 pub const MAX_ENERGY: f32 = 16.0;
 
+/// Half the width of the widest crack in which a hit is looked for, pattern units.
+const WIDE: f32 = 0.1;
+
 /// One impact on a growth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Impact {
@@ -115,7 +118,7 @@ impl CrackGrowth {
         let first = self.network.nodes.len() as u32;
         let seed = mix(self.seed ^ mix(u64::from(index)));
         for place in markers::starts(self.params.starts, (pos, energy), reach, extent, seed) {
-            let is_free = !self.nodes.any_within(place, 1e-4) && !self.is_on_crack(place);
+            let is_free = !self.nodes.any_within(place, 1e-4) && !self.is_on_crack(place, index);
             if is_free && !self.mask.is_forbidden(place / extent) {
                 self.bear(place, NO_PARENT, 0, index, 1.0);
             }
@@ -212,10 +215,19 @@ impl CrackGrowth {
         }
     }
 
-    /// Whether a place lies on a crack, or as good as.
-    fn is_on_crack(&self, place: Vec2) -> bool {
-        let close = 0.3 * self.params.step_length;
-        self.params.arrest > 0.0 && self.arrest.as_ref().is_some_and(|arrest| arrest.walls.any_within(place, close))
+    /// Whether a place lies on a crack, or as good as: at its line, or within the width of one of another impact.
+    fn is_on_crack(&self, place: Vec2, impact: u32) -> bool {
+        let Some(arrest) = self.arrest.as_ref().filter(|_| self.params.arrest > 0.0) else { return false };
+        arrest.walls.any_within(place, 0.3 * self.params.step_length) || self.is_in_wide_crack(place, impact)
+    }
+
+    fn is_in_wide_crack(&self, place: Vec2, impact: u32) -> bool {
+        let mut is_in = false;
+        self.nodes.within(place, WIDE, |node, distance_sq| {
+            let node = self.network.nodes[node as usize];
+            is_in |= node.impact != impact && distance_sq <= 0.25 * node.width * node.width;
+        });
+        is_in
     }
 
     /// Joins the nodes of a crushed core, from `first` on: each to the nearest before it, and most to the one after it.
@@ -260,7 +272,7 @@ impl CrackGrowth {
     fn sprout(&mut self, pos: Vec2, impact: u32) {
         let length = self.params.step_length;
         let mut near = Vec::new();
-        self.nodes.within(pos, 3.0 * length, |node, distance_sq| near.push((distance_sq, node)));
+        self.nodes.within(pos, WIDE.max(3.0 * length), |node, distance_sq| near.push((distance_sq, node)));
         near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let first = self.network.nodes.len();
         for (_, index) in near.into_iter().take(12) {
@@ -268,9 +280,11 @@ impl CrackGrowth {
             let node = nodes[index as usize];
             let beside = nodes.get(node.parent as usize).or_else(|| nodes.get(self.child_of(index) as usize));
             let across = beside.map_or(Vec2::X, |other| (node.pos - other.pos).perp().normalize_or(Vec2::X));
+            // Out of the crack, however wide it is.
+            let way_out = length.max(0.5 * (node.width + length));
             for way in [across, -across] {
                 let born = self.network.nodes.len();
-                self.extend(index, node.pos + way * length, false);
+                self.extend(index, node.pos + way * way_out, false);
                 if let Some(child) = self.network.nodes.get_mut(born) {
                     child.impact = impact;
                 }
