@@ -6,11 +6,11 @@ use glam::Vec2;
 
 impl CrackGrowth {
     /// Adds cracks that have not grown here, say those of [`Seams::network`](crate::voronoi::Seams::network). To hits and steps
-    /// afterwards they are cracks of another hit: with [`arrest`](GrowthParams::arrest) new ones stop at them, and a hit on one starts from it.
+    /// afterwards they are cracks of another hit: with [`arrest`](super::GrowthParams::arrest) new ones stop at them, and a hit on one starts from it.
     ///
     /// They come in the steps after those made so far, in order of their [`birth`](Node::birth), and each opens to its width within
     /// `opening` further steps; returns how many steps all of that takes. Lines are straight from node to node; a network of another extent is
-    /// stretched over the surface. They do not count for [`max_nodes`](GrowthParams::max_nodes). Where they
+    /// stretched over the surface. They do not count for [`max_nodes`](super::GrowthParams::max_nodes). Where they
     /// cross what has grown already, they cross it.
     ///
     /// ```

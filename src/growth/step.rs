@@ -151,7 +151,7 @@ impl CrackGrowth {
     /// Where cracks of later hits and steps like to run, avoid to, and never go; an empty mask = everywhere alike.
     ///
     /// Markers move to the weakest place near them, cracks steer along what is weak and around what is strong, and no line
-    /// enters a forbidden texel. A hit on one is [rejected](Rejected::Forbidden). What is grown stays.
+    /// enters a forbidden texel. A hit on one is [rejected](super::Rejected::Forbidden). What is grown stays.
     pub fn set_mask(&mut self, mask: impl Into<Arc<CrackMask>>) {
         self.mask = mask.into();
         self.mind_others();
