@@ -37,7 +37,9 @@ impl CrackGrowth {
         if first == 0 {
             return 0;
         }
-        self.added -= self.network.nodes[..first].iter().filter(|node| node.impact == NO_IMPACT).count();
+        // What has grown from foreign cracks may be of no impact either.
+        let foreign = self.network.nodes[..first].iter().filter(|node| node.impact == NO_IMPACT).count();
+        self.added = self.added.saturating_sub(foreign);
         let forgotten = first as u32;
         let links = self.network.forget(forgotten);
         let number = |node: u32| node.checked_sub(forgotten);
@@ -174,6 +176,29 @@ mod tests {
         growth.take_changed(&mut after);
         assert!(expected.len() > 20);
         assert_eq!(after.into_iter().map(|segment| place(growth.network(), segment)).collect::<Vec<_>>(), expected);
+    }
+
+    #[test]
+    fn foreign_cracks_and_what_has_grown_from_them_are_forgotten_too() {
+        for (seed, arrest) in [(1, 0.0), (2, 0.0), (3, 0.05)] {
+            let params = GrowthParams { max_nodes: 300, arrest, ..GrowthParams::DEFAULT };
+            let mut foreign = CrackGrowth::new(GrowthParams { reach: 0.2, ..params.clone() }, Vec2::ONE, seed).unwrap();
+            foreign.hit(Vec2::splat(0.5), 1.0);
+            while foreign.step().grew() {}
+            let mut growth = CrackGrowth::new(params, Vec2::ONE, seed).unwrap();
+            growth.add_cracks(foreign.network(), 0);
+            let mut rng = Rng::new(seed);
+            for _ in 0..30 {
+                if growth.nodes_left() < 150 {
+                    growth.forget_oldest(150);
+                }
+                growth.hit(Vec2::new(rng.unit(), rng.unit()), 1.0);
+                while growth.step().grew() {}
+                assert!(growth.network().nodes().len() <= 300 + foreign.network().nodes().len());
+            }
+            growth.forget_oldest(0);
+            assert!(growth.network().nodes().is_empty() && growth.nodes_left() == 300);
+        }
     }
 
     #[test]
