@@ -20,6 +20,9 @@ pub(crate) struct Options {
     /// Masks of each preset
     #[arg(long, default_value_t = 24)]
     masks: u64,
+    /// Seed of the first mask; each further one has the next
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
     /// Side of a mask in texels
     #[arg(long, default_value_t = 512, value_parser = clap::value_parser!(u32).range(16..=4096))]
     size: u32,
@@ -50,24 +53,26 @@ struct View {
     scale: f32,
     /// How much the distances differ: 0 = not at all, 1 = by a factor of about 2 either way.
     spread: f32,
+    /// Side of the surface, in sides of a picture: they show a part of it.
+    pane: f32,
 }
 
 const fn view(preset: &str) -> View {
-    let (hits, energy, scale, spread) = match preset.as_bytes() {
-        b"concrete" => ((1, 4), (0.3, 1.5), 1.4, 0.5),
-        b"plaster" => ((1, 3), (0.1, 1.0), 1.2, 0.8),
-        b"brick" => ((1, 3), (0.0134, 0.134), 3.57, 0.817),
+    let (hits, energy, scale, spread, pane) = match preset.as_bytes() {
+        b"concrete" => ((1, 4), (0.3, 1.5), 1.4, 0.5, 1.0),
+        b"plaster" => ((1, 3), (0.1, 1.0), 1.2, 0.8, 1.0),
+        b"brick" => ((1, 3), (0.0134, 0.134), 3.57, 0.817, 1.0),
         // Weak ones: flying stones, not hammers.
-        b"glass" => ((1, 4), (0.0045, 0.112), 2.16, 0.9),
-        b"laminated_glass" => ((1, 4), (0.02, 0.5), 1.0, 0.5),
+        b"glass" => ((1, 10), (0.004, 0.1), 2.3, 0.9, 2.1),
+        b"laminated_glass" => ((1, 4), (0.02, 0.5), 1.0, 0.5, 1.0),
         // One hit cracks the whole surface.
-        b"tempered_glass" => ((1, 1), (1.0, 1.0), 2.7, 0.8),
-        b"mud" => ((1, 1), (1.0, 1.0), 1.7, 1.0),
-        b"glaze" => ((1, 1), (1.0, 1.0), 1.4, 0.8),
-        b"clay" => ((1, 3), (0.5, 1.5), 1.0, 1.0),
-        _ => ((1, 3), (0.5, 1.5), 1.0, 0.5),
+        b"tempered_glass" => ((1, 1), (1.0, 1.0), 2.7, 0.8, 1.0),
+        b"mud" => ((1, 1), (1.0, 1.0), 1.5, 0.96, 1.0),
+        b"glaze" => ((1, 1), (1.0, 1.0), 1.4, 0.8, 1.0),
+        b"clay" => ((1, 3), (0.5, 1.5), 1.0, 1.0, 1.0),
+        _ => ((1, 3), (0.5, 1.5), 1.0, 0.5, 1.0),
     };
-    View { hits, energy, scale, spread }
+    View { hits, energy, scale, spread, pane }
 }
 
 pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
@@ -75,7 +80,7 @@ pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
     let names = if options.preset.is_empty() { &all[..] } else { &options.preset };
     let frame = SurfaceFrame::new(UVec2::splat(options.size))?;
     for name in names {
-        let View { hits: (fewest, most), energy: (weakest, hardest), scale, spread } = view(name);
+        let View { hits: (fewest, most), energy: (weakest, hardest), scale, spread, pane } = view(name);
         let (scale, spread) = (options.scale.unwrap_or(scale), options.spread.unwrap_or(spread));
         let mut preset = CrackPreset::named(name).ok_or_else(|| format!("no preset `{name}`"))?;
         for (name, value) in &options.set {
@@ -83,19 +88,25 @@ pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
         }
         let folder = options.out.join(name);
         fs::create_dir_all(&folder)?;
-        for seed in 1..=options.masks {
+        for seed in (0..options.masks).map(|i| options.seed.wrapping_add(i)) {
             let mut rng = Rng::new(seed).stream("realism");
             let distance = spread * 0.7 * (rng.signed() + rng.signed());
             let seen = preset.scaled(scale * ops::exp(distance));
-            let mut growth = CrackGrowth::new(seen.growth, frame.extent(), seed)?;
+            let extent = pane * frame.extent();
+            let mut growth = CrackGrowth::new(seen.growth, extent, seed)?;
             for _ in 0..fewest + rng.next_u32() % (most - fewest + 1) {
                 let place = Vec2::new(rng.range(0.1, 0.9), rng.range(0.1, 0.9));
-                growth.hit(frame.uv_to_pos(place), options.energy * rng.range(weakest, hardest));
+                growth.hit(place * extent, options.energy * rng.range(weakest, hardest));
                 while growth.step().grew() {}
             }
+            // Nobody takes a picture of a part without cracks.
+            let nodes = growth.network().nodes();
+            let node = nodes.get(rng.next_u32() as usize % nodes.len().max(1)).map_or(extent * 0.5, |node| node.pos);
+            let place = node - frame.extent() * Vec2::new(rng.range(0.2, 0.8), rng.range(0.2, 0.8));
+            let window = place.clamp(Vec2::ZERO, extent - frame.extent());
             let mut field = DepthField::new(frame);
             for path in growth.network().segments().filter_map(|segment| growth.network().path(segment)) {
-                stamp_path(&mut field, &seen.profile, &path);
+                stamp_path(&mut field, &seen.profile, &path.moved(-window));
             }
             mask(&field).save(folder.join(format!("seed_{seed:02}.png")))?;
         }

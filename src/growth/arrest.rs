@@ -361,6 +361,11 @@ impl CrackGrowth {
         }
     }
 
+    /// Whether a crack or the border lies within `reach` of a node in this direction.
+    pub(super) fn is_near_crack(&self, from: u32, way: Vec2, reach: f32) -> bool {
+        self.goal_ahead(from, way, reach, AHEAD).is_some()
+    }
+
     fn border_ahead(&self, pos: Vec2, heading: Vec2, reach: f32, ahead: f32) -> Option<(f32, Goal)> {
         let extent = self.network.extent();
         let sides = [

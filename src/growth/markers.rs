@@ -116,7 +116,7 @@ pub(super) fn lay_out(
                         break;
                     }
                     // A ray bends a little from ring to ring.
-                    angle += 0.12 * jitter * rng.signed() * (first / radius.max(first)).max(0.25);
+                    angle += 0.06 * jitter * rng.signed() * (first / radius.max(first)).max(0.25);
                     let along = radius + 0.5 * jitter * gap * rng.signed();
                     let (pos, chance) = (region.center + params.direct(ops::unit(angle)) * along, rng.unit());
                     offer(pos, chance, occupancy, None);

@@ -43,6 +43,7 @@ mod markers;
 mod nodes;
 mod params;
 mod pull;
+mod spurs;
 mod step;
 #[cfg(test)]
 mod tests;

@@ -124,6 +124,9 @@ pub struct GrowthParams {
     pub tip_taper: f32,
     /// How much the width varies along a crack, 0..=0.9, as a share of it.
     pub unevenness: f32,
+    /// Share of the length of thin cracks at which they are hairlines, too fine to be seen from afar, 0..=0.6: pictures of them fall
+    /// into pieces there, while the network goes on. Wide cracks have fewer.
+    pub hairlines: f32,
     /// How much a crack keeps its direction, against the pull of the markers: 0 = not at all, 1 = as much as it follows them.
     /// 0..=8.
     pub inertia: f32,
@@ -152,6 +155,8 @@ pub struct GrowthParams {
     pub arrest: f32,
     /// Share of tips that stop short of the crack that they would have met, 0..=1.
     pub open_ends: f32,
+    /// Share of nodes beside which a short side crack starts that ends by itself, 0..=1.
+    pub spurs: f32,
     /// Cracks that begin by themselves where markers are out of every crack's reach: how many for each step of growth, 0..=64.
     /// They come late, so they end at the older ones.
     pub nucleation: f32,
@@ -187,6 +192,7 @@ impl GrowthParams {
         max_width: 0.03,
         tip_taper: 0.0,
         unevenness: 0.0,
+        hairlines: 0.0,
         inertia: 0.0,
         axis: 0.0,
         directed: 0.0,
@@ -199,6 +205,7 @@ impl GrowthParams {
         draw_islands: false,
         island_distance: 0.03,
         open_ends: 0.0,
+        spurs: 0.0,
         arrest: 0.0,
         nucleation: 0.0,
         variety: 0.0,
@@ -288,6 +295,7 @@ impl GrowthParams {
         max_width: f32 = 0.0005, 0.4;
         tip_taper: f32 = 0.0, 0.9;
         unevenness: f32 = 0.0, 0.9;
+        hairlines: f32 = 0.0, 0.6;
         inertia: f32 = 0.0, 8.0;
         axis: f32 = -7.0, 7.0;
         directed: f32 = 0.0, 1.0;
@@ -298,6 +306,7 @@ impl GrowthParams {
         connection_every: u32 = 1.0, 1000.0;
         island_distance: f32 = 0.0, 1.0;
         open_ends: f32 = 0.0, 1.0;
+        spurs: f32 = 0.0, 1.0;
         arrest: f32 = 0.0, 1.0;
         nucleation: f32 = 0.0, 64.0;
         variety: f32 = 0.0, 1.0;
@@ -535,7 +544,8 @@ impl GrowthParams {
     /// Each new node either kills a marker or brings one closer by at least `D²/4` of squared distance, and no marker
     /// begins further than [`crack_radius`](Self::crack_radius) from the node that it attracts. With closed venation a marker
     /// attracts no more than six nodes at once, and for no longer than twice as many steps. With arrest a marker counts for each
-    /// time that it may be given up, every node may be a tip that runs on, and with nucleation every marker a start.
+    /// time that it may be given up, every node may be a tip that runs on, and with nucleation every marker a start;
+    /// each node may have a spur.
     #[must_use]
     pub fn most_nodes(&self, markers: u64, starts: u64) -> u64 {
         let approaches = ((self.crack_radius / self.step_length).powi(2) / PROGRESS).ceil() as u64;
@@ -544,10 +554,11 @@ impl GrowthParams {
             births = 6 * markers * u64::from(super::closed::patience(self));
         }
         let starts = starts + if self.nucleation > 0.0 { markers } else { 0 };
+        let each = if self.spurs > 0.0 { 2 } else { 1 };
         if self.arrest <= 0.0 {
-            return starts + births;
+            return each * (starts + births);
         }
         let run = u64::from(super::arrest::steps_for(self.arrest.max(self.island_distance), self.step_length)) + 2;
-        (starts + births * u64::from(super::field::MOST_GIVEN_UP)) * (1 + run)
+        each * (starts + births * u64::from(super::field::MOST_GIVEN_UP)) * (1 + run)
     }
 }

@@ -1,6 +1,6 @@
 //! Where growth is pulled to: eq. 2 of Couto et al.
 
-use super::{CrackGrowth, params::PROGRESS};
+use super::{CrackGrowth, MarkerLayout, params::PROGRESS};
 use crate::{
     math::hash_unit,
     pattern::{CrackMask, NO_PARENT},
@@ -18,9 +18,14 @@ pub(super) struct Pull {
     closest_id: u32,
     pub(super) child: Vec2,
     pub(super) serves: bool,
+    /// Its markers lie too far aside.
+    strays: bool,
     /// Where nothing grows from the node any more: its markers on that side are given up.
     pub(super) stopped: Option<Vec2>,
 }
+
+/// Cosine of the widest angle at which a ray with inertia forks, and of what it bends away from the hit's direction: 40 degrees.
+const FORK: f32 = 0.766;
 
 const FIXED: f32 = 16_777_216.0;
 pub(super) const NO_PULL: u32 = u32::MAX;
@@ -43,6 +48,7 @@ impl CrackGrowth {
                     closest_id: u32::MAX,
                     child: Vec2::ZERO,
                     serves: false,
+                    strays: false,
                     stopped: None,
                 });
             }
@@ -65,6 +71,9 @@ impl CrackGrowth {
         let extent = self.network.extent();
         let (length, kill) = (self.params.step_length, self.params.kill_distance);
         let next = self.network.nodes.len() as u64;
+        // A crack does not turn on its heel: what it cannot serve on its way is left to others. And rays keep to their way.
+        let keeps_on = self.arrest.is_some() && (self.params.inertia > 0.0 || !self.mask.is_empty());
+        let is_ray = keeps_on && self.params.inertia > 0.0 && matches!(self.params.markers, MarkerLayout::Polar { .. });
         for (child, &(_, slot)) in (next..).zip(&self.order) {
             let pull = &mut self.pulls[slot as usize];
             let from = self.network.nodes[pull.node as usize].pos;
@@ -73,6 +82,12 @@ impl CrackGrowth {
                 && let Some(before) = self.network.nodes.get(self.network.nodes[pull.node as usize].parent as usize)
             {
                 let heading = (from - before.pos).normalize_or_zero();
+                if is_ray {
+                    let impact = self.network.nodes[pull.node as usize].impact;
+                    let hit = self.impacts.get(impact as usize).map_or(before.pos, |impact| impact.pos);
+                    let outward = (from - hit).normalize_or(heading);
+                    pull.strays = heading.dot(direction) < FORK || outward.dot(direction) < FORK;
+                }
                 // A side branch has left that heading already.
                 if heading.dot(direction) > 0.0 {
                     direction = (direction + heading * self.params.inertia).normalize_or_zero();
@@ -97,9 +112,11 @@ impl CrackGrowth {
                 pull.serves = left_sq <= kill * kill || left_sq <= distance_sq - PROGRESS * length * length;
             }
         });
-        // A crack does not turn on its heel: what it cannot serve on its way is left to others.
-        let keeps_on = self.arrest.is_some() && (self.params.inertia > 0.0 || !self.mask.is_empty());
         for pull in &mut self.pulls {
+            if pull.strays {
+                pull.serves = false;
+                continue;
+            }
             let is_start = self.network.nodes[pull.node as usize].parent == NO_PARENT;
             if !pull.serves && (is_start || !keeps_on) {
                 let (from, to) = (self.network.nodes[pull.node as usize].pos, self.field.marker(pull.closest).pos);

@@ -180,7 +180,8 @@ impl CrackGrowth {
     pub(super) fn bear(&mut self, pos: Vec2, parent: u32, generation: u32, impact: u32, bend: f32) {
         let node = self.network.nodes.len() as u64;
         let wider = self.impacts.get(impact as usize).map_or(1.0, |impact| impact.widening);
-        let width = self.widths.tip(parent, hash_unit(self.seed ^ 0x1D, node), wider);
+        let draw = |what| hash_unit(self.seed ^ what, node);
+        let width = self.widths.tip(parent, [draw(0x1D), draw(0x2D)], wider);
         if let Some(arrest) = &mut self.arrest {
             arrest.push_node(false);
         }
@@ -264,6 +265,9 @@ impl CrackGrowth {
         for node in first..last {
             self.field.visit(node, &self.network.nodes, &self.nodes);
         }
+        // They attract nothing.
+        self.spur(first..last);
+        self.newborn = first..self.network.nodes.len() as u32;
         self.join_newborn();
         if first == last && !any_stopped && !self.arrest.as_ref().is_some_and(Arrest::is_running) {
             self.steps_left = 0;

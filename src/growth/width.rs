@@ -12,6 +12,15 @@ const NOTCH: f32 = 1.5;
 /// Free ends are narrower over so many nodes.
 const TAPERED: u32 = 5;
 
+/// Where a crack is a mere hairline, its tip is so much narrower.
+const HAIRLINE: f32 = 0.1;
+
+/// A hairline opens with each notch, and from this one on it is as wide as the rest.
+const OPEN: u8 = 9;
+
+/// Share of the nodes of a hairline after which it goes on.
+const GOES_ON: f32 = 0.6;
+
 /// Widths of nodes by the number of nodes behind them (`lw = line_growth * n_c'` of Couto et al., with the exponent of
 /// Murray's pipe model: `n` nodes are as wide as `n^(1/murray)` tips).
 ///
@@ -23,6 +32,8 @@ pub(super) struct Widths {
     notches: Vec<(u32, f32)>,
     /// How much widths vary along a crack, as a share.
     unevenness: f32,
+    /// Share of the nodes at which a crack is a hairline.
+    hairlines: f32,
     pipes: Vec<Pipe>,
 }
 
@@ -37,6 +48,15 @@ struct Pipe {
     factor: f32,
     /// And for the hammering on its impact.
     wider: f32,
+    is_hairline: bool,
+}
+
+impl Pipe {
+    /// Its width where `notch` is that of its notch.
+    fn width(self, notch: f32) -> f32 {
+        let open = if self.is_hairline { (f32::from(self.notch) / f32::from(OPEN)).min(1.0) } else { 1.0 };
+        notch * self.factor * self.wider * (HAIRLINE + (1.0 - HAIRLINE) * open)
+    }
 }
 
 impl Widths {
@@ -54,13 +74,13 @@ impl Widths {
             let width = (params.line_width * (1.0 + params.line_growth * pipes)).min(params.max_width) * taper(count);
             notches.push((count, width));
         }
-        Self { notches, unevenness: params.unevenness, pipes: Vec::new() }
+        Self { notches, unevenness: params.unevenness, hairlines: params.hairlines, pipes: Vec::new() }
     }
 
     /// Other notches for the nodes to come; those that are there never become thinner.
     pub(super) fn set_params(&mut self, params: &GrowthParams) {
         self.notches = Self::new(params).notches;
-        self.unevenness = params.unevenness;
+        (self.unevenness, self.hairlines) = (params.unevenness, params.hairlines);
         let last = (self.notches.len() - 1) as u8;
         for pipe in &mut self.pipes {
             pipe.notch = pipe.notch.min(last);
@@ -71,22 +91,29 @@ impl Widths {
         self.pipes.reserve(nodes);
     }
 
-    /// Prepares the place of a node that grows from `parent`, with a draw of its own; returns its width.
-    pub(super) fn tip(&mut self, parent: u32, draw: f32, wider: f32) -> f32 {
+    /// Prepares the place of a node that grows from `parent`, with two draws of its own; returns its width.
+    pub(super) fn tip(&mut self, parent: u32, [draw, fine]: [f32; 2], wider: f32) -> f32 {
         let mut factor = 1.0;
+        let mut is_hairline = false;
+        if self.hairlines > 0.0 {
+            let begins = (1.0 - GOES_ON) * self.hairlines / (1.0 - self.hairlines).max(1e-3);
+            let is_within = self.pipes.get(parent as usize).is_some_and(|pipe| pipe.is_hairline);
+            is_hairline = fine < if is_within { GOES_ON } else { begins };
+        }
         if self.unevenness > 0.0 {
             // Each node is much like the one before.
             let before = self.pipes.get(parent as usize).map_or(1.0, |pipe| pipe.factor);
             factor += 0.75 * (before - 1.0) + self.unevenness * (draw - 0.5);
             factor = factor.clamp(1.0 - self.unevenness, 1.0 + self.unevenness);
         }
-        self.pipes.push(Pipe { behind: 1, told: 1, notch: 0, factor, wider });
-        self.notches[0].1 * factor * wider
+        let pipe = Pipe { behind: 1, told: 1, notch: 0, factor, wider, is_hairline };
+        self.pipes.push(pipe);
+        pipe.width(self.notches[0].1)
     }
 
     /// Prepares the place of a node that comes with a width of its own.
     pub(super) fn admit(&mut self) {
-        self.pipes.push(Pipe { behind: 1, told: 1, notch: 0, factor: 1.0, wider: 1.0 });
+        self.pipes.push(Pipe { behind: 1, told: 1, notch: 0, factor: 1.0, wider: 1.0, is_hairline: false });
     }
 
     /// Forgets the first nodes.
@@ -126,7 +153,7 @@ impl Widths {
             more = pipe.behind - pipe.told;
             pipe.told = pipe.behind;
             let this = &mut nodes[node as usize];
-            this.width = this.width.max(self.notches[usize::from(pipe.notch)].1 * pipe.factor * pipe.wider);
+            this.width = this.width.max(pipe.width(self.notches[usize::from(pipe.notch)].1));
             widened(node);
             node = this.parent;
         }

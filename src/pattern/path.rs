@@ -38,6 +38,15 @@ impl SegmentPath {
         &self.points[..self.len]
     }
 
+    /// The same line elsewhere.
+    #[must_use]
+    pub fn moved(mut self, by: Vec2) -> Self {
+        for point in &mut self.points[..self.len] {
+            point.pos += by;
+        }
+        self
+    }
+
     /// The line up to a share of its points, 0..=1, the last one between two of them.
     #[must_use]
     pub(super) fn up_to(mut self, share: f32) -> Self {

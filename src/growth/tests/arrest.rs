@@ -34,6 +34,8 @@ fn random_arrest(rng: &mut Rng) -> GrowthParams {
         directed: if rng.unit() < 0.5 { 0.0 } else { rng.unit() },
         reach: rng.range(0.3, 1.5),
         max_nodes: 3000,
+        spurs: if rng.unit() < 0.7 { 0.0 } else { 0.4 * rng.unit() },
+        hairlines: 0.6 * rng.unit(),
         ..params
     }
 }

@@ -2,6 +2,7 @@
 
 mod arrest;
 mod reference;
+mod side;
 
 use super::{CrackGrowth, GrowthParams, HitOutcome, MAX_ENERGY, MarkerLayout, Rejected, StartLayout, Venation};
 use crate::{
@@ -65,6 +66,7 @@ fn random_params(rng: &mut Rng, small: bool) -> GrowthParams {
         nucleation: 0.0,
         tip_taper: 0.0,
         unevenness: 0.0,
+        hairlines: 0.0,
         inertia: 0.0,
         axis: 0.0,
         directed: 0.0,
@@ -72,6 +74,7 @@ fn random_params(rng: &mut Rng, small: bool) -> GrowthParams {
         width_variety: 0.0,
         draw_markers: rng.unit() < 0.2,
         max_nodes: 1_000_000,
+        spurs: if small || rng.unit() < 0.5 { 0.0 } else { rng.unit() },
     };
     params.validate().expect("random parameters are valid");
     params
