@@ -3,11 +3,14 @@
 use super::{
     Broken, Shard,
     broken::Piece,
-    plane::{Faces, empty_mesh, write_mesh},
+    form::{Form, Style},
 };
 use crate::{
-    plugin::carrier::Carrier,
-    shatter::{Pose, ShardMesh},
+    plugin::{
+        beside::throw_away,
+        carrier::{Carrier, Clothes},
+    },
+    shatter::Pose,
 };
 use bevy::{asset::UntypedHandle, prelude::*};
 use std::collections::VecDeque;
@@ -62,7 +65,6 @@ impl Body {
     /// Hides a body and keeps it for another shard.
     fn park(self, world: &mut World, carrier: &Carrier) {
         let Ok(mut entity) = world.get_entity_mut(self.entity) else { return };
-        entity.remove::<Shard>();
         // Materials and their pictures are the surface's.
         (carrier.kind.undress)(&mut entity);
         if let Some(mut visibility) = entity.get_mut::<Visibility>() {
@@ -80,57 +82,18 @@ impl Body {
     }
 }
 
-/// What the entity of a shard wears.
-pub(super) struct Clothes<'a> {
-    pub(super) carrier: &'a Carrier,
-    pub(super) material: &'a UntypedHandle,
-    pub(super) inside: Option<&'a UntypedHandle>,
-    pub(super) is_mirrored: bool,
-}
+/// A piece that is to be shown: its index, its pose, and its form.
+pub(super) type Shown = (usize, Pose, Form);
 
-impl Clothes<'_> {
-    /// Shows a shard of the form of `mesh`, with a body that is there or a new one.
-    pub(super) fn put_on(&self, world: &mut World, shard: Shard, place: Transform, mesh: &ShardMesh) -> Option<Body> {
-        let Self { carrier, material, inside, is_mirrored } = *self;
-        let (is_solid, surface) = (carrier.kind.is_solid, shard.surface);
-        let form = |world: &mut World, kept: Option<&Handle<Mesh>>, faces| {
-            let mut meshes = world.get_resource_mut::<Assets<Mesh>>()?;
-            if let Some(kept) = kept
-                && let Some(mut old) = meshes.get_mut(kept)
-            {
-                write_mesh(&mut old, mesh, faces, is_mirrored, is_solid);
-                return Some(kept.clone());
-            }
-            let mut new = empty_mesh();
-            write_mesh(&mut new, mesh, faces, is_mirrored, is_solid);
-            Some(meshes.add(new))
-        };
-        if let Some(mut body) = Spares::take(world, is_solid) {
-            body.mesh = form(world, Some(&body.mesh), Faces::Picture)?;
-            let mut entity = world.entity_mut(body.entity);
-            entity.insert((shard, place, Visibility::Inherited));
-            if entity.get::<ChildOf>().is_none_or(|parent| parent.parent() != surface) {
-                entity.insert(ChildOf(surface));
-            }
-            (carrier.kind.dress)(&mut entity, Some(body.mesh.clone()), material);
-            if let (Some((sides, kept)), Some(inside)) = (&mut body.sides, inside) {
-                *kept = form(world, Some(kept), Faces::Inside)?;
-                (carrier.kind.dress)(&mut world.entity_mut(*sides), Some(kept.clone()), inside);
-            }
-            return Some(body);
-        }
-        let picture = form(world, None, Faces::Picture)?;
-        let mut entity = world.spawn((shard, place, Visibility::Inherited, ChildOf(surface)));
-        (carrier.kind.dress)(&mut entity, Some(picture.clone()), material);
-        let mut body = Body { entity: entity.id(), mesh: picture, sides: None };
-        if is_solid && let Some(inside) = inside {
-            let sides = form(world, None, Faces::Inside)?;
-            let mut child = world.spawn((Transform::default(), Visibility::Inherited, ChildOf(body.entity)));
-            (carrier.kind.dress)(&mut child, Some(sides.clone()), inside);
-            body.sides = Some((child.id(), sides));
-        }
-        Some(body)
+/// Puts meshes where they are drawn from: in the place of others, which go to `old`, or beside them.
+fn place_mesh(meshes: &mut Assets<Mesh>, kept: Option<&Handle<Mesh>>, mesh: Mesh, old: &mut Vec<Mesh>) -> Handle<Mesh> {
+    if let Some(kept) = kept
+        && let Some(mut before) = meshes.get_mut(kept)
+    {
+        old.push(core::mem::replace(&mut *before, mesh));
+        return kept.clone();
     }
+    meshes.add(mesh)
 }
 
 impl Broken {
@@ -149,30 +112,92 @@ impl Broken {
         self.wear[level].clone()
     }
 
-    /// Makes the entity of a piece, in its pose. `None` if there is nothing to make it of.
+    /// Makes the entities of pieces: of bodies that are there, then all others at a stroke. Returns them, and which pieces they are,
+    /// in order; not those for which something is missing.
     pub(super) fn spawn(
         &mut self,
         world: &mut World,
         surface: Entity,
         carrier: &Carrier,
-        index: usize,
-        pose: Pose,
-        scratch: &mut ShardMesh,
-    ) -> Option<(Entity, [u32; 2])> {
-        let level = self.level(carrier, pose);
-        let material = self.material(world, surface, carrier, level)?;
-        let place = self.place(carrier, index, pose)?;
-        let piece = self.pieces.get(index)?;
-        let frame = self.plane.frame(piece.uv, self.rim, piece.seed);
-        if carrier.kind.is_solid {
-            piece.cut.solid_mesh_into(piece.number, &frame, self.thickness(), scratch);
-        } else {
-            scratch.clear();
-            piece.cut.flat_mesh_into(piece.number, &frame, scratch);
+        shown: Vec<Shown>,
+    ) -> Vec<(Entity, [u32; 2])> {
+        let (is_solid, inside) = (carrier.kind.is_solid, self.inside.clone());
+        if shown.is_empty() || !world.contains_resource::<Assets<Mesh>>() {
+            return Vec::new();
         }
+        let mut old = Vec::new();
+        // Which pieces are new entities, and the meshes of their sides.
+        let (mut new, mut sides, mut clothes) = (Vec::new(), Vec::new(), Vec::new());
+        let mut all = Vec::with_capacity(shown.len());
+        for (index, pose, form) in shown {
+            let level = self.level(carrier, pose);
+            let Some(material) = self.material(world, surface, carrier, level) else { continue };
+            let Some(place) = self.place(carrier, index, pose) else { continue };
+            let Some(shard) = self.shard(surface, index) else { continue };
+            let body = Spares::take(world, is_solid);
+            let mut meshes = world.resource_mut::<Assets<Mesh>>();
+            let mesh = place_mesh(&mut meshes, body.as_ref().map(|body| &body.mesh), form.picture, &mut old);
+            let side = form.sides.zip(inside.clone()).map(|(side, inside)| {
+                let kept = body.as_ref().and_then(|body| body.sides.as_ref()).map(|(_, kept)| kept);
+                (place_mesh(&mut meshes, kept, side, &mut old), inside)
+            });
+            let worn = Clothes { parent: surface, place, mesh: mesh.clone(), material };
+            all.push(index);
+            let Some(piece) = self.pieces.get_mut(index) else { continue };
+            (piece.level, piece.times) = (level, piece.times + 1);
+            match body {
+                Some(mut body) => {
+                    (carrier.kind.dress)(&mut world.entity_mut(body.entity), Some(shard), worn);
+                    if let (Some((entity, kept)), Some((mesh, material))) = (&mut body.sides, side) {
+                        let worn = Clothes { parent: body.entity, place: Transform::default(), mesh, material };
+                        *kept = worn.mesh.clone();
+                        (carrier.kind.dress)(&mut world.entity_mut(*entity), None, worn);
+                    }
+                    piece.body = Some(Body { mesh, ..body });
+                }
+                None => {
+                    new.push((index, mesh));
+                    sides.push(side);
+                    clothes.push((shard, worn));
+                }
+            }
+        }
+        let entities = (carrier.kind.spawn)(world, clothes);
+        let mut with_sides = Vec::new();
+        for (((index, mesh), side), entity) in new.into_iter().zip(sides).zip(entities) {
+            self.pieces[index].body = Some(Body { entity, mesh, sides: None });
+            with_sides.extend(side.map(|(mesh, material)| {
+                let clothes = Clothes { parent: entity, place: Transform::default(), mesh, material };
+                (index, clothes)
+            }));
+        }
+        if !with_sides.is_empty() {
+            let kept: Vec<(usize, Handle<Mesh>)> =
+                with_sides.iter().map(|(index, clothes)| (*index, clothes.mesh.clone())).collect();
+            let clothes = with_sides.into_iter().map(|(_, clothes)| clothes).collect();
+            let entities = (carrier.kind.spawn_sides)(world, clothes);
+            for ((index, mesh), entity) in kept.into_iter().zip(entities) {
+                if let Some(body) = &mut self.pieces[index].body {
+                    body.sides = Some((entity, mesh));
+                }
+            }
+        }
+        if !old.is_empty() {
+            throw_away(old);
+        }
+        let of = |index: usize| {
+            let piece = &self.pieces[index];
+            Some((piece.body.as_ref()?.entity, [piece.id, piece.times]))
+        };
+        all.into_iter().filter_map(of).collect()
+    }
+
+    /// What the entity of a piece says that is to be shown once more.
+    fn shard(&self, surface: Entity, index: usize) -> Option<Shard> {
+        let piece = self.pieces.get(index)?;
         let scale = self.plane.size / piece.cut.extent();
         let flight = &piece.flight;
-        let shard = Shard {
+        Some(Shard {
             surface,
             pieces: piece.cut.clone(),
             number: piece.number,
@@ -180,15 +205,13 @@ impl Broken {
             spin: self.plane.rotation * (flight.axis * flight.spin),
             scale,
             piece: [piece.id, piece.times + 1],
-        };
-        let is_mirrored = self.plane.is_mirrored();
-        let clothes = Clothes { carrier, material: &material, inside: self.inside.as_ref(), is_mirrored };
-        let body = clothes.put_on(world, shard, place, scratch)?;
-        let entity = body.entity;
-        let piece = self.pieces.get_mut(index)?;
-        (piece.body, piece.level) = (Some(body), level);
-        piece.times += 1;
-        Some((entity, [piece.id, piece.times]))
+        })
+    }
+
+    /// How its shards are formed.
+    pub(super) fn style(&self, carrier: &Carrier) -> Style {
+        let thickness = carrier.kind.is_solid.then(|| self.thickness());
+        Style { plane: self.plane, rim: self.rim, thickness }
     }
 
     /// Thickness of shards in the entity's units.
@@ -232,7 +255,7 @@ impl Broken {
         if level != was {
             let material = self.material(world, surface, carrier, level);
             if let (Some(material), Ok(mut entity)) = (material, world.get_entity_mut(entity)) {
-                (carrier.kind.dress)(&mut entity, None, &material);
+                (carrier.kind.change)(&mut entity, &material);
             }
             self.pieces[index].level = level;
         }

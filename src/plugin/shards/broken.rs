@@ -159,6 +159,7 @@ impl Broken {
 
 /// Makes a surface whole again: its shards and holes go. Returns the bytes that it no longer needs.
 pub(in crate::plugin) fn drop_shards(world: &mut World, entity: Entity, active: &mut Active) -> u64 {
+    active.renew();
     let Some(mut broken) = active.broken.take() else { return 0 };
     for index in 0..broken.pieces.len() {
         broken.hide(world, &active.carrier, index);
