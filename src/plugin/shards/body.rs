@@ -3,7 +3,7 @@
 use super::{
     Broken, Shard,
     broken::Piece,
-    form::{Form, Style},
+    form::{Form, Origin, Style},
 };
 use crate::{
     plugin::{
@@ -13,7 +13,7 @@ use crate::{
     shatter::Pose,
 };
 use bevy::{asset::UntypedHandle, prelude::*};
-use std::collections::VecDeque;
+use std::collections::BTreeMap;
 
 /// How many degrees of fading there are in 2D, a material each; 3D shards shrink instead.
 pub(super) const LEVELS: usize = 8;
@@ -27,13 +27,17 @@ pub(super) struct Body {
     mesh: Handle<Mesh>,
     /// The sides of a solid shard.
     sides: Option<(Entity, Handle<Mesh>)>,
+    /// What its meshes were made of.
+    origin: Origin,
 }
 
-/// Bodies of shards that are not shown any more, hidden, the oldest first. They are kept as long as any surface is broken.
+/// Bodies of shards that are not shown any more, hidden, numbered as they came. They are kept as long as any surface is broken, and
+/// as they are: a piece that is shown once more has its own again if no other has taken it.
 #[derive(Resource, Default)]
 pub(in crate::plugin) struct Spares {
-    flat: VecDeque<Body>,
-    solid: VecDeque<Body>,
+    flat: BTreeMap<u64, Body>,
+    solid: BTreeMap<u64, Body>,
+    next: u64,
 }
 
 impl Spares {
@@ -41,30 +45,51 @@ impl Spares {
     pub(super) fn clear(world: &mut World) {
         let is_any = |spares: &Self| !(spares.flat.is_empty() && spares.solid.is_empty());
         if world.get_resource().is_some_and(is_any) {
-            let Self { flat, solid } = core::mem::take(&mut *world.resource_mut());
-            for body in flat.into_iter().chain(solid) {
+            let mut spares = world.resource_mut::<Self>();
+            let (flat, solid) = (core::mem::take(&mut spares.flat), core::mem::take(&mut spares.solid));
+            for body in flat.into_values().chain(solid.into_values()) {
                 world.try_despawn(body.entity).ok();
             }
         }
     }
 
-    /// A body that has not been taken away meanwhile.
+    const fn of(&mut self, is_solid: bool) -> &mut BTreeMap<u64, Body> {
+        if is_solid { &mut self.solid } else { &mut self.flat }
+    }
+
+    /// The oldest body that has not been taken away meanwhile.
     fn take(world: &mut World, is_solid: bool) -> Option<Body> {
         loop {
-            let mut spares = world.get_resource_mut::<Self>()?;
-            let body = if is_solid { spares.solid.pop_front() } else { spares.flat.pop_front() }?;
-            let is_there = |entity| world.get_entity(entity).is_ok();
-            if is_there(body.entity) && body.sides.as_ref().is_none_or(|(sides, _)| is_there(*sides)) {
+            let (_, body) = world.get_resource_mut::<Self>()?.of(is_solid).pop_first()?;
+            if body.is_there(world) {
                 return Some(body);
             }
         }
     }
+
+    /// The body with this number, if its meshes are those of `origin`.
+    fn take_back(world: &mut World, is_solid: bool, number: u64, origin: &Origin) -> Option<Body> {
+        let mut spares = world.get_resource_mut::<Self>()?;
+        let spares = spares.of(is_solid);
+        if spares.get(&number)?.origin != *origin {
+            return None;
+        }
+        let body = spares.remove(&number)?;
+        let meshes = world.get_resource::<Assets<Mesh>>()?;
+        let has_meshes = meshes.contains(&body.mesh) && body.sides.iter().all(|(_, mesh)| meshes.contains(mesh));
+        (has_meshes && body.is_there(world)).then_some(body)
+    }
 }
 
 impl Body {
-    /// Hides a body and keeps it for another shard.
-    fn park(self, world: &mut World, carrier: &Carrier) {
-        let Ok(mut entity) = world.get_entity_mut(self.entity) else { return };
+    fn is_there(&self, world: &World) -> bool {
+        let is_there = |entity| world.get_entity(entity).is_ok();
+        is_there(self.entity) && self.sides.as_ref().is_none_or(|(sides, _)| is_there(*sides))
+    }
+
+    /// Hides a body and keeps it for another shard. Returns its number among the spare ones.
+    fn park(self, world: &mut World, carrier: &Carrier) -> Option<u64> {
+        let mut entity = world.get_entity_mut(self.entity).ok()?;
         // Materials and their pictures are the surface's.
         (carrier.kind.undress)(&mut entity);
         if let Some(mut visibility) = entity.get_mut::<Visibility>() {
@@ -75,15 +100,21 @@ impl Body {
         {
             (carrier.kind.undress)(&mut sides);
         }
-        if let Some(mut spares) = world.get_resource_mut::<Spares>() {
-            let kept = if self.sides.is_some() { &mut spares.solid } else { &mut spares.flat };
-            kept.push_back(self);
-        }
+        let mut spares = world.get_resource_mut::<Spares>()?;
+        let number = spares.next;
+        spares.next += 1;
+        spares.of(self.sides.is_some()).insert(number, self);
+        Some(number)
     }
 }
 
-/// A piece that is to be shown: its index, its pose, and its form.
-pub(super) type Shown = (usize, Pose, Form);
+/// A piece that is to be shown.
+pub(super) struct Shown {
+    pub(super) index: usize,
+    pub(super) pose: Pose,
+    /// Its form, if that has been made.
+    pub(super) form: Option<Form>,
+}
 
 /// Puts meshes where they are drawn from: in the place of others, which go to `old`, or beside them.
 fn place_mesh(meshes: &mut Assets<Mesh>, kept: Option<&Handle<Mesh>>, mesh: Mesh, old: &mut Vec<Mesh>) -> Handle<Mesh> {
@@ -125,26 +156,48 @@ impl Broken {
         if shown.is_empty() || !world.contains_resource::<Assets<Mesh>>() {
             return Vec::new();
         }
+        let style = self.style(carrier);
+        let origin = |piece: &Piece| Origin::of(style, piece);
+        // Its own first, so that none is taken by another.
+        let own: Vec<Option<Body>> = shown
+            .iter()
+            .map(|Shown { index, .. }| {
+                let piece = self.pieces.get_mut(*index)?;
+                Spares::take_back(world, is_solid, piece.spare.take()?, &origin(piece))
+            })
+            .collect();
+        let is_formless = |(shown, own): &(&Shown, &Option<Body>)| shown.form.is_none() && own.is_none();
+        let formless = shown.iter().zip(&own).filter(is_formless);
+        let formless: Vec<&Piece> = formless.filter_map(|(shown, _)| self.pieces.get(shown.index)).collect();
+        let mut forms = style.forms(&formless).into_iter();
         let mut old = Vec::new();
         // Which pieces are new entities, and the meshes of their sides.
         let (mut new, mut sides, mut clothes) = (Vec::new(), Vec::new(), Vec::new());
         let mut all = Vec::with_capacity(shown.len());
-        for (index, pose, form) in shown {
+        for (Shown { index, pose, form }, own) in shown.into_iter().zip(own) {
+            let form = if own.is_none() { form.or_else(|| forms.next()) } else { None };
             let level = self.level(carrier, pose);
             let Some(material) = self.material(world, surface, carrier, level) else { continue };
             let Some(place) = self.place(carrier, index, pose) else { continue };
             let Some(shard) = self.shard(surface, index) else { continue };
-            let body = Spares::take(world, is_solid);
+            let body = own.or_else(|| Spares::take(world, is_solid));
             let mut meshes = world.resource_mut::<Assets<Mesh>>();
-            let mesh = place_mesh(&mut meshes, body.as_ref().map(|body| &body.mesh), form.picture, &mut old);
-            let side = form.sides.zip(inside.clone()).map(|(side, inside)| {
-                let kept = body.as_ref().and_then(|body| body.sides.as_ref()).map(|(_, kept)| kept);
-                (place_mesh(&mut meshes, kept, side, &mut old), inside)
-            });
+            let kept = body.as_ref().map(|body| (&body.mesh, body.sides.as_ref().map(|(_, mesh)| mesh)));
+            let (mesh, side) = match (form, kept) {
+                (Some(Form { picture, sides }), kept) => {
+                    let mesh = place_mesh(&mut meshes, kept.map(|(mesh, _)| mesh), picture, &mut old);
+                    let kept = kept.and_then(|(_, mesh)| mesh);
+                    (mesh, sides.map(|sides| place_mesh(&mut meshes, kept, sides, &mut old)))
+                }
+                (None, Some((mesh, side))) => (mesh.clone(), side.cloned()),
+                (None, None) => continue,
+            };
+            let side = side.zip(inside.clone());
             let worn = Clothes { parent: surface, place, mesh: mesh.clone(), material };
             all.push(index);
             let Some(piece) = self.pieces.get_mut(index) else { continue };
             (piece.level, piece.times) = (level, piece.times + 1);
+            let origin = origin(piece);
             match body {
                 Some(mut body) => {
                     (carrier.kind.dress)(&mut world.entity_mut(body.entity), Some(shard), worn);
@@ -153,10 +206,10 @@ impl Broken {
                         *kept = worn.mesh.clone();
                         (carrier.kind.dress)(&mut world.entity_mut(*entity), None, worn);
                     }
-                    piece.body = Some(Body { mesh, ..body });
+                    piece.body = Some(Body { mesh, origin, ..body });
                 }
                 None => {
-                    new.push((index, mesh));
+                    new.push((index, mesh, origin));
                     sides.push(side);
                     clothes.push((shard, worn));
                 }
@@ -164,8 +217,8 @@ impl Broken {
         }
         let entities = (carrier.kind.spawn)(world, clothes);
         let mut with_sides = Vec::new();
-        for (((index, mesh), side), entity) in new.into_iter().zip(sides).zip(entities) {
-            self.pieces[index].body = Some(Body { entity, mesh, sides: None });
+        for (((index, mesh, origin), side), entity) in new.into_iter().zip(sides).zip(entities) {
+            self.pieces[index].body = Some(Body { entity, mesh, sides: None, origin });
             with_sides.extend(side.map(|(mesh, material)| {
                 let clothes = Clothes { parent: entity, place: Transform::default(), mesh, material };
                 (index, clothes)
@@ -264,16 +317,16 @@ impl Broken {
     /// Takes the entity of a piece away.
     pub(super) fn hide(&mut self, world: &mut World, carrier: &Carrier, index: usize) {
         if let Some(body) = self.pieces.get_mut(index).and_then(|piece| piece.body.take()) {
-            self.put_away(world, carrier, body);
+            self.pieces[index].spare = self.put_away(world, carrier, body);
         }
     }
 
-    /// Takes a body away, for another shard if nobody else has made something of it.
-    pub(super) fn put_away(&self, world: &mut World, carrier: &Carrier, body: Body) {
+    /// Takes a body away, for another shard if nobody else has made something of it. Returns its number among the spare ones.
+    pub(super) fn put_away(&self, world: &mut World, carrier: &Carrier, body: Body) -> Option<u64> {
         if self.settings.fly {
-            body.park(world, carrier);
-        } else {
-            world.try_despawn(body.entity).ok();
+            return body.park(world, carrier);
         }
+        world.try_despawn(body.entity).ok();
+        None
     }
 }

@@ -83,6 +83,8 @@ pub(super) struct Piece {
     /// Whether it is not to be shown any more: it is transparent, or has made room for another.
     pub(super) is_spent: bool,
     pub(super) body: Option<Body>,
+    /// The number of its last body among the spare ones.
+    pub(super) spare: Option<u64>,
     /// How often it has been shown.
     pub(super) times: u32,
     pub(super) level: usize,

@@ -2,6 +2,7 @@
 
 use super::{
     Broken, Reassembled, ShatterCracks, Spares,
+    body::Shown,
     broken::Piece,
     drop_shards,
     holes::{bounds, spans_of},
@@ -34,7 +35,7 @@ enum Fate {
 }
 
 /// Shards that are shown from this frame on: entity, surface, and which of its pieces for which time.
-type Shown = Vec<(Entity, Entity, [u32; 2])>;
+type News = Vec<(Entity, Entity, [u32; 2])>;
 
 /// Lets time pass for all shards and puts them where they are then.
 pub(in crate::plugin) fn fly_shards(world: &mut World) {
@@ -82,7 +83,7 @@ fn fly(
     active: &mut Active,
     mut broken: Box<Broken>,
     seconds: f32,
-    shown: &mut Shown,
+    shown: &mut News,
 ) -> Fate {
     let (speed, seek, is_flying) = match world.get_mut::<ShatterCracks>(surface) {
         Some(mut settings) => (settings.speed, settings.bypass_change_detection().seek.take(), settings.fly),
@@ -127,12 +128,10 @@ fn fly(
         let mut index = 0;
         while index < broken.pieces.len() {
             broken.break_if_due(index);
-            fresh.extend(broken.show(world, surface, &active.carrier, index).map(|pose| (index, pose)));
+            let pose = broken.show(world, surface, &active.carrier, index);
+            fresh.extend(pose.map(|pose| Shown { index, pose, form: None }));
             index += 1;
         }
-        let pieces: Vec<&Piece> = fresh.iter().map(|(index, _)| &broken.pieces[*index]).collect();
-        let forms = broken.style(&active.carrier).forms(&pieces);
-        let fresh = fresh.into_iter().zip(forms).map(|((index, pose), form)| (index, pose, form)).collect();
         let fresh = broken.spawn(world, surface, &active.carrier, fresh);
         shown.extend(fresh.into_iter().map(|(entity, piece)| (entity, surface, piece)));
     }
@@ -185,6 +184,7 @@ impl Broken {
                 uv: piece.uv,
                 is_spent: piece.is_spent,
                 body: None,
+                spare: None,
                 times: 0,
                 level: 0,
             });

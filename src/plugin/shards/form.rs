@@ -9,6 +9,7 @@ use bevy::{
     tasks::{ComputeTaskPool, ParallelSlice},
 };
 use core::ops::Range;
+use std::sync::{Arc, Weak};
 
 /// So many shards are worth a task.
 const CHUNK: usize = 32;
@@ -19,6 +20,28 @@ pub(super) struct Form {
     pub(super) picture: Mesh,
     /// The sides of a solid shard.
     pub(super) sides: Option<Mesh>,
+}
+
+/// What the form of a piece follows from.
+pub(super) struct Origin {
+    shards: Weak<Shards>,
+    number: u32,
+    uv: [Vec2; 2],
+    seed: u64,
+    style: Style,
+}
+
+impl Origin {
+    pub(super) fn of(style: Style, piece: &Piece) -> Self {
+        Self { shards: Arc::downgrade(&piece.cut), number: piece.number, uv: piece.uv, seed: piece.seed, style }
+    }
+}
+
+impl PartialEq for Origin {
+    fn eq(&self, other: &Self) -> bool {
+        self.shards.ptr_eq(&other.shards)
+            && (self.number, self.uv, self.seed, self.style) == (other.number, other.uv, other.seed, other.style)
+    }
 }
 
 /// How shards of a surface are formed.

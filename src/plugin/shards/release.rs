@@ -2,6 +2,7 @@
 
 use super::{
     Broken, Shard, ShardsError, ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen, Shattered,
+    body::Shown,
     broken::Piece,
     holes::cut_span,
     order::{Leaving, Made, Order},
@@ -225,7 +226,9 @@ fn release(
         broken.end = broken.end.max(broken.time + f64::from(flight.end()));
         broken.holes.set(&spans, true);
         let is_spent = form.is_none();
-        shown.extend(form.map(|form| (broken.pieces.len(), Pose::AT_REST, form)));
+        if form.is_some() {
+            shown.push(Shown { index: broken.pieces.len(), pose: Pose::AT_REST, form });
+        }
         broken.pieces.push(Piece {
             cut: broken.cut.clone(),
             number,
@@ -240,6 +243,7 @@ fn release(
             uv,
             is_spent,
             body: None,
+            spare: None,
             times: 0,
             level: 0,
         });
