@@ -5,8 +5,8 @@
 //! app is taken off. `finished/*`: a frame with 10,000 cracked surfaces of 32 x 32 that have come to an end, beside one with
 //! 10,000 plain sprites. "only ...": parts of the first that no program could do without. `baking`: what of each frame the crate's systems
 //! take while guided cracks are baked and appear, 60 frames a second, from the first frame to ten after the last crack. `shards/*`: what
-//! the crate's own systems take of the main thread in the frame in which a pane becomes 500 shards, for the first time and with
-//! bodies that are there from before, and in each frame in which 5,000 fly. With a Vulkan driver (software will do) uploads are part
+//! the crate's own systems take of the main thread in the three frames in which a pane becomes 500 shards for the first time, 60 a second,
+//! in the one in which as many are shown once more, and in each in which 5,000 fly. With a Vulkan driver (software will do) uploads are part
 //! of it; without, it says so.
 
 #![expect(clippy::print_stdout, clippy::expect_used, reason = "a benchmark")]

@@ -30,6 +30,14 @@ impl<W: Send + 'static, T: Send + 'static> Beside<W, T> {
     }
 }
 
+#[cfg(test)]
+impl<W, T> Beside<W, T> {
+    /// Whether a task has done it.
+    pub(super) fn is_done(&self) -> bool {
+        self.task.as_ref().is_some_and(Task::is_finished)
+    }
+}
+
 fn take<W>(work: &Mutex<Option<W>>) -> Option<W> {
     work.lock().unwrap_or_else(PoisonError::into_inner).take()
 }

@@ -352,3 +352,69 @@ fn inside(
     }
     before.or_else(|| (active.carrier.kind.inside)(world, &active.carrier, active.base.mean(), bright))
 }
+
+#[cfg(all(test, feature = "2d"))]
+mod tests {
+    use super::*;
+    use crate::{
+        plugin::prelude::*,
+        shatter::{Anchor, ShatterParams},
+    };
+    use bevy::{
+        asset::RenderAssetUsages,
+        image::TextureAtlasLayout,
+        render::render_resource::{Extent3d, TextureDimension, TextureFormat},
+    };
+
+    /// By count: the frames in which shards are asked for, made and there cut nothing, and paint nothing.
+    #[test]
+    fn no_frame_cuts_or_paints_for_shards() {
+        let mut app = App::new();
+        app.add_plugins((
+            MinimalPlugins,
+            TransformPlugin,
+            AssetPlugin::default(),
+            ImagePlugin::default(),
+            CrackPlugins,
+        ))
+        .init_asset::<TextureAtlasLayout>()
+        .init_asset::<Mesh>()
+        .init_asset::<ColorMaterial>();
+        app.finish();
+        app.cleanup();
+        let extent = Extent3d { width: 64, height: 64, depth_or_array_layers: 1 };
+        let (format, usage) = (TextureFormat::Rgba8UnormSrgb, RenderAssetUsages::default());
+        let image = Image::new_fill(extent, TextureDimension::D2, &[200, 200, 200, 255], format, usage);
+        let image = app.world_mut().resource_mut::<Assets<Image>>().add(image);
+        let settings = ShatterCracks {
+            cut: ShatterParams { carry_on: true, ..ShatterParams::DEFAULT },
+            anchor: Anchor::Nothing,
+            ..default()
+        };
+        let sprite = (Sprite::from_image(image), CrackSurface::new(CrackPreset::GLASS), settings);
+        let entity = app.world_mut().spawn(sprite).id();
+        app.world_mut().trigger(CrackHit::uv(entity, Vec2::splat(0.5)).with_energy(2.0));
+        app.update();
+        while app.world().get::<CrackState>(entity).is_some_and(|state| state.status != CrackStatus::Done) {
+            app.update();
+        }
+        for around in [Vec2::splat(0.2), Vec2::splat(0.8)] {
+            let painted = |app: &App| app.world().resource::<Surfaces>().active[&entity].painted;
+            let (before, shown) = (painted(&app), app.world().get::<CrackShards>(entity).map_or(0, |told| told.shown));
+            app.world_mut().commands().entity(entity).shatter_cracks(ShatterRequest::around(around, 0.1));
+            app.update();
+            let is_made = |app: &App| {
+                let requests = &app.world().resource::<Surfaces>().requests;
+                requests.iter().any(|request| request.work.as_ref().is_some_and(|(work, _)| work.is_done()))
+            };
+            while !is_made(&app) {
+                std::thread::yield_now();
+            }
+            (0..2).for_each(|_| app.update());
+            assert!(app.world().get::<CrackShards>(entity).is_some_and(|told| told.shown > shown));
+            let active = &app.world().resource::<Surfaces>().active[&entity];
+            assert_eq!(painted(&app), before, "a whole frame's painting");
+            assert!(active.views.iter().all(|view| view.dirty.is_empty()), "texels to paint");
+        }
+    }
+}
