@@ -1,6 +1,6 @@
 //! [`Carrier`]: what shows a surface's pictures, a sprite or a material.
 
-use super::{CrackError, CrackMaps, CrackTextures, shards::Plane, surfaces::Active};
+use super::{CrackError, CrackMaps, CrackTextures, Shard, shards::Plane, surfaces::Active};
 use bevy::{
     asset::{UntypedAssetId, UntypedHandle},
     prelude::*,
@@ -58,10 +58,24 @@ pub(super) struct Kind {
     pub(super) shard_material: fn(&mut World, Entity, &Carrier, &Handle<Image>, f32) -> Option<UntypedHandle>,
     /// The material of their sides, if they have any, of a picture of this mean colour (sRGB).
     pub(super) inside: fn(&mut World, &Carrier, [f32; 3], f32) -> Option<UntypedHandle>,
-    /// Gives a shard its mesh, if that is new, and its material.
-    pub(super) dress: fn(&mut EntityWorldMut, Option<Handle<Mesh>>, &UntypedHandle),
-    /// Takes the material away.
+    /// Makes entities of shards, all at a stroke.
+    pub(super) spawn: fn(&mut World, Vec<(Shard, Clothes)>) -> Vec<Entity>,
+    /// The same for their sides.
+    pub(super) spawn_sides: fn(&mut World, Vec<Clothes>) -> Vec<Entity>,
+    /// Makes a shard, or the sides of one, of an entity that was one.
+    pub(super) dress: fn(&mut EntityWorldMut, Option<Shard>, Clothes),
+    /// Gives a shard another material.
+    pub(super) change: fn(&mut EntityWorldMut, &UntypedHandle),
+    /// Takes what makes it a shard from an entity, and the material.
     pub(super) undress: fn(&mut EntityWorldMut),
+}
+
+/// What a shard or its sides are shown with.
+pub(super) struct Clothes {
+    pub(super) parent: Entity,
+    pub(super) place: Transform,
+    pub(super) mesh: Handle<Mesh>,
+    pub(super) material: UntypedHandle,
 }
 
 /// All kinds, the first that fits is taken.

@@ -4,7 +4,7 @@ use super::{
     CrackState, CrackStats, CrackTextures, ShatterRequest, bake,
     carrier::{self, Found},
     queue::HitQueue,
-    shards::drop_shards,
+    shards::{Request, drop_shards},
     surfaces::Surfaces,
 };
 use bevy::{
@@ -24,8 +24,12 @@ pub trait CrackCommandsExt {
     /// while they close makes them grow on from where they are. Not a number, zero or below: at once.
     fn close_cracks(&mut self, seconds: f32) -> &mut Self;
 
-    /// Knocks shards out of a cracked surface, in this frame, along the cracks it has. Nothing happens to an entity without cracks; one
+    /// Knocks shards out of a cracked surface, along the cracks it has. Nothing happens to an entity without cracks; one
     /// that cannot shatter says so with [`ShatterFailed`](super::ShatterFailed). See [`ShatterCracks`](super::ShatterCracks).
+    ///
+    /// The shards are those of this frame, and are there two frames later, on every machine: they are made on the
+    /// [`AsyncComputeTaskPool`](bevy::tasks::AsyncComputeTaskPool) meanwhile. Only if they are not ready then, or the surface has been
+    /// shattered or mended in between, they are made in that frame. Healing takes the request back.
     fn shatter_cracks(&mut self, request: ShatterRequest) -> &mut Self;
 }
 
@@ -46,7 +50,7 @@ impl CrackCommandsExt for EntityCommands<'_> {
         let entity = self.id();
         self.commands().queue(move |world: &mut World| {
             if let Some(mut surfaces) = world.get_resource_mut::<Surfaces>() {
-                surfaces.requests.push((entity, request));
+                surfaces.requests.push(Request::new(entity, request));
             }
         });
         self

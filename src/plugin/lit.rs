@@ -112,6 +112,7 @@ impl CrackMaterial for CrackLitMaterial {
 
 impl MaterialSlot for MeshMaterial2d<CrackLitMaterial> {
     type Material = CrackLitMaterial;
+    type Mesh = Mesh2d;
 
     fn material(&self) -> &Handle<CrackLitMaterial> {
         &self.0
@@ -119,13 +120,6 @@ impl MaterialSlot for MeshMaterial2d<CrackLitMaterial> {
 
     fn set_material(&mut self, material: Handle<CrackLitMaterial>) {
         self.0 = material;
-    }
-
-    fn wear(entity: &mut EntityWorldMut, mesh: Option<Handle<Mesh>>, material: Handle<CrackLitMaterial>) {
-        match mesh {
-            Some(mesh) => entity.insert((Mesh2d(mesh), Self(material))),
-            None => entity.insert(Self(material)),
-        };
     }
 }
 

@@ -1,8 +1,8 @@
 //! Meshes with a material as carriers.
 
 use super::{
-    CrackError, CrackMaps, CrackTextures,
-    carrier::{Carrier, Found, Kind, Shown},
+    CrackError, CrackMaps, CrackTextures, Shard,
+    carrier::{Carrier, Clothes, Found, Kind, Shown},
     mesh::{closest_uv, place_of, wrap},
     shards::Plane,
     surfaces::Active,
@@ -31,12 +31,12 @@ pub(super) trait CrackMaterial: Asset + Clone {
 }
 
 /// The component that holds a material.
-pub(super) trait MaterialSlot: Component<Mutability = Mutable> {
+pub(super) trait MaterialSlot: Component<Mutability = Mutable> + From<Handle<Self::Material>> {
     type Material: CrackMaterial;
+    /// The component that holds the mesh beside it.
+    type Mesh: Component + From<Handle<Mesh>>;
     fn material(&self) -> &Handle<Self::Material>;
     fn set_material(&mut self, material: Handle<Self::Material>);
-    /// The components that show a material, and a mesh if given.
-    fn wear(entity: &mut EntityWorldMut, mesh: Option<Handle<Mesh>>, material: Handle<Self::Material>);
 }
 
 /// How to deal with meshes whose material is in the component `S`.
@@ -51,7 +51,10 @@ pub(super) const fn kind<S: MaterialSlot>() -> Kind {
         open: open::<S>,
         shard_material: shard_material::<S>,
         inside: inside::<S>,
+        spawn: spawn::<S>,
+        spawn_sides: spawn_sides::<S>,
         dress: dress::<S>,
+        change: change::<S>,
         undress: undress::<S>,
     }
 }
@@ -196,25 +199,50 @@ fn inside<S: MaterialSlot>(world: &mut World, carrier: &Carrier, mean: [f32; 3],
     Some(materials.add(inside).untyped())
 }
 
-/// Gives a shard its mesh, if that is new, and its material.
-pub(super) fn dress<S: MaterialSlot>(
-    entity: &mut EntityWorldMut,
-    mesh: Option<Handle<Mesh>>,
-    material: &UntypedHandle,
-) {
-    S::wear(entity, mesh, material.clone().typed());
+/// Makes entities of shards.
+pub(super) fn spawn<S: MaterialSlot>(world: &mut World, shards: Vec<(Shard, Clothes)>) -> Vec<Entity> {
+    world.spawn_batch(shards.into_iter().map(|(shard, clothes)| (shard, worn::<S>(clothes)))).collect()
 }
 
-/// Takes the material of a shard away.
+/// Makes entities of the sides of shards.
+pub(super) fn spawn_sides<S: MaterialSlot>(world: &mut World, sides: Vec<Clothes>) -> Vec<Entity> {
+    world.spawn_batch(sides.into_iter().map(worn::<S>)).collect()
+}
+
+/// All that is seen of a shard.
+fn worn<S: MaterialSlot>(clothes: Clothes) -> (ChildOf, Transform, Visibility, S::Mesh, S) {
+    let Clothes { parent, place, mesh, material } = clothes;
+    (ChildOf(parent), place, Visibility::Inherited, mesh.into(), material.typed().into())
+}
+
+/// Makes a shard of an entity that was one.
+pub(super) fn dress<S: MaterialSlot>(entity: &mut EntityWorldMut, shard: Option<Shard>, clothes: Clothes) {
+    let is_child = entity.get::<ChildOf>().is_some_and(|child| child.parent() == clothes.parent);
+    let (parent, place, visibility, mesh, material) = worn::<S>(clothes);
+    let seen = (place, visibility, mesh, material);
+    match (shard, is_child) {
+        (Some(shard), true) => entity.insert((shard, seen)),
+        (Some(shard), false) => entity.insert((shard, parent, seen)),
+        (None, true) => entity.insert(seen),
+        (None, false) => entity.insert((parent, seen)),
+    };
+}
+
+/// Gives a shard another material.
+pub(super) fn change<S: MaterialSlot>(entity: &mut EntityWorldMut, material: &UntypedHandle) {
+    entity.insert(S::from(material.clone().typed()));
+}
+
+/// Takes what makes it a shard from an entity, and the material.
 pub(super) fn undress<S: MaterialSlot>(entity: &mut EntityWorldMut) {
-    entity.remove::<S>();
+    entity.remove::<(Shard, S)>();
 }
 
 #[cfg(feature = "2d")]
 mod flat {
     use super::{Affine2, CrackMaps, CrackMaterial, CrackTextures, Handle, Image, MaterialSlot};
     use bevy::{
-        prelude::{Alpha, ColorMaterial, EntityWorldMut, Mesh, Mesh2d, MeshMaterial2d},
+        prelude::{Alpha, ColorMaterial, Mesh2d, MeshMaterial2d},
         sprite_render::AlphaMode2d,
     };
 
@@ -255,6 +283,7 @@ mod flat {
 
     impl MaterialSlot for MeshMaterial2d<ColorMaterial> {
         type Material = ColorMaterial;
+        type Mesh = Mesh2d;
 
         fn material(&self) -> &Handle<ColorMaterial> {
             &self.0
@@ -262,13 +291,6 @@ mod flat {
 
         fn set_material(&mut self, material: Handle<ColorMaterial>) {
             self.0 = material;
-        }
-
-        fn wear(entity: &mut EntityWorldMut, mesh: Option<Handle<Mesh>>, material: Handle<ColorMaterial>) {
-            match mesh {
-                Some(mesh) => entity.insert((Mesh2d(mesh), Self(material))),
-                None => entity.insert(Self(material)),
-            };
         }
     }
 }
@@ -278,7 +300,7 @@ mod standard {
     use super::{Affine2, CrackMaps, CrackMaterial, CrackTextures, Handle, Image, MaterialSlot};
     use bevy::{
         pbr::ParallaxMappingMethod,
-        prelude::{AlphaMode, Color, EntityWorldMut, Mesh, Mesh3d, MeshMaterial3d, StandardMaterial},
+        prelude::{AlphaMode, Color, Mesh3d, MeshMaterial3d, StandardMaterial},
     };
 
     impl CrackMaterial for StandardMaterial {
@@ -347,6 +369,7 @@ mod standard {
 
     impl MaterialSlot for MeshMaterial3d<StandardMaterial> {
         type Material = StandardMaterial;
+        type Mesh = Mesh3d;
 
         fn material(&self) -> &Handle<StandardMaterial> {
             &self.0
@@ -354,13 +377,6 @@ mod standard {
 
         fn set_material(&mut self, material: Handle<StandardMaterial>) {
             self.0 = material;
-        }
-
-        fn wear(entity: &mut EntityWorldMut, mesh: Option<Handle<Mesh>>, material: Handle<StandardMaterial>) {
-            match mesh {
-                Some(mesh) => entity.insert((Mesh3d(mesh), Self(material))),
-                None => entity.insert(Self(material)),
-            };
         }
     }
 }

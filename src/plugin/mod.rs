@@ -18,6 +18,7 @@
 
 mod activate;
 mod bake;
+mod beside;
 mod budget;
 mod carrier;
 mod clock;

@@ -43,6 +43,7 @@ pub(super) fn paint_surfaces(
     while let Some(entity) = dirty.pop_front() {
         let Some(active) = active.get_mut(&entity) else { continue };
         active.is_dirty = false;
+        active.painted += 1;
         let before = active.playback.as_ref().map(|playback| playback.shown);
         stamp(active, &mut scratch);
         paint(active, &mut images, &mut uploads, &mut scratch.rects);

@@ -10,7 +10,9 @@ mod body;
 mod broken;
 mod drawn;
 mod fly;
+mod form;
 mod holes;
+mod order;
 mod plane;
 mod release;
 
@@ -18,7 +20,7 @@ pub(super) use body::Spares;
 pub(super) use broken::{Broken, Struck, drop_shards};
 pub(super) use fly::fly_shards;
 pub(super) use plane::Plane;
-pub(super) use release::{any_requests, shatter_surfaces, shatter_when_due};
+pub(super) use release::{Request, any_requests, shatter_surfaces, shatter_when_due};
 
 use crate::shatter::{Anchor, BreakAgain, BurstParams, ConvexPiece, RimLook, Shards, ShatterError, ShatterParams};
 use bevy::prelude::*;

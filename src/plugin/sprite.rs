@@ -19,7 +19,10 @@ pub(super) const KIND: Kind = Kind {
     open: |_, _| {},
     shard_material,
     inside: |_, _, _, _| None,
+    spawn: material::spawn::<MeshMaterial2d<ColorMaterial>>,
+    spawn_sides: material::spawn_sides::<MeshMaterial2d<ColorMaterial>>,
     dress: material::dress::<MeshMaterial2d<ColorMaterial>>,
+    change: material::change::<MeshMaterial2d<ColorMaterial>>,
     undress: material::undress::<MeshMaterial2d<ColorMaterial>>,
 };
 

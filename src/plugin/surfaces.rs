@@ -1,12 +1,12 @@
 //! [`Surfaces`]: the surfaces that have been hit.
 
 use super::{
-    CrackClock, CrackSurface, CrackTextures, ShatterRequest,
+    CrackClock, CrackSurface, CrackTextures,
     carrier::Carrier,
     clock::Playback,
     freeze::Frozen,
-    picture::{BasePicture, density},
-    shards::{Broken, Struck},
+    picture::BasePicture,
+    shards::{Broken, Request, Struck},
 };
 use crate::{
     CrackPreset, Grid,
@@ -92,6 +92,10 @@ pub(super) struct Active {
     pub(super) struck: Option<Struck>,
     /// Nodes of the network and closed cells when shards last fell by themselves.
     pub(super) fell_at: (usize, usize),
+    /// How often it has been painted.
+    pub(super) painted: u64,
+    /// What its shards are made from: another one whenever shards leave or return, or the surface becomes another.
+    pub(super) version: Arc<()>,
     /// Its shards and holes; `None` = it is whole.
     pub(super) broken: Option<Box<Broken>>,
 }
@@ -143,6 +147,8 @@ impl Active {
             cells_told: 1,
             struck: None,
             fell_at: (0, 1),
+            painted: 0,
+            version: Arc::default(),
             broken: None,
             surface,
             preset,
@@ -162,6 +168,11 @@ impl Active {
         }
     }
 
+    /// Its shards are made from something else from now on.
+    pub(super) fn renew(&mut self) {
+        self.version = Arc::default();
+    }
+
     /// Keeps what grows from now on out of the holes of the picture and of shards.
     pub(super) fn mind_holes(&mut self) {
         self.growth.set_density(self.density());
@@ -170,12 +181,11 @@ impl Active {
     /// Where cracks may go: not over holes.
     pub(super) fn density(&self) -> Option<Grid<f32>> {
         let rect = self.views.get(self.view)?.rect;
-        let holes = self.broken.as_ref().map(|broken| &broken.holes);
         let base = self.surface.alpha_mask.then_some(&*self.base);
-        let is_hole = |texel| {
-            holes.is_some_and(|holes| holes.contains(texel)) || base.is_some_and(|base| base.is_hole(rect.min + texel))
-        };
-        density(rect.size(), is_hole)
+        match &self.broken {
+            Some(broken) => broken.holes.density(rect, base),
+            None => base?.density(rect),
+        }
     }
 
     /// Shows the cracks in `rect` of the image from now on.
@@ -254,7 +264,7 @@ pub(super) struct Surfaces {
     /// Surfaces that have shattered.
     pub(super) broken: Vec<Entity>,
     /// Surfaces that are to shatter, in order.
-    pub(super) requests: Vec<(Entity, ShatterRequest)>,
+    pub(super) requests: Vec<Request>,
     /// All shards that are shown, the oldest first: entity, surface, and which of its pieces for which time; and some that are not
     /// any more.
     pub(super) shards: VecDeque<(Entity, Entity, [u32; 2])>,
@@ -297,6 +307,7 @@ impl Surfaces {
 
     /// Forgets everything about a surface.
     pub(super) fn remove(&mut self, entity: Entity) -> Option<Active> {
+        self.requests.retain(|request| request.entity != entity);
         let active = self.active.remove(&entity)?;
         // Out of the lists at once: if it comes back before its turn, it must not be in them twice.
         if active.is_growing {

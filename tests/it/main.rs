@@ -31,5 +31,7 @@ mod shards;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod shards_life;
 #[cfg(all(feature = "2d", feature = "3d"))]
+mod shards_order;
+#[cfg(all(feature = "2d", feature = "3d"))]
 mod support;
 mod voronoi;

@@ -57,7 +57,8 @@ pub(crate) fn crack(app: &mut App, entity: Entity) {
 
 pub(crate) fn shatter(app: &mut App, entity: Entity, request: ShatterRequest) {
     app.world_mut().commands().entity(entity).shatter_cracks(request);
-    step(app);
+    // They are there two frames later.
+    steps(app, 3);
 }
 
 pub(crate) fn shards(app: &mut App) -> Vec<Entity> {
@@ -425,7 +426,7 @@ fn shards_fall_by_themselves() {
     for when in [ShatterWhen::AtDamage(0.05), ShatterWhen::CellsAsTheyClose, ShatterWhen::AtDamage(1.1)] {
         let settings = ShatterCracks { when, anchor: Anchor::Border, speed: 1.0, ..loose() };
         let entity = cracked(&mut app, UVec2::splat(96), settings);
-        steps(&mut app, 2);
+        steps(&mut app, 6);
         let told = heard::<Shattered>(&mut app);
         match when {
             ShatterWhen::AtDamage(damage) if damage > 1.0 => assert!(told.is_empty()),
@@ -521,7 +522,7 @@ fn what_cannot_shatter_says_so_and_stays_whole() {
     let untouched = spawn_picture(&mut app, UVec2::splat(8));
     shatter(&mut app, untouched, all);
     app.world_mut().commands().entity(untouched).shatter_cracks(all).despawn();
-    step(&mut app);
+    steps(&mut app, 3);
     assert!(heard::<ShatterFailed>(&mut app).is_empty() && heard::<Shattered>(&mut app).is_empty());
     // Odd speeds do no harm.
     shatter(&mut app, entity, all);

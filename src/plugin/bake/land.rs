@@ -5,6 +5,7 @@ use super::{
         CrackBudget, CrackClock, CrackError, CrackMaskSource, CrackStatus, CrackTextures, GuidedAppearance,
         GuidedCracks,
         activate::{install, make_ready, set_status},
+        beside::throw_away,
         carrier::Carrier,
         clock::First,
         mask::{Key, PictureMasks},
@@ -15,7 +16,7 @@ use super::{
         upload::Uploads,
         watch::Past,
     },
-    Bake, Bakes, Job, Plan, Work,
+    Bake, Job, Plan, Work,
     finish::{Finish, Finished, Next, Order},
     job::{Ground, Lines},
 };
@@ -148,7 +149,7 @@ pub(super) fn land(
 /// Has a surface made anew that has changed meanwhile.
 fn again(world: &mut World, entity: Entity, bake: &mut Bake, finished: Finished) -> Result<(), CrackError> {
     let Finished { order: past, added, covered, growth, cells, field, pictures, replay, .. } = finished;
-    throw_away(world, (growth, cells, field, pictures, replay));
+    throw_away((growth, cells, field, pictures, replay));
     let ground = Ground { base: past.base, mask: past.mask };
     let ground = past.is_new.then_some(ground);
     order(world, entity, bake, Lines { network: added.network, opening: added.opening, covered, ground })?;
@@ -242,7 +243,7 @@ fn replace(world: &mut World, entity: Entity, mut active: Active, mut finished: 
     surfaces.active.insert(entity, active);
     surfaces.bytes -= bytes;
     begin_to_show(world, entity);
-    throw_away(world, (before, shown_before));
+    throw_away((before, shown_before));
 }
 
 fn begin_to_show(world: &mut World, entity: Entity) {
@@ -250,11 +251,4 @@ fn begin_to_show(world: &mut World, entity: Entity) {
     surfaces.start_growing(entity);
     surfaces.soil(entity);
     set_status(world, entity, CrackStatus::Growing);
-}
-
-/// Gives back memory where no frame waits for it.
-fn throw_away(world: &World, rubbish: impl Send + 'static) {
-    if let Some(pool) = world.resource::<Bakes>().pool() {
-        pool.spawn(async move { drop(rubbish) }).detach();
-    }
 }

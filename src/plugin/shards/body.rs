@@ -3,14 +3,17 @@
 use super::{
     Broken, Shard,
     broken::Piece,
-    plane::{Faces, empty_mesh, write_mesh},
+    form::{Form, Origin, Style},
 };
 use crate::{
-    plugin::carrier::Carrier,
-    shatter::{Pose, ShardMesh},
+    plugin::{
+        beside::throw_away,
+        carrier::{Carrier, Clothes},
+    },
+    shatter::Pose,
 };
 use bevy::{asset::UntypedHandle, prelude::*};
-use std::collections::VecDeque;
+use std::collections::BTreeMap;
 
 /// How many degrees of fading there are in 2D, a material each; 3D shards shrink instead.
 pub(super) const LEVELS: usize = 8;
@@ -24,13 +27,17 @@ pub(super) struct Body {
     mesh: Handle<Mesh>,
     /// The sides of a solid shard.
     sides: Option<(Entity, Handle<Mesh>)>,
+    /// What its meshes were made of.
+    origin: Origin,
 }
 
-/// Bodies of shards that are not shown any more, hidden, the oldest first. They are kept as long as any surface is broken.
+/// Bodies of shards that are not shown any more, hidden, numbered as they came. They are kept as long as any surface is broken, and
+/// as they are: a piece that is shown once more has its own again if no other has taken it.
 #[derive(Resource, Default)]
 pub(in crate::plugin) struct Spares {
-    flat: VecDeque<Body>,
-    solid: VecDeque<Body>,
+    flat: BTreeMap<u64, Body>,
+    solid: BTreeMap<u64, Body>,
+    next: u64,
 }
 
 impl Spares {
@@ -38,31 +45,51 @@ impl Spares {
     pub(super) fn clear(world: &mut World) {
         let is_any = |spares: &Self| !(spares.flat.is_empty() && spares.solid.is_empty());
         if world.get_resource().is_some_and(is_any) {
-            let Self { flat, solid } = core::mem::take(&mut *world.resource_mut());
-            for body in flat.into_iter().chain(solid) {
+            let mut spares = world.resource_mut::<Self>();
+            let (flat, solid) = (core::mem::take(&mut spares.flat), core::mem::take(&mut spares.solid));
+            for body in flat.into_values().chain(solid.into_values()) {
                 world.try_despawn(body.entity).ok();
             }
         }
     }
 
-    /// A body that has not been taken away meanwhile.
+    const fn of(&mut self, is_solid: bool) -> &mut BTreeMap<u64, Body> {
+        if is_solid { &mut self.solid } else { &mut self.flat }
+    }
+
+    /// The oldest body that has not been taken away meanwhile.
     fn take(world: &mut World, is_solid: bool) -> Option<Body> {
         loop {
-            let mut spares = world.get_resource_mut::<Self>()?;
-            let body = if is_solid { spares.solid.pop_front() } else { spares.flat.pop_front() }?;
-            let is_there = |entity| world.get_entity(entity).is_ok();
-            if is_there(body.entity) && body.sides.as_ref().is_none_or(|(sides, _)| is_there(*sides)) {
+            let (_, body) = world.get_resource_mut::<Self>()?.of(is_solid).pop_first()?;
+            if body.is_there(world) {
                 return Some(body);
             }
         }
     }
+
+    /// The body with this number, if its meshes are those of `origin`.
+    fn take_back(world: &mut World, is_solid: bool, number: u64, origin: &Origin) -> Option<Body> {
+        let mut spares = world.get_resource_mut::<Self>()?;
+        let spares = spares.of(is_solid);
+        if spares.get(&number)?.origin != *origin {
+            return None;
+        }
+        let body = spares.remove(&number)?;
+        let meshes = world.get_resource::<Assets<Mesh>>()?;
+        let has_meshes = meshes.contains(&body.mesh) && body.sides.iter().all(|(_, mesh)| meshes.contains(mesh));
+        (has_meshes && body.is_there(world)).then_some(body)
+    }
 }
 
 impl Body {
-    /// Hides a body and keeps it for another shard.
-    fn park(self, world: &mut World, carrier: &Carrier) {
-        let Ok(mut entity) = world.get_entity_mut(self.entity) else { return };
-        entity.remove::<Shard>();
+    fn is_there(&self, world: &World) -> bool {
+        let is_there = |entity| world.get_entity(entity).is_ok();
+        is_there(self.entity) && self.sides.as_ref().is_none_or(|(sides, _)| is_there(*sides))
+    }
+
+    /// Hides a body and keeps it for another shard. Returns its number among the spare ones.
+    fn park(self, world: &mut World, carrier: &Carrier) -> Option<u64> {
+        let mut entity = world.get_entity_mut(self.entity).ok()?;
         // Materials and their pictures are the surface's.
         (carrier.kind.undress)(&mut entity);
         if let Some(mut visibility) = entity.get_mut::<Visibility>() {
@@ -73,64 +100,31 @@ impl Body {
         {
             (carrier.kind.undress)(&mut sides);
         }
-        if let Some(mut spares) = world.get_resource_mut::<Spares>() {
-            let kept = if self.sides.is_some() { &mut spares.solid } else { &mut spares.flat };
-            kept.push_back(self);
-        }
+        let mut spares = world.get_resource_mut::<Spares>()?;
+        let number = spares.next;
+        spares.next += 1;
+        spares.of(self.sides.is_some()).insert(number, self);
+        Some(number)
     }
 }
 
-/// What the entity of a shard wears.
-pub(super) struct Clothes<'a> {
-    pub(super) carrier: &'a Carrier,
-    pub(super) material: &'a UntypedHandle,
-    pub(super) inside: Option<&'a UntypedHandle>,
-    pub(super) is_mirrored: bool,
+/// A piece that is to be shown.
+pub(super) struct Shown {
+    pub(super) index: usize,
+    pub(super) pose: Pose,
+    /// Its form, if that has been made.
+    pub(super) form: Option<Form>,
 }
 
-impl Clothes<'_> {
-    /// Shows a shard of the form of `mesh`, with a body that is there or a new one.
-    pub(super) fn put_on(&self, world: &mut World, shard: Shard, place: Transform, mesh: &ShardMesh) -> Option<Body> {
-        let Self { carrier, material, inside, is_mirrored } = *self;
-        let (is_solid, surface) = (carrier.kind.is_solid, shard.surface);
-        let form = |world: &mut World, kept: Option<&Handle<Mesh>>, faces| {
-            let mut meshes = world.get_resource_mut::<Assets<Mesh>>()?;
-            if let Some(kept) = kept
-                && let Some(mut old) = meshes.get_mut(kept)
-            {
-                write_mesh(&mut old, mesh, faces, is_mirrored, is_solid);
-                return Some(kept.clone());
-            }
-            let mut new = empty_mesh();
-            write_mesh(&mut new, mesh, faces, is_mirrored, is_solid);
-            Some(meshes.add(new))
-        };
-        if let Some(mut body) = Spares::take(world, is_solid) {
-            body.mesh = form(world, Some(&body.mesh), Faces::Picture)?;
-            let mut entity = world.entity_mut(body.entity);
-            entity.insert((shard, place, Visibility::Inherited));
-            if entity.get::<ChildOf>().is_none_or(|parent| parent.parent() != surface) {
-                entity.insert(ChildOf(surface));
-            }
-            (carrier.kind.dress)(&mut entity, Some(body.mesh.clone()), material);
-            if let (Some((sides, kept)), Some(inside)) = (&mut body.sides, inside) {
-                *kept = form(world, Some(kept), Faces::Inside)?;
-                (carrier.kind.dress)(&mut world.entity_mut(*sides), Some(kept.clone()), inside);
-            }
-            return Some(body);
-        }
-        let picture = form(world, None, Faces::Picture)?;
-        let mut entity = world.spawn((shard, place, Visibility::Inherited, ChildOf(surface)));
-        (carrier.kind.dress)(&mut entity, Some(picture.clone()), material);
-        let mut body = Body { entity: entity.id(), mesh: picture, sides: None };
-        if is_solid && let Some(inside) = inside {
-            let sides = form(world, None, Faces::Inside)?;
-            let mut child = world.spawn((Transform::default(), Visibility::Inherited, ChildOf(body.entity)));
-            (carrier.kind.dress)(&mut child, Some(sides.clone()), inside);
-            body.sides = Some((child.id(), sides));
-        }
-        Some(body)
+/// Puts meshes where they are drawn from: in the place of others, which go to `old`, or beside them.
+fn place_mesh(meshes: &mut Assets<Mesh>, kept: Option<&Handle<Mesh>>, mesh: Mesh, old: &mut Vec<Mesh>) -> Handle<Mesh> {
+    if let Some(kept) = kept
+        && let Some(mut before) = meshes.get_mut(kept)
+    {
+        old.push(core::mem::replace(&mut *before, mesh));
+        return kept.clone();
     }
+    meshes.add(mesh)
 }
 
 impl Broken {
@@ -149,30 +143,114 @@ impl Broken {
         self.wear[level].clone()
     }
 
-    /// Makes the entity of a piece, in its pose. `None` if there is nothing to make it of.
+    /// Makes the entities of pieces: of bodies that are there, then all others at a stroke. Returns them, and which pieces they are,
+    /// in order; not those for which something is missing.
     pub(super) fn spawn(
         &mut self,
         world: &mut World,
         surface: Entity,
         carrier: &Carrier,
-        index: usize,
-        pose: Pose,
-        scratch: &mut ShardMesh,
-    ) -> Option<(Entity, [u32; 2])> {
-        let level = self.level(carrier, pose);
-        let material = self.material(world, surface, carrier, level)?;
-        let place = self.place(carrier, index, pose)?;
-        let piece = self.pieces.get(index)?;
-        let frame = self.plane.frame(piece.uv, self.rim, piece.seed);
-        if carrier.kind.is_solid {
-            piece.cut.solid_mesh_into(piece.number, &frame, self.thickness(), scratch);
-        } else {
-            scratch.clear();
-            piece.cut.flat_mesh_into(piece.number, &frame, scratch);
+        shown: Vec<Shown>,
+    ) -> Vec<(Entity, [u32; 2])> {
+        let (is_solid, inside) = (carrier.kind.is_solid, self.inside.clone());
+        if shown.is_empty() || !world.contains_resource::<Assets<Mesh>>() {
+            return Vec::new();
         }
+        let style = self.style(carrier);
+        let origin = |piece: &Piece| Origin::of(style, piece);
+        // Its own first, so that none is taken by another.
+        let own: Vec<Option<Body>> = shown
+            .iter()
+            .map(|Shown { index, .. }| {
+                let piece = self.pieces.get_mut(*index)?;
+                Spares::take_back(world, is_solid, piece.spare.take()?, &origin(piece))
+            })
+            .collect();
+        let is_formless = |(shown, own): &(&Shown, &Option<Body>)| shown.form.is_none() && own.is_none();
+        let formless = shown.iter().zip(&own).filter(is_formless);
+        let formless: Vec<&Piece> = formless.filter_map(|(shown, _)| self.pieces.get(shown.index)).collect();
+        let mut forms = style.forms(&formless).into_iter();
+        let mut old = Vec::new();
+        // Which pieces are new entities, and the meshes of their sides.
+        let (mut new, mut sides, mut clothes) = (Vec::new(), Vec::new(), Vec::new());
+        let mut all = Vec::with_capacity(shown.len());
+        for (Shown { index, pose, form }, own) in shown.into_iter().zip(own) {
+            let form = if own.is_none() { form.or_else(|| forms.next()) } else { None };
+            let level = self.level(carrier, pose);
+            let Some(material) = self.material(world, surface, carrier, level) else { continue };
+            let Some(place) = self.place(carrier, index, pose) else { continue };
+            let Some(shard) = self.shard(surface, index) else { continue };
+            let body = own.or_else(|| Spares::take(world, is_solid));
+            let mut meshes = world.resource_mut::<Assets<Mesh>>();
+            let kept = body.as_ref().map(|body| (&body.mesh, body.sides.as_ref().map(|(_, mesh)| mesh)));
+            let (mesh, side) = match (form, kept) {
+                (Some(Form { picture, sides }), kept) => {
+                    let mesh = place_mesh(&mut meshes, kept.map(|(mesh, _)| mesh), picture, &mut old);
+                    let kept = kept.and_then(|(_, mesh)| mesh);
+                    (mesh, sides.map(|sides| place_mesh(&mut meshes, kept, sides, &mut old)))
+                }
+                (None, Some((mesh, side))) => (mesh.clone(), side.cloned()),
+                (None, None) => continue,
+            };
+            let side = side.zip(inside.clone());
+            let worn = Clothes { parent: surface, place, mesh: mesh.clone(), material };
+            all.push(index);
+            let Some(piece) = self.pieces.get_mut(index) else { continue };
+            (piece.level, piece.times) = (level, piece.times + 1);
+            let origin = origin(piece);
+            match body {
+                Some(mut body) => {
+                    (carrier.kind.dress)(&mut world.entity_mut(body.entity), Some(shard), worn);
+                    if let (Some((entity, kept)), Some((mesh, material))) = (&mut body.sides, side) {
+                        let worn = Clothes { parent: body.entity, place: Transform::default(), mesh, material };
+                        *kept = worn.mesh.clone();
+                        (carrier.kind.dress)(&mut world.entity_mut(*entity), None, worn);
+                    }
+                    piece.body = Some(Body { mesh, origin, ..body });
+                }
+                None => {
+                    new.push((index, mesh, origin));
+                    sides.push(side);
+                    clothes.push((shard, worn));
+                }
+            }
+        }
+        let entities = (carrier.kind.spawn)(world, clothes);
+        let mut with_sides = Vec::new();
+        for (((index, mesh, origin), side), entity) in new.into_iter().zip(sides).zip(entities) {
+            self.pieces[index].body = Some(Body { entity, mesh, sides: None, origin });
+            with_sides.extend(side.map(|(mesh, material)| {
+                let clothes = Clothes { parent: entity, place: Transform::default(), mesh, material };
+                (index, clothes)
+            }));
+        }
+        if !with_sides.is_empty() {
+            let kept: Vec<(usize, Handle<Mesh>)> =
+                with_sides.iter().map(|(index, clothes)| (*index, clothes.mesh.clone())).collect();
+            let clothes = with_sides.into_iter().map(|(_, clothes)| clothes).collect();
+            let entities = (carrier.kind.spawn_sides)(world, clothes);
+            for ((index, mesh), entity) in kept.into_iter().zip(entities) {
+                if let Some(body) = &mut self.pieces[index].body {
+                    body.sides = Some((entity, mesh));
+                }
+            }
+        }
+        if !old.is_empty() {
+            throw_away(old);
+        }
+        let of = |index: usize| {
+            let piece = &self.pieces[index];
+            Some((piece.body.as_ref()?.entity, [piece.id, piece.times]))
+        };
+        all.into_iter().filter_map(of).collect()
+    }
+
+    /// What the entity of a piece says that is to be shown once more.
+    fn shard(&self, surface: Entity, index: usize) -> Option<Shard> {
+        let piece = self.pieces.get(index)?;
         let scale = self.plane.size / piece.cut.extent();
         let flight = &piece.flight;
-        let shard = Shard {
+        Some(Shard {
             surface,
             pieces: piece.cut.clone(),
             number: piece.number,
@@ -180,15 +258,13 @@ impl Broken {
             spin: self.plane.rotation * (flight.axis * flight.spin),
             scale,
             piece: [piece.id, piece.times + 1],
-        };
-        let is_mirrored = self.plane.is_mirrored();
-        let clothes = Clothes { carrier, material: &material, inside: self.inside.as_ref(), is_mirrored };
-        let body = clothes.put_on(world, shard, place, scratch)?;
-        let entity = body.entity;
-        let piece = self.pieces.get_mut(index)?;
-        (piece.body, piece.level) = (Some(body), level);
-        piece.times += 1;
-        Some((entity, [piece.id, piece.times]))
+        })
+    }
+
+    /// How its shards are formed.
+    pub(super) fn style(&self, carrier: &Carrier) -> Style {
+        let thickness = carrier.kind.is_solid.then(|| self.thickness());
+        Style { plane: self.plane, rim: self.rim, thickness }
     }
 
     /// Thickness of shards in the entity's units.
@@ -232,7 +308,7 @@ impl Broken {
         if level != was {
             let material = self.material(world, surface, carrier, level);
             if let (Some(material), Ok(mut entity)) = (material, world.get_entity_mut(entity)) {
-                (carrier.kind.dress)(&mut entity, None, &material);
+                (carrier.kind.change)(&mut entity, &material);
             }
             self.pieces[index].level = level;
         }
@@ -241,16 +317,16 @@ impl Broken {
     /// Takes the entity of a piece away.
     pub(super) fn hide(&mut self, world: &mut World, carrier: &Carrier, index: usize) {
         if let Some(body) = self.pieces.get_mut(index).and_then(|piece| piece.body.take()) {
-            self.put_away(world, carrier, body);
+            self.pieces[index].spare = self.put_away(world, carrier, body);
         }
     }
 
-    /// Takes a body away, for another shard if nobody else has made something of it.
-    pub(super) fn put_away(&self, world: &mut World, carrier: &Carrier, body: Body) {
+    /// Takes a body away, for another shard if nobody else has made something of it. Returns its number among the spare ones.
+    pub(super) fn put_away(&self, world: &mut World, carrier: &Carrier, body: Body) -> Option<u64> {
         if self.settings.fly {
-            body.park(world, carrier);
-        } else {
-            world.try_despawn(body.entity).ok();
+            return body.park(world, carrier);
         }
+        world.try_despawn(body.entity).ok();
+        None
     }
 }

@@ -83,6 +83,8 @@ pub(super) struct Piece {
     /// Whether it is not to be shown any more: it is transparent, or has made room for another.
     pub(super) is_spent: bool,
     pub(super) body: Option<Body>,
+    /// The number of its last body among the spare ones.
+    pub(super) spare: Option<u64>,
     /// How often it has been shown.
     pub(super) times: u32,
     pub(super) level: usize,
@@ -159,6 +161,7 @@ impl Broken {
 
 /// Makes a surface whole again: its shards and holes go. Returns the bytes that it no longer needs.
 pub(in crate::plugin) fn drop_shards(world: &mut World, entity: Entity, active: &mut Active) -> u64 {
+    active.renew();
     let Some(mut broken) = active.broken.take() else { return 0 };
     for index in 0..broken.pieces.len() {
         broken.hide(world, &active.carrier, index);

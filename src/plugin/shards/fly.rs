@@ -1,7 +1,12 @@
 //! Shards in motion.
 
 use super::{
-    Broken, Reassembled, ShatterCracks, Spares, broken::Piece, drop_shards, holes::bounds, release::make_room,
+    Broken, Reassembled, ShatterCracks, Spares,
+    body::Shown,
+    broken::Piece,
+    drop_shards,
+    holes::{bounds, spans_of},
+    release::make_room,
 };
 use crate::{
     math::mix,
@@ -9,7 +14,7 @@ use crate::{
         carrier::Carrier,
         surfaces::{Active, Surfaces},
     },
-    shatter::ShardMesh,
+    shatter::Pose,
 };
 use bevy::prelude::*;
 use std::sync::Arc;
@@ -30,10 +35,10 @@ enum Fate {
 }
 
 /// Shards that are shown from this frame on: entity, surface, and which of its pieces for which time.
-type Shown = Vec<(Entity, Entity, [u32; 2])>;
+type News = Vec<(Entity, Entity, [u32; 2])>;
 
 /// Lets time pass for all shards and puts them where they are then.
-pub(in crate::plugin) fn fly_shards(world: &mut World, mut scratch: Local<ShardMesh>) {
+pub(in crate::plugin) fn fly_shards(world: &mut World) {
     let seconds = world.get_resource::<Time>().map_or(DEFAULT_FRAME, |time| time.delta_secs());
     let (mut whole, mut shown) = (Vec::new(), Vec::new());
     world.resource_scope(|world, mut surfaces: Mut<Surfaces>| {
@@ -41,9 +46,10 @@ pub(in crate::plugin) fn fly_shards(world: &mut World, mut scratch: Local<ShardM
         broken.retain(|&entity| {
             let Some(active) = surfaces.active.get_mut(&entity) else { return false };
             let Some(pieces) = active.broken.take() else { return false };
-            match fly(world, entity, active, pieces, seconds, &mut scratch, &mut shown) {
+            match fly(world, entity, active, pieces, seconds, &mut shown) {
                 Fate::Broken => {}
                 Fate::Mended => {
+                    active.renew();
                     active.mind_holes();
                     surfaces.soil(entity);
                 }
@@ -77,8 +83,7 @@ fn fly(
     active: &mut Active,
     mut broken: Box<Broken>,
     seconds: f32,
-    scratch: &mut ShardMesh,
-    shown: &mut Shown,
+    shown: &mut News,
 ) -> Fate {
     let (speed, seek, is_flying) = match world.get_mut::<ShatterCracks>(surface) {
         Some(mut settings) => (settings.speed, settings.bypass_change_detection().seek.take(), settings.fly),
@@ -112,21 +117,23 @@ fn fly(
             }
             continue;
         }
-        broken.holes.set(&piece.cut, piece.number, active.field.frame, false);
+        broken.holes.set(&spans_of(&piece.cut, piece.number, active.field.frame), false);
         broken.put_back(&piece);
         active.mark(bounds(&piece.cut, piece.number, active.field.frame));
         fate = Fate::Mended;
     }
     let is_over = before > broken.end && now > broken.end;
     if is_flying && !is_over {
+        let mut fresh = Vec::new();
         let mut index = 0;
         while index < broken.pieces.len() {
             broken.break_if_due(index);
-            if let Some((entity, piece)) = broken.show(world, surface, &active.carrier, index, scratch) {
-                shown.push((entity, surface, piece));
-            }
+            let pose = broken.show(world, surface, &active.carrier, index);
+            fresh.extend(pose.map(|pose| Shown { index, pose, form: None }));
             index += 1;
         }
+        let fresh = broken.spawn(world, surface, &active.carrier, fresh);
+        shown.extend(fresh.into_iter().map(|(entity, piece)| (entity, surface, piece)));
     }
     broken.tell(world, surface);
     active.broken = Some(broken);
@@ -134,15 +141,8 @@ fn fly(
 }
 
 impl Broken {
-    /// Puts a piece where it is now, if it is anywhere. Returns its entity, and which piece that is, if it is shown from now on.
-    fn show(
-        &mut self,
-        world: &mut World,
-        surface: Entity,
-        carrier: &Carrier,
-        index: usize,
-        scratch: &mut ShardMesh,
-    ) -> Option<(Entity, [u32; 2])> {
+    /// Puts a piece where it is now, if it is anywhere. Returns its pose if it is to be shown from now on.
+    fn show(&mut self, world: &mut World, surface: Entity, carrier: &Carrier, index: usize) -> Option<Pose> {
         let piece = &self.pieces[index];
         let pose = piece.flight.pose((self.time - piece.start) as f32);
         if pose.opacity <= 0.0 || piece.is_broken {
@@ -150,7 +150,7 @@ impl Broken {
             return None;
         }
         if piece.body.is_none() && !piece.is_spent {
-            return self.spawn(world, surface, carrier, index, pose, scratch);
+            return Some(pose);
         }
         self.pose(world, surface, carrier, index, pose);
         None
@@ -184,6 +184,7 @@ impl Broken {
                 uv: piece.uv,
                 is_spent: piece.is_spent,
                 body: None,
+                spare: None,
                 times: 0,
                 level: 0,
             });

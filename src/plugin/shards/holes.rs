@@ -1,13 +1,24 @@
 //! [`Holes`]: the texels that have left a surface.
 
-use crate::{Grid, pattern::SurfaceFrame, raster::TexelRect, shatter::Shards};
+use crate::{
+    Grid,
+    pattern::SurfaceFrame,
+    plugin::picture::{BasePicture, density},
+    raster::TexelRect,
+    shatter::Shards,
+};
 use bevy::prelude::*;
+use core::ops::Range;
 
 /// The texels that have left a surface with its shards.
+#[derive(Clone)]
 pub(in crate::plugin) struct Holes {
     gone: Grid<bool>,
     count: u64,
 }
+
+/// Texels beside each other: y, first x, and the x after the last.
+pub(super) type Span = [u32; 3];
 
 impl Holes {
     pub(super) fn new(size: UVec2) -> Self {
@@ -19,58 +30,80 @@ impl Holes {
         self.gone.get(texel.x, texel.y).unwrap_or(false)
     }
 
-    /// Texels in the rows of a rectangle that are gone: y, and the x of each.
-    fn texels(&self, rect: TexelRect) -> impl Iterator<Item = UVec2> + '_ {
-        let is_any = self.count > 0;
-        (rect.min.y..if is_any { rect.max.y } else { rect.min.y })
-            .flat_map(move |y| (rect.min.x..rect.max.x).map(move |x| UVec2::new(x, y)))
-            .filter(|texel| self.contains(*texel))
+    /// Whether there are any.
+    pub(in crate::plugin) fn is_any(&self) -> bool {
+        self.count > 0
+    }
+
+    /// What lies in a rectangle, row by row: runs of texels that are all gone, or all there.
+    fn for_each_run(&self, rect: TexelRect, is_gone: bool, mut run: impl FnMut(Span)) {
+        for y in rect.min.y..rect.max.y {
+            let mut x = rect.min.x;
+            for texels in self.gone.row(y as usize)[rect.min.x as usize..rect.max.x as usize].chunk_by(|a, b| a == b) {
+                let end = x + texels.len() as u32;
+                if texels[0] == is_gone {
+                    run([y, x, end]);
+                }
+                x = end;
+            }
+        }
     }
 
     /// Makes the holes in `rect` of the field transparent in the RGBA texels of an image of `size`, where the field lies at `origin`.
     pub(in crate::plugin) fn cut_out(&self, rgba: &mut [u8], size: UVec2, origin: UVec2, rect: TexelRect) {
-        for texel in self.texels(rect) {
-            if let Some(alpha) = rgba.get_mut(index(size, origin + texel) + 3) {
-                *alpha = 0;
-            }
+        if self.is_any() {
+            let rect = rect.intersect(TexelRect::whole(self.gone.size()));
+            self.for_each_run(rect, true, |span| cut_span(rgba, size, origin, span));
         }
     }
 
     /// Copies what is there in `rect` of the field from one image to another of the same size.
     pub(super) fn copy_present(&self, from: &[u8], to: &mut [u8], size: UVec2, origin: UVec2, rect: TexelRect) {
-        for y in rect.min.y..rect.max.y {
-            for x in rect.min.x..rect.max.x {
-                let texel = UVec2::new(x, y);
-                let start = index(size, origin + texel);
-                if !self.contains(texel)
-                    && let (Some(from), Some(to)) = (from.get(start..start + 4), to.get_mut(start..start + 4))
-                {
-                    to.copy_from_slice(from);
-                }
-            }
-        }
-    }
-
-    /// Opens or closes the hole of a shard.
-    pub(super) fn set(&mut self, shards: &Shards, shard: u32, frame: SurfaceFrame, is_gone: bool) {
-        let Self { gone, count } = self;
-        for_each_span(shards, shard, frame, |y, from, to| {
-            for texel in &mut gone.row_mut(y as usize)[from as usize..to as usize] {
-                if core::mem::replace(texel, is_gone) != is_gone {
-                    *count = if is_gone { *count + 1 } else { *count - 1 };
-                }
+        self.for_each_run(rect, false, |span| {
+            let texels = texels(size, origin, span);
+            if let (Some(from), Some(to)) = (from.get(texels.clone()), to.get_mut(texels)) {
+                to.copy_from_slice(from);
             }
         });
     }
+
+    /// Where cracks may go on a surface that shows `view` of a picture, if its holes matter: not over any hole. `None` = everywhere.
+    pub(in crate::plugin) fn density(&self, view: TexelRect, base: Option<&BasePicture>) -> Option<Grid<f32>> {
+        let is_hole = |texel| self.contains(texel) || base.is_some_and(|base| base.is_hole(view.min + texel));
+        density(view.size(), is_hole)
+    }
+
+    /// Opens or closes a hole.
+    pub(super) fn set(&mut self, spans: &[Span], is_gone: bool) {
+        let Self { gone, count } = self;
+        for &[y, from, to] in spans {
+            let row = &mut gone.row_mut(y as usize)[from as usize..to as usize];
+            let changed = row.iter().filter(|texel| **texel != is_gone).count() as u64;
+            row.fill(is_gone);
+            *count = if is_gone { *count + changed } else { *count - changed };
+        }
+    }
+}
+
+/// Makes texels of an image transparent, see [`Holes::cut_out`].
+pub(super) fn cut_span(rgba: &mut [u8], size: UVec2, origin: UVec2, span: Span) {
+    if let Some(texels) = rgba.get_mut(texels(size, origin, span)) {
+        texels.as_chunks_mut().0.iter_mut().for_each(|[.., alpha]: &mut [u8; 4]| *alpha = 0);
+    }
+}
+
+/// Where texels of the field lie in an image.
+fn texels(size: UVec2, origin: UVec2, [y, from, to]: Span) -> Range<usize> {
+    let start = index(size, origin + UVec2::new(from, y));
+    start..start + 4 * (to - from) as usize
 }
 
 fn index(size: UVec2, texel: UVec2) -> usize {
     4 * (texel.y as usize * size.x as usize + texel.x as usize)
 }
 
-/// The texels whose centres lie in a shard, row by row: y, first x, and the x after the last. Each texel lies in exactly one of the
-/// shards that tile a surface.
-pub(super) fn for_each_span(shards: &Shards, shard: u32, frame: SurfaceFrame, mut span: impl FnMut(u32, u32, u32)) {
+/// The texels whose centres lie in a shard, row by row. Each texel lies in exactly one of the shards that tile a surface.
+pub(super) fn spans_of(shards: &Shards, shard: u32, frame: SurfaceFrame) -> Vec<Span> {
     let texel = |corner: u32| frame.to_texel(shards.positions()[corner as usize]).as_dvec2();
     let size = frame.size();
     // Where outlines cross the middles of rows.
@@ -92,13 +125,12 @@ pub(super) fn for_each_span(shards: &Shards, shard: u32, frame: SurfaceFrame, mu
     }
     crossings.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
     // Of each row an even number.
-    for [from, to] in crossings.as_chunks::<2>().0 {
+    let spans = crossings.as_chunks::<2>().0.iter().map(|[from, to]| {
         // The first centre at or beyond the crossing.
-        let columns = [from.1, to.1].map(|x| (x - 0.5).ceil().clamp(0.0, f64::from(size.x)) as u32);
-        if columns[0] < columns[1] {
-            span(from.0, columns[0], columns[1]);
-        }
-    }
+        let [start, end] = [from.1, to.1].map(|x| (x - 0.5).ceil().clamp(0.0, f64::from(size.x)) as u32);
+        [from.0, start, end]
+    });
+    spans.filter(|[_, start, end]| start < end).collect()
 }
 
 /// The texels around a shard.
@@ -136,15 +168,16 @@ mod tests {
             let mut covered = Grid::new(frame.size(), 0u8);
             let mut holes = Holes::new(frame.size());
             for shard in 0..shards.len() as u32 {
-                for_each_span(&shards, shard, frame, |y, from, to| {
+                let spans = spans_of(&shards, shard, frame);
+                for &[y, from, to] in &spans {
                     covered.row_mut(y as usize)[from as usize..to as usize].iter_mut().for_each(|n| *n += 1);
-                });
-                holes.set(&shards, shard, frame, true);
+                }
+                holes.set(&spans, true);
             }
             assert!(covered.as_slice().iter().all(|n| *n == 1), "{} shards", shards.len());
             assert_eq!(holes.count, 90 * 60);
             for shard in (0..shards.len() as u32).rev() {
-                holes.set(&shards, shard, frame, false);
+                holes.set(&spans_of(&shards, shard, frame), false);
             }
             assert!(holes.count == 0 && !holes.gone.as_slice().contains(&true));
         }
@@ -158,7 +191,7 @@ mod tests {
         let shards = shatter(cuts, &ShatterParams::DEFAULT).unwrap();
         let left = shards.at(Vec2::new(0.2, 0.5)).unwrap();
         let mut holes = Holes::new(frame.size());
-        holes.set(&shards, left, frame, true);
+        holes.set(&spans_of(&shards, left, frame), true);
         // A frame in an atlas.
         let (size, origin, whole) = (UVec2::new(10, 6), UVec2::new(3, 1), TexelRect::whole(frame.size()));
         let mut image = vec![200; 240];

@@ -1,11 +1,7 @@
-//! [`Plane`]: where a flat surface lies in its own space, and meshes for its shards.
+//! [`Plane`]: where a flat surface lies in its own space.
 
-use crate::shatter::{MeshFrame, Pose, RimLook, ShardMesh};
-use bevy::{
-    asset::RenderAssetUsages,
-    mesh::{Indices, MeshVertexAttribute, PrimitiveTopology, VertexAttributeValues},
-    prelude::*,
-};
+use crate::shatter::Pose;
+use bevy::prelude::*;
 
 /// Where a flat surface lies in the entity's own space.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,84 +44,10 @@ impl Plane {
         Transform::from_translation(translation).with_rotation(self.rotation * pose.rotation)
     }
 
-    /// How shards become meshes, `uv` being the part of the texture that the surface shows.
-    pub(super) const fn frame(&self, uv: [Vec2; 2], rim: RimLook, seed: u64) -> MeshFrame {
-        MeshFrame { size: self.size, uv, centred: true, rim, seed }
-    }
-
     /// Whether the picture is mirrored.
     pub(super) fn is_mirrored(&self) -> bool {
         self.size.x * self.size.y < 0.0
     }
-}
-
-/// Which faces of a shard.
-#[derive(Clone, Copy, PartialEq)]
-pub(super) enum Faces {
-    /// Those that show the picture.
-    Picture,
-    /// The others.
-    Inside,
-}
-
-/// A mesh of the engine without anything in it.
-pub(super) fn empty_mesh() -> Mesh {
-    Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::default())
-}
-
-/// Makes a mesh of the engine the faces of a shard, in the memory that it has.
-pub(super) fn write_mesh(mesh: &mut Mesh, shard: &ShardMesh, faces: Faces, is_mirrored: bool, with_tangents: bool) {
-    // Where the sides' vertices begin: their first triangle names the first of them.
-    let split = shard.indices.get(shard.sides).map_or(shard.positions.len(), |first| *first as usize);
-    let (vertices, indices) = match faces {
-        Faces::Picture => (0..split, 0..shard.sides),
-        Faces::Inside => (split..shard.positions.len(), shard.sides..shard.indices.len()),
-    };
-    let start = vertices.start as u32;
-    let mut kept = match mesh.try_remove_indices() {
-        Ok(Some(Indices::U32(kept))) => kept,
-        _ => Vec::new(),
-    };
-    kept.clear();
-    kept.extend(shard.indices[indices].iter().map(|index| index - start));
-    // Where the picture is mirrored, what ran around counter-clockwise runs clockwise, and normals look inward.
-    let side = if is_mirrored { -1.0 } else { 1.0 };
-    if is_mirrored {
-        kept.as_chunks_mut::<3>().0.iter_mut().for_each(|triangle| triangle.swap(1, 2));
-    }
-    mesh.insert_indices(Indices::U32(kept));
-    let normals = shard.normals[vertices.clone()].iter().map(|[x, y, z]| [side * x, side * y, *z]);
-    if with_tangents {
-        // u runs along x; the normal map's green points up.
-        let tangent = |[x, y, z]: [f32; 3]| match faces {
-            Faces::Inside => [y, -x, 0.0, 1.0],
-            Faces::Picture => {
-                let along = Vec3::new(1.0 - x * x, -x * y, -x * z).normalize_or(Vec3::X) * side;
-                along.extend(side * z.signum()).to_array()
-            }
-        };
-        fill(mesh, Mesh::ATTRIBUTE_TANGENT, normals.clone().map(tangent));
-    }
-    fill(mesh, Mesh::ATTRIBUTE_NORMAL, normals);
-    fill(mesh, Mesh::ATTRIBUTE_POSITION, shard.positions[vertices.clone()].iter().copied());
-    fill(mesh, Mesh::ATTRIBUTE_UV_0, shard.uvs[vertices].iter().copied());
-    if faces == Faces::Picture && !shard.colors.is_empty() {
-        fill(mesh, Mesh::ATTRIBUTE_COLOR, shard.colors.iter().copied());
-    } else {
-        mesh.remove_attribute(Mesh::ATTRIBUTE_COLOR);
-    }
-}
-
-/// Replaces the values of an attribute, in the memory that they had.
-fn fill<const N: usize>(mesh: &mut Mesh, attribute: MeshVertexAttribute, values: impl Iterator<Item = [f32; N]>)
-where
-    Vec<[f32; N]>: Into<VertexAttributeValues> + TryFrom<VertexAttributeValues>,
-{
-    let kept = mesh.try_remove_attribute(attribute).ok();
-    let mut kept: Vec<[f32; N]> = kept.and_then(|kept| kept.try_into().ok()).unwrap_or_default();
-    kept.clear();
-    kept.extend(values);
-    mesh.insert_attribute(attribute, kept);
 }
 
 #[cfg(test)]

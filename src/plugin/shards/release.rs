@@ -1,23 +1,42 @@
-//! From a surface to shards.
+//! From requests to shards: they are made beside the frames, and a frame takes them up.
 
 use super::{
     Broken, Shard, ShardsError, ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen, Shattered,
+    body::Shown,
     broken::Piece,
-    holes::{bounds, for_each_span},
+    holes::cut_span,
+    order::{Leaving, Made, Order},
 };
 use crate::{
-    math::mix,
     plugin::{
         CrackBudget, CrackState, CrackStatus,
+        beside::Beside,
         paint::paint_now,
         surfaces::{Active, Surfaces},
+        textures,
         upload::Uploads,
     },
     raster::TexelRect,
-    shatter::{Burst, Cuts, Pose, ShardMesh, Shards, ShatterError, Support, shatter},
+    shatter::Pose,
 };
 use bevy::{asset::UntypedHandle, prelude::*};
-use std::sync::Arc;
+
+/// Frames from a request to its shards: the same on every machine, however long they take to make.
+const FRAMES: u32 = 2;
+
+/// A surface that is to shatter.
+pub(in crate::plugin) struct Request {
+    pub(in crate::plugin) entity: Entity,
+    request: ShatterRequest,
+    /// Once its shards are being made, and how many frames ago that was begun.
+    work: Option<(Beside<Order, Result<Made, ShardsError>>, u32)>,
+}
+
+impl Request {
+    pub(in crate::plugin) const fn new(entity: Entity, request: ShatterRequest) -> Self {
+        Self { entity, request, work: None }
+    }
+}
 
 /// Asks for shards where they are to fall by themselves.
 pub(in crate::plugin) fn shatter_when_due(
@@ -36,7 +55,12 @@ pub(in crate::plugin) fn shatter_when_due(
         };
         if is_due {
             active.fell_at = (nodes, cells);
-            surfaces.requests.push((entity, ShatterRequest { reach: settings.reach, ..ShatterRequest::ALL }));
+            let request = ShatterRequest { reach: settings.reach, ..ShatterRequest::ALL };
+            // One that has not begun will do for both.
+            let is_same = |other: &Request| (other.entity, other.request) == (entity, request) && other.work.is_none();
+            if !surfaces.requests.iter().any(is_same) {
+                surfaces.requests.push(Request::new(entity, request));
+            }
         }
     }
 }
@@ -46,31 +70,42 @@ pub(in crate::plugin) fn any_requests(surfaces: Res<Surfaces>) -> bool {
     !surfaces.requests.is_empty()
 }
 
-/// Shatters the surfaces that are to.
-pub(in crate::plugin) fn shatter_surfaces(world: &mut World, mut scratch: Local<ShardMesh>) {
+/// Shatters the surfaces that are to, one request after the other.
+pub(in crate::plugin) fn shatter_surfaces(world: &mut World) {
     let mut told = Vec::new();
     let mut failed = Vec::new();
     world.resource_scope(|world, mut surfaces: Mut<Surfaces>| {
         let requests = core::mem::take(&mut surfaces.requests);
-        for (entity, request) in requests {
+        for request in requests {
+            let entity = request.entity;
+            let is_first = surfaces.requests.iter().all(|other| other.entity != entity);
             let left = world.resource::<CrackBudget>().max_texture_bytes.saturating_sub(surfaces.bytes);
             let Some(active) = surfaces.active.get_mut(&entity) else { continue };
-            if active.is_dirty {
-                // The shards are to show what the surface will.
-                surfaces.requests.push((entity, request));
+            // The shards are to show what the surface will.
+            if active.is_dirty || !is_first {
+                surfaces.requests.push(request);
                 continue;
             }
-            let (bytes, was_broken) = (active.bytes, active.broken.is_some());
-            let outcome = release(world, entity, active, &request, left, &mut scratch);
-            let (more, is_broken) = (active.bytes - bytes, active.broken.is_some());
-            surfaces.bytes += more;
-            if is_broken && !was_broken {
-                surfaces.broken.push(entity);
-            }
+            let outcome = match proceed(world, active, request) {
+                Ok(Progress::Wait(request)) => {
+                    surfaces.requests.push(request);
+                    continue;
+                }
+                Ok(Progress::Made(made)) => {
+                    let (bytes, was_broken) = (active.bytes, active.broken.is_some());
+                    let outcome = release(world, entity, active, *made, left);
+                    let (more, is_broken) = (active.bytes - bytes, active.broken.is_some());
+                    surfaces.bytes += more;
+                    if is_broken && !was_broken {
+                        surfaces.broken.push(entity);
+                    }
+                    outcome
+                }
+                Err(error) => Err(error),
+            };
             match outcome {
                 Ok(shards) if shards.is_empty() => {}
                 Ok(shards) => {
-                    surfaces.soil(entity);
                     surfaces.shards.extend(shards.iter().map(|(shard, piece)| (*shard, entity, *piece)));
                     told.push(Shattered { entity, shards: shards.into_iter().map(|(shard, _)| shard).collect() });
                 }
@@ -87,6 +122,34 @@ pub(in crate::plugin) fn shatter_surfaces(world: &mut World, mut scratch: Local<
         warn!("{} cannot shatter: {}", event.entity, event.error);
         world.trigger(event);
     }
+}
+
+enum Progress {
+    Wait(Request),
+    Made(Box<Made>),
+}
+
+/// Begins to make what was asked for, waits for it, or has it.
+fn proceed(world: &World, active: &Active, mut request: Request) -> Result<Progress, ShardsError> {
+    let order = |request: &Request| Order::of(world, request.entity, active, &request.request);
+    let made = match request.work.take() {
+        None => {
+            request.work = Some((Beside::start(order(&request)?, Order::make), 1));
+            return Ok(Progress::Wait(request));
+        }
+        Some((work, frames)) if frames < FRAMES => {
+            request.work = Some((work, frames + 1));
+            return Ok(Progress::Wait(request));
+        }
+        Some((work, _)) => work.finish(),
+    };
+    let made = match made {
+        Some(Ok(made)) if !made.fits(active) => None,
+        made => made,
+    };
+    // It has become another surface: in this frame, or it would never be done where that happens often.
+    let made = made.map_or_else(|| order(&request)?.make(), |made| made)?;
+    Ok(Progress::Made(Box::new(made)))
 }
 
 /// The oldest shards go if there are too many.
@@ -115,76 +178,35 @@ pub(super) fn make_room(world: &mut World, surfaces: &mut Surfaces) {
     }
 }
 
-/// Releases what a blow knocks out of a surface.
+/// Takes up what leaves a surface.
 fn release(
     world: &mut World,
     entity: Entity,
     active: &mut Active,
-    request: &ShatterRequest,
+    made: Made,
     left: u64,
-    scratch: &mut ShardMesh,
 ) -> Result<Vec<(Entity, [u32; 2])>, ShardsError> {
-    let settings = world.get::<ShatterCracks>(entity).cloned().unwrap_or_default();
-    if !(0.0..=10.0).contains(&settings.thickness) {
-        let value = f64::from(settings.thickness);
-        let name = "thickness";
-        return Err(ShatterError::OutOfRange { name, value, min: 0.0, max: 10.0 }.into());
-    }
-    let rim = active.rim(&settings);
-    rim.validate()?;
-    if let Some(again) = settings.again {
-        again.validate()?;
-    }
-    let network = active.growth.network();
-    let extent = network.extent();
-    let (pos, energy, direction) =
-        active.struck.map_or((0.5 * extent, 1.0, Vec3::ZERO), |struck| (struck.pos, struck.energy, struck.direction));
-    let from = request.uv.map_or(pos, |uv| uv * extent);
-    let plane = (active.carrier.kind.plane)(world, entity, active).map_err(|reason| ShardsError::NotFlat { reason })?;
-    let to_local =
-        world.get::<GlobalTransform>(entity).map_or(Mat3::IDENTITY, |at| at.affine().matrix3.inverse().into());
-    let direction = plane.rotation.inverse() * (to_local * request.direction.unwrap_or(direction));
-    let seed = active.surface.seed ^ u64::from(active.broken.as_ref().map_or(0, |broken| broken.released));
-    let burst = Burst::new(settings.burst, from, direction, request.energy.unwrap_or(energy), seed)?;
-
-    // What has been cut stays cut, unless there is more to cut along.
-    let grown = (network.nodes().len(), network.links().len());
-    let same = |broken: &Broken| {
-        let before = &broken.settings;
-        broken.grown == grown && before.cut == settings.cut && before.anchor == settings.anchor
-    };
-    let (cut, mut support) = match &active.broken {
-        Some(broken) if same(broken) => (broken.cut.clone(), broken.support.clone()),
-        broken => {
-            let mut cuts = Cuts::from_network(network)?;
-            for line in broken.iter().flat_map(|broken| &broken.carried) {
-                cuts.add_line(line)?;
-            }
-            let cut = Arc::new(shatter(cuts, &settings.cut)?);
-            let support = match broken {
-                Some(broken) => broken.support.renewed(&broken.cut, &cut, settings.anchor),
-                None => Support::new(&cut, settings.anchor),
-            };
-            (cut, support)
-        }
-    };
-    let fallen = support.hit(&cut, from, request.reach)?;
-    if fallen.hit.is_empty() && fallen.loose.is_empty() {
+    if made.leaving.is_empty() {
         return Ok(Vec::new());
     }
     let is_first = active.broken.is_none();
-    let is_new = active.broken.as_ref().is_none_or(|broken| !Arc::ptr_eq(&broken.cut, &cut));
+    let Made { settings, rim, plane, grown, cut, is_new, support, leaving, rects, uv, drawn, density, room, .. } = made;
     if is_first {
         can_copy_picture(world, active, left)?;
     }
     if is_new && !cut.carried().is_empty() {
-        active.stamp_lines(cut.carried());
-        paint_now(world, active);
+        match drawn.filter(|drawn| drawn.fits(active)) {
+            Some(drawn) => drawn.put_on(world, active),
+            None => {
+                active.stamp_lines(cut.carried());
+                paint_now(world, active);
+            }
+        }
     }
     let mut broken = match active.broken.take() {
         Some(broken) => broken,
         None => {
-            let picture = copy_picture(world, active)?;
+            let picture = copy_picture(world, active, room)?;
             (active.carrier.kind.open)(world, &active.carrier);
             Box::new(Broken::new((cut.clone(), support.clone()), grown, settings.clone(), picture, plane, active))
         }
@@ -192,30 +214,25 @@ fn release(
     if is_new {
         broken.carried.extend_from_slice(cut.carried());
     }
-    broken.rim = rim;
-    let again = settings.again;
     broken.inside = inside(world, active, &settings, rim.bright, broken.inside.take());
-    (broken.cut, broken.support, broken.grown, broken.settings, broken.plane) = (cut, support, grown, settings, plane);
+    (broken.cut, broken.support, broken.grown) = (cut, support, grown);
+    (broken.settings, broken.plane, broken.rim) = (settings, plane, rim);
     if !is_first {
-        let pieces = fallen.hit.iter().chain(&fallen.loose);
-        let rects = pieces.map(|&number| bounds(&broken.cut, number, active.field.frame));
-        refresh(world, active, &broken, rects);
+        refresh(world, active, &broken, &rects);
     }
-    let falls = fallen.hit.iter().map(|_| false).chain(fallen.loose.iter().map(|_| true));
-    let mut shards = Vec::new();
-    for (&number, is_falling) in fallen.hit.iter().chain(&fallen.loose).zip(falls) {
-        let Some(shard) = broken.cut.get(number) else { continue };
-        let (id, nth) = (broken.next, broken.released);
-        (broken.next, broken.released) = (id + 1, nth + 1);
-        let flight = if is_falling { burst.fall(nth, shard) } else { burst.flight(nth, shard) };
-        let seed = mix(active.surface.seed ^ mix(u64::from(nth)));
-        let again = again.and_then(|again| Some((again, flight.delay + again.due(shard.area, seed)?)));
+    punch(world, active, &leaving, &rects);
+    let mut shown = Vec::with_capacity(leaving.len());
+    for Leaving { number, flight, seed, again, spans, form } in leaving {
         broken.end = broken.end.max(broken.time + f64::from(flight.end()));
-        let is_spent = is_transparent(active, &broken.cut, number);
+        broken.holes.set(&spans, true);
+        let is_spent = form.is_none();
+        if form.is_some() {
+            shown.push(Shown { index: broken.pieces.len(), pose: Pose::AT_REST, form });
+        }
         broken.pieces.push(Piece {
             cut: broken.cut.clone(),
             number,
-            id,
+            id: broken.next,
             seed,
             start: broken.time,
             born: broken.time,
@@ -223,25 +240,23 @@ fn release(
             again,
             is_broken: false,
             part_of: None,
-            uv: shown_uv(active),
+            uv,
             is_spent,
             body: None,
+            spare: None,
             times: 0,
             level: 0,
         });
-        broken.holes.set(&broken.cut, number, active.field.frame, true);
-        active.mark(bounds(&broken.cut, number, active.field.frame));
-        let index = broken.pieces.len() - 1;
-        if !is_spent && let Some(shard) = broken.spawn(world, entity, &active.carrier, index, Pose::AT_REST, scratch) {
-            shards.push(shard);
-        }
+        (broken.next, broken.released) = (broken.next + 1, broken.released + 1);
     }
+    let shards = broken.spawn(world, entity, &active.carrier, shown);
     if is_first {
         active.bytes += broken.bytes;
     }
     broken.tell(world, entity);
     active.broken = Some(broken);
-    active.mind_holes();
+    active.renew();
+    active.growth.set_density(density);
     Ok(shards)
 }
 
@@ -261,28 +276,32 @@ fn can_copy_picture(world: &World, active: &Active, left: u64) -> Result<(), Sha
     images.get(diffuse).map(|_| ()).ok_or(ShardsError::NoDiffuse)
 }
 
-/// A copy of the surface's picture, and its bytes.
-fn copy_picture(world: &mut World, active: &Active) -> Result<(Handle<Image>, u64), ShardsError> {
+/// A copy of the surface's picture, in memory that is there, and its bytes.
+fn copy_picture(world: &mut World, active: &Active, mut room: Vec<u8>) -> Result<(Handle<Image>, u64), ShardsError> {
     let diffuse = active.textures.diffuse.as_ref().ok_or(ShardsError::NoDiffuse)?;
     let mut images = world.get_resource_mut::<Assets<Image>>().ok_or(ShardsError::NoAssets { name: "Image" })?;
-    let copy = images.get(diffuse).cloned().ok_or(ShardsError::NoDiffuse)?;
+    let shown = images.get(diffuse).ok_or(ShardsError::NoDiffuse)?;
+    room.clear();
+    room.extend_from_slice(shown.data.as_deref().ok_or(ShardsError::NoDiffuse)?);
+    let copy = textures::DIFFUSE.image(shown.size(), room, &shown.sampler).ok_or(ShardsError::NoDiffuse)?;
     let copy = images.add(copy);
     world.resource_mut::<Uploads>().expect_whole();
     Ok((copy, copy_bytes(active)))
 }
 
 /// Brings what is about to leave up to date in the copy of the picture: more cracks have grown since.
-fn refresh(world: &mut World, active: &Active, broken: &Broken, rects: impl Iterator<Item = TexelRect>) {
+fn refresh(world: &mut World, active: &Active, broken: &Broken, rects: &[TexelRect]) {
     let (Some(diffuse), Some(view)) = (&active.textures.diffuse, active.views.get(active.view)) else { return };
     let Some(mut images) = world.get_resource_mut::<Assets<Image>>() else { return };
     // Without an asset event, which would upload the whole image.
     let Some(mut copy) = images.get_mut_untracked(&broken.whole).and_then(|image| image.data.take()) else { return };
-    let size = active.base.size;
+    let (size, field) = (active.base.size, active.field.frame.size());
+    let shown = TexelRect::whole(view.rect.size());
+    // One more, for those who blend neighbouring texels.
+    let rects = rects.iter().map(|rect| rect.grow(1, field).intersect(shown)).filter(|rect| !rect.is_empty());
     let mut changed = Vec::new();
     if let Some(shown) = images.get(diffuse).and_then(|image| image.data.as_ref()) {
         for rect in rects {
-            // One more, for those who blend neighbouring texels.
-            let rect = rect.grow(1, active.field.frame.size());
             broken.holes.copy_present(shown, &mut copy, size, view.rect.min, rect);
             changed.push(TexelRect { min: rect.min + view.rect.min, max: rect.max + view.rect.min });
         }
@@ -296,22 +315,26 @@ fn refresh(world: &mut World, active: &Active, broken: &Broken, rects: impl Iter
     }
 }
 
-/// The part of the texture that the surface shows.
-fn shown_uv(active: &Active) -> [Vec2; 2] {
-    let size = active.base.size.as_vec2();
-    let rect = active.views.get(active.view).map_or(TexelRect::whole(active.base.size), |view| view.rect);
-    [rect.min.as_vec2() / size, rect.max.as_vec2() / size]
-}
-
-/// Whether nothing of a piece can be seen.
-fn is_transparent(active: &Active, cut: &Shards, number: u32) -> bool {
-    let Some(view) = active.views.get(active.view) else { return false };
-    let (mut is_any, mut is_seen) = (false, false);
-    for_each_span(cut, number, active.field.frame, |y, from, to| {
-        is_any = true;
-        is_seen = is_seen || (from..to).any(|x| !active.base.is_hole(view.rect.min + UVec2::new(x, y)));
-    });
-    is_any && !is_seen
+/// Makes the surface transparent where pieces leave it: nothing is painted for that.
+fn punch(world: &mut World, active: &mut Active, leaving: &[Leaving], rects: &[TexelRect]) {
+    let shown = active.view;
+    for (_, view) in active.views.iter_mut().enumerate().filter(|(index, _)| *index != shown) {
+        rects.iter().for_each(|rect| view.dirty.mark(*rect));
+    }
+    let (Some(diffuse), Some(view)) = (&active.textures.diffuse, active.views.get(shown)) else { return };
+    let (size, origin, within) = (active.base.size, view.rect.min, view.rect.size());
+    let Some(mut images) = world.get_resource_mut::<Assets<Image>>() else { return };
+    // Without an asset event, which would upload the whole image.
+    if let Some(data) = images.get_mut_untracked(diffuse).and_then(|image| image.data.as_mut()) {
+        for &[y, from, to] in leaving.iter().flat_map(|piece| &piece.spans).filter(|[y, ..]| *y < within.y) {
+            cut_span(data, size, origin, [y, from.min(within.x), to.min(within.x)]);
+        }
+    }
+    let mut uploads = world.resource_mut::<Uploads>();
+    for rect in rects {
+        let rect = rect.intersect(TexelRect::whole(within));
+        uploads.push(diffuse.id(), TexelRect { min: rect.min + origin, max: rect.max + origin });
+    }
 }
 
 /// The material of the sides.
@@ -328,4 +351,70 @@ fn inside(
         return active.carrier.kind.is_solid.then(|| inside.clone().untyped());
     }
     before.or_else(|| (active.carrier.kind.inside)(world, &active.carrier, active.base.mean(), bright))
+}
+
+#[cfg(all(test, feature = "2d"))]
+mod tests {
+    use super::*;
+    use crate::{
+        plugin::prelude::*,
+        shatter::{Anchor, ShatterParams},
+    };
+    use bevy::{
+        asset::RenderAssetUsages,
+        image::TextureAtlasLayout,
+        render::render_resource::{Extent3d, TextureDimension, TextureFormat},
+    };
+
+    /// By count: the frames in which shards are asked for, made and there cut nothing, and paint nothing.
+    #[test]
+    fn no_frame_cuts_or_paints_for_shards() {
+        let mut app = App::new();
+        app.add_plugins((
+            MinimalPlugins,
+            TransformPlugin,
+            AssetPlugin::default(),
+            ImagePlugin::default(),
+            CrackPlugins,
+        ))
+        .init_asset::<TextureAtlasLayout>()
+        .init_asset::<Mesh>()
+        .init_asset::<ColorMaterial>();
+        app.finish();
+        app.cleanup();
+        let extent = Extent3d { width: 64, height: 64, depth_or_array_layers: 1 };
+        let (format, usage) = (TextureFormat::Rgba8UnormSrgb, RenderAssetUsages::default());
+        let image = Image::new_fill(extent, TextureDimension::D2, &[200, 200, 200, 255], format, usage);
+        let image = app.world_mut().resource_mut::<Assets<Image>>().add(image);
+        let settings = ShatterCracks {
+            cut: ShatterParams { carry_on: true, ..ShatterParams::DEFAULT },
+            anchor: Anchor::Nothing,
+            ..default()
+        };
+        let sprite = (Sprite::from_image(image), CrackSurface::new(CrackPreset::GLASS), settings);
+        let entity = app.world_mut().spawn(sprite).id();
+        app.world_mut().trigger(CrackHit::uv(entity, Vec2::splat(0.5)).with_energy(2.0));
+        app.update();
+        while app.world().get::<CrackState>(entity).is_some_and(|state| state.status != CrackStatus::Done) {
+            app.update();
+        }
+        for around in [Vec2::splat(0.2), Vec2::splat(0.8)] {
+            let painted = |app: &App| app.world().resource::<Surfaces>().active[&entity].painted;
+            let (before, shown) = (painted(&app), app.world().get::<CrackShards>(entity).map_or(0, |told| told.shown));
+            app.world_mut().commands().entity(entity).shatter_cracks(ShatterRequest::around(around, 0.1));
+            app.update();
+            let is_made = |app: &App| {
+                let requests = &app.world().resource::<Surfaces>().requests;
+                requests.iter().any(|request| request.work.as_ref().is_some_and(|(work, _)| work.is_done()))
+            };
+            while !is_made(&app) {
+                std::thread::yield_now();
+            }
+            (0..2).for_each(|_| app.update());
+            assert!(app.world().get::<CrackShards>(entity).is_some_and(|told| told.shown > shown));
+            let active = &app.world().resource::<Surfaces>().active[&entity];
+            assert_eq!(painted(&app), before, "a whole frame's painting");
+            assert!(active.views.iter().all(|view| view.dirty.is_empty()), "texels to paint");
+        }
+    }
 }

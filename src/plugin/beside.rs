@@ -1,0 +1,81 @@
+//! Work that is done beside the frames.
+
+use bevy::tasks::{AsyncComputeTaskPool, Task, block_on};
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Work that a task does, unless its result is wanted before the task has begun.
+pub(super) struct Beside<W, T> {
+    work: Arc<Mutex<Option<W>>>,
+    run: fn(W) -> T,
+    /// It makes nothing where the work has been taken away from it.
+    task: Option<Task<Option<T>>>,
+}
+
+impl<W: Send + 'static, T: Send + 'static> Beside<W, T> {
+    /// Begins some work.
+    pub(super) fn start(work: W, run: fn(W) -> T) -> Self {
+        let work = Arc::new(Mutex::new(Some(work)));
+        let begin = work.clone();
+        let task = AsyncComputeTaskPool::try_get().map(|pool| pool.spawn(async move { take(&begin).map(run) }));
+        Self { work, run, task }
+    }
+
+    /// What comes of it. What no thread has begun, as where there are none, is done here. `None` if the task has failed.
+    pub(super) fn finish(self) -> Option<T> {
+        match take(&self.work) {
+            Some(work) => Some((self.run)(work)),
+            // It is at work on another thread, or done.
+            None => self.task.and_then(block_on),
+        }
+    }
+}
+
+#[cfg(test)]
+impl<W, T> Beside<W, T> {
+    /// Whether a task has done it.
+    pub(super) fn is_done(&self) -> bool {
+        self.task.as_ref().is_some_and(Task::is_finished)
+    }
+}
+
+fn take<W>(work: &Mutex<Option<W>>) -> Option<W> {
+    work.lock().unwrap_or_else(PoisonError::into_inner).take()
+}
+
+/// Gives back memory where no frame waits for it.
+pub(super) fn throw_away(rubbish: impl Send + 'static) {
+    if let Some(pool) = AsyncComputeTaskPool::try_get() {
+        pool.spawn(async move { drop(rubbish) }).detach();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bevy::tasks::TaskPool;
+    use std::{sync::mpsc, thread};
+
+    #[test]
+    fn work_is_done_once_whoever_does_it() {
+        let run = |(number, done): (u32, mpsc::Sender<thread::ThreadId>)| {
+            done.send(thread::current().id()).expect("someone listens");
+            2 * number
+        };
+        AsyncComputeTaskPool::get_or_init(|| TaskPool::new());
+        let (mut here, mut there) = (0, 0);
+        for number in 0..200 {
+            let (tell, told) = mpsc::channel();
+            let beside = Beside::start((number, tell), run);
+            let mut who = None;
+            if number % 2 == 0 {
+                // Not before it is done.
+                who = told.recv().ok();
+            }
+            assert_eq!(beside.finish(), Some(2 * number));
+            let who = who.or_else(|| told.recv().ok()).expect("it was done");
+            assert!(told.recv().is_err(), "only once");
+            *if who == thread::current().id() { &mut here } else { &mut there } += 1;
+        }
+        assert!(there >= 100 && here + there == 200, "{here} {there}");
+    }
+}

@@ -1,0 +1,134 @@
+//! [`Form`]: the meshes of a shard, made on any thread.
+
+use super::{Plane, broken::Piece};
+use crate::shatter::{MeshFrame, RimLook, ShardMesh, Shards};
+use bevy::{
+    asset::RenderAssetUsages,
+    mesh::{Indices, PrimitiveTopology},
+    prelude::*,
+    tasks::{ComputeTaskPool, ParallelSlice},
+};
+use core::ops::Range;
+use std::sync::{Arc, Weak};
+
+/// So many shards are worth a task.
+const CHUNK: usize = 32;
+
+/// The meshes of a shard.
+pub(super) struct Form {
+    /// What shows the picture.
+    pub(super) picture: Mesh,
+    /// The sides of a solid shard.
+    pub(super) sides: Option<Mesh>,
+}
+
+/// What the form of a piece follows from.
+pub(super) struct Origin {
+    shards: Weak<Shards>,
+    number: u32,
+    uv: [Vec2; 2],
+    seed: u64,
+    style: Style,
+}
+
+impl Origin {
+    pub(super) fn of(style: Style, piece: &Piece) -> Self {
+        Self { shards: Arc::downgrade(&piece.cut), number: piece.number, uv: piece.uv, seed: piece.seed, style }
+    }
+}
+
+impl PartialEq for Origin {
+    fn eq(&self, other: &Self) -> bool {
+        self.shards.ptr_eq(&other.shards)
+            && (self.number, self.uv, self.seed, self.style) == (other.number, other.uv, other.seed, other.style)
+    }
+}
+
+/// How shards of a surface are formed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Style {
+    pub(super) plane: Plane,
+    pub(super) rim: RimLook,
+    /// Units of the entity; `None` = flat.
+    pub(super) thickness: Option<f32>,
+}
+
+impl Style {
+    /// The meshes of a shard that shows the part `uv` of the texture.
+    pub(super) fn form(&self, shards: &Shards, number: u32, uv: [Vec2; 2], seed: u64) -> Form {
+        let frame = MeshFrame { size: self.plane.size, uv, centred: true, rim: self.rim, seed };
+        let is_mirrored = self.plane.is_mirrored();
+        let Some(thickness) = self.thickness else {
+            let ShardMesh { positions, normals, uvs, colors, indices, .. } = shards.flat_mesh(number, &frame);
+            return Form { picture: mesh(positions, normals, uvs, colors, indices, is_mirrored), sides: None };
+        };
+        let form = shards.solid_mesh(number, &frame, thickness);
+        // Where the sides' vertices begin: their first triangle names the first of them.
+        let split = form.indices.get(form.sides).map_or(form.positions.len(), |first| *first as usize);
+        let part = |vertices: Range<usize>, indices: Range<usize>, colors: &[[f32; 4]]| {
+            let start = vertices.start as u32;
+            mesh(
+                form.positions[vertices.clone()].to_vec(),
+                form.normals[vertices.clone()].to_vec(),
+                form.uvs[vertices].to_vec(),
+                colors.to_vec(),
+                form.indices[indices].iter().map(|index| index - start).collect(),
+                is_mirrored,
+            )
+        };
+        let picture = part(0..split, 0..form.sides, &form.colors);
+        let sides = part(split..form.positions.len(), form.sides..form.indices.len(), &[]);
+        let side = if is_mirrored { -1.0 } else { 1.0 };
+        // u runs along x; the normal map's green points up.
+        let on_picture = |[x, y, z]: [f32; 3]| {
+            let [x, y] = [side * x, side * y];
+            let along = Vec3::new(1.0 - x * x, -x * y, -x * z).normalize_or(Vec3::X) * side;
+            along.extend(side * z.signum()).to_array()
+        };
+        let on_sides = |[x, y, _]: [f32; 3]| [side * y, -side * x, 0.0, 1.0];
+        Form {
+            picture: with_tangents(picture, &form.normals[..split], on_picture),
+            sides: Some(with_tangents(sides, &form.normals[split..], on_sides)),
+        }
+    }
+
+    /// The meshes of pieces, by all threads that there are.
+    pub(super) fn forms(&self, pieces: &[&Piece]) -> Vec<Form> {
+        let form = |piece: &&Piece| self.form(&piece.cut, piece.number, piece.uv, piece.seed);
+        match ComputeTaskPool::try_get() {
+            Some(pool) if pieces.len() > CHUNK => {
+                let chunks =
+                    pieces.par_chunk_map(pool, CHUNK, |_, chunk| chunk.iter().map(form).collect::<Vec<Form>>());
+                chunks.into_iter().flatten().collect()
+            }
+            _ => pieces.iter().map(form).collect(),
+        }
+    }
+}
+
+/// A mesh of the engine.
+fn mesh(
+    positions: Vec<[f32; 3]>,
+    mut normals: Vec<[f32; 3]>,
+    uvs: Vec<[f32; 2]>,
+    colors: Vec<[f32; 4]>,
+    mut indices: Vec<u32>,
+    is_mirrored: bool,
+) -> Mesh {
+    // Where the picture is mirrored, what ran around counter-clockwise runs clockwise, and normals look inward.
+    if is_mirrored {
+        normals.iter_mut().for_each(|[x, y, _]| (*x, *y) = (-*x, -*y));
+        indices.as_chunks_mut::<3>().0.iter_mut().for_each(|triangle| triangle.swap(1, 2));
+    }
+    let mesh = Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::default())
+        .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, positions)
+        .with_inserted_attribute(Mesh::ATTRIBUTE_NORMAL, normals)
+        .with_inserted_attribute(Mesh::ATTRIBUTE_UV_0, uvs)
+        .with_inserted_indices(Indices::U32(indices));
+    if colors.is_empty() { mesh } else { mesh.with_inserted_attribute(Mesh::ATTRIBUTE_COLOR, colors) }
+}
+
+fn with_tangents(mesh: Mesh, normals: &[[f32; 3]], tangent: impl Fn([f32; 3]) -> [f32; 4]) -> Mesh {
+    let tangents: Vec<[f32; 4]> = normals.iter().map(|normal| tangent(*normal)).collect();
+    mesh.with_inserted_attribute(Mesh::ATTRIBUTE_TANGENT, tangents)
+}

@@ -1,0 +1,241 @@
+//! From a surface to its shards, beside the frames: nothing here touches the world but [`Order::of`], which looks at it.
+
+use super::{
+    Broken, Plane, ShardsError, ShatterCracks, ShatterRequest,
+    drawn::{Drawn, Sketch},
+    form::{Form, Style},
+    holes::{Holes, Span, spans_of},
+};
+use crate::{
+    Grid,
+    math::mix,
+    pattern::{Network, SurfaceFrame},
+    plugin::{picture::BasePicture, surfaces::Active},
+    raster::{DirtyTiles, TexelRect},
+    shatter::{BreakAgain, Burst, Cuts, Flight, RimLook, Shards, ShatterError, Support, shatter},
+};
+use bevy::prelude::*;
+use std::sync::Arc;
+
+/// What a surface is to lose, and all that was to be known of it when that was asked for.
+pub(super) struct Order {
+    /// What the surface was then, see [`Active::version`].
+    version: Arc<()>,
+    settings: ShatterCracks,
+    rim: RimLook,
+    plane: Plane,
+    is_solid: bool,
+    from: Vec2,
+    reach: f32,
+    burst: Burst,
+    /// The surface's.
+    seed: u64,
+    /// Nodes and links of the network.
+    grown: (usize, usize),
+    pieces: Pieces,
+    /// Whether it is whole.
+    is_first: bool,
+    sketch: Option<Sketch>,
+    /// Pieces that were released before.
+    released: u32,
+    holes: Option<Holes>,
+    base: Arc<BasePicture>,
+    frame: SurfaceFrame,
+    view: TexelRect,
+    alpha_mask: bool,
+}
+
+/// Where the pieces come from.
+enum Pieces {
+    /// What has been cut stays cut.
+    Cut(Arc<Shards>, Support),
+    /// There is more to cut along: a network, and what was carried on. What it was cut into before, and what held.
+    Lines(Network, Vec<Vec<Vec2>>, Option<(Arc<Shards>, Support)>),
+}
+
+/// What leaves a surface.
+pub(super) struct Made {
+    version: Arc<()>,
+    pub(super) settings: ShatterCracks,
+    pub(super) rim: RimLook,
+    pub(super) plane: Plane,
+    pub(super) grown: (usize, usize),
+    pub(super) cut: Arc<Shards>,
+    /// Whether it was cut anew.
+    pub(super) is_new: bool,
+    pub(super) support: Support,
+    /// In the order of their release.
+    pub(super) leaving: Vec<Leaving>,
+    /// What `leaving` covers, texels of the field.
+    pub(super) rects: Vec<TexelRect>,
+    /// The part of the texture that the surface showed.
+    pub(super) uv: [Vec2; 2],
+    /// The cracks that were carried on.
+    pub(super) drawn: Option<Drawn>,
+    /// Where cracks may go then.
+    pub(super) density: Option<Grid<f32>>,
+    /// Memory for a copy of the picture, written once: the first write is the dear one.
+    pub(super) room: Vec<u8>,
+}
+
+/// A piece that leaves its place.
+pub(super) struct Leaving {
+    pub(super) number: u32,
+    pub(super) flight: Flight,
+    pub(super) seed: u64,
+    /// How it breaks again, and how many seconds after the blow.
+    pub(super) again: Option<(BreakAgain, f32)>,
+    pub(super) spans: Vec<Span>,
+    /// Its meshes, unless nothing of it can be seen.
+    pub(super) form: Option<Form>,
+}
+
+impl Made {
+    /// Whether the surface is still what it was.
+    pub(super) fn fits(&self, active: &Active) -> bool {
+        Arc::ptr_eq(&self.version, &active.version)
+    }
+}
+
+impl Order {
+    /// Looks at a surface.
+    pub(super) fn of(
+        world: &World,
+        entity: Entity,
+        active: &Active,
+        request: &ShatterRequest,
+    ) -> Result<Self, ShardsError> {
+        let settings = world.get::<ShatterCracks>(entity).cloned().unwrap_or_default();
+        if !(0.0..=10.0).contains(&settings.thickness) {
+            let value = f64::from(settings.thickness);
+            let name = "thickness";
+            return Err(ShatterError::OutOfRange { name, value, min: 0.0, max: 10.0 }.into());
+        }
+        let rim = active.rim(&settings);
+        rim.validate()?;
+        if let Some(again) = settings.again {
+            again.validate()?;
+        }
+        let network = active.growth.network();
+        let extent = network.extent();
+        let (pos, energy, direction) = active
+            .struck
+            .map_or((0.5 * extent, 1.0, Vec3::ZERO), |struck| (struck.pos, struck.energy, struck.direction));
+        let from = request.uv.map_or(pos, |uv| uv * extent);
+        let plane =
+            (active.carrier.kind.plane)(world, entity, active).map_err(|reason| ShardsError::NotFlat { reason })?;
+        let to_local =
+            world.get::<GlobalTransform>(entity).map_or(Mat3::IDENTITY, |at| at.affine().matrix3.inverse().into());
+        let direction = plane.rotation.inverse() * (to_local * request.direction.unwrap_or(direction));
+        let broken = active.broken.as_deref();
+        let released = broken.map_or(0, |broken| broken.released);
+        let seed = active.surface.seed;
+        let energy = request.energy.unwrap_or(energy);
+        let burst = Burst::new(settings.burst, from, direction, energy, seed ^ u64::from(released))?;
+        let grown = (network.nodes().len(), network.links().len());
+        let same = |broken: &Broken| {
+            let before = &broken.settings;
+            broken.grown == grown && before.cut == settings.cut && before.anchor == settings.anchor
+        };
+        let pieces = match broken {
+            Some(broken) if same(broken) => Pieces::Cut(broken.cut.clone(), broken.support.clone()),
+            Some(Broken { cut, support, carried, .. }) => {
+                Pieces::Lines(network.clone(), carried.clone(), Some((cut.clone(), support.clone())))
+            }
+            None => Pieces::Lines(network.clone(), Vec::new(), None),
+        };
+        let is_sketched = settings.cut.carry_on && matches!(pieces, Pieces::Lines(..));
+        Ok(Self {
+            version: active.version.clone(),
+            rim,
+            plane,
+            is_solid: active.carrier.kind.is_solid,
+            from,
+            reach: request.reach,
+            burst,
+            seed,
+            grown,
+            pieces,
+            is_first: broken.is_none(),
+            sketch: if is_sketched { Sketch::new(active) } else { None },
+            released,
+            holes: broken.map(|broken| broken.holes.clone()),
+            base: active.base.clone(),
+            frame: active.field.frame,
+            view: active.views.get(active.view).map_or(TexelRect::whole(active.base.size), |view| view.rect),
+            alpha_mask: active.surface.alpha_mask,
+            settings,
+        })
+    }
+
+    /// Makes all that needs no world.
+    pub(super) fn make(self) -> Result<Made, ShardsError> {
+        let is_new = matches!(self.pieces, Pieces::Lines(..));
+        let (cut, mut support) = match self.pieces {
+            Pieces::Cut(cut, support) => (cut, support),
+            Pieces::Lines(network, carried, before) => {
+                let mut cuts = Cuts::from_network(&network)?;
+                for line in &carried {
+                    cuts.add_line(line)?;
+                }
+                let cut = Arc::new(shatter(cuts, &self.settings.cut)?);
+                let support = match before {
+                    Some((old, support)) => support.renewed(&old, &cut, self.settings.anchor),
+                    None => Support::new(&cut, self.settings.anchor),
+                };
+                (cut, support)
+            }
+        };
+        let fallen = support.hit(&cut, self.from, self.reach)?;
+        let (frame, settings) = (self.frame, self.settings);
+        let size = self.base.size.as_vec2();
+        let uv = [self.view.min.as_vec2() / size, self.view.max.as_vec2() / size];
+        let thickness = settings.thickness * self.plane.size.y.abs() / cut.extent().y;
+        let style = Style { plane: self.plane, rim: self.rim, thickness: self.is_solid.then_some(thickness) };
+        let mut holes = self.holes.unwrap_or_else(|| Holes::new(frame.size()));
+        let mut dirty = DirtyTiles::new(frame.size());
+        let is_seen = |&[y, from, to]: &Span| (from..to).any(|x| !self.base.is_hole(self.view.min + UVec2::new(x, y)));
+        let falls = fallen.hit.iter().map(|_| false).chain(fallen.loose.iter().map(|_| true));
+        let mut leaving = Vec::with_capacity(fallen.hit.len() + fallen.loose.len());
+        for ((&number, is_falling), nth) in fallen.hit.iter().chain(&fallen.loose).zip(falls).zip(self.released..) {
+            let Some(shard) = cut.get(number) else { continue };
+            let flight = if is_falling { self.burst.fall(nth, shard) } else { self.burst.flight(nth, shard) };
+            let seed = mix(self.seed ^ mix(u64::from(nth)));
+            let again = settings.again.and_then(|again| Some((again, flight.delay + again.due(shard.area, seed)?)));
+            let spans = spans_of(&cut, number, frame);
+            for &[y, from, to] in &spans {
+                dirty.mark(TexelRect { min: UVec2::new(from, y), max: UVec2::new(to, y + 1) });
+            }
+            holes.set(&spans, true);
+            let is_shown = spans.is_empty() || spans.iter().any(is_seen);
+            let form = is_shown.then(|| style.form(&cut, number, uv, seed));
+            leaving.push(Leaving { number, flight, seed, again, spans, form });
+        }
+        let mut rects = Vec::new();
+        dirty.take_rects(&mut rects);
+        let density = holes.density(self.view, self.alpha_mask.then_some(&*self.base));
+        let room = if self.is_first && !leaving.is_empty() { vec![1; self.base.diffuse.len()] } else { Vec::new() };
+        let drawn = match self.sketch {
+            Some(sketch) if !leaving.is_empty() && !cut.carried().is_empty() => {
+                Some(sketch.draw(cut.carried(), &self.base))
+            }
+            _ => None,
+        };
+        Ok(Made {
+            version: self.version,
+            settings,
+            rim: self.rim,
+            plane: self.plane,
+            grown: self.grown,
+            cut,
+            is_new,
+            support,
+            leaving,
+            rects,
+            uv,
+            drawn,
+            density,
+            room,
+        })
+    }
+}
