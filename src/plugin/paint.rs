@@ -160,9 +160,12 @@ fn paint(active: &mut Active, images: &mut Assets<Image>, uploads: &mut Uploads,
             broken.holes.cut_out(diffuse, size, origin, rect);
         }
         let rect = TexelRect { min: rect.min + origin, max: rect.max + origin }.intersect(TexelRect::whole(size));
-        for texture in active.textures.handles() {
-            uploads.push(texture.id(), rect);
-        }
+        let pictures = [
+            diffuse.as_ref().map(Handle::id).zip(targets.diffuse.as_deref()),
+            normal.as_ref().map(Handle::id).zip(targets.normal.as_deref()),
+            depth.as_ref().map(Handle::id).zip(targets.depth.as_deref()),
+        ];
+        uploads.push_texels(pictures, size, rect);
     }
     put_data(images, diffuse.as_ref(), diffuse_data);
     put_data(images, normal.as_ref(), normal_data);
