@@ -52,6 +52,9 @@ const FEW: usize = 4;
 /// No more than about this many bytes go up in a frame, so that no buffer is larger than a device allows; the rest waits.
 const MAX_STAGED: usize = 64 << 20;
 
+/// Up to this many bytes are packed by each [`Packer`], the rest when the renderer fetches it.
+const MAX_PACKED: usize = 8 << 20;
+
 /// More memory than this is not kept for the next frame, bytes.
 const MAX_KEPT: usize = 16 << 20;
 
@@ -66,6 +69,8 @@ struct Changed {
 /// Rows of texels among the packed ones.
 #[derive(Clone, Copy)]
 struct Place {
+    /// Which [`Rows`].
+    part: usize,
     /// Where the first row begins.
     offset: usize,
     /// From row to row.
@@ -100,8 +105,40 @@ impl Rows {
     }
 }
 
-/// The images of a surface that there are, with their data.
-pub(super) type Pictures<'a> = [Option<(AssetId<Image>, &'a [u8])>; 3];
+/// Packs texels for the GPU, on any thread.
+#[derive(Default)]
+pub(super) struct Packer {
+    is_wanted: bool,
+    part: usize,
+    rects: Vec<Changed>,
+    rows: Rows,
+}
+
+impl Packer {
+    /// Notes that the same texels have changed in the images of a surface of `size` texels, and packs them: they have just been
+    /// written, so that the cache still has them.
+    pub(super) fn push<'a>(&mut self, images: impl Iterator<Item = Option<(AssetId<Image>, &'a [u8])>> + Clone, size: UVec2, rect: TexelRect) {
+        if !self.is_wanted || rect.is_empty() {
+            return;
+        }
+        let (stride, area) = (size.x as usize, size.x as usize * size.y as usize);
+        let [x, y] = rect.min.as_usizevec2().to_array();
+        let [width, height] = rect.size().as_usizevec2().to_array();
+        let images = images.flatten().map(|(image, data)| (image, data, data.len() / area));
+        let beside = |texel: usize| (width * texel).next_multiple_of(COPY_ALIGNMENT);
+        let pitch = images.clone().map(|(.., texel)| beside(texel)).sum::<usize>().next_multiple_of(ROW_ALIGNMENT);
+        let is_packed = pitch <= SIDE_BY_SIDE * SHORT_ROW && self.rows.end + pitch * height <= MAX_PACKED;
+        let mut offset = if is_packed { self.rows.extend(pitch * height) } else { 0 };
+        for (image, data, texel) in images {
+            let place = is_packed.then_some(Place { part: self.part, offset, pitch, row: width * texel });
+            if let Some(place) = place {
+                pack(&mut self.rows.bytes, place, data, (y * stride + x) * texel, stride * texel, height);
+                offset += beside(texel);
+            }
+            self.rects.push(Changed { image, rect, place });
+        }
+    }
+}
 
 /// Rectangles to upload.
 #[derive(Resource, Default)]
@@ -109,7 +146,8 @@ pub(super) struct Uploads {
     /// Whether there is a renderer that fetches them.
     is_wanted: bool,
     rects: Vec<Changed>,
-    rows: Rows,
+    /// Hold the texels of `rects` that are packed: number `i` those of part `i + 1`.
+    packers: Vec<Packer>,
     /// Number of rectangles of each image since they were last thinned out.
     limit: usize,
     /// Whether whole textures are on their way.
@@ -169,28 +207,14 @@ impl Uploads {
         }
     }
 
-    /// Notes that the same texels have changed in the images of a surface of `size` texels, and packs them: they have just been
-    /// written, so that the cache still has them.
-    pub(super) fn push_texels(&mut self, images: Pictures<'_>, size: UVec2, rect: TexelRect) {
-        if !self.is_wanted || rect.is_empty() {
-            return;
+    /// Lends some packers to `paint`, and takes what they have packed, one after the other.
+    pub(super) fn pack(&mut self, count: usize, paint: impl FnOnce(&mut [Packer])) {
+        while self.packers.len() < count {
+            let part = self.packers.len() + 1;
+            self.packers.push(Packer { is_wanted: self.is_wanted, part, ..default() });
         }
-        let (stride, area) = (size.x as usize, size.x as usize * size.y as usize);
-        let [x, y] = rect.min.as_usizevec2().to_array();
-        let [width, height] = rect.size().as_usizevec2().to_array();
-        let images = images.into_iter().flatten().map(|(image, data)| (image, data, data.len() / area));
-        let beside = |texel: usize| (width * texel).next_multiple_of(COPY_ALIGNMENT);
-        let pitch = images.clone().map(|(.., texel)| beside(texel)).sum::<usize>().next_multiple_of(ROW_ALIGNMENT);
-        let is_packed = pitch <= SIDE_BY_SIDE * SHORT_ROW && self.rows.end + pitch * height <= MAX_STAGED;
-        let mut offset = if is_packed { self.rows.extend(pitch * height) } else { 0 };
-        for (image, data, texel) in images {
-            let place = is_packed.then_some(Place { offset, pitch, row: width * texel });
-            if let Some(place) = place {
-                pack(&mut self.rows.bytes, place, data, (y * stride + x) * texel, stride * texel, height);
-                offset += beside(texel);
-            }
-            self.rects.push(Changed { image, rect, place });
-        }
+        paint(&mut self.packers[..count]);
+        self.packers.iter_mut().for_each(|packer| self.rects.append(&mut packer.rects));
     }
 
     /// What brings whole pictures to the renderer, if there is one.
@@ -229,7 +253,7 @@ impl Uploads {
             }
         }
         self.rects = thin;
-        self.rows.clear();
+        self.packers.iter_mut().for_each(|packer| packer.rows.clear());
     }
 }
 
@@ -255,12 +279,16 @@ struct Copy {
     image: AssetId<Image>,
     rect: TexelRect,
     texel: usize,
-    is_packed: bool,
+    /// Which [`Rows`], [`LOOSE`] if it is not packed yet.
+    part: usize,
     /// Where the first row begins.
     offset: usize,
     /// From row to row.
     pitch: usize,
 }
+
+/// The part of what is not packed before the renderer fetches it.
+const LOOSE: usize = 0;
 
 impl Copy {
     /// Bytes of a row.
@@ -278,7 +306,7 @@ impl Copy {
     }
 
     fn fits_beside(&self, other: &Self) -> bool {
-        let fits = |copy: &Self| !copy.is_packed && copy.row() <= SHORT_ROW;
+        let fits = |copy: &Self| copy.part == LOOSE && copy.row() <= SHORT_ROW;
         self.height() == other.height() && fits(self) && fits(other)
     }
 }
@@ -286,7 +314,7 @@ impl Copy {
 /// Finds a place for each copy that is not packed, side by side with its neighbours where they are equally high (the textures of
 /// a surface).
 fn lay_out(copies: &mut [Copy], rows: &mut Rows) {
-    for equals in copies.chunk_by_mut(Copy::fits_beside).filter(|equals| !equals[0].is_packed) {
+    for equals in copies.chunk_by_mut(Copy::fits_beside).filter(|equals| equals[0].part == LOOSE) {
         for shelf in equals.chunks_mut(SIDE_BY_SIDE) {
             let mut pitch = 0;
             for copy in &mut *shelf {
@@ -305,7 +333,7 @@ fn lay_out(copies: &mut [Copy], rows: &mut Rows) {
 struct Staging {
     rects: Vec<Changed>,
     copies: Vec<Copy>,
-    rows: Rows,
+    parts: Vec<Rows>,
     buffers: Buffers,
 }
 
@@ -361,48 +389,48 @@ fn upload_rects(
         copy_whole(&mut whole, images, &gpu_images, &device, &queue, &mut stats);
         main.resource_mut::<Uploads>().staged = whole;
     }
-    let Staging { rects, copies, rows, buffers } = &mut *staging;
+    let Staging { rects, copies, parts, buffers } = &mut *staging;
     let mut uploads = main.resource_mut::<Uploads>();
     core::mem::swap(rects, &mut uploads.rects);
-    core::mem::swap(rows, &mut uploads.rows);
+    parts.resize_with(uploads.packers.len() + 1, Rows::default);
+    for (rows, packer) in parts[LOOSE + 1..].iter_mut().zip(&mut uploads.packers) {
+        core::mem::swap(rows, &mut packer.rows);
+    }
     if !rects.is_empty()
         && let Some(images) = main.get_resource::<Assets<Image>>()
     {
         // What is not on the GPU yet stays in the list.
         let mut most_bytes = 0;
-        rects.retain_mut(|Changed { image, rect, place }| match plan(*image, *rect, images, &gpu_images) {
-            Plan::Copy(copy) if most_bytes > 0 && most_bytes + copy.most_bytes() > MAX_STAGED => {
-                *place = None;
-                true
-            }
+        rects.retain(|Changed { image, rect, place }| match plan(*image, *rect, images, &gpu_images) {
+            Plan::Copy(copy) if most_bytes > 0 && most_bytes + copy.most_bytes() > MAX_STAGED => true,
             Plan::Copy(mut copy) => {
                 most_bytes += copy.most_bytes();
                 stats.rects += 1;
                 stats.bytes += copy.rect.area() * copy.texel as u64;
                 if let Some(place) = place.filter(|place| copy.rect == *rect && copy.row() == place.row) {
-                    copy = Copy { is_packed: true, offset: place.offset, pitch: place.pitch, ..copy };
+                    let Place { part, offset, pitch, .. } = place;
+                    copy = Copy { part, offset, pitch, ..copy };
                 }
                 copies.push(copy);
                 false
             }
-            Plan::Wait => {
-                *place = None;
-                true
-            }
+            Plan::Wait => true,
             Plan::Drop => false,
         });
-        lay_out(copies, rows);
-        copies.iter().filter(|copy| !copy.is_packed).for_each(|copy| pack_copy(copy, images, &mut rows.bytes));
-        let rows = &rows.bytes[..rows.end];
+        let loose = &mut parts[LOOSE];
+        lay_out(copies, loose);
+        let unpacked = copies.iter().filter(|copy| copy.part == LOOSE);
+        unpacked.for_each(|copy| pack_copy(copy, images, &mut loose.bytes));
         if copies.len() <= FEW {
-            write(copies, rows, &gpu_images, &queue);
+            write(copies, parts, &gpu_images, &queue);
         } else {
-            copy(copies, rows, buffers, &gpu_images, &device, &queue);
+            copy(copies, parts, buffers, &gpu_images, &device, &queue);
         }
         copies.clear();
     }
-    rows.clear();
+    parts.iter_mut().for_each(Rows::clear);
     if !rects.is_empty() {
+        rects.iter_mut().for_each(|changed| changed.place = None);
         main.resource_mut::<Uploads>().rects.append(rects);
     }
     *main.resource_mut::<CrackUploadStats>() = stats;
@@ -428,7 +456,7 @@ fn copy_whole(
                     && copy.row() <= copy.pitch
                     && size == staged.buffer.size()
                 {
-                    copy_one(&mut encoder, &copy, &staged.buffer, gpu);
+                    copy_one(&mut encoder, &copy, 0, &staged.buffer, gpu);
                     stats.rects += 1;
                     stats.bytes += copy.rect.area() * copy.texel as u64;
                 }
@@ -441,9 +469,11 @@ fn copy_whole(
     queue.submit([encoder.finish()]);
 }
 
-fn copy_one(encoder: &mut CommandEncoder, copy: &Copy, buffer: &Buffer, gpu: &GpuImage) {
+/// Copies from a buffer in which the copy's part begins at `start`.
+fn copy_one(encoder: &mut CommandEncoder, copy: &Copy, start: usize, buffer: &Buffer, gpu: &GpuImage) {
     let (to, size) = destination(gpu, copy);
-    encoder.copy_buffer_to_texture(TexelCopyBufferInfo { buffer, layout: layout(copy, copy.offset as u64) }, to, size);
+    let layout = layout(copy, (start + copy.offset) as u64);
+    encoder.copy_buffer_to_texture(TexelCopyBufferInfo { buffer, layout }, to, size);
 }
 
 enum Plan {
@@ -468,7 +498,7 @@ fn plan(id: AssetId<Image>, rect: TexelRect, images: &Assets<Image>, gpu_images:
     if rect.is_empty() || image.data.as_ref().is_none_or(|data| data.len() < needed) {
         return Plan::Drop;
     }
-    Plan::Copy(Copy { image: id, rect, texel: texel as usize, is_packed: false, offset: 0, pitch: 0 })
+    Plan::Copy(Copy { image: id, rect, texel: texel as usize, part: LOOSE, offset: 0, pitch: 0 })
 }
 
 /// Copies the texels of a rectangle to their place.
@@ -478,7 +508,7 @@ fn pack_copy(copy: &Copy, images: &Assets<Image>, rows: &mut [u8]) {
     {
         let stride = image.width() as usize * copy.texel;
         let from = copy.rect.min.y as usize * stride + copy.rect.min.x as usize * copy.texel;
-        let place = Place { offset: copy.offset, pitch: copy.pitch, row: copy.row() };
+        let place = Place { part: copy.part, offset: copy.offset, pitch: copy.pitch, row: copy.row() };
         pack(rows, place, data, from, stride, copy.height());
     }
 }
@@ -508,30 +538,39 @@ fn layout(copy: &Copy, offset: u64) -> TexelCopyBufferLayout {
 }
 
 /// Writes rectangles one by one.
-fn write(copies: &[Copy], rows: &[u8], gpu_images: &RenderAssets<GpuImage>, queue: &RenderQueue) {
+fn write(copies: &[Copy], parts: &[Rows], gpu_images: &RenderAssets<GpuImage>, queue: &RenderQueue) {
     for copy in copies {
         let Some(gpu) = gpu_images.get(copy.image) else { continue };
         let (to, size) = destination(gpu, copy);
-        queue.write_texture(to, &rows[copy.offset..], layout(copy, 0), size);
+        queue.write_texture(to, &parts[copy.part].bytes[copy.offset..], layout(copy, 0), size);
     }
 }
 
 /// Copies all rectangles from one buffer in one submission: a write of its own costs more than its texels.
 fn copy(
     copies: &[Copy],
-    rows: &[u8],
+    parts: &[Rows],
     buffers: &Buffers,
     gpu_images: &RenderAssets<GpuImage>,
     device: &RenderDevice,
     queue: &RenderQueue,
 ) {
-    let buffer = buffers.take(rows.len() as u64, device);
-    buffer.slice(..).get_mapped_range_mut().slice(..rows.len()).copy_from_slice(rows);
+    let (mut starts, mut size) = (Vec::with_capacity(parts.len()), 0);
+    for rows in parts {
+        starts.push(size);
+        size += rows.end;
+    }
+    let buffer = buffers.take(size as u64, device);
+    let mut memory = buffer.slice(..).get_mapped_range_mut();
+    for (rows, start) in parts.iter().zip(&starts) {
+        memory.slice(*start..start + rows.end).copy_from_slice(&rows.bytes[..rows.end]);
+    }
+    drop(memory);
     buffer.unmap();
     let mut encoder = device.create_command_encoder(&CommandEncoderDescriptor { label: Some("crack_texels") });
     for copy in copies {
         let Some(gpu) = gpu_images.get(copy.image) else { continue };
-        copy_one(&mut encoder, copy, &buffer, gpu);
+        copy_one(&mut encoder, copy, starts[copy.part], &buffer, gpu);
     }
     queue.submit([encoder.finish()]);
     buffers.give_back(buffer, device);
