@@ -64,14 +64,26 @@ impl Frame<'_> {
     }
 }
 
-/// 0..1, different for every texel.
+/// 0..1, different for every texel: for those from `(x, y)` on. One operation after the other on all of them: so they are vectors.
 #[inline(always)]
-fn noise(x: u32, y: u32) -> f32 {
-    let mut h = x.wrapping_mul(0x9E37_79B1) ^ y.wrapping_mul(0x85EB_CA77);
-    h = (h ^ (h >> 15)).wrapping_mul(0x2C1B_3C6D);
-    h = (h ^ (h >> 12)).wrapping_mul(0x297A_2D39);
-    // Through i32, for which the conversion is one instruction on every machine.
-    ((h ^ (h >> 15)) >> 8) as i32 as f32 * (1.0 / 16_777_216.0)
+fn noise(x: u32, y: u32) -> [f32; BLOCK] {
+    const X: u32 = 0x9E37_79B1;
+    let (first, row) = (x.wrapping_mul(X), y.wrapping_mul(0x85EB_CA77));
+    let (mut hash, mut out) = ([0u32; BLOCK], [0.0; BLOCK]);
+    for i in 0..BLOCK {
+        hash[i] = first.wrapping_add(X.wrapping_mul(i as u32)) ^ row;
+    }
+    for h in &mut hash {
+        *h = (*h ^ (*h >> 15)).wrapping_mul(0x2C1B_3C6D);
+    }
+    for h in &mut hash {
+        *h = (*h ^ (*h >> 12)).wrapping_mul(0x297A_2D39);
+    }
+    for i in 0..BLOCK {
+        // Through i32, for which the conversion is one instruction on every machine.
+        out[i] = ((hash[i] ^ (hash[i] >> 15)) >> 8) as i32 as f32 * (1.0 / 16_777_216.0);
+    }
+    out
 }
 
 /// Colours of a row whose first texel is `at` of the field.
@@ -140,20 +152,7 @@ impl Block<'_> {
     #[inline(always)]
     fn paint<const OPAQUE: bool>(&self, frame: &Frame<'_>, look: &LookTable, at: UVec2) -> [u32; BLOCK] {
         // Channel by channel, so that each loop works on many texels at once.
-        let mut over = [[0.0; BLOCK]; 4];
-        for (i, &depth) in self.depth.iter().enumerate() {
-            let [r, g, b, cover] = look.layer(depth);
-            (over[0][i], over[1][i], over[2][i], over[3][i]) = (r, g, b, cover);
-        }
-        if look.grain > 0.0 {
-            let mut share = [0.0; BLOCK];
-            for (i, share) in share.iter_mut().enumerate() {
-                *share = 1.0 - look.grain * noise(at.x.wrapping_add(i as u32), at.y);
-            }
-            for over in &mut over {
-                over.iter_mut().zip(&share).for_each(|(over, share)| *over *= share);
-            }
-        }
+        let over = self.over(look, at);
         let under = self.picture(frame, look, at);
         let mut painted = [0; BLOCK];
         let (mut under_share, mut over_share, mut facing) = ([0.0; BLOCK], [1.0; BLOCK], [0.0; BLOCK]);
@@ -190,6 +189,36 @@ impl Block<'_> {
             }
         }
         painted
+    }
+
+    /// What lies over the picture: three colours times cover, and cover. Texel by texel, the four of each at once, then turned.
+    #[inline(always)]
+    fn over(&self, look: &LookTable, at: UVec2) -> [[f32; BLOCK]; 4] {
+        let mut share = [1.0; BLOCK];
+        if look.grain > 0.0 {
+            let noise = noise(at.x, at.y);
+            for i in 0..BLOCK {
+                share[i] = 1.0 - look.grain * noise[i];
+            }
+        }
+        let mut between = [0.0; BLOCK];
+        for i in 0..BLOCK {
+            between[i] = LookTable::between(self.depth[i]);
+        }
+        let mut layers = [[0.0; 4]; BLOCK];
+        for i in 0..BLOCK {
+            let (low, high) = look.layers(self.depth[i]);
+            for part in 0..4 {
+                layers[i][part] = (low[part] + (high[part] - low[part]) * between[i]) * share[i];
+            }
+        }
+        let mut over = [[0.0; BLOCK]; 4];
+        for part in 0..4 {
+            for i in 0..BLOCK {
+                over[part][i] = layers[i][part];
+            }
+        }
+        over
     }
 
     /// The colours of the picture, shifted where the surface is tilted.

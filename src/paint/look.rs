@@ -140,8 +140,8 @@ pub(super) type Layer = [f32; 4];
 /// A [`Look`] made ready to paint with.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LookTable {
-    /// The ramp at depths 0, 256, .. 65536; linear between, so that slow gradients have no steps.
-    ramp: Box<[Layer; STEPS + 1]>,
+    /// Nothing, then the ramp at depths 0, 256, .. 65536; linear between, so that slow gradients have no steps.
+    ramp: Box<[Layer; STEPS + 2]>,
     pub(super) glint: f32,
     pub(super) grain: f32,
     pub(super) shift: f32,
@@ -208,32 +208,43 @@ impl LookTable {
     pub fn new(look: &Look, texels_per_unit: f32) -> Result<Self, LookError> {
         look.validate()?;
         within("texels_per_unit", texels_per_unit, f32::MIN_POSITIVE..=MAX_SIDE as f32, "above 0, up to 16384")?;
-        let ramp = Box::new(std::array::from_fn(|i| {
+        let mut ramp = Box::new([[0.0; 4]; STEPS + 2]);
+        for (i, layer) in ramp[1..].iter_mut().enumerate() {
             let (color, cover) = look.at(i as f32 / STEPS as f32);
             let [r, g, b] = color.map(|channel| 255.0 * channel * cover);
-            [r, g, b, cover]
-        }));
+            *layer = [r, g, b, cover];
+        }
         // Sobel's kernel weighs a slope of one depth step per texel with 8.
         let slope = look.relief * texels_per_unit / (8.0 * 65535.0);
         let Look { glint, grain, shift, opaque, .. } = *look;
         Ok(Self { ramp, glint, grain, shift, slope, opaque })
     }
 
-    /// What the ramp puts over the picture at `depth`; nothing at zero.
+    /// What the ramp puts over the picture at the steps before and after `depth`.
     #[inline(always)]
-    pub(super) fn layer(&self, depth: u16) -> Layer {
-        if depth == 0 {
-            return [0.0; 4];
-        }
-        let (step, t) = (usize::from(depth >> 8), f32::from(depth & 255) / 256.0);
-        let (low, high) = (self.ramp[step], self.ramp[step + 1]);
-        std::array::from_fn(|i| low[i] + (high[i] - low[i]) * t)
+    pub(super) fn layers(&self, depth: u16) -> (&Layer, &Layer) {
+        // Depth zero lies at the first entry, without a branch.
+        let step = usize::from(depth >> 8) + usize::from(depth != 0);
+        (&self.ramp[step], &self.ramp[step + 1])
+    }
+
+    /// How far `depth` is from the step before it to the one after, 0..1.
+    #[inline(always)]
+    pub(super) fn between(depth: u16) -> f32 {
+        f32::from(depth & 255) * (1.0 / 256.0)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    impl LookTable {
+        fn layer(&self, depth: u16) -> Layer {
+            let ((low, high), t) = (self.layers(depth), Self::between(depth));
+            std::array::from_fn(|i| low[i] + (high[i] - low[i]) * t)
+        }
+    }
 
     fn refused(look: &Look) -> Option<&'static str> {
         match LookTable::new(look, 512.0) {

@@ -1,6 +1,6 @@
 //! [`CrackBudget`]: what cracks may cost, and [`CrackStats`]: what became of the hits.
 
-use bevy::{platform::time::Instant, prelude::*};
+use bevy::{platform::time::Instant, prelude::*, tasks::ComputeTaskPool};
 use core::time::Duration;
 
 /// What all surfaces together may cost.
@@ -85,6 +85,19 @@ impl FrameClock {
 impl Timer {
     pub(super) fn is_over(&self) -> bool {
         self.before + self.start.elapsed() >= self.limit
+    }
+}
+
+/// Does `work` for every share, on as many threads as there are; in order if there is only one share, or one thread.
+///
+/// Systems that call it run on the main thread, which would wait for them otherwise: so it works as well.
+pub(super) fn share_out<S: Send>(shares: impl ExactSizeIterator<Item = S>, work: impl Fn(S) + Sync) {
+    let work = &work;
+    match ComputeTaskPool::try_get().filter(|_| shares.len() > 1) {
+        Some(pool) => {
+            pool.scope(|scope| shares.for_each(|share| scope.spawn(async move { work(share) })));
+        }
+        None => shares.for_each(work),
     }
 }
 

@@ -1,16 +1,32 @@
 //! The growth systems: time to steps.
 
-use super::{CrackBudget, CrackCommandsExt, budget::FrameClock, surfaces::Surfaces};
-use bevy::prelude::*;
+use super::{
+    CrackBudget, CrackCommandsExt,
+    budget::{FrameClock, share_out},
+    surfaces::{Active, Surfaces, batch},
+};
+use bevy::{ecs::system::NonSendMarker, prelude::*};
 
 /// Share of the frame's budget after which no further step is made.
-const SHARE: f32 = 0.7;
+const BUDGET_SHARE: f32 = 0.7;
+
+/// So many surfaces make their steps one after the other: fewer are not worth another thread.
+const SHARE: usize = 16;
 
 /// Length of a frame where there is no clock, seconds.
 const DEFAULT_FRAME: f32 = 1.0 / 60.0;
 
-/// Makes the steps that are due, one surface after the other, one step each, until none is due or the budget is spent.
+/// A surface in turn.
+struct Job<'a> {
+    entity: Entity,
+    active: &'a mut Active,
+    /// Whether it has grown; `None` = its turn has not come.
+    has_grown: Option<bool>,
+}
+
+/// Makes the steps that are due, some surfaces at once, one step each in turn, until none is due or the budget is spent.
 pub(super) fn grow_surfaces(
+    _main_thread: NonSendMarker,
     mut commands: Commands,
     time: Option<Res<Time>>,
     budget: Res<CrackBudget>,
@@ -20,7 +36,7 @@ pub(super) fn grow_surfaces(
     if surfaces.growing.is_empty() && surfaces.held.is_empty() {
         return;
     }
-    let timer = clock.start(&budget, SHARE);
+    let timer = clock.start(&budget, BUDGET_SHARE);
     let seconds = time.map_or(DEFAULT_FRAME, |time| time.delta_secs());
     let Surfaces { active, growing, held, dirty, .. } = &mut *surfaces;
     let room = budget.max_growing.max(1).saturating_sub(growing.len()).min(held.len());
@@ -32,31 +48,46 @@ pub(super) fn grow_surfaces(
     }
     // Surfaces in a row that had nothing to do and are still in the list.
     let mut idle = 0;
-    while idle < growing.len() {
-        let Some(entity) = growing.pop_front() else { break };
-        let Some(active) = active.get_mut(&entity).filter(|active| active.is_growing) else { continue };
-        let has_grown = active.step_if_due();
-        if has_grown {
-            idle = 0;
-        }
-        if !active.is_at_rest() {
-            idle += usize::from(!has_grown);
-            growing.push_back(entity);
-        } else {
-            active.is_growing = false;
-            active.due = 0.0;
-            if active.has_closed() {
-                commands.entity(entity).heal_cracks();
+    let mut left = Vec::new();
+    while left.is_empty() && idle < growing.len() {
+        let mut jobs = batch(active, growing, |entity, active| {
+            active.is_growing.then_some(Job { entity, active, has_grown: None })
+        });
+        share_out(jobs.chunks_mut(SHARE).enumerate(), |(i, jobs)| {
+            for (k, job) in jobs.iter_mut().enumerate() {
+                if (i, k) == (0, 0) || !timer.is_over() {
+                    job.has_grown = Some(job.active.step_if_due());
+                }
             }
-        }
-        let is_news = has_grown || active.is_behind() || (!active.is_growing && active.is_open);
-        if is_news && !active.is_dirty {
-            active.is_dirty = true;
-            dirty.push_back(entity);
+        });
+        for Job { entity, active, has_grown } in jobs {
+            let Some(has_grown) = has_grown else {
+                left.push(entity);
+                continue;
+            };
+            if has_grown {
+                idle = 0;
+            }
+            if !active.is_at_rest() {
+                idle += usize::from(!has_grown);
+                growing.push_back(entity);
+            } else {
+                active.is_growing = false;
+                active.due = 0.0;
+                if active.has_closed() {
+                    commands.entity(entity).heal_cracks();
+                }
+            }
+            let is_news = has_grown || active.is_behind() || (!active.is_growing && active.is_open);
+            if is_news && !active.is_dirty {
+                active.is_dirty = true;
+                dirty.push_back(entity);
+            }
         }
         if timer.is_over() {
             break;
         }
     }
+    left.into_iter().rev().for_each(|entity| growing.push_front(entity));
     clock.stop(&timer);
 }

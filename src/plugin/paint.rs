@@ -2,9 +2,9 @@
 
 use super::{
     CellClosed, CrackBudget, CrackFinished, CrackState, CrackStatus, CrackTextures, CrackTip,
-    budget::FrameClock,
-    surfaces::{Active, Surfaces, Touched},
-    upload::Uploads,
+    budget::{FrameClock, share_out},
+    surfaces::{Active, Surfaces, Touched, batch},
+    upload::{Packer, Uploads},
 };
 use crate::{
     growth::CrackGrowth,
@@ -12,7 +12,10 @@ use crate::{
     pattern::{Moment, NO_PARENT, SegmentId},
     raster::{DOT_DEPTH, DepthField, Profile, Redrawn, TexelRect, stamp_dot, stamp_path, stamp_path_with},
 };
-use bevy::prelude::*;
+use bevy::{ecs::system::NonSendMarker, prelude::*};
+
+/// So many of them are painted one after the other: fewer are not worth another thread.
+const SHARE: usize = 4;
 
 /// Buffers kept from frame to frame.
 #[derive(Default)]
@@ -23,8 +26,21 @@ pub(super) struct Scratch {
     rects: Vec<TexelRect>,
 }
 
-/// Paints what has changed, surface after surface, at least one, until the budget is spent.
+/// A surface that is being painted.
+struct Job<'a> {
+    entity: Entity,
+    active: &'a mut Active,
+    canvas: Canvas,
+    /// What was shown before, if it has a playback.
+    before: Option<Moment>,
+    is_painted: bool,
+}
+
+/// Paints what has changed, some surfaces at once, at least one, until the budget is spent.
+///
+/// A surface has its cracks, base and textures to itself, so that it does not matter which thread paints it.
 pub(super) fn paint_surfaces(
+    _main_thread: NonSendMarker,
     mut commands: Commands,
     budget: Res<CrackBudget>,
     mut clock: ResMut<FrameClock>,
@@ -32,7 +48,7 @@ pub(super) fn paint_surfaces(
     mut uploads: ResMut<Uploads>,
     images: Option<ResMut<Assets<Image>>>,
     mut states: Query<&mut CrackState>,
-    mut scratch: Local<Scratch>,
+    mut scratch: Local<Vec<Scratch>>,
 ) {
     if surfaces.dirty.is_empty() {
         return;
@@ -40,28 +56,62 @@ pub(super) fn paint_surfaces(
     let Some(mut images) = images else { return };
     let timer = clock.start(&budget, 1.0);
     let Surfaces { active, dirty, .. } = &mut *surfaces;
-    while let Some(entity) = dirty.pop_front() {
-        let Some(active) = active.get_mut(&entity) else { continue };
-        active.is_dirty = false;
-        active.painted += 1;
-        let before = active.playback.as_ref().map(|playback| playback.shown);
-        stamp(active, &mut scratch);
-        paint(active, &mut images, &mut uploads, &mut scratch.rects);
-        let is_done = active.is_open && active.is_complete();
-        tell_cells(active, entity, &mut commands);
-        if let Ok(mut state) = states.get_mut(entity) {
-            tell(active, &mut state, before, is_done);
-        }
-        active.close_playback();
-        if is_done {
-            active.is_open = false;
-            commands.trigger(CrackFinished { entity });
+    let mut left = Vec::new();
+    while left.is_empty() && !dirty.is_empty() {
+        let mut jobs: Vec<Job> = batch(active, dirty, |entity, active| Some(Job::new(entity, active, &mut images)));
+        let shares = jobs.len().div_ceil(SHARE);
+        let known = scratch.len().max(shares);
+        scratch.resize_with(known, Scratch::default);
+        uploads.pack(shares, |packers| {
+            let shares = jobs.chunks_mut(SHARE).zip(&mut *scratch).zip(packers).enumerate();
+            share_out(shares, |(i, ((jobs, scratch), packer))| {
+                for (k, job) in jobs.iter_mut().enumerate() {
+                    if (i, k) == (0, 0) || !timer.is_over() {
+                        job.paint(scratch, packer);
+                    }
+                }
+            });
+        });
+        for Job { entity, active, canvas, before, is_painted } in jobs {
+            canvas.put_back(&active.textures, &mut images);
+            if !is_painted {
+                left.push(entity);
+                continue;
+            }
+            active.is_dirty = false;
+            active.painted += 1;
+            let is_done = active.is_open && active.is_complete();
+            tell_cells(active, entity, &mut commands);
+            if let Ok(mut state) = states.get_mut(entity) {
+                tell(active, &mut state, before, is_done);
+            }
+            active.close_playback();
+            if is_done {
+                active.is_open = false;
+                commands.trigger(CrackFinished { entity });
+            }
         }
         if timer.is_over() {
             break;
         }
     }
+    left.into_iter().rev().for_each(|entity| dirty.push_front(entity));
     clock.stop(&timer);
+}
+
+impl<'a> Job<'a> {
+    fn new(entity: Entity, active: &'a mut Active, images: &mut Assets<Image>) -> Self {
+        let before = active.playback.as_ref().map(|playback| playback.shown);
+        let canvas = Canvas::take(&active.textures, images);
+        Self { entity, active, canvas, before, is_painted: false }
+    }
+
+    fn paint(&mut self, scratch: &mut Scratch, packer: &mut Packer) {
+        stamp(self.active, scratch);
+        self.canvas.paint(self.active, packer, &mut scratch.rects);
+        self.active.cells.update(self.active.growth.network());
+        self.is_painted = true;
+    }
 }
 
 /// Stamps what has grown since the last time into the field, or whatever is to be shown.
@@ -130,62 +180,59 @@ pub(super) fn stamp_all(growth: &CrackGrowth, profile: &Profile, field: &mut Dep
 /// Paints in the middle of a frame what is dirty.
 pub(super) fn paint_now(world: &mut World, active: &mut Active) {
     world.resource_scope(|world, mut images: Mut<Assets<Image>>| {
-        paint(active, &mut images, &mut world.resource_mut::<Uploads>(), &mut Vec::new());
+        let mut canvas = Canvas::take(&active.textures, &mut images);
+        world.resource_mut::<Uploads>().pack(1, |packers| {
+            packers.iter_mut().for_each(|packer| canvas.paint(active, packer, &mut Vec::new()));
+        });
+        canvas.put_back(&active.textures, &mut images);
     });
 }
 
-/// Paints the dirty texels of the view that is shown and asks for their upload.
-fn paint(active: &mut Active, images: &mut Assets<Image>, uploads: &mut Uploads, rects: &mut Vec<TexelRect>) {
-    let size = active.base.size;
-    let Some(view) = active.views.get_mut(active.view) else { return };
-    view.dirty.take_rects(rects);
-    if rects.is_empty() {
-        return;
+/// The data of a surface's textures, out of their images: many cannot be borrowed at once.
+struct Canvas([Option<Vec<u8>>; 3]);
+
+impl Canvas {
+    /// Texels are changed without an asset event, which would upload the whole image.
+    fn take(textures: &CrackTextures, images: &mut Assets<Image>) -> Self {
+        Self(textures.all().map(|texture| images.get_mut_untracked(texture?)?.data.take()))
     }
-    let origin = view.rect.min;
-    let shown = TexelRect::whole(view.rect.size());
-    let CrackTextures { diffuse, normal, depth } = &active.textures;
-    // Three images of one collection cannot be borrowed at once: their data is taken out and put back.
-    let mut diffuse_data = take_data(images, diffuse.as_ref());
-    let mut normal_data = take_data(images, normal.as_ref());
-    let mut depth_data = take_data(images, depth.as_ref());
-    let mut targets = PaintTargets {
-        diffuse: diffuse_data.as_deref_mut(),
-        normal: normal_data.as_deref_mut(),
-        depth: depth_data.as_deref_mut(),
-    };
-    rects.iter_mut().for_each(|rect| *rect = rect.intersect(shown));
-    paint_rects(active.base.texels(), &active.field, &active.look, rects, origin, &mut targets);
-    for rect in rects.drain(..) {
-        if let (Some(broken), Some(diffuse)) = (&active.broken, targets.diffuse.as_deref_mut()) {
-            broken.holes.cut_out(diffuse, size, origin, rect);
-        }
-        let rect = TexelRect { min: rect.min + origin, max: rect.max + origin }.intersect(TexelRect::whole(size));
-        for texture in active.textures.handles() {
-            uploads.push(texture.id(), rect);
+
+    fn put_back(self, textures: &CrackTextures, images: &mut Assets<Image>) {
+        for (texture, data) in textures.all().into_iter().zip(self.0) {
+            if let Some(image) = texture.and_then(|texture| images.get_mut_untracked(texture)) {
+                image.data = data;
+            }
         }
     }
-    put_data(images, diffuse.as_ref(), diffuse_data);
-    put_data(images, normal.as_ref(), normal_data);
-    put_data(images, depth.as_ref(), depth_data);
-}
 
-/// Texels are changed without an asset event, which would upload the whole image.
-fn take_data(images: &mut Assets<Image>, texture: Option<&Handle<Image>>) -> Option<Vec<u8>> {
-    images.get_mut_untracked(texture?)?.data.take()
-}
-
-fn put_data(images: &mut Assets<Image>, texture: Option<&Handle<Image>>, data: Option<Vec<u8>>) {
-    if let Some(texture) = texture
-        && let Some(image) = images.get_mut_untracked(texture)
-    {
-        image.data = data;
+    /// Paints the dirty texels of the view that is shown and asks for their upload.
+    fn paint(&mut self, active: &mut Active, packer: &mut Packer, rects: &mut Vec<TexelRect>) {
+        let size = active.base.size;
+        let Some(view) = active.views.get_mut(active.view) else { return };
+        view.dirty.take_rects(rects);
+        if rects.is_empty() {
+            return;
+        }
+        let origin = view.rect.min;
+        let shown = TexelRect::whole(view.rect.size());
+        rects.iter_mut().for_each(|rect| *rect = rect.intersect(shown));
+        let [diffuse, normal, depth] = self.0.each_mut().map(Option::as_deref_mut);
+        let mut targets = PaintTargets { diffuse, normal, depth };
+        paint_rects(active.base.texels(), &active.field, &active.look, rects, origin, &mut targets);
+        for rect in rects.drain(..) {
+            if let (Some(broken), Some(diffuse)) = (&active.broken, targets.diffuse.as_deref_mut()) {
+                broken.holes.cut_out(diffuse, size, origin, rect);
+            }
+            let rect = TexelRect { min: rect.min + origin, max: rect.max + origin }.intersect(TexelRect::whole(size));
+            let data = [targets.diffuse.as_deref(), targets.normal.as_deref(), targets.depth.as_deref()];
+            let pictures = active.textures.all().into_iter().zip(data);
+            packer.push(pictures.map(|(texture, data)| Some((texture?.id(), data?))), size, rect);
+        }
     }
 }
 
 /// Tells of the cells that have closed and are shown closed for the first time.
 fn tell_cells(active: &mut Active, entity: Entity, commands: &mut Commands) {
-    active.cells.update(active.growth.network());
     let now = active.shown().whole();
     while let Some(cell) = active.cells.cells().get(active.cells_told).filter(|cell| cell.birth <= now) {
         let uv = active.field.frame.pos_to_uv(cell.centroid);

@@ -276,6 +276,22 @@ pub(super) struct Surfaces {
     pub(super) bytes: u64,
 }
 
+/// The most surfaces that are worked on at once.
+const BATCH: usize = 64;
+
+/// Takes the first surfaces out of a line in which each is once, and makes a job of each that is there.
+pub(super) fn batch<'a, J>(
+    active: &'a mut EntityHashMap<Active>,
+    line: &mut VecDeque<Entity>,
+    mut job: impl FnMut(Entity, &'a mut Active) -> Option<J>,
+) -> Vec<J> {
+    let mut entities = [Entity::PLACEHOLDER; BATCH];
+    let count = line.len().min(BATCH);
+    entities.iter_mut().zip(line.drain(..count)).for_each(|(slot, entity)| *slot = entity);
+    let found = active.get_disjoint_mut(entities.each_ref());
+    entities.into_iter().zip(found).filter_map(|(entity, active)| job(entity, active?)).collect()
+}
+
 impl Surfaces {
     /// Puts a surface that was hit in the line to grow.
     pub(super) fn start_growing(&mut self, entity: Entity) {

@@ -24,7 +24,12 @@ pub struct CrackTextures {
 impl CrackTextures {
     /// The textures there are.
     pub fn handles(&self) -> impl Iterator<Item = &Handle<Image>> {
-        [&self.diffuse, &self.normal, &self.depth].into_iter().flatten()
+        self.all().into_iter().flatten()
+    }
+
+    /// In the order of [`KINDS`].
+    pub(super) fn all(&self) -> [Option<&Handle<Image>>; 3] {
+        [self.diffuse.as_ref(), self.normal.as_ref(), self.depth.as_ref()]
     }
 }
 

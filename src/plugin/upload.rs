@@ -1,8 +1,9 @@
 //! Upload of rectangles into GPU textures that exist. Only this file knows the render world.
 //!
-//! The texels on the CPU (`Image::data`) are the truth. Painting changes them without an asset event and notes the
-//! rectangle here; the extraction, which sees both worlds, copies it into the texture. Whatever else makes the renderer
-//! prepare an image again uploads all of `data`, cracks included.
+//! The texels on the CPU (`Image::data`) are the truth. Painting changes them without an asset event, notes the
+//! rectangle here and packs its texels, while the cache still has them, the way the GPU wants them; the extraction, which
+//! sees both worlds, copies them into the texture. Whatever else makes the renderer prepare an image again uploads all of `data`,
+//! cracks included.
 
 use crate::raster::TexelRect;
 use bevy::{
@@ -12,13 +13,14 @@ use bevy::{
         ExtractSchedule, MainWorld, RenderApp,
         render_asset::{RenderAssetBytesPerFrameLimiter, RenderAssets, extract_render_asset_bytes_per_frame},
         render_resource::{
-            Buffer, BufferDescriptor, BufferUsages, CommandEncoder, CommandEncoderDescriptor, Extent3d, Origin3d,
-            TexelCopyBufferInfo, TexelCopyBufferLayout, TexelCopyTextureInfo, TextureAspect,
+            Buffer, BufferDescriptor, BufferUsages, CommandEncoder, CommandEncoderDescriptor, Extent3d, MapMode,
+            Origin3d, TexelCopyBufferInfo, TexelCopyBufferLayout, TexelCopyTextureInfo, TextureAspect,
         },
         renderer::{RenderDevice, RenderQueue},
         texture::GpuImage,
     },
 };
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// What went to the GPU in the last frame that was rendered.
 #[derive(Resource, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -50,15 +52,102 @@ const FEW: usize = 4;
 /// No more than about this many bytes go up in a frame, so that no buffer is larger than a device allows; the rest waits.
 const MAX_STAGED: usize = 64 << 20;
 
+/// Up to this many bytes are packed by each [`Packer`], the rest when the renderer fetches it.
+const MAX_PACKED: usize = 8 << 20;
+
 /// More memory than this is not kept for the next frame, bytes.
 const MAX_KEPT: usize = 16 << 20;
+
+/// Texels of an image that have changed.
+struct Changed {
+    image: AssetId<Image>,
+    rect: TexelRect,
+    /// Where they are packed, if they are.
+    place: Option<Place>,
+}
+
+/// Rows of texels among the packed ones.
+#[derive(Clone, Copy)]
+struct Place {
+    /// Which [`Rows`].
+    part: usize,
+    /// Where the first row begins.
+    offset: usize,
+    /// From row to row.
+    pitch: usize,
+    /// Length of a row.
+    row: usize,
+}
+
+/// Packed texels. The memory is kept from frame to frame, what lies beyond the end is of no use.
+#[derive(Default)]
+struct Rows {
+    bytes: Vec<u8>,
+    end: usize,
+}
+
+impl Rows {
+    /// Makes room for so many bytes at the end, and returns where they begin.
+    fn extend(&mut self, by: usize) -> usize {
+        let offset = self.end;
+        self.end += by;
+        if self.bytes.len() < self.end {
+            self.bytes.resize(self.end.next_power_of_two(), 0);
+        }
+        offset
+    }
+
+    fn clear(&mut self) {
+        self.end = 0;
+        if self.bytes.len() > MAX_KEPT {
+            self.bytes = Vec::new();
+        }
+    }
+}
+
+/// Packs texels for the GPU, on any thread.
+#[derive(Default)]
+pub(super) struct Packer {
+    is_wanted: bool,
+    part: usize,
+    rects: Vec<Changed>,
+    rows: Rows,
+}
+
+impl Packer {
+    /// Notes that the same texels have changed in the images of a surface of `size` texels, and packs them: they have just been
+    /// written, so that the cache still has them.
+    pub(super) fn push<'a>(&mut self, images: impl Iterator<Item = Option<(AssetId<Image>, &'a [u8])>> + Clone, size: UVec2, rect: TexelRect) {
+        if !self.is_wanted || rect.is_empty() {
+            return;
+        }
+        let (stride, area) = (size.x as usize, size.x as usize * size.y as usize);
+        let [x, y] = rect.min.as_usizevec2().to_array();
+        let [width, height] = rect.size().as_usizevec2().to_array();
+        let images = images.flatten().map(|(image, data)| (image, data, data.len() / area));
+        let beside = |texel: usize| (width * texel).next_multiple_of(COPY_ALIGNMENT);
+        let pitch = images.clone().map(|(.., texel)| beside(texel)).sum::<usize>().next_multiple_of(ROW_ALIGNMENT);
+        let is_packed = pitch <= SIDE_BY_SIDE * SHORT_ROW && self.rows.end + pitch * height <= MAX_PACKED;
+        let mut offset = if is_packed { self.rows.extend(pitch * height) } else { 0 };
+        for (image, data, texel) in images {
+            let place = is_packed.then_some(Place { part: self.part, offset, pitch, row: width * texel });
+            if let Some(place) = place {
+                pack(&mut self.rows.bytes, place, data, (y * stride + x) * texel, stride * texel, height);
+                offset += beside(texel);
+            }
+            self.rects.push(Changed { image, rect, place });
+        }
+    }
+}
 
 /// Rectangles to upload.
 #[derive(Resource, Default)]
 pub(super) struct Uploads {
     /// Whether there is a renderer that fetches them.
     is_wanted: bool,
-    rects: Vec<(AssetId<Image>, TexelRect)>,
+    rects: Vec<Changed>,
+    /// Hold the texels of `rects` that are packed: number `i` those of part `i + 1`.
+    packers: Vec<Packer>,
     /// Number of rectangles of each image since they were last thinned out.
     limit: usize,
     /// Whether whole textures are on their way.
@@ -114,8 +203,18 @@ impl Uploads {
     /// Notes that texels of an image have changed.
     pub(super) fn push(&mut self, image: AssetId<Image>, rect: TexelRect) {
         if self.is_wanted && !rect.is_empty() {
-            self.rects.push((image, rect));
+            self.rects.push(Changed { image, rect, place: None });
         }
+    }
+
+    /// Lends some packers to `paint`, and takes what they have packed, one after the other.
+    pub(super) fn pack(&mut self, count: usize, paint: impl FnOnce(&mut [Packer])) {
+        while self.packers.len() < count {
+            let part = self.packers.len() + 1;
+            self.packers.push(Packer { is_wanted: self.is_wanted, part, ..default() });
+        }
+        paint(&mut self.packers[..count]);
+        self.packers.iter_mut().for_each(|packer| self.rects.append(&mut packer.rects));
     }
 
     /// What brings whole pictures to the renderer, if there is one.
@@ -127,6 +226,8 @@ impl Uploads {
     /// Notes that all of an image has changed to what is staged, if it is.
     pub(super) fn push_whole(&mut self, image: AssetId<Image>, size: UVec2, staged: Option<Staged>) {
         self.staged.retain(|(other, _)| *other != image);
+        // What is packed is older, and would come after it.
+        self.rects.iter_mut().filter(|changed| changed.image == image).for_each(|changed| changed.place = None);
         match staged {
             Some(staged) if self.is_wanted => self.staged.push((image, staged)),
             _ => self.push(image, TexelRect::whole(size)),
@@ -141,17 +242,18 @@ impl Uploads {
     /// Replaces the rectangles of each image by the one around them.
     fn thin_out(&mut self) {
         let mut places = HashMap::<AssetId<Image>, usize>::default();
-        let mut thin = Vec::<(AssetId<Image>, TexelRect)>::new();
-        for (image, rect) in self.rects.drain(..) {
+        let mut thin = Vec::<Changed>::new();
+        for Changed { image, rect, .. } in self.rects.drain(..) {
             match places.get(&image) {
-                Some(place) => thin[*place].1 = thin[*place].1.union(rect),
+                Some(place) => thin[*place].rect = thin[*place].rect.union(rect),
                 None => {
                     places.insert(image, thin.len());
-                    thin.push((image, rect));
+                    thin.push(Changed { image, rect, place: None });
                 }
             }
         }
         self.rects = thin;
+        self.packers.iter_mut().for_each(|packer| packer.rows.clear());
     }
 }
 
@@ -177,11 +279,16 @@ struct Copy {
     image: AssetId<Image>,
     rect: TexelRect,
     texel: usize,
+    /// Which [`Rows`], [`LOOSE`] if it is not packed yet.
+    part: usize,
     /// Where the first row begins.
     offset: usize,
     /// From row to row.
     pitch: usize,
 }
+
+/// The part of what is not packed before the renderer fetches it.
+const LOOSE: usize = 0;
 
 impl Copy {
     /// Bytes of a row.
@@ -199,36 +306,68 @@ impl Copy {
     }
 
     fn fits_beside(&self, other: &Self) -> bool {
-        self.height() == other.height() && self.row() <= SHORT_ROW && other.row() <= SHORT_ROW
+        let fits = |copy: &Self| copy.part == LOOSE && copy.row() <= SHORT_ROW;
+        self.height() == other.height() && fits(self) && fits(other)
     }
 }
 
-/// Finds a place for each copy, side by side with its neighbours where they are equally high (the textures of a surface);
-/// returns the bytes they take.
-fn lay_out(copies: &mut [Copy]) -> usize {
-    let mut end = 0;
-    for equals in copies.chunk_by_mut(Copy::fits_beside) {
+/// Finds a place for each copy that is not packed, side by side with its neighbours where they are equally high (the textures of
+/// a surface).
+fn lay_out(copies: &mut [Copy], rows: &mut Rows) {
+    for equals in copies.chunk_by_mut(Copy::fits_beside).filter(|equals| equals[0].part == LOOSE) {
         for shelf in equals.chunks_mut(SIDE_BY_SIDE) {
             let mut pitch = 0;
             for copy in &mut *shelf {
-                copy.offset = end + pitch;
+                copy.offset = rows.end + pitch;
                 pitch += copy.row().next_multiple_of(COPY_ALIGNMENT);
             }
             pitch = pitch.next_multiple_of(ROW_ALIGNMENT);
             shelf.iter_mut().for_each(|copy| copy.pitch = pitch);
-            end += pitch * shelf[0].height();
+            rows.extend(pitch * shelf[0].height());
         }
     }
-    end
 }
 
 /// Memory that is kept from frame to frame.
 #[derive(Resource, Default)]
 struct Staging {
-    rects: Vec<(AssetId<Image>, TexelRect)>,
+    rects: Vec<Changed>,
     copies: Vec<Copy>,
-    rows: Vec<u8>,
-    buffer: Option<Buffer>,
+    parts: Vec<Rows>,
+    buffers: Buffers,
+}
+
+/// Buffers that the GPU has read, ready to be written again: new ones cost their memory's page faults.
+#[derive(Clone, Default)]
+struct Buffers(Arc<Mutex<Vec<Buffer>>>);
+
+impl Buffers {
+    /// A buffer that is mapped.
+    fn take(&self, size: u64, device: &RenderDevice) -> Buffer {
+        let mut ready = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        // One that is too small goes.
+        ready.pop().filter(|buffer| buffer.size() >= size).unwrap_or_else(|| {
+            device.create_buffer(&BufferDescriptor {
+                label: Some("crack_texels"),
+                size: size.next_power_of_two(),
+                usage: BufferUsages::MAP_WRITE | BufferUsages::COPY_SRC,
+                mapped_at_creation: true,
+            })
+        })
+    }
+
+    /// Keeps a buffer that was submitted for when the GPU has read it.
+    fn give_back(&self, buffer: Buffer, device: &RenderDevice) {
+        if buffer.size() > MAX_KEPT as u64 {
+            return;
+        }
+        let (ready, kept) = (self.0.clone(), buffer.clone());
+        device.map_buffer(&buffer.slice(..), MapMode::Write, move |mapped| {
+            if mapped.is_ok() {
+                ready.lock().unwrap_or_else(PoisonError::into_inner).push(kept);
+            }
+        });
+    }
 }
 
 fn upload_rects(
@@ -250,41 +389,48 @@ fn upload_rects(
         copy_whole(&mut whole, images, &gpu_images, &device, &queue, &mut stats);
         main.resource_mut::<Uploads>().staged = whole;
     }
-    let Staging { rects, copies, rows, buffer } = &mut *staging;
-    core::mem::swap(rects, &mut main.resource_mut::<Uploads>().rects);
+    let Staging { rects, copies, parts, buffers } = &mut *staging;
+    let mut uploads = main.resource_mut::<Uploads>();
+    core::mem::swap(rects, &mut uploads.rects);
+    parts.resize_with(uploads.packers.len() + 1, Rows::default);
+    for (rows, packer) in parts[LOOSE + 1..].iter_mut().zip(&mut uploads.packers) {
+        core::mem::swap(rows, &mut packer.rows);
+    }
     if !rects.is_empty()
         && let Some(images) = main.get_resource::<Assets<Image>>()
     {
         // What is not on the GPU yet stays in the list.
         let mut most_bytes = 0;
-        rects.retain(|(id, rect)| match plan(*id, *rect, images, &gpu_images) {
+        rects.retain(|Changed { image, rect, place }| match plan(*image, *rect, images, &gpu_images) {
             Plan::Copy(copy) if most_bytes > 0 && most_bytes + copy.most_bytes() > MAX_STAGED => true,
-            Plan::Copy(copy) => {
+            Plan::Copy(mut copy) => {
                 most_bytes += copy.most_bytes();
                 stats.rects += 1;
                 stats.bytes += copy.rect.area() * copy.texel as u64;
+                if let Some(place) = place.filter(|place| copy.rect == *rect && copy.row() == place.row) {
+                    let Place { part, offset, pitch, .. } = place;
+                    copy = Copy { part, offset, pitch, ..copy };
+                }
                 copies.push(copy);
                 false
             }
             Plan::Wait => true,
             Plan::Drop => false,
         });
-        let size = lay_out(copies);
-        if rows.len() < size {
-            rows.resize(size, 0);
-        }
-        copies.iter().for_each(|copy| pack(copy, images, rows));
+        let loose = &mut parts[LOOSE];
+        lay_out(copies, loose);
+        let unpacked = copies.iter().filter(|copy| copy.part == LOOSE);
+        unpacked.for_each(|copy| pack_copy(copy, images, &mut loose.bytes));
         if copies.len() <= FEW {
-            write(copies, rows, &gpu_images, &queue);
+            write(copies, parts, &gpu_images, &queue);
         } else {
-            copy(copies, &rows[..size], buffer, &gpu_images, &device, &queue);
+            copy(copies, parts, buffers, &gpu_images, &device, &queue);
         }
         copies.clear();
-        if rows.len() > MAX_KEPT {
-            *rows = Vec::new();
-        }
     }
+    parts.iter_mut().for_each(Rows::clear);
     if !rects.is_empty() {
+        rects.iter_mut().for_each(|changed| changed.place = None);
         main.resource_mut::<Uploads>().rects.append(rects);
     }
     *main.resource_mut::<CrackUploadStats>() = stats;
@@ -310,7 +456,7 @@ fn copy_whole(
                     && copy.row() <= copy.pitch
                     && size == staged.buffer.size()
                 {
-                    copy_one(&mut encoder, &copy, &staged.buffer, gpu);
+                    copy_one(&mut encoder, &copy, 0, &staged.buffer, gpu);
                     stats.rects += 1;
                     stats.bytes += copy.rect.area() * copy.texel as u64;
                 }
@@ -323,9 +469,11 @@ fn copy_whole(
     queue.submit([encoder.finish()]);
 }
 
-fn copy_one(encoder: &mut CommandEncoder, copy: &Copy, buffer: &Buffer, gpu: &GpuImage) {
+/// Copies from a buffer in which the copy's part begins at `start`.
+fn copy_one(encoder: &mut CommandEncoder, copy: &Copy, start: usize, buffer: &Buffer, gpu: &GpuImage) {
     let (to, size) = destination(gpu, copy);
-    encoder.copy_buffer_to_texture(TexelCopyBufferInfo { buffer, layout: layout(copy, copy.offset as u64) }, to, size);
+    let layout = layout(copy, (start + copy.offset) as u64);
+    encoder.copy_buffer_to_texture(TexelCopyBufferInfo { buffer, layout }, to, size);
 }
 
 enum Plan {
@@ -350,22 +498,28 @@ fn plan(id: AssetId<Image>, rect: TexelRect, images: &Assets<Image>, gpu_images:
     if rect.is_empty() || image.data.as_ref().is_none_or(|data| data.len() < needed) {
         return Plan::Drop;
     }
-    Plan::Copy(Copy { image: id, rect, texel: texel as usize, offset: 0, pitch: 0 })
+    Plan::Copy(Copy { image: id, rect, texel: texel as usize, part: LOOSE, offset: 0, pitch: 0 })
 }
 
 /// Copies the texels of a rectangle to their place.
-fn pack(copy: &Copy, images: &Assets<Image>, rows: &mut [u8]) {
-    let Some((image, data)) = images.get(copy.image).and_then(|image| Some((image, image.data.as_ref()?))) else {
-        return;
-    };
-    let stride = image.width() as usize * copy.texel;
-    let length = copy.row();
-    let mut from = copy.rect.min.y as usize * stride + copy.rect.min.x as usize * copy.texel;
-    let mut to = copy.offset;
-    for _ in 0..copy.height() {
-        rows[to..to + length].copy_from_slice(&data[from..from + length]);
+fn pack_copy(copy: &Copy, images: &Assets<Image>, rows: &mut [u8]) {
+    if let Some(image) = images.get(copy.image)
+        && let Some(data) = &image.data
+    {
+        let stride = image.width() as usize * copy.texel;
+        let from = copy.rect.min.y as usize * stride + copy.rect.min.x as usize * copy.texel;
+        let place = Place { part: copy.part, offset: copy.offset, pitch: copy.pitch, row: copy.row() };
+        pack(rows, place, data, from, stride, copy.height());
+    }
+}
+
+/// Copies rows of an image, the first of which begins at `from`, to their place.
+fn pack(rows: &mut [u8], place: Place, data: &[u8], mut from: usize, stride: usize, height: usize) {
+    let mut to = place.offset;
+    for _ in 0..height {
+        rows[to..to + place.row].copy_from_slice(&data[from..from + place.row]);
         from += stride;
-        to += copy.pitch;
+        to += place.pitch;
     }
 }
 
@@ -384,38 +538,40 @@ fn layout(copy: &Copy, offset: u64) -> TexelCopyBufferLayout {
 }
 
 /// Writes rectangles one by one.
-fn write(copies: &[Copy], rows: &[u8], gpu_images: &RenderAssets<GpuImage>, queue: &RenderQueue) {
+fn write(copies: &[Copy], parts: &[Rows], gpu_images: &RenderAssets<GpuImage>, queue: &RenderQueue) {
     for copy in copies {
         let Some(gpu) = gpu_images.get(copy.image) else { continue };
         let (to, size) = destination(gpu, copy);
-        queue.write_texture(to, &rows[copy.offset..], layout(copy, 0), size);
+        queue.write_texture(to, &parts[copy.part].bytes[copy.offset..], layout(copy, 0), size);
     }
 }
 
 /// Copies all rectangles from one buffer in one submission: a write of its own costs more than its texels.
 fn copy(
     copies: &[Copy],
-    rows: &[u8],
-    buffer: &mut Option<Buffer>,
+    parts: &[Rows],
+    buffers: &Buffers,
     gpu_images: &RenderAssets<GpuImage>,
     device: &RenderDevice,
     queue: &RenderQueue,
 ) {
-    let size = rows.len() as u64;
-    let buffer = match buffer {
-        Some(buffer) if buffer.size() >= size => buffer,
-        _ => buffer.insert(device.create_buffer(&BufferDescriptor {
-            label: Some("crack_texels"),
-            size: size.next_power_of_two(),
-            usage: BufferUsages::COPY_SRC | BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        })),
-    };
-    queue.write_buffer(buffer, 0, rows);
+    let (mut starts, mut size) = (Vec::with_capacity(parts.len()), 0);
+    for rows in parts {
+        starts.push(size);
+        size += rows.end;
+    }
+    let buffer = buffers.take(size as u64, device);
+    let mut memory = buffer.slice(..).get_mapped_range_mut();
+    for (rows, start) in parts.iter().zip(&starts) {
+        memory.slice(*start..start + rows.end).copy_from_slice(&rows.bytes[..rows.end]);
+    }
+    drop(memory);
+    buffer.unmap();
     let mut encoder = device.create_command_encoder(&CommandEncoderDescriptor { label: Some("crack_texels") });
     for copy in copies {
         let Some(gpu) = gpu_images.get(copy.image) else { continue };
-        copy_one(&mut encoder, copy, buffer, gpu);
+        copy_one(&mut encoder, copy, starts[copy.part], &buffer, gpu);
     }
     queue.submit([encoder.finish()]);
+    buffers.give_back(buffer, device);
 }

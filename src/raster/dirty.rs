@@ -13,9 +13,13 @@ const CALL: u64 = 4;
 /// tiles makes the tree deep.
 const MAX_BEST_SPLITS: u32 = 16;
 
+/// Above this many marks they are no longer kept one by one: rectangles are of whole tiles then.
+const MAX_MARKS: usize = 256;
+
 /// The changed parts of a surface, in tiles of [`DirtyTiles::TILE`] texels.
 ///
 /// Asking an empty set costs nothing, and it owns no memory before the first mark; all else costs in proportion to the marked tiles.
+/// A few marks are kept as they are, too, so that rectangles hold no more of their tiles than was marked.
 ///
 /// ```
 /// use bevy_crack::raster::{DirtyTiles, TexelRect};
@@ -24,7 +28,7 @@ const MAX_BEST_SPLITS: u32 = 16;
 /// dirty.mark(TexelRect { min: [90, 40].into(), max: [91, 41].into() });
 /// let mut rects = Vec::new();
 /// dirty.take_rects(&mut rects);
-/// assert_eq!(rects, [TexelRect { min: [88, 40].into(), max: [96, 48].into() }]);
+/// assert_eq!(rects, [TexelRect { min: [90, 40].into(), max: [91, 41].into() }]);
 /// assert!(dirty.is_empty());
 /// ```
 #[derive(Clone, Debug, Default)]
@@ -34,6 +38,8 @@ pub struct DirtyTiles {
     tiles: Vec<u64>,
     /// One bit per row of tiles that has a marked one.
     rows: Vec<u64>,
+    /// What was marked, up to one more than [`MAX_MARKS`].
+    marks: Vec<TexelRect>,
     marked: bool,
 }
 
@@ -67,6 +73,9 @@ impl DirtyTiles {
             self.rows = vec![0; rows.div_ceil(WORD)];
         }
         self.marked = true;
+        if self.marks.len() <= MAX_MARKS {
+            self.marks.push(rect);
+        }
         let tile = |texel: u32| (texel / Self::TILE) as usize;
         let (left, right) = (tile(rect.min.x), tile(rect.max.x - 1));
         for row in tile(rect.min.y)..=tile(rect.max.y - 1) {
@@ -88,10 +97,12 @@ impl DirtyTiles {
     /// Unmarks everything.
     pub fn clear(&mut self) {
         self.drain(|_, _| {});
+        self.marks.clear();
     }
 
-    /// Unmarks everything and appends rectangles that cover all marked tiles: disjoint, of whole tiles (clipped to the
-    /// surface), few, in an order that depends on the marked tiles alone.
+    /// Unmarks everything and appends rectangles that cover all that was marked: disjoint, few, not empty, in an order that depends on
+    /// the marked tiles alone. Each is the least one around what was marked within some tiles; after more than a few hundred marks,
+    /// those tiles as a whole.
     ///
     /// An unmarked tile is covered only where a rectangle more would cost more than the tile.
     pub fn take_rects(&mut self, rects: &mut Vec<TexelRect>) {
@@ -105,7 +116,13 @@ impl DirtyTiles {
         for rect in &mut rects[first..] {
             rect.min *= Self::TILE;
             rect.max = (rect.max * Self::TILE).min(self.size);
+            if self.marks.len() <= MAX_MARKS {
+                let tiles = *rect;
+                let marked = self.marks.iter().map(|mark| mark.intersect(tiles));
+                *rect = marked.fold(TexelRect::default(), TexelRect::union);
+            }
         }
+        self.marks.clear();
     }
 
     /// Unmarks everything and calls `visit` with column and row of every marked tile, row by row.
@@ -245,6 +262,7 @@ impl Bounds {
 mod tests {
     use super::*;
     use crate::{Grid, math::Rng};
+    use std::ops::Range;
 
     fn below(rng: &mut Rng, n: u32) -> u32 {
         rng.next_u32() % n
@@ -263,10 +281,14 @@ mod tests {
             let size = UVec2::new(1 + below(&mut rng, 700), 1 + below(&mut rng, if round % 3 == 0 { 40 } else { 900 }));
             let mut dirty = DirtyTiles::new(size);
             let mut marked = Grid::new(size, 0u8);
-            for _ in 0..below(&mut rng, 60) {
+            let n = if round % 10 == 0 { 2 * MAX_MARKS as u32 } else { 60 };
+            let n = below(&mut rng, n) as usize;
+            let mut n_marks = 0;
+            for _ in 0..n {
                 let rect = random_rect(&mut rng, size, if round % 2 == 0 { 30 } else { 200 });
                 dirty.mark(rect);
                 let rect = rect.intersect(TexelRect::whole(size));
+                n_marks += usize::from(!rect.is_empty());
                 for y in rect.min.y..rect.max.y {
                     for x in rect.min.x..rect.max.x {
                         marked.row_mut(y as usize)[x as usize] = 1;
@@ -282,10 +304,24 @@ mod tests {
             assert_eq!(rects, repeated);
             assert!(dirty.is_empty() && dirty.tiles.iter().all(|&word| word == 0), "tiles left");
             for rect in &rects {
-                assert!(!rect.is_empty() && rect.min % DirtyTiles::TILE == UVec2::ZERO, "{rect:?}");
-                assert!(rect.max.cmple(size).all(), "{rect:?} sticks out of {size}");
-                let whole = |max: u32, size: u32| max == size || max.is_multiple_of(DirtyTiles::TILE);
-                assert!(whole(rect.max.x, size.x) && whole(rect.max.y, size.y), "{rect:?}");
+                assert!(!rect.is_empty() && rect.max.cmple(size).all(), "{rect:?} of {size}");
+                if n_marks > MAX_MARKS {
+                    assert_eq!(rect.min % DirtyTiles::TILE, UVec2::ZERO, "{rect:?}");
+                    let whole = |max: u32, size: u32| max == size || max.is_multiple_of(DirtyTiles::TILE);
+                    assert!(whole(rect.max.x, size.x) && whole(rect.max.y, size.y), "{rect:?}");
+                } else {
+                    let TexelRect { min, max } = *rect;
+                    let holds = |x: Range<u32>, y: Range<u32>| {
+                        y.flat_map(|y| x.clone().map(move |x| (x, y))).any(|(x, y)| marked.get(x, y) != Some(0))
+                    };
+                    let sides = [
+                        (min.x..max.x, min.y..min.y + 1),
+                        (min.x..max.x, max.y - 1..max.y),
+                        (min.x..min.x + 1, min.y..max.y),
+                        (max.x - 1..max.x, min.y..max.y),
+                    ];
+                    assert!(sides.into_iter().all(|(x, y)| holds(x, y)), "{rect:?} is not the least");
+                }
                 for y in rect.min.y..rect.max.y {
                     for texel in &mut marked.row_mut(y as usize)[rect.min.x as usize..rect.max.x as usize] {
                         assert!(*texel < 2, "two rectangles overlap");
