@@ -222,7 +222,7 @@ impl CrackPreset {
     /// Laminated glass: a dense web of radials and rings around the hit, which holds together.
     pub const LAMINATED_GLASS: Self = Self {
         growth: GrowthParams {
-            kill_distance: 0.03,
+            kill_distance: 0.024,
             step_length: 0.018,
             crack_radius: 0.2,
             num_iterations: 120,
@@ -234,8 +234,8 @@ impl CrackPreset {
             murray: 2.6,
             max_width: 0.008,
             unevenness: 0.3,
-            wander: 0.08,
-            roughness: 0.07,
+            wander: 0.05,
+            roughness: 0.04,
             draw_connections: true,
             connection_gaps: 0.1,
             chips: 0.15,
@@ -243,6 +243,7 @@ impl CrackPreset {
             arrest: 0.02,
             variety: 0.2,
             width_variety: 0.2,
+            inertia: 1.2,
             ..GrowthParams::DEFAULT
         },
         profile: Profile { depth: 1.0, full_width: 0.004, wall: 0.3, rim_width: 0.006, rim_depth: 0.3, faintest: 0.6 },
