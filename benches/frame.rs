@@ -4,7 +4,8 @@
 //! `growing/*`: 100 surfaces of 512 x 512 that were hit at once, one step a frame each; the time of an idle frame of the same
 //! app is taken off. `finished/*`: a frame with 10,000 cracked surfaces of 32 x 32 that have come to an end, beside one with
 //! 10,000 plain sprites. "only ...": parts of the first that no program could do without. `baking`: what of each frame the crate's systems
-//! take while guided cracks are baked and appear, 60 frames a second, from the first frame to ten after the last crack. `shards/*`: what
+//! take while guided cracks are baked, 60 frames a second, from the first frame to ten after the last crack; `front`, `widen`: while they
+//! appear within a second. `shards/*`: what
 //! the crate's own systems take of the main thread in the three frames in which a pane becomes 500 shards for the first time, 60 a second,
 //! in the one in which as many are shown once more, and in each in which 5,000 fly. With a Vulkan driver (software will do) uploads are part
 //! of it; without, it says so.
@@ -14,6 +15,7 @@
 use bevy::{
     app::{App, PluginsState},
     asset::RenderAssetUsages,
+    ecs::schedule::SingleThreadedExecutor,
     prelude::*,
     render::{
         render_resource::{
@@ -354,23 +356,37 @@ fn many(cracked: bool) -> App {
     app
 }
 
-/// Time of the crate's systems in each frame of some bakes, each on a new surface.
-fn baking_frames(side: u32) -> Vec<Duration> {
+/// How the systems of a frame run.
+#[derive(Clone, Copy, PartialEq)]
+enum Run {
+    /// One after the other, so that work is measured, and not what they wait for threads that a bake keeps busy.
+    InARow,
+    /// As the engine has them.
+    OnThreads,
+}
+
+/// Time of the crate's systems in each frame of some bakes, each on a new surface; apart, those in which its cracks appear.
+fn baking_frames(side: u32, appearance: GuidedAppearance, run: Run) -> [Vec<Duration>; 2] {
     let mut app = app();
     measure_systems(&mut app);
+    if run == Run::InARow {
+        app.edit_schedule(PostUpdate, |schedule| _ = schedule.set_executor(SingleThreadedExecutor::new()));
+    }
     app.insert_resource(CrackBudget { max_texture_bytes: 1 << 34, ..default() });
     let cross = |at: UVec2| f32::from(u8::from((24..40).contains(&at.x) || (24..40).contains(&at.y)));
     let texels = (0..64 * 64).map(|i| cross(UVec2::new(i % 64, i / 64))).collect();
     let guide = Grid::from_vec(UVec2::splat(64), texels).expect("the size fits");
-    let mut times = Vec::new();
+    let [mut baking, mut appearing] = [Vec::new(), Vec::new()];
     for seed in 0..BAKES as u64 {
         let entity = with_sprites(&mut app, 1, side, false)[0];
-        let guided = GuidedCracks { max_side: side, ..GuidedCracks::new(CrackGuide::new(guide.clone())) };
+        let guided = GuidedCracks { max_side: side, appearance, ..GuidedCracks::new(CrackGuide::new(guide.clone())) };
         app.world_mut().entity_mut(entity).insert((CrackSurface::new(CrackPreset::CONCRETE), guided.with_seed(seed)));
         let mut after = 0;
         while after < 10 {
             app.insert_resource(OurSystems::default());
+            let is_baked = app.world().get::<BakeProgress>(entity) == Some(&BakeProgress(1.0));
             let frame = time_of(|| app.update());
+            let times = if is_baked && after == 0 { &mut appearing } else { &mut baking };
             times.push(app.world().resource::<OurSystems>().1);
             let state = app.world().get::<CrackState>(entity);
             after += u32::from(state.is_some_and(|state| state.status == CrackStatus::Done));
@@ -379,15 +395,26 @@ fn baking_frames(side: u32) -> Vec<Duration> {
         app.world_mut().despawn(entity);
         (0..3).for_each(|_| app.update());
     }
-    times
+    [baking, appearing]
 }
 
 fn baking(side: u32) {
-    let mut times = baking_frames(side);
+    for (name, run) in [("in a row", Run::InARow), ("on threads", Run::OnThreads)] {
+        let frames = baking_frames(side, GuidedAppearance::AtOnce, run).concat();
+        println!("baking {side} x {side}, systems {name}: {}", percentiles(frames));
+    }
+    let front = GuidedAppearance::Front { from: Vec2::splat(0.5), seconds: 1.0 };
+    for (name, appearance) in [("front", front), ("widen", GuidedAppearance::Widen { seconds: 1.0 })] {
+        let [_, frames] = baking_frames(side, appearance, Run::InARow);
+        println!("{name} {side} x {side}, systems in a row: {}", percentiles(frames));
+    }
+}
+
+fn percentiles(mut times: Vec<Duration>) -> String {
     times.sort();
     let at = |share: f64| times[((times.len() - 1) as f64 * share) as usize].as_secs_f64() * 1e3;
     let (half, most, all) = (at(0.5), at(0.99), at(1.0));
-    println!("baking {side} x {side}: {} frames, p50 {half:.3} ms, p99 {most:.3} ms, max {all:.3} ms", times.len());
+    format!("{} frames, p50 {half:.3} ms, p99 {most:.3} ms, max {all:.3} ms", times.len())
 }
 
 /// Panes that are cracked all over, and become at most 500 shards each.

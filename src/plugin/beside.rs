@@ -61,7 +61,7 @@ mod tests {
             done.send(thread::current().id()).expect("someone listens");
             2 * number
         };
-        AsyncComputeTaskPool::get_or_init(|| TaskPool::new());
+        AsyncComputeTaskPool::get_or_init(TaskPool::new);
         let (mut here, mut there) = (0, 0);
         for number in 0..200 {
             let (tell, told) = mpsc::channel();

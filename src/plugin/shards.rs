@@ -2,7 +2,8 @@
 //! does it.
 //!
 //! What falls out is an entity each, a child of its surface, in the mesh of [`Shards::flat_mesh`] or [`Shards::solid_mesh`]. The
-//! surface's diffuse texture is transparent where it was (`holes`); the shards show a copy without holes. Where a shard is, is a
+//! surface's diffuse texture is transparent where it was (`holes`); the shards show a copy without holes. All that needs no world is made on
+//! a task (`order`, `form`), and a frame takes it up (`release`). Where a shard is, is a
 //! function of the time since the surface broke first (`fly`), so time may run at any speed, backwards, or jump. Entities and
 //! meshes of shards that are gone serve for others (`body`).
 

@@ -148,7 +148,7 @@ fn proceed(world: &World, active: &Active, mut request: Request) -> Result<Progr
         made => made,
     };
     // It has become another surface: in this frame, or it would never be done where that happens often.
-    let made = made.map_or_else(|| order(&request)?.make(), |made| made)?;
+    let made = made.unwrap_or_else(|| order(&request)?.make())?;
     Ok(Progress::Made(Box::new(made)))
 }
 
