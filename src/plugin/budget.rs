@@ -9,8 +9,9 @@ use core::time::Duration;
 #[derive(Resource, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Resource, Default)]
 pub struct CrackBudget {
-    /// Time for hits, growth and painting in one frame, milliseconds; default 2. What is left over waits for the next
-    /// frame; at least one hit, one step and one surface are done in each. NaN and values below zero count as 0.
+    /// Time for hits, growth and painting in one frame, milliseconds, however many threads grow and paint; default 2. What is left
+    /// over waits for the next frame; at least one hit, one step and one surface are done in each. NaN and values below zero count
+    /// as 0.
     pub milliseconds: f32,
     /// Hits that may wait on one surface; default 4096. A further one adds its energy to a waiting one near it.
     pub max_queued_per_surface: usize,
