@@ -105,3 +105,19 @@ pub(super) fn share_out<S: Send>(shares: impl ExactSizeIterator<Item = S>, work:
 pub(super) fn start_frame(mut clock: ResMut<FrameClock>) {
     clock.spent = Duration::ZERO;
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bevy::tasks::TaskPool;
+
+    #[test]
+    fn every_share_is_done_once() {
+        ComputeTaskPool::get_or_init(TaskPool::default);
+        for n in [0, 1, 3, 4, 100] {
+            let mut done = vec![0; n];
+            share_out(done.chunks_mut(3), |share| share.iter_mut().for_each(|done| *done += 1));
+            assert_eq!(done, vec![1; n]);
+        }
+    }
+}
