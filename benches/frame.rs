@@ -170,12 +170,30 @@ fn idle(app: &mut App) -> Duration {
     times[4]
 }
 
-/// Mean time of a growing frame over an idle one, what of it the main world's systems took, and bytes uploaded in it.
-fn growing_frames() -> (Duration, Duration, u64) {
+/// CPU time of all threads so far, those of the driver included; zero where the system does not tell.
+fn cpu_time() -> Duration {
+    let tasks = std::fs::read_dir("/proc/self/task").into_iter().flatten();
+    let times = tasks.filter_map(|task| {
+        let times = std::fs::read_to_string(task.ok()?.path().join("schedstat")).ok()?;
+        times.split(' ').next()?.parse::<u64>().ok()
+    });
+    Duration::from_nanos(times.sum())
+}
+
+/// CPU time of some idle frames.
+fn idle_cpu(app: &mut App) -> Duration {
+    let start = cpu_time();
+    (0..FRAMES).for_each(|_| app.update());
+    cpu_time().saturating_sub(start)
+}
+
+/// Mean time of a growing frame over an idle one, what of it the main world's systems took, bytes uploaded in it, and the CPU time
+/// of all threads over that of an idle one.
+fn growing_frames() -> (Duration, Duration, u64, Duration) {
     let mut app = app();
     measure_systems(&mut app);
     let entities = with_sprites(&mut app, SURFACES, SIDE, true);
-    let idle = idle(&mut app);
+    let (idle, idle_cpu) = (idle(&mut app), idle_cpu(&mut app));
     for entity in entities {
         app.world_mut().trigger(CrackHit::uv(entity, Vec2::splat(0.5)));
     }
@@ -183,12 +201,14 @@ fn growing_frames() -> (Duration, Duration, u64) {
     app.update();
     let (mut time, mut bytes) = (Duration::ZERO, 0);
     app.insert_resource(OurSystems::default());
+    let cpu = cpu_time();
     for _ in 0..FRAMES {
         time += time_of(|| app.update());
         bytes += app.world().resource::<CrackUploadStats>().bytes;
     }
+    let cpu = cpu_time().saturating_sub(cpu + idle_cpu);
     let systems = app.world().resource::<OurSystems>().1;
-    (time.saturating_sub(idle * FRAMES) / FRAMES, systems / FRAMES, bytes / u64::from(FRAMES))
+    (time.saturating_sub(idle * FRAMES) / FRAMES, systems / FRAMES, bytes / u64::from(FRAMES), cpu / FRAMES)
 }
 
 #[derive(Resource, Default)]
@@ -226,7 +246,8 @@ fn paint_whole(mut naive: ResMut<Naive>, mut images: ResMut<Assets<Image>>, look
     }
 }
 
-fn naive_frames() -> Duration {
+/// Mean time and CPU time of a growing frame over an idle one.
+fn naive_frames() -> (Duration, Duration) {
     let mut app = app();
     let frame = SurfaceFrame::new(UVec2::splat(SIDE)).expect("the size is valid");
     let preset = CrackPreset::CONCRETE;
@@ -243,11 +264,13 @@ fn naive_frames() -> Duration {
         naive.0.push((growth, DepthField::new(frame), base, diffuse, normal));
     }
     (0..3).for_each(|_| app.update());
-    let idle = idle(&mut app);
+    let (idle, idle_cpu) = (idle(&mut app), idle_cpu(&mut app));
     app.insert_resource(naive).add_systems(Update, paint_whole);
     app.update();
+    let cpu = cpu_time();
     let time = (0..FRAMES).map(|_| time_of(|| app.update())).sum::<Duration>();
-    time.saturating_sub(idle * FRAMES) / FRAMES
+    let cpu = cpu_time().saturating_sub(cpu + idle_cpu);
+    (time.saturating_sub(idle * FRAMES) / FRAMES, cpu / FRAMES)
 }
 
 /// The rectangles that a growing frame paints, of each surface and frame.
@@ -519,8 +542,10 @@ fn shards(c: &mut Criterion) {
 fn frame(c: &mut Criterion) {
     [1024, 2048].into_iter().for_each(baking);
     floors();
-    let (_, systems, bytes) = growing_frames();
+    let (_, systems, bytes, cpu) = growing_frames();
     println!("the main world's systems: {:.2} ms a frame", systems.as_secs_f64() * 1e3);
+    let (ours, naive) = (cpu.as_secs_f64() * 1e3, naive_frames().1.as_secs_f64() * 1e3);
+    println!("CPU time of all threads: {ours:.2} ms a frame, whole images: {naive:.2} ms");
     let whole = SURFACES as u64 * u64::from(SIDE * SIDE) * 8;
     if let Some(times) = whole.checked_div(bytes) {
         println!("bytes a frame: {bytes}, whole images: {whole}, {times} times fewer");
@@ -529,7 +554,7 @@ fn frame(c: &mut Criterion) {
     group.sample_size(10);
     group.bench_function("100 surfaces", |b| b.iter_custom(|n| (0..n).map(|_| growing_frames().0).sum()));
     group.bench_function("100 surfaces, main world", |b| b.iter_custom(|n| (0..n).map(|_| growing_frames().1).sum()));
-    group.bench_function("100 whole images", |b| b.iter_custom(|n| (0..n).map(|_| naive_frames()).sum()));
+    group.bench_function("100 whole images", |b| b.iter_custom(|n| (0..n).map(|_| naive_frames().0).sum()));
     group.finish();
     let mut group = c.benchmark_group("finished");
     group.sample_size(20);

@@ -70,8 +70,8 @@ fn noise(x: u32, y: u32) -> [f32; BLOCK] {
     const X: u32 = 0x9E37_79B1;
     let (first, row) = (x.wrapping_mul(X), y.wrapping_mul(0x85EB_CA77));
     let (mut hash, mut out) = ([0u32; BLOCK], [0.0; BLOCK]);
-    for i in 0..BLOCK {
-        hash[i] = first.wrapping_add(X.wrapping_mul(i as u32)) ^ row;
+    for (i, h) in (0..).zip(&mut hash) {
+        *h = first.wrapping_add(X.wrapping_mul(i)) ^ row;
     }
     for h in &mut hash {
         *h = (*h ^ (*h >> 15)).wrapping_mul(0x2C1B_3C6D);
@@ -202,8 +202,8 @@ impl Block<'_> {
             }
         }
         let mut between = [0.0; BLOCK];
-        for i in 0..BLOCK {
-            between[i] = LookTable::between(self.depth[i]);
+        for (between, &depth) in between.iter_mut().zip(self.depth) {
+            *between = LookTable::between(depth);
         }
         let mut layers = [[0.0; 4]; BLOCK];
         for i in 0..BLOCK {

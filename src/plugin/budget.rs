@@ -9,8 +9,9 @@ use core::time::Duration;
 #[derive(Resource, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Resource, Default)]
 pub struct CrackBudget {
-    /// Time for hits, growth and painting in one frame, milliseconds; default 2. What is left over waits for the next
-    /// frame; at least one hit, one step and one surface are done in each. NaN and values below zero count as 0.
+    /// Time for hits, growth and painting in one frame, milliseconds, however many threads grow and paint; default 2. What is left
+    /// over waits for the next frame; at least one hit, one step and one surface are done in each. NaN and values below zero count
+    /// as 0.
     pub milliseconds: f32,
     /// Hits that may wait on one surface; default 4096. A further one adds its energy to a waiting one near it.
     pub max_queued_per_surface: usize,
@@ -103,4 +104,20 @@ pub(super) fn share_out<S: Send>(shares: impl ExactSizeIterator<Item = S>, work:
 
 pub(super) fn start_frame(mut clock: ResMut<FrameClock>) {
     clock.spent = Duration::ZERO;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bevy::tasks::TaskPool;
+
+    #[test]
+    fn every_share_is_done_once() {
+        ComputeTaskPool::get_or_init(TaskPool::default);
+        for n in [0, 1, 3, 4, 100] {
+            let mut done = vec![0; n];
+            share_out(done.chunks_mut(3), |share| share.iter_mut().for_each(|done| *done += 1));
+            assert_eq!(done, vec![1; n]);
+        }
+    }
 }

@@ -5,6 +5,10 @@
 //! sees both worlds, copies them into the texture. Whatever else makes the renderer prepare an image again uploads all of `data`,
 //! cracks included.
 
+mod pack;
+
+pub(super) use pack::Packer;
+
 use crate::raster::TexelRect;
 use bevy::{
     platform::collections::HashMap,
@@ -20,6 +24,7 @@ use bevy::{
         texture::GpuImage,
     },
 };
+use pack::{COPY_ALIGNMENT, Changed, LOOSE, MAX_KEPT, Place, ROW_ALIGNMENT, Rows, SHORT_ROW, SIDE_BY_SIDE, pack};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// What went to the GPU in the last frame that was rendered.
@@ -32,113 +37,15 @@ pub struct CrackUploadStats {
     pub rects: u32,
 }
 
-/// Copies between buffers and textures want rows that begin at multiples of this, bytes.
-const ROW_ALIGNMENT: usize = 256;
-
-/// Rows of a copy begin at multiples of this, bytes, beside those of others. Copies from elsewhere are slow or wrong on some
-/// devices.
-const COPY_ALIGNMENT: usize = 64;
-
-/// Up to this many copies lie side by side, if their rows are no longer than this, bytes: so less is lost to [`ROW_ALIGNMENT`].
-const SIDE_BY_SIDE: usize = 4;
-const SHORT_ROW: usize = 1024;
-
-/// Above this many rectangles of one image the one around them all is uploaded: nobody fetches them.
-const MAX_RECTS_PER_IMAGE: usize = 1024;
+/// Above this many rectangles that nobody fetches, or that were fetched and wait, the one around them all is uploaded of each image.
+const MAX_UNFETCHED: usize = 1024;
+const MAX_WAITING: usize = 1 << 16;
 
 /// Up to this many rectangles are written one by one, more go through one buffer.
 const FEW: usize = 4;
 
 /// No more than about this many bytes go up in a frame, so that no buffer is larger than a device allows; the rest waits.
 const MAX_STAGED: usize = 64 << 20;
-
-/// Up to this many bytes are packed by each [`Packer`], the rest when the renderer fetches it.
-const MAX_PACKED: usize = 8 << 20;
-
-/// More memory than this is not kept for the next frame, bytes.
-const MAX_KEPT: usize = 16 << 20;
-
-/// Texels of an image that have changed.
-struct Changed {
-    image: AssetId<Image>,
-    rect: TexelRect,
-    /// Where they are packed, if they are.
-    place: Option<Place>,
-}
-
-/// Rows of texels among the packed ones.
-#[derive(Clone, Copy)]
-struct Place {
-    /// Which [`Rows`].
-    part: usize,
-    /// Where the first row begins.
-    offset: usize,
-    /// From row to row.
-    pitch: usize,
-    /// Length of a row.
-    row: usize,
-}
-
-/// Packed texels. The memory is kept from frame to frame, what lies beyond the end is of no use.
-#[derive(Default)]
-struct Rows {
-    bytes: Vec<u8>,
-    end: usize,
-}
-
-impl Rows {
-    /// Makes room for so many bytes at the end, and returns where they begin.
-    fn extend(&mut self, by: usize) -> usize {
-        let offset = self.end;
-        self.end += by;
-        if self.bytes.len() < self.end {
-            self.bytes.resize(self.end.next_power_of_two(), 0);
-        }
-        offset
-    }
-
-    fn clear(&mut self) {
-        self.end = 0;
-        if self.bytes.len() > MAX_KEPT {
-            self.bytes = Vec::new();
-        }
-    }
-}
-
-/// Packs texels for the GPU, on any thread.
-#[derive(Default)]
-pub(super) struct Packer {
-    is_wanted: bool,
-    part: usize,
-    rects: Vec<Changed>,
-    rows: Rows,
-}
-
-impl Packer {
-    /// Notes that the same texels have changed in the images of a surface of `size` texels, and packs them: they have just been
-    /// written, so that the cache still has them.
-    pub(super) fn push<'a>(&mut self, images: impl Iterator<Item = Option<(AssetId<Image>, &'a [u8])>> + Clone, size: UVec2, rect: TexelRect) {
-        if !self.is_wanted || rect.is_empty() {
-            return;
-        }
-        let (stride, area) = (size.x as usize, size.x as usize * size.y as usize);
-        let [x, y] = rect.min.as_usizevec2().to_array();
-        let [width, height] = rect.size().as_usizevec2().to_array();
-        let images = images.flatten().map(|(image, data)| (image, data, data.len() / area));
-        let beside = |texel: usize| (width * texel).next_multiple_of(COPY_ALIGNMENT);
-        let pitch = images.clone().map(|(.., texel)| beside(texel)).sum::<usize>().next_multiple_of(ROW_ALIGNMENT);
-        let is_packed = pitch <= SIDE_BY_SIDE * SHORT_ROW && self.rows.end + pitch * height <= MAX_PACKED;
-        let mut offset = if is_packed { self.rows.extend(pitch * height) } else { 0 };
-        for (image, data, texel) in images {
-            let place = is_packed.then_some(Place { part: self.part, offset, pitch, row: width * texel });
-            if let Some(place) = place {
-                pack(&mut self.rows.bytes, place, data, (y * stride + x) * texel, stride * texel, height);
-                offset += beside(texel);
-            }
-            self.rects.push(Changed { image, rect, place });
-        }
-    }
-}
 
 /// Rectangles to upload.
 #[derive(Resource, Default)]
@@ -148,8 +55,10 @@ pub(super) struct Uploads {
     rects: Vec<Changed>,
     /// Hold the texels of `rects` that are packed: number `i` those of part `i + 1`.
     packers: Vec<Packer>,
-    /// Number of rectangles of each image since they were last thinned out.
+    /// Number of rectangles up to which they are not thinned out again.
     limit: usize,
+    /// Whether the renderer has fetched them since they were last looked at.
+    is_fetched: bool,
     /// Whether whole textures are on their way.
     has_whole: bool,
     /// Whole pictures that come before the rectangles.
@@ -211,7 +120,7 @@ impl Uploads {
     pub(super) fn pack(&mut self, count: usize, paint: impl FnOnce(&mut [Packer])) {
         while self.packers.len() < count {
             let part = self.packers.len() + 1;
-            self.packers.push(Packer { is_wanted: self.is_wanted, part, ..default() });
+            self.packers.push(Packer::new(self.is_wanted, part));
         }
         paint(&mut self.packers[..count]);
         self.packers.iter_mut().for_each(|packer| self.rects.append(&mut packer.rects));
@@ -259,7 +168,8 @@ impl Uploads {
 
 /// Keeps the list short when the renderer does not fetch it (a minimised window).
 pub(super) fn drop_unwanted(mut uploads: ResMut<Uploads>) {
-    if uploads.rects.len() > uploads.limit.max(MAX_RECTS_PER_IMAGE) {
+    let most = if core::mem::take(&mut uploads.is_fetched) { MAX_WAITING } else { MAX_UNFETCHED };
+    if uploads.rects.len() > uploads.limit.max(most) {
         uploads.thin_out();
         uploads.limit = 2 * uploads.rects.len();
     }
@@ -286,9 +196,6 @@ struct Copy {
     /// From row to row.
     pitch: usize,
 }
-
-/// The part of what is not packed before the renderer fetches it.
-const LOOSE: usize = 0;
 
 impl Copy {
     /// Bytes of a row.
@@ -391,6 +298,7 @@ fn upload_rects(
     }
     let Staging { rects, copies, parts, buffers } = &mut *staging;
     let mut uploads = main.resource_mut::<Uploads>();
+    uploads.is_fetched = true;
     core::mem::swap(rects, &mut uploads.rects);
     parts.resize_with(uploads.packers.len() + 1, Rows::default);
     for (rows, packer) in parts[LOOSE + 1..].iter_mut().zip(&mut uploads.packers) {
@@ -513,16 +421,6 @@ fn pack_copy(copy: &Copy, images: &Assets<Image>, rows: &mut [u8]) {
     }
 }
 
-/// Copies rows of an image, the first of which begins at `from`, to their place.
-fn pack(rows: &mut [u8], place: Place, data: &[u8], mut from: usize, stride: usize, height: usize) {
-    let mut to = place.offset;
-    for _ in 0..height {
-        rows[to..to + place.row].copy_from_slice(&data[from..from + place.row]);
-        from += stride;
-        to += place.pitch;
-    }
-}
-
 fn destination<'a>(gpu: &'a GpuImage, copy: &Copy) -> (TexelCopyTextureInfo<'a>, Extent3d) {
     let (min, size) = (copy.rect.min, copy.rect.size());
     let origin = Origin3d { x: min.x, y: min.y, z: 0 };
@@ -574,4 +472,57 @@ fn copy(
     }
     queue.submit([encoder.finish()]);
     buffers.give_back(buffer, device);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_packed_gives_way_to_what_comes_later() {
+        let ids = [1, 2].map(|n| AssetId::Uuid { uuid: bevy::asset::uuid::Uuid::from_u128(n) });
+        let size = UVec2::new(20, 10);
+        let data = vec![7; 800];
+        let rect = |x| TexelRect { min: UVec2::new(x, 2), max: UVec2::new(x + 3, 6) };
+        let mut uploads = Uploads { is_wanted: true, ..default() };
+        let fill = |uploads: &mut Uploads| {
+            uploads.pack(2, |packers| {
+                for (packer, x) in packers.iter_mut().zip([4, 9]) {
+                    packer.push(ids.into_iter().map(|id| Some((id, &data[..]))), size, rect(x));
+                }
+            });
+        };
+        let packed = |uploads: &Uploads, id| -> Vec<bool> {
+            let changed = uploads.rects.iter().filter(|changed| changed.image == id);
+            changed.map(|changed| changed.place.is_some()).collect()
+        };
+        fill(&mut uploads);
+        uploads.push_whole(ids[0], size, None);
+        assert_eq!(packed(&uploads, ids[0]), [false, false, false], "older than the whole");
+        assert_eq!(packed(&uploads, ids[1]), [true, true]);
+        // Thinned out: one rectangle of each image around all of its own, packed when it is fetched.
+        fill(&mut uploads);
+        uploads.thin_out();
+        assert_eq!(uploads.rects.len(), 2);
+        for (changed, around) in uploads.rects.iter().zip([TexelRect::whole(size), rect(4).union(rect(9))]) {
+            assert!(changed.rect == around && changed.place.is_none(), "{:?}", changed.rect);
+        }
+    }
+
+    #[test]
+    fn only_what_nobody_fetches_is_thinned_out() {
+        for is_fetched in [true, false] {
+            let mut app = App::new();
+            app.init_resource::<Uploads>().add_systems(Update, drop_unwanted);
+            let mut uploads = app.world_mut().resource_mut::<Uploads>();
+            (uploads.is_wanted, uploads.is_fetched) = (true, is_fetched);
+            for x in 0..=MAX_UNFETCHED as u32 {
+                let min = UVec2::new(x, 0);
+                uploads.push(AssetId::default(), TexelRect { min, max: min + 1 });
+            }
+            app.update();
+            let left = app.world().resource::<Uploads>().rects.len();
+            assert_eq!(left, if is_fetched { MAX_UNFETCHED + 1 } else { 1 });
+        }
+    }
 }

@@ -172,7 +172,8 @@ impl Capsule {
         rect
     }
 
-    /// Blocks of [`LANES`] texels, row by row. A block may stick out of `rect`: the values there are zero.
+    /// Blocks of [`LANES`] texels and at most one of half as many, row by row. A block may stick out of `rect`: the values there are
+    /// zero.
     fn stamp_rows<const TELL: bool, const TAPER: bool, const RIM: bool>(
         &self,
         field: &mut DepthField,
@@ -201,7 +202,7 @@ impl Capsule {
                     continue;
                 }
             }
-            let n = (x1 - x0).next_multiple_of(LANES);
+            let n = (x1 - x0).next_multiple_of(LANES / 2);
             x0 = x0.min(width.saturating_sub(n));
             let end = (x0 + n).min(width);
             // The columns that have changed, and those between them.
@@ -214,13 +215,15 @@ impl Capsule {
             };
             let (blocks, rest) = field.depth.row_mut(y as usize)[x0..end].as_chunks_mut::<LANES>();
             for block in blocks {
-                add(x0, self.stamp_block::<TAPER, RIM>(block, section, x0 as f32, dy));
+                add(x0, self.stamp_block::<LANES, TAPER, RIM>(block, section, x0 as f32, dy));
                 x0 += LANES;
             }
-            if !rest.is_empty() {
+            if let Ok(block) = <&mut [u16; LANES / 2]>::try_from(&mut *rest) {
+                add(x0, self.stamp_block::<{ LANES / 2 }, TAPER, RIM>(block, section, x0 as f32, dy));
+            } else if !rest.is_empty() {
                 let mut block = [0; LANES];
                 block[..rest.len()].copy_from_slice(rest);
-                add(x0, self.stamp_block::<TAPER, RIM>(&mut block, section, x0 as f32, dy));
+                add(x0, self.stamp_block::<LANES, TAPER, RIM>(&mut block, section, x0 as f32, dy));
                 rest.copy_from_slice(&block[..rest.len()]);
             }
             if TELL && span.start < span.end {
@@ -238,16 +241,16 @@ impl Capsule {
 
     /// Returns the bits that have changed, 16 a texel.
     #[inline(always)]
-    fn stamp_block<const TAPER: bool, const RIM: bool>(
+    fn stamp_block<const N: usize, const TAPER: bool, const RIM: bool>(
         &self,
-        block: &mut [u16; LANES],
+        block: &mut [u16; N],
         section: &Section,
         x: f32,
         dy: f32,
     ) -> u128 {
         let uniform = section.cut(self.r_from);
-        let mut values = [0.0; LANES];
-        for i in 0..LANES {
+        let mut values = [0.0; N];
+        for i in 0..N {
             let dx = (x + CENTRES[i]) - self.from.x;
             let t = clamp01((dx * self.along.x + dy * self.along.y) * self.inv_len_sq);
             let (across_x, across_y) = (dx - t * self.along.x, dy - t * self.along.y);

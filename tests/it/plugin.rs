@@ -69,7 +69,7 @@ fn sprite_cracks_and_heals() {
     assert!(counts(&app).applied == 2);
 }
 
-/// The pattern does not depend on the frame rate (E7), on the budget or on other surfaces.
+/// The pattern does not depend on the frame rate (E7), on the budget or on other surfaces, however many threads paint them.
 #[test]
 fn same_hits_same_texels() {
     let run = |milliseconds: u64, budget: f32, others: usize| {
@@ -90,6 +90,8 @@ fn same_hits_same_texels() {
     assert_eq!(run(3, 1e6, 0), reference, "another frame rate");
     assert_eq!(run(200, 1e6, 0), reference, "slow frames");
     assert_eq!(run(20, 0.0, 3), reference, "no budget and other surfaces");
+    assert_eq!(run(20, 1e6, 100), reference, "side by side with many");
+    assert_eq!(run(20, 0.5, 100), reference, "side by side with as many as there is time for");
 }
 
 /// I9, I1, I4, I10: hits on nothing, with broken numbers, with broken transforms: refused, counted, no panic.
