@@ -71,6 +71,7 @@ pub(super) struct Kind {
 }
 
 /// What a shard or its sides are shown with.
+#[cfg_attr(not(any(feature = "2d", feature = "3d")), expect(dead_code, reason = "there are no kinds then"))]
 pub(super) struct Clothes {
     pub(super) parent: Entity,
     pub(super) place: Transform,
