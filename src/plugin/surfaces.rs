@@ -277,7 +277,7 @@ pub(super) struct Surfaces {
 }
 
 /// The most surfaces that are worked on at once.
-const BATCH: usize = 64;
+const BATCH: usize = 128;
 
 /// Takes the first surfaces out of a line in which each is once, and makes a job of each that is there.
 pub(super) fn batch<'a, J>(
