@@ -180,8 +180,7 @@ impl CrackGrowth {
     pub(super) fn bear(&mut self, pos: Vec2, parent: u32, generation: u32, impact: u32, bend: f32) {
         let node = self.network.nodes.len() as u64;
         let wider = self.impacts.get(impact as usize).map_or(1.0, |impact| impact.widening);
-        let draw = |what| hash_unit(self.seed ^ what, node);
-        let width = self.widths.tip(parent, [draw(0x1D), draw(0x2D)], wider);
+        let width = self.widths.tip(parent, |what| hash_unit(self.seed ^ what, node), wider);
         if let Some(arrest) = &mut self.arrest {
             arrest.push_node(false);
         }

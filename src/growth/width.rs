@@ -91,19 +91,19 @@ impl Widths {
         self.pipes.reserve(nodes);
     }
 
-    /// Prepares the place of a node that grows from `parent`, with two draws of its own; returns its width.
-    pub(super) fn tip(&mut self, parent: u32, [draw, fine]: [f32; 2], wider: f32) -> f32 {
+    /// Prepares the place of a node that grows from `parent`, with draws of its own; returns its width.
+    pub(super) fn tip(&mut self, parent: u32, draw: impl Fn(u64) -> f32, wider: f32) -> f32 {
         let mut factor = 1.0;
         let mut is_hairline = false;
         if self.hairlines > 0.0 {
             let begins = (1.0 - GOES_ON) * self.hairlines / (1.0 - self.hairlines).max(1e-3);
             let is_within = self.pipes.get(parent as usize).is_some_and(|pipe| pipe.is_hairline);
-            is_hairline = fine < if is_within { GOES_ON } else { begins };
+            is_hairline = draw(0x2D) < if is_within { GOES_ON } else { begins };
         }
         if self.unevenness > 0.0 {
             // Each node is much like the one before.
             let before = self.pipes.get(parent as usize).map_or(1.0, |pipe| pipe.factor);
-            factor += 0.75 * (before - 1.0) + self.unevenness * (draw - 0.5);
+            factor += 0.75 * (before - 1.0) + self.unevenness * (draw(0x1D) - 0.5);
             factor = factor.clamp(1.0 - self.unevenness, 1.0 + self.unevenness);
         }
         let pipe = Pipe { behind: 1, told: 1, notch: 0, factor, wider, is_hairline };
