@@ -155,7 +155,8 @@ pub struct GrowthParams {
     pub arrest: f32,
     /// Share of tips that stop short of the crack that they would have met, 0..=1.
     pub open_ends: f32,
-    /// Share of nodes beside which a short side crack starts that ends by itself, 0..=1.
+    /// Share of nodes beside which a short side crack starts that ends by itself, 0..=1: 0.55 to 1.1 segments long, 53 to 90 degrees
+    /// off, only where no other crack is near.
     pub spurs: f32,
     /// Cracks that begin by themselves where markers are out of every crack's reach: how many for each step of growth, 0..=64.
     /// They come late, so they end at the older ones.

@@ -38,7 +38,7 @@ impl SegmentPath {
         &self.points[..self.len]
     }
 
-    /// The same line elsewhere.
+    /// The same line, `by` further on (pattern units); widths stay.
     #[must_use]
     pub fn moved(mut self, by: Vec2) -> Self {
         for point in &mut self.points[..self.len] {
