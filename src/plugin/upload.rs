@@ -2,23 +2,25 @@
 //!
 //! The texels on the CPU (`Image::data`) are the truth. Painting changes them without an asset event, notes the
 //! rectangle here and packs its texels, while the cache still has them, the way the GPU wants them; the extraction, which
-//! sees both worlds, copies them into the texture. Whatever else makes the renderer prepare an image again uploads all of `data`,
+//! sees both worlds, puts them where the GPU reads them. The commands to copy them into the textures are made beside the
+//! renderer's preparations. Whatever else makes the renderer prepare an image again uploads all of `data`,
 //! cracks included.
 
 mod pack;
 
 pub(super) use pack::Packer;
 
+use super::beside::Beside;
 use crate::raster::TexelRect;
 use bevy::{
     platform::collections::HashMap,
     prelude::*,
     render::{
-        ExtractSchedule, MainWorld, RenderApp,
+        ExtractSchedule, MainWorld, Render, RenderApp, RenderSystems,
         render_asset::{RenderAssetBytesPerFrameLimiter, RenderAssets, extract_render_asset_bytes_per_frame},
         render_resource::{
             Buffer, BufferDescriptor, BufferUsages, CommandEncoder, CommandEncoderDescriptor, Extent3d, MapMode,
-            Origin3d, TexelCopyBufferInfo, TexelCopyBufferLayout, TexelCopyTextureInfo, TextureAspect,
+            Origin3d, TexelCopyBufferInfo, TexelCopyBufferLayout, TexelCopyTextureInfo, Texture, TextureAspect,
         },
         renderer::{RenderDevice, RenderQueue},
         texture::GpuImage,
@@ -186,13 +188,15 @@ pub(super) fn connect(app: &mut App) {
     let Some(render_app) = app.get_sub_app_mut(RenderApp) else { return };
     render_app
         .init_resource::<Staging>()
-        .add_systems(ExtractSchedule, upload_rects.after(extract_render_asset_bytes_per_frame));
+        .add_systems(ExtractSchedule, upload_rects.after(extract_render_asset_bytes_per_frame))
+        .add_systems(Render, finish_sending.after(RenderSystems::Prepare).before(RenderSystems::Render));
     app.world_mut().resource_mut::<Uploads>().is_wanted = true;
 }
 
 /// A rectangle that fits, with the place of its rows in the staging buffer.
 struct Copy {
     image: AssetId<Image>,
+    texture: Texture,
     rect: TexelRect,
     texel: usize,
     /// Which [`Rows`], [`LOOSE`] if it is not packed yet.
@@ -225,6 +229,38 @@ struct Staging {
     rects: Vec<Changed>,
     copies: Vec<Copy>,
     buffers: Buffers,
+    /// Gives back the memory of its list.
+    sending: Option<Beside<Sending, Vec<Copy>>>,
+}
+
+impl Staging {
+    /// Waits for what is being sent.
+    fn finish(&mut self) {
+        if let Some(copies) = self.sending.take().and_then(Beside::finish) {
+            self.copies = copies;
+        }
+    }
+}
+
+/// Copies to be made from a buffer.
+struct Sending {
+    device: RenderDevice,
+    queue: RenderQueue,
+    buffers: Buffers,
+    buffer: Buffer,
+    copies: Vec<Copy>,
+}
+
+impl Sending {
+    /// All in one submission: a write of its own for each costs more than its texels.
+    fn send(self) -> Vec<Copy> {
+        let Self { device, queue, buffers, buffer, mut copies } = self;
+        let mut encoder = device.create_command_encoder(&CommandEncoderDescriptor { label: Some("crack_texels") });
+        copies.drain(..).for_each(|copy| copy_one(&mut encoder, &copy, &buffer));
+        queue.submit([encoder.finish()]);
+        buffers.give_back(buffer, &device);
+        copies
+    }
 }
 
 /// Buffers that the GPU has read, ready to be written again: new ones cost their memory's page faults.
@@ -271,6 +307,8 @@ fn upload_rects(
     if core::mem::take(&mut main.resource_mut::<Uploads>().has_whole) {
         limiter.max_bytes = None;
     }
+    // Only if the renderer has skipped a frame.
+    staging.finish();
     let mut stats = CrackUploadStats::default();
     let mut whole = core::mem::take(&mut main.resource_mut::<Uploads>().staged);
     if !whole.is_empty()
@@ -279,7 +317,7 @@ fn upload_rects(
         copy_whole(&mut whole, images, &gpu_images, &device, &queue, &mut stats);
         main.resource_mut::<Uploads>().staged = whole;
     }
-    let Staging { rects, copies, buffers } = &mut *staging;
+    let Staging { rects, copies, buffers, sending } = &mut *staging;
     let mut uploads = main.resource_mut::<Uploads>();
     uploads.is_fetched = true;
     core::mem::swap(rects, &mut uploads.rects);
@@ -312,11 +350,14 @@ fn upload_rects(
             pack_copy(copy, images, &mut loose.bytes);
         }
         if copies.len() <= FEW {
-            write(copies, &packers, &gpu_images, &queue);
+            write(copies, &packers, &queue);
+            copies.clear();
         } else {
-            copy(copies, &packers, buffers, &gpu_images, &device, &queue);
+            let buffer = fill(copies, &packers, buffers, &device);
+            let (device, queue, buffers) = (device.clone(), queue.clone(), buffers.clone());
+            let work = Sending { device, queue, buffers, buffer, copies: core::mem::take(copies) };
+            *sending = Some(Beside::start(work, Sending::send));
         }
-        copies.clear();
     }
     packers.iter_mut().for_each(|packer| packer.rows.clear());
     main.resource_mut::<Uploads>().packers = packers;
@@ -343,11 +384,8 @@ fn copy_whole(
             Plan::Copy(copy) => {
                 let copy = Copy { pitch: staged.pitch, ..copy };
                 let size = (copy.pitch * copy.height()) as u64;
-                if let Some(gpu) = gpu_images.get(*id)
-                    && copy.row() <= copy.pitch
-                    && size == staged.buffer.size()
-                {
-                    copy_one(&mut encoder, &copy, 0, &staged.buffer, gpu);
+                if copy.row() <= copy.pitch && size == staged.buffer.size() {
+                    copy_one(&mut encoder, &copy, &staged.buffer);
                     stats.rects += 1;
                     stats.bytes += copy.rect.area() * copy.texel as u64;
                 }
@@ -360,10 +398,14 @@ fn copy_whole(
     queue.submit([encoder.finish()]);
 }
 
-/// Copies from a buffer in which the copy's part begins at `start`.
-fn copy_one(encoder: &mut CommandEncoder, copy: &Copy, start: usize, buffer: &Buffer, gpu: &GpuImage) {
-    let (to, size) = destination(gpu, copy);
-    let layout = layout(copy, (start + copy.offset) as u64);
+/// What is sent beside the renderer's preparations comes before what is drawn.
+fn finish_sending(mut staging: ResMut<Staging>) {
+    staging.finish();
+}
+
+fn copy_one(encoder: &mut CommandEncoder, copy: &Copy, buffer: &Buffer) {
+    let (to, size) = destination(copy);
+    let layout = layout(copy, copy.offset as u64);
     encoder.copy_buffer_to_texture(TexelCopyBufferInfo { buffer, layout }, to, size);
 }
 
@@ -389,7 +431,8 @@ fn plan(id: AssetId<Image>, rect: TexelRect, images: &Assets<Image>, gpu_images:
     if rect.is_empty() || image.data.as_ref().is_none_or(|data| data.len() < needed) {
         return Plan::Drop;
     }
-    Plan::Copy(Copy { image: id, rect, texel: texel as usize, part: LOOSE, offset: 0, pitch: 0 })
+    let (texture, texel) = (gpu.texture.clone(), texel as usize);
+    Plan::Copy(Copy { image: id, texture, rect, texel, part: LOOSE, offset: 0, pitch: 0 })
 }
 
 /// Copies the texels of a rectangle to their place.
@@ -404,11 +447,11 @@ fn pack_copy(copy: &Copy, images: &Assets<Image>, rows: &mut [u8]) {
     }
 }
 
-fn destination<'a>(gpu: &'a GpuImage, copy: &Copy) -> (TexelCopyTextureInfo<'a>, Extent3d) {
+fn destination(copy: &Copy) -> (TexelCopyTextureInfo<'_>, Extent3d) {
     let (min, size) = (copy.rect.min, copy.rect.size());
     let origin = Origin3d { x: min.x, y: min.y, z: 0 };
     (
-        TexelCopyTextureInfo { texture: &gpu.texture, mip_level: 0, origin, aspect: TextureAspect::All },
+        TexelCopyTextureInfo { texture: &copy.texture, mip_level: 0, origin, aspect: TextureAspect::All },
         Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 },
     )
 }
@@ -419,28 +462,21 @@ fn layout(copy: &Copy, offset: u64) -> TexelCopyBufferLayout {
 }
 
 /// Writes rectangles one by one.
-fn write(copies: &[Copy], packers: &[Packer], gpu_images: &RenderAssets<GpuImage>, queue: &RenderQueue) {
+fn write(copies: &[Copy], packers: &[Packer], queue: &RenderQueue) {
     for copy in copies {
-        let Some(gpu) = gpu_images.get(copy.image) else { continue };
-        let (to, size) = destination(gpu, copy);
+        let (to, size) = destination(copy);
         queue.write_texture(to, &packers[copy.part].rows.bytes[copy.offset..], layout(copy, 0), size);
     }
 }
 
-/// Copies all rectangles from one buffer in one submission: a write of its own costs more than its texels.
-fn copy(
-    copies: &[Copy],
-    packers: &[Packer],
-    buffers: &Buffers,
-    gpu_images: &RenderAssets<GpuImage>,
-    device: &RenderDevice,
-    queue: &RenderQueue,
-) {
+/// Brings all packed texels to one buffer, and the copies to their places there.
+fn fill(copies: &mut [Copy], packers: &[Packer], buffers: &Buffers, device: &RenderDevice) -> Buffer {
     let (mut starts, mut size) = (Vec::with_capacity(packers.len()), 0);
     for packer in packers {
         starts.push(size);
         size += packer.rows.end();
     }
+    copies.iter_mut().for_each(|copy| copy.offset += starts[copy.part]);
     let buffer = buffers.take(size as u64, device);
     let mut memory = buffer.slice(..).get_mapped_range_mut();
     for (Packer { rows, .. }, start) in packers.iter().zip(&starts) {
@@ -448,13 +484,7 @@ fn copy(
     }
     drop(memory);
     buffer.unmap();
-    let mut encoder = device.create_command_encoder(&CommandEncoderDescriptor { label: Some("crack_texels") });
-    for copy in copies {
-        let Some(gpu) = gpu_images.get(copy.image) else { continue };
-        copy_one(&mut encoder, copy, starts[copy.part], &buffer, gpu);
-    }
-    queue.submit([encoder.finish()]);
-    buffers.give_back(buffer, device);
+    buffer
 }
 
 #[cfg(test)]
