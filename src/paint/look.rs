@@ -2,7 +2,11 @@
 
 use crate::pattern::MAX_SIDE;
 use glam::Vec4;
-use std::{borrow::Cow, ops::RangeInclusive};
+use std::{
+    borrow::Cow,
+    ops::RangeInclusive,
+    sync::{Arc, Mutex, PoisonError, Weak},
+};
 
 /// A point of a [`Look`]'s ramp.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -138,12 +142,21 @@ const STEPS: usize = 256;
 /// What a depth puts over the picture: colour times cover in 0..=255 (sRGB), and cover 0..=1.
 pub(super) type Layer = Vec4;
 
+/// Nothing, then the ramp at depths 0, 256, .. 65280, each with what is gained up to the next: linear between, so that slow
+/// gradients have no steps.
+type Ramp = [[Layer; 2]; STEPS + 1];
+
+/// Ramps in use, with the stops that they are made from. Surfaces with the same stops share one: so the processor's caches hold one
+/// while many surfaces are painted, and not each surface's own.
+static RAMPS: Mutex<Vec<(Cow<'static, [ColorStop]>, Weak<Ramp>)>> = Mutex::new(Vec::new());
+
+/// No more than so many are shared.
+const MAX_SHARED: usize = 64;
+
 /// A [`Look`] made ready to paint with.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LookTable {
-    /// Nothing, then the ramp at depths 0, 256, .. 65280, each with what is gained up to the next: linear between, so that slow
-    /// gradients have no steps.
-    ramp: Box<[[Layer; 2]; STEPS + 1]>,
+    ramp: Arc<Ramp>,
     pub(super) glint: f32,
     pub(super) grain: f32,
     pub(super) shift: f32,
@@ -202,6 +215,34 @@ pub(super) fn within(
     if allowed.contains(&value) { Ok(()) } else { Err(LookError::OutOfRange { field, value, range }) }
 }
 
+impl Look {
+    fn ramp(&self) -> Ramp {
+        let layer = |step: usize| {
+            let (color, cover) = self.at(step as f32 / STEPS as f32);
+            let [r, g, b] = color.map(|channel| 255.0 * channel * cover);
+            Layer::new(r, g, b, cover)
+        };
+        let mut ramp = [[Layer::ZERO; 2]; STEPS + 1];
+        for (step, place) in ramp[1..].iter_mut().enumerate() {
+            *place = [layer(step), layer(step + 1) - layer(step)];
+        }
+        ramp
+    }
+
+    fn shared_ramp(&self) -> Arc<Ramp> {
+        let mut ramps = RAMPS.lock().unwrap_or_else(PoisonError::into_inner);
+        let known = ramps.iter().find(|(stops, _)| *stops == self.ramp).and_then(|(_, ramp)| ramp.upgrade());
+        known.unwrap_or_else(|| {
+            ramps.retain(|(_, ramp)| ramp.strong_count() > 0);
+            let ramp = Arc::new(self.ramp());
+            if ramps.len() < MAX_SHARED {
+                ramps.push((self.ramp.clone(), Arc::downgrade(&ramp)));
+            }
+            ramp
+        })
+    }
+}
+
 impl LookTable {
     /// Tables for `look`; `texels_per_unit` as in [`SurfaceFrame`](crate::pattern::SurfaceFrame).
     ///
@@ -210,15 +251,7 @@ impl LookTable {
     pub fn new(look: &Look, texels_per_unit: f32) -> Result<Self, LookError> {
         look.validate()?;
         within("texels_per_unit", texels_per_unit, f32::MIN_POSITIVE..=MAX_SIDE as f32, "above 0, up to 16384")?;
-        let layer = |step: usize| {
-            let (color, cover) = look.at(step as f32 / STEPS as f32);
-            let [r, g, b] = color.map(|channel| 255.0 * channel * cover);
-            Layer::new(r, g, b, cover)
-        };
-        let mut ramp = Box::new([[Layer::ZERO; 2]; STEPS + 1]);
-        for (step, place) in ramp[1..].iter_mut().enumerate() {
-            *place = [layer(step), layer(step + 1) - layer(step)];
-        }
+        let ramp = look.shared_ramp();
         // Sobel's kernel weighs a slope of one depth step per texel with 8.
         let slope = look.relief * texels_per_unit / (8.0 * 65535.0);
         let Look { glint, grain, shift, opaque, .. } = *look;
@@ -282,6 +315,30 @@ mod tests {
             refused(&Look { ramp: vec![stop(0.5, [0.0; 3], 0.0); 17].into(), ..Look::GROOVE }),
             Some("ramp.len()")
         );
+    }
+
+    #[test]
+    fn equal_stops_share_a_ramp_and_others_do_not() {
+        let stops = vec![stop(0.3, [0.1, 0.9, 0.2], 0.7), stop(0.9, [0.4, 0.2, 0.3], 1.0)];
+        let look = Look { ramp: stops.clone().into(), ..Look::GROOVE };
+        let table = |look: &Look| LookTable::new(look, 512.0).unwrap();
+        let (first, second) = (table(&look), table(&Look { glint: 0.1, ..look.clone() }));
+        assert!(Arc::ptr_eq(&first.ramp, &second.ramp), "not shared");
+        let other = table(&Look { ramp: stops[..1].to_vec().into(), ..Look::GROOVE });
+        assert_ne!(first.ramp, other.ramp);
+        let before = *first.ramp;
+        drop((first, second));
+        assert_eq!(*table(&look).ramp, before);
+        // Many looks at once: those that are not shared are right as well.
+        let tables: Vec<_> = (0..2 * MAX_SHARED)
+            .map(|i| {
+                let stops = vec![stop(0.5, [0.0, 0.0, i as f32 / 255.0], 1.0)];
+                (i, table(&Look { ramp: stops.into(), ..Look::GROOVE }))
+            })
+            .collect();
+        for (i, table) in tables {
+            assert_eq!(layer(&table, 0x8000)[2], i as f32 / 255.0 * 255.0);
+        }
     }
 
     #[test]
