@@ -204,14 +204,14 @@ impl Drawing {
         let on_border = |place: Place| self.lattice.sides(place).contains(&true);
         let tips: Vec<u32> =
             (0..at.len() as u32).filter(|&v| at[v as usize].0 == 1 && !on_border(self.places[v as usize])).collect();
-        let grid = EdgeGrid::new(self);
+        let mut grid = EdgeGrid::new(self);
         let rng = Rng::new(seed).stream("carry on");
-        let (mut younger, mut lines) = (Vec::new(), Vec::new());
+        let mut lines = Vec::with_capacity(tips.len());
         for tip in tips {
             let back = self.way_back(&at, tip);
             let [start, back] = [tip, back].map(|vertex| self.places[vertex as usize]);
             let way = vector(back, start).map(|x| x as f64);
-            let Some((edge, hit)) = self.first_hit(start, way, &grid, &younger) else { continue };
+            let Some((edge, hit)) = self.first_hit(start, way, &grid) else { continue };
             let [from, to] = self.edges[edge as usize];
             if let Some(pieces) = self.split(edge, hit) {
                 for (end, piece) in [from, to].into_iter().zip(pieces) {
@@ -219,13 +219,11 @@ impl Drawing {
                         *edges ^= edge ^ piece;
                     }
                 }
-                younger.extend(pieces);
             }
             let ends = [tip, hit].map(|v| self.lattice.pos(self.places[v as usize]));
             let line = self.rough_line(ends, rng.nth(u64::from(tip)));
-            let first = self.edges.len() as u32;
             self.line(line.iter().copied());
-            younger.extend(first..self.edges.len() as u32);
+            grid.add_new(self);
             lines.push(line);
         }
         self.edges.retain(|&edge| edge != DEAD);
@@ -249,7 +247,7 @@ impl Drawing {
     }
 
     /// The first edge on the way from a place, other than those that begin there, and the vertex at which the way meets it.
-    fn first_hit(&mut self, start: Place, way: [f64; 2], grid: &EdgeGrid, younger: &[u32]) -> Option<(u32, u32)> {
+    fn first_hit(&mut self, start: Place, way: [f64; 2], grid: &EdgeGrid) -> Option<(u32, u32)> {
         // To the first side of the surface.
         let share = [0, 1]
             .map(|i| {
@@ -263,29 +261,29 @@ impl Drawing {
         }
         let end: Place =
             [0, 1].map(|i| ((f64::from(start[i]) + way[i] * share).round() as i32).clamp(0, self.lattice.corner[i]));
-        let mut best: Option<(f64, u32)> = None;
-        let mut look = |edge: u32| {
-            if self.edges[edge as usize] == DEAD {
-                return;
-            }
-            let [c, d] = self.ends(edge);
-            if c == start || d == start {
-                return;
-            }
-            let (oc, od) = (orient(start, end, c), orient(start, end, d));
-            if oc.signum() * od.signum() > 0 || (oc == 0 && od == 0) {
-                return;
-            }
-            let (side, run) = (vector(c, d), vector(start, end));
-            let along = cross(vector(start, c), side) as f64 / cross(run, side) as f64;
-            if (0.0..=1.0).contains(&along) && best.is_none_or(|best| (along, edge) < best) {
-                best = Some((along, edge));
-            }
-        };
-        grid.along(start, end, |edges| edges.iter().copied().for_each(&mut look));
-        younger.iter().copied().for_each(&mut look);
-        let (along, edge) = best?;
         let run = vector(start, end);
+        let mut best: Option<(f64, u32)> = None;
+        grid.along(start, end, |edges, far| {
+            for edge in edges.filter(|&edge| self.edges[edge as usize] != DEAD) {
+                let [c, d] = self.ends(edge);
+                let (oc, od) = (cross(run, vector(start, c)), cross(run, vector(start, d)));
+                if c == start || d == start || oc.signum() * od.signum() > 0 || (oc == 0 && od == 0) {
+                    continue;
+                }
+                let side = vector(c, d);
+                let along = cross(vector(start, c), side) as f64 / cross(run, side) as f64;
+                if (0.0..=1.0).contains(&along) && best.is_none_or(|best| (along, edge) < best) {
+                    best = Some((along, edge));
+                }
+            }
+            // All further squares lie further on; a place more, for rounding.
+            let is_before = |i: usize, along: f64| {
+                let left = f64::from(far[i] - start[i]) - run[i] as f64 * along;
+                left * run[i].signum() as f64 > 1.0 || run[i] == 0
+            };
+            best.is_some_and(|(along, _)| is_before(0, along) && is_before(1, along))
+        });
+        let (along, edge) = best?;
         let hit: Place = [0, 1].map(|i| start[i] + (run[i] as f64 * along).round() as i32);
         // The sides of the surface stay straight.
         let [c, d] = self.ends(edge);
@@ -314,8 +312,8 @@ impl Drawing {
         let start = self.lattice.snap(from);
         let way = way.as_dvec2().to_array();
         let grid = EdgeGrid::new(self);
-        let Some((there, one)) = self.first_hit(start, way, &grid, &[]) else { return };
-        let Some((back, other)) = self.first_hit(start, way.map(|x| -x), &grid, &[]) else { return };
+        let Some((there, one)) = self.first_hit(start, way, &grid) else { return };
+        let Some((back, other)) = self.first_hit(start, way.map(|x| -x), &grid) else { return };
         self.split(there, one);
         if back != there {
             self.split(back, other);
@@ -361,7 +359,16 @@ struct EdgeGrid {
     /// Per square: where its edges begin in `edges`; one more at the end.
     starts: Vec<u32>,
     edges: Vec<u32>,
+    /// How many edges of the drawing are in it.
+    known: usize,
+    /// Edges that came later, each with the one before it in its square.
+    newer: Vec<[u32; 2]>,
+    /// Per square: the last of them; empty as long as there are none.
+    newest: Vec<u32>,
 }
+
+/// The end of a list in [`EdgeGrid::newer`].
+const NONE: u32 = u32::MAX;
 
 impl EdgeGrid {
     fn new(drawing: &Drawing) -> Self {
@@ -372,14 +379,19 @@ impl EdgeGrid {
             shift += 1;
         }
         let (columns, rows) = ((w >> shift) as usize + 1, (h >> shift) as usize + 1);
-        let mut grid = Self { shift, columns, starts: vec![0; columns * rows + 1], edges: Vec::new() };
+        let known = drawing.edges.len();
+        let starts = vec![0; columns * rows + 1];
+        let mut grid = Self { shift, columns, starts, edges: Vec::new(), known, newer: Vec::new(), newest: Vec::new() };
         let mut passes = Vec::with_capacity(3 * drawing.edges.len());
         for edge in 0..drawing.edges.len() as u32 {
             if drawing.edges[edge as usize] == DEAD {
                 continue;
             }
             let [a, b] = drawing.ends(edge);
-            grid.squares(a, b, |square| passes.push((square, edge)));
+            grid.squares(a, b, |[column, row]| {
+                passes.push((grid.square(column, row), edge));
+                false
+            });
         }
         for &(square, _) in &passes {
             grid.starts[square as usize + 1] += 1;
@@ -396,26 +408,50 @@ impl EdgeGrid {
         grid
     }
 
-    /// Every square that the line between two places touches, row by row.
-    fn squares(&self, a: Place, b: Place, mut visit: impl FnMut(u32)) {
-        let (top, bottom) = if a[1] <= b[1] { (a, b) } else { (b, a) };
-        let square = |x: i32| (x >> self.shift) as usize;
-        let (first, last) = (square(top[1]), square(bottom[1]));
-        let (low, high) = (top[0].min(bottom[0]), top[0].max(bottom[0]));
-        if first == last || square(low) == square(high) {
-            for row in first..=last {
-                (square(low)..=square(high)).for_each(|column| visit((row * self.columns + column) as u32));
-            }
-            return;
+    /// Takes in the edges that have been added to the drawing.
+    fn add_new(&mut self, drawing: &Drawing) {
+        let (mut newer, mut newest) = (std::mem::take(&mut self.newer), std::mem::take(&mut self.newest));
+        newest.resize(self.starts.len() - 1, NONE);
+        for edge in self.known as u32..drawing.edges.len() as u32 {
+            let [a, b] = drawing.ends(edge);
+            self.squares(a, b, |[column, row]| {
+                let last = &mut newest[self.square(column, row) as usize];
+                newer.push([edge, std::mem::replace(last, newer.len() as u32)]);
+                false
+            });
         }
-        let slope = f64::from(bottom[0] - top[0]) / f64::from(bottom[1] - top[1]);
-        for row in first..=last {
-            // A little wider on either side, for rounding.
-            let x_at = |y: i64| f64::from(top[0]) + slope * (y as f64 - f64::from(top[1]));
-            let ends = [x_at((row << self.shift) as i64), x_at(((row + 1) << self.shift) as i64)];
-            let from = low.max((ends[0].min(ends[1]) as i32).saturating_sub(2));
-            let to = high.min((ends[0].max(ends[1]) as i32).saturating_add(2));
-            (square(from)..=square(to)).for_each(|column| visit((row * self.columns + column) as u32));
+        (self.known, self.newer, self.newest) = (drawing.edges.len(), newer, newest);
+    }
+
+    const fn square(&self, column: usize, row: usize) -> u32 {
+        (row * self.columns + column) as u32
+    }
+
+    /// Every square that the line between two places touches, in the order of its way: row by row, and within a row one after the
+    /// other. Ends when `visit` returns `true`.
+    fn squares(&self, a: Place, b: Place, mut visit: impl FnMut([usize; 2]) -> bool) {
+        let index = |x: i32| (x >> self.shift) as usize;
+        let (low, high) = (a[0].min(b[0]), a[0].max(b[0]));
+        let (first, last) = (index(a[1].min(b[1])), index(a[1].max(b[1])));
+        let is_narrow = first == last || index(low) == index(high);
+        let slope = f64::from(b[0] - a[0]) / f64::from(b[1] - a[1]);
+        let x_at = |y: i64| f64::from(a[0]) + slope * (y as f64 - f64::from(a[1]));
+        for step in 0..=last - first {
+            let row = if a[1] <= b[1] { first + step } else { last - step };
+            let (from, to) = if is_narrow {
+                (low, high)
+            } else {
+                // A little wider on either side, for rounding.
+                let ends = [row, row + 1].map(|row| x_at((row << self.shift) as i64));
+                let from = (ends[0].min(ends[1]) as i32).saturating_sub(2);
+                (low.max(from), high.min((ends[0].max(ends[1]) as i32).saturating_add(2)))
+            };
+            let (from, to) = (index(from), index(to));
+            for step in 0..=to.saturating_sub(from) {
+                if visit([if a[0] <= b[0] { from + step } else { to - step }, row]) {
+                    return;
+                }
+            }
         }
     }
 
@@ -423,8 +459,20 @@ impl EdgeGrid {
         &self.edges[self.starts[square as usize] as usize..self.starts[square as usize + 1] as usize]
     }
 
-    fn along(&self, a: Place, b: Place, mut visit: impl FnMut(&[u32])) {
-        self.squares(a, b, |square| visit(self.in_square(square)));
+    /// The edges in every square on the way from a place to another, and the corner at which the way leaves the square at the
+    /// latest, until `visit` returns `true`.
+    fn along(&self, a: Place, b: Place, mut visit: impl FnMut(&mut dyn Iterator<Item = u32>, Place) -> bool) {
+        self.squares(a, b, |[column, row]| {
+            let square = self.square(column, row);
+            let mut newer = self.newest.get(square as usize).copied().unwrap_or(NONE);
+            let newer = std::iter::from_fn(|| {
+                let &[edge, before] = self.newer.get(newer as usize)?;
+                newer = before;
+                Some(edge)
+            });
+            let far = |i: usize, at: usize| ((at + usize::from(a[i] <= b[i])) << self.shift) as i32;
+            visit(&mut self.in_square(square).iter().copied().chain(newer), [far(0, column), far(1, row)])
+        });
     }
 
     /// Every pair of edges that share a square of which one is not older than `new`, the older first; some more than once.
