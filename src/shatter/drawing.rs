@@ -70,9 +70,13 @@ impl Drawing {
 
     /// Cuts lines where they meet, until they share nothing but ends, and drops what is there twice.
     pub(super) fn make_planar(&mut self) {
-        self.lay_border();
+        self.make_planar_from(0);
+    }
+
+    /// [`make_planar`](Self::make_planar) where the edges before `new` share nothing but ends.
+    fn make_planar_from(&mut self, new: usize) {
         // After the first round, only pairs with a new edge can meet.
-        let (mut round, mut new, mut cuts) = (0, 0, Vec::new());
+        let (mut round, mut new, mut cuts) = (0, self.lay_border(new), Vec::new());
         loop {
             let grid = EdgeGrid::new(self);
             let mut changed = false;
@@ -85,12 +89,14 @@ impl Drawing {
         }
     }
 
-    /// Lays the border anew, from each place on it to the next.
-    fn lay_border(&mut self) {
-        self.edges.retain(|&[a, b]| {
+    /// Lays the border anew, from each place on it to the next. Returns how many of the first `old` edges are left.
+    fn lay_border(&mut self, old: usize) -> u32 {
+        let is_inside = |&[a, b]: &[u32; 2]| {
             let sides = [a, b].map(|vertex| self.places[vertex as usize]);
             self.lattice.side_of(sides[0], sides[1]).is_none()
-        });
+        };
+        let left = self.edges[..old].iter().filter(|ends| is_inside(ends)).count() as u32;
+        self.edges.retain(is_inside);
         let mut on_side: [Vec<u32>; 4] = Default::default();
         for (vertex, &place) in (0u32..).zip(&self.places) {
             for (vertices, is_on) in on_side.iter_mut().zip(self.lattice.sides(place)) {
@@ -104,6 +110,7 @@ impl Drawing {
             vertices.sort_unstable_by_key(|&vertex| self.places[vertex as usize]);
             self.edges.extend(vertices.windows(2).map(|pair| [pair[0], pair[1]]));
         }
+        left
     }
 
     /// Notes where two edges must be cut so that they share nothing but ends. `false` if they need not be.
@@ -191,7 +198,7 @@ impl Drawing {
         first
     }
 
-    /// Carries every open end on, in the direction in which it came, to the next line. Returns the new lines.
+    /// Carries every open end on, in the direction in which it came, to the next line, in a drawing that is planar. Returns the new lines.
     pub(super) fn carry_on(&mut self, seed: u64) -> Vec<Vec<Vec2>> {
         let mut at: Vec<(u32, u32)> = vec![(0, u32::MAX); self.places.len()];
         for (edge, ends) in (0u32..).zip(&self.edges) {
@@ -204,6 +211,7 @@ impl Drawing {
         let on_border = |place: Place| self.lattice.sides(place).contains(&true);
         let tips: Vec<u32> =
             (0..at.len() as u32).filter(|&v| at[v as usize].0 == 1 && !on_border(self.places[v as usize])).collect();
+        let old = self.edges.len();
         let mut grid = EdgeGrid::new(self);
         let rng = Rng::new(seed).stream("carry on");
         let mut lines = Vec::with_capacity(tips.len());
@@ -226,8 +234,9 @@ impl Drawing {
             grid.add_new(self);
             lines.push(line);
         }
+        let left = self.edges[..old].iter().filter(|&&edge| edge != DEAD).count();
         self.edges.retain(|&edge| edge != DEAD);
-        self.make_planar();
+        self.make_planar_from(left);
         lines
     }
 

@@ -90,34 +90,37 @@ impl Shards {
             }
             first = end;
         }
+        // Sets of corners, each with one of 64 names: a few too many are looked at where there are more.
+        let set = |corners: &[u32]| corners.iter().fold(0u64, |set, corner| set | 1 << (corner % 64));
+        let triangles = self.triangles(shard);
+        let triangle_sets: Vec<u64> = triangles.iter().map(|triangle| set(triangle)).collect();
+        let band_sets: Vec<u64> = (0..).zip(&following).map(|(a, &b)| set(&[a, b])).collect();
         // Corners that have moved: only what they are part of can have folded.
-        let mut moved = vec![true; places.len()];
-        let mut bad = Vec::new();
+        let mut moved = u64::MAX;
+        let (mut bad, mut moved_in) = (Vec::new(), vec![u32::MAX; places.len()]);
         for round in 0.. {
-            for triangle in self.triangles(shard) {
-                let corners = triangle.map(|i| i as usize);
-                if corners.iter().any(|&i| moved[i]) && is_folded(corners.map(|i| bevels[i].inner)) {
-                    bad.extend(corners);
+            for (triangle, _) in triangles.iter().zip(&triangle_sets).filter(|(_, set)| *set & moved != 0) {
+                if is_folded(triangle.map(|i| bevels[i as usize].inner)) {
+                    bad.extend(triangle);
                 }
             }
-            for (a, &b) in following.iter().enumerate() {
-                let b = b as usize;
-                let [inner_a, inner_b] = [bevels[a].inner, bevels[b].inner];
-                let is_band_folded =
-                    || is_folded([places[a], places[b], inner_b]) || is_folded([places[a], inner_b, inner_a]);
-                if (moved[a] || moved[b]) && is_band_folded() {
+            for ((a, &b), _) in (0u32..).zip(&following).zip(&band_sets).filter(|(_, set)| *set & moved != 0) {
+                let [from, to] = [a, b].map(|i| places[i as usize]);
+                let [inner_from, inner_to] = [a, b].map(|i| bevels[i as usize].inner);
+                if is_folded([from, to, inner_to]) || is_folded([from, inner_to, inner_from]) {
                     bad.extend([a, b]);
                 }
             }
-            moved.fill(false);
+            moved = 0;
             for i in bad.drain(..) {
-                let (inner, place) = (&mut bevels[i].inner, places[i]);
-                if !moved[i] && *inner != place {
+                let (inner, place, at) = (&mut bevels[i as usize].inner, places[i as usize], &mut moved_in[i as usize]);
+                if *at != round && *inner != place {
                     *inner = if round < HALVINGS { 0.5 * (*inner + place) } else { place };
-                    moved[i] = true;
+                    *at = round;
+                    moved |= set(&[i]);
                 }
             }
-            if !moved.contains(&true) {
+            if moved == 0 {
                 break;
             }
         }
