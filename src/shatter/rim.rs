@@ -90,37 +90,30 @@ impl Shards {
             }
             first = end;
         }
-        // Sets of corners, each with one of 64 names: a few too many are looked at where there are more.
-        let set = |corners: &[u32]| corners.iter().fold(0u64, |set, corner| set | 1 << (corner % 64));
+        // Without a branch for each: which is folded cannot be foreseen.
         let triangles = self.triangles(shard);
-        let triangle_sets: Vec<u64> = triangles.iter().map(|triangle| set(triangle)).collect();
-        let band_sets: Vec<u64> = (0..).zip(&following).map(|(a, &b)| set(&[a, b])).collect();
-        // Corners that have moved: only what they are part of can have folded.
-        let mut moved = u64::MAX;
-        let (mut bad, mut moved_in) = (Vec::new(), vec![u32::MAX; places.len()]);
+        let mut folded = vec![false; places.len()];
         for round in 0.. {
-            for (triangle, _) in triangles.iter().zip(&triangle_sets).filter(|(_, set)| *set & moved != 0) {
-                if is_folded(triangle.map(|i| bevels[i as usize].inner)) {
-                    bad.extend(triangle);
+            for triangle in triangles {
+                let is_bad = is_folded(triangle.map(|i| bevels[i as usize].inner));
+                triangle.iter().for_each(|&i| folded[i as usize] |= is_bad);
+            }
+            for (a, &b) in following.iter().enumerate() {
+                let b = b as usize;
+                let [inner_a, inner_b] = [bevels[a].inner, bevels[b].inner];
+                let is_bad =
+                    is_folded([places[a], places[b], inner_b]) | is_folded([places[a], inner_b, inner_a]);
+                folded[a] |= is_bad;
+                folded[b] |= is_bad;
+            }
+            let mut moved = false;
+            for ((bevel, &place), folded) in bevels.iter_mut().zip(&places).zip(&mut folded) {
+                if std::mem::take(folded) && bevel.inner != place {
+                    bevel.inner = if round < HALVINGS { 0.5 * (bevel.inner + place) } else { place };
+                    moved = true;
                 }
             }
-            for ((a, &b), _) in (0u32..).zip(&following).zip(&band_sets).filter(|(_, set)| *set & moved != 0) {
-                let [from, to] = [a, b].map(|i| places[i as usize]);
-                let [inner_from, inner_to] = [a, b].map(|i| bevels[i as usize].inner);
-                if is_folded([from, to, inner_to]) || is_folded([from, inner_to, inner_from]) {
-                    bad.extend([a, b]);
-                }
-            }
-            moved = 0;
-            for i in bad.drain(..) {
-                let (inner, place, at) = (&mut bevels[i as usize].inner, places[i as usize], &mut moved_in[i as usize]);
-                if *at != round && *inner != place {
-                    *inner = if round < HALVINGS { 0.5 * (*inner + place) } else { place };
-                    *at = round;
-                    moved |= set(&[i]);
-                }
-            }
-            if moved == 0 {
+            if !moved {
                 break;
             }
         }
