@@ -6,8 +6,8 @@
 //! 10,000 plain sprites. "only ...": parts of the first that no program could do without. `baking`: what of each frame the crate's systems
 //! take while guided cracks are baked, 60 frames a second, from the first frame to ten after the last crack; `front`, `widen`: while they
 //! appear within a second. `shards/*`: what
-//! the crate's own systems take of the main thread in the three frames in which a pane becomes 500 shards for the first time, 60 a second,
-//! in the one in which as many are shown once more, and in each in which 5,000 fly. With a Vulkan driver (software will do) uploads are part
+//! the crate's own systems take of the main thread in the three frames in which a pane becomes 500 shards for the first time, 60 a second
+//! (beside three in which nothing happens), in the one in which as many are shown once more, and in each in which 5,000 fly. With a Vulkan driver (software will do) uploads are part
 //! of it; without, it says so.
 
 #![expect(clippy::print_stdout, clippy::expect_used, reason = "a benchmark")]
@@ -441,9 +441,12 @@ fn percentiles(mut times: Vec<Duration>) -> String {
 }
 
 /// Panes that are cracked all over, and become at most 500 shards each.
-fn panes(count: usize) -> (App, Vec<Entity>) {
+fn panes(count: usize, run: Run) -> (App, Vec<Entity>) {
     let mut app = app();
     measure_shards(&mut app);
+    if run == Run::InARow {
+        app.edit_schedule(PostUpdate, |schedule| _ = schedule.set_executor(SingleThreadedExecutor::new()));
+    }
     app.world_mut().resource_mut::<CrackBudget>().max_shards = 10_000;
     let panes: Vec<Entity> = (0..count as u64)
         .map(|seed| {
@@ -495,13 +498,21 @@ fn least_and_median(mut times: Vec<Duration>) -> String {
 }
 
 fn shards(c: &mut Criterion) {
-    let (mut app, panes) = panes(10);
-    let burst = |pane: &Entity| {
-        app.world_mut().commands().entity(*pane).shatter_cracks(ShatterRequest::ALL);
-        // Those in which it is asked for, made, and there.
-        systems_of(&mut app, 3)
+    let first_time = |run: Run, name: &str| {
+        let (mut app, panes) = panes(10, run);
+        let idle = (0..20).map(|_| systems_of(&mut app, 3)).collect();
+        println!("idle, systems {name}, three frames: {}", least_and_median(idle));
+        let burst = |pane: &Entity| {
+            app.world_mut().commands().entity(*pane).shatter_cracks(ShatterRequest::ALL);
+            // Those in which it is asked for, made, and there.
+            systems_of(&mut app, 3)
+        };
+        let times = panes.iter().map(burst).collect();
+        println!("500 shards for the first time, systems {name}, three frames: {}", least_and_median(times));
+        (app, panes)
     };
-    println!("500 shards for the first time: {}", least_and_median(panes.iter().map(burst).collect()));
+    drop(first_time(Run::InARow, "in a row"));
+    let (mut app, panes) = first_time(Run::OnThreads, "on threads");
     let shown = app.world_mut().query::<&Shard>().iter(app.world()).count();
     println!("{shown} shards in all");
     let mut again = Vec::new();

@@ -255,21 +255,20 @@ impl Drawing {
         }
     }
 
+    /// Where the way from a place meets the border.
+    fn border_ahead(&self, start: Place, way: [f64; 2]) -> Option<Place> {
+        let to_side = |i: usize| {
+            let room = if way[i] > 0.0 { self.lattice.corner[i] - start[i] } else { -start[i] };
+            if way[i] == 0.0 { f64::INFINITY } else { f64::from(room) / way[i] }
+        };
+        let share = to_side(0).min(to_side(1));
+        let at = |i: usize| ((f64::from(start[i]) + way[i] * share).round() as i32).clamp(0, self.lattice.corner[i]);
+        share.is_finite().then(|| [at(0), at(1)])
+    }
+
     /// The first edge on the way from a place, other than those that begin there, and the vertex at which the way meets it.
     fn first_hit(&mut self, start: Place, way: [f64; 2], grid: &EdgeGrid) -> Option<(u32, u32)> {
-        // To the first side of the surface.
-        let share = [0, 1]
-            .map(|i| {
-                let room = if way[i] > 0.0 { self.lattice.corner[i] - start[i] } else { -start[i] };
-                if way[i] == 0.0 { f64::INFINITY } else { f64::from(room) / way[i] }
-            })
-            .into_iter()
-            .fold(f64::INFINITY, f64::min);
-        if !share.is_finite() {
-            return None;
-        }
-        let end: Place =
-            [0, 1].map(|i| ((f64::from(start[i]) + way[i] * share).round() as i32).clamp(0, self.lattice.corner[i]));
+        let end = self.border_ahead(start, way)?;
         let run = vector(start, end);
         let mut best: Option<(f64, u32)> = None;
         grid.along(start, end, |edges, far| {
@@ -494,5 +493,70 @@ impl EdgeGrid {
                 edges[..i].iter().for_each(|&e| visit(e, f));
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The edge that a way meets first, by a look at each.
+    fn first_of_all(drawing: &Drawing, start: Place, end: Place) -> Option<u32> {
+        let run = vector(start, end);
+        let alongs = (0..drawing.edges.len() as u32).filter_map(|edge| {
+            let [c, d] = drawing.ends(edge);
+            let (oc, od) = (orient(start, end, c), orient(start, end, d));
+            if c == start || d == start || oc.signum() * od.signum() > 0 || (oc == 0 && od == 0) {
+                return None;
+            }
+            let along = cross(vector(start, c), vector(c, d)) as f64 / cross(run, vector(c, d)) as f64;
+            (0.0..=1.0).contains(&along).then_some((along, edge))
+        });
+        alongs.min_by(|a, b| a.partial_cmp(b).unwrap()).map(|(_, edge)| edge)
+    }
+
+    #[test]
+    fn a_way_meets_what_it_would_meet_if_it_looked_at_every_line() {
+        let mut rng = Rng::new(3);
+        let (mut met, mut upright) = (0, 0);
+        for case in 0..200 {
+            let extent = Vec2::new(1.0, 0.2 + rng.unit());
+            let mut drawing = Drawing::new(Lattice::new(extent).unwrap());
+            let mut place = |rng: &mut Rng| Vec2::new(rng.unit(), rng.unit()) * extent;
+            let draw = |drawing: &mut Drawing, rng: &mut Rng, place: &mut dyn FnMut(&mut Rng) -> Vec2| {
+                let from = place(rng);
+                let length = if rng.unit() < 0.2 { 1.0 } else { 0.05 };
+                let to = from + Vec2::new(rng.signed(), rng.signed()) * length;
+                drawing.line([from, to.clamp(Vec2::ZERO, extent)].into_iter());
+            };
+            (0..rng.next_u32() % 80).for_each(|_| draw(&mut drawing, &mut rng, &mut place));
+            drawing.make_planar();
+            let mut grid = EdgeGrid::new(&drawing);
+            (0..rng.next_u32() % 40).for_each(|_| draw(&mut drawing, &mut rng, &mut place));
+            grid.add_new(&drawing);
+            for _ in 0..20 {
+                let start = drawing.lattice.snap(place(&mut rng));
+                let way = match rng.next_u32() % 4 {
+                    0 => [0.0, 1.0],
+                    1 => [-1.0, 0.0],
+                    _ => [rng.signed().into(), rng.signed().into()],
+                };
+                let vertices = drawing.places.len();
+                let Some(end) = drawing.border_ahead(start, way) else { continue };
+                let expected = first_of_all(&drawing, start, end);
+                let found = drawing.first_hit(start, way, &grid);
+                if let Some((edge, _)) = found {
+                    assert_eq!(Some(edge), expected, "case {case}: from {start:?} to {end:?}");
+                    (met, upright) = (met + 1, upright + u32::from(way[0] == 0.0));
+                } else {
+                    // Nothing, or something that begins so near that it is met where the way begins.
+                    let near = expected.map(|edge| drawing.ends(edge));
+                    assert!(near.is_none_or(|[c, d]| orient(c, d, start).unsigned_abs() <= 1 << 26), "{near:?}");
+                }
+                drawing.places.truncate(vertices);
+                drawing.vertex_at.retain(|_, vertex| (*vertex as usize) < vertices);
+            }
+        }
+        assert!(met > 3000 && upright > 300, "{met} {upright}");
     }
 }

@@ -101,8 +101,7 @@ impl Shards {
             for (a, &b) in following.iter().enumerate() {
                 let b = b as usize;
                 let [inner_a, inner_b] = [bevels[a].inner, bevels[b].inner];
-                let is_bad =
-                    is_folded([places[a], places[b], inner_b]) | is_folded([places[a], inner_b, inner_a]);
+                let is_bad = is_folded([places[a], places[b], inner_b]) | is_folded([places[a], inner_b, inner_a]);
                 folded[a] |= is_bad;
                 folded[b] |= is_bad;
             }

@@ -50,7 +50,7 @@ enum Pieces {
     /// What has been cut stays cut.
     Cut(Arc<Shards>, Support),
     /// There is more to cut along: a network, and what was carried on. What it was cut into before, and what held.
-    Lines(Network, Vec<Vec<Vec2>>, Option<(Arc<Shards>, Support)>),
+    Lines(Network, Vec<Arc<[Vec<Vec2>]>>, Option<(Arc<Shards>, Support)>),
 }
 
 /// What leaves a surface.
@@ -178,7 +178,7 @@ impl Order {
             Pieces::Cut(cut, support) => (cut, support),
             Pieces::Lines(network, carried, before) => {
                 let mut cuts = Cuts::from_network(&network)?;
-                for line in &carried {
+                for line in carried.iter().flat_map(|lines| lines.iter()) {
                     cuts.add_line(line)?;
                 }
                 let cut = Arc::new(shatter(cuts, &self.settings.cut)?);

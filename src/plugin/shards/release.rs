@@ -212,8 +212,8 @@ fn release(
             Box::new(Broken::new((cut.clone(), support.clone()), grown, settings.clone(), picture, plane, active))
         }
     };
-    if is_new {
-        broken.carried.extend_from_slice(cut.carried());
+    if is_new && !cut.carried().is_empty() {
+        broken.carried.push(cut.shared_carried());
     }
     broken.inside = inside(world, active, &settings, rim.bright, broken.inside.take());
     (broken.cut, broken.support, broken.grown) = (cut, support, grown);
