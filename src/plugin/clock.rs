@@ -367,6 +367,7 @@ pub(super) fn follow_clocks(
             let is_first = active.playback.is_none();
             active.follow(clock.bypass_change_detection());
             surfaces.wake(entity);
+            surfaces.film(entity, None);
             if is_first {
                 // What has grown frame by frame is drawn once more, at a stroke.
                 surfaces.soil(entity);

@@ -107,7 +107,8 @@ fn recover(world: &mut World, entity: Entity) {
 
 fn take(world: &mut World, entity: Entity) -> Option<Active> {
     let mut surfaces = world.resource_mut::<Surfaces>();
-    let active = surfaces.active.remove(&entity)?;
+    let mut active = surfaces.active.remove(&entity)?;
+    active.recall();
     surfaces.disown(entity, &active);
     Some(active)
 }

@@ -6,6 +6,7 @@ use super::{
         CrackError, CrackMaps, CrackSurface,
         activate::{frame, look},
         clock::First,
+        film::Score,
         paint::stamp_all,
         picture::BasePicture,
         surfaces::{Active, Added, Touched},
@@ -106,6 +107,8 @@ struct Drawn {
     touched: Touched,
     look: LookTable,
     replay: Option<(Replay, Moment)>,
+    /// If it will show other times.
+    score: Option<Arc<Score>>,
 }
 
 /// What a frame takes up.
@@ -119,6 +122,7 @@ pub(super) struct Finished {
     pub(super) touched: Touched,
     pub(super) look: LookTable,
     pub(super) replay: Option<(Replay, Moment)>,
+    pub(super) score: Option<Arc<Score>>,
     /// The texels of each texture, and the same where the renderer can read them.
     pub(super) pictures: [Option<Picture>; 3],
 }
@@ -151,7 +155,7 @@ impl Finish {
                 Stage::Paint { growth, cells, drawn, texels, row }
             }
             Stage::Paint { growth, cells, drawn, texels, .. } => {
-                let Drawn { field, touched, look, replay } = *drawn;
+                let Drawn { field, touched, look, replay, score } = *drawn;
                 let pictures = order.stage(texels);
                 return Ok(Next::Done(Box::new(Finished {
                     order,
@@ -163,6 +167,7 @@ impl Finish {
                     touched,
                     look,
                     replay,
+                    score,
                     pictures,
                 })));
             }
@@ -202,7 +207,8 @@ impl Order {
                 Some((replay, moment))
             }
         };
-        let drawn = Box::new(Drawn { field, touched, look: look(&self.preset, frame)?, replay });
+        let score = replay.is_some().then(|| Score::of(&growth));
+        let drawn = Box::new(Drawn { field, touched, look: look(&self.preset, frame)?, replay, score });
         let texels = |kind: &TextureKind| (kind.is_wanted)(self.maps).then(|| (kind.texels)(&self.base));
         Ok(Stage::Paint { growth, cells, drawn, texels: textures::KINDS.each_ref().map(texels), row: 0 })
     }
@@ -221,9 +227,10 @@ impl Order {
     fn stage(&self, texels: [Option<Vec<u8>>; 3]) -> [Option<Picture>; 3] {
         let mut kinds = textures::KINDS.iter();
         texels.map(|texels| {
-            let row = self.base.size.x as usize * kinds.next().map_or(0, TextureKind::texel);
+            let (texel, size) = (kinds.next().map_or(0, TextureKind::texel), self.base.size);
             let texels = texels?;
-            let staged = self.stager.as_ref().and_then(|stager| stager.stage(&texels, row));
+            let stager = self.stager.as_ref();
+            let staged = stager.and_then(|stager| stager.stage(&texels, size, texel, &[TexelRect::whole(size)]));
             Some(Picture { texels, staged })
         })
     }
