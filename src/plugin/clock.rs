@@ -20,6 +20,9 @@ use bevy::prelude::*;
 /// A hit adds steps at the end of time and makes a clock that runs backwards run forwards, from where it is; nothing jumps.
 /// Removing the clock lets time run on to the end.
 ///
+/// The cracks of [`GuidedCracks`](super::GuidedCracks) are shown a frame or a few later than their time, see
+/// [`GuidedAppearance`](super::GuidedAppearance).
+///
 /// ```
 /// use bevy::prelude::*;
 /// use bevy_crack::prelude::*;

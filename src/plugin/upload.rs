@@ -25,7 +25,7 @@ use bevy::{
     },
 };
 use pack::{COPY_ALIGNMENT, Changed, LOOSE, MAX_KEPT, Place, ROW_ALIGNMENT, Rows, SHORT_ROW, SIDE_BY_SIDE, pack};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError, Weak};
 
 /// What went to the GPU in the last frame that was rendered.
 #[derive(Resource, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -65,13 +65,18 @@ pub(super) struct Uploads {
     staged: Vec<(AssetId<Image>, Staged)>,
 }
 
-/// Brings pictures to where the GPU can read them, on any thread.
+/// Brings pictures to where the GPU can read them, on any thread, and keeps that memory for the next ones.
 #[derive(Clone)]
-pub(super) struct Stager(RenderDevice);
+pub(super) struct Stager {
+    device: RenderDevice,
+    buffers: Buffers,
+}
 
 /// Parts of a picture where the GPU can read them.
 pub(super) struct Staged {
     buffer: Buffer,
+    /// Where it is to go then.
+    home: Weak<Mutex<Vec<Buffer>>>,
     /// Each with the place of its first row.
     parts: Vec<(TexelRect, usize)>,
 }
@@ -98,15 +103,10 @@ impl Stager {
         };
         let parts: Vec<_> = rects.iter().map(place).collect();
         let size = end as u64;
-        if size == 0 || size > self.0.limits().max_buffer_size {
+        if size == 0 || size.next_power_of_two() > self.device.limits().max_buffer_size {
             return None;
         }
-        let buffer = self.0.create_buffer(&BufferDescriptor {
-            label: Some("crack_picture"),
-            size,
-            usage: BufferUsages::MAP_WRITE | BufferUsages::COPY_SRC,
-            mapped_at_creation: true,
-        });
+        let buffer = self.buffers.take(size, &self.device);
         let mut memory = buffer.slice(..).get_mapped_range_mut();
         for &(rect, start) in &parts {
             let (pitch, row) = (pitch(rect, texel), rect.size().x as usize * texel);
@@ -118,7 +118,7 @@ impl Stager {
         }
         drop(memory);
         buffer.unmap();
-        Some(Staged { buffer, parts })
+        Some(Staged { buffer, home: Arc::downgrade(&self.buffers.0), parts })
     }
 }
 
@@ -150,7 +150,8 @@ impl Uploads {
     /// What brings whole pictures to the renderer, if there is one.
     pub(super) fn stager(&self, device: Option<&RenderDevice>) -> Option<Stager> {
         // In a browser the device stays on its thread.
-        device.filter(|_| self.is_wanted && !cfg!(target_arch = "wasm32")).map(|device| Stager(device.clone()))
+        let device = device.filter(|_| self.is_wanted && !cfg!(target_arch = "wasm32"))?;
+        Some(Stager { device: device.clone(), buffers: Buffers::default() })
     }
 
     /// Notes that all of an image has changed to what is staged, if it is.
@@ -297,14 +298,16 @@ impl Buffers {
         })
     }
 
-    /// Keeps a buffer that was submitted for when the GPU has read it.
-    fn give_back(&self, buffer: Buffer, device: &RenderDevice) {
-        if buffer.size() > MAX_KEPT as u64 {
+    /// Keeps a buffer that was submitted for when the GPU has read it, if it is wanted then.
+    fn give_back(home: Weak<Mutex<Vec<Buffer>>>, buffer: Buffer, device: &RenderDevice) {
+        if home.strong_count() == 0 {
             return;
         }
-        let (ready, kept) = (self.0.clone(), buffer.clone());
+        let kept = buffer.clone();
         device.map_buffer(&buffer.slice(..), MapMode::Write, move |mapped| {
-            if mapped.is_ok() {
+            if mapped.is_ok()
+                && let Some(ready) = home.upgrade()
+            {
                 ready.lock().unwrap_or_else(PoisonError::into_inner).push(kept);
             }
         });
@@ -388,29 +391,38 @@ fn copy_whole(
     stats: &mut CrackUploadStats,
 ) {
     let mut encoder = device.create_command_encoder(&CommandEncoderDescriptor { label: Some("crack_pictures") });
-    staged.retain(|(id, staged)| {
-        let mut waits = false;
-        for &(rect, offset) in &staged.parts {
-            match plan(*id, rect, images, gpu_images) {
-                Plan::Copy(copy) => {
-                    let copy = Copy { offset, pitch: pitch(rect, copy.texel), ..copy };
-                    let end = offset + copy.pitch * copy.height();
-                    if let Some(gpu) = gpu_images.get(*id)
-                        && copy.rect == rect
-                        && end as u64 <= staged.buffer.size()
-                    {
-                        copy_one(&mut encoder, &copy, 0, &staged.buffer, gpu);
-                        stats.rects += 1;
-                        stats.bytes += copy.rect.area() * copy.texel as u64;
+    let mut done = Vec::new();
+    *staged = core::mem::take(staged)
+        .into_iter()
+        .filter_map(|(id, staged)| {
+            let mut waits = false;
+            for &(rect, offset) in &staged.parts {
+                match plan(id, rect, images, gpu_images) {
+                    Plan::Copy(copy) => {
+                        let copy = Copy { offset, pitch: pitch(rect, copy.texel), ..copy };
+                        let end = offset + copy.pitch * copy.height();
+                        if let Some(gpu) = gpu_images.get(id)
+                            && copy.rect == rect
+                            && end as u64 <= staged.buffer.size()
+                        {
+                            copy_one(&mut encoder, &copy, 0, &staged.buffer, gpu);
+                            stats.rects += 1;
+                            stats.bytes += copy.rect.area() * copy.texel as u64;
+                        }
                     }
+                    Plan::Wait => waits = true,
+                    Plan::Drop => {}
                 }
-                Plan::Wait => waits = true,
-                Plan::Drop => {}
             }
-        }
-        waits
-    });
+            if waits {
+                return Some((id, staged));
+            }
+            done.push(staged);
+            None
+        })
+        .collect();
     queue.submit([encoder.finish()]);
+    done.into_iter().for_each(|Staged { buffer, home, .. }| Buffers::give_back(home, buffer, device));
 }
 
 /// Copies from a buffer in which the copy's part begins at `start`.
@@ -507,7 +519,9 @@ fn copy(
         copy_one(&mut encoder, copy, starts[copy.part], &buffer, gpu);
     }
     queue.submit([encoder.finish()]);
-    buffers.give_back(buffer, device);
+    if buffer.size() <= MAX_KEPT as u64 {
+        Buffers::give_back(Arc::downgrade(&buffers.0), buffer, device);
+    }
 }
 
 #[cfg(test)]

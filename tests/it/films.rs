@@ -170,7 +170,14 @@ fn whatever_happens_on_the_way() {
         app.world_mut().get_mut::<Sprite>(entity).unwrap().rect = Some(rect);
     };
     let removed: Happen = |app, entity| _ = app.world_mut().entity_mut(entity).remove::<GuidedCracks>();
-    let happenings: [(&str, Happen); 7] = [
+    let tinted: Happen = |app, _| {
+        // In each frame, and what is shown stays the same.
+        app.add_systems(Update, |mut sprites: Query<&mut Sprite>| {
+            sprites.iter_mut().for_each(|mut sprite| sprite.color = Color::WHITE)
+        });
+    };
+    let happenings: [(&str, Happen); 8] = [
+        ("tint", tinted),
         ("hit", hit),
         ("preset", preset),
         ("another picture", another),

@@ -6,7 +6,7 @@ use super::{
         CrackError, CrackMaps, CrackSurface,
         activate::{frame, look},
         clock::First,
-        film::Score,
+        film::Film,
         paint::stamp_all,
         picture::BasePicture,
         surfaces::{Active, Added, Touched},
@@ -107,8 +107,6 @@ struct Drawn {
     touched: Touched,
     look: LookTable,
     replay: Option<(Replay, Moment)>,
-    /// If it will show other times.
-    score: Option<Arc<Score>>,
 }
 
 /// What a frame takes up.
@@ -122,7 +120,8 @@ pub(super) struct Finished {
     pub(super) touched: Touched,
     pub(super) look: LookTable,
     pub(super) replay: Option<(Replay, Moment)>,
-    pub(super) score: Option<Arc<Score>>,
+    /// If it is to show other times.
+    pub(super) film: Option<Box<Film>>,
     /// The texels of each texture, and the same where the renderer can read them.
     pub(super) pictures: [Option<Picture>; 3],
 }
@@ -155,7 +154,8 @@ impl Finish {
                 Stage::Paint { growth, cells, drawn, texels, row }
             }
             Stage::Paint { growth, cells, drawn, texels, .. } => {
-                let Drawn { field, touched, look, replay, score } = *drawn;
+                let Drawn { field, touched, look, replay } = *drawn;
+                let film = replay.is_some().then(|| Box::new(Film::new(&growth, &texels)));
                 let pictures = order.stage(texels);
                 return Ok(Next::Done(Box::new(Finished {
                     order,
@@ -167,7 +167,7 @@ impl Finish {
                     touched,
                     look,
                     replay,
-                    score,
+                    film,
                     pictures,
                 })));
             }
@@ -207,8 +207,7 @@ impl Order {
                 Some((replay, moment))
             }
         };
-        let score = replay.is_some().then(|| Score::of(&growth));
-        let drawn = Box::new(Drawn { field, touched, look: look(&self.preset, frame)?, replay, score });
+        let drawn = Box::new(Drawn { field, touched, look: look(&self.preset, frame)?, replay });
         let texels = |kind: &TextureKind| (kind.is_wanted)(self.maps).then(|| (kind.texels)(&self.base));
         Ok(Stage::Paint { growth, cells, drawn, texels: textures::KINDS.each_ref().map(texels), row: 0 })
     }
