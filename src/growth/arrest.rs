@@ -91,6 +91,11 @@ impl Arrest {
         }
     }
 
+    pub(super) fn reserve(&mut self, nodes: usize) {
+        self.sealed.reserve(nodes);
+        self.walls.reserve(nodes);
+    }
+
     pub(super) fn push_node(&mut self, is_sealed: bool) {
         self.sealed.push(is_sealed);
     }

@@ -19,6 +19,9 @@ pub const MAX_ENERGY: f32 = 16.0;
 /// Half the width of the widest crack in which a hit is looked for, pattern units.
 const WIDE: f32 = 0.1;
 
+/// Room is made for so many nodes at least.
+const FEW_NODES: usize = 64;
+
 /// One impact on a growth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Impact {
@@ -180,15 +183,18 @@ impl CrackGrowth {
             }
         });
         // A large growth makes about two nodes a marker: room for them now, so that no step pauses to move them all.
-        let expected = (2 * self.field.living_at_most()).min(self.params.max_nodes as usize);
+        let expected = (2 * self.field.living_at_most()).max(FEW_NODES).min(self.room());
         if expected > 4096 {
             self.field.reserve();
-            self.network.nodes.reserve(expected);
-            self.nodes.reserve(expected);
-            self.widths.reserve(expected);
-            self.pull_of.reserve(expected);
-            self.changes.reserve(expected);
-            self.timeline.reserve(expected);
+        }
+        self.network.nodes.reserve(expected);
+        self.nodes.reserve(expected);
+        self.widths.reserve(expected);
+        self.pull_of.reserve(expected);
+        self.changes.reserve(expected);
+        self.timeline.reserve(expected);
+        if let Some(arrest) = &mut self.arrest {
+            arrest.reserve(expected);
         }
     }
 

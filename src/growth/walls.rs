@@ -57,6 +57,13 @@ impl Walls {
             .flat_map(move |y| (low.x as usize..=high.x as usize).map(move |x| y * width + x))
     }
 
+    /// Room for lines that are mostly of two pieces in two cells.
+    pub(super) fn reserve(&mut self, lines: usize) {
+        self.entries.reserve(2 * lines);
+        self.walls.reserve(lines);
+        self.points.reserve(3 * lines);
+    }
+
     /// Adds the line between two nodes.
     pub(super) fn add(&mut self, ends: (u32, u32), path: &SegmentPath) {
         let wall = self.walls.len() as u32;

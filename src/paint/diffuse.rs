@@ -5,7 +5,7 @@ use super::{
     patch::Patch,
     rows::{Rgba, channel, round},
 };
-use glam::UVec2;
+use glam::{Mat4, UVec2};
 
 /// Texels whose colours are computed at once, or copied if all are untouched.
 pub(super) const BLOCK: usize = 8;
@@ -94,11 +94,15 @@ pub(super) fn diffuse_row<const ROOM: usize>(
     patch: &Patch<ROOM>,
     row: usize,
     look: &LookTable,
-    mut at: UVec2,
+    at: UVec2,
 ) {
-    let mut place = patch.row(row).start;
-    for (out, base) in out.chunks_mut(BLOCK).zip(base.chunks(BLOCK)) {
-        if let Some(block) = Block::load(base, patch, place) {
+    let place = patch.row(row).start;
+    for from in (0..out.len()).step_by(BLOCK) {
+        // The last one begins early enough to be whole, if there is room: texels that are painted twice are the same twice.
+        let from = from.min(out.len().saturating_sub(BLOCK));
+        let (out, base) = (&mut out[from..], &base[from..]);
+        if let Some(block) = Block::load(base, patch, place + from) {
+            let at = UVec2::new(at.x + from as u32, at.y);
             let painted =
                 if look.opaque { block.paint::<true>(frame, look, at) } else { block.paint::<false>(frame, look, at) };
             let painted = painted.map(u32::to_le_bytes);
@@ -112,8 +116,6 @@ pub(super) fn diffuse_row<const ROOM: usize>(
         } else {
             out.copy_from_slice(base);
         }
-        place += BLOCK;
-        at.x += BLOCK as u32;
     }
 }
 
@@ -205,17 +207,12 @@ impl Block<'_> {
         for (between, &depth) in between.iter_mut().zip(self.depth) {
             *between = LookTable::between(depth);
         }
-        let mut layers = [[0.0; 4]; BLOCK];
-        for i in 0..BLOCK {
-            let (low, high) = look.layers(self.depth[i]);
-            for part in 0..4 {
-                layers[i][part] = (low[part] + (high[part] - low[part]) * between[i]) * share[i];
-            }
-        }
+        let layer = |i: usize| look.layer(self.depth[i], between[i]) * share[i];
         let mut over = [[0.0; BLOCK]; 4];
-        for part in 0..4 {
-            for i in 0..BLOCK {
-                over[part][i] = layers[i][part];
+        for i in (0..BLOCK).step_by(4) {
+            let turned = Mat4::from_cols(layer(i), layer(i + 1), layer(i + 2), layer(i + 3)).transpose();
+            for (over, part) in over.iter_mut().zip(turned.to_cols_array_2d()) {
+                over[i..i + 4].copy_from_slice(&part);
             }
         }
         over

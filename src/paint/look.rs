@@ -1,6 +1,7 @@
 //! [`Look`]: what a crack does to the picture, as data.
 
 use crate::pattern::MAX_SIDE;
+use glam::Vec4;
 use std::{borrow::Cow, ops::RangeInclusive};
 
 /// A point of a [`Look`]'s ramp.
@@ -135,13 +136,14 @@ const MAX_STOPS: usize = 16;
 const STEPS: usize = 256;
 
 /// What a depth puts over the picture: colour times cover in 0..=255 (sRGB), and cover 0..=1.
-pub(super) type Layer = [f32; 4];
+pub(super) type Layer = Vec4;
 
 /// A [`Look`] made ready to paint with.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LookTable {
-    /// Nothing, then the ramp at depths 0, 256, .. 65536; linear between, so that slow gradients have no steps.
-    ramp: Box<[Layer; STEPS + 2]>,
+    /// Nothing, then the ramp at depths 0, 256, .. 65280, each with what is gained up to the next: linear between, so that slow
+    /// gradients have no steps.
+    ramp: Box<[[Layer; 2]; STEPS + 1]>,
     pub(super) glint: f32,
     pub(super) grain: f32,
     pub(super) shift: f32,
@@ -208,11 +210,14 @@ impl LookTable {
     pub fn new(look: &Look, texels_per_unit: f32) -> Result<Self, LookError> {
         look.validate()?;
         within("texels_per_unit", texels_per_unit, f32::MIN_POSITIVE..=MAX_SIDE as f32, "above 0, up to 16384")?;
-        let mut ramp = Box::new([[0.0; 4]; STEPS + 2]);
-        for (i, layer) in ramp[1..].iter_mut().enumerate() {
-            let (color, cover) = look.at(i as f32 / STEPS as f32);
+        let layer = |step: usize| {
+            let (color, cover) = look.at(step as f32 / STEPS as f32);
             let [r, g, b] = color.map(|channel| 255.0 * channel * cover);
-            *layer = [r, g, b, cover];
+            Layer::new(r, g, b, cover)
+        };
+        let mut ramp = Box::new([[Layer::ZERO; 2]; STEPS + 1]);
+        for (step, place) in ramp[1..].iter_mut().enumerate() {
+            *place = [layer(step), layer(step + 1) - layer(step)];
         }
         // Sobel's kernel weighs a slope of one depth step per texel with 8.
         let slope = look.relief * texels_per_unit / (8.0 * 65535.0);
@@ -220,12 +225,12 @@ impl LookTable {
         Ok(Self { ramp, glint, grain, shift, slope, opaque })
     }
 
-    /// What the ramp puts over the picture at the steps before and after `depth`.
+    /// What the ramp puts over the picture at `depth`, which lies so far [between](Self::between) two steps.
     #[inline(always)]
-    pub(super) fn layers(&self, depth: u16) -> (&Layer, &Layer) {
+    pub(super) fn layer(&self, depth: u16, between: f32) -> Layer {
         // Depth zero lies at the first entry, without a branch.
-        let step = usize::from(depth >> 8) + usize::from(depth != 0);
-        (&self.ramp[step], &self.ramp[step + 1])
+        let [low, gain] = self.ramp[usize::from(depth >> 8) + usize::from(depth != 0)];
+        low + gain * between
     }
 
     /// How far `depth` is from the step before it to the one after, 0..1.
@@ -239,11 +244,8 @@ impl LookTable {
 mod tests {
     use super::*;
 
-    impl LookTable {
-        fn layer(&self, depth: u16) -> Layer {
-            let ((low, high), t) = (self.layers(depth), Self::between(depth));
-            std::array::from_fn(|i| low[i] + (high[i] - low[i]) * t)
-        }
+    fn layer(table: &LookTable, depth: u16) -> [f32; 4] {
+        table.layer(depth, LookTable::between(depth)).to_array()
     }
 
     fn refused(look: &Look) -> Option<&'static str> {
@@ -290,12 +292,12 @@ mod tests {
         assert_eq!(look.at(0.5), ([0.5, 0.0, 0.5], 0.75));
         assert_eq!(look.at(1.0), ([0.0, 0.0, 1.0], 1.0));
         let table = LookTable::new(&look, 512.0).unwrap();
-        assert_eq!(table.layer(0), [0.0; 4]);
-        assert_eq!(table.layer(0x8000), [0.5 * 0.75 * 255.0, 0.0, 0.5 * 0.75 * 255.0, 0.75]);
+        assert_eq!(layer(&table, 0), [0.0; 4]);
+        assert_eq!(layer(&table, 0x8000), [0.5 * 0.75 * 255.0, 0.0, 0.5 * 0.75 * 255.0, 0.75]);
         // Two stops at one depth are a step, and a first stop at zero covers all but depth zero itself.
         let step = vec![stop(0.0, [1.0; 3], 1.0), stop(0.5, [1.0; 3], 1.0), stop(0.5, [0.0; 3], 1.0)];
         let table = LookTable::new(&Look { ramp: step.into(), ..Look::GROOVE }, 512.0).unwrap();
-        assert_eq!(table.layer(1)[3], 1.0);
-        assert_eq!((table.layer(0), table.layer(0x8000)[0], table.layer(0x7F00)[0]), ([0.0; 4], 0.0, 255.0));
+        assert_eq!(layer(&table, 1)[3], 1.0);
+        assert_eq!((layer(&table, 0), layer(&table, 0x8000)[0], layer(&table, 0x7F00)[0]), ([0.0; 4], 0.0, 255.0));
     }
 }

@@ -22,6 +22,9 @@ pub const CORNERS: u32 = u32::MAX - 4;
 const RANGE: f64 = (1u32 << 30) as f64;
 const NONE: u32 = u32::MAX;
 
+/// Room for so many nodes from the start, so that most surfaces ask for memory once.
+const FEW: usize = 64;
+
 /// A part of the surface that cracks and border enclose.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cell {
@@ -175,14 +178,14 @@ impl CellTracker {
             extent,
             scale,
             corner: [0; 2],
-            vertices: Vec::new(),
-            vertex_at: HashMap::new(),
-            vertex_of: Vec::new(),
+            vertices: Vec::with_capacity(FEW),
+            vertex_at: HashMap::with_capacity(FEW),
+            vertex_of: Vec::with_capacity(FEW),
             links: 0,
             border: BTreeMap::new(),
-            origin: Vec::new(),
-            next: Vec::new(),
-            loop_of: Vec::new(),
+            origin: Vec::with_capacity(2 * FEW),
+            next: Vec::with_capacity(2 * FEW),
+            loop_of: Vec::with_capacity(2 * FEW),
             loops: Vec::new(),
             cells: Vec::new(),
             touched: Vec::new(),
@@ -248,9 +251,9 @@ impl CellTracker {
         }
         self.touched.sort_unstable();
         self.touched.dedup();
-        for cell in std::mem::take(&mut self.touched) {
-            self.measure(cell);
-        }
+        let mut touched = std::mem::take(&mut self.touched);
+        touched.drain(..).for_each(|cell| self.measure(cell));
+        self.touched = touched;
         first..self.cells.len() as u32
     }
 

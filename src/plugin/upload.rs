@@ -24,7 +24,7 @@ use bevy::{
         texture::GpuImage,
     },
 };
-use pack::{COPY_ALIGNMENT, Changed, LOOSE, MAX_KEPT, Place, ROW_ALIGNMENT, Rows, SHORT_ROW, SIDE_BY_SIDE, pack};
+use pack::{Changed, LOOSE, MAX_KEPT, Place, ROW_ALIGNMENT, pack};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
 /// What went to the GPU in the last frame that was rendered.
@@ -41,6 +41,9 @@ pub struct CrackUploadStats {
 const MAX_UNFETCHED: usize = 1024;
 const MAX_WAITING: usize = 1 << 16;
 
+/// The least size of a buffer, bytes.
+const LEAST_BUFFER: u64 = 1 << 18;
+
 /// Up to this many rectangles are written one by one, more go through one buffer.
 const FEW: usize = 4;
 
@@ -53,7 +56,7 @@ pub(super) struct Uploads {
     /// Whether there is a renderer that fetches them.
     is_wanted: bool,
     rects: Vec<Changed>,
-    /// Hold the texels of `rects` that are packed: number `i` those of part `i + 1`.
+    /// Hold the texels of `rects` that are packed, each those of the part of its number; the one of [`LOOSE`] is the renderer's.
     packers: Vec<Packer>,
     /// Number of rectangles up to which they are not thinned out again.
     limit: usize,
@@ -139,12 +142,15 @@ impl Uploads {
 
     /// Lends some packers to `paint`, and takes what they have packed, one after the other.
     pub(super) fn pack(&mut self, count: usize, paint: impl FnOnce(&mut [Packer])) {
-        while self.packers.len() < count {
-            let part = self.packers.len() + 1;
+        self.have_packers(LOOSE + 1 + count);
+        paint(&mut self.packers[LOOSE + 1..][..count]);
+        self.packers.iter_mut().for_each(|packer| self.rects.append(&mut packer.rects));
+    }
+
+    fn have_packers(&mut self, count: usize) {
+        for part in self.packers.len()..count {
             self.packers.push(Packer::new(self.is_wanted, part));
         }
-        paint(&mut self.packers[..count]);
-        self.packers.iter_mut().for_each(|packer| self.rects.append(&mut packer.rects));
     }
 
     /// What brings whole pictures to the renderer, if there is one.
@@ -246,28 +252,6 @@ impl Copy {
     fn most_bytes(&self) -> usize {
         self.row().next_multiple_of(ROW_ALIGNMENT) * self.height()
     }
-
-    fn fits_beside(&self, other: &Self) -> bool {
-        let fits = |copy: &Self| copy.part == LOOSE && copy.row() <= SHORT_ROW;
-        self.height() == other.height() && fits(self) && fits(other)
-    }
-}
-
-/// Finds a place for each copy that is not packed, side by side with its neighbours where they are equally high (the textures of
-/// a surface).
-fn lay_out(copies: &mut [Copy], rows: &mut Rows) {
-    for equals in copies.chunk_by_mut(Copy::fits_beside).filter(|equals| equals[0].part == LOOSE) {
-        for shelf in equals.chunks_mut(SIDE_BY_SIDE) {
-            let mut pitch = 0;
-            for copy in &mut *shelf {
-                copy.offset = rows.end + pitch;
-                pitch += copy.row().next_multiple_of(COPY_ALIGNMENT);
-            }
-            pitch = pitch.next_multiple_of(ROW_ALIGNMENT);
-            shelf.iter_mut().for_each(|copy| copy.pitch = pitch);
-            rows.extend(pitch * shelf[0].height());
-        }
-    }
 }
 
 /// Memory that is kept from frame to frame.
@@ -275,7 +259,6 @@ fn lay_out(copies: &mut [Copy], rows: &mut Rows) {
 struct Staging {
     rects: Vec<Changed>,
     copies: Vec<Copy>,
-    parts: Vec<Rows>,
     buffers: Buffers,
 }
 
@@ -291,7 +274,7 @@ impl Buffers {
         ready.pop().filter(|buffer| buffer.size() >= size).unwrap_or_else(|| {
             device.create_buffer(&BufferDescriptor {
                 label: Some("crack_texels"),
-                size: size.next_power_of_two(),
+                size: size.next_power_of_two().max(LEAST_BUFFER),
                 usage: BufferUsages::MAP_WRITE | BufferUsages::COPY_SRC,
                 mapped_at_creation: true,
             })
@@ -333,14 +316,12 @@ fn upload_rects(
         copy_whole(&mut whole, images, &gpu_images, &device, &queue, &mut stats);
         main.resource_mut::<Uploads>().staged = whole;
     }
-    let Staging { rects, copies, parts, buffers } = &mut *staging;
+    let Staging { rects, copies, buffers } = &mut *staging;
     let mut uploads = main.resource_mut::<Uploads>();
     uploads.is_fetched = true;
     core::mem::swap(rects, &mut uploads.rects);
-    parts.resize_with(uploads.packers.len() + 1, Rows::default);
-    for (rows, packer) in parts[LOOSE + 1..].iter_mut().zip(&mut uploads.packers) {
-        core::mem::swap(rows, &mut packer.rows);
-    }
+    uploads.have_packers(LOOSE + 1);
+    let mut packers = core::mem::take(&mut uploads.packers);
     if !rects.is_empty()
         && let Some(images) = main.get_resource::<Assets<Image>>()
     {
@@ -362,18 +343,20 @@ fn upload_rects(
             Plan::Wait => true,
             Plan::Drop => false,
         });
-        let loose = &mut parts[LOOSE];
-        lay_out(copies, loose);
-        let unpacked = copies.iter().filter(|copy| copy.part == LOOSE);
-        unpacked.for_each(|copy| pack_copy(copy, images, &mut loose.bytes));
+        let loose = &mut packers[LOOSE].rows;
+        for copy in copies.iter_mut().filter(|copy| copy.part == LOOSE) {
+            (copy.offset, copy.pitch) = loose.place(copy.row(), copy.height());
+            pack_copy(copy, images, &mut loose.bytes);
+        }
         if copies.len() <= FEW {
-            write(copies, parts, &gpu_images, &queue);
+            write(copies, &packers, &gpu_images, &queue);
         } else {
-            copy(copies, parts, buffers, &gpu_images, &device, &queue);
+            copy(copies, &packers, buffers, &gpu_images, &device, &queue);
         }
         copies.clear();
     }
-    parts.iter_mut().for_each(Rows::clear);
+    packers.iter_mut().for_each(|packer| packer.rows.clear());
+    main.resource_mut::<Uploads>().packers = packers;
     if !rects.is_empty() {
         rects.iter_mut().for_each(|changed| changed.place = None);
         main.resource_mut::<Uploads>().rects.append(rects);
@@ -484,32 +467,32 @@ fn layout(copy: &Copy, offset: u64) -> TexelCopyBufferLayout {
 }
 
 /// Writes rectangles one by one.
-fn write(copies: &[Copy], parts: &[Rows], gpu_images: &RenderAssets<GpuImage>, queue: &RenderQueue) {
+fn write(copies: &[Copy], packers: &[Packer], gpu_images: &RenderAssets<GpuImage>, queue: &RenderQueue) {
     for copy in copies {
         let Some(gpu) = gpu_images.get(copy.image) else { continue };
         let (to, size) = destination(gpu, copy);
-        queue.write_texture(to, &parts[copy.part].bytes[copy.offset..], layout(copy, 0), size);
+        queue.write_texture(to, &packers[copy.part].rows.bytes[copy.offset..], layout(copy, 0), size);
     }
 }
 
 /// Copies all rectangles from one buffer in one submission: a write of its own costs more than its texels.
 fn copy(
     copies: &[Copy],
-    parts: &[Rows],
+    packers: &[Packer],
     buffers: &Buffers,
     gpu_images: &RenderAssets<GpuImage>,
     device: &RenderDevice,
     queue: &RenderQueue,
 ) {
-    let (mut starts, mut size) = (Vec::with_capacity(parts.len()), 0);
-    for rows in parts {
+    let (mut starts, mut size) = (Vec::with_capacity(packers.len()), 0);
+    for packer in packers {
         starts.push(size);
-        size += rows.end;
+        size += packer.rows.end();
     }
     let buffer = buffers.take(size as u64, device);
     let mut memory = buffer.slice(..).get_mapped_range_mut();
-    for (rows, start) in parts.iter().zip(&starts) {
-        memory.slice(*start..start + rows.end).copy_from_slice(&rows.bytes[..rows.end]);
+    for (Packer { rows, .. }, start) in packers.iter().zip(&starts) {
+        memory.slice(*start..start + rows.end()).copy_from_slice(&rows.bytes[..rows.end()]);
     }
     drop(memory);
     buffer.unmap();

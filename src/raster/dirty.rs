@@ -16,6 +16,9 @@ const MAX_BEST_SPLITS: u32 = 16;
 /// Above this many marks they are no longer kept one by one: rectangles are of whole tiles then.
 const MAX_MARKS: usize = 256;
 
+/// Room for so many marks and tiles, so that most surfaces ask for memory once.
+const FEW: usize = 64;
+
 /// The changed parts of a surface, in tiles of [`DirtyTiles::TILE`] texels.
 ///
 /// Asking an empty set costs nothing, and it owns no memory before the first mark; all else costs in proportion to the marked tiles.
@@ -71,6 +74,7 @@ impl DirtyTiles {
             let rows = self.size.y.div_ceil(Self::TILE) as usize;
             self.tiles = vec![0; rows * words];
             self.rows = vec![0; rows.div_ceil(WORD)];
+            self.marks.reserve(FEW);
         }
         self.marked = true;
         if self.marks.len() <= MAX_MARKS {
@@ -109,7 +113,7 @@ impl DirtyTiles {
         if self.is_empty() {
             return;
         }
-        let mut tiles = Vec::new();
+        let mut tiles = Vec::with_capacity(FEW);
         self.drain(|x, y| tiles.push(UVec2::new(x, y)));
         let first = rects.len();
         cover(&mut tiles, 0, rects);
@@ -206,15 +210,23 @@ fn middle_cut(whole: TileRect) -> (usize, u32) {
 fn best_cut(tiles: &[UVec2], whole: TileRect) -> (usize, u32) {
     let size = whole.size();
     let mut best = ((u64::MAX, true, u32::MAX), middle_cut(whole));
+    let (mut few, mut many) = ([Bounds::EMPTY; 2 * FEW], Vec::new());
     for axis in 0..2 {
         let n = size[axis];
+        let both = if n as usize <= FEW {
+            &mut few[..2 * n as usize]
+        } else {
+            many.resize(2 * n as usize, Bounds::EMPTY);
+            &mut many[..2 * n as usize]
+        };
+        both.fill(Bounds::EMPTY);
         // The bounds of each line of tiles across the axis, then of all from that line on.
-        let mut lines = vec![Bounds::EMPTY; n as usize];
+        let (lines, onward) = both.split_at_mut(n as usize);
         for tile in tiles {
             let line = tile[axis] - whole.min[axis];
             lines[line as usize].add(Bounds { first: line, last: line, low: tile[1 - axis], high: tile[1 - axis] });
         }
-        let mut onward = lines.clone();
+        onward.copy_from_slice(lines);
         for i in (1..onward.len()).rev() {
             let next = onward[i];
             onward[i - 1].add(next);

@@ -20,7 +20,7 @@ use super::{
     section::{MAX_RADIUS, Section, at_door, clamp01, max, min},
 };
 use crate::pattern::{PathPoint, SegmentPath, SurfaceFrame};
-use glam::{DVec2, UVec2, Vec2};
+use glam::{DVec2, UVec2, Vec2, Vec4};
 
 /// Texels computed at once. Eight `f32` are two SSE registers; 16 spill, 4 leave half of the latency of `sqrt` unused.
 const LANES: usize = 8;
@@ -207,10 +207,10 @@ impl Capsule {
             let end = (x0 + n).min(width);
             // The columns that have changed, and those between them.
             let mut span = end..x0;
-            let mut add = |x0: usize, change: u128| {
+            let mut add = |x0: usize, change: u32| {
                 if TELL && change != 0 {
-                    span.start = span.start.min(x0 + change.trailing_zeros() as usize / 16);
-                    span.end = end.min(x0 + LANES - change.leading_zeros() as usize / 16);
+                    span.start = span.start.min(x0 + change.trailing_zeros() as usize);
+                    span.end = end.min(x0 + change.ilog2() as usize + 1);
                 }
             };
             let (blocks, rest) = field.depth.row_mut(y as usize)[x0..end].as_chunks_mut::<LANES>();
@@ -239,7 +239,7 @@ impl Capsule {
         }
     }
 
-    /// Returns the bits that have changed, 16 a texel.
+    /// Returns which texels have changed, a bit each.
     #[inline(always)]
     fn stamp_block<const N: usize, const TAPER: bool, const RIM: bool>(
         &self,
@@ -247,7 +247,7 @@ impl Capsule {
         section: &Section,
         x: f32,
         dy: f32,
-    ) -> u128 {
+    ) -> u32 {
         let uniform = section.cut(self.r_from);
         let mut values = [0.0; N];
         for i in 0..N {
@@ -262,13 +262,21 @@ impl Capsule {
             }
             values[i] = value * cut.scale;
         }
-        let mut change = [[0; 2]; LANES];
-        for ((depth, value), change) in block.iter_mut().zip(values).zip(&mut change) {
-            let deeper = (*depth).max(round_to_u16(value));
-            *change = (*depth ^ deeper).to_le_bytes();
-            *depth = deeper;
+        let (mut old, mut new) = ([0.0; N], [0.0; N]);
+        for i in 0..N {
+            old[i] = whole(block[i]);
+            new[i] = values[i] + WHOLE;
         }
-        change.as_flattened().first_chunk().map_or(0, |bytes| u128::from_le_bytes(*bytes))
+        let mut change = 0;
+        for k in 0..N / 4 {
+            let [old, new] =
+                [old, new].map(|all| Vec4::new(all[4 * k], all[4 * k + 1], all[4 * k + 2], all[4 * k + 3]));
+            change |= new.cmpgt(old).bitmask() << (4 * k);
+        }
+        for i in 0..N {
+            block[i] = max(new[i], old[i]).to_bits() as u16;
+        }
+        change
     }
 }
 
@@ -284,11 +292,14 @@ fn fetch(field: &DepthField, rect: TexelRect) {
     std::hint::black_box(sum);
 }
 
-/// Rounds a value of 0..=65535. Adding 2^23 leaves the whole number in the low bits of the float: unlike a cast, which
+/// Added to a value of 0..=65535, it rounds it and leaves the whole number in the low bits of the float: unlike a cast, which
 /// has to look after NaN, this is one addition on every machine.
+const WHOLE: f32 = 8_388_608.0;
+
+/// [`WHOLE`] and a whole number.
 #[inline(always)]
-fn round_to_u16(value: f32) -> u16 {
-    (value + 8_388_608.0).to_bits() as u16
+fn whole(depth: u16) -> f32 {
+    f32::from_bits(WHOLE.to_bits() | u32::from(depth))
 }
 
 /// The range of `from + t * (to - from)`, `t` in 0..=1, inside a box (Liang and Barsky 1984); `None` if there is none.

@@ -8,11 +8,16 @@ pub(super) const ROW_ALIGNMENT: usize = 256;
 
 /// Rows of a copy begin at multiples of this, bytes, beside those of others. Copies from elsewhere are slow or wrong on some
 /// devices.
-pub(super) const COPY_ALIGNMENT: usize = 64;
+const COPY_ALIGNMENT: usize = 64;
 
-/// Up to this many copies lie side by side, if their rows are no longer than this, bytes: so less is lost to [`ROW_ALIGNMENT`].
-pub(super) const SIDE_BY_SIDE: usize = 4;
-pub(super) const SHORT_ROW: usize = 1024;
+/// Copies lie side by side in rows of so many bytes, if they are no wider: so less is lost to [`ROW_ALIGNMENT`].
+const PITCH: usize = 1024;
+
+/// Where copies may begin in a row.
+const LANES: usize = PITCH / COPY_ALIGNMENT;
+
+/// The least memory that is asked for, bytes.
+const LEAST: usize = 1 << 16;
 
 /// The part of what is not packed before the renderer fetches it.
 pub(super) const LOOSE: usize = 0;
@@ -48,22 +53,38 @@ pub(super) struct Place {
 #[derive(Default)]
 pub(super) struct Rows {
     pub(super) bytes: Vec<u8>,
-    pub(super) end: usize,
+    /// Rows of [`PITCH`] bytes that are taken, of each lane.
+    taken: [usize; LANES],
 }
 
 impl Rows {
-    /// Makes room for so many bytes at the end, and returns where they begin.
-    pub(super) fn extend(&mut self, by: usize) -> usize {
-        let offset = self.end;
-        self.end += by;
-        if self.bytes.len() < self.end {
-            self.bytes.resize(self.end.next_power_of_two(), 0);
+    /// Finds room for `height` rows of `row` bytes, as near the top as there is; returns where the first begins, and the way from
+    /// row to row.
+    pub(super) fn place(&mut self, row: usize, height: usize) -> (usize, usize) {
+        let lanes = row.div_ceil(COPY_ALIGNMENT).min(LANES);
+        let tops = self.taken.windows(lanes.max(1)).map(|lanes| lanes.iter().copied().max().unwrap_or(0));
+        let (top, lane) = tops.zip(0..).min().unwrap_or((0, 0));
+        let (pitch, rows) = if row <= PITCH {
+            (PITCH, height)
+        } else {
+            let pitch = row.next_multiple_of(ROW_ALIGNMENT);
+            (pitch, (pitch * height).div_ceil(PITCH))
+        };
+        self.taken[lane..lane + lanes].fill(top + rows);
+        let end = (top + rows) * PITCH;
+        if self.bytes.len() < end {
+            self.bytes.resize(end.next_power_of_two().max(LEAST), 0);
         }
-        offset
+        (top * PITCH + lane * COPY_ALIGNMENT, pitch)
+    }
+
+    /// Bytes that are taken, with those between them.
+    pub(super) fn end(&self) -> usize {
+        self.taken.iter().copied().max().unwrap_or(0) * PITCH
     }
 
     pub(super) fn clear(&mut self) {
-        self.end = 0;
+        self.taken = [0; LANES];
         if self.bytes.len() > MAX_KEPT {
             self.bytes = Vec::new();
         }
@@ -89,7 +110,7 @@ impl Packer {
     /// written, so that the cache still has them.
     pub(in crate::plugin) fn push<'a>(
         &mut self,
-        images: impl Iterator<Item = Option<(AssetId<Image>, &'a [u8])>> + Clone,
+        images: impl Iterator<Item = Option<(AssetId<Image>, &'a [u8])>>,
         size: UVec2,
         rect: TexelRect,
     ) {
@@ -99,17 +120,16 @@ impl Packer {
         let (stride, area) = (size.x as usize, size.x as usize * size.y as usize);
         let [x, y] = rect.min.as_usizevec2().to_array();
         let [width, height] = rect.size().as_usizevec2().to_array();
-        let images = images.flatten().map(|(image, data)| (image, data, data.len() / area));
-        let beside = |texel: usize| (width * texel).next_multiple_of(COPY_ALIGNMENT);
-        let pitch = images.clone().map(|(.., texel)| beside(texel)).sum::<usize>().next_multiple_of(ROW_ALIGNMENT);
-        let is_packed = pitch <= SIDE_BY_SIDE * SHORT_ROW && self.rows.end + pitch * height <= MAX_PACKED;
-        let mut offset = if is_packed { self.rows.extend(pitch * height) } else { 0 };
-        for (image, data, texel) in images {
-            let place = is_packed.then_some(Place { part: self.part, offset, pitch, row: width * texel });
-            if let Some(place) = place {
+        for (image, data) in images.flatten() {
+            let texel = data.len() / area;
+            let row = width * texel;
+            let is_packed = self.rows.end() + row.next_multiple_of(PITCH) * height <= MAX_PACKED;
+            let place = is_packed.then(|| {
+                let (offset, pitch) = self.rows.place(row, height);
+                let place = Place { part: self.part, offset, pitch, row };
                 pack(&mut self.rows.bytes, place, data, (y * stride + x) * texel, stride * texel, height);
-                offset += beside(texel);
-            }
+                place
+            });
             self.rects.push(Changed { image, rect, place });
         }
     }
@@ -150,26 +170,22 @@ mod tests {
             }
             rects.retain(|rect| !rect.is_empty());
             assert_eq!(packer.rects.len(), 3 * rects.len());
-            let mut end = 0;
             for (i, changed) in packer.rects.iter().enumerate() {
                 let (rect, data) = (rects[i / 3], &data[i % 3]);
                 assert_eq!(changed.rect, rect);
                 let Some(Place { part, offset, pitch, row }) = changed.place else { continue };
                 let texel = data.len() / area;
                 assert!(part == 5 && row == rect.size().x as usize * texel, "{rect:?}");
-                assert!(
-                    pitch % ROW_ALIGNMENT == 0 && offset % COPY_ALIGNMENT == 0 && offset >= end,
-                    "{offset} {pitch}"
-                );
+                assert!(pitch % ROW_ALIGNMENT == 0 && offset % COPY_ALIGNMENT == 0, "{offset} {pitch}");
+                assert!(offset + pitch * (rect.size().y as usize - 1) + row <= packer.rows.end(), "beyond the end");
                 for y in rect.min.y..rect.max.y {
                     let from = (y * size.x + rect.min.x) as usize * texel;
                     let to = offset + (y - rect.min.y) as usize * pitch;
+                    // So none lies over another: that would hold something else.
                     assert_eq!(packer.rows.bytes[to..to + row], data[from..from + row], "{rect:?}");
                 }
-                // The next begins beside it, or below.
-                end = offset + if i % 3 == 2 { row + pitch * (rect.size().y as usize - 1) } else { row };
             }
-            assert!(end <= packer.rows.end && packer.rows.end <= MAX_PACKED);
+            assert!(packer.rows.end() <= MAX_PACKED);
             assert!(packer.rects.iter().any(|changed| changed.place.is_some()), "nothing is packed");
         }
     }
