@@ -361,35 +361,18 @@ fn inside(
 mod tests {
     use super::*;
     use crate::{
-        plugin::prelude::*,
+        plugin::{
+            headless::{app, blank},
+            prelude::*,
+        },
         shatter::{Anchor, ShatterParams},
-    };
-    use bevy::{
-        asset::RenderAssetUsages,
-        image::TextureAtlasLayout,
-        render::render_resource::{Extent3d, TextureDimension, TextureFormat},
     };
 
     /// By count: the frames in which shards are asked for, made and there cut nothing, and paint nothing.
     #[test]
     fn no_frame_cuts_or_paints_for_shards() {
-        let mut app = App::new();
-        app.add_plugins((
-            MinimalPlugins,
-            TransformPlugin,
-            AssetPlugin::default(),
-            ImagePlugin::default(),
-            CrackPlugins,
-        ))
-        .init_asset::<TextureAtlasLayout>()
-        .init_asset::<Mesh>()
-        .init_asset::<ColorMaterial>();
-        app.finish();
-        app.cleanup();
-        let extent = Extent3d { width: 64, height: 64, depth_or_array_layers: 1 };
-        let (format, usage) = (TextureFormat::Rgba8UnormSrgb, RenderAssetUsages::default());
-        let image = Image::new_fill(extent, TextureDimension::D2, &[200, 200, 200, 255], format, usage);
-        let image = app.world_mut().resource_mut::<Assets<Image>>().add(image);
+        let mut app = app(CrackBudget::default());
+        let image = app.world_mut().resource_mut::<Assets<Image>>().add(blank(UVec2::splat(64)));
         let settings = ShatterCracks {
             cut: ShatterParams { carry_on: true, ..ShatterParams::DEFAULT },
             anchor: Anchor::Nothing,
