@@ -194,7 +194,7 @@ fn work(mut job: Job, line: &Line, home: ThreadId) -> Outcome {
 }
 
 /// A panic becomes an error: in a task it would end the app.
-fn guarded<T>(run: impl FnOnce() -> Result<T, CrackError>) -> Result<T, CrackError> {
+pub(super) fn guarded<T>(run: impl FnOnce() -> Result<T, CrackError>) -> Result<T, CrackError> {
     catch_unwind(AssertUnwindSafe(run)).unwrap_or_else(|panic| {
         let text = panic.downcast_ref::<&str>().copied().or(panic.downcast_ref::<String>().map(String::as_str));
         Err(CrackError::Bake { reason: format!("it panicked: {}", text.unwrap_or("unknown")) })

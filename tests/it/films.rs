@@ -173,7 +173,7 @@ fn whatever_happens_on_the_way() {
     let tinted: Happen = |app, _| {
         // In each frame, and what is shown stays the same.
         app.add_systems(Update, |mut sprites: Query<&mut Sprite>| {
-            sprites.iter_mut().for_each(|mut sprite| sprite.color = Color::WHITE)
+            sprites.iter_mut().for_each(|mut sprite| sprite.color = Color::WHITE);
         });
     };
     let happenings: [(&str, Happen); 8] = [
