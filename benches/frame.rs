@@ -6,8 +6,8 @@
 //! 10,000 plain sprites. "only ...": parts of the first that no program could do without. `baking`: what of each frame the crate's systems
 //! take while guided cracks are baked, 60 frames a second, from the first frame to ten after the last crack; `front`, `widen`: while they
 //! appear within a second. `shards/*`: what
-//! the crate's own systems take of the main thread in the three frames in which a pane becomes 500 shards for the first time, 60 a second,
-//! in the one in which as many are shown once more, and in each in which 5,000 fly. With a Vulkan driver (software will do) uploads are part
+//! the crate's own systems take of the main thread in the three frames in which a pane becomes 500 shards for the first time, 60 a second
+//! (beside three in which nothing happens), in the one in which as many are shown once more, and in each in which 5,000 fly. With a Vulkan driver (software will do) uploads are part
 //! of it; without, it says so.
 
 #![expect(clippy::print_stdout, clippy::expect_used, reason = "a benchmark")]
@@ -38,7 +38,10 @@ use bevy_crack::{
     shatter::{Anchor, ShatterParams},
 };
 use criterion::{Criterion, criterion_group, criterion_main};
-use std::time::{Duration, Instant};
+use std::{
+    path::Path,
+    time::{Duration, Instant},
+};
 
 const SURFACES: usize = 100;
 const SIDE: u32 = 512;
@@ -68,17 +71,30 @@ fn app() -> App {
     app
 }
 
-/// Time that the crate's systems of the main world took, all frames together.
+/// Time that the crate's systems of the main world took, all frames together, and CPU time of the thread that looks.
 #[derive(Resource, Default)]
-struct OurSystems(Option<Instant>, Duration);
+struct OurSystems(Option<(Instant, Duration)>, Duration, Duration);
 
 fn start_watch(mut time: ResMut<OurSystems>) {
-    time.0 = Some(Instant::now());
+    let cpu = cpu_time_here();
+    time.0 = Some((Instant::now(), cpu));
 }
 
 fn stop_watch(mut time: ResMut<OurSystems>) {
-    let elapsed = time.0.take().map_or(Duration::ZERO, |start| start.elapsed());
-    time.1 += elapsed;
+    let Some((start, cpu)) = time.0.take() else { return };
+    time.1 += start.elapsed();
+    time.2 += cpu_time_here().saturating_sub(cpu);
+}
+
+/// CPU time of this thread so far; zero where the system does not tell.
+fn cpu_time_here() -> Duration {
+    // The system brings its count up to date now.
+    std::thread::yield_now();
+    Duration::from_nanos(nanoseconds("/proc/thread-self/schedstat".as_ref()).unwrap_or(0))
+}
+
+fn nanoseconds(path: &Path) -> Option<u64> {
+    std::fs::read_to_string(path).ok()?.split(' ').next()?.parse().ok()
 }
 
 fn measure_systems(app: &mut App) {
@@ -173,10 +189,7 @@ fn idle(app: &mut App) -> Duration {
 /// CPU time of all threads so far, those of the driver included; zero where the system does not tell.
 fn cpu_time() -> Duration {
     let tasks = std::fs::read_dir("/proc/self/task").into_iter().flatten();
-    let times = tasks.filter_map(|task| {
-        let times = std::fs::read_to_string(task.ok()?.path().join("schedstat")).ok()?;
-        times.split(' ').next()?.parse::<u64>().ok()
-    });
+    let times = tasks.filter_map(|task| nanoseconds(&task.ok()?.path().join("schedstat")));
     Duration::from_nanos(times.sum())
 }
 
@@ -388,8 +401,11 @@ enum Run {
     OnThreads,
 }
 
-/// Time of the crate's systems in each frame of some bakes, each on a new surface; apart, those in which its cracks appear.
-fn baking_frames(side: u32, appearance: GuidedAppearance, run: Run) -> [Vec<Duration>; 2] {
+/// Time and CPU time of the crate's systems in each frame.
+type Frames = Vec<[Duration; 2]>;
+
+/// The frames of some bakes, each on a new surface; apart, those in which its cracks appear, and how many times are shown.
+fn baking_frames(side: u32, appearance: GuidedAppearance, run: Run) -> ([Frames; 2], usize) {
     let mut app = app();
     measure_systems(&mut app);
     if run == Run::InARow {
@@ -400,6 +416,7 @@ fn baking_frames(side: u32, appearance: GuidedAppearance, run: Run) -> [Vec<Dura
     let texels = (0..64 * 64).map(|i| cross(UVec2::new(i % 64, i / 64))).collect();
     let guide = Grid::from_vec(UVec2::splat(64), texels).expect("the size fits");
     let [mut baking, mut appearing] = [Vec::new(), Vec::new()];
+    let (mut times_shown, mut shown) = (0, 0.0);
     for seed in 0..BAKES as u64 {
         let entity = with_sprites(&mut app, 1, side, false)[0];
         let guided = GuidedCracks { max_side: side, appearance, ..GuidedCracks::new(CrackGuide::new(guide.clone())) };
@@ -410,40 +427,56 @@ fn baking_frames(side: u32, appearance: GuidedAppearance, run: Run) -> [Vec<Dura
             let is_baked = app.world().get::<BakeProgress>(entity) == Some(&BakeProgress(1.0));
             let frame = time_of(|| app.update());
             let times = if is_baked && after == 0 { &mut appearing } else { &mut baking };
-            times.push(app.world().resource::<OurSystems>().1);
+            let OurSystems(_, time, cpu) = app.world().resource();
+            times.push([*time, *cpu]);
             let state = app.world().get::<CrackState>(entity);
+            let now = state.map_or(0.0, |state| state.time);
+            times_shown += usize::from(core::mem::replace(&mut shown, now) != now);
             after += u32::from(state.is_some_and(|state| state.status == CrackStatus::Done));
             std::thread::sleep((Duration::from_secs(1) / 60).saturating_sub(frame));
         }
         app.world_mut().despawn(entity);
         (0..3).for_each(|_| app.update());
     }
-    [baking, appearing]
+    ([baking, appearing], times_shown / BAKES)
 }
 
 fn baking(side: u32) {
     for (name, run) in [("in a row", Run::InARow), ("on threads", Run::OnThreads)] {
-        let frames = baking_frames(side, GuidedAppearance::AtOnce, run).concat();
-        println!("baking {side} x {side}, systems {name}: {}", percentiles(frames));
+        let frames = baking_frames(side, GuidedAppearance::AtOnce, run).0.concat();
+        println!("baking {side} x {side}, systems {name}: {}", percentiles(&frames, run));
     }
     let front = GuidedAppearance::Front { from: Vec2::splat(0.5), seconds: 1.0 };
     for (name, appearance) in [("front", front), ("widen", GuidedAppearance::Widen { seconds: 1.0 })] {
-        let [_, frames] = baking_frames(side, appearance, Run::InARow);
-        println!("{name} {side} x {side}, systems in a row: {}", percentiles(frames));
+        let ([_, frames], shown) = baking_frames(side, appearance, Run::InARow);
+        println!(
+            "{name} {side} x {side}, systems in a row: {}; {shown} times are shown",
+            percentiles(&frames, Run::InARow)
+        );
     }
 }
 
-fn percentiles(mut times: Vec<Duration>) -> String {
-    times.sort();
-    let at = |share: f64| times[((times.len() - 1) as f64 * share) as usize].as_secs_f64() * 1e3;
-    let (half, most, all) = (at(0.5), at(0.99), at(1.0));
-    format!("{} frames, p50 {half:.3} ms, p99 {most:.3} ms, max {all:.3} ms", times.len())
+fn percentiles(frames: &Frames, run: Run) -> String {
+    let of = |which: usize| {
+        let mut times: Vec<Duration> = frames.iter().map(|times| times[which]).collect();
+        times.sort();
+        let at = |share: f64| times[((times.len() - 1) as f64 * share) as usize].as_secs_f64() * 1e3;
+        format!("p50 {:.3} ms, p99 {:.3} ms, max {:.3} ms", at(0.5), at(0.99), at(1.0))
+    };
+    match run {
+        Run::InARow => format!("{} frames, {}; CPU time {}", frames.len(), of(0), of(1)),
+        // Not all on the thread that looks.
+        Run::OnThreads => format!("{} frames, {}", frames.len(), of(0)),
+    }
 }
 
 /// Panes that are cracked all over, and become at most 500 shards each.
-fn panes(count: usize) -> (App, Vec<Entity>) {
+fn panes(count: usize, run: Run) -> (App, Vec<Entity>) {
     let mut app = app();
     measure_shards(&mut app);
+    if run == Run::InARow {
+        app.edit_schedule(PostUpdate, |schedule| _ = schedule.set_executor(SingleThreadedExecutor::new()));
+    }
     app.world_mut().resource_mut::<CrackBudget>().max_shards = 10_000;
     let panes: Vec<Entity> = (0..count as u64)
         .map(|seed| {
@@ -495,13 +528,21 @@ fn least_and_median(mut times: Vec<Duration>) -> String {
 }
 
 fn shards(c: &mut Criterion) {
-    let (mut app, panes) = panes(10);
-    let burst = |pane: &Entity| {
-        app.world_mut().commands().entity(*pane).shatter_cracks(ShatterRequest::ALL);
-        // Those in which it is asked for, made, and there.
-        systems_of(&mut app, 3)
+    let first_time = |run: Run, name: &str| {
+        let (mut app, panes) = panes(10, run);
+        let idle = (0..20).map(|_| systems_of(&mut app, 3)).collect();
+        println!("idle, systems {name}, three frames: {}", least_and_median(idle));
+        let burst = |pane: &Entity| {
+            app.world_mut().commands().entity(*pane).shatter_cracks(ShatterRequest::ALL);
+            // Those in which it is asked for, made, and there.
+            systems_of(&mut app, 3)
+        };
+        let times = panes.iter().map(burst).collect();
+        println!("500 shards for the first time, systems {name}, three frames: {}", least_and_median(times));
+        (app, panes)
     };
-    println!("500 shards for the first time: {}", least_and_median(panes.iter().map(burst).collect()));
+    drop(first_time(Run::InARow, "in a row"));
+    let (mut app, panes) = first_time(Run::OnThreads, "on threads");
     let shown = app.world_mut().query::<&Shard>().iter(app.world()).count();
     println!("{shown} shards in all");
     let mut again = Vec::new();

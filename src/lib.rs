@@ -1,3 +1,5 @@
+// Whether a surface may go from thread to thread depends on what a buffer of the renderer is made of, which goes deep.
+#![recursion_limit = "256"]
 #![cfg_attr(docsrs, feature(doc_cfg))]
 //! Cracks that grow over sprites and walls, frame by frame, from the points where they are hit.
 //!

@@ -15,7 +15,7 @@ use bevy::{
     window::ExitCondition,
     winit::WinitPlugin,
 };
-use bevy_crack::prelude::CrackPlugins;
+use bevy_crack::prelude::{CrackBudget, CrackPlugins};
 use clap::{CommandFactory, FromArgMatches, Parser};
 use std::{panic, path::PathBuf, time::Duration};
 
@@ -97,7 +97,9 @@ pub fn demo_app(title: &str, arguments: &DemoArguments) -> App {
             .disable::<bevy::render::pipelined_rendering::PipelinedRenderingPlugin>()
             .set(WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() })
             .add(ScheduleRunnerPlugin::run_loop(Duration::ZERO));
-        app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs(1) / 30));
+        // Nothing is put off: each frame is to be right.
+        app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs(1) / 30))
+            .insert_resource(CrackBudget { milliseconds: 1e6, ..default() });
     }
     app.add_plugins(plugins).insert_resource(output).insert_resource(arguments.clone());
     if output == Output::Window {

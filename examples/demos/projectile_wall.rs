@@ -76,13 +76,10 @@ fn setup(
 ) {
     commands.spawn(Camera2d);
     let quad = meshes.add(Rectangle::new(SIDE, SIDE));
-    let concrete = CrackPreset::CONCRETE;
-    // Bricks crack as concrete does, more often and less far.
-    let mut brick = CrackPreset::CONCRETE;
-    brick.growth.num_lines_grid = 12;
-    brick.growth.num_columns_grid = 12;
-    brick.growth.reach = 0.4;
-    for (x, name, preset, seed) in [(-430.0, "brick_red", brick, 1), (0.0, "concrete_fine", concrete, 2)] {
+    // Walls crack along their mortar, the light lines of the picture.
+    let brick = CrackSurface::new(CrackPreset::BRICK).with_seed(1).with_mask(CrackMaskSource::FromPicture);
+    let concrete = CrackSurface::new(CrackPreset::CONCRETE).with_seed(2);
+    for (x, name, surface) in [(-430.0, "brick_red", brick), (0.0, "concrete_fine", concrete)] {
         let (picture, normal) = with_normals(&assets, name);
         commands.spawn((
             Exhibit,
@@ -94,7 +91,7 @@ fn setup(
                 ),
             ),
             Transform::from_xyz(x, 60.0, 0.0),
-            CrackSurface::new(preset).with_seed(seed),
+            surface,
             OnCanvas { picture, size: Vec2::splat(SIDE) },
         ));
     }

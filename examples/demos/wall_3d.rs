@@ -56,21 +56,22 @@ fn setup(
     let wall = meshes.add(Rectangle::new(2.0 * HALF, 2.0 * HALF));
     let right = Quat::from_rotation_y(-std::f32::consts::FRAC_PI_2);
     let floor = Quat::from_rotation_x(-std::f32::consts::FRAC_PI_2);
+    // Walls crack along their mortar, the light lines of the picture.
+    let of_brick = CrackSurface::new(CrackPreset::BRICK).with_mask(CrackMaskSource::FromPicture);
+    let of_concrete = CrackSurface::new(CrackPreset::CONCRETE);
     let sides = [
-        (Transform::from_xyz(0.0, 0.0, -HALF), concrete.clone(), 1),
-        (Transform::from_xyz(-HALF, 0.0, 0.0).with_rotation(right.inverse()), brick.clone(), 2),
-        (Transform::from_xyz(HALF, 0.0, 0.0).with_rotation(right), brick, 3),
-        (Transform::from_xyz(0.0, -HALF, 0.0).with_rotation(floor), concrete, 4),
+        (Transform::from_xyz(0.0, 0.0, -HALF), concrete.clone(), of_concrete.clone().with_seed(1)),
+        (
+            Transform::from_xyz(-HALF, 0.0, 0.0).with_rotation(right.inverse()),
+            brick.clone(),
+            of_brick.clone().with_seed(2),
+        ),
+        (Transform::from_xyz(HALF, 0.0, 0.0).with_rotation(right), brick, of_brick.with_seed(3)),
+        (Transform::from_xyz(0.0, -HALF, 0.0).with_rotation(floor), concrete, of_concrete.with_seed(4)),
     ];
-    for (transform, material, seed) in sides {
+    for (transform, material, surface) in sides {
         commands
-            .spawn((
-                Wall,
-                Mesh3d(wall.clone()),
-                MeshMaterial3d(material),
-                transform,
-                CrackSurface::new(CrackPreset::CONCRETE).with_seed(seed),
-            ))
+            .spawn((Wall, Mesh3d(wall.clone()), MeshMaterial3d(material), transform, surface))
             .observe(hit_on_press);
     }
     commands.spawn((

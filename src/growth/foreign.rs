@@ -33,31 +33,29 @@ impl CrackGrowth {
         // Nothing leaves the border by rounding.
         let place = |pos: Vec2| Vec2::select(pos.cmpeq(from), extent, (pos / from * extent).min(extent));
         let (before, first) = (self.steps, self.network.nodes.len() as u32);
-        // Nodes and links that are there, and nodes that have opened.
-        let (mut node, mut link, mut opened) = (0, 0, 0);
-        for step in 0..=last.saturating_add(opening) {
+        // Links that a hit has made since the last step come in the next one.
+        self.timeline.begin(before.saturating_add(1));
+        (self.links_told..self.network.links.len() as u32).for_each(|_| self.timeline.add_link());
+        // Nodes and links that are there.
+        let (mut node, mut link) = (0, 0);
+        for step in 0..=last {
             self.steps = before.saturating_add(step).saturating_add(1);
             self.timeline.begin(self.steps);
-            for (i, &Node { width, birth, .. }) in cracks.nodes.iter().enumerate().take(node).skip(opened) {
-                let share = (step - birth + 1) as f32 / (opening + 1) as f32;
-                self.timeline.widen(first + i as u32, width * share);
-                opened += usize::from(step - birth >= opening);
-            }
             while let Some(&added) = cracks.nodes.get(node).filter(|added| added.birth <= step) {
                 let parent = if added.parent == NO_PARENT { NO_PARENT } else { added.parent + first };
                 let birth = self.steps;
                 self.add(Node { pos: place(added.pos), parent, birth, impact: NO_IMPACT, bend: 0.0, ..added });
-                self.timeline.add_node(added.width / (opening + 1) as f32);
+                self.timeline.add_opening_node(added.width, opening);
                 node += 1;
-                opened += usize::from(opening == 0);
             }
             while let Some(&added) = cracks.links.get(link).filter(|added| added.birth <= step) {
                 let (a, b, birth) = (added.a + first, added.b + first, self.steps);
                 self.network.links.push(Link { a, b, birth, bend: 0.0, ..added });
-                self.timeline.add_link();
+                self.timeline.add_opening_link(opening);
                 link += 1;
             }
         }
+        self.steps = self.steps.saturating_add(opening);
         let told = std::mem::replace(&mut self.links_told, self.network.links.len() as u32);
         self.changes.list.extend((told..self.links_told).map(SegmentId::Link));
         self.newborn = first..self.network.nodes.len() as u32;

@@ -127,8 +127,8 @@ pub struct GrowthParams {
     /// Share of the length of thin cracks at which they are hairlines, too fine to be seen from afar, 0..=0.6: pictures of them fall
     /// into pieces there, while the network goes on. Wide cracks have fewer.
     pub hairlines: f32,
-    /// How much a crack keeps its direction, against the pull of the markers: 0 = not at all, 1 = as much as it follows them.
-    /// 0..=8.
+    /// How much a crack keeps its direction, against the pull of the markers: 0 = not at all, 1 = as much as it follows them. In
+    /// what a [mask](crate::pattern::CrackMask) marks as weak it keeps less of it, or none: there the joint leads. 0..=8.
     pub inertia: f32,
     /// Direction in which cracks like to run, radians from the x axis (y runs down): across what pulls the surface apart. -7..=7.
     pub axis: f32,

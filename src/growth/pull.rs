@@ -88,9 +88,10 @@ impl CrackGrowth {
                     let outward = (from - hit).normalize_or(heading);
                     pull.strays = heading.dot(direction) < FORK || outward.dot(direction) < FORK;
                 }
-                // A side branch has left that heading already.
+                // A side branch has left that heading already, and in a joint the joint leads.
                 if heading.dot(direction) > 0.0 {
-                    direction = (direction + heading * self.params.inertia).normalize_or_zero();
+                    let inertia = self.params.inertia * (1.0 - self.mask.weak_at(from / extent));
+                    direction = (direction + heading * inertia).normalize_or_zero();
                 }
             }
             direction = self.params.direct(direction);

@@ -74,7 +74,8 @@ pub struct Dot {
 ///
 /// What comes in step `s` grows from nothing at moment `s - 1` to its whole at moment `s`: a segment by its length, a
 /// width from what it was to what it becomes, a dot by its radius. What a hit makes comes in the step after it. So at
-/// [`Moment::START`] nothing is there, and at the [`end`](Self::end) the network is as it is.
+/// [`Moment::START`] nothing is there, and at the [`end`](Self::end) the network is as it is. Cracks that were
+/// [added](crate::growth::CrackGrowth::add_cracks) may open on for some steps, all the way evenly.
 ///
 /// Entries are only ever added, in order of their steps.
 ///
@@ -98,18 +99,38 @@ pub struct Timeline {
     /// The step that entries belong to.
     now: u32,
     nodes: Vec<Birth>,
-    /// Per link: the step in which it came.
-    links: Vec<u32>,
+    links: Vec<LinkBirth>,
     widenings: Vec<Widening>,
     dots: Vec<(u32, Dot)>,
+    /// The longest opening, and the step after which all that open are open.
+    longest: u32,
+    open: u32,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Birth {
     step: u32,
     width: f32,
+    /// Steps after that of its birth in which it opens to that width.
+    opening: u32,
     /// The latest of its widenings, or [`NONE`].
     latest: u32,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct LinkBirth {
+    step: u32,
+    /// As of a node.
+    opening: u32,
+}
+
+/// Width at `moment` of what comes in a step and opens to `width` in so many further ones, evenly from nothing at the start of the
+/// first; in that one it has the width of its end.
+fn opened(width: f32, step: u32, opening: u32, moment: Moment) -> f32 {
+    let start = u64::from(step.saturating_sub(1)) * u64::from(Moment::PARTS);
+    let all = (u64::from(opening) + 1) * u64::from(Moment::PARTS);
+    let passed = u64::from(moment.0).saturating_sub(start).max(u64::from(Moment::PARTS));
+    if passed < all { width * (passed as f64 / all as f64) as f32 } else { width }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -145,12 +166,29 @@ impl Timeline {
 
     /// The next node comes, of this width.
     pub(crate) fn add_node(&mut self, width: f32) {
-        self.nodes.push(Birth { step: self.now, width, latest: NONE });
+        self.add_opening_node(width, 0);
+    }
+
+    /// The next node comes, and opens to this width in so many further steps.
+    pub(crate) fn add_opening_node(&mut self, width: f32, opening: u32) {
+        self.nodes.push(Birth { step: self.now, width, opening, latest: NONE });
+        self.opens(opening);
     }
 
     /// The next link comes.
     pub(crate) fn add_link(&mut self) {
-        self.links.push(self.now);
+        self.add_opening_link(0);
+    }
+
+    /// The next link comes, and opens to its width in so many further steps.
+    pub(crate) fn add_opening_link(&mut self, opening: u32) {
+        self.links.push(LinkBirth { step: self.now, opening });
+        self.opens(opening);
+    }
+
+    fn opens(&mut self, opening: u32) {
+        self.longest = self.longest.max(opening);
+        self.open = self.open.max(self.now.saturating_add(opening));
     }
 
     /// A node becomes wider.
@@ -189,11 +227,12 @@ impl Timeline {
     pub fn end(&self) -> u32 {
         let last = [
             self.nodes.last().map(|birth| birth.step),
-            self.links.last().copied(),
+            self.links.last().map(|birth| birth.step),
             self.widenings.last().map(|widening| widening.step),
             self.dots.last().map(|dot| dot.0),
         ];
-        last.into_iter().flatten().max().unwrap_or(0)
+        let is_empty = self.nodes.is_empty() && self.links.is_empty();
+        last.into_iter().flatten().max().unwrap_or(0).max(if is_empty { 0 } else { self.open })
     }
 
     /// The line of a segment at `moment`; `None` if it is not there (yet).
@@ -209,7 +248,8 @@ impl Timeline {
         let widths = match segment {
             SegmentId::Branch(_) => (self.width_at(a, moment)?, self.width_at(b, moment)?),
             SegmentId::Link(i) => {
-                let width = network.links().get(i as usize)?.width;
+                let LinkBirth { step, opening } = *self.links.get(i as usize)?;
+                let width = opened(network.links().get(i as usize)?.width, step, opening, moment);
                 (width, width)
             }
         };
@@ -223,7 +263,10 @@ impl Timeline {
         let birth = self.nodes.get(node as usize)?;
         let goal = self.version(birth.latest, moment.begun());
         let base = self.version(goal, moment.whole());
-        let width = |version: u32| self.widenings.get(version as usize).map_or(birth.width, |widening| widening.width);
+        let width = |version: u32| match self.widenings.get(version as usize) {
+            Some(widening) => widening.width,
+            None => opened(birth.width, birth.step, birth.opening, moment),
+        };
         let (from, to) = (width(base), width(goal));
         Some(if goal == base { to } else { from + (to - from) * moment.share(moment.begun()) })
     }
@@ -256,8 +299,20 @@ impl Timeline {
     pub(crate) fn step_of(&self, segment: SegmentId) -> Option<u32> {
         match segment {
             SegmentId::Branch(node) => self.nodes.get(node as usize).map(|birth| birth.step),
-            SegmentId::Link(link) => self.links.get(link as usize).copied(),
+            SegmentId::Link(link) => self.links.get(link as usize).map(|birth| birth.step),
         }
+    }
+
+    /// The nodes and the links that have come by the end of step `step` and open on after it.
+    pub(crate) fn opening(&self, step: u32) -> (impl Iterator<Item = usize>, impl Iterator<Item = usize>) {
+        // Those before have opened for as long as any do.
+        let over = step.saturating_sub(self.longest);
+        let (first, last) = (self.entries(over), self.entries(step));
+        let is_open = move |birth: u32, opening: u32| birth.saturating_add(opening) <= step;
+        (
+            (first.nodes..last.nodes).filter(move |&i| !is_open(self.nodes[i].step, self.nodes[i].opening)),
+            (first.links..last.links).filter(move |&i| !is_open(self.links[i].step, self.links[i].opening)),
+        )
     }
 
     /// The node that a widening is of.
@@ -274,7 +329,7 @@ impl Timeline {
     pub(crate) fn entries(&self, step: u32) -> Entries {
         Entries {
             nodes: self.nodes.partition_point(|birth| birth.step <= step),
-            links: self.links.partition_point(|&link| link <= step),
+            links: self.links.partition_point(|birth| birth.step <= step),
             widenings: self.widenings.partition_point(|widening| widening.step <= step),
             dots: self.dots.partition_point(|dot| dot.0 <= step),
         }

@@ -4,10 +4,9 @@ use super::{
     CrackBudget, CrackClock, CrackError, CrackFailed, CrackMaps, CrackResolution, CrackState, CrackStats, CrackStatus,
     CrackSurface, CrackTextures, HitPoint,
     budget::FrameClock,
-    carrier::{self, Carrier, Found, Shown},
+    carrier::{self, Carrier, Shown, Untouched},
     mask,
     picture::{self, BasePicture, Space},
-    preset,
     queue::{HitQueue, QueuedHit},
     shards::Struck,
     surfaces::{Active, Ground, Surfaces},
@@ -140,19 +139,8 @@ pub(super) fn make_ready(world: &mut World, entity: Entity) -> Result<bool, Crac
     if world.resource::<Surfaces>().active.contains_key(&entity) {
         return Ok(true);
     }
-    // Removed since the hit: the hook has dropped its hits, unless they came in between.
-    let Some(surface) = world.get::<CrackSurface>(entity).cloned() else { return Err(CrackError::NothingToCrack) };
-    if !world.contains_resource::<Assets<Image>>() {
-        return Err(CrackError::NoImages);
-    }
-    let (kind, found) = carrier::inspect(world, entity);
-    let (kind, shown) = match (kind, found) {
-        (Some(kind), Found::Shown(shown)) => (kind, *shown),
-        (_, Found::Waiting) => return Ok(false),
-        (_, Found::Unusable(error)) => return Err(error),
-        _ => return Err(CrackError::NothingToCrack),
-    };
-    let Some(preset) = preset::resolve(world, &surface.preset)? else { return Ok(false) };
+    let Some(untouched) = carrier::untouched(world, entity)? else { return Ok(false) };
+    let Untouched { surface, preset, kind, shown } = untouched;
     let Some(draft) = draft(world, &surface, &shown, 0)? else { return Ok(false) };
     let Some(mask) = mask::resolve(world, &surface, &shown, &draft)? else { return Ok(false) };
     let frame = frame(draft.plan.rect)?;

@@ -41,7 +41,7 @@ pub(super) struct Bakes {
     /// Bakes were cancelled while the list was worked on.
     cancelled: Vec<Entity>,
     /// Whether tasks turned out to run in place.
-    no_threads: bool,
+    pub(super) no_threads: bool,
 }
 
 /// A bake that goes on.
@@ -114,7 +114,8 @@ impl Bakes {
         }
     }
 
-    fn pool(&self) -> Option<&'static AsyncComputeTaskPool> {
+    /// What tasks run on that do not stop the frames.
+    pub(super) fn pool(&self) -> Option<&'static AsyncComputeTaskPool> {
         AsyncComputeTaskPool::try_get().filter(|_| !self.no_threads)
     }
 }
@@ -193,7 +194,7 @@ fn work(mut job: Job, line: &Line, home: ThreadId) -> Outcome {
 }
 
 /// A panic becomes an error: in a task it would end the app.
-fn guarded<T>(run: impl FnOnce() -> Result<T, CrackError>) -> Result<T, CrackError> {
+pub(super) fn guarded<T>(run: impl FnOnce() -> Result<T, CrackError>) -> Result<T, CrackError> {
     catch_unwind(AssertUnwindSafe(run)).unwrap_or_else(|panic| {
         let text = panic.downcast_ref::<&str>().copied().or(panic.downcast_ref::<String>().map(String::as_str));
         Err(CrackError::Bake { reason: format!("it panicked: {}", text.unwrap_or("unknown")) })
@@ -383,11 +384,13 @@ fn go_on(world: &mut World, entity: Entity, bake: &mut Bake, made: Made) -> Resu
 mod tests {
     use super::*;
     #[cfg(feature = "2d")]
-    use crate::Grid;
-    #[cfg(feature = "2d")]
-    use crate::plugin::surfaces::Surfaces;
-    #[cfg(feature = "2d")]
-    use bevy::asset::RenderAssetUsages;
+    use crate::{
+        Grid,
+        plugin::{
+            headless::{app, blank, shown},
+            surfaces::Surfaces,
+        },
+    };
 
     #[test]
     fn e11_a_panic_is_an_error() {
@@ -396,46 +399,11 @@ mod tests {
         assert_eq!(guarded(|| Ok(7)), Ok(7));
     }
 
-    #[cfg(feature = "2d")]
-    fn blank(size: UVec2) -> Image {
-        use bevy::render::render_resource::{Extent3d, TextureDimension, TextureFormat};
-        let extent = Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 };
-        let format = TextureFormat::Rgba8UnormSrgb;
-        Image::new_fill(extent, TextureDimension::D2, &[200, 200, 200, 255], format, RenderAssetUsages::default())
-    }
-
-    /// Assets and time, but no renderer; no more than a slice a frame.
-    #[cfg(feature = "2d")]
-    fn app() -> App {
-        use bevy::image::TextureAtlasLayout;
-        let mut app = App::new();
-        app.add_plugins((
-            MinimalPlugins,
-            TransformPlugin,
-            AssetPlugin::default(),
-            ImagePlugin::default(),
-            crate::plugin::CrackPlugins,
-        ))
-        .init_asset::<TextureAtlasLayout>();
-        app.finish();
-        app.cleanup();
-        app.insert_resource(CrackBudget { milliseconds: 0.0, ..default() });
-        app
-    }
-
-    /// What the sprite shows.
-    #[cfg(feature = "2d")]
-    fn shown(app: &App, entity: Entity) -> Vec<u8> {
-        let image = app.world().get::<Sprite>(entity).map(|sprite| sprite.image.clone()).unwrap_or_default();
-        let images = app.world().resource::<Assets<Image>>();
-        images.get(&image).and_then(|image| image.data.clone()).unwrap_or_default()
-    }
-
     /// Frames until the bake has ended, and the progress after each.
     #[cfg(feature = "2d")]
     fn frames(no_threads: bool) -> (Vec<f32>, Vec<u8>) {
         use crate::plugin::prelude::*;
-        let mut app = app();
+        let mut app = app(CrackBudget { milliseconds: 0.0, ..default() });
         app.world_mut().resource_mut::<Bakes>().no_threads = no_threads;
         let image = app.world_mut().resource_mut::<Assets<Image>>().add(blank(UVec2::new(300, 200)));
         let guide = CrackGuide::new(Grid::new(UVec2::new(3, 1), 0.5));
@@ -475,7 +443,7 @@ mod tests {
         #[derive(Resource, Default)]
         struct Seen(Vec<(usize, bool, Vec<u8>)>);
 
-        let mut app = app();
+        let mut app = app(CrackBudget { milliseconds: 0.0, ..default() });
         app.init_resource::<Seen>().add_observer(
             |baked: On<CrackBaked>,
              mut surfaces: ResMut<Surfaces>,

@@ -28,13 +28,15 @@ impl<W: Send + 'static, T: Send + 'static> Beside<W, T> {
             None => self.task.and_then(block_on),
         }
     }
-}
 
-#[cfg(test)]
-impl<W, T> Beside<W, T> {
     /// Whether a task has done it.
     pub(super) fn is_done(&self) -> bool {
         self.task.as_ref().is_some_and(Task::is_finished)
+    }
+
+    /// The work, if no thread has begun it.
+    pub(super) fn take_back(&self) -> Option<W> {
+        take(&self.work)
     }
 }
 

@@ -12,6 +12,8 @@ pub struct CrackBudget {
     /// Time for hits, growth and painting in one frame, milliseconds, however many threads grow and paint; default 2. What is left
     /// over waits for the next frame; at least one hit, one step and one surface are done in each. NaN and values below zero count
     /// as 0.
+    ///
+    /// With a second or more nothing that a frame shows is put off: for recordings, whose frames may take any time.
     pub milliseconds: f32,
     /// Hits that may wait on one surface; default 4096. A further one adds its energy to a waiting one near it.
     pub max_queued_per_surface: usize,
@@ -55,6 +57,13 @@ pub struct CrackStats {
     pub rejected: u64,
     /// Hits that wait.
     pub queued: u64,
+}
+
+impl CrackBudget {
+    /// Whether frames may take any time.
+    pub(super) fn is_boundless(&self) -> bool {
+        self.milliseconds >= 1000.0
+    }
 }
 
 /// Time spent in this frame by the systems of this crate.

@@ -1,6 +1,7 @@
 //! [`Carrier`]: what shows a surface's pictures, a sprite or a material.
 
-use super::{CrackError, CrackMaps, CrackTextures, Shard, shards::Plane, surfaces::Active};
+use super::{CrackError, CrackMaps, CrackSurface, CrackTextures, Shard, preset, shards::Plane, surfaces::Active};
+use crate::CrackPreset;
 use bevy::{
     asset::{UntypedAssetId, UntypedHandle},
     prelude::*,
@@ -135,4 +136,29 @@ pub(super) fn inspect(world: &World, entity: Entity) -> (Option<&'static Kind>, 
         }
     }
     (None, Found::Unusable(CrackError::NothingToCrack))
+}
+
+/// A surface that has not cracked.
+pub(super) struct Untouched {
+    pub(super) surface: CrackSurface,
+    pub(super) preset: CrackPreset,
+    pub(super) kind: &'static Kind,
+    pub(super) shown: Shown,
+}
+
+/// What the entity is made of; `None` if some of it is not there yet.
+pub(super) fn untouched(world: &World, entity: Entity) -> Result<Option<Untouched>, CrackError> {
+    // Removed since it was asked for: the hook has dropped its hits, unless they came in between.
+    let Some(surface) = world.get::<CrackSurface>(entity).cloned() else { return Err(CrackError::NothingToCrack) };
+    if !world.contains_resource::<Assets<Image>>() {
+        return Err(CrackError::NoImages);
+    }
+    let (kind, shown) = match inspect(world, entity) {
+        (Some(kind), Found::Shown(shown)) => (kind, *shown),
+        (_, Found::Waiting) => return Ok(None),
+        (_, Found::Unusable(error)) => return Err(error),
+        _ => return Err(CrackError::NothingToCrack),
+    };
+    let preset = preset::resolve(world, &surface.preset)?;
+    Ok(preset.map(|preset| Untouched { surface, preset, kind, shown }))
 }

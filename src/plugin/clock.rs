@@ -20,6 +20,9 @@ use bevy::prelude::*;
 /// A hit adds steps at the end of time and makes a clock that runs backwards run forwards, from where it is; nothing jumps.
 /// Removing the clock lets time run on to the end.
 ///
+/// The cracks of [`GuidedCracks`](super::GuidedCracks) are shown a frame or a few later than their time, see
+/// [`GuidedAppearance`](super::GuidedAppearance).
+///
 /// ```
 /// use bevy::prelude::*;
 /// use bevy_crack::prelude::*;
@@ -367,6 +370,7 @@ pub(super) fn follow_clocks(
             let is_first = active.playback.is_none();
             active.follow(clock.bypass_change_detection());
             surfaces.wake(entity);
+            surfaces.film(entity, None);
             if is_first {
                 // What has grown frame by frame is drawn once more, at a stroke.
                 surfaces.soil(entity);

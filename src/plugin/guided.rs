@@ -161,6 +161,12 @@ impl From<Arc<[u8]>> for GuideSource {
 
 /// How baked cracks come. Under a [`CrackClock`](super::CrackClock), which rules then, in the same order; on a surface that has been hit
 /// before, at once.
+///
+/// A frame does not draw them: what the surface is to show is drawn and painted beside the frames, and a frame takes it up when it is
+/// ready, one later at the earliest. So what is shown lags a little behind; [`CrackState::time`](super::CrackState::time)
+/// is what it shows, and when time stands still, or has come to its end, that is exactly the picture of that time. While cracks move, this
+/// takes some 8 bytes a texel more. Where there are no threads it is done in slices inside the [`CrackBudget`](super::CrackBudget);
+/// with a budget of a second or more, in the frame itself.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum GuidedAppearance {
     /// All at once.

@@ -63,6 +63,7 @@ fn close(world: &mut World, entity: Entity, seconds: f32) {
     let is_closing = world.get_resource_mut::<Surfaces>().is_some_and(|mut surfaces| {
         let is_closing = surfaces.active.get_mut(&entity).is_some_and(|active| active.close(seconds));
         surfaces.wake(entity);
+        surfaces.film(entity, None);
         is_closing
     });
     if !is_closing {

@@ -23,9 +23,12 @@ mod budget;
 mod carrier;
 mod clock;
 mod error;
+mod film;
 mod freeze;
 mod grow;
 mod guided;
+#[cfg(all(test, feature = "2d"))]
+mod headless;
 mod heal;
 mod hit;
 #[cfg(feature = "2d")]
@@ -187,7 +190,7 @@ impl Plugin for CrackPlugin {
                     (clock::follow_clocks, grow::grow_surfaces, bake::bake_guided.run_if(bake::any_baking))
                         .chain()
                         .in_set(Grow),
-                    paint::paint_surfaces.in_set(Paint),
+                    (film::show_films.run_if(film::any_filmed), paint::paint_surfaces).chain().in_set(Paint),
                     upload::drop_unwanted.in_set(Upload),
                 ),
             );

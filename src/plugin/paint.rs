@@ -78,18 +78,7 @@ pub(super) fn paint_surfaces(
                 left.push(entity);
                 continue;
             }
-            active.is_dirty = false;
-            active.painted += 1;
-            let is_done = active.is_open && active.is_complete();
-            tell_cells(active, entity, &mut commands);
-            if let Ok(mut state) = states.get_mut(entity) {
-                tell(active, &mut state, before, is_done);
-            }
-            active.close_playback();
-            if is_done {
-                active.is_open = false;
-                commands.trigger(CrackFinished { entity });
-            }
+            tell_painted(active, entity, before, &mut states, &mut commands);
         }
         if timer.is_over() {
             break;
@@ -228,6 +217,28 @@ impl Canvas {
             let pictures = active.textures.all().into_iter().zip(data);
             packer.push(pictures.map(|(texture, data)| Some((texture?.id(), data?))), size, rect);
         }
+    }
+}
+
+/// Tells what is shown of a surface that has been painted; `before` was shown before if it has a playback.
+pub(super) fn tell_painted(
+    active: &mut Active,
+    entity: Entity,
+    before: Option<Moment>,
+    states: &mut Query<&mut CrackState>,
+    commands: &mut Commands,
+) {
+    active.is_dirty = false;
+    active.painted += 1;
+    let is_done = active.is_open && active.is_complete();
+    tell_cells(active, entity, commands);
+    if let Ok(mut state) = states.get_mut(entity) {
+        tell(active, &mut state, before, is_done);
+    }
+    active.close_playback();
+    if is_done {
+        active.is_open = false;
+        commands.trigger(CrackFinished { entity });
     }
 }
 

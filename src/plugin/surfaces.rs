@@ -4,6 +4,7 @@ use super::{
     CrackClock, CrackSurface, CrackTextures,
     carrier::Carrier,
     clock::Playback,
+    film::Film,
     freeze::Frozen,
     picture::BasePicture,
     shards::{Broken, Request, Struck},
@@ -70,6 +71,9 @@ pub(super) struct Active {
     pub(super) added: Option<Added>,
     /// Shows other times than the end; `None` = everything that has grown is shown.
     pub(super) playback: Option<Playback>,
+    /// What makes those times beside the frames, for baked cracks. While it is at work `field`, `touched` and the playback's replay are
+    /// with it, and the surface counts as dirty without being in the list.
+    pub(super) film: Option<Box<Film>>,
     pub(super) hits: u32,
     /// What it has forgotten and still shows.
     pub(super) frozen: Option<Frozen>,
@@ -135,6 +139,7 @@ impl Active {
             appearing: None,
             added: None,
             playback: None,
+            film: None,
             hits: 0,
             touched: Touched::new(frame.size()),
             is_growing: false,
@@ -259,6 +264,8 @@ pub(super) struct Surfaces {
     pub(super) held: VecDeque<Entity>,
     /// Surfaces to paint, each once, in turns.
     pub(super) dirty: VecDeque<Entity>,
+    /// Surfaces whose times are made beside the frames.
+    pub(super) filmed: Vec<Entity>,
     /// Surfaces whose components or pictures have changed.
     pub(super) changed: Vec<Entity>,
     /// Surfaces that have shattered.

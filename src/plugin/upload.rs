@@ -27,7 +27,7 @@ use bevy::{
     },
 };
 use pack::{Changed, LOOSE, MAX_KEPT, Place, ROW_ALIGNMENT, pack};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError, Weak};
 
 /// What went to the GPU in the last frame that was rendered.
 #[derive(Resource, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -66,43 +66,64 @@ pub(super) struct Uploads {
     is_fetched: bool,
     /// Whether whole textures are on their way.
     has_whole: bool,
-    /// Whole pictures that come before the rectangles.
+    /// Pictures, or parts of them, that come before the rectangles.
     staged: Vec<(AssetId<Image>, Staged)>,
 }
 
-/// Brings whole pictures to where the GPU can read them, on any thread.
+/// Brings pictures to where the GPU can read them, on any thread, and keeps that memory for the next ones.
 #[derive(Clone)]
-pub(super) struct Stager(RenderDevice);
+pub(super) struct Stager {
+    device: RenderDevice,
+    buffers: Buffers,
+}
 
-/// A whole picture where the GPU can read it.
+/// Parts of a picture where the GPU can read them.
 pub(super) struct Staged {
     buffer: Buffer,
-    /// From row to row, bytes.
-    pitch: usize,
+    /// Where it is to go then.
+    home: Weak<Mutex<Vec<Buffer>>>,
+    /// Each with the place of its first row.
+    parts: Vec<(TexelRect, usize)>,
+}
+
+/// From row to row of a staged part, bytes.
+fn pitch(rect: TexelRect, texel: usize) -> usize {
+    (rect.size().x as usize * texel).next_multiple_of(ROW_ALIGNMENT)
 }
 
 impl Stager {
-    /// `None` if rows have no texels, or the device has no buffer so large.
-    pub(super) fn stage(&self, texels: &[u8], row: usize) -> Option<Staged> {
-        let pitch = row.next_multiple_of(ROW_ALIGNMENT);
-        let height = texels.len().checked_div(row).filter(|height| *height > 0)?;
-        let size = (pitch * height) as u64;
-        if size > self.0.limits().max_buffer_size {
+    /// Parts of a picture of `size` texels of so many bytes; `None` if there are none, they are not in the picture, or the device has
+    /// no buffer so large.
+    pub(super) fn stage(&self, texels: &[u8], size: UVec2, texel: usize, rects: &[TexelRect]) -> Option<Staged> {
+        let stride = size.x as usize * texel;
+        let whole = TexelRect::whole(size);
+        if texels.len() != stride * size.y as usize || rects.iter().any(|rect| rect.intersect(whole) != *rect) {
             return None;
         }
-        let buffer = self.0.create_buffer(&BufferDescriptor {
-            label: Some("crack_picture"),
-            size,
-            usage: BufferUsages::MAP_WRITE | BufferUsages::COPY_SRC,
-            mapped_at_creation: true,
-        });
+        let mut end = 0;
+        let place = |rect: &TexelRect| {
+            let start = end;
+            end += pitch(*rect, texel) * rect.size().y as usize;
+            (*rect, start)
+        };
+        let parts: Vec<_> = rects.iter().map(place).collect();
+        let size = end as u64;
+        if size == 0 || size.next_power_of_two() > self.device.limits().max_buffer_size {
+            return None;
+        }
+        let buffer = self.buffers.take(size, &self.device);
         let mut memory = buffer.slice(..).get_mapped_range_mut();
-        for (y, texels) in texels.chunks_exact(row).enumerate() {
-            memory.slice(y * pitch..y * pitch + row).copy_from_slice(texels);
+        for &(rect, start) in &parts {
+            let (pitch, row) = (pitch(rect, texel), rect.size().x as usize * texel);
+            let rows = texels.chunks_exact(stride).skip(rect.min.y as usize).take(rect.size().y as usize);
+            for (y, texels) in rows.enumerate() {
+                let (to, from) = (start + y * pitch, rect.min.x as usize * texel);
+                memory.slice(to..to + row).copy_from_slice(&texels[from..from + row]);
+            }
         }
         drop(memory);
         buffer.unmap();
-        Some(Staged { buffer, pitch })
+        Some(Staged { buffer, home: Arc::downgrade(&self.buffers.0), parts })
     }
 }
 
@@ -137,17 +158,31 @@ impl Uploads {
     /// What brings whole pictures to the renderer, if there is one.
     pub(super) fn stager(&self, device: Option<&RenderDevice>) -> Option<Stager> {
         // In a browser the device stays on its thread.
-        device.filter(|_| self.is_wanted && !cfg!(target_arch = "wasm32")).map(|device| Stager(device.clone()))
+        let device = device.filter(|_| self.is_wanted && !cfg!(target_arch = "wasm32"))?;
+        Some(Stager { device: device.clone(), buffers: Buffers::default() })
     }
 
     /// Notes that all of an image has changed to what is staged, if it is.
     pub(super) fn push_whole(&mut self, image: AssetId<Image>, size: UVec2, staged: Option<Staged>) {
         self.staged.retain(|(other, _)| *other != image);
+        self.push_staged(image, size, &[TexelRect::whole(size)], staged);
+    }
+
+    /// The same of parts of an image.
+    pub(super) fn push_staged(
+        &mut self,
+        image: AssetId<Image>,
+        size: UVec2,
+        rects: &[TexelRect],
+        staged: Option<Staged>,
+    ) {
         // What is packed is older, and would come after it.
         self.rects.iter_mut().filter(|changed| changed.image == image).for_each(|changed| changed.place = None);
         match staged {
+            // Nobody fetches them: no more are kept.
+            Some(_) if self.is_staged(image) => self.push_whole(image, size, None),
             Some(staged) if self.is_wanted => self.staged.push((image, staged)),
-            _ => self.push(image, TexelRect::whole(size)),
+            _ => rects.iter().for_each(|rect| self.push(image, *rect)),
         }
     }
 
@@ -258,7 +293,9 @@ impl Sending {
         let mut encoder = device.create_command_encoder(&CommandEncoderDescriptor { label: Some("crack_texels") });
         copies.drain(..).for_each(|copy| copy_one(&mut encoder, &copy, &buffer));
         queue.submit([encoder.finish()]);
-        buffers.give_back(buffer, &device);
+        if buffer.size() <= MAX_KEPT as u64 {
+            Buffers::give_back(Arc::downgrade(&buffers.0), buffer, &device);
+        }
         copies
     }
 }
@@ -282,14 +319,16 @@ impl Buffers {
         })
     }
 
-    /// Keeps a buffer that was submitted for when the GPU has read it.
-    fn give_back(&self, buffer: Buffer, device: &RenderDevice) {
-        if buffer.size() > MAX_KEPT as u64 {
+    /// Keeps a buffer that was submitted for when the GPU has read it, if it is wanted then.
+    fn give_back(home: Weak<Mutex<Vec<Buffer>>>, buffer: Buffer, device: &RenderDevice) {
+        if home.strong_count() == 0 {
             return;
         }
-        let (ready, kept) = (self.0.clone(), buffer.clone());
+        let kept = buffer.clone();
         device.map_buffer(&buffer.slice(..), MapMode::Write, move |mapped| {
-            if mapped.is_ok() {
+            if mapped.is_ok()
+                && let Some(ready) = home.upgrade()
+            {
                 ready.lock().unwrap_or_else(PoisonError::into_inner).push(kept);
             }
         });
@@ -378,24 +417,35 @@ fn copy_whole(
     stats: &mut CrackUploadStats,
 ) {
     let mut encoder = device.create_command_encoder(&CommandEncoderDescriptor { label: Some("crack_pictures") });
-    staged.retain(|(id, staged)| {
-        let whole = TexelRect::whole(images.get(*id).map_or(UVec2::ZERO, Image::size));
-        match plan(*id, whole, images, gpu_images) {
-            Plan::Copy(copy) => {
-                let copy = Copy { pitch: staged.pitch, ..copy };
-                let size = (copy.pitch * copy.height()) as u64;
-                if copy.row() <= copy.pitch && size == staged.buffer.size() {
-                    copy_one(&mut encoder, &copy, &staged.buffer);
-                    stats.rects += 1;
-                    stats.bytes += copy.rect.area() * copy.texel as u64;
+    let mut done = Vec::new();
+    *staged = core::mem::take(staged)
+        .into_iter()
+        .filter_map(|(id, staged)| {
+            let mut waits = false;
+            for &(rect, offset) in &staged.parts {
+                match plan(id, rect, images, gpu_images) {
+                    Plan::Copy(copy) => {
+                        let copy = Copy { offset, pitch: pitch(rect, copy.texel), ..copy };
+                        let end = offset + copy.pitch * copy.height();
+                        if copy.rect == rect && end as u64 <= staged.buffer.size() {
+                            copy_one(&mut encoder, &copy, &staged.buffer);
+                            stats.rects += 1;
+                            stats.bytes += copy.rect.area() * copy.texel as u64;
+                        }
+                    }
+                    Plan::Wait => waits = true,
+                    Plan::Drop => {}
                 }
-                false
             }
-            Plan::Wait => true,
-            Plan::Drop => false,
-        }
-    });
+            if waits {
+                return Some((id, staged));
+            }
+            done.push(staged);
+            None
+        })
+        .collect();
     queue.submit([encoder.finish()]);
+    done.into_iter().for_each(|Staged { buffer, home, .. }| Buffers::give_back(home, buffer, device));
 }
 
 /// What is sent beside the renderer's preparations comes before what is drawn.

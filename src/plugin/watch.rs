@@ -171,6 +171,7 @@ fn update_settings(world: &World, entity: Entity, active: &mut Active) -> bool {
 
 fn update_preset(active: &mut Active, preset: CrackPreset) -> Result<(), CrackError> {
     let look = look(&preset, active.field.frame)?;
+    active.recall();
     if preset.growth != active.preset.growth {
         let outcome = active.growth.set_params(preset.growth.clone());
         outcome.map_err(|error| CrackError::Preset { reason: error.to_string() })?;
@@ -249,6 +250,7 @@ fn update_picture(world: &mut World, entity: Entity, active: &mut Active, shown:
     let Some(mask) = mask::resolve(world, &active.surface, &shown, &draft)? else { return Ok(false) };
     let frame = frame(draft.plan.rect)?;
     let look = look(&active.preset, frame)?;
+    active.recall();
     let regrown = regrow(active, frame, mask.clone())?;
     active.textures = make_textures(world, &draft, Some(&active.textures))?;
     // Shards show the picture that was.

@@ -43,6 +43,13 @@ impl DepthField {
         Self { frame, depth, forbidden: None }
     }
 
+    /// Takes the depths out, and leaves a field without texels in the same place, on which nothing is drawn.
+    #[cfg(feature = "bevy")]
+    pub(crate) fn take(&mut self) -> Self {
+        let empty = Self { frame: self.frame, depth: Grid::new(UVec2::ZERO, 0), forbidden: None };
+        std::mem::replace(self, empty)
+    }
+
     /// Makes all of it untouched. What is forbidden stays so.
     pub fn clear(&mut self) {
         self.depth.as_mut_slice().fill(0);

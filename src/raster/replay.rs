@@ -70,8 +70,9 @@ pub struct Replay {
     cell_marks: Vec<u32>,
     /// Number of the move.
     turn: u32,
-    /// Marked tiles, and their texels before the move.
+    /// Marked tiles, how many of them have been seen to, and their texels before the move.
     marked: Vec<u32>,
+    drawn: usize,
     before: Vec<[u16; (TILE * TILE) as usize]>,
 }
 
@@ -141,6 +142,7 @@ impl Replay {
             cell_marks: vec![0; count(cells)],
             turn: 0,
             marked: Vec::new(),
+            drawn: 0,
             before: Vec::new(),
         }
     }
@@ -157,11 +159,31 @@ impl Replay {
         self.at
     }
 
+    /// Whether the next move draws all of the field anew.
+    #[cfg(feature = "bevy")]
+    pub(crate) const fn is_stale(&self) -> bool {
+        self.is_stale
+    }
+
     /// Makes `field` show `network` at the moment `to`, and tells in `redrawn` what has changed.
     ///
     /// `field` must be the one of the moves before, unchanged (one of another size is drawn anew), and `network` and `timeline`
     /// those of one growth, which may have grown since.
     pub fn show(
+        &mut self,
+        field: &mut DepthField,
+        network: &Network,
+        timeline: &Timeline,
+        to: Moment,
+        redrawn: &mut Redrawn,
+    ) {
+        self.begin(field, network, timeline, to, redrawn);
+        while !self.draw(field, network, timeline, usize::MAX, redrawn) {}
+        self.end(field, redrawn);
+    }
+
+    /// The first part of [`show`](Self::show): clears what will be drawn anew.
+    pub(crate) fn begin(
         &mut self,
         field: &mut DepthField,
         network: &Network,
@@ -183,9 +205,8 @@ impl Replay {
             self.mark_changes(timeline, seen, to);
         }
         self.at = to;
+        self.drawn = 0;
         self.clear_marked(field, redrawn);
-        self.draw_marked(field, network, timeline, redrawn);
-        self.compare_marked(field, redrawn);
     }
 
     /// Marks the tiles under all that is not at the moment `to` as it is shown. Of the timeline, `seen` is shown.
@@ -203,22 +224,33 @@ impl Replay {
         }
         for widening in range(|entries| entries.widenings) {
             let Some(node) = timeline.widened(widening) else { continue };
-            // A branch tapers between two widths.
-            let Kin { part, mut child, .. } = self.nodes[node as usize];
-            self.mark_part(part);
-            while child != NONE {
-                let kin = self.nodes[child as usize];
-                if timeline.step_of(SegmentId::Branch(child)).is_some_and(|step| step <= late.begun()) {
-                    self.mark_part(kin.part);
-                }
-                child = kin.sibling;
-            }
+            self.mark_width(timeline, node as usize, late);
         }
         for link in range(|entries| entries.links) {
             self.mark_part(self.links[link]);
         }
+        let (nodes, links) = timeline.opening(early.whole());
+        for node in nodes.take_while(|&node| node < seen.nodes) {
+            self.mark_width(timeline, node, late);
+        }
+        for link in links.take_while(|&link| link < seen.links) {
+            self.mark_part(self.links[link]);
+        }
         for dot in range(|entries| entries.dots) {
             self.mark_part(self.dots[dot]);
+        }
+    }
+
+    /// Marks what changes with the width of a node: a branch tapers between two widths.
+    fn mark_width(&mut self, timeline: &Timeline, node: usize, late: Moment) {
+        let Kin { part, mut child, .. } = self.nodes[node];
+        self.mark_part(part);
+        while child != NONE {
+            let kin = self.nodes[child as usize];
+            if timeline.step_of(SegmentId::Branch(child)).is_some_and(|step| step <= late.begun()) {
+                self.mark_part(kin.part);
+            }
+            child = kin.sibling;
         }
     }
 
@@ -262,14 +294,25 @@ impl Replay {
         }
     }
 
-    /// Stamps what touches a marked tile, all of it: beside the marked tiles it changes nothing, for it is there already.
-    fn draw_marked(&mut self, field: &mut DepthField, network: &Network, timeline: &Timeline, redrawn: &mut Redrawn) {
+    /// The second part: stamps what touches a marked tile, all of it: beside the marked tiles it changes nothing, for it is there
+    /// already. Looks at no more than about `most` segments; says whether it is done.
+    pub(crate) fn draw(
+        &mut self,
+        field: &mut DepthField,
+        network: &Network,
+        timeline: &Timeline,
+        most: usize,
+        redrawn: &mut Redrawn,
+    ) -> bool {
         let columns = self.tiles.x.div_ceil(CELL);
-        for &tile in &self.marked {
+        let mut looked_at = 0;
+        while let Some(&tile) = self.marked.get(self.drawn).filter(|_| looked_at < most) {
+            self.drawn += 1;
             let cell = tile / self.tiles.x / CELL * columns + tile % self.tiles.x / CELL;
             if std::mem::replace(&mut self.cell_marks[cell as usize], self.turn) == self.turn {
                 continue;
             }
+            looked_at += self.cells[cell as usize].len();
             for &part in &self.cells[cell as usize] {
                 let part = &mut self.parts[part as usize];
                 if std::mem::replace(&mut part.visited, self.turn) == self.turn {
@@ -294,10 +337,11 @@ impl Replay {
                 }
             }
         }
+        self.drawn == self.marked.len()
     }
 
-    /// Notes the texels of the marked tiles that differ from before.
-    fn compare_marked(&mut self, field: &DepthField, redrawn: &mut Redrawn) {
+    /// The last part: notes the texels of the marked tiles that differ from before.
+    pub(crate) fn end(&mut self, field: &DepthField, redrawn: &mut Redrawn) {
         for (&tile, before) in self.marked.iter().zip(&self.before) {
             let rect = self.tile(tile);
             let mut changed = TexelRect::default();

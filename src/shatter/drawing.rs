@@ -70,9 +70,13 @@ impl Drawing {
 
     /// Cuts lines where they meet, until they share nothing but ends, and drops what is there twice.
     pub(super) fn make_planar(&mut self) {
-        self.lay_border();
+        self.make_planar_from(0);
+    }
+
+    /// [`make_planar`](Self::make_planar) where the edges before `new` share nothing but ends.
+    fn make_planar_from(&mut self, new: usize) {
         // After the first round, only pairs with a new edge can meet.
-        let (mut round, mut new, mut cuts) = (0, 0, Vec::new());
+        let (mut round, mut new, mut cuts) = (0, self.lay_border(new), Vec::new());
         loop {
             let grid = EdgeGrid::new(self);
             let mut changed = false;
@@ -85,12 +89,14 @@ impl Drawing {
         }
     }
 
-    /// Lays the border anew, from each place on it to the next.
-    fn lay_border(&mut self) {
-        self.edges.retain(|&[a, b]| {
+    /// Lays the border anew, from each place on it to the next. Returns how many of the first `old` edges are left.
+    fn lay_border(&mut self, old: usize) -> u32 {
+        let is_inside = |&[a, b]: &[u32; 2]| {
             let sides = [a, b].map(|vertex| self.places[vertex as usize]);
             self.lattice.side_of(sides[0], sides[1]).is_none()
-        });
+        };
+        let left = self.edges[..old].iter().filter(|ends| is_inside(ends)).count() as u32;
+        self.edges.retain(is_inside);
         let mut on_side: [Vec<u32>; 4] = Default::default();
         for (vertex, &place) in (0u32..).zip(&self.places) {
             for (vertices, is_on) in on_side.iter_mut().zip(self.lattice.sides(place)) {
@@ -104,6 +110,7 @@ impl Drawing {
             vertices.sort_unstable_by_key(|&vertex| self.places[vertex as usize]);
             self.edges.extend(vertices.windows(2).map(|pair| [pair[0], pair[1]]));
         }
+        left
     }
 
     /// Notes where two edges must be cut so that they share nothing but ends. `false` if they need not be.
@@ -191,7 +198,7 @@ impl Drawing {
         first
     }
 
-    /// Carries every open end on, in the direction in which it came, to the next line. Returns the new lines.
+    /// Carries every open end on, in the direction in which it came, to the next line, in a drawing that is planar. Returns the new lines.
     pub(super) fn carry_on(&mut self, seed: u64) -> Vec<Vec<Vec2>> {
         let mut at: Vec<(u32, u32)> = vec![(0, u32::MAX); self.places.len()];
         for (edge, ends) in (0u32..).zip(&self.edges) {
@@ -204,14 +211,15 @@ impl Drawing {
         let on_border = |place: Place| self.lattice.sides(place).contains(&true);
         let tips: Vec<u32> =
             (0..at.len() as u32).filter(|&v| at[v as usize].0 == 1 && !on_border(self.places[v as usize])).collect();
-        let grid = EdgeGrid::new(self);
+        let old = self.edges.len();
+        let mut grid = EdgeGrid::new(self);
         let rng = Rng::new(seed).stream("carry on");
-        let (mut younger, mut lines) = (Vec::new(), Vec::new());
+        let mut lines = Vec::with_capacity(tips.len());
         for tip in tips {
             let back = self.way_back(&at, tip);
             let [start, back] = [tip, back].map(|vertex| self.places[vertex as usize]);
             let way = vector(back, start).map(|x| x as f64);
-            let Some((edge, hit)) = self.first_hit(start, way, &grid, &younger) else { continue };
+            let Some((edge, hit)) = self.first_hit(start, way, &grid) else { continue };
             let [from, to] = self.edges[edge as usize];
             if let Some(pieces) = self.split(edge, hit) {
                 for (end, piece) in [from, to].into_iter().zip(pieces) {
@@ -219,17 +227,16 @@ impl Drawing {
                         *edges ^= edge ^ piece;
                     }
                 }
-                younger.extend(pieces);
             }
             let ends = [tip, hit].map(|v| self.lattice.pos(self.places[v as usize]));
             let line = self.rough_line(ends, rng.nth(u64::from(tip)));
-            let first = self.edges.len() as u32;
             self.line(line.iter().copied());
-            younger.extend(first..self.edges.len() as u32);
+            grid.add_new(self);
             lines.push(line);
         }
+        let left = self.edges[..old].iter().filter(|&&edge| edge != DEAD).count();
         self.edges.retain(|&edge| edge != DEAD);
-        self.make_planar();
+        self.make_planar_from(left);
         lines
     }
 
@@ -248,44 +255,43 @@ impl Drawing {
         }
     }
 
-    /// The first edge on the way from a place, other than those that begin there, and the vertex at which the way meets it.
-    fn first_hit(&mut self, start: Place, way: [f64; 2], grid: &EdgeGrid, younger: &[u32]) -> Option<(u32, u32)> {
-        // To the first side of the surface.
-        let share = [0, 1]
-            .map(|i| {
-                let room = if way[i] > 0.0 { self.lattice.corner[i] - start[i] } else { -start[i] };
-                if way[i] == 0.0 { f64::INFINITY } else { f64::from(room) / way[i] }
-            })
-            .into_iter()
-            .fold(f64::INFINITY, f64::min);
-        if !share.is_finite() {
-            return None;
-        }
-        let end: Place =
-            [0, 1].map(|i| ((f64::from(start[i]) + way[i] * share).round() as i32).clamp(0, self.lattice.corner[i]));
-        let mut best: Option<(f64, u32)> = None;
-        let mut look = |edge: u32| {
-            if self.edges[edge as usize] == DEAD {
-                return;
-            }
-            let [c, d] = self.ends(edge);
-            if c == start || d == start {
-                return;
-            }
-            let (oc, od) = (orient(start, end, c), orient(start, end, d));
-            if oc.signum() * od.signum() > 0 || (oc == 0 && od == 0) {
-                return;
-            }
-            let (side, run) = (vector(c, d), vector(start, end));
-            let along = cross(vector(start, c), side) as f64 / cross(run, side) as f64;
-            if (0.0..=1.0).contains(&along) && best.is_none_or(|best| (along, edge) < best) {
-                best = Some((along, edge));
-            }
+    /// Where the way from a place meets the border.
+    fn border_ahead(&self, start: Place, way: [f64; 2]) -> Option<Place> {
+        let to_side = |i: usize| {
+            let room = if way[i] > 0.0 { self.lattice.corner[i] - start[i] } else { -start[i] };
+            if way[i] == 0.0 { f64::INFINITY } else { f64::from(room) / way[i] }
         };
-        grid.along(start, end, |edges| edges.iter().copied().for_each(&mut look));
-        younger.iter().copied().for_each(&mut look);
-        let (along, edge) = best?;
+        let share = to_side(0).min(to_side(1));
+        let at = |i: usize| ((f64::from(start[i]) + way[i] * share).round() as i32).clamp(0, self.lattice.corner[i]);
+        share.is_finite().then(|| [at(0), at(1)])
+    }
+
+    /// The first edge on the way from a place, other than those that begin there, and the vertex at which the way meets it.
+    fn first_hit(&mut self, start: Place, way: [f64; 2], grid: &EdgeGrid) -> Option<(u32, u32)> {
+        let end = self.border_ahead(start, way)?;
         let run = vector(start, end);
+        let mut best: Option<(f64, u32)> = None;
+        grid.along(start, end, |edges, far| {
+            for edge in edges.filter(|&edge| self.edges[edge as usize] != DEAD) {
+                let [c, d] = self.ends(edge);
+                let (oc, od) = (cross(run, vector(start, c)), cross(run, vector(start, d)));
+                if c == start || d == start || oc.signum() * od.signum() > 0 || (oc == 0 && od == 0) {
+                    continue;
+                }
+                let side = vector(c, d);
+                let along = cross(vector(start, c), side) as f64 / cross(run, side) as f64;
+                if (0.0..=1.0).contains(&along) && best.is_none_or(|best| (along, edge) < best) {
+                    best = Some((along, edge));
+                }
+            }
+            // All further squares lie further on; a place more, for rounding.
+            let is_before = |i: usize, along: f64| {
+                let left = f64::from(far[i] - start[i]) - run[i] as f64 * along;
+                left * run[i].signum() as f64 > 1.0 || run[i] == 0
+            };
+            best.is_some_and(|(along, _)| is_before(0, along) && is_before(1, along))
+        });
+        let (along, edge) = best?;
         let hit: Place = [0, 1].map(|i| start[i] + (run[i] as f64 * along).round() as i32);
         // The sides of the surface stay straight.
         let [c, d] = self.ends(edge);
@@ -314,8 +320,8 @@ impl Drawing {
         let start = self.lattice.snap(from);
         let way = way.as_dvec2().to_array();
         let grid = EdgeGrid::new(self);
-        let Some((there, one)) = self.first_hit(start, way, &grid, &[]) else { return };
-        let Some((back, other)) = self.first_hit(start, way.map(|x| -x), &grid, &[]) else { return };
+        let Some((there, one)) = self.first_hit(start, way, &grid) else { return };
+        let Some((back, other)) = self.first_hit(start, way.map(|x| -x), &grid) else { return };
         self.split(there, one);
         if back != there {
             self.split(back, other);
@@ -361,7 +367,16 @@ struct EdgeGrid {
     /// Per square: where its edges begin in `edges`; one more at the end.
     starts: Vec<u32>,
     edges: Vec<u32>,
+    /// How many edges of the drawing are in it.
+    known: usize,
+    /// Edges that came later, each with the one before it in its square.
+    newer: Vec<[u32; 2]>,
+    /// Per square: the last of them; empty as long as there are none.
+    newest: Vec<u32>,
 }
+
+/// The end of a list in [`EdgeGrid::newer`].
+const NONE: u32 = u32::MAX;
 
 impl EdgeGrid {
     fn new(drawing: &Drawing) -> Self {
@@ -372,14 +387,19 @@ impl EdgeGrid {
             shift += 1;
         }
         let (columns, rows) = ((w >> shift) as usize + 1, (h >> shift) as usize + 1);
-        let mut grid = Self { shift, columns, starts: vec![0; columns * rows + 1], edges: Vec::new() };
+        let known = drawing.edges.len();
+        let starts = vec![0; columns * rows + 1];
+        let mut grid = Self { shift, columns, starts, edges: Vec::new(), known, newer: Vec::new(), newest: Vec::new() };
         let mut passes = Vec::with_capacity(3 * drawing.edges.len());
         for edge in 0..drawing.edges.len() as u32 {
             if drawing.edges[edge as usize] == DEAD {
                 continue;
             }
             let [a, b] = drawing.ends(edge);
-            grid.squares(a, b, |square| passes.push((square, edge)));
+            grid.squares(a, b, |[column, row]| {
+                passes.push((grid.square(column, row), edge));
+                false
+            });
         }
         for &(square, _) in &passes {
             grid.starts[square as usize + 1] += 1;
@@ -396,26 +416,50 @@ impl EdgeGrid {
         grid
     }
 
-    /// Every square that the line between two places touches, row by row.
-    fn squares(&self, a: Place, b: Place, mut visit: impl FnMut(u32)) {
-        let (top, bottom) = if a[1] <= b[1] { (a, b) } else { (b, a) };
-        let square = |x: i32| (x >> self.shift) as usize;
-        let (first, last) = (square(top[1]), square(bottom[1]));
-        let (low, high) = (top[0].min(bottom[0]), top[0].max(bottom[0]));
-        if first == last || square(low) == square(high) {
-            for row in first..=last {
-                (square(low)..=square(high)).for_each(|column| visit((row * self.columns + column) as u32));
-            }
-            return;
+    /// Takes in the edges that have been added to the drawing.
+    fn add_new(&mut self, drawing: &Drawing) {
+        let (mut newer, mut newest) = (std::mem::take(&mut self.newer), std::mem::take(&mut self.newest));
+        newest.resize(self.starts.len() - 1, NONE);
+        for edge in self.known as u32..drawing.edges.len() as u32 {
+            let [a, b] = drawing.ends(edge);
+            self.squares(a, b, |[column, row]| {
+                let last = &mut newest[self.square(column, row) as usize];
+                newer.push([edge, std::mem::replace(last, newer.len() as u32)]);
+                false
+            });
         }
-        let slope = f64::from(bottom[0] - top[0]) / f64::from(bottom[1] - top[1]);
-        for row in first..=last {
-            // A little wider on either side, for rounding.
-            let x_at = |y: i64| f64::from(top[0]) + slope * (y as f64 - f64::from(top[1]));
-            let ends = [x_at((row << self.shift) as i64), x_at(((row + 1) << self.shift) as i64)];
-            let from = low.max((ends[0].min(ends[1]) as i32).saturating_sub(2));
-            let to = high.min((ends[0].max(ends[1]) as i32).saturating_add(2));
-            (square(from)..=square(to)).for_each(|column| visit((row * self.columns + column) as u32));
+        (self.known, self.newer, self.newest) = (drawing.edges.len(), newer, newest);
+    }
+
+    const fn square(&self, column: usize, row: usize) -> u32 {
+        (row * self.columns + column) as u32
+    }
+
+    /// Every square that the line between two places touches, in the order of its way: row by row, and within a row one after the
+    /// other. Ends when `visit` returns `true`.
+    fn squares(&self, a: Place, b: Place, mut visit: impl FnMut([usize; 2]) -> bool) {
+        let index = |x: i32| (x >> self.shift) as usize;
+        let (low, high) = (a[0].min(b[0]), a[0].max(b[0]));
+        let (first, last) = (index(a[1].min(b[1])), index(a[1].max(b[1])));
+        let is_narrow = first == last || index(low) == index(high);
+        let slope = f64::from(b[0] - a[0]) / f64::from(b[1] - a[1]);
+        let x_at = |y: i64| f64::from(a[0]) + slope * (y as f64 - f64::from(a[1]));
+        for step in 0..=last - first {
+            let row = if a[1] <= b[1] { first + step } else { last - step };
+            let (from, to) = if is_narrow {
+                (low, high)
+            } else {
+                // A little wider on either side, for rounding.
+                let ends = [row, row + 1].map(|row| x_at((row << self.shift) as i64));
+                let from = (ends[0].min(ends[1]) as i32).saturating_sub(2);
+                (low.max(from), high.min((ends[0].max(ends[1]) as i32).saturating_add(2)))
+            };
+            let (from, to) = (index(from), index(to));
+            for step in 0..=to.saturating_sub(from) {
+                if visit([if a[0] <= b[0] { from + step } else { to - step }, row]) {
+                    return;
+                }
+            }
         }
     }
 
@@ -423,8 +467,20 @@ impl EdgeGrid {
         &self.edges[self.starts[square as usize] as usize..self.starts[square as usize + 1] as usize]
     }
 
-    fn along(&self, a: Place, b: Place, mut visit: impl FnMut(&[u32])) {
-        self.squares(a, b, |square| visit(self.in_square(square)));
+    /// The edges in every square on the way from a place to another, and the corner at which the way leaves the square at the
+    /// latest, until `visit` returns `true`.
+    fn along(&self, a: Place, b: Place, mut visit: impl FnMut(&mut dyn Iterator<Item = u32>, Place) -> bool) {
+        self.squares(a, b, |[column, row]| {
+            let square = self.square(column, row);
+            let mut newer = self.newest.get(square as usize).copied().unwrap_or(NONE);
+            let newer = std::iter::from_fn(|| {
+                let &[edge, before] = self.newer.get(newer as usize)?;
+                newer = before;
+                Some(edge)
+            });
+            let far = |i: usize, at: usize| ((at + usize::from(a[i] <= b[i])) << self.shift) as i32;
+            visit(&mut self.in_square(square).iter().copied().chain(newer), [far(0, column), far(1, row)])
+        });
     }
 
     /// Every pair of edges that share a square of which one is not older than `new`, the older first; some more than once.
@@ -437,5 +493,70 @@ impl EdgeGrid {
                 edges[..i].iter().for_each(|&e| visit(e, f));
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The edge that a way meets first, by a look at each.
+    fn first_of_all(drawing: &Drawing, start: Place, end: Place) -> Option<u32> {
+        let run = vector(start, end);
+        let alongs = (0..drawing.edges.len() as u32).filter_map(|edge| {
+            let [c, d] = drawing.ends(edge);
+            let (oc, od) = (orient(start, end, c), orient(start, end, d));
+            if c == start || d == start || oc.signum() * od.signum() > 0 || (oc == 0 && od == 0) {
+                return None;
+            }
+            let along = cross(vector(start, c), vector(c, d)) as f64 / cross(run, vector(c, d)) as f64;
+            (0.0..=1.0).contains(&along).then_some((along, edge))
+        });
+        alongs.min_by(|a, b| a.partial_cmp(b).unwrap()).map(|(_, edge)| edge)
+    }
+
+    #[test]
+    fn a_way_meets_what_it_would_meet_if_it_looked_at_every_line() {
+        let mut rng = Rng::new(3);
+        let (mut met, mut upright) = (0, 0);
+        for case in 0..200 {
+            let extent = Vec2::new(1.0, 0.2 + rng.unit());
+            let mut drawing = Drawing::new(Lattice::new(extent).unwrap());
+            let mut place = |rng: &mut Rng| Vec2::new(rng.unit(), rng.unit()) * extent;
+            let draw = |drawing: &mut Drawing, rng: &mut Rng, place: &mut dyn FnMut(&mut Rng) -> Vec2| {
+                let from = place(rng);
+                let length = if rng.unit() < 0.2 { 1.0 } else { 0.05 };
+                let to = from + Vec2::new(rng.signed(), rng.signed()) * length;
+                drawing.line([from, to.clamp(Vec2::ZERO, extent)].into_iter());
+            };
+            (0..rng.next_u32() % 80).for_each(|_| draw(&mut drawing, &mut rng, &mut place));
+            drawing.make_planar();
+            let mut grid = EdgeGrid::new(&drawing);
+            (0..rng.next_u32() % 40).for_each(|_| draw(&mut drawing, &mut rng, &mut place));
+            grid.add_new(&drawing);
+            for _ in 0..20 {
+                let start = drawing.lattice.snap(place(&mut rng));
+                let way = match rng.next_u32() % 4 {
+                    0 => [0.0, 1.0],
+                    1 => [-1.0, 0.0],
+                    _ => [rng.signed().into(), rng.signed().into()],
+                };
+                let vertices = drawing.places.len();
+                let Some(end) = drawing.border_ahead(start, way) else { continue };
+                let expected = first_of_all(&drawing, start, end);
+                let found = drawing.first_hit(start, way, &grid);
+                if let Some((edge, _)) = found {
+                    assert_eq!(Some(edge), expected, "case {case}: from {start:?} to {end:?}");
+                    (met, upright) = (met + 1, upright + u32::from(way[0] == 0.0));
+                } else {
+                    // Nothing, or something that begins so near that it is met where the way begins.
+                    let near = expected.map(|edge| drawing.ends(edge));
+                    assert!(near.is_none_or(|[c, d]| orient(c, d, start).unsigned_abs() <= 1 << 26), "{near:?}");
+                }
+                drawing.places.truncate(vertices);
+                drawing.vertex_at.retain(|_, vertex| (*vertex as usize) < vertices);
+            }
+        }
+        assert!(met > 3000 && upright > 300, "{met} {upright}");
     }
 }

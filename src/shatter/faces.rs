@@ -4,6 +4,7 @@ use super::{
     drawing::{DEAD, Drawing},
     lattice::{Place, cross, distance_sq, vector},
 };
+use std::cmp::Reverse;
 
 const NONE: u32 = u32::MAX;
 
@@ -154,61 +155,63 @@ impl Faces {
         most: usize,
         group: impl Fn(u32) -> G,
     ) -> bool {
-        let mut areas = self.areas.clone();
-        let least = if areas.len() > most.max(1) {
-            // Those above the first that is too many may stay.
-            let (_, first, _) = areas.select_nth_unstable_by(most.max(1), |a, b| b.cmp(a));
-            least.max(*first + 1)
-        } else {
-            least
+        let length = |ends: &[u32; 2]| {
+            let [a, b] = ends.map(|vertex| drawing.places[vertex as usize]);
+            (distance_sq(a, b) as f64).sqrt()
         };
-        let mut areas = self.areas.clone();
-        let mut order: Vec<u32> = (0..areas.len() as u32).filter(|&face| areas[face as usize] < least).collect();
-        if order.is_empty() || areas.len() < 2 {
-            return false;
-        }
-        order.sort_by_key(|&face| (areas[face as usize], face));
-        let mut edges_of: Vec<Vec<u32>> = vec![Vec::new(); areas.len()];
-        for (edge, sides) in (0u32..).zip(self.face_of.as_chunks::<2>().0) {
-            for side in sides.iter().filter(|&&side| side != NONE) {
-                edges_of[*side as usize].push(edge);
+        let lengths: Vec<f64> = drawing.edges.iter().map(length).collect();
+        let edges = EdgesOf::new(self);
+        let (mut areas, mut joined) = (self.areas.clone(), Joined::new(self.len()));
+        let (mut order, mut shares): (Vec<u32>, Vec<(u32, f64)>) = (Vec::new(), Vec::new());
+        // Small ones that have joined may be more than enough, and too many: until none has a neighbour to join.
+        let mut any = true;
+        while std::mem::take(&mut any) {
+            order.clear();
+            order.extend((0..areas.len() as u32).filter(|&face| joined.root(face) == face));
+            let mut least = least;
+            if order.len() > most.max(1) {
+                // Those above the first that is too many may stay.
+                let (_, &mut first, _) =
+                    order.select_nth_unstable_by_key(most.max(1), |&face| Reverse(areas[face as usize]));
+                least = least.max(areas[first as usize] + 1);
             }
-        }
-        let mut joined: Vec<u32> = (0..areas.len() as u32).collect();
-        for face in order {
-            let face = root(&mut joined, face);
-            if areas[face as usize] >= least {
-                continue;
-            }
-            let mut shares: Vec<(u32, f64)> = Vec::new();
-            for &edge in &edges_of[face as usize] {
-                let [a, b] = drawing.edges[edge as usize].map(|v| drawing.places[v as usize]);
-                for side in 0..2 {
-                    let other = self.face_of[2 * edge as usize + side];
-                    if other == NONE {
-                        continue;
-                    }
-                    let other = root(&mut joined, other);
-                    if other != face && group(other) == group(face) {
-                        shares.push((other, (distance_sq(a, b) as f64).sqrt()));
-                    }
+            order.retain(|&face| areas[face as usize] < least);
+            order.sort_unstable_by_key(|&face| (areas[face as usize], face));
+            for &face in &order {
+                let face = joined.root(face);
+                if areas[face as usize] >= least {
+                    continue;
                 }
-            }
-            shares.sort_by_key(|share| share.0);
-            let best = shares
-                .chunk_by(|a, b| a.0 == b.0)
-                .map(|shared| (shared.iter().map(|share| share.1).sum::<f64>(), shared[0].0))
-                .max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)));
-            if let Some((_, other)) = best {
-                joined[face as usize] = other;
-                areas[other as usize] += areas[face as usize];
-                let edges = std::mem::take(&mut edges_of[face as usize]);
-                edges_of[other as usize].extend(edges);
+                shares.clear();
+                let mut member = face;
+                while member != NONE {
+                    for &edge in edges.of(member) {
+                        for side in [2 * edge, 2 * edge + 1] {
+                            let other = self.face_of[side as usize];
+                            let other = if other == NONE { face } else { joined.root(other) };
+                            if other == face || group(other) != group(face) {
+                                continue;
+                            }
+                            let length = lengths[edge as usize];
+                            match shares.iter_mut().rev().find(|share| share.0 == other) {
+                                Some(share) => share.1 += length,
+                                None => shares.push((other, length)),
+                            }
+                        }
+                    }
+                    member = joined.following[member as usize];
+                }
+                let best = shares.iter().max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)));
+                if let Some(&(other, _)) = best {
+                    joined.join(face, other);
+                    areas[other as usize] += areas[face as usize];
+                    any = true;
+                }
             }
         }
         let mut dropped = false;
         for (edge, sides) in drawing.edges.iter_mut().zip(self.face_of.as_chunks::<2>().0) {
-            if sides.contains(&NONE) || root(&mut joined, sides[0]) != root(&mut joined, sides[1]) {
+            if sides.contains(&NONE) || joined.root(sides[0]) != joined.root(sides[1]) {
                 continue;
             }
             *edge = DEAD;
@@ -219,13 +222,66 @@ impl Faces {
     }
 }
 
-fn root(joined: &mut [u32], mut face: u32) -> u32 {
-    while joined[face as usize] != face {
-        let above = joined[joined[face as usize] as usize];
-        joined[face as usize] = above;
-        face = above;
+/// The edges around each face.
+struct EdgesOf {
+    /// Per face: where its edges begin in `edges`; one more at the end.
+    starts: Vec<u32>,
+    edges: Vec<u32>,
+}
+
+impl EdgesOf {
+    fn new(faces: &Faces) -> Self {
+        let mut starts = vec![0; faces.len() + 1];
+        for &face in faces.face_of.iter().filter(|&&face| face != NONE) {
+            starts[face as usize + 1] += 1;
+        }
+        for i in 1..starts.len() {
+            starts[i] += starts[i - 1];
+        }
+        let (mut fill, mut edges) = (starts.clone(), vec![0; starts[faces.len()] as usize]);
+        for (half_edge, &face) in (0..).zip(&faces.face_of).filter(|(_, face)| **face != NONE) {
+            let at = &mut fill[face as usize];
+            edges[*at as usize] = half_edge / 2;
+            *at += 1;
+        }
+        Self { starts, edges }
     }
-    face
+
+    fn of(&self, face: u32) -> &[u32] {
+        &self.edges[self.starts[face as usize] as usize..self.starts[face as usize + 1] as usize]
+    }
+}
+
+/// Which faces have become one.
+struct Joined {
+    above: Vec<u32>,
+    /// Per face: the next one of the same, from the root on.
+    following: Vec<u32>,
+    /// Per root: the last one of the same.
+    last: Vec<u32>,
+}
+
+impl Joined {
+    fn new(faces: usize) -> Self {
+        let each: Vec<u32> = (0..faces as u32).collect();
+        Self { above: each.clone(), following: vec![NONE; faces], last: each }
+    }
+
+    fn root(&mut self, mut face: u32) -> u32 {
+        while self.above[face as usize] != face {
+            let above = self.above[self.above[face as usize] as usize];
+            self.above[face as usize] = above;
+            face = above;
+        }
+        face
+    }
+
+    /// Makes one root part of another.
+    fn join(&mut self, root: u32, other: u32) {
+        self.above[root as usize] = other;
+        self.following[self.last[other as usize] as usize] = root;
+        self.last[other as usize] = self.last[root as usize];
+    }
 }
 
 /// Where a half-edge begins.

@@ -155,6 +155,7 @@ impl Shards {
         // From x to y is clockwise when y is up.
         let order = if z < 0.0 { [0, 1, 2] } else { [0, 2, 1] };
         let triangles = self.triangles(shard).iter();
+        mesh.indices.reserve(3 * triangles.len() + 6 * bevels.len());
         if bevels.is_empty() {
             mesh.normals.extend(std::iter::repeat_n([0.0, 0.0, up], corners.len()));
             mesh.indices.extend(triangles.flat_map(|triangle| order.map(|i| start + triangle[i])));

@@ -90,34 +90,29 @@ impl Shards {
             }
             first = end;
         }
-        // Corners that have moved: only what they are part of can have folded.
-        let mut moved = vec![true; places.len()];
-        let mut bad = Vec::new();
+        // Without a branch for each: which is folded cannot be foreseen.
+        let triangles = self.triangles(shard);
+        let mut folded = vec![false; places.len()];
         for round in 0.. {
-            for triangle in self.triangles(shard) {
-                let corners = triangle.map(|i| i as usize);
-                if corners.iter().any(|&i| moved[i]) && is_folded(corners.map(|i| bevels[i].inner)) {
-                    bad.extend(corners);
-                }
+            for triangle in triangles {
+                let is_bad = is_folded(triangle.map(|i| bevels[i as usize].inner));
+                triangle.iter().for_each(|&i| folded[i as usize] |= is_bad);
             }
             for (a, &b) in following.iter().enumerate() {
                 let b = b as usize;
                 let [inner_a, inner_b] = [bevels[a].inner, bevels[b].inner];
-                let is_band_folded =
-                    || is_folded([places[a], places[b], inner_b]) || is_folded([places[a], inner_b, inner_a]);
-                if (moved[a] || moved[b]) && is_band_folded() {
-                    bad.extend([a, b]);
+                let is_bad = is_folded([places[a], places[b], inner_b]) | is_folded([places[a], inner_b, inner_a]);
+                folded[a] |= is_bad;
+                folded[b] |= is_bad;
+            }
+            let mut moved = false;
+            for ((bevel, &place), folded) in bevels.iter_mut().zip(&places).zip(&mut folded) {
+                if std::mem::take(folded) && bevel.inner != place {
+                    bevel.inner = if round < HALVINGS { 0.5 * (bevel.inner + place) } else { place };
+                    moved = true;
                 }
             }
-            moved.fill(false);
-            for i in bad.drain(..) {
-                let (inner, place) = (&mut bevels[i].inner, places[i]);
-                if !moved[i] && *inner != place {
-                    *inner = if round < HALVINGS { 0.5 * (*inner + place) } else { place };
-                    moved[i] = true;
-                }
-            }
-            if !moved.contains(&true) {
+            if !moved {
                 break;
             }
         }

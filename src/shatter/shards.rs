@@ -7,7 +7,7 @@ use super::{
     triangulate::{Clipper, area_of, convex_pieces, simplify},
 };
 use glam::{DVec2, Vec2};
-use std::ops::Range;
+use std::{ops::Range, sync::Arc};
 
 /// A piece of the surface.
 #[derive(Clone, Debug, PartialEq)]
@@ -51,7 +51,7 @@ pub struct Shards {
     triangles: Vec<[u32; 3]>,
     neighbours: Vec<Neighbour>,
     pub(super) shards: Vec<Shard>,
-    carried: Vec<Vec<Vec2>>,
+    carried: Arc<[Vec<Vec2>]>,
 }
 
 impl Shards {
@@ -66,7 +66,7 @@ impl Shards {
             triangles: Vec::with_capacity(2 * drawing.edges.len()),
             neighbours: Vec::with_capacity(2 * faces.len() + 16),
             shards: Vec::with_capacity(faces.len()),
-            carried,
+            carried: carried.into(),
         };
         let mut builder =
             Builder { shards: &mut shards, clipper: Clipper::default(), shared: Vec::new(), border: [0.0; 4] };
@@ -161,6 +161,12 @@ impl Shards {
     #[must_use]
     pub fn carried(&self) -> &[Vec<Vec2>] {
         &self.carried
+    }
+
+    /// The same, to be kept.
+    #[cfg(feature = "bevy")]
+    pub(crate) fn shared_carried(&self) -> Arc<[Vec<Vec2>]> {
+        self.carried.clone()
     }
 
     /// The shard at a place in pattern units; costs as much as all outlines are long.

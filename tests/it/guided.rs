@@ -16,17 +16,17 @@ use std::{
 
 /// What was told.
 #[derive(Resource, Default, Debug, PartialEq)]
-struct Told {
-    baked: Vec<(Entity, Option<f32>)>,
-    failed: Vec<(Entity, CrackError)>,
-    finished: usize,
+pub(crate) struct Told {
+    pub(crate) baked: Vec<(Entity, Option<f32>)>,
+    pub(crate) failed: Vec<(Entity, CrackError)>,
+    pub(crate) finished: usize,
 }
 
-fn guided_app() -> App {
+pub(crate) fn guided_app() -> App {
     listening(app())
 }
 
-fn listening(mut app: App) -> App {
+pub(crate) fn listening(mut app: App) -> App {
     app.init_resource::<Told>()
         .add_observer(|baked: On<CrackBaked>, mut told: ResMut<Told>| told.baked.push((baked.entity, baked.covered)))
         .add_observer(|failed: On<CrackFailed>, mut told: ResMut<Told>| {
@@ -36,16 +36,16 @@ fn listening(mut app: App) -> App {
     app
 }
 
-fn told(app: &App) -> &Told {
+pub(crate) fn told(app: &App) -> &Told {
     app.world().resource()
 }
 
-fn progress(app: &App, entity: Entity) -> f32 {
+pub(crate) fn progress(app: &App, entity: Entity) -> f32 {
     get::<BakeProgress>(app, entity).0
 }
 
 /// A cross of broad strokes.
-fn cross(size: UVec2) -> Grid<f32> {
+pub(crate) fn cross(size: UVec2) -> Grid<f32> {
     let mut grid = Grid::new(size, 0.0);
     for y in 0..size.y {
         for (x, value) in (0..size.x).zip(grid.row_mut(y as usize)) {
@@ -57,7 +57,7 @@ fn cross(size: UVec2) -> Grid<f32> {
     grid
 }
 
-fn guided() -> GuidedCracks {
+pub(crate) fn guided() -> GuidedCracks {
     let mut guided = GuidedCracks::new(CrackGuide::new(cross(UVec2::splat(64))));
     guided.params.sites = 40;
     guided
@@ -69,7 +69,7 @@ fn spawn(app: &mut App, guided: GuidedCracks) -> Entity {
 }
 
 /// Frames until the bakes begun so far have ended.
-fn bake(app: &mut App, entity: Entity) {
+pub(crate) fn bake(app: &mut App, entity: Entity) {
     let n = told(app).baked.len() + told(app).failed.len();
     wait_for(app, "the end of the bake", |app| told(app).baked.len() + told(app).failed.len() > n);
     if told(app).failed.is_empty() {

@@ -8,6 +8,8 @@ mod cells;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod clock;
 #[cfg(all(feature = "2d", feature = "3d"))]
+mod films;
+#[cfg(all(feature = "2d", feature = "3d"))]
 mod freeze;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod gpu;

@@ -6,6 +6,7 @@ use bevy_crack::{
     math::Rng,
     pattern::{CrackMask, Moment, Node, SegmentId, SurfaceFrame},
     raster::{DOT_DEPTH, DepthField, Redrawn, Replay, TexelRect, stamp_dot, stamp_path},
+    voronoi::{VoronoiBake, VoronoiParams},
 };
 use glam::{UVec2, Vec2};
 
@@ -44,6 +45,28 @@ impl Scene {
 
     fn grow(&mut self) {
         while self.growth.step().grew() {}
+    }
+
+    /// Cracks that have not grown, which open for some steps; returns how many links.
+    fn add(&mut self, rng: &mut Rng) -> usize {
+        let params = VoronoiParams { sites: 9, ..VoronoiParams::DEFAULT };
+        let size = self.field.frame.size();
+        let (_, seams) = VoronoiBake::new(params, Vec::new(), size, rng.next_u32().into()).unwrap().finish();
+        let (first, before) = (self.growth.network().links().len() as u32, self.growth.steps());
+        let opening = rng.next_u32() % 40;
+        self.growth.add_cracks(&seams.network(Vec2::new(rng.unit(), rng.unit())), opening);
+        let (network, timeline) = (self.growth.network(), self.growth.timeline());
+        let added = (0u32..).zip(network.links()).skip(first as usize);
+        for (i, link) in added {
+            assert!(link.birth > before, "{link:?}");
+            let width =
+                |step| timeline.path_at(network, SegmentId::Link(i), Moment::after(step)).unwrap().points()[0].width;
+            for age in 0..=opening {
+                let share = (age + 1) as f32 / (opening + 1) as f32;
+                assert!((width(link.birth + age) - share * link.width).abs() < 1e-6, "link {i} opens as its nodes do");
+            }
+        }
+        network.links().len() - first as usize
     }
 
     fn end(&self) -> u32 {
@@ -113,6 +136,7 @@ fn holds(rect: &TexelRect, texel: UVec2) -> bool {
 /// told, and nothing else.
 #[test]
 fn any_moment_is_the_same_however_it_was_reached() {
+    let mut links = 0;
     for (round, preset) in presets().enumerate() {
         for (seed, size) in [(1, UVec2::new(203, 141)), (2, UVec2::new(64, 130))] {
             let mut rng = Rng::new(seed + 10 * round as u64);
@@ -121,6 +145,7 @@ fn any_moment_is_the_same_however_it_was_reached() {
                 match rng.next_u32() % 8 {
                     0 if jump < 60 || scene.end() == 0 => scene.hit(&mut rng),
                     1 => scene.grow(),
+                    2 if jump < 60 => links += scene.add(&mut rng),
                     _ => {
                         for _ in 0..rng.next_u32() % 9 {
                             scene.growth.step();
@@ -144,6 +169,7 @@ fn any_moment_is_the_same_however_it_was_reached() {
             assert_eq!(scene.field, scene.untouched, "nothing is there at the start");
         }
     }
+    assert!(links > 50, "{links} places where arms of a front meet");
 }
 
 /// Played in frames of any length, forwards to the end and back, every moment on the way is that of a jump.

@@ -2,11 +2,11 @@
 
 use super::{
     super::{
-        CrackError, CrackMaskSource, CrackSurface, GuideSource, GuidedCracks,
+        CrackError, CrackMaskSource, GuideSource, GuidedCracks,
         activate::plan_pictures,
-        carrier::{self, Found, Shown},
+        carrier::{self, Shown, Untouched},
         mask::{Key, PictureMasks},
-        picture, preset,
+        picture,
         surfaces::Surfaces,
     },
     Bake, Bakes, Plan, Work,
@@ -86,17 +86,8 @@ pub(super) fn begin(world: &mut World, entity: Entity, bake: &mut Bake) -> Resul
 
 /// What a surface will be that has not cracked yet, and its mask; `None` if its pictures are not there yet.
 fn plan(world: &World, entity: Entity, pictures: &mut Pictures) -> Result<Option<(Plan, RawMask)>, CrackError> {
-    let Some(surface) = world.get::<CrackSurface>(entity).cloned() else { return Err(CrackError::NothingToCrack) };
-    if !world.contains_resource::<Assets<Image>>() {
-        return Err(CrackError::NoImages);
-    }
-    let (kind, shown) = match carrier::inspect(world, entity) {
-        (Some(kind), Found::Shown(shown)) => (kind, *shown),
-        (_, Found::Waiting) => return Ok(None),
-        (_, Found::Unusable(error)) => return Err(error),
-        _ => return Err(CrackError::NothingToCrack),
-    };
-    let Some(preset) = preset::resolve(world, &surface.preset)? else { return Ok(None) };
+    let Some(untouched) = carrier::untouched(world, entity)? else { return Ok(None) };
+    let Untouched { surface, preset, kind, shown } = untouched;
     let Some(plan) = plan_pictures(world, &surface, &shown, 0)? else { return Ok(None) };
     let mask = match &surface.mask {
         CrackMaskSource::FromPicture => match &shown.diffuse {

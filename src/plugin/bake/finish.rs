@@ -6,6 +6,7 @@ use super::{
         CrackError, CrackMaps, CrackSurface,
         activate::{frame, look},
         clock::First,
+        film::Film,
         paint::stamp_all,
         picture::BasePicture,
         surfaces::{Active, Added, Touched},
@@ -119,6 +120,8 @@ pub(super) struct Finished {
     pub(super) touched: Touched,
     pub(super) look: LookTable,
     pub(super) replay: Option<(Replay, Moment)>,
+    /// If it is to show other times.
+    pub(super) film: Option<Box<Film>>,
     /// The texels of each texture, and the same where the renderer can read them.
     pub(super) pictures: [Option<Picture>; 3],
 }
@@ -152,6 +155,7 @@ impl Finish {
             }
             Stage::Paint { growth, cells, drawn, texels, .. } => {
                 let Drawn { field, touched, look, replay } = *drawn;
+                let film = replay.is_some().then(|| Box::new(Film::new(&growth, &texels)));
                 let pictures = order.stage(texels);
                 return Ok(Next::Done(Box::new(Finished {
                     order,
@@ -163,6 +167,7 @@ impl Finish {
                     touched,
                     look,
                     replay,
+                    film,
                     pictures,
                 })));
             }
@@ -221,9 +226,10 @@ impl Order {
     fn stage(&self, texels: [Option<Vec<u8>>; 3]) -> [Option<Picture>; 3] {
         let mut kinds = textures::KINDS.iter();
         texels.map(|texels| {
-            let row = self.base.size.x as usize * kinds.next().map_or(0, TextureKind::texel);
+            let (texel, size) = (kinds.next().map_or(0, TextureKind::texel), self.base.size);
             let texels = texels?;
-            let staged = self.stager.as_ref().and_then(|stager| stager.stage(&texels, row));
+            let stager = self.stager.as_ref();
+            let staged = stager.and_then(|stager| stager.stage(&texels, size, texel, &[TexelRect::whole(size)]));
             Some(Picture { texels, staged })
         })
     }

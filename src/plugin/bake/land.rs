@@ -8,6 +8,7 @@ use super::{
         beside::throw_away,
         carrier::Carrier,
         clock::First,
+        film::Film,
         mask::{Key, PictureMasks},
         shards::drop_shards,
         surfaces,
@@ -194,7 +195,7 @@ fn fill(world: &mut World, textures: &CrackTextures, finished: &mut Finished) {
 fn settle(world: &mut World, entity: Entity, plan: Plan, textures: CrackTextures, finished: Finished) {
     let seconds = seconds(world, entity);
     let Plan { surface, preset, kind, shown, pictures, is_outdated, .. } = plan;
-    let Finished { order, added, growth, cells, field, touched, look, replay, .. } = finished;
+    let Finished { order, added, growth, cells, field, touched, look, replay, film, .. } = finished;
     if let (CrackMaskSource::FromPicture, Some(picture)) = (&surface.mask, &shown.diffuse) {
         world.resource_mut::<PictureMasks>().remember(Key::new(picture, &pictures), &order.mask);
     }
@@ -208,16 +209,17 @@ fn settle(world: &mut World, entity: Entity, plan: Plan, textures: CrackTextures
     if is_outdated {
         world.resource_mut::<Surfaces>().changed.push(entity);
     }
-    begin_to_show(world, entity);
+    begin_to_show(world, entity, film);
 }
 
 /// Puts baked cracks on a surface that has cracked before and is taken out of the others.
 fn replace(world: &mut World, entity: Entity, mut active: Active, mut finished: Finished) {
     let seconds = seconds(world, entity);
+    active.drop_film();
     // Shards are of the cells that were.
     let bytes = drop_shards(world, entity, &mut active);
     fill(world, &active.textures, &mut finished);
-    let Finished { order, added, growth, cells, field, touched, look, replay, pictures, .. } = finished;
+    let Finished { order, added, growth, cells, field, touched, look, replay, film, pictures, .. } = finished;
     // Steps that it has grown since are made up for.
     active.due += f64::from(Past::of(&active).steps.saturating_sub(order.past.steps));
     let before = (
@@ -242,12 +244,13 @@ fn replace(world: &mut World, entity: Entity, mut active: Active, mut finished: 
     let mut surfaces = world.resource_mut::<Surfaces>();
     surfaces.active.insert(entity, active);
     surfaces.bytes -= bytes;
-    begin_to_show(world, entity);
+    begin_to_show(world, entity, film);
     throw_away((before, shown_before));
 }
 
-fn begin_to_show(world: &mut World, entity: Entity) {
+fn begin_to_show(world: &mut World, entity: Entity, film: Option<Box<Film>>) {
     let mut surfaces = world.resource_mut::<Surfaces>();
+    surfaces.film(entity, film);
     surfaces.start_growing(entity);
     surfaces.soil(entity);
     set_status(world, entity, CrackStatus::Growing);

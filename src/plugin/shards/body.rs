@@ -113,7 +113,7 @@ pub(super) struct Shown {
     pub(super) index: usize,
     pub(super) pose: Pose,
     /// Its form, if that has been made.
-    pub(super) form: Option<Form>,
+    pub(super) form: Option<Box<Form>>,
 }
 
 /// Puts meshes where they are drawn from: in the place of others, which go to `old`, or beside them.
@@ -175,7 +175,7 @@ impl Broken {
         let (mut new, mut sides, mut clothes) = (Vec::new(), Vec::new(), Vec::new());
         let mut all = Vec::with_capacity(shown.len());
         for (Shown { index, pose, form }, own) in shown.into_iter().zip(own) {
-            let form = if own.is_none() { form.or_else(|| forms.next()) } else { None };
+            let form = if own.is_none() { form.map(|form| *form).or_else(|| forms.next()) } else { None };
             let level = self.level(carrier, pose);
             let Some(material) = self.material(world, surface, carrier, level) else { continue };
             let Some(place) = self.place(carrier, index, pose) else { continue };

@@ -39,7 +39,7 @@ pub(in crate::plugin) struct Broken {
     pub(super) rim: RimLook,
     pub(in crate::plugin) holes: Holes,
     /// Cracks that were carried on when it was cut, and are drawn.
-    pub(in crate::plugin) carried: Vec<Vec<Vec2>>,
+    pub(in crate::plugin) carried: Vec<Arc<[Vec<Vec2>]>>,
     /// Pieces that are out of their places and fragments of them, by id: fragments come after what they were part of.
     pub(super) pieces: Vec<Piece>,
     /// Id for the next piece.

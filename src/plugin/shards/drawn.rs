@@ -35,7 +35,7 @@ impl Active {
     /// Draws the cracks that were carried on once more: the field has been drawn anew.
     pub(in crate::plugin) fn stamp_carried(&mut self) {
         if let Some(broken) = self.broken.take() {
-            self.stamp_lines(&broken.carried);
+            broken.carried.iter().for_each(|lines| self.stamp_lines(lines));
             self.broken = Some(broken);
         }
     }

@@ -102,35 +102,65 @@ fn index(size: UVec2, texel: UVec2) -> usize {
     4 * (texel.y as usize * size.x as usize + texel.x as usize)
 }
 
-/// The texels whose centres lie in a shard, row by row. Each texel lies in exactly one of the shards that tile a surface.
-pub(super) fn spans_of(shards: &Shards, shard: u32, frame: SurfaceFrame) -> Vec<Span> {
-    let texel = |corner: u32| frame.to_texel(shards.positions()[corner as usize]).as_dvec2();
-    let size = frame.size();
-    // Where outlines cross the middles of rows.
-    let mut crossings = Vec::new();
-    for ring in core::iter::once(shards.outline(shard)).chain(shards.holes(shard)) {
-        let Some(&last) = ring.last() else { continue };
-        let mut a = texel(last);
-        for &corner in ring {
-            let b = texel(corner);
-            // From above to below, so that both shards of an edge find the same crossing.
-            let (low, high) = if a.y < b.y { (a, b) } else { (b, a) };
-            let rows = [low.y, high.y].map(|y| (y - 0.5).ceil().clamp(0.0, f64::from(size.y)) as u32);
-            crossings.extend((rows[0]..rows[1]).map(|y| {
-                let height = f64::from(y) + 0.5;
-                (y, low.x + (height - low.y) / (high.y - low.y) * (high.x - low.x))
-            }));
-            a = b;
-        }
+/// Finds the texels of shards. Each lies in exactly one of the shards that tile a surface.
+pub(super) struct Scan {
+    frame: SurfaceFrame,
+    /// Where outlines cross the middles of rows: y, and the first texel beyond, as one number.
+    crossings: Vec<u64>,
+}
+
+impl Scan {
+    pub(super) const fn new(frame: SurfaceFrame) -> Self {
+        Self { frame, crossings: Vec::new() }
     }
-    crossings.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
-    // Of each row an even number.
-    let spans = crossings.as_chunks::<2>().0.iter().map(|[from, to]| {
-        // The first centre at or beyond the crossing.
-        let [start, end] = [from.1, to.1].map(|x| (x - 0.5).ceil().clamp(0.0, f64::from(size.x)) as u32);
-        [from.0, start, end]
+
+    /// Adds the texels whose centres lie in a shard, row by row.
+    pub(super) fn find(&mut self, shards: &Shards, shard: u32, spans: &mut Vec<Span>) {
+        let texel = |corner: u32| self.frame.to_texel(shards.positions()[corner as usize]).as_dvec2();
+        let size = self.frame.size();
+        // Of what lies at `at`, the first centre there or beyond.
+        let first = |at: f64, most: u32| (at - 0.5).ceil().clamp(0.0, f64::from(most)) as u32;
+        self.crossings.clear();
+        for ring in core::iter::once(shards.outline(shard)).chain(shards.holes(shard)) {
+            let Some(&last) = ring.last() else { continue };
+            let mut a = texel(last);
+            for &corner in ring {
+                let b = texel(corner);
+                // From above to below, so that both shards of an edge find the same crossing.
+                let (low, high) = if a.y < b.y { (a, b) } else { (b, a) };
+                self.crossings.extend((first(low.y, size.y)..first(high.y, size.y)).map(|y| {
+                    let height = f64::from(y) + 0.5;
+                    let x = low.x + (height - low.y) / (high.y - low.y) * (high.x - low.x);
+                    u64::from(y) << 32 | u64::from(first(x, size.x))
+                }));
+                a = b;
+            }
+        }
+        self.crossings.sort_unstable();
+        // Of each row an even number.
+        let pairs = self.crossings.as_chunks::<2>().0.iter();
+        let found = pairs.map(|[from, to]| [(from >> 32) as u32, *from as u32, *to as u32]);
+        spans.extend(found.filter(|[_, start, end]| start < end));
+    }
+}
+
+/// The texels whose centres lie in a shard, row by row.
+pub(super) fn spans_of(shards: &Shards, shard: u32, frame: SurfaceFrame) -> Vec<Span> {
+    let mut spans = Vec::new();
+    Scan::new(frame).find(shards, shard, &mut spans);
+    spans
+}
+
+/// Puts spans in order, and makes one of those that touch.
+pub(super) fn join_spans(spans: &mut Vec<Span>) {
+    spans.sort_unstable();
+    spans.dedup_by(|[y, from, to], [last_y, _, end]| {
+        let touches = y == last_y && from == end;
+        if touches {
+            *end = *to;
+        }
+        touches
     });
-    spans.filter(|[_, start, end]| start < end).collect()
 }
 
 /// The texels around a shard.
@@ -166,14 +196,17 @@ mod tests {
             }
             let shards = shatter(cuts, &ShatterParams { carry_on: true, ..ShatterParams::DEFAULT }).unwrap();
             let mut covered = Grid::new(frame.size(), 0u8);
-            let mut holes = Holes::new(frame.size());
+            let (mut holes, mut all) = (Holes::new(frame.size()), Vec::new());
             for shard in 0..shards.len() as u32 {
                 let spans = spans_of(&shards, shard, frame);
                 for &[y, from, to] in &spans {
                     covered.row_mut(y as usize)[from as usize..to as usize].iter_mut().for_each(|n| *n += 1);
                 }
                 holes.set(&spans, true);
+                all.extend(spans);
             }
+            join_spans(&mut all);
+            assert_eq!(all, (0..60).map(|y| [y, 0, 90]).collect::<Vec<Span>>());
             assert!(covered.as_slice().iter().all(|n| *n == 1), "{} shards", shards.len());
             assert_eq!(holes.count, 90 * 60);
             for shard in (0..shards.len() as u32).rev() {

@@ -4,7 +4,7 @@ use super::{
     Broken, Plane, ShardsError, ShatterCracks, ShatterRequest,
     drawn::{Drawn, Sketch},
     form::{Form, Style},
-    holes::{Holes, Span, spans_of},
+    holes::{Holes, Scan, Span, join_spans},
 };
 use crate::{
     Grid,
@@ -50,7 +50,7 @@ enum Pieces {
     /// What has been cut stays cut.
     Cut(Arc<Shards>, Support),
     /// There is more to cut along: a network, and what was carried on. What it was cut into before, and what held.
-    Lines(Network, Vec<Vec<Vec2>>, Option<(Arc<Shards>, Support)>),
+    Lines(Network, Vec<Arc<[Vec<Vec2>]>>, Option<(Arc<Shards>, Support)>),
 }
 
 /// What leaves a surface.
@@ -66,8 +66,12 @@ pub(super) struct Made {
     pub(super) support: Support,
     /// In the order of their release.
     pub(super) leaving: Vec<Leaving>,
-    /// What `leaving` covers, texels of the field.
+    /// The texels of `leaving`, row by row.
+    pub(super) spans: Vec<Span>,
+    /// Rectangles that cover them, texels of the field.
     pub(super) rects: Vec<TexelRect>,
+    /// All that has left the surface then.
+    pub(super) holes: Holes,
     /// The part of the texture that the surface showed.
     pub(super) uv: [Vec2; 2],
     /// The cracks that were carried on.
@@ -85,9 +89,8 @@ pub(super) struct Leaving {
     pub(super) seed: u64,
     /// How it breaks again, and how many seconds after the blow.
     pub(super) again: Option<(BreakAgain, f32)>,
-    pub(super) spans: Vec<Span>,
     /// Its meshes, unless nothing of it can be seen.
-    pub(super) form: Option<Form>,
+    pub(super) form: Option<Box<Form>>,
 }
 
 impl Made {
@@ -175,7 +178,7 @@ impl Order {
             Pieces::Cut(cut, support) => (cut, support),
             Pieces::Lines(network, carried, before) => {
                 let mut cuts = Cuts::from_network(&network)?;
-                for line in &carried {
+                for line in carried.iter().flat_map(|lines| lines.iter()) {
                     cuts.add_line(line)?;
                 }
                 let cut = Arc::new(shatter(cuts, &self.settings.cut)?);
@@ -193,7 +196,7 @@ impl Order {
         let thickness = settings.thickness * self.plane.size.y.abs() / cut.extent().y;
         let style = Style { plane: self.plane, rim: self.rim, thickness: self.is_solid.then_some(thickness) };
         let mut holes = self.holes.unwrap_or_else(|| Holes::new(frame.size()));
-        let mut dirty = DirtyTiles::new(frame.size());
+        let (mut scan, mut spans) = (Scan::new(frame), Vec::new());
         let is_seen = |&[y, from, to]: &Span| (from..to).any(|x| !self.base.is_hole(self.view.min + UVec2::new(x, y)));
         let falls = fallen.hit.iter().map(|_| false).chain(fallen.loose.iter().map(|_| true));
         let mut leaving = Vec::with_capacity(fallen.hit.len() + fallen.loose.len());
@@ -202,16 +205,18 @@ impl Order {
             let flight = if is_falling { self.burst.fall(nth, shard) } else { self.burst.flight(nth, shard) };
             let seed = mix(self.seed ^ mix(u64::from(nth)));
             let again = settings.again.and_then(|again| Some((again, flight.delay + again.due(shard.area, seed)?)));
-            let spans = spans_of(&cut, number, frame);
-            for &[y, from, to] in &spans {
-                dirty.mark(TexelRect { min: UVec2::new(from, y), max: UVec2::new(to, y + 1) });
-            }
-            holes.set(&spans, true);
-            let is_shown = spans.is_empty() || spans.iter().any(is_seen);
-            let form = is_shown.then(|| style.form(&cut, number, uv, seed));
-            leaving.push(Leaving { number, flight, seed, again, spans, form });
+            let first = spans.len();
+            scan.find(&cut, number, &mut spans);
+            let is_shown = spans.len() == first || spans[first..].iter().any(is_seen);
+            let form = is_shown.then(|| Box::new(style.form(&cut, number, uv, seed)));
+            leaving.push(Leaving { number, flight, seed, again, form });
         }
-        let mut rects = Vec::new();
+        join_spans(&mut spans);
+        holes.set(&spans, true);
+        let (mut dirty, mut rects) = (DirtyTiles::new(frame.size()), Vec::new());
+        for &[y, from, to] in &spans {
+            dirty.mark(TexelRect { min: UVec2::new(from, y), max: UVec2::new(to, y + 1) });
+        }
         dirty.take_rects(&mut rects);
         let density = holes.density(self.view, self.alpha_mask.then_some(&*self.base));
         let room = if self.is_first && !leaving.is_empty() { vec![1; self.base.diffuse.len()] } else { Vec::new() };
@@ -231,7 +236,9 @@ impl Order {
             is_new,
             support,
             leaving,
+            spans,
             rects,
+            holes,
             uv,
             drawn,
             density,

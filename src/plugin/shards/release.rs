@@ -4,7 +4,7 @@ use super::{
     Broken, Shard, ShardsError, ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen, Shattered,
     body::Shown,
     broken::Piece,
-    holes::cut_span,
+    holes::{Span, cut_span},
     order::{Leaving, Made, Order},
 };
 use crate::{
@@ -190,7 +190,8 @@ fn release(
         return Ok(Vec::new());
     }
     let is_first = active.broken.is_none();
-    let Made { settings, rim, plane, grown, cut, is_new, support, leaving, rects, uv, drawn, density, room, .. } = made;
+    let Made { settings, rim, plane, grown, cut, is_new, support, leaving, .. } = made;
+    let Made { spans, rects, holes, uv, drawn, density, room, .. } = made;
     if is_first {
         can_copy_picture(world, active, left)?;
     }
@@ -211,8 +212,8 @@ fn release(
             Box::new(Broken::new((cut.clone(), support.clone()), grown, settings.clone(), picture, plane, active))
         }
     };
-    if is_new {
-        broken.carried.extend_from_slice(cut.carried());
+    if is_new && !cut.carried().is_empty() {
+        broken.carried.push(cut.shared_carried());
     }
     broken.inside = inside(world, active, &settings, rim.bright, broken.inside.take());
     (broken.cut, broken.support, broken.grown) = (cut, support, grown);
@@ -220,11 +221,12 @@ fn release(
     if !is_first {
         refresh(world, active, &broken, &rects);
     }
-    punch(world, active, &leaving, &rects);
+    broken.holes = holes;
+    punch(world, active, &spans, &rects);
+    broken.pieces.reserve(leaving.len());
     let mut shown = Vec::with_capacity(leaving.len());
-    for Leaving { number, flight, seed, again, spans, form } in leaving {
+    for Leaving { number, flight, seed, again, form } in leaving {
         broken.end = broken.end.max(broken.time + f64::from(flight.end()));
-        broken.holes.set(&spans, true);
         let is_spent = form.is_none();
         if form.is_some() {
             shown.push(Shown { index: broken.pieces.len(), pose: Pose::AT_REST, form });
@@ -316,7 +318,7 @@ fn refresh(world: &mut World, active: &Active, broken: &Broken, rects: &[TexelRe
 }
 
 /// Makes the surface transparent where pieces leave it: nothing is painted for that.
-fn punch(world: &mut World, active: &mut Active, leaving: &[Leaving], rects: &[TexelRect]) {
+fn punch(world: &mut World, active: &mut Active, spans: &[Span], rects: &[TexelRect]) {
     let shown = active.view;
     for (_, view) in active.views.iter_mut().enumerate().filter(|(index, _)| *index != shown) {
         rects.iter().for_each(|rect| view.dirty.mark(*rect));
@@ -326,7 +328,7 @@ fn punch(world: &mut World, active: &mut Active, leaving: &[Leaving], rects: &[T
     let Some(mut images) = world.get_resource_mut::<Assets<Image>>() else { return };
     // Without an asset event, which would upload the whole image.
     if let Some(data) = images.get_mut_untracked(diffuse).and_then(|image| image.data.as_mut()) {
-        for &[y, from, to] in leaving.iter().flat_map(|piece| &piece.spans).filter(|[y, ..]| *y < within.y) {
+        for &[y, from, to] in spans.iter().filter(|[y, ..]| *y < within.y) {
             cut_span(data, size, origin, [y, from.min(within.x), to.min(within.x)]);
         }
     }
@@ -350,42 +352,27 @@ fn inside(
     if let Some(inside) = &settings.inside {
         return active.carrier.kind.is_solid.then(|| inside.clone().untyped());
     }
-    before.or_else(|| (active.carrier.kind.inside)(world, &active.carrier, active.base.mean(), bright))
+    let carrier = &active.carrier;
+    let make = |world| (carrier.kind.inside)(world, carrier, active.base.mean(), bright);
+    before.or_else(|| if carrier.kind.is_solid { make(world) } else { None })
 }
 
 #[cfg(all(test, feature = "2d"))]
 mod tests {
     use super::*;
     use crate::{
-        plugin::prelude::*,
+        plugin::{
+            headless::{app, blank},
+            prelude::*,
+        },
         shatter::{Anchor, ShatterParams},
-    };
-    use bevy::{
-        asset::RenderAssetUsages,
-        image::TextureAtlasLayout,
-        render::render_resource::{Extent3d, TextureDimension, TextureFormat},
     };
 
     /// By count: the frames in which shards are asked for, made and there cut nothing, and paint nothing.
     #[test]
     fn no_frame_cuts_or_paints_for_shards() {
-        let mut app = App::new();
-        app.add_plugins((
-            MinimalPlugins,
-            TransformPlugin,
-            AssetPlugin::default(),
-            ImagePlugin::default(),
-            CrackPlugins,
-        ))
-        .init_asset::<TextureAtlasLayout>()
-        .init_asset::<Mesh>()
-        .init_asset::<ColorMaterial>();
-        app.finish();
-        app.cleanup();
-        let extent = Extent3d { width: 64, height: 64, depth_or_array_layers: 1 };
-        let (format, usage) = (TextureFormat::Rgba8UnormSrgb, RenderAssetUsages::default());
-        let image = Image::new_fill(extent, TextureDimension::D2, &[200, 200, 200, 255], format, usage);
-        let image = app.world_mut().resource_mut::<Assets<Image>>().add(image);
+        let mut app = app(CrackBudget::default());
+        let image = app.world_mut().resource_mut::<Assets<Image>>().add(blank(UVec2::splat(64)));
         let settings = ShatterCracks {
             cut: ShatterParams { carry_on: true, ..ShatterParams::DEFAULT },
             anchor: Anchor::Nothing,
