@@ -633,8 +633,6 @@ fn shards(c: &mut Criterion) {
 fn frame(c: &mut Criterion) {
     [1024, 2048].into_iter().for_each(baking);
     floors();
-    let budgeted = percentiles(&budgeted_frames(), Run::OnThreads);
-    println!("growing, the systems under the default budget: {budgeted}");
     // In turns, so that both have the same machine.
     let (ours, naive): (Vec<Costs>, Vec<Costs>) = (0..RUNS).map(|_| (growing_frames(), naive_frames())).unzip();
     for (name, runs) in [("ours", &ours), ("whole images", &naive)] {
@@ -648,6 +646,8 @@ fn frame(c: &mut Criterion) {
     if let Some(times) = whole.checked_div(bytes) {
         println!("bytes a frame: {bytes}, whole images: {whole}, {times} times fewer");
     }
+    let budgeted = percentiles(&budgeted_frames(), Run::OnThreads);
+    println!("growing, the systems under the default budget: {budgeted}");
     let mut group = c.benchmark_group("growing");
     group.sample_size(10);
     group.bench_function("100 surfaces", |b| {
