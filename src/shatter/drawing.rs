@@ -1,6 +1,6 @@
 //! [`Drawing`]: lines on the lattice, made planar.
 
-use super::lattice::{Lattice, Place, PlaceMap, cross, distance_sq, dot, key, orient, vector};
+use super::lattice::{Lattice, NONE, Place, PlaceMap, cross, distance_sq, dot, key, orient, vector};
 use crate::math::Rng;
 use glam::Vec2;
 
@@ -369,14 +369,11 @@ struct EdgeGrid {
     edges: Vec<u32>,
     /// How many edges of the drawing are in it.
     known: usize,
-    /// Edges that came later, each with the one before it in its square.
+    /// Edges that came later, each with the one before it in its square, or [`NONE`].
     newer: Vec<[u32; 2]>,
     /// Per square: the last of them; empty as long as there are none.
     newest: Vec<u32>,
 }
-
-/// The end of a list in [`EdgeGrid::newer`].
-const NONE: u32 = u32::MAX;
 
 impl EdgeGrid {
     fn new(drawing: &Drawing) -> Self {

@@ -2,11 +2,9 @@
 
 use super::{
     drawing::{DEAD, Drawing},
-    lattice::{Place, cross, distance_sq, vector},
+    lattice::{NONE, Place, cross, distance_sq, vector},
 };
 use std::cmp::Reverse;
-
-const NONE: u32 = u32::MAX;
 
 /// The rings around each face. Half-edge `2 e` runs along edge `e`, `2 e + 1` against it; a face lies where x turns to
 /// reach y, that is inside its outer ring.

@@ -3,6 +3,9 @@
 use glam::Vec2;
 use std::hash::{BuildHasherDefault, Hasher};
 
+/// No number of a thing.
+pub(super) const NONE: u32 = u32::MAX;
+
 /// A place on the lattice.
 pub(super) type Place = [i32; 2];
 

@@ -353,8 +353,10 @@ fn inside(
         return active.carrier.kind.is_solid.then(|| inside.clone().untyped());
     }
     let carrier = &active.carrier;
-    let make = |world| (carrier.kind.inside)(world, carrier, active.base.mean(), bright);
-    before.or_else(|| if carrier.kind.is_solid { make(world) } else { None })
+    if before.is_some() || !carrier.kind.is_solid {
+        return before;
+    }
+    (carrier.kind.inside)(world, carrier, active.base.mean(), bright)
 }
 
 #[cfg(all(test, feature = "2d"))]
