@@ -181,13 +181,6 @@ fn time_of(mut work: impl FnMut()) -> Duration {
     start.elapsed()
 }
 
-/// Median time of an idle frame.
-fn idle(app: &mut App) -> Duration {
-    let mut times: Vec<_> = (0..9).map(|_| time_of(|| app.update())).collect();
-    times.sort();
-    times[4]
-}
-
 /// CPU time of all threads so far, those of the driver included; zero where the system does not tell.
 fn cpu_time() -> Duration {
     let tasks = std::fs::read_dir("/proc/self/task").into_iter().flatten();
@@ -195,78 +188,100 @@ fn cpu_time() -> Duration {
     Duration::from_nanos(times.sum())
 }
 
-/// CPU time of an idle frame, of some.
-fn idle_cpu(app: &mut App) -> Duration {
-    let start = cpu_time();
-    (0..FRAMES).for_each(|_| app.update());
-    cpu_time().saturating_sub(start) / FRAMES
-}
-
-/// What each of some frames took over an idle one: time, CPU time of all threads, and of the time the main world's systems.
+/// What each of some frames took, and idle ones of the same app: time, CPU time of all threads, and of the time the main world's systems.
+#[derive(Default)]
 struct Costs {
     times: Vec<Duration>,
     cpu: Vec<Duration>,
     systems: Vec<Duration>,
+    idle_times: Vec<Duration>,
+    idle_cpu: Vec<Duration>,
     /// Bytes uploaded in all of them.
     bytes: u64,
 }
 
 impl Costs {
-    /// Measures some frames beside others, which are idle.
-    fn of(app: &mut App, count: u32, idle: Duration, idle_cpu: Duration) -> Self {
-        let mut frames = Self { times: Vec::new(), cpu: Vec::new(), systems: Vec::new(), bytes: 0 };
+    /// Measures idle frames.
+    fn idle(app: &mut App) -> Self {
+        let mut idle = Self::default();
+        idle.measure(app, 2 * FRAMES);
+        Self { idle_times: idle.times, idle_cpu: idle.cpu, ..Self::default() }
+    }
+
+    /// Measures some frames.
+    fn measure(&mut self, app: &mut App, count: u32) {
         for _ in 0..count {
             app.insert_resource(OurSystems::default());
             let cpu = cpu_time();
-            frames.times.push(time_of(|| app.update()).saturating_sub(idle));
-            frames.cpu.push(cpu_time().saturating_sub(cpu + idle_cpu));
-            frames.systems.push(app.world().resource::<OurSystems>().1);
-            frames.bytes += app.world().resource::<CrackUploadStats>().bytes;
+            self.times.push(time_of(|| app.update()));
+            self.cpu.push(cpu_time().saturating_sub(cpu));
+            self.systems.push(app.world().resource::<OurSystems>().1);
+            self.bytes += app.world().resource::<CrackUploadStats>().bytes;
         }
-        frames
     }
 
-    fn mean(times: &[Duration]) -> Duration {
-        times.iter().sum::<Duration>() / times.len() as u32
+    /// Mean time of a frame over the median of the idle ones.
+    fn time(&self) -> Duration {
+        mean(&self.times).saturating_sub(median(&self.idle_times))
     }
 
-    /// Of several runs, each frame as it was in the run in which it took least: others on the machine only ever lengthen one.
+    /// The same of the CPU time.
+    fn cpu(&self) -> Duration {
+        mean(&self.cpu).saturating_sub(median(&self.idle_cpu))
+    }
+
+    /// Of several runs, each frame as it was in the run in which it took least, and so the idle ones: others on the machine only ever
+    /// lengthen one.
     fn at_best(runs: &[Self]) -> [Duration; 3] {
         let of = |times: fn(&Self) -> &Vec<Duration>| {
             let least = |frame: usize| runs.iter().map(|run| times(run)[frame]).min().unwrap_or_default();
-            Self::mean(&(0..times(&runs[0]).len()).map(least).collect::<Vec<Duration>>())
+            mean(&(0..times(&runs[0]).len()).map(least).collect::<Vec<Duration>>())
         };
-        [of(|run| &run.times), of(|run| &run.cpu), of(|run| &run.systems)]
+        let [time, cpu] = [of(|run| &run.times), of(|run| &run.cpu)];
+        let [idle, idle_cpu] = [of(|run| &run.idle_times), of(|run| &run.idle_cpu)];
+        [time.saturating_sub(idle), cpu.saturating_sub(idle_cpu), of(|run| &run.systems)]
     }
 }
 
-/// Growing surfaces, all of them hit; what an idle frame takes, and its CPU time.
-fn growing(budget: CrackBudget) -> (App, Duration, Duration) {
+fn mean(times: &[Duration]) -> Duration {
+    times.iter().sum::<Duration>() / times.len() as u32
+}
+
+fn median(times: &[Duration]) -> Duration {
+    let mut times = times.to_vec();
+    times.sort();
+    times[times.len() / 2]
+}
+
+/// Growing surfaces, all of them hit, and what idle frames took before.
+fn growing(budget: CrackBudget) -> (App, Costs) {
     let mut app = app();
     app.insert_resource(budget);
     measure_systems(&mut app);
     let entities = with_sprites(&mut app, SURFACES, SIDE, true);
-    let (idle, idle_cpu) = (idle(&mut app), idle_cpu(&mut app));
+    let idle = Costs::idle(&mut app);
     for entity in entities {
         app.world_mut().trigger(CrackHit::uv(entity, Vec2::splat(0.5)));
     }
-    (app, idle, idle_cpu)
+    (app, idle)
 }
 
 /// Frames in which all surfaces grow.
 fn growing_frames() -> Costs {
-    let (mut app, idle, idle_cpu) = growing(CrackBudget { milliseconds: 1e6, max_texture_bytes: 1 << 34, ..default() });
+    let (mut app, mut costs) = growing(CrackBudget { milliseconds: 1e6, max_texture_bytes: 1 << 34, ..default() });
     app.update();
     app.update();
-    Costs::of(&mut app, FRAMES, idle, idle_cpu)
+    costs.measure(&mut app, FRAMES);
+    costs
 }
 
 /// The main world's systems in each frame from the hits to the last crack, under the default budget.
 fn budgeted_frames() -> Frames {
-    let (mut app, idle, idle_cpu) = growing(CrackBudget { max_texture_bytes: 1 << 34, ..default() });
+    let (mut app, _) = growing(CrackBudget { max_texture_bytes: 1 << 34, ..default() });
     let mut systems = Vec::new();
     loop {
-        let frame = Costs::of(&mut app, 1, idle, idle_cpu);
+        let mut frame = Costs::default();
+        frame.measure(&mut app, 1);
         systems.extend(frame.systems.into_iter().zip(frame.cpu).map(<[Duration; 2]>::from));
         let mut states = app.world_mut().query::<&CrackState>();
         let is_done = states.iter(app.world()).all(|state| state.status == CrackStatus::Done);
@@ -330,10 +345,11 @@ fn naive_frames() -> Costs {
         naive.0.push((growth, DepthField::new(frame), base, diffuse, normal));
     }
     (0..3).for_each(|_| app.update());
-    let (idle, idle_cpu) = (idle(&mut app), idle_cpu(&mut app));
+    let mut costs = Costs::idle(&mut app);
     app.insert_resource(naive).add_systems(Update, paint_whole);
     app.update();
-    Costs::of(&mut app, FRAMES, idle, idle_cpu)
+    costs.measure(&mut app, FRAMES);
+    costs
 }
 
 /// The rectangles that a growing frame paints, of each surface and frame.
@@ -638,8 +654,11 @@ fn frame(c: &mut Criterion) {
     for (name, runs) in [("ours", &ours), ("whole images", &naive)] {
         let [time, cpu, systems] = Costs::at_best(runs).map(|time| time.as_secs_f64() * 1e3);
         println!("{name}, each frame at its best: {time:.2} ms, the systems {systems:.2} ms, CPU time {cpu:.2} ms");
-        let cpu = |run: &Costs| Costs::mean(&run.cpu);
-        println!("{name}, CPU time of all threads a frame: {}", least_and_median(runs.iter().map(cpu).collect()));
+        println!("{name}, a frame: {}", least_and_median(runs.iter().map(Costs::time).collect()));
+        println!(
+            "{name}, CPU time of all threads a frame: {}",
+            least_and_median(runs.iter().map(Costs::cpu).collect())
+        );
     }
     let bytes = ours[0].bytes / u64::from(FRAMES);
     let whole = SURFACES as u64 * u64::from(SIDE * SIDE) * 8;
@@ -651,13 +670,13 @@ fn frame(c: &mut Criterion) {
     let mut group = c.benchmark_group("growing");
     group.sample_size(10);
     group.bench_function("100 surfaces", |b| {
-        b.iter_custom(|n| (0..n).map(|_| Costs::mean(&growing_frames().times)).sum());
+        b.iter_custom(|n| (0..n).map(|_| growing_frames().time()).sum());
     });
     group.bench_function("100 surfaces, main world", |b| {
-        b.iter_custom(|n| (0..n).map(|_| Costs::mean(&growing_frames().systems)).sum());
+        b.iter_custom(|n| (0..n).map(|_| mean(&growing_frames().systems)).sum());
     });
     group.bench_function("100 whole images", |b| {
-        b.iter_custom(|n| (0..n).map(|_| Costs::mean(&naive_frames().times)).sum());
+        b.iter_custom(|n| (0..n).map(|_| naive_frames().time()).sum());
     });
     group.finish();
     let mut group = c.benchmark_group("finished");

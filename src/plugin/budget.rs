@@ -2,6 +2,7 @@
 
 use bevy::{platform::time::Instant, prelude::*, tasks::ComputeTaskPool};
 use core::time::Duration;
+use std::sync::{Mutex, PoisonError};
 
 /// What all surfaces together may cost.
 ///
@@ -101,11 +102,22 @@ impl Timer {
 /// Does `work` for every share, on as many threads as there are; in order if there is only one share, or one thread.
 ///
 /// Systems that call it run on the main thread, which would wait for them otherwise: so it works as well.
-pub(super) fn share_out<S: Send>(shares: impl ExactSizeIterator<Item = S>, work: impl Fn(S) + Sync) {
-    let work = &work;
+pub(super) fn share_out<S: Send>(shares: impl ExactSizeIterator<Item = S> + Send, work: impl Fn(S) + Sync) {
     match ComputeTaskPool::try_get().filter(|_| shares.len() > 1) {
         Some(pool) => {
-            pool.scope(|scope| shares.for_each(|share| scope.spawn(async move { work(share) })));
+            // A task for each would cost more than some of them.
+            let tasks = shares.len().min(pool.thread_num() + 1);
+            let (shares, work) = (&Mutex::new(shares), &work);
+            let next = || shares.lock().unwrap_or_else(PoisonError::into_inner).next();
+            pool.scope(|scope| {
+                for _ in 0..tasks {
+                    scope.spawn(async move {
+                        while let Some(share) = next() {
+                            work(share);
+                        }
+                    });
+                }
+            });
         }
         None => shares.for_each(work),
     }

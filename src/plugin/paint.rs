@@ -12,7 +12,7 @@ use crate::{
     pattern::{Moment, NO_PARENT, SegmentId},
     raster::{DOT_DEPTH, DepthField, Profile, Redrawn, TexelRect, stamp_dot, stamp_path, stamp_path_with},
 };
-use bevy::{ecs::system::NonSendMarker, prelude::*};
+use bevy::{ecs::system::NonSendMarker, prelude::*, render::renderer::RenderDevice};
 
 /// So many of them are painted one after the other: fewer are not worth another thread.
 const SHARE: usize = 4;
@@ -47,6 +47,7 @@ pub(super) fn paint_surfaces(
     mut surfaces: ResMut<Surfaces>,
     mut uploads: ResMut<Uploads>,
     images: Option<ResMut<Assets<Image>>>,
+    device: Option<Res<RenderDevice>>,
     mut states: Query<&mut CrackState>,
     mut scratch: Local<Vec<Scratch>>,
 ) {
@@ -62,7 +63,7 @@ pub(super) fn paint_surfaces(
         let shares = jobs.len().div_ceil(SHARE);
         let known = scratch.len().max(shares);
         scratch.resize_with(known, Scratch::default);
-        uploads.pack(shares, |packers| {
+        uploads.pack(shares, device.as_deref(), |packers| {
             let shares = jobs.chunks_mut(SHARE).zip(&mut *scratch).zip(packers).enumerate();
             share_out(shares, |(i, ((jobs, scratch), packer))| {
                 for (k, job) in jobs.iter_mut().enumerate() {
@@ -170,7 +171,8 @@ pub(super) fn stamp_all(growth: &CrackGrowth, profile: &Profile, field: &mut Dep
 pub(super) fn paint_now(world: &mut World, active: &mut Active) {
     world.resource_scope(|world, mut images: Mut<Assets<Image>>| {
         let mut canvas = Canvas::take(&active.textures, &mut images);
-        world.resource_mut::<Uploads>().pack(1, |packers| {
+        let device = world.get_resource::<RenderDevice>().cloned();
+        world.resource_mut::<Uploads>().pack(1, device.as_ref(), |packers| {
             packers.iter_mut().for_each(|packer| canvas.paint(active, packer, &mut Vec::new()));
         });
         canvas.put_back(&active.textures, &mut images);

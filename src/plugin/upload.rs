@@ -26,7 +26,8 @@ use bevy::{
         texture::GpuImage,
     },
 };
-use pack::{Changed, LOOSE, MAX_KEPT, Place, ROW_ALIGNMENT, pack};
+use core::ops::Range;
+use pack::{Changed, Layout, Memory, PER_PACKER, Place, ROW_ALIGNMENT, Source, Write};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
 /// What went to the GPU in the last frame that was rendered.
@@ -46,6 +47,9 @@ const MAX_WAITING: usize = 1 << 16;
 /// The least size of a buffer, bytes.
 const LEAST_BUFFER: u64 = 1 << 18;
 
+/// More memory than this is not kept for the next frame, bytes.
+const MAX_KEPT: u64 = 16 << 20;
+
 /// Up to this many rectangles are written one by one, more go through one buffer.
 const FEW: usize = 4;
 
@@ -58,8 +62,10 @@ pub(super) struct Uploads {
     /// Whether there is a renderer that fetches them.
     is_wanted: bool,
     rects: Vec<Changed>,
-    /// Hold the texels of `rects` that are packed, each those of the part of its number; the one of [`LOOSE`] is the renderer's.
     packers: Vec<Packer>,
+    /// Where the texels of `rects` are packed that are.
+    packed: Option<Packed>,
+    buffers: Buffers,
     /// Number of rectangles up to which they are not thinned out again.
     limit: usize,
     /// Whether the renderer has fetched them since they were last looked at.
@@ -142,17 +148,33 @@ impl Uploads {
         }
     }
 
-    /// Lends some packers to `paint`, and takes what they have packed, one after the other.
-    pub(super) fn pack(&mut self, count: usize, paint: impl FnOnce(&mut [Packer])) {
-        self.have_packers(LOOSE + 1 + count);
-        paint(&mut self.packers[LOOSE + 1..][..count]);
+    /// Lends some packers to `paint`, and takes what they have packed, one after the other. Without a device it is packed when the
+    /// renderer fetches it.
+    pub(super) fn pack(&mut self, count: usize, device: Option<&RenderDevice>, paint: impl FnOnce(&mut [Packer])) {
+        // In a browser the device stays on its thread.
+        if let Some(device) = device.filter(|_| self.is_wanted && !cfg!(target_arch = "wasm32"))
+            && self.packed.is_none()
+        {
+            let bytes = ((count * PER_PACKER) as u64).min(MAX_KEPT);
+            self.packed = Some(Packed::new(self.buffers.take(bytes, device)));
+        }
+        let memory = self.packed.as_ref().map(|packed| &packed.memory);
+        self.lend(count, memory.cloned().as_ref());
+        paint(&mut self.packers[..count]);
         self.packers.iter_mut().for_each(|packer| self.rects.append(&mut packer.rects));
     }
 
-    fn have_packers(&mut self, count: usize) {
-        for part in self.packers.len()..count {
-            self.packers.push(Packer::new(self.is_wanted, part));
-        }
+    fn lend(&mut self, count: usize, memory: Option<&Arc<Memory>>) {
+        let is_wanted = self.is_wanted;
+        let known = self.packers.len().max(count);
+        self.packers.resize_with(known, || Packer::new(is_wanted, None));
+        self.packers[..count].iter_mut().for_each(|packer| packer.lend(memory));
+    }
+
+    /// Takes what is packed, so that nobody writes to it any more.
+    fn close(&mut self) -> Option<Packed> {
+        self.packers.iter_mut().for_each(Packer::close);
+        self.packed.take()
     }
 
     /// What brings whole pictures to the renderer, if there is one.
@@ -205,8 +227,42 @@ impl Uploads {
             }
         }
         self.rects = thin;
-        self.packers.iter_mut().for_each(|packer| packer.rows.clear());
+        if let Some(packed) = self.close() {
+            self.packed = Some(packed.anew());
+        }
     }
+}
+
+/// A buffer in which texels are packed.
+struct Packed {
+    buffer: Buffer,
+    memory: Arc<Memory>,
+}
+
+impl Packed {
+    /// A buffer that is mapped.
+    fn new(buffer: Buffer) -> Self {
+        let mapped = buffer.clone();
+        let open = move |range: Range<usize>| writer(&mapped, range);
+        Self { memory: Arc::new(Memory::new(buffer.size() as usize, Box::new(open))), buffer }
+    }
+
+    /// The same memory with nothing in it.
+    fn anew(self) -> Self {
+        Self::new(self.buffer)
+    }
+
+    /// What the GPU can read now.
+    fn close(self) -> Buffer {
+        self.buffer.unmap();
+        self.buffer
+    }
+}
+
+/// Writes to a part of a buffer that is mapped. The buffer cannot be unmapped as long as it lives.
+fn writer(buffer: &Buffer, range: Range<usize>) -> Write {
+    let mut view = buffer.slice(range.start as u64..range.end as u64).get_mapped_range_mut();
+    Box::new(move |place, source| source.rows(place, |to, row| view.slice(to..to + row.len()).copy_from_slice(row)))
 }
 
 /// Keeps the list short when the renderer does not fetch it (a minimised window).
@@ -234,12 +290,8 @@ struct Copy {
     texture: Texture,
     rect: TexelRect,
     texel: usize,
-    /// Which [`Rows`], [`LOOSE`] if it is not packed yet.
-    part: usize,
-    /// Where the first row begins.
-    offset: usize,
-    /// From row to row.
-    pitch: usize,
+    /// Where it is packed, if it is: in which of the buffers, and where there.
+    place: Option<(usize, Place)>,
 }
 
 impl Copy {
@@ -248,13 +300,10 @@ impl Copy {
         self.rect.size().x as usize * self.texel
     }
 
-    fn height(&self) -> usize {
-        self.rect.size().y as usize
-    }
-
-    /// The most bytes that it takes in the staging buffer.
-    fn most_bytes(&self) -> usize {
-        self.row().next_multiple_of(ROW_ALIGNMENT) * self.height()
+    /// Its texels, if the image is there.
+    fn source<'a>(&self, images: &'a Assets<Image>) -> Option<Source<'a>> {
+        let image = images.get(self.image)?;
+        Some(Source::new(image.data.as_ref()?, image.width() as usize, self.texel, self.rect))
     }
 }
 
@@ -263,7 +312,6 @@ impl Copy {
 struct Staging {
     rects: Vec<Changed>,
     copies: Vec<Copy>,
-    buffers: Buffers,
     /// Gives back the memory of its list.
     sending: Option<Beside<Sending, Vec<Copy>>>,
 }
@@ -277,24 +325,28 @@ impl Staging {
     }
 }
 
-/// Copies to be made from a buffer.
+/// Copies to be made from buffers.
 struct Sending {
     device: RenderDevice,
     queue: RenderQueue,
-    buffers: Buffers,
-    buffer: Buffer,
+    home: Buffers,
+    buffers: Vec<Buffer>,
     copies: Vec<Copy>,
 }
 
 impl Sending {
     /// All in one submission: a write of its own for each costs more than its texels.
     fn send(self) -> Vec<Copy> {
-        let Self { device, queue, buffers, buffer, mut copies } = self;
+        let Self { device, queue, home, buffers, mut copies } = self;
         let mut encoder = device.create_command_encoder(&CommandEncoderDescriptor { label: Some("crack_texels") });
-        copies.drain(..).for_each(|copy| copy_one(&mut encoder, &copy, &buffer));
+        for copy in copies.drain(..) {
+            if let Some((buffer, place)) = copy.place {
+                copy_one(&mut encoder, &copy, place, &buffers[buffer]);
+            }
+        }
         queue.submit([encoder.finish()]);
-        if buffer.size() <= MAX_KEPT as u64 {
-            Buffers::give_back(Arc::downgrade(&buffers.0), buffer, &device);
+        for buffer in buffers.into_iter().filter(|buffer| buffer.size() <= MAX_KEPT) {
+            Buffers::give_back(Arc::downgrade(&home.0), buffer, &device);
         }
         copies
     }
@@ -356,53 +408,47 @@ fn upload_rects(
         copy_whole(&mut whole, images, &gpu_images, &device, &queue, &mut stats);
         main.resource_mut::<Uploads>().staged = whole;
     }
-    let Staging { rects, copies, buffers, sending } = &mut *staging;
+    let Staging { rects, copies, sending } = &mut *staging;
     let mut uploads = main.resource_mut::<Uploads>();
     uploads.is_fetched = true;
     core::mem::swap(rects, &mut uploads.rects);
-    uploads.have_packers(LOOSE + 1);
-    let mut packers = core::mem::take(&mut uploads.packers);
+    let mut packed = uploads.close();
+    let home = uploads.buffers.clone();
     if !rects.is_empty()
         && let Some(images) = main.get_resource::<Assets<Image>>()
     {
         // What is not on the GPU yet stays in the list.
-        let mut most_bytes = 0;
+        let mut bytes_in_all = 0;
         rects.retain(|Changed { image, rect, place }| match plan(*image, *rect, images, &gpu_images) {
-            Plan::Copy(copy) if most_bytes > 0 && most_bytes + copy.most_bytes() > MAX_STAGED => true,
-            Plan::Copy(mut copy) => {
-                most_bytes += copy.most_bytes();
+            Plan::Copy(copy) => {
+                let bytes = copy.source(images).map_or(0, |source| source.bytes());
+                if bytes_in_all > 0 && bytes_in_all + bytes > MAX_STAGED {
+                    return true;
+                }
+                bytes_in_all += bytes;
                 stats.rects += 1;
                 stats.bytes += copy.rect.area() * copy.texel as u64;
-                if let Some(place) = place.filter(|place| copy.rect == *rect && copy.row() == place.row) {
-                    let Place { part, offset, pitch, .. } = place;
-                    copy = Copy { part, offset, pitch, ..copy };
-                }
-                copies.push(copy);
+                let place = place.filter(|place| copy.rect == *rect && copy.row() == place.row);
+                copies.push(Copy { place: place.map(|place| (0, place)), ..copy });
                 false
             }
             Plan::Wait => true,
             Plan::Drop => false,
         });
-        let loose = &mut packers[LOOSE].rows;
-        for copy in copies.iter_mut().filter(|copy| copy.part == LOOSE) {
-            (copy.offset, copy.pitch) = loose.place(copy.row(), copy.height());
-            pack_copy(copy, images, &mut loose.bytes);
-        }
         if copies.len() <= FEW {
-            write(copies, &packers, &queue);
-            copies.clear();
+            copies.drain(..).for_each(|copy| write(&copy, images, &queue));
         } else {
-            let buffer = fill(copies, &packers, buffers, &device);
-            let (device, queue, buffers) = (device.clone(), queue.clone(), buffers.clone());
-            let work = Sending { device, queue, buffers, buffer, copies: core::mem::take(copies) };
+            let buffers = pack_rest(copies, images, packed.take(), &home, &device);
+            let (device, queue) = (device.clone(), queue.clone());
+            let work = Sending { device, queue, home, buffers, copies: core::mem::take(copies) };
             *sending = Some(Beside::start(work, Sending::send));
         }
     }
-    packers.iter_mut().for_each(|packer| packer.rows.clear());
-    main.resource_mut::<Uploads>().packers = packers;
+    let mut uploads = main.resource_mut::<Uploads>();
+    uploads.packed = packed.map(Packed::anew);
     if !rects.is_empty() {
         rects.iter_mut().for_each(|changed| changed.place = None);
-        main.resource_mut::<Uploads>().rects.append(rects);
+        uploads.rects.append(rects);
     }
     *main.resource_mut::<CrackUploadStats>() = stats;
 }
@@ -425,10 +471,10 @@ fn copy_whole(
             for &(rect, offset) in &staged.parts {
                 match plan(id, rect, images, gpu_images) {
                     Plan::Copy(copy) => {
-                        let copy = Copy { offset, pitch: pitch(rect, copy.texel), ..copy };
-                        let end = offset + copy.pitch * copy.height();
+                        let place = Place { offset, pitch: pitch(rect, copy.texel), row: copy.row() };
+                        let end = offset + place.pitch * rect.size().y as usize;
                         if copy.rect == rect && end as u64 <= staged.buffer.size() {
-                            copy_one(&mut encoder, &copy, &staged.buffer);
+                            copy_one(&mut encoder, &copy, place, &staged.buffer);
                             stats.rects += 1;
                             stats.bytes += copy.rect.area() * copy.texel as u64;
                         }
@@ -453,9 +499,9 @@ fn finish_sending(mut staging: ResMut<Staging>) {
     staging.finish();
 }
 
-fn copy_one(encoder: &mut CommandEncoder, copy: &Copy, buffer: &Buffer) {
+fn copy_one(encoder: &mut CommandEncoder, copy: &Copy, place: Place, buffer: &Buffer) {
     let (to, size) = destination(copy);
-    let layout = layout(copy, copy.offset as u64);
+    let layout = layout(place.offset, place.pitch);
     encoder.copy_buffer_to_texture(TexelCopyBufferInfo { buffer, layout }, to, size);
 }
 
@@ -482,19 +528,7 @@ fn plan(id: AssetId<Image>, rect: TexelRect, images: &Assets<Image>, gpu_images:
         return Plan::Drop;
     }
     let (texture, texel) = (gpu.texture.clone(), texel as usize);
-    Plan::Copy(Copy { image: id, texture, rect, texel, part: LOOSE, offset: 0, pitch: 0 })
-}
-
-/// Copies the texels of a rectangle to their place.
-fn pack_copy(copy: &Copy, images: &Assets<Image>, rows: &mut [u8]) {
-    if let Some(image) = images.get(copy.image)
-        && let Some(data) = &image.data
-    {
-        let stride = image.width() as usize * copy.texel;
-        let from = copy.rect.min.y as usize * stride + copy.rect.min.x as usize * copy.texel;
-        let place = Place { part: copy.part, offset: copy.offset, pitch: copy.pitch, row: copy.row() };
-        pack(rows, place, data, from, stride, copy.height());
-    }
+    Plan::Copy(Copy { image: id, texture, rect, texel, place: None })
 }
 
 fn destination(copy: &Copy) -> (TexelCopyTextureInfo<'_>, Extent3d) {
@@ -506,35 +540,47 @@ fn destination(copy: &Copy) -> (TexelCopyTextureInfo<'_>, Extent3d) {
     )
 }
 
-fn layout(copy: &Copy, offset: u64) -> TexelCopyBufferLayout {
-    let bytes_per_row = u32::try_from(copy.pitch).ok();
-    TexelCopyBufferLayout { offset, bytes_per_row, rows_per_image: None }
+fn layout(offset: usize, pitch: usize) -> TexelCopyBufferLayout {
+    TexelCopyBufferLayout { offset: offset as u64, bytes_per_row: u32::try_from(pitch).ok(), rows_per_image: None }
 }
 
-/// Writes rectangles one by one.
-fn write(copies: &[Copy], packers: &[Packer], queue: &RenderQueue) {
-    for copy in copies {
+/// Writes a rectangle by itself.
+fn write(copy: &Copy, images: &Assets<Image>, queue: &RenderQueue) {
+    if let Some(source) = copy.source(images) {
         let (to, size) = destination(copy);
-        queue.write_texture(to, &packers[copy.part].rows.bytes[copy.offset..], layout(copy, 0), size);
+        let (texels, stride) = source.texels();
+        queue.write_texture(to, texels, layout(0, stride), size);
     }
 }
 
-/// Brings all packed texels to one buffer, and the copies to their places there.
-fn fill(copies: &mut [Copy], packers: &[Packer], buffers: &Buffers, device: &RenderDevice) -> Buffer {
-    let (mut starts, mut size) = (Vec::with_capacity(packers.len()), 0);
-    for packer in packers {
-        starts.push(size);
-        size += packer.rows.end();
+/// Packs what is not packed yet; returns the buffers of all.
+fn pack_rest(
+    copies: &mut [Copy],
+    images: &Assets<Image>,
+    packed: Option<Packed>,
+    home: &Buffers,
+    device: &RenderDevice,
+) -> Vec<Buffer> {
+    let mut buffers: Vec<Buffer> = packed.into_iter().map(Packed::close).collect();
+    let mut layout = Layout::default();
+    let mut rest = Vec::new();
+    for copy in copies.iter_mut().filter(|copy| copy.place.is_none()) {
+        if let Some(source) = copy.source(images)
+            && let Some(place) = layout.place(source, usize::MAX)
+        {
+            copy.place = Some((buffers.len(), place));
+            rest.push((place, source));
+        }
     }
-    copies.iter_mut().for_each(|copy| copy.offset += starts[copy.part]);
-    let buffer = buffers.take(size as u64, device);
-    let mut memory = buffer.slice(..).get_mapped_range_mut();
-    for (Packer { rows, .. }, start) in packers.iter().zip(&starts) {
-        memory.slice(*start..start + rows.end()).copy_from_slice(&rows.bytes[..rows.end()]);
+    if !rest.is_empty() {
+        let buffer = home.take(layout.end() as u64, device);
+        let mut write = writer(&buffer, 0..layout.end());
+        rest.into_iter().for_each(|(place, source)| write(place, source));
+        drop(write);
+        buffer.unmap();
+        buffers.push(buffer);
     }
-    drop(memory);
-    buffer.unmap();
-    buffer
+    buffers
 }
 
 #[cfg(test)]
@@ -549,7 +595,8 @@ mod tests {
         let rect = |x| TexelRect { min: UVec2::new(x, 2), max: UVec2::new(x + 3, 6) };
         let mut uploads = Uploads { is_wanted: true, ..default() };
         let fill = |uploads: &mut Uploads| {
-            uploads.pack(2, |packers| {
+            uploads.lend(2, Some(&pack::tests::memory(1 << 18).0));
+            uploads.pack(2, None, |packers| {
                 for (packer, x) in packers.iter_mut().zip([4, 9]) {
                     packer.push(ids.into_iter().map(|id| Some((id, &data[..]))), size, rect(x));
                 }

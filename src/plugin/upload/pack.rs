@@ -2,6 +2,11 @@
 
 use crate::raster::TexelRect;
 use bevy::prelude::*;
+use core::ops::Range;
+use std::sync::{
+    Arc,
+    atomic::{AtomicUsize, Ordering},
+};
 
 /// Copies between buffers and textures want rows that begin at multiples of this, bytes.
 pub(super) const ROW_ALIGNMENT: usize = 256;
@@ -16,17 +21,11 @@ const PITCH: usize = 1024;
 /// Where copies may begin in a row.
 const LANES: usize = PITCH / COPY_ALIGNMENT;
 
-/// The least memory that is asked for, bytes.
-const LEAST: usize = 1 << 16;
+/// Rows that a packer takes at once.
+const BLOCK_ROWS: usize = 32;
 
-/// The part of what is not packed before the renderer fetches it.
-pub(super) const LOOSE: usize = 0;
-
-/// Up to this many bytes are packed by each [`Packer`], the rest when the renderer fetches it.
-const MAX_PACKED: usize = 1 << 20;
-
-/// More memory than this is not kept for the next frame, bytes.
-pub(super) const MAX_KEPT: usize = 16 << 20;
+/// Bytes that suffice for a packer, mostly.
+pub(super) const PER_PACKER: usize = 4 * BLOCK_ROWS * PITCH;
 
 /// Texels of an image that have changed.
 pub(super) struct Changed {
@@ -39,8 +38,6 @@ pub(super) struct Changed {
 /// Rows of texels among the packed ones.
 #[derive(Clone, Copy)]
 pub(super) struct Place {
-    /// Which [`Rows`].
-    pub(super) part: usize,
     /// Where the first row begins.
     pub(super) offset: usize,
     /// From row to row.
@@ -49,45 +46,122 @@ pub(super) struct Place {
     pub(super) row: usize,
 }
 
-/// Packed texels. The memory is kept from frame to frame, what lies beyond the end is of no use.
-#[derive(Default)]
-pub(super) struct Rows {
-    pub(super) bytes: Vec<u8>,
-    /// Rows of [`PITCH`] bytes that are taken, of each lane.
-    taken: [usize; LANES],
+/// Rows of texels in an image.
+#[derive(Clone, Copy)]
+pub(super) struct Source<'a> {
+    data: &'a [u8],
+    /// Where the first row begins.
+    from: usize,
+    /// From row to row.
+    stride: usize,
+    /// Length of a row.
+    row: usize,
+    height: usize,
 }
 
-impl Rows {
-    /// Finds room for `height` rows of `row` bytes, as near the top as there is; returns where the first begins, and the way from
-    /// row to row.
-    pub(super) fn place(&mut self, row: usize, height: usize) -> (usize, usize) {
-        let lanes = row.div_ceil(COPY_ALIGNMENT).min(LANES);
-        let tops = self.taken.windows(lanes.max(1)).map(|lanes| lanes.iter().copied().max().unwrap_or(0));
-        let (top, lane) = tops.zip(0..).min().unwrap_or((0, 0));
-        let (pitch, rows) = if row <= PITCH {
-            (PITCH, height)
-        } else {
-            let pitch = row.next_multiple_of(ROW_ALIGNMENT);
-            (pitch, (pitch * height).div_ceil(PITCH))
-        };
-        self.taken[lane..lane + lanes].fill(top + rows);
-        let end = (top + rows) * PITCH;
-        if self.bytes.len() < end {
-            self.bytes.resize(end.next_power_of_two().max(LEAST), 0);
+impl<'a> Source<'a> {
+    /// The texels `rect` of an image so many texels wide.
+    pub(super) fn new(data: &'a [u8], width: usize, texel: usize, rect: TexelRect) -> Self {
+        let ([x, y], [row, height]) = (rect.min.as_usizevec2().to_array(), rect.size().as_usizevec2().to_array());
+        Self { data, from: (y * width + x) * texel, stride: width * texel, row: row * texel, height }
+    }
+
+    /// From row to row where they are packed, and how many rows of [`PITCH`] bytes they take there.
+    fn packed(&self) -> (usize, usize) {
+        if self.row <= PITCH {
+            return (PITCH, self.height);
         }
-        (top * PITCH + lane * COPY_ALIGNMENT, pitch)
+        let pitch = self.row.next_multiple_of(ROW_ALIGNMENT);
+        (pitch, (pitch * self.height).div_ceil(PITCH))
+    }
+
+    /// Bytes that they take where they are packed, about.
+    pub(super) fn bytes(&self) -> usize {
+        self.row.next_multiple_of(ROW_ALIGNMENT) * self.height
+    }
+
+    /// The texels from the first row to the end of the image, and the way from row to row.
+    pub(super) fn texels(&self) -> (&'a [u8], usize) {
+        (&self.data[self.from..], self.stride)
+    }
+
+    /// Calls `write` with each row and where it is to go, from the place of the first one on.
+    pub(super) fn rows(&self, place: Place, mut write: impl FnMut(usize, &[u8])) {
+        let (mut from, mut to) = (self.from, place.offset);
+        for _ in 0..self.height {
+            write(to, &self.data[from..from + self.row]);
+            from += self.stride;
+            to += place.pitch;
+        }
+    }
+}
+
+/// Writes texels to their place in a part of the memory, counted from its start.
+pub(super) type Write = Box<dyn FnMut(Place, Source<'_>) + Send + Sync>;
+
+/// Opens a range of bytes.
+type Open = Box<dyn Fn(Range<usize>) -> Write + Send + Sync>;
+
+/// Memory that the GPU will read, taken in blocks of rows of [`PITCH`] bytes.
+pub(super) struct Memory {
+    /// It is not asked for the same bytes twice.
+    open: Open,
+    rows: usize,
+    /// The first row that nobody has taken.
+    next: AtomicUsize,
+}
+
+impl Memory {
+    pub(super) fn new(bytes: usize, open: Open) -> Self {
+        Self { open, rows: bytes / PITCH, next: AtomicUsize::new(0) }
+    }
+
+    /// Takes some rows; `None` if there are no more.
+    fn block(&self, height: usize) -> Option<Block> {
+        let beyond = |first: usize| first.checked_add(height).filter(|end| *end <= self.rows);
+        let first = self.next.fetch_update(Ordering::Relaxed, Ordering::Relaxed, beyond).ok()?;
+        let end = first + height;
+        let write = (self.open)(first * PITCH..end * PITCH);
+        Some(Block { write, first, height, layout: Layout::default() })
+    }
+}
+
+/// Where texels lie in rows of [`PITCH`] bytes: how many of them are taken, of each lane.
+#[derive(Default)]
+pub(super) struct Layout([usize; LANES]);
+
+impl Layout {
+    /// Finds room for texels, as near the top as there is above row `end`.
+    pub(super) fn place(&mut self, source: Source, end: usize) -> Option<Place> {
+        let lanes = source.row.div_ceil(COPY_ALIGNMENT).clamp(1, LANES);
+        let (pitch, height) = source.packed();
+        let tops = self.0.windows(lanes).map(|lanes| lanes.iter().copied().max().unwrap_or(0));
+        let (top, lane) = tops.zip(0..).min()?;
+        let bottom = top.checked_add(height).filter(|bottom| *bottom <= end)?;
+        self.0[lane..lane + lanes].fill(bottom);
+        Some(Place { offset: top * PITCH + lane * COPY_ALIGNMENT, pitch, row: source.row })
     }
 
     /// Bytes that are taken, with those between them.
     pub(super) fn end(&self) -> usize {
-        self.taken.iter().copied().max().unwrap_or(0) * PITCH
+        self.0.iter().copied().max().unwrap_or(0) * PITCH
     }
+}
 
-    pub(super) fn clear(&mut self) {
-        self.taken = [0; LANES];
-        if self.bytes.len() > MAX_KEPT {
-            self.bytes = Vec::new();
-        }
+/// Some rows of a [`Memory`].
+struct Block {
+    write: Write,
+    first: usize,
+    height: usize,
+    layout: Layout,
+}
+
+impl Block {
+    /// Packs texels; `None` if there is no room for them.
+    fn pack(&mut self, source: Source) -> Option<Place> {
+        let place = self.layout.place(source, self.height)?;
+        (self.write)(place, source);
+        Some(Place { offset: self.first * PITCH + place.offset, ..place })
     }
 }
 
@@ -95,15 +169,28 @@ impl Rows {
 #[derive(Default)]
 pub(in crate::plugin) struct Packer {
     is_wanted: bool,
-    part: usize,
+    memory: Option<Arc<Memory>>,
+    /// What it has taken last.
+    block: Option<Block>,
     pub(super) rects: Vec<Changed>,
-    pub(super) rows: Rows,
 }
 
 impl Packer {
-    /// A packer whose rows are those of `part`; it packs nothing if it is not wanted.
-    pub(super) fn new(is_wanted: bool, part: usize) -> Self {
-        Self { is_wanted, part, ..Self::default() }
+    /// A packer for some memory; if it is not wanted, it notes nothing.
+    pub(super) fn new(is_wanted: bool, memory: Option<Arc<Memory>>) -> Self {
+        Self { is_wanted, memory, ..Self::default() }
+    }
+
+    /// Goes on with what it has taken, or begins with other memory.
+    pub(super) fn lend(&mut self, memory: Option<&Arc<Memory>>) {
+        if self.memory.is_none() {
+            self.memory = memory.cloned();
+        }
+    }
+
+    /// Gives back the memory.
+    pub(super) fn close(&mut self) {
+        (self.block, self.memory) = (None, None);
     }
 
     /// Notes that the same texels have changed in the images of a surface of `size` texels, and packs them: they have just been
@@ -117,76 +204,94 @@ impl Packer {
         if !self.is_wanted || rect.is_empty() {
             return;
         }
-        let (stride, area) = (size.x as usize, size.x as usize * size.y as usize);
-        let [x, y] = rect.min.as_usizevec2().to_array();
-        let [width, height] = rect.size().as_usizevec2().to_array();
+        let [width, height] = size.as_usizevec2().to_array();
         for (image, data) in images.flatten() {
-            let texel = data.len() / area;
-            let row = width * texel;
-            let is_packed = self.rows.end() + row.next_multiple_of(PITCH) * height <= MAX_PACKED;
-            let place = is_packed.then(|| {
-                let (offset, pitch) = self.rows.place(row, height);
-                let place = Place { part: self.part, offset, pitch, row };
-                pack(&mut self.rows.bytes, place, data, (y * stride + x) * texel, stride * texel, height);
-                place
-            });
+            let place = self.pack(Source::new(data, width, data.len() / (width * height), rect));
             self.rects.push(Changed { image, rect, place });
         }
     }
-}
 
-/// Copies rows of an image, the first of which begins at `from`, to their place.
-pub(super) fn pack(rows: &mut [u8], place: Place, data: &[u8], mut from: usize, stride: usize, height: usize) {
-    let mut to = place.offset;
-    for _ in 0..height {
-        rows[to..to + place.row].copy_from_slice(&data[from..from + place.row]);
-        from += stride;
-        to += place.pitch;
+    /// Packs texels; `None` if there is no room for them.
+    fn pack(&mut self, source: Source) -> Option<Place> {
+        let memory = self.memory.as_ref()?;
+        if let Some(place) = self.block.as_mut().and_then(|block| block.pack(source)) {
+            return Some(place);
+        }
+        let height = source.packed().1;
+        let mut block = memory.block(height.max(BLOCK_ROWS))?;
+        let place = block.pack(source);
+        // One that is full is of no use.
+        if source.row < PITCH {
+            self.block = Some(block);
+        }
+        place
     }
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::math::Rng;
+    use std::sync::{Mutex, PoisonError};
+
+    /// Memory that no device knows.
+    pub(in super::super) fn memory(size: usize) -> (Arc<Memory>, Arc<Mutex<Vec<u8>>>) {
+        let bytes = Arc::new(Mutex::new(vec![0; size]));
+        let all = bytes.clone();
+        let open = move |range: Range<usize>| -> Write {
+            let all = all.clone();
+            Box::new(move |place, source| {
+                let mut bytes = all.lock().unwrap_or_else(PoisonError::into_inner);
+                let bytes = &mut bytes[range.clone()];
+                source.rows(place, |to, row| bytes[to..to + row.len()].copy_from_slice(row));
+            })
+        };
+        (Arc::new(Memory::new(size, Box::new(open))), bytes)
+    }
 
     #[test]
     fn packed_rows_are_those_of_the_pictures() {
+        const BYTES: usize = 1 << 20;
         let mut rng = Rng::new(3);
         for size in [[37, 23], [600, 9], [1, 1], [1500, 700]] {
             let size = UVec2::from(size);
             let area = size.x as usize * size.y as usize;
             let data = [4, 4, 1].map(|texel| (0..texel * area).map(|_| rng.next_u32() as u8).collect::<Vec<_>>());
-            let mut packer = Packer::new(true, 5);
+            let (memory, bytes) = memory(BYTES);
+            let mut packers = [(); 3].map(|()| Packer::new(true, Some(memory.clone())));
             let mut rects = vec![TexelRect::whole(size), TexelRect::default()];
             for _ in 0..40 {
                 let mut corner = || UVec2::new(rng.next_u32() % size.x, rng.next_u32() % size.y);
                 let (a, b) = (corner(), corner());
                 rects.push(TexelRect { min: a.min(b), max: a.max(b) + 1 });
             }
-            for rect in &rects {
+            for (i, rect) in rects.iter().enumerate() {
                 let pictures = data.iter().map(|data| Some((AssetId::default(), &data[..])));
-                packer.push(pictures, size, *rect);
+                packers[i % 3].push(pictures, size, *rect);
             }
-            rects.retain(|rect| !rect.is_empty());
-            assert_eq!(packer.rects.len(), 3 * rects.len());
-            for (i, changed) in packer.rects.iter().enumerate() {
-                let (rect, data) = (rects[i / 3], &data[i % 3]);
-                assert_eq!(changed.rect, rect);
-                let Some(Place { part, offset, pitch, row }) = changed.place else { continue };
-                let texel = data.len() / area;
-                assert!(part == 5 && row == rect.size().x as usize * texel, "{rect:?}");
-                assert!(pitch % ROW_ALIGNMENT == 0 && offset % COPY_ALIGNMENT == 0, "{offset} {pitch}");
-                assert!(offset + pitch * (rect.size().y as usize - 1) + row <= packer.rows.end(), "beyond the end");
-                for y in rect.min.y..rect.max.y {
-                    let from = (y * size.x + rect.min.x) as usize * texel;
-                    let to = offset + (y - rect.min.y) as usize * pitch;
-                    // So none lies over another: that would hold something else.
-                    assert_eq!(packer.rows.bytes[to..to + row], data[from..from + row], "{rect:?}");
+            let mut packed = 0;
+            for (i, packer) in packers.iter().enumerate() {
+                let rects: Vec<_> = rects.iter().skip(i).step_by(3).filter(|rect| !rect.is_empty()).collect();
+                assert_eq!(packer.rects.len(), 3 * rects.len());
+                for (k, changed) in packer.rects.iter().enumerate() {
+                    let (rect, data) = (*rects[k / 3], &data[k % 3]);
+                    assert_eq!(changed.rect, rect);
+                    let Some(Place { offset, pitch, row }) = changed.place else { continue };
+                    packed += 1;
+                    let texel = data.len() / area;
+                    assert_eq!(row, rect.size().x as usize * texel, "{rect:?}");
+                    assert!(pitch % ROW_ALIGNMENT == 0 && offset % COPY_ALIGNMENT == 0, "{offset} {pitch}");
+                    for y in rect.min.y..rect.max.y {
+                        let from = (y * size.x + rect.min.x) as usize * texel;
+                        let to = offset + (y - rect.min.y) as usize * pitch;
+                        // So none lies over another: that would hold something else.
+                        let bytes = bytes.lock().unwrap_or_else(PoisonError::into_inner);
+                        assert_eq!(bytes[to..to + row], data[from..from + row], "{rect:?}");
+                    }
                 }
             }
-            assert!(packer.rows.end() <= MAX_PACKED);
-            assert!(packer.rects.iter().any(|changed| changed.place.is_some()), "nothing is packed");
+            let all = 3 * (rects.len() - 1);
+            assert!(packed > 0 && (packed == all) == (area < 100_000), "{packed} of {all} are packed");
         }
     }
 }
