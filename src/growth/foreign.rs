@@ -72,7 +72,7 @@ impl CrackGrowth {
 
     /// Notes a node that has not grown.
     fn add(&mut self, node: Node) {
-        self.widths.admit();
+        self.widths.admit(node.parent);
         if let Some(arrest) = &mut self.arrest {
             arrest.push_node(false);
         }

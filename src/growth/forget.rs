@@ -53,7 +53,7 @@ impl CrackGrowth {
         for node in &self.network.nodes {
             self.nodes.push(node.pos);
         }
-        self.widths.forget(first);
+        self.widths.forget(&self.network.nodes);
         self.linker.forget(forgotten);
         self.pull_of.drain(..first);
         self.unshown = self.unshown.iter().filter_map(|&node| number(node)).collect();

@@ -35,15 +35,24 @@ pub(super) struct Widths {
     /// Share of the nodes at which a crack is a hairline.
     hairlines: f32,
     pipes: Vec<Pipe>,
+    /// Of each node.
+    forms: Vec<Form>,
 }
 
-/// What a node knows of what hangs on it, itself included.
+/// What a node knows of what hangs on it, itself included. As little as possible: on the way up a branch each is read before it is
+/// known which one comes next.
 #[derive(Clone, Copy, Debug)]
 struct Pipe {
     behind: u32,
     /// How much of that its parent has been told.
     told: u32,
+    parent: u32,
     notch: u8,
+}
+
+/// What else makes the width of a node.
+#[derive(Clone, Copy, Debug)]
+struct Form {
     /// What the width of its notch is multiplied by.
     factor: f32,
     /// And for the hammering on its impact.
@@ -51,11 +60,13 @@ struct Pipe {
     is_hairline: bool,
 }
 
-impl Pipe {
-    /// Its width where `notch` is that of its notch.
-    fn width(self, notch: f32) -> f32 {
-        let open = if self.is_hairline { (f32::from(self.notch) / f32::from(OPEN)).min(1.0) } else { 1.0 };
-        notch * self.factor * self.wider * (HAIRLINE + (1.0 - HAIRLINE) * open)
+impl Form {
+    const PLAIN: Self = Self { factor: 1.0, wider: 1.0, is_hairline: false };
+
+    /// The width at a notch.
+    fn width(self, notch: u8, width: f32) -> f32 {
+        let open = if self.is_hairline { (f32::from(notch) / f32::from(OPEN)).min(1.0) } else { 1.0 };
+        width * self.factor * self.wider * (HAIRLINE + (1.0 - HAIRLINE) * open)
     }
 }
 
@@ -74,7 +85,8 @@ impl Widths {
             let width = (params.line_width * (1.0 + params.line_growth * pipes)).min(params.max_width) * taper(count);
             notches.push((count, width));
         }
-        Self { notches, unevenness: params.unevenness, hairlines: params.hairlines, pipes: Vec::new() }
+        let (unevenness, hairlines) = (params.unevenness, params.hairlines);
+        Self { notches, unevenness, hairlines, pipes: Vec::new(), forms: Vec::new() }
     }
 
     /// Other notches for the nodes to come; those that are there never become thinner.
@@ -89,6 +101,7 @@ impl Widths {
 
     pub(super) fn reserve(&mut self, nodes: usize) {
         self.pipes.reserve(nodes);
+        self.forms.reserve(nodes);
     }
 
     /// Prepares the place of a node that grows from `parent`, with draws of its own; returns its width.
@@ -97,33 +110,41 @@ impl Widths {
         let mut is_hairline = false;
         if self.hairlines > 0.0 {
             let begins = (1.0 - GOES_ON) * self.hairlines / (1.0 - self.hairlines).max(1e-3);
-            let is_within = self.pipes.get(parent as usize).is_some_and(|pipe| pipe.is_hairline);
+            let is_within = self.forms.get(parent as usize).is_some_and(|form| form.is_hairline);
             is_hairline = draw(0x2D) < if is_within { GOES_ON } else { begins };
         }
         if self.unevenness > 0.0 {
             // Each node is much like the one before.
-            let before = self.pipes.get(parent as usize).map_or(1.0, |pipe| pipe.factor);
+            let before = self.forms.get(parent as usize).map_or(1.0, |form| form.factor);
             factor += 0.75 * (before - 1.0) + self.unevenness * (draw(0x1D) - 0.5);
             factor = factor.clamp(1.0 - self.unevenness, 1.0 + self.unevenness);
         }
-        let pipe = Pipe { behind: 1, told: 1, notch: 0, factor, wider, is_hairline };
-        self.pipes.push(pipe);
-        pipe.width(self.notches[0].1)
+        let form = Form { factor, wider, is_hairline };
+        self.place(parent, form);
+        form.width(0, self.notches[0].1)
     }
 
     /// Prepares the place of a node that comes with a width of its own.
-    pub(super) fn admit(&mut self) {
-        self.pipes.push(Pipe { behind: 1, told: 1, notch: 0, factor: 1.0, wider: 1.0, is_hairline: false });
+    pub(super) fn admit(&mut self, parent: u32) {
+        self.place(parent, Form::PLAIN);
     }
 
-    /// Forgets the first nodes.
-    pub(super) fn forget(&mut self, first: usize) {
+    fn place(&mut self, parent: u32, form: Form) {
+        self.pipes.push(Pipe { behind: 1, told: 1, parent, notch: 0 });
+        self.forms.push(form);
+    }
+
+    /// Forgets all nodes but the last ones, which are these.
+    pub(super) fn forget(&mut self, left: &[Node]) {
+        let first = self.pipes.len().saturating_sub(left.len());
         self.pipes.drain(..first);
+        self.forms.drain(..first);
+        self.pipes.iter_mut().zip(left).for_each(|(pipe, node)| pipe.parent = node.parent);
     }
 
     /// Makes a node wider for good.
     pub(super) fn scale(&mut self, node: u32, by: f32) {
-        self.pipes[node as usize].wider *= by;
+        self.forms[node as usize].wider *= by;
     }
 
     /// Takes up the newest node and widens what it hangs on; calls `widened` with each node that became wider.
@@ -152,10 +173,11 @@ impl Widths {
             }
             more = pipe.behind - pipe.told;
             pipe.told = pipe.behind;
+            let width = self.forms[node as usize].width(pipe.notch, self.notches[usize::from(pipe.notch)].1);
             let this = &mut nodes[node as usize];
-            this.width = this.width.max(pipe.width(self.notches[usize::from(pipe.notch)].1));
+            this.width = this.width.max(width);
             widened(node);
-            node = this.parent;
+            node = pipe.parent;
         }
     }
 }

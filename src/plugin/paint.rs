@@ -14,6 +14,9 @@ use crate::{
 };
 use bevy::{ecs::system::NonSendMarker, prelude::*, render::renderer::RenderDevice};
 
+/// Share of the frame's budget after which nothing further is painted: the rest is for what is under way then, and for telling of it.
+const BUDGET_SHARE: f32 = 0.9;
+
 /// So many of them are painted one after the other: fewer are not worth another thread.
 const SHARE: usize = 4;
 
@@ -55,7 +58,7 @@ pub(super) fn paint_surfaces(
         return;
     }
     let Some(mut images) = images else { return };
-    let timer = clock.start(&budget, 1.0);
+    let timer = clock.start(&budget, BUDGET_SHARE);
     let Surfaces { active, dirty, .. } = &mut *surfaces;
     let mut left = Vec::new();
     while left.is_empty() && !dirty.is_empty() {
