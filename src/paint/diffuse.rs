@@ -2,13 +2,11 @@
 
 use super::{
     LookTable,
-    patch::Patch,
+    patch::{BLOCK, Patch},
     rows::{Rgba, channel, round},
 };
+use crate::raster::TexelRect;
 use glam::{Mat4, UVec2};
-
-/// Texels whose colours are computed at once, or copied if all are untouched.
-pub(super) const BLOCK: usize = 8;
 
 /// How much brighter a wall gets that faces the light squarely, for a glint of 1: a highlight of the crack's own, sRGB
 /// levels, and a share of what is there. Found by eye on glass (the first) and concrete (the second).
@@ -86,35 +84,66 @@ fn noise(x: u32, y: u32) -> [f32; BLOCK] {
     out
 }
 
-/// Colours of a row whose first texel is `at` of the field.
-pub(super) fn diffuse_row<const ROOM: usize>(
+/// Colours of a patch that lies at `rect` of the field.
+///
+/// First all are those of the picture, and blocks that are touched go on a list; then those are painted. To find and paint them
+/// one by one takes longer: a processor that guesses wrong which one is touched cannot begin it while it is at the one before.
+pub(super) fn diffuse_patch<const ROOM: usize>(
     out: &mut [Rgba],
-    base: &[Rgba],
+    frame: &Frame<'_>,
+    patch: &mut Patch<ROOM>,
+    look: &LookTable,
+    rect: TexelRect,
+) {
+    let width = rect.size().x as usize;
+    if width < BLOCK {
+        narrow_patch(out, frame, patch, look, rect);
+        return;
+    }
+    let mut count = 0;
+    for (row, y) in (rect.min.y..rect.max.y).enumerate() {
+        let first = frame.index(rect.min.x, y);
+        let (out, base) = (&mut out[first..first + width], &frame.base[first..first + width]);
+        for from in (0..width).step_by(BLOCK) {
+            // The last one begins early enough to be whole: texels that are painted twice are the same twice.
+            let from = from.min(width - BLOCK);
+            // A copy of fixed length is a few moves in place of a call.
+            if let (Some(out), Some(base)) = (out[from..].first_chunk_mut::<BLOCK>(), base[from..].first_chunk()) {
+                *out = *base;
+            }
+            let place = row * patch.stride + from;
+            patch.blocks[count] = (place as u16, UVec2::new(rect.min.x + from as u32, y));
+            count += usize::from(patch.is_touched(place));
+        }
+    }
+    for &(place, at) in &patch.blocks[..count] {
+        let first = frame.index(at.x, at.y);
+        if let (Some(block), Some(out)) =
+            (Block::load(&frame.base[first..], patch, place.into()), out[first..].first_chunk_mut())
+        {
+            *out = block.colors(frame, look, at);
+        }
+    }
+}
+
+/// The same of one that is narrower than a block.
+fn narrow_patch<const ROOM: usize>(
+    out: &mut [Rgba],
     frame: &Frame<'_>,
     patch: &Patch<ROOM>,
-    row: usize,
     look: &LookTable,
-    at: UVec2,
+    rect: TexelRect,
 ) {
-    let place = patch.row(row).start;
-    for from in (0..out.len()).step_by(BLOCK) {
-        // The last one begins early enough to be whole, if there is room: texels that are painted twice are the same twice.
-        let from = from.min(out.len().saturating_sub(BLOCK));
-        let (out, base) = (&mut out[from..], &base[from..]);
-        if let Some(block) = Block::load(base, patch, place + from) {
-            let at = UVec2::new(at.x + from as u32, at.y);
-            let painted =
-                if look.opaque { block.paint::<true>(frame, look, at) } else { block.paint::<false>(frame, look, at) };
-            let painted = painted.map(u32::to_le_bytes);
-            match out.first_chunk_mut() {
-                Some(out) => *out = painted,
-                None => out.copy_from_slice(&painted[..out.len()]),
-            }
-        } else if let (Some(out), Some(base)) = (out.first_chunk_mut::<BLOCK>(), base.first_chunk()) {
-            // A copy of fixed length is a few moves in place of a call.
-            *out = *base;
-        } else {
-            out.copy_from_slice(base);
+    let width = rect.size().x as usize;
+    for (row, y) in (rect.min.y..rect.max.y).enumerate() {
+        let first = frame.index(rect.min.x, y);
+        let (out, base) = (&mut out[first..first + width], &frame.base[first..first + width]);
+        out.copy_from_slice(base);
+        let place = row * patch.stride;
+        if patch.is_touched(place)
+            && let Some(block) = Block::load(base, patch, place)
+        {
+            out.copy_from_slice(&block.colors(frame, look, UVec2::new(rect.min.x, y))[..width]);
         }
     }
 }
@@ -129,12 +158,9 @@ struct Block<'a> {
 }
 
 impl<'a> Block<'a> {
-    /// The block at `place` of a patch, `None` if it is untouched.
+    /// The block at `place` of a patch, if that is so long.
     #[inline(always)]
     fn load<const ROOM: usize>(base: &[Rgba], patch: &'a Patch<ROOM>, place: usize) -> Option<Self> {
-        if *patch.touch[place..].first_chunk()? == [0; BLOCK] {
-            return None;
-        }
         let mut bytes = [[0; 4]; BLOCK];
         match base.first_chunk() {
             Some(base) => bytes = *base,
@@ -151,6 +177,13 @@ impl<'a> Block<'a> {
 }
 
 impl Block<'_> {
+    #[inline(always)]
+    fn colors(&self, frame: &Frame<'_>, look: &LookTable, at: UVec2) -> [Rgba; BLOCK] {
+        let painted =
+            if look.opaque { self.paint::<true>(frame, look, at) } else { self.paint::<false>(frame, look, at) };
+        painted.map(u32::to_le_bytes)
+    }
+
     #[inline(always)]
     fn paint<const OPAQUE: bool>(&self, frame: &Frame<'_>, look: &LookTable, at: UVec2) -> [u32; BLOCK] {
         // Channel by channel, so that each loop works on many texels at once.

@@ -1,7 +1,11 @@
 //! The depths of some texels, and their slopes.
 
 use crate::{Grid, raster::TexelRect};
+use glam::UVec2;
 use std::ops::Range;
+
+/// Texels whose colours are computed at once, or copied if all are untouched.
+pub(super) const BLOCK: usize = 8;
 
 /// The depths of a patch and of the texels around it, and what is made of them.
 ///
@@ -24,6 +28,8 @@ pub(super) struct Patch<const ROOM: usize> {
     pub(super) y: [f32; ROOM],
     /// One over the length of `(x, y, 1)`.
     pub(super) inv_len: [f32; ROOM],
+    /// Blocks that are touched, each with its place here and in the field.
+    pub(super) blocks: [(u16, UVec2); ROOM],
 }
 
 impl<const ROOM: usize> Patch<ROOM> {
@@ -36,6 +42,7 @@ impl<const ROOM: usize> Patch<ROOM> {
         x: [0.0; ROOM],
         y: [0.0; ROOM],
         inv_len: [0.0; ROOM],
+        blocks: [(0, UVec2::ZERO); ROOM],
     };
 
     /// Reads the depths; false if they are all zero.
@@ -75,6 +82,11 @@ impl<const ROOM: usize> Patch<ROOM> {
             y[k] = down;
             inv_len[k] = 1.0 / (right * right + down * down + 1.0).sqrt();
         }
+    }
+
+    /// Whether a texel of the block at a place is touched, or one beside it.
+    pub(super) fn is_touched(&self, place: usize) -> bool {
+        self.touch[place..].first_chunk::<BLOCK>().is_some_and(|touch| *touch != [0; BLOCK])
     }
 
     /// The places of a row.

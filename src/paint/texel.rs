@@ -8,8 +8,8 @@
 
 use super::{
     LookTable,
-    diffuse::{BLOCK, Frame, diffuse_row},
-    patch::Patch,
+    diffuse::{Frame, diffuse_patch},
+    patch::{BLOCK, Patch},
     rows::{Rgba, depth_row, flat_row, tilted_row},
 };
 use crate::raster::{DepthField, TexelRect};
@@ -214,12 +214,11 @@ impl Job<'_> {
         if self.diffuse_out.is_some() || self.normal_out.is_some() {
             patch.measure(self.look.slope);
         }
+        if let Some(out) = &mut self.diffuse_out {
+            diffuse_patch(out, &self.frame, patch, self.look, rect);
+        }
         for (row, y) in (rect.min.y..rect.max.y).enumerate() {
             let range = self.range(rect, y);
-            if let Some(out) = &mut self.diffuse_out {
-                let (out, base) = (&mut out[range.clone()], &self.frame.base[range.clone()]);
-                diffuse_row(out, base, &self.frame, patch, row, self.look, UVec2::new(rect.min.x, y));
-            }
             if let Some(out) = &mut self.normal_out {
                 let out = &mut out[range.clone()];
                 match self.normal {

@@ -25,6 +25,9 @@ use glam::{DVec2, UVec2, Vec2, Vec4};
 /// Texels computed at once. Eight `f32` are two SSE registers; 16 spill, 4 leave half of the latency of `sqrt` unused.
 const LANES: usize = 8;
 
+/// So many blocks in a row are few.
+const FEW_BLOCKS: usize = 3;
+
 /// Centres of the texels of one block, from its left edge.
 const CENTRES: [f32; LANES] = [0.5, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5, 7.5];
 
@@ -185,6 +188,11 @@ impl Capsule {
             fetch(field, rect);
         }
         let width = field.depth.width();
+        let blocks = (rect.size().x as usize).div_ceil(LANES);
+        if blocks <= FEW_BLOCKS && blocks * LANES <= width {
+            self.stamp_blocks::<TELL, TAPER, RIM>(field, section, rect, blocks, changed);
+            return;
+        }
         let mut band = TexelRect::default();
         let (left, right) = (rect.min.x as f32, rect.max.x as f32);
         let slope = self.along.x / self.along.y;
@@ -236,6 +244,41 @@ impl Capsule {
         }
         if !band.is_empty() {
             changed(band);
+        }
+    }
+
+    /// As many blocks in every row: where they are few, the processor guesses right how it goes on.
+    fn stamp_blocks<const TELL: bool, const TAPER: bool, const RIM: bool>(
+        &self,
+        field: &mut DepthField,
+        section: &Section,
+        rect: TexelRect,
+        blocks: usize,
+        changed: &mut dyn FnMut(TexelRect),
+    ) {
+        let x0 = (rect.min.x as usize).min(field.depth.width() - blocks * LANES);
+        let mut top = rect.min.y;
+        while top < rect.max.y {
+            let bottom = (top + 1).next_multiple_of(BAND).min(rect.max.y);
+            // The columns and rows that have changed, a bit each.
+            let (mut columns, mut rows) = (0, 0);
+            for (i, y) in (top..bottom).enumerate() {
+                let dy = (y as f32 + 0.5) - self.from.y;
+                let row = &mut field.depth.row_mut(y as usize)[x0..x0 + blocks * LANES];
+                let mut change = 0;
+                for (k, block) in row.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
+                    let x = (x0 + k * LANES) as f32;
+                    change |= self.stamp_block::<LANES, TAPER, RIM>(block, section, x, dy) << (k * LANES);
+                }
+                columns |= change;
+                rows |= u32::from(change != 0) << i;
+            }
+            if TELL && columns != 0 {
+                let min = UVec2::new(x0 as u32 + columns.trailing_zeros(), top + rows.trailing_zeros());
+                let max = UVec2::new(x0 as u32 + columns.ilog2() + 1, top + rows.ilog2() + 1);
+                changed(TexelRect { min, max });
+            }
+            top = bottom;
         }
     }
 
