@@ -2,8 +2,8 @@
 //!
 //! `cargo bench --profile dev --bench frame`: the build that `cargo test` uses.
 //! `growing/*`: 100 surfaces of 512 x 512 that were hit at once, one step a frame each; the time of an idle frame of the same
-//! app is taken off. `finished/*`: a frame with 10,000 cracked surfaces of 32 x 32 that have come to an end, beside one with
-//! 10,000 plain sprites. "only ...": parts of the first that no program could do without. `baking`: what of each frame the crate's systems
+//! app is taken off. "10,000 ...": a frame with cracked surfaces of 32 x 32 that have come to an end, in turns with one with
+//! plain sprites. "only ...": parts of the first that no program could do without. `baking`: what of each frame the crate's systems
 //! take while guided cracks are baked, 60 frames a second, from the first frame to ten after the last crack; `front`, `widen`: while they
 //! appear within a second. `shards/*`: what
 //! the crate's own systems take of the main thread in the three frames in which a pane becomes 500 shards for the first time, 60 a second
@@ -679,15 +679,24 @@ fn frame(c: &mut Criterion) {
         b.iter_custom(|n| (0..n).map(|_| naive_frames().time()).sum());
     });
     group.finish();
-    let mut group = c.benchmark_group("finished");
-    group.sample_size(20);
-    for (name, cracked) in [("10,000 cracked surfaces", true), ("10,000 plain sprites", false)] {
-        group.bench_function(name, |b| {
-            let mut app = many(cracked);
-            b.iter(|| app.update());
-        });
+    finished();
+}
+
+/// Frames with cracked surfaces, which are at rest, in turns with frames of plain sprites.
+fn finished() {
+    let mut apps = [many(true), many(false)];
+    apps.iter_mut().for_each(measure_systems);
+    let mut costs = [Costs::default(), Costs::default()];
+    for _ in 0..200 {
+        for (app, costs) in apps.iter_mut().zip(&mut costs) {
+            // The other's frame has emptied the caches.
+            app.update();
+            costs.measure(app, 2);
+        }
     }
-    group.finish();
+    for (name, Costs { times, systems, .. }) in ["10,000 cracked surfaces", "10,000 plain sprites"].iter().zip(costs) {
+        println!("{name}, a frame: {}; the systems {}", least_and_median(times), least_and_median(systems));
+    }
 }
 
 criterion_group!(benches, shards, frame);

@@ -297,7 +297,8 @@ pub(super) fn show_films(
             if active.is_dirty {
                 dirty.retain(|other| *other != entity);
             }
-            film.stager = film.stager.or_else(|| uploads.stager(device.as_deref()));
+            let stager = film.stager.filter(|stager| device.as_ref().is_some_and(|device| stager.is_of(device)));
+            film.stager = stager.or_else(|| uploads.stager(device.as_deref()));
             film.start(active, has_threads);
             if has_threads {
                 break;

@@ -12,7 +12,7 @@ use crate::{
     pattern::{Moment, NO_PARENT, SegmentId},
     raster::{DOT_DEPTH, DepthField, Profile, Redrawn, TexelRect, stamp_dot, stamp_path, stamp_path_with},
 };
-use bevy::{ecs::system::NonSendMarker, prelude::*, render::renderer::RenderDevice};
+use bevy::{ecs::system::NonSendMarker, prelude::*};
 
 /// Share of the frame's budget after which nothing further is painted: the rest is for what is under way then, and for telling of it.
 const BUDGET_SHARE: f32 = 0.9;
@@ -50,7 +50,6 @@ pub(super) fn paint_surfaces(
     mut surfaces: ResMut<Surfaces>,
     mut uploads: ResMut<Uploads>,
     images: Option<ResMut<Assets<Image>>>,
-    device: Option<Res<RenderDevice>>,
     mut states: Query<&mut CrackState>,
     mut scratch: Local<Vec<Scratch>>,
 ) {
@@ -66,7 +65,7 @@ pub(super) fn paint_surfaces(
         let shares = jobs.len().div_ceil(SHARE);
         let known = scratch.len().max(shares);
         scratch.resize_with(known, Scratch::default);
-        uploads.pack(shares, device.as_deref(), |packers| {
+        uploads.pack(shares, |packers| {
             let shares = jobs.chunks_mut(SHARE).zip(&mut *scratch).zip(packers).enumerate();
             share_out(shares, |(i, ((jobs, scratch), packer))| {
                 for (k, job) in jobs.iter_mut().enumerate() {
@@ -174,8 +173,7 @@ pub(super) fn stamp_all(growth: &CrackGrowth, profile: &Profile, field: &mut Dep
 pub(super) fn paint_now(world: &mut World, active: &mut Active) {
     world.resource_scope(|world, mut images: Mut<Assets<Image>>| {
         let mut canvas = Canvas::take(&active.textures, &mut images);
-        let device = world.get_resource::<RenderDevice>().cloned();
-        world.resource_mut::<Uploads>().pack(1, device.as_ref(), |packers| {
+        world.resource_mut::<Uploads>().pack(1, |packers| {
             packers.iter_mut().for_each(|packer| canvas.paint(active, packer, &mut Vec::new()));
         });
         canvas.put_back(&active.textures, &mut images);

@@ -16,7 +16,7 @@ use bevy::{
     platform::collections::HashMap,
     prelude::*,
     render::{
-        ExtractSchedule, MainWorld, Render, RenderApp, RenderSystems,
+        ExtractSchedule, GpuResourceAppExt, MainWorld, Render, RenderApp, RenderSystems,
         render_asset::{RenderAssetBytesPerFrameLimiter, RenderAssets, extract_render_asset_bytes_per_frame},
         render_resource::{
             Buffer, BufferDescriptor, BufferUsages, CommandEncoder, CommandEncoderDescriptor, Extent3d, MapMode,
@@ -63,9 +63,8 @@ pub(super) struct Uploads {
     is_wanted: bool,
     rects: Vec<Changed>,
     packers: Vec<Packer>,
-    /// Where the texels of `rects` are packed that are.
+    /// Where the texels of `rects` are packed that are: from the renderer, which is done with it.
     packed: Option<Packed>,
-    buffers: Buffers,
     /// Number of rectangles up to which they are not thinned out again.
     limit: usize,
     /// Whether the renderer has fetched them since they were last looked at.
@@ -85,6 +84,7 @@ pub(super) struct Stager {
 
 /// Parts of a picture where the GPU can read them.
 pub(super) struct Staged {
+    device: RenderDevice,
     buffer: Buffer,
     /// Where it is to go then.
     home: Weak<Mutex<Vec<Buffer>>>,
@@ -98,6 +98,11 @@ fn pitch(rect: TexelRect, texel: usize) -> usize {
 }
 
 impl Stager {
+    /// Whether the GPU is still the one behind this device.
+    pub(super) fn is_of(&self, device: &RenderDevice) -> bool {
+        self.device.wgpu_device() == device.wgpu_device()
+    }
+
     /// Parts of a picture of `size` texels of so many bytes; `None` if there are none, they are not in the picture, or the device has
     /// no buffer so large.
     pub(super) fn stage(&self, texels: &[u8], size: UVec2, texel: usize, rects: &[TexelRect]) -> Option<Staged> {
@@ -129,7 +134,7 @@ impl Stager {
         }
         drop(memory);
         buffer.unmap();
-        Some(Staged { buffer, home: Arc::downgrade(&self.buffers.0), parts })
+        Some(Staged { device: self.device.clone(), buffer, home: self.buffers.home(), parts })
     }
 }
 
@@ -148,18 +153,11 @@ impl Uploads {
         }
     }
 
-    /// Lends some packers to `paint`, and takes what they have packed, one after the other. Without a device it is packed when the
-    /// renderer fetches it.
-    pub(super) fn pack(&mut self, count: usize, device: Option<&RenderDevice>, paint: impl FnOnce(&mut [Packer])) {
-        // In a browser the device stays on its thread.
-        if let Some(device) = device.filter(|_| self.is_wanted && !cfg!(target_arch = "wasm32"))
-            && self.packed.is_none()
-        {
-            let bytes = ((count * PER_PACKER) as u64).min(MAX_KEPT);
-            self.packed = Some(Packed::new(self.buffers.take(bytes, device)));
-        }
-        let memory = self.packed.as_ref().map(|packed| &packed.memory);
-        self.lend(count, memory.cloned().as_ref());
+    /// Lends some packers to `paint`, and takes what they have packed, one after the other. What they have no room for is packed when
+    /// the renderer fetches it.
+    pub(super) fn pack(&mut self, count: usize, paint: impl FnOnce(&mut [Packer])) {
+        let memory = self.packed.as_ref().map(|packed| packed.memory.clone());
+        self.lend(count, memory.as_ref());
         paint(&mut self.packers[..count]);
         self.packers.iter_mut().for_each(|packer| self.rects.append(&mut packer.rects));
     }
@@ -167,7 +165,7 @@ impl Uploads {
     fn lend(&mut self, count: usize, memory: Option<&Arc<Memory>>) {
         let is_wanted = self.is_wanted;
         let known = self.packers.len().max(count);
-        self.packers.resize_with(known, || Packer::new(is_wanted, None));
+        self.packers.resize_with(known, || Packer::new(is_wanted));
         self.packers[..count].iter_mut().for_each(|packer| packer.lend(memory));
     }
 
@@ -236,20 +234,31 @@ impl Uploads {
 /// A buffer in which texels are packed.
 struct Packed {
     buffer: Buffer,
+    /// Where it is to go then.
+    home: Weak<Mutex<Vec<Buffer>>>,
     memory: Arc<Memory>,
 }
 
 impl Packed {
-    /// A buffer that is mapped.
-    fn new(buffer: Buffer) -> Self {
+    /// A buffer of so many bytes.
+    fn open(size: u64, buffers: &Buffers, device: &RenderDevice) -> Self {
+        Self::new(buffers.take(size, device), buffers.home())
+    }
+
+    fn new(buffer: Buffer, home: Weak<Mutex<Vec<Buffer>>>) -> Self {
         let mapped = buffer.clone();
         let open = move |range: Range<usize>| writer(&mapped, range);
-        Self { memory: Arc::new(Memory::new(buffer.size() as usize, Box::new(open))), buffer }
+        Self { memory: Arc::new(Memory::new(buffer.size() as usize, Box::new(open))), buffer, home }
     }
 
     /// The same memory with nothing in it.
     fn anew(self) -> Self {
-        Self::new(self.buffer)
+        Self::new(self.buffer, self.home)
+    }
+
+    /// Whether it is of the device that is there, and not of one that was lost.
+    fn is_of(&self, buffers: &Buffers) -> bool {
+        Weak::ptr_eq(&self.home, &buffers.home())
     }
 
     /// What the GPU can read now.
@@ -279,6 +288,8 @@ pub(super) fn connect(app: &mut App) {
     let Some(render_app) = app.get_sub_app_mut(RenderApp) else { return };
     render_app
         .init_resource::<Staging>()
+        // Again whenever the renderer gets another device.
+        .init_gpu_resource::<Staging>()
         .add_systems(ExtractSchedule, upload_rects.after(extract_render_asset_bytes_per_frame))
         .add_systems(Render, finish_sending.after(RenderSystems::Prepare).before(RenderSystems::Render));
     app.world_mut().resource_mut::<Uploads>().is_wanted = true;
@@ -300,6 +311,11 @@ impl Copy {
         self.rect.size().x as usize * self.texel
     }
 
+    /// Bytes that it takes where it is packed, about.
+    fn bytes(&self) -> usize {
+        self.row().next_multiple_of(ROW_ALIGNMENT) * self.rect.size().y as usize
+    }
+
     /// Its texels, if the image is there.
     fn source<'a>(&self, images: &'a Assets<Image>) -> Option<Source<'a>> {
         let image = images.get(self.image)?;
@@ -312,6 +328,7 @@ impl Copy {
 struct Staging {
     rects: Vec<Changed>,
     copies: Vec<Copy>,
+    buffers: Buffers,
     /// Gives back the memory of its list.
     sending: Option<Beside<Sending, Vec<Copy>>>,
 }
@@ -329,7 +346,8 @@ impl Staging {
 struct Sending {
     device: RenderDevice,
     queue: RenderQueue,
-    home: Buffers,
+    /// Where the buffers are to go then.
+    home: Weak<Mutex<Vec<Buffer>>>,
     buffers: Vec<Buffer>,
     copies: Vec<Copy>,
 }
@@ -340,13 +358,15 @@ impl Sending {
         let Self { device, queue, home, buffers, mut copies } = self;
         let mut encoder = device.create_command_encoder(&CommandEncoderDescriptor { label: Some("crack_texels") });
         for copy in copies.drain(..) {
-            if let Some((buffer, place)) = copy.place {
-                copy_one(&mut encoder, &copy, place, &buffers[buffer]);
+            if let Some((buffer, place)) = copy.place
+                && let Some(buffer) = buffers.get(buffer)
+            {
+                copy_one(&mut encoder, &copy, place, buffer);
             }
         }
         queue.submit([encoder.finish()]);
         for buffer in buffers.into_iter().filter(|buffer| buffer.size() <= MAX_KEPT) {
-            Buffers::give_back(Arc::downgrade(&home.0), buffer, &device);
+            Buffers::give_back(home.clone(), buffer, &device);
         }
         copies
     }
@@ -357,6 +377,10 @@ impl Sending {
 struct Buffers(Arc<Mutex<Vec<Buffer>>>);
 
 impl Buffers {
+    fn home(&self) -> Weak<Mutex<Vec<Buffer>>> {
+        Arc::downgrade(&self.0)
+    }
+
     /// A buffer that is mapped.
     fn take(&self, size: u64, device: &RenderDevice) -> Buffer {
         let mut ready = self.0.lock().unwrap_or_else(PoisonError::into_inner);
@@ -401,52 +425,56 @@ fn upload_rects(
     // Only if the renderer has skipped a frame.
     staging.finish();
     let mut stats = CrackUploadStats::default();
-    let mut whole = core::mem::take(&mut main.resource_mut::<Uploads>().staged);
+    let mut uploads = main.resource_mut::<Uploads>();
+    let mut whole = core::mem::take(&mut uploads.staged);
+    // What a device that was lost was to bring there.
+    for (image, lost) in whole.extract_if(.., |(_, staged)| staged.device.wgpu_device() != device.wgpu_device()) {
+        lost.parts.iter().for_each(|(rect, _)| uploads.push(image, *rect));
+    }
     if !whole.is_empty()
         && let Some(images) = main.get_resource::<Assets<Image>>()
     {
         copy_whole(&mut whole, images, &gpu_images, &device, &queue, &mut stats);
         main.resource_mut::<Uploads>().staged = whole;
     }
-    let Staging { rects, copies, sending } = &mut *staging;
+    let Staging { rects, copies, buffers, sending } = &mut *staging;
     let mut uploads = main.resource_mut::<Uploads>();
     uploads.is_fetched = true;
-    core::mem::swap(rects, &mut uploads.rects);
-    let mut packed = uploads.close();
-    let home = uploads.buffers.clone();
-    if !rects.is_empty()
-        && let Some(images) = main.get_resource::<Assets<Image>>()
-    {
-        // What is not on the GPU yet stays in the list.
-        let mut bytes_in_all = 0;
-        rects.retain(|Changed { image, rect, place }| match plan(*image, *rect, images, &gpu_images) {
-            Plan::Copy(copy) => {
-                let bytes = copy.source(images).map_or(0, |source| source.bytes());
-                if bytes_in_all > 0 && bytes_in_all + bytes > MAX_STAGED {
-                    return true;
+    if !uploads.rects.is_empty() {
+        core::mem::swap(rects, &mut uploads.rects);
+        let room = (uploads.packers.len() * PER_PACKER) as u64;
+        let mut packed = uploads.close().filter(|packed| packed.is_of(buffers));
+        let has_packed = packed.is_some();
+        let mut bytes = 0;
+        if let Some(images) = main.get_resource::<Assets<Image>>() {
+            // What is not on the GPU yet stays in the list.
+            rects.retain(|Changed { image, rect, place }| match plan(*image, *rect, images, &gpu_images) {
+                Plan::Copy(copy) if bytes > 0 && bytes + copy.bytes() > MAX_STAGED => true,
+                Plan::Copy(copy) => {
+                    bytes += copy.bytes();
+                    stats.rects += 1;
+                    stats.bytes += copy.rect.area() * copy.texel as u64;
+                    let place = place.filter(|place| has_packed && copy.rect == *rect && copy.row() == place.row);
+                    copies.push(Copy { place: place.map(|place| (0, place)), ..copy });
+                    false
                 }
-                bytes_in_all += bytes;
-                stats.rects += 1;
-                stats.bytes += copy.rect.area() * copy.texel as u64;
-                let place = place.filter(|place| copy.rect == *rect && copy.row() == place.row);
-                copies.push(Copy { place: place.map(|place| (0, place)), ..copy });
-                false
+                Plan::Wait => true,
+                Plan::Drop => false,
+            });
+            if copies.len() <= FEW {
+                copies.drain(..).for_each(|copy| write(&copy, images, &queue));
+                packed = packed.map(Packed::anew);
+            } else {
+                let home = buffers.home();
+                let filled = pack_rest(copies, images, packed.take(), buffers, &device);
+                packed = Some(Packed::open(room.min(MAX_KEPT), buffers, &device));
+                let (device, queue) = (device.clone(), queue.clone());
+                let work = Sending { device, queue, home, buffers: filled, copies: core::mem::take(copies) };
+                *sending = Some(Beside::start(work, Sending::send));
             }
-            Plan::Wait => true,
-            Plan::Drop => false,
-        });
-        if copies.len() <= FEW {
-            copies.drain(..).for_each(|copy| write(&copy, images, &queue));
-        } else {
-            let buffers = pack_rest(copies, images, packed.take(), &home, &device);
-            let (device, queue) = (device.clone(), queue.clone());
-            let work = Sending { device, queue, home, buffers, copies: core::mem::take(copies) };
-            *sending = Some(Beside::start(work, Sending::send));
         }
-    }
-    let mut uploads = main.resource_mut::<Uploads>();
-    uploads.packed = packed.map(Packed::anew);
-    if !rects.is_empty() {
+        let mut uploads = main.resource_mut::<Uploads>();
+        uploads.packed = packed;
         rects.iter_mut().for_each(|changed| changed.place = None);
         uploads.rects.append(rects);
     }
@@ -596,7 +624,7 @@ mod tests {
         let mut uploads = Uploads { is_wanted: true, ..default() };
         let fill = |uploads: &mut Uploads| {
             uploads.lend(2, Some(&pack::tests::memory(1 << 18).0));
-            uploads.pack(2, None, |packers| {
+            uploads.pack(2, |packers| {
                 for (packer, x) in packers.iter_mut().zip([4, 9]) {
                     packer.push(ids.into_iter().map(|id| Some((id, &data[..]))), size, rect(x));
                 }

@@ -2,7 +2,10 @@
 //! and pass, unless `CRACK_REQUIRE_ALL=1` is set.
 
 use crate::support::*;
-use bevy::{prelude::*, render::render_resource::TextureFormat};
+use bevy::{
+    prelude::*,
+    render::{RenderApp, RenderStartup, render_resource::TextureFormat},
+};
 use bevy_crack::{math::Rng, plugin::CrackUploadStats, prelude::*};
 
 /// The acceptance test: after each of 200 frames of hits the textures on the GPU equal the CPU copy.
@@ -40,6 +43,37 @@ fn textures_on_the_gpu_equal_the_cpu_copy() {
     }
     assert!(surfaces.into_iter().all(|entity| state(&app, entity).nodes > 100));
     assert!(bytes > 0, "rectangles were uploaded");
+}
+
+/// What the renderer does once more when it gets another device: cracks grow on, and what was under way arrives.
+#[test]
+fn e10_a_renderer_that_starts_again_shows_the_same() {
+    let Some((_one, mut app)) = gpu_app() else { return };
+    let surfaces: Vec<_> = (0..8).map(|_| spawn_picture(&mut app, UVec2::splat(128))).collect();
+    steps(&mut app, 2);
+    let mut rng = Rng::new(4);
+    let mut most = 0;
+    for round in 0..40 {
+        for entity in &surfaces {
+            let at = Vec2::new(rng.unit(), rng.unit());
+            hit(&mut app, CrackHit::uv(*entity, at).with_energy(rng.unit()));
+        }
+        if round % 4 == 3 {
+            // In the middle of a frame of the main world, too: what it has packed is of the device before.
+            let start_again = |app: &mut App| {
+                let render_app = app.get_sub_app_mut(RenderApp).expect("there is a renderer");
+                render_app.world_mut().run_schedule(RenderStartup);
+            };
+            if round % 8 == 3 {
+                app.world_mut().run_schedule(Main);
+            }
+            start_again(&mut app);
+        }
+        step(&mut app);
+        most = most.max(app.world().resource::<CrackUploadStats>().rects);
+        assert_on_gpu(&mut app, &surfaces);
+    }
+    assert!(most > 20, "{most} at once");
 }
 
 /// A picture of one or two channels is shown red, or red and green, and so is its cracked copy where no crack is.

@@ -75,11 +75,6 @@ impl<'a> Source<'a> {
         (pitch, (pitch * self.height).div_ceil(PITCH))
     }
 
-    /// Bytes that they take where they are packed, about.
-    pub(super) fn bytes(&self) -> usize {
-        self.row.next_multiple_of(ROW_ALIGNMENT) * self.height
-    }
-
     /// The texels from the first row to the end of the image, and the way from row to row.
     pub(super) fn texels(&self) -> (&'a [u8], usize) {
         (&self.data[self.from..], self.stride)
@@ -176,12 +171,12 @@ pub(in crate::plugin) struct Packer {
 }
 
 impl Packer {
-    /// A packer for some memory; if it is not wanted, it notes nothing.
-    pub(super) fn new(is_wanted: bool, memory: Option<Arc<Memory>>) -> Self {
-        Self { is_wanted, memory, ..Self::default() }
+    /// A packer without memory; if it is not wanted, it notes nothing.
+    pub(super) fn new(is_wanted: bool) -> Self {
+        Self { is_wanted, ..Self::default() }
     }
 
-    /// Goes on with what it has taken, or begins with other memory.
+    /// Gives it memory if it has none.
     pub(super) fn lend(&mut self, memory: Option<&Arc<Memory>>) {
         if self.memory.is_none() {
             self.memory = memory.cloned();
@@ -258,7 +253,8 @@ pub(super) mod tests {
             let area = size.x as usize * size.y as usize;
             let data = [4, 4, 1].map(|texel| (0..texel * area).map(|_| rng.next_u32() as u8).collect::<Vec<_>>());
             let (memory, bytes) = memory(BYTES);
-            let mut packers = [(); 3].map(|()| Packer::new(true, Some(memory.clone())));
+            let mut packers = [(); 3].map(|()| Packer::new(true));
+            packers.iter_mut().for_each(|packer| packer.lend(Some(&memory)));
             let mut rects = vec![TexelRect::whole(size), TexelRect::default()];
             for _ in 0..40 {
                 let mut corner = || UVec2::new(rng.next_u32() % size.x, rng.next_u32() % size.y);
