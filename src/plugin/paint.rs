@@ -113,8 +113,7 @@ pub(super) fn stamp(active: &mut Active, scratch: &mut Scratch) {
         let (growth, redrawn) = (&active.growth, &mut scratch.redrawn);
         playback.replay.show(&mut active.field, growth.network(), growth.timeline(), moment, redrawn);
         playback.shown = moment;
-        redrawn.cleared.iter().for_each(|tile| active.touched.unmark(*tile));
-        redrawn.stamped.iter().for_each(|rect| active.touched.mark(*rect));
+        active.touched.follow(redrawn);
         redrawn.changed.iter().for_each(|rect| active.mark(*rect));
         if !redrawn.changed.is_empty() {
             active.stamp_carried();

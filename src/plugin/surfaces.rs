@@ -14,7 +14,7 @@ use crate::{
     growth::CrackGrowth,
     paint::LookTable,
     pattern::{CellTracker, Network},
-    raster::{DepthField, DirtyTiles, Profile, TexelRect},
+    raster::{DepthField, DirtyTiles, Profile, Redrawn, TexelRect},
 };
 use bevy::{asset::UntypedAssetId, ecs::entity::EntityHashMap, platform::collections::HashMap, prelude::*};
 use std::{collections::VecDeque, sync::Arc};
@@ -237,8 +237,14 @@ impl Touched {
         }
     }
 
+    /// Takes up what has been drawn anew.
+    pub(super) fn follow(&mut self, redrawn: &Redrawn) {
+        redrawn.cleared.iter().for_each(|tile| self.unmark(*tile));
+        redrawn.stamped.iter().for_each(|rect| self.mark(*rect));
+    }
+
     /// Takes the one tile `rect` out.
-    pub(super) fn unmark(&mut self, rect: TexelRect) {
+    fn unmark(&mut self, rect: TexelRect) {
         let tile = rect.min / DirtyTiles::TILE;
         if tile.cmplt(self.tiles).all() {
             let word = &mut self.bits[(tile.y * self.tiles.x.div_ceil(64) + tile.x / 64) as usize];

@@ -203,7 +203,7 @@ impl Order {
             Some(moment) => {
                 let (mut replay, mut redrawn) = (Replay::new(frame.size(), profile), Redrawn::default());
                 replay.show(&mut field, growth.network(), growth.timeline(), moment, &mut redrawn);
-                redrawn.stamped.iter().for_each(|rect| touched.mark(*rect));
+                touched.follow(&redrawn);
                 Some((replay, moment))
             }
         };

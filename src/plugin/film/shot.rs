@@ -119,8 +119,7 @@ impl Shot {
     /// Finds out what is to be painted.
     fn plan(&mut self) -> Vec<TexelRect> {
         let Self { redrawn, touched, dirty, field, .. } = self;
-        redrawn.cleared.iter().for_each(|tile| touched.unmark(*tile));
-        redrawn.stamped.iter().for_each(|rect| touched.mark(*rect));
+        touched.follow(redrawn);
         let size = field.frame.size();
         redrawn.changed.iter().for_each(|rect| dirty.mark(rect.grow(1, size)));
         self.changed.clear();
