@@ -6,19 +6,25 @@ use crate::pattern::{NO_PARENT, Node, SegmentId};
 #[derive(Clone, Debug, Default)]
 pub(super) struct Changes {
     pub(super) list: Vec<SegmentId>,
-    /// Per node: whether its branch is on the list.
-    pub(super) listed: Vec<bool>,
-    /// First child and next sibling of each node: a branch tapers between two widths, so it changes with either.
-    pub(super) child: Vec<u32>,
-    pub(super) sibling: Vec<u32>,
+    /// Of each node: a branch tapers between two widths, so it changes with either.
+    pub(super) kin: Vec<Kin>,
+}
+
+/// Where a node is in its family. [`NO_PARENT`] is nobody.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Kin {
+    /// The last child.
+    pub(super) child: u32,
+    /// The next of its parent's children.
+    pub(super) sibling: u32,
+    /// Whether the branch from the parent is on the list.
+    pub(super) is_listed: bool,
 }
 
 impl Changes {
     pub(super) fn reserve(&mut self, nodes: usize) {
         self.list.reserve(nodes);
-        self.listed.reserve(nodes);
-        self.child.reserve(nodes);
-        self.sibling.reserve(nodes);
+        self.kin.reserve(nodes);
     }
 
     /// Forgets nodes and links; `nodes` are those that are left, `number` says what a segment is called now.
@@ -28,7 +34,7 @@ impl Changes {
             self.push_node(node.parent);
         }
         self.list.clear();
-        self.listed.fill(false);
+        self.kin.iter_mut().for_each(|kin| kin.is_listed = false);
         for segment in before.list.into_iter().filter_map(number) {
             match segment {
                 SegmentId::Branch(node) if nodes[node as usize].parent != NO_PARENT => self.list_branch(node),
@@ -39,21 +45,19 @@ impl Changes {
     }
 
     pub(super) fn push_node(&mut self, parent: u32) {
-        let node = self.listed.len() as u32;
-        self.listed.push(false);
-        self.child.push(NO_PARENT);
-        let sibling = match self.child.get_mut(parent as usize) {
-            Some(child) => std::mem::replace(child, node),
+        let node = self.kin.len() as u32;
+        let sibling = match self.kin.get_mut(parent as usize) {
+            Some(parent) => std::mem::replace(&mut parent.child, node),
             None => NO_PARENT,
         };
-        self.sibling.push(sibling);
+        self.kin.push(Kin { child: NO_PARENT, sibling, is_listed: false });
         if parent != NO_PARENT {
             self.list_branch(node);
         }
     }
 
     pub(super) fn list_branch(&mut self, node: u32) {
-        if !std::mem::replace(&mut self.listed[node as usize], true) {
+        if !std::mem::replace(&mut self.kin[node as usize].is_listed, true) {
             self.list.push(SegmentId::Branch(node));
         }
     }
@@ -62,10 +66,10 @@ impl Changes {
         if has_parent {
             self.list_branch(node);
         }
-        let mut child = self.child[node as usize];
+        let mut child = self.kin[node as usize].child;
         while child != NO_PARENT {
             self.list_branch(child);
-            child = self.sibling[child as usize];
+            child = self.kin[child as usize].sibling;
         }
     }
 }

@@ -24,7 +24,7 @@ impl CrackGrowth {
         for node in newborn {
             let from = self.network.nodes[node as usize].parent;
             // Once at each node, when the crack runs on from it.
-            if from == NO_PARENT || self.changes.sibling[node as usize] != NO_PARENT {
+            if from == NO_PARENT || self.changes.kin[node as usize].sibling != NO_PARENT {
                 continue;
             }
             let mut rng = Rng::new(mix(self.seed ^ 0x5B ^ u64::from(from) << 16));

@@ -178,6 +178,13 @@ impl CrackGrowth {
 
     /// Adds a node; the caller lets it visit the markers.
     pub(super) fn bear(&mut self, pos: Vec2, parent: u32, generation: u32, impact: u32, bend: f32) {
+        let first = self.network.nodes.len() as u32;
+        self.bear_thin(pos, parent, generation, impact, bend);
+        self.widen_with(|widths, nodes, widened| widths.push(nodes, first, widened));
+    }
+
+    /// Adds a node of which the others do not know yet.
+    fn bear_thin(&mut self, pos: Vec2, parent: u32, generation: u32, impact: u32, bend: f32) {
         let node = self.network.nodes.len() as u64;
         let wider = self.impacts.get(impact as usize).map_or(1.0, |impact| impact.widening);
         let width = self.widths.tip(parent, |what| hash_unit(self.seed ^ what, node), wider);
@@ -189,7 +196,6 @@ impl CrackGrowth {
         self.pull_of.push(NO_PULL);
         self.changes.push_node(parent);
         self.timeline.add_node(width);
-        self.widen_with(|widths, nodes, widened| widths.push(nodes, widened));
     }
 
     /// A tip that has met a crack is as wide there as further back.
@@ -251,9 +257,10 @@ impl CrackGrowth {
                 self.pull_of[node as usize] = NO_PULL;
                 if i < room {
                     let (parent, child) = (self.network.nodes[node as usize], self.pulls[slot as usize].child);
-                    self.bear(child, node, parent.generation.saturating_add(1), parent.impact, 1.0);
+                    self.bear_thin(child, node, parent.generation.saturating_add(1), parent.impact, 1.0);
                 }
             }
+            self.widen_with(|widths, nodes, widened| widths.push(nodes, first, widened));
         }
         self.pulls.clear();
         if self.params.nucleation > 0.0 {
@@ -344,7 +351,7 @@ impl CrackGrowth {
 
     /// The last child of a node, or [`NO_PARENT`].
     pub(super) fn child_of(&self, node: u32) -> u32 {
-        self.changes.child[node as usize]
+        self.changes.kin[node as usize].child
     }
 
     pub(super) fn join_newborn(&mut self) {
@@ -422,7 +429,7 @@ impl CrackGrowth {
     pub fn take_changed(&mut self, changed: &mut Vec<SegmentId>) {
         for segment in self.changes.list.drain(..) {
             if let SegmentId::Branch(node) = segment {
-                self.changes.listed[node as usize] = false;
+                self.changes.kin[node as usize].is_listed = false;
             }
             changed.push(segment);
         }

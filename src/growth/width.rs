@@ -28,7 +28,7 @@ const GOES_ON: f32 = 0.6;
 /// and not the whole way to the start, and a segment is repainted about a dozen times in its life.
 #[derive(Clone, Debug)]
 pub(super) struct Widths {
-    /// Nodes behind from which each notch holds, with its width.
+    /// Nodes behind from which each notch holds, with its width; then one that none reaches.
     notches: Vec<(u32, f32)>,
     /// How much widths vary along a crack, as a share.
     unevenness: f32,
@@ -37,6 +37,10 @@ pub(super) struct Widths {
     pipes: Vec<Pipe>,
     /// Of each node.
     forms: Vec<Form>,
+    /// Nodes, and how many more hang on each than it knows; empty in between.
+    told: Vec<(u32, u32)>,
+    /// Room for those that are due for another notch.
+    due: Vec<u32>,
 }
 
 /// What a node knows of what hangs on it, itself included. As little as possible: on the way up a branch each is read before it is
@@ -45,7 +49,7 @@ pub(super) struct Widths {
 struct Pipe {
     behind: u32,
     /// How much of that its parent has been told.
-    told: u32,
+    passed_on: u32,
     parent: u32,
     notch: u8,
 }
@@ -85,15 +89,17 @@ impl Widths {
             let width = (params.line_width * (1.0 + params.line_growth * pipes)).min(params.max_width) * taper(count);
             notches.push((count, width));
         }
+        notches.push((u32::MAX, 0.0));
         let (unevenness, hairlines) = (params.unevenness, params.hairlines);
-        Self { notches, unevenness, hairlines, pipes: Vec::new(), forms: Vec::new() }
+        let (pipes, forms) = (Vec::new(), Vec::new());
+        Self { notches, unevenness, hairlines, pipes, forms, told: Vec::new(), due: Vec::new() }
     }
 
     /// Other notches for the nodes to come; those that are there never become thinner.
     pub(super) fn set_params(&mut self, params: &GrowthParams) {
         self.notches = Self::new(params).notches;
         (self.unevenness, self.hairlines) = (params.unevenness, params.hairlines);
-        let last = (self.notches.len() - 1) as u8;
+        let last = (self.notches.len() - 2) as u8;
         for pipe in &mut self.pipes {
             pipe.notch = pipe.notch.min(last);
         }
@@ -130,7 +136,7 @@ impl Widths {
     }
 
     fn place(&mut self, parent: u32, form: Form) {
-        self.pipes.push(Pipe { behind: 1, told: 1, parent, notch: 0 });
+        self.pipes.push(Pipe { behind: 1, passed_on: 1, parent, notch: 0 });
         self.forms.push(form);
     }
 
@@ -147,37 +153,52 @@ impl Widths {
         self.forms[node as usize].wider *= by;
     }
 
-    /// Takes up the newest node and widens what it hangs on; calls `widened` with each node that became wider.
-    pub(super) fn push(&mut self, nodes: &mut [Node], widened: impl FnMut(u32)) {
-        let Some(newest) = nodes.last() else { return };
-        let parent = newest.parent;
-        self.add(nodes, parent, 1, widened);
+    /// Takes up the nodes from `first` on and widens what they hang on; calls `widened` with each node that became wider.
+    pub(super) fn push(&mut self, nodes: &mut [Node], first: u32, widened: impl FnMut(u32)) {
+        let born = nodes[first as usize..].iter().filter(|node| node.parent != NO_PARENT);
+        self.told.extend(born.map(|node| (node.parent, 1)));
+        self.spread(nodes, widened);
     }
 
     /// An end that is free no longer: as if the crack ran on beyond it.
     pub(super) fn join(&mut self, nodes: &mut [Node], tip: u32, widened: impl FnMut(u32)) {
-        self.add(nodes, tip, TAPERED, widened);
+        self.told.push((tip, TAPERED));
+        self.spread(nodes, widened);
     }
 
-    /// Adds `more` nodes behind a node.
-    fn add(&mut self, nodes: &mut [Node], mut node: u32, mut more: u32, mut widened: impl FnMut(u32)) {
-        while node != NO_PARENT {
-            let pipe = &mut self.pipes[node as usize];
-            pipe.behind += more;
-            let before = pipe.notch;
-            while self.notches.get(usize::from(pipe.notch) + 1).is_some_and(|&(count, _)| pipe.behind >= count) {
-                pipe.notch += 1;
+    /// Tells nodes how many more hang on them, then those that they hang on, and so on: all that are as far on their way at once, as
+    /// each is in memory that is known only from the one before, and many such reads take hardly longer than one.
+    fn spread(&mut self, nodes: &mut [Node], mut widened: impl FnMut(u32)) {
+        while !self.told.is_empty() {
+            self.due.resize(self.told.len(), 0);
+            let mut due = 0;
+            for &(node, more) in &self.told {
+                let pipe = &mut self.pipes[node as usize];
+                pipe.behind += more;
+                // Without a branch, which would be guessed wrong at every other node.
+                self.due[due] = node;
+                due += usize::from(pipe.behind >= self.notches[usize::from(pipe.notch) + 1].0);
             }
-            if pipe.notch == before {
-                return;
+            self.told.clear();
+            for &node in &self.due[..due] {
+                let pipe = &mut self.pipes[node as usize];
+                let before = pipe.notch;
+                while pipe.behind >= self.notches[usize::from(pipe.notch) + 1].0 {
+                    pipe.notch += 1;
+                }
+                // Told twice at once.
+                if pipe.notch == before {
+                    continue;
+                }
+                if pipe.parent != NO_PARENT {
+                    self.told.push((pipe.parent, pipe.behind - pipe.passed_on));
+                }
+                pipe.passed_on = pipe.behind;
+                let width = self.forms[node as usize].width(pipe.notch, self.notches[usize::from(pipe.notch)].1);
+                let this = &mut nodes[node as usize];
+                this.width = this.width.max(width);
+                widened(node);
             }
-            more = pipe.behind - pipe.told;
-            pipe.told = pipe.behind;
-            let width = self.forms[node as usize].width(pipe.notch, self.notches[usize::from(pipe.notch)].1);
-            let this = &mut nodes[node as usize];
-            this.width = this.width.max(width);
-            widened(node);
-            node = pipe.parent;
         }
     }
 }
