@@ -122,7 +122,9 @@ impl CrackGrowth {
             };
         }
         let reach = self.params.arrest.max(TURN * length);
-        match self.goal_ahead(from, heading, reach, AHEAD) {
+        // A ray turns to nothing: it runs straight on until it touches what is in its way.
+        let goal = if self.are_rays() { None } else { self.goal_ahead(from, heading, reach, AHEAD) };
+        match goal {
             None => {}
             Some((_, Goal::Node(_))) if self.stays_open(from) => {
                 self.seal(from);
@@ -141,7 +143,9 @@ impl CrackGrowth {
         }
         let Some(node) = self.extend(from, to, false) else { return Advance::Stopped(heading) };
         // It may have come to lie close beside a crack that was not ahead.
-        if let Some((_, beside)) = self.foreign(node, None, BESIDE * length, AHEAD) {
+        if !self.are_rays()
+            && let Some((_, beside)) = self.foreign(node, None, BESIDE * length, AHEAD)
+        {
             let way = self.network.nodes[beside as usize].pos - self.network.nodes[node as usize].pos;
             self.join_near(node, way, LAST_REACH);
             self.seal(node);

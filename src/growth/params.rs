@@ -128,7 +128,9 @@ pub struct GrowthParams {
     /// into pieces there, while the network goes on. Wide cracks have fewer.
     pub hairlines: f32,
     /// How much a crack keeps its direction, against the pull of the markers: 0 = not at all, 1 = as much as it follows them. In
-    /// what a [mask](crate::pattern::CrackMask) marks as weak it keeps less of it, or none: there the joint leads. 0..=8.
+    /// what a [mask](crate::pattern::CrackMask) marks as weak it keeps less of it, or none: there the joint leads. 0..=8. With polar
+    /// markers and [`arrest`](Self::arrest) cracks are rays then: they follow what lies within 20 degrees of their way and of that from the hit,
+    /// run straight into the crack that is ahead of them, and end otherwise.
     pub inertia: f32,
     /// Direction in which cracks like to run, radians from the x axis (y runs down): across what pulls the surface apart. -7..=7.
     pub axis: f32,

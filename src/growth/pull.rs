@@ -3,7 +3,7 @@
 use super::{CrackGrowth, MarkerLayout, params::PROGRESS};
 use crate::{
     math::hash_unit,
-    pattern::{CrackMask, NO_PARENT},
+    pattern::{CrackMask, NO_PARENT, Node},
 };
 use glam::Vec2;
 
@@ -18,28 +18,43 @@ pub(super) struct Pull {
     closest_id: u32,
     pub(super) child: Vec2,
     pub(super) serves: bool,
-    /// Its markers lie too far aside.
-    strays: bool,
+    /// What a ray must keep to: its heading, and the way from the hit; zero for what may turn anywhere.
+    ways: [Vec2; 2],
     /// Where nothing grows from the node any more: its markers on that side are given up.
     pub(super) stopped: Option<Vec2>,
 }
 
-/// Cosine of the widest angle at which a ray with inertia forks, and of what it bends away from the hit's direction: 40 degrees.
-const FORK: f32 = 0.766;
+/// Cosine of the angle to its way and to the hit's direction beyond which a marker does not draw a ray with inertia: 20 degrees.
+const ASIDE: f32 = 0.94;
 
 const FIXED: f32 = 16_777_216.0;
 pub(super) const NO_PULL: u32 = u32::MAX;
 
 impl CrackGrowth {
+    /// Whether cracks are rays that keep to their way.
+    pub(super) fn are_rays(&self) -> bool {
+        self.arrest.is_some() && self.params.inertia > 0.0 && matches!(self.params.markers, MarkerLayout::Polar { .. })
+    }
+
     /// Collects `S(c)` of every node, and the order of the nodes.
     pub(super) fn gather_pulls(&mut self) {
         self.field.grow_older();
         self.field.sweep();
-        let Self { field, network, pulls, pull_of, .. } = self;
+        let are_rays = self.are_rays();
+        let Self { field, network, impacts, pulls, pull_of, .. } = self;
         field.each_pull(&network.nodes, |index, node, distance_sq| {
             let slot = &mut pull_of[node as usize];
             if *slot == NO_PULL {
                 *slot = pulls.len() as u32;
+                let Node { pos, parent, impact, .. } = network.nodes[node as usize];
+                let ways = match network.nodes.get(parent as usize) {
+                    Some(before) if are_rays => {
+                        let heading = (pos - before.pos).normalize_or_zero();
+                        let hit = impacts.get(impact as usize).map_or(before.pos, |impact| impact.pos);
+                        [heading, (pos - hit).normalize_or(heading)]
+                    }
+                    _ => [Vec2::ZERO; 2],
+                };
                 pulls.push(Pull {
                     node,
                     sum: [0, 0],
@@ -48,15 +63,19 @@ impl CrackGrowth {
                     closest_id: u32::MAX,
                     child: Vec2::ZERO,
                     serves: false,
-                    strays: false,
+                    ways,
                     stopped: None,
                 });
             }
             let pull = &mut pulls[*slot as usize];
             let marker = field.marker(index);
-            let towards = (marker.pos - network.nodes[node as usize].pos) * (FIXED / distance_sq.sqrt());
-            pull.sum[0] += i64::from(towards.x as i32);
-            pull.sum[1] += i64::from(towards.y as i32);
+            let way = marker.pos - network.nodes[node as usize].pos;
+            // What lies aside of a ray is left to others.
+            if pull.ways.iter().all(|&ahead| ahead == Vec2::ZERO || ahead.dot(way) >= ASIDE * distance_sq.sqrt()) {
+                let towards = way * (FIXED / distance_sq.sqrt());
+                pull.sum[0] += i64::from(towards.x as i32);
+                pull.sum[1] += i64::from(towards.y as i32);
+            }
             if (distance_sq, marker.id) < (pull.closest_sq, pull.closest_id) {
                 (pull.closest, pull.closest_sq, pull.closest_id) = (index, distance_sq, marker.id);
             }
@@ -71,9 +90,8 @@ impl CrackGrowth {
         let extent = self.network.extent();
         let (length, kill) = (self.params.step_length, self.params.kill_distance);
         let next = self.network.nodes.len() as u64;
-        // A crack does not turn on its heel: what it cannot serve on its way is left to others. And rays keep to their way.
+        // A crack does not turn on its heel: what it cannot serve on its way is left to others.
         let keeps_on = self.arrest.is_some() && (self.params.inertia > 0.0 || !self.mask.is_empty());
-        let is_ray = keeps_on && self.params.inertia > 0.0 && matches!(self.params.markers, MarkerLayout::Polar { .. });
         for (child, &(_, slot)) in (next..).zip(&self.order) {
             let pull = &mut self.pulls[slot as usize];
             let from = self.network.nodes[pull.node as usize].pos;
@@ -82,12 +100,6 @@ impl CrackGrowth {
                 && let Some(before) = self.network.nodes.get(self.network.nodes[pull.node as usize].parent as usize)
             {
                 let heading = (from - before.pos).normalize_or_zero();
-                if is_ray {
-                    let impact = self.network.nodes[pull.node as usize].impact;
-                    let hit = self.impacts.get(impact as usize).map_or(before.pos, |impact| impact.pos);
-                    let outward = (from - hit).normalize_or(heading);
-                    pull.strays = heading.dot(direction) < FORK || outward.dot(direction) < FORK;
-                }
                 // A side branch has left that heading already, and in a joint the joint leads.
                 if heading.dot(direction) > 0.0 {
                     let inertia = self.params.inertia * (1.0 - self.mask.weak_at(from / extent));
@@ -114,7 +126,7 @@ impl CrackGrowth {
             }
         });
         for pull in &mut self.pulls {
-            if pull.strays {
+            if pull.sum == [0, 0] && pull.ways != [Vec2::ZERO; 2] {
                 pull.serves = false;
                 continue;
             }

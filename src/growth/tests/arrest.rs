@@ -3,7 +3,7 @@
 use super::{random_extent, random_params};
 use crate::growth::{CrackGrowth, GrowthParams, HitOutcome, Rejected, Venation};
 use crate::{
-    Grid,
+    CrackPreset, Grid,
     math::Rng,
     pattern::{CrackMask, LinkKind, Moment, NO_IMPACT, NO_PARENT, SegmentId, SurfaceFrame},
     raster::{DepthField, Profile, stamp_path},
@@ -134,6 +134,33 @@ fn no_two_cracks_cross_and_junctions_are_steep() {
     // The smaller of the two angles, so at most 90.
     assert!(median > 70.0, "median angle {median}");
     assert!(angles.len() > 800, "only {} T-junctions", angles.len());
+}
+
+/// A ray of glass runs away from its hit until it ends or meets an older crack: it turns neither aside nor back.
+#[test]
+fn rays_keep_to_their_way() {
+    for preset in [CrackPreset::GLASS, CrackPreset::LAMINATED_GLASS] {
+        for case in 0..40u64 {
+            let mut rng = Rng::new(case).stream("rays");
+            let mut growth = CrackGrowth::new(preset.growth.clone(), Vec2::ONE, case).unwrap();
+            for _ in 0..6 {
+                growth.hit(Vec2::new(rng.unit(), rng.unit()), rng.range(0.3, 1.5));
+                // At the same time or one after the other.
+                while case % 2 == 0 && growth.step().grew() {}
+            }
+            while growth.step().grew() {}
+            let (network, length) = (growth.network(), growth.params().step_length);
+            for node in network.nodes() {
+                let Some(parent) = network.nodes().get(node.parent as usize) else { continue };
+                let arm = parent.pos - growth.impacts()[node.impact as usize].pos;
+                let way = node.pos - parent.pos;
+                if arm.length() > 6.0 * length && way.length() > 0.5 * length {
+                    let aside = arm.angle_to(way).to_degrees().abs();
+                    assert!(aside < 25.0, "case {case}: {aside} degrees aside at {}", node.pos);
+                }
+            }
+        }
+    }
 }
 
 #[test]
