@@ -1,6 +1,6 @@
 //! What cracks cost in a frame of a game, beside painting and uploading whole images.
 //!
-//! `cargo bench --profile dev --bench frame`: the build that `cargo test` uses.
+//! `cargo bench --bench frame` builds the engine as games ship it; with `--profile dev` the build that `cargo test` uses serves.
 //! `growing/*`: 100 surfaces of 512 x 512 that were hit at once, one step a frame each; the time of an idle frame of the same
 //! app is taken off. "10,000 ...": a frame with cracked surfaces of 32 x 32 that have come to an end, in turns with one with
 //! plain sprites. "only ...": parts of the first that no program could do without. `baking`: what of each frame the crate's systems

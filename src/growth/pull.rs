@@ -1,6 +1,6 @@
 //! Where growth is pulled to: eq. 2 of Couto et al.
 
-use super::{CrackGrowth, MarkerLayout, params::PROGRESS};
+use super::{CrackGrowth, Impact, MarkerLayout, params::PROGRESS};
 use crate::{
     math::hash_unit,
     pattern::{CrackMask, NO_PARENT, Node},
@@ -18,8 +18,6 @@ pub(super) struct Pull {
     closest_id: u32,
     pub(super) child: Vec2,
     pub(super) serves: bool,
-    /// What a ray must keep to: its heading, and the way from the hit; zero for what may turn anywhere.
-    ways: [Vec2; 2],
     /// Where nothing grows from the node any more: its markers on that side are given up.
     pub(super) stopped: Option<Vec2>,
 }
@@ -41,20 +39,15 @@ impl CrackGrowth {
         self.field.grow_older();
         self.field.sweep();
         let are_rays = self.are_rays();
-        let Self { field, network, impacts, pulls, pull_of, .. } = self;
+        let Self { field, network, impacts, pulls, ways, pull_of, .. } = self;
+        ways.clear();
         field.each_pull(&network.nodes, |index, node, distance_sq| {
             let slot = &mut pull_of[node as usize];
             if *slot == NO_PULL {
                 *slot = pulls.len() as u32;
-                let Node { pos, parent, impact, .. } = network.nodes[node as usize];
-                let ways = match network.nodes.get(parent as usize) {
-                    Some(before) if are_rays => {
-                        let heading = (pos - before.pos).normalize_or_zero();
-                        let hit = impacts.get(impact as usize).map_or(before.pos, |impact| impact.pos);
-                        [heading, (pos - hit).normalize_or(heading)]
-                    }
-                    _ => [Vec2::ZERO; 2],
-                };
+                if are_rays {
+                    ways.push(kept(&network.nodes, node, impacts));
+                }
                 pulls.push(Pull {
                     node,
                     sum: [0, 0],
@@ -63,16 +56,17 @@ impl CrackGrowth {
                     closest_id: u32::MAX,
                     child: Vec2::ZERO,
                     serves: false,
-                    ways,
                     stopped: None,
                 });
             }
-            let pull = &mut pulls[*slot as usize];
+            let (pull, ways) = (&mut pulls[*slot as usize], ways.get(*slot as usize));
             let marker = field.marker(index);
             let way = marker.pos - network.nodes[node as usize].pos;
             // What lies aside of a ray is left to others.
-            if pull.ways.iter().all(|&ahead| ahead == Vec2::ZERO || ahead.dot(way) >= ASIDE * distance_sq.sqrt()) {
-                let towards = way * (FIXED / distance_sq.sqrt());
+            let distance = distance_sq.sqrt();
+            if ways.is_none_or(|ways| ways.iter().all(|&kept| kept == Vec2::ZERO || kept.dot(way) >= ASIDE * distance))
+            {
+                let towards = way * (FIXED / distance);
                 pull.sum[0] += i64::from(towards.x as i32);
                 pull.sum[1] += i64::from(towards.y as i32);
             }
@@ -125,8 +119,8 @@ impl CrackGrowth {
                 pull.serves = left_sq <= kill * kill || left_sq <= distance_sq - PROGRESS * length * length;
             }
         });
-        for pull in &mut self.pulls {
-            if pull.sum == [0, 0] && pull.ways != [Vec2::ZERO; 2] {
+        for (slot, pull) in self.pulls.iter_mut().enumerate() {
+            if pull.sum == [0, 0] && self.ways.get(slot).is_some_and(|ways| *ways != [Vec2::ZERO; 2]) {
                 pull.serves = false;
                 continue;
             }
@@ -139,6 +133,15 @@ impl CrackGrowth {
             }
         }
     }
+}
+
+/// What a ray must keep to: its heading, and the way from the hit; zero for a start, which may turn anywhere.
+fn kept(nodes: &[Node], node: u32, impacts: &[Impact]) -> [Vec2; 2] {
+    let Node { pos, parent, impact, .. } = nodes[node as usize];
+    let Some(before) = nodes.get(parent as usize) else { return [Vec2::ZERO; 2] };
+    let heading = (pos - before.pos).normalize_or_zero();
+    let hit = impacts.get(impact as usize).map_or(before.pos, |impact| impact.pos);
+    [heading, (pos - hit).normalize_or(heading)]
 }
 
 /// Turns `direction` by up to 80 degrees towards what is weak and away from what is strong or forbidden.

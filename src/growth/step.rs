@@ -89,6 +89,8 @@ pub struct CrackGrowth {
     pub(super) changes: Changes,
     pub(super) timeline: Timeline,
     pub(super) pulls: Vec<Pull>,
+    /// Where cracks are rays: what each of `pulls` must keep to.
+    pub(super) ways: Vec<[Vec2; 2]>,
     /// Node and entry in `pulls`, in order of the nodes.
     pub(super) order: Vec<(u32, u32)>,
     /// Per node: its entry in `pulls` during a step.
@@ -134,6 +136,7 @@ impl CrackGrowth {
             changes: Changes::default(),
             timeline: Timeline::default(),
             pulls: Vec::new(),
+            ways: Vec::new(),
             order: Vec::new(),
             pull_of: Vec::new(),
             widened: Vec::new(),
