@@ -4,7 +4,7 @@ use super::{
     CrackBudget, CrackClock, CrackError, CrackFailed, CrackMaps, CrackResolution, CrackState, CrackStats, CrackStatus,
     CrackSurface, CrackTextures, HitPoint,
     budget::FrameClock,
-    carrier::{self, Carrier, Shown, Untouched},
+    carrier::{self, Carrier, Found, Kind, Shown, Untouched},
     mask,
     picture::{self, BasePicture, Space},
     queue::{HitQueue, QueuedHit},
@@ -40,7 +40,9 @@ pub(super) fn apply_hits(world: &mut World) {
     let timer = world.resource::<FrameClock>().start(world.resource::<CrackBudget>(), SHARE);
     world.resource_mut::<HitQueue>().unpark();
     while let Some(entity) = world.resource::<HitQueue>().next() {
-        match make_ready(world, entity) {
+        // A hit beside a surface makes nothing for it.
+        let ready = if is_missed(world, entity) { Ok(true) } else { make_ready(world, entity) };
+        match ready {
             Ok(true) => apply_next(world, entity),
             Ok(false) => {
                 set_status(world, entity, CrackStatus::Waiting);
@@ -70,15 +72,38 @@ fn apply_next(world: &mut World, entity: Entity) {
         }
         *world.resource_mut::<CrackStats>() = stats;
     });
+    if world.get::<CrackState>(entity).is_some_and(|state| state.status == CrackStatus::Waiting) {
+        set_status(world, entity, CrackStatus::Untouched);
+    }
+}
+
+/// Whether the first hit of a surface without cracks is to be refused for where it lands.
+fn is_missed(world: &World, entity: Entity) -> bool {
+    if world.resource::<Surfaces>().active.contains_key(&entity) {
+        return false;
+    }
+    let Some(hit) = world.resource::<HitQueue>().first(entity) else { return false };
+    let (Some(kind), Found::Shown(shown)) = carrier::inspect(world, entity) else { return false };
+    let is_there = shown.pictures().all(|picture| matches!(picture::is_loaded(world, picture), Ok(true)));
+    is_there && locate(world, entity, kind, hit.at).is_err()
+}
+
+/// Texture coordinates of a hit, within the surface.
+fn locate(world: &World, entity: Entity, kind: &Kind, at: HitPoint) -> Result<Vec2, &'static str> {
+    let uv = match at {
+        HitPoint::Uv(uv) => uv,
+        HitPoint::Local(point) | HitPoint::World(point) => (kind.locate)(world, entity, point)?,
+    };
+    // Not a number is not within either.
+    let is_within = uv.cmpge(Vec2::ZERO).all() && uv.cmple(Vec2::ONE).all();
+    is_within.then_some(uv).ok_or("it lies off the surface")
 }
 
 fn apply(world: &mut World, entity: Entity, hit: QueuedHit) -> Result<HitOutcome, &'static str> {
     const GONE: &str = "the surface is gone";
-    let kind = world.resource::<Surfaces>().active.get(&entity).ok_or(GONE)?.carrier.kind;
-    let uv = match hit.at {
-        HitPoint::Uv(uv) => uv,
-        HitPoint::Local(point) | HitPoint::World(point) => (kind.locate)(world, entity, point)?,
-    };
+    let active = world.resource::<Surfaces>().active.get(&entity);
+    let kind = active.map(|active| active.carrier.kind).or_else(|| carrier::inspect(world, entity).0).ok_or(GONE)?;
+    let uv = locate(world, entity, kind, hit.at)?;
     let mut surfaces = world.resource_mut::<Surfaces>();
     let active = surfaces.active.get_mut(&entity).ok_or(GONE)?;
     let texel = active.field.frame.to_texel(active.field.frame.uv_to_pos(uv)).max(Vec2::ZERO).as_uvec2();
@@ -87,9 +112,6 @@ fn apply(world: &mut World, entity: Entity, hit: QueuedHit) -> Result<HitOutcome
     }
     if active.surface.alpha_mask
         && let Some(view) = active.views.get(active.view)
-        // What lies off the surface is the growth's to refuse.
-        && uv.cmpge(Vec2::ZERO).all()
-        && uv.cmple(Vec2::ONE).all()
         && active.base.is_hole(view.rect.min + (uv * view.rect.size().as_vec2()).as_uvec2().min(view.rect.size() - 1))
     {
         return Err("the surface is transparent there");

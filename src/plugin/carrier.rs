@@ -101,14 +101,14 @@ pub(super) struct Carrier {
     pub(super) own: Option<UntypedHandle>,
     /// The mesh before, and the mesh with tangents.
     pub(super) mesh: Option<(Handle<Mesh>, Handle<Mesh>)>,
-    /// Whether the sprite's size was set by us.
-    pub(super) is_sized: bool,
+    /// The size that was given to the sprite.
+    pub(super) size: Option<Vec2>,
 }
 
 impl Carrier {
     /// It still shows what it showed.
     pub(super) fn new(kind: &'static Kind, shown: Shown) -> Self {
-        Self { kind, shown, own: None, mesh: None, is_sized: false }
+        Self { kind, shown, own: None, mesh: None, size: None }
     }
 
     /// Ids of the pictures it was made from.

@@ -102,12 +102,9 @@ fn forget(world: &mut World, entity: Entity) {
     }
 }
 
-/// From the hook of a component that goes: its hits are refused now, the rest follows when commands are applied.
-pub(super) fn forget_later(world: &mut DeferredWorld, entity: Entity) {
-    world.commands().queue(move |world: &mut World| {
-        purge(world, entity);
-        forget(world, entity);
-    });
+/// From the hook of a component that goes: the entity is healed when commands are applied.
+pub(super) fn heal_later(world: &mut DeferredWorld, entity: Entity) {
+    world.commands().queue(move |world: &mut World| heal(world, entity));
 }
 
 /// From the hook of a new component: if the entity is a clone and shows private textures of another, it gets the

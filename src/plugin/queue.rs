@@ -74,6 +74,11 @@ impl HitQueue {
         }
     }
 
+    /// The hit of a surface that waits the longest.
+    pub(super) fn first(&self, entity: Entity) -> Option<&QueuedHit> {
+        self.hits.get(&entity)?.front()
+    }
+
     /// The next surface in turn.
     pub(super) fn next(&self) -> Option<Entity> {
         self.turns.front().copied()

@@ -49,7 +49,7 @@ fn inspect(world: &World, entity: Entity) -> Found {
         (frame, rect) => frame.or(rect),
     };
     // A sprite of one colour shows Bevy's white picture of one texel.
-    let is_blank = sprite.image == Handle::default() && sprite.custom_size.is_some() && rect.is_none();
+    let is_blank = sprite.image == Handle::default() && rect.is_none();
     Found::Shown(Box::new(Shown {
         asset: sprite.image.clone().untyped(),
         diffuse: (!is_blank).then(|| sprite.image.clone()),
@@ -67,16 +67,14 @@ fn attach(world: &mut World, entity: Entity, carrier: &mut Carrier, textures: &C
     carrier.own = Some(own.clone().untyped());
     let images = world.get_resource::<Assets<Image>>();
     let size = |handle: &Handle<Image>| images.and_then(|images| images.get(handle)).map(Image::size_f32);
-    let (before, now) = (carrier.shown.diffuse.as_ref().and_then(size), size(own));
+    let (before, now) = (size(&carrier.shown.asset.clone().typed()), size(own));
     let Some(mut sprite) = world.get_mut::<Sprite>(entity) else { return };
     sprite.image = own.clone();
-    if core::mem::take(&mut carrier.is_sized) {
-        sprite.custom_size = None;
-    }
+    give_size_back(&mut sprite, carrier.size.take());
     // Textures of another size must not change the size of the sprite.
     if sprite.custom_size.is_none() && before != now {
         sprite.custom_size = before;
-        carrier.is_sized = true;
+        carrier.size = before;
     }
 }
 
@@ -85,7 +83,12 @@ fn detach(world: &mut World, entity: Entity, carrier: &Carrier) {
     if carrier.is_showing(&sprite.image.clone().untyped()) {
         sprite.image = carrier.shown.asset.clone().typed();
     }
-    if carrier.is_sized {
+    give_size_back(&mut sprite, carrier.size);
+}
+
+/// Takes the size that was given to a sprite from it, unless somebody has changed it since.
+fn give_size_back(sprite: &mut Sprite, given: Option<Vec2>) {
+    if given.is_some() && sprite.custom_size == given {
         sprite.custom_size = None;
     }
 }

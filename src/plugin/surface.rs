@@ -9,20 +9,25 @@ use bevy::{
 /// This sprite, 2D mesh or 3D mesh can crack.
 ///
 /// Costs nothing until the first hit. Then the surface gets textures of its own, which start as copies of its pictures;
-/// everybody else who shows those pictures keeps the originals. Removing the component gives the originals back.
+/// everybody else who shows those pictures keeps the originals. Removing the component heals it: the originals are back, and
+/// [`CrackState`] is as at the start.
+///
+/// `Sprite::image` and the material in `MeshMaterial2d` or `MeshMaterial3d` are the surface's own while it is cracked. A
+/// copy of a material is changed through the handle that the entity has then, not through the one it was spawned with, and is dropped
+/// by healing; another image or material put in its place is cracked as the first one was.
 #[derive(Component, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Component, Default)]
 #[require(CrackState)]
 #[component(on_add = added, on_remove = removed)]
 pub struct CrackSurface {
-    /// How cracks grow and look, here or in a file. Changes hold for what grows from then on; invalid ones are refused with
-    /// one warning.
+    /// How cracks grow and look, here or in a file. A changed look and profile show on all cracks at once, changed growth on what
+    /// grows from then on; invalid changes are refused with one warning.
     pub preset: PresetSource,
     /// Seed of the pattern. A change takes effect after healing.
     pub seed: u64,
-    /// Size of the textures.
+    /// Size of the textures. A change takes effect when they are made anew: after healing, or with another picture.
     pub resolution: CrackResolution,
-    /// Which maps are written.
+    /// Which maps are written. A change takes effect as one of `resolution`.
     pub write: CrackMaps,
     /// Whether transparent texels refuse hits and attract no cracks; default true.
     pub alpha_mask: bool,
@@ -69,7 +74,8 @@ impl Default for CrackSurface {
 /// Size of a surface's textures.
 #[derive(Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum CrackResolution {
-    /// As its picture; 512 texels along the longer side where there is none.
+    /// As its picture. Where there is none, 512 texels along the longer side of a sprite's `custom_size`, 512 x 512 on a mesh: for a
+    /// long wall of one colour [`Fixed`](Self::Fixed) gives its proportions, or cracks are stretched with it.
     #[default]
     Picture,
     /// This size, the picture being resampled. Sprites with a `rect` or an atlas keep the size of their picture.
@@ -100,5 +106,5 @@ fn added(mut world: DeferredWorld, context: HookContext) {
 }
 
 fn removed(mut world: DeferredWorld, context: HookContext) {
-    heal::forget_later(&mut world, context.entity);
+    heal::heal_later(&mut world, context.entity);
 }

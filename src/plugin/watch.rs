@@ -139,9 +139,9 @@ fn update(world: &mut World, entity: Entity, active: &mut Active) -> Result<bool
     }
     // Somebody gave it another picture.
     let Some(kind) = kind else { return Ok(true) };
-    let is_sized = active.carrier.is_sized;
+    let size = active.carrier.size;
     let mesh = active.carrier.mesh.take();
-    active.carrier = Carrier { mesh, is_sized, ..Carrier::new(kind, shown.clone()) };
+    active.carrier = Carrier { mesh, size, ..Carrier::new(kind, shown.clone()) };
     update_picture(world, entity, active, shown)
 }
 

@@ -531,3 +531,37 @@ fn i10_hits_land_where_a_mirrored_turned_or_sheared_sprite_shows_them() {
         app.world_mut().despawn(parent);
     }
 }
+
+#[test]
+fn i3_hits_that_miss_make_nothing() {
+    let mut app = app();
+    let image = add(&mut app, picture(UVec2::splat(64)));
+    let sprite = spawn_small(&mut app, &image, 1);
+    let late = app.world().resource::<Assets<Image>>().reserve_handle();
+    let loading = spawn_small(&mut app, &late, 2);
+    let material = add(&mut app, ColorMaterial { texture: Some(image), ..default() });
+    let mesh = add(&mut app, Mesh::from(Rectangle::new(64.0, 64.0)));
+    let surface = CrackSurface::new(small_preset());
+    let flat = app.world_mut().spawn((Mesh2d(mesh), MeshMaterial2d(material), Transform::default(), surface)).id();
+    step(&mut app);
+    for entity in [sprite, flat] {
+        hit(&mut app, CrackHit::world(entity, Vec3::new(500.0, 0.0, 0.0)));
+        hit(&mut app, CrackHit::uv(entity, Vec2::new(1.5, 0.5)));
+    }
+    hit(&mut app, CrackHit::local(loading, Vec3::new(500.0, 0.0, 0.0)));
+    steps(&mut app, 2);
+    assert_eq!(counts(&app).rejected, 4);
+    assert_eq!(state(&app, loading).status, CrackStatus::Waiting);
+    app.world_mut()
+        .resource_mut::<Assets<Image>>()
+        .insert(&late, picture(UVec2::splat(32)))
+        .expect("a handle that is kept");
+    steps(&mut app, 2);
+    assert_eq!(counts(&app).rejected, 5);
+    for entity in [sprite, flat, loading] {
+        assert!(app.world().get::<CrackTextures>(entity).is_none(), "no memory for what is not cracked");
+        assert_eq!(state(&app, entity), CrackState::default());
+        hit(&mut app, center(entity));
+        settle(&mut app, entity);
+    }
+}

@@ -942,3 +942,50 @@ fn half_bits(x: f32) -> u16 {
     let exponent = ((bits >> 23) & 0xFF) as i32 - 127 + 15;
     ((exponent as u16) << 10) | ((bits >> 13) & 0x3FF) as u16
 }
+
+#[test]
+fn t4_a_sprite_of_one_colour_without_a_size() {
+    let mut app = app();
+    // As many games make their bricks: the scale is the size.
+    let scale = Transform::from_scale(Vec3::new(90.0, 60.0, 1.0));
+    let sprite = Sprite { color: Color::srgb(0.2, 0.4, 0.9), ..default() };
+    let entity = app.world_mut().spawn((sprite.clone(), scale, CrackSurface::default())).id();
+    hit(&mut app, CrackHit::world(entity, Vec3::new(20.0, 10.0, 0.0)));
+    settle(&mut app, entity);
+    assert_eq!(size_of(&app, &image_of(&app, entity)), UVec2::splat(512), "cracks have room");
+    assert!(share_untouched(&shown(&app, entity), &[255; 512 * 512 * 4]) > 0.5, "most of it is as it was");
+    assert_eq!(get::<Sprite>(&app, entity).custom_size, Some(Vec2::ONE), "it is as large as before");
+    app.world_mut().commands().entity(entity).heal_cracks();
+    step(&mut app);
+    let healed = get::<Sprite>(&app, entity);
+    assert_eq!((healed.image, healed.custom_size), (sprite.image, None));
+}
+
+#[test]
+fn t4_a_size_that_a_game_gives_a_cracked_sprite_is_kept() {
+    let mut app = app();
+    let image = add(&mut app, picture(UVec2::splat(64)));
+    let entity = spawn_with(&mut app, &image, CrackResolution::Fixed(UVec2::splat(32)));
+    let set_size = |app: &mut App, size: Option<Vec2>| {
+        app.world_mut().get_mut::<Sprite>(entity).expect("the sprite").custom_size = size;
+    };
+    let heal = |app: &mut App| {
+        app.world_mut().commands().entity(entity).heal_cracks();
+        step(app);
+    };
+    hit(&mut app, center(entity));
+    settle(&mut app, entity);
+    heal(&mut app);
+    assert_eq!(get::<Sprite>(&app, entity).custom_size, None, "the size that the crate gave it is taken back");
+    hit(&mut app, center(entity));
+    settle(&mut app, entity);
+    let size = Some(Vec2::new(77.0, 33.0));
+    set_size(&mut app, size);
+    // Another picture, then none of ours.
+    let other = add(&mut app, picture(UVec2::splat(16)));
+    app.world_mut().get_mut::<Sprite>(entity).expect("the sprite").image = other;
+    steps(&mut app, 2);
+    assert_eq!(get::<Sprite>(&app, entity).custom_size, size);
+    heal(&mut app);
+    assert_eq!(get::<Sprite>(&app, entity).custom_size, size);
+}

@@ -515,3 +515,16 @@ fn e7_a_long_frame_makes_a_bounded_number_of_steps() {
         assert_eq!(state(&app, entity).nodes, before, "{rate} steps a second");
     }
 }
+
+#[test]
+fn e2_a_surface_that_is_none_any_more_is_untouched() {
+    let mut app = app();
+    let entity = spawn_picture(&mut app, UVec2::splat(48));
+    let n_frames = frames_to_end(&mut app, entity);
+    app.world_mut().entity_mut(entity).remove::<CrackSurface>();
+    assert_eq!(state(&app, entity), CrackState::default(), "nothing is left of the cracks");
+    app.world_mut().entity_mut(entity).insert(CrackSurface::default());
+    step(&mut app);
+    assert_eq!(state(&app, entity), CrackState::default(), "it has not been hit yet");
+    assert_eq!(frames_to_end(&mut app, entity), n_frames, "it starts anew");
+}
