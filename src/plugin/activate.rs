@@ -6,7 +6,7 @@ use super::{
     budget::FrameClock,
     carrier::{self, Carrier, Found, Kind, Shown, Untouched},
     mask,
-    picture::{self, BasePicture, Space},
+    picture::{self, BaseKey, BasePicture, BasePictures, Space},
     queue::{HitQueue, QueuedHit},
     shards::Struck,
     surfaces::{Active, Ground, Surfaces},
@@ -231,15 +231,13 @@ impl PicturePlan {
         let n = self.size.x as usize * self.size.y as usize;
         let read =
             |image: Option<&Image>| image.map(|image| picture::read(image, Space::Linear, self.size)).transpose();
-        Ok(BasePicture {
-            size: self.size,
-            diffuse: match diffuse {
-                Some(image) => picture::read_shown(image, self.size)?,
-                None => vec![255; n * 4],
-            },
-            normal: if self.maps.normal { read(normal)? } else { None },
-            depth: if self.maps.depth { read(depth)?.map(|rgba| picture::red(&rgba)) } else { None },
-        })
+        let diffuse = match diffuse {
+            Some(image) => picture::read_shown(image, self.size)?,
+            None => vec![255; n * 4],
+        };
+        let normal = if self.maps.normal { read(normal)? } else { None };
+        let depth = if self.maps.depth { read(depth)?.map(|rgba| picture::red(&rgba)) } else { None };
+        Ok(BasePicture::new(self.size, diffuse, normal, depth))
     }
 }
 
@@ -271,19 +269,23 @@ pub(super) fn plan_pictures(
 
 /// Reads the pictures of a surface; `None` if they are not there yet. `owned` as in [`plan_pictures`].
 pub(super) fn draft(
-    world: &World,
+    world: &mut World,
     surface: &CrackSurface,
     shown: &Shown,
     owned: u64,
 ) -> Result<Option<Draft>, CrackError> {
     let Some(plan) = plan_pictures(world, surface, shown, owned)? else { return Ok(None) };
-    let images = world.get_resource::<Assets<Image>>().ok_or(CrackError::NoImages)?;
-    let image = |picture: &Option<Handle<Image>>| picture.as_ref().and_then(|picture| images.get(picture));
-    let base = plan.read([&shown.diffuse, &shown.normal, &shown.depth].map(image))?;
-    Ok(Some(Draft { base: Arc::new(base), plan }))
+    let maps = [(&shown.diffuse, true), (&shown.normal, plan.maps.normal), (&shown.depth, plan.maps.depth)];
+    let maps = maps.map(|(map, is_needed)| map.as_ref().filter(|_| is_needed));
+    let key = BaseKey { pictures: maps.map(|map| map.map(Handle::id)), size: plan.size };
+    let base = world.resource_scope(|world, mut bases: Mut<BasePictures>| {
+        let images = world.get_resource::<Assets<Image>>().ok_or(CrackError::NoImages)?;
+        bases.get(key, || plan.read(maps.map(|map| map.and_then(|picture| images.get(picture)))))
+    })?;
+    Ok(Some(Draft { base, plan }))
 }
 
-/// Bytes of the textures on the CPU and the GPU, the base picture and the depth field.
+/// Bytes of the textures on the CPU and the GPU, the base picture, as if no other surface had the same, and the depth field.
 fn bytes(size: UVec2, maps: CrackMaps) -> u64 {
     let texel = 4 + 2 + 8 * u64::from(maps.diffuse) + 8 * u64::from(maps.normal) + 2 * u64::from(maps.depth);
     u64::from(size.x) * u64::from(size.y) * texel

@@ -154,6 +154,7 @@ impl Plugin for CrackPlugin {
             .init_resource::<budget::FrameClock>()
             .init_resource::<queue::HitQueue>()
             .init_resource::<mask::PictureMasks>()
+            .init_resource::<picture::BasePictures>()
             .init_resource::<surfaces::Surfaces>()
             .init_resource::<bake::Bakes>()
             .add_message::<CrackHit>()

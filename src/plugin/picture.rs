@@ -4,14 +4,17 @@ use super::CrackError;
 use crate::{Grid, paint::BaseTexels, raster::TexelRect};
 use bevy::{
     asset::{AssetServer, LoadState},
+    platform::collections::HashMap,
     prelude::*,
     render::render_resource::{TextureDimension, TextureFormat},
 };
+use std::sync::{Arc, Weak};
 
 /// The untouched pictures of a surface, all of one size.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct BasePicture {
     pub(super) size: UVec2,
+    has_holes: bool,
     /// RGBA8, sRGB.
     pub(super) diffuse: Vec<u8>,
     /// RGBA8, linear; `None` = flat.
@@ -24,6 +27,11 @@ pub(super) struct BasePicture {
 const OPAQUE: u8 = 8;
 
 impl BasePicture {
+    pub(super) fn new(size: UVec2, diffuse: Vec<u8>, normal: Option<Vec<u8>>, depth: Option<Vec<u8>>) -> Self {
+        let has_holes = diffuse.as_chunks::<4>().0.iter().any(|texel| texel[3] < OPAQUE);
+        Self { size, has_holes, diffuse, normal, depth }
+    }
+
     /// Whether the texel is a hole.
     pub(super) fn is_hole(&self, texel: UVec2) -> bool {
         let texel = texel.min(self.size.saturating_sub(UVec2::ONE));
@@ -33,7 +41,7 @@ impl BasePicture {
 
     /// To paint on.
     pub(super) fn texels(&self) -> BaseTexels<'_> {
-        let Self { size, diffuse, normal, depth } = self;
+        let Self { size, diffuse, normal, depth, .. } = self;
         BaseTexels { size: *size, diffuse, normal: normal.as_deref(), depth: depth.as_deref() }
     }
 
@@ -44,7 +52,42 @@ impl BasePicture {
 
     /// Where cracks may go in `rect`: not over holes. `None` if there are none.
     pub(super) fn density(&self, rect: TexelRect) -> Option<Grid<f32>> {
-        density(rect.size(), |texel| self.is_hole(rect.min + texel))
+        self.has_holes.then(|| density(rect.size(), |texel| self.is_hole(rect.min + texel)))?
+    }
+}
+
+/// Base pictures that are in use: surfaces that show the same have one together.
+#[derive(Resource, Default)]
+pub(super) struct BasePictures(HashMap<BaseKey, Weak<BasePicture>>);
+
+/// What a base picture is read from: diffuse, normal and depth, those of them that there are.
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+pub(super) struct BaseKey {
+    pub(super) pictures: [Option<AssetId<Image>>; 3],
+    pub(super) size: UVec2,
+}
+
+impl BasePictures {
+    /// The one that is in use, or what `read` makes.
+    pub(super) fn get(
+        &mut self,
+        key: BaseKey,
+        read: impl FnOnce() -> Result<BasePicture, CrackError>,
+    ) -> Result<Arc<BasePicture>, CrackError> {
+        if let Some(base) = self.0.get(&key).and_then(Weak::upgrade) {
+            return Ok(base);
+        }
+        let base = Arc::new(read()?);
+        if self.0.len() == self.0.capacity() {
+            self.0.retain(|_, base| base.strong_count() > 0);
+        }
+        self.0.insert(key, Arc::downgrade(&base));
+        Ok(base)
+    }
+
+    /// The picture is another one now.
+    pub(super) fn forget(&mut self, picture: AssetId<Image>) {
+        self.0.retain(|key, _| !key.pictures.contains(&Some(picture)));
     }
 }
 
@@ -210,6 +253,27 @@ fn resample(texels: &[u8], from: UVec2, to: UVec2) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_base_picture_in_use_is_read_once() {
+        let mut bases = BasePictures::default();
+        let id = AssetId::from(bevy::asset::uuid::Uuid::from_u128(7));
+        let key = |side: u32| BaseKey { pictures: [None, Some(id), None], size: UVec2::splat(side) };
+        let white = |side: u32| BasePicture::new(UVec2::splat(side), vec![255; 4 * (side * side) as usize], None, None);
+        let unread = || -> Result<BasePicture, CrackError> { panic!("it is in use") };
+        assert_eq!(bases.get(key(1), || Err(CrackError::NoCpuData)), Err(CrackError::NoCpuData));
+        let one = bases.get(key(1), || Ok(white(1))).unwrap();
+        assert!(Arc::ptr_eq(&one, &bases.get(key(1), unread).unwrap()));
+        let two = bases.get(key(2), || Ok(white(2))).unwrap();
+        assert_eq!((one.size, two.size), (UVec2::ONE, UVec2::splat(2)));
+        bases.forget(AssetId::default());
+        assert!(Arc::ptr_eq(&two, &bases.get(key(2), unread).unwrap()));
+        bases.forget(id);
+        assert!(!Arc::ptr_eq(&two, &bases.get(key(2), || Ok(white(2))).unwrap()));
+        // Those that nobody uses are not kept.
+        (3..99).for_each(|side| _ = bases.get(key(side), || Ok(white(side))));
+        assert!(bases.0.len() < 33, "{} are known", bases.0.len());
+    }
 
     #[test]
     fn resampling_keeps_even_pictures_and_halves_steps() {

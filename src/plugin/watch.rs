@@ -7,6 +7,7 @@ use super::{
     carrier::{self, Carrier, Found, Shown},
     mask::{self, PictureMasks},
     paint::stamp_anew,
+    picture::BasePictures,
     preset,
     shards::drop_shards,
     surfaces::{Active, Added, Surfaces},
@@ -42,6 +43,7 @@ pub(super) fn watch_pictures(
     events: Option<MessageReader<AssetEvent<Image>>>,
     mut surfaces: ResMut<Surfaces>,
     mut masks: ResMut<PictureMasks>,
+    mut bases: ResMut<BasePictures>,
     mut bakes: ResMut<Bakes>,
 ) {
     let Some(mut events) = events else { return };
@@ -49,6 +51,7 @@ pub(super) fn watch_pictures(
     for event in events.read() {
         if let AssetEvent::Modified { id } | AssetEvent::Added { id } = event {
             masks.forget(*id);
+            bases.forget(*id);
             bakes.forget_picture(*id);
             for entity in sources.get(id).into_iter().flatten() {
                 changed.push(*entity);

@@ -687,9 +687,14 @@ fn t9_a_changed_picture_of_the_same_size_keeps_its_cracks() {
     let (damage, nodes) = (state(&app, entity).damage, state(&app, entity).nodes);
     let new = solid(UVec2::splat(64), [20, 160, 40, 255]);
     let base = new.data.clone().unwrap();
+    let late = spawn_sprite(&mut app, &image);
     replace(&mut app, &image, new);
+    // Before anybody is told of it.
+    hit(&mut app, center(late));
     steps(&mut app, 3);
     let now = shown(&app, entity);
+    settle(&mut app, late);
+    assert!(shown(&app, late) == now, "what was read before is read again");
     let share = share_untouched(&now, &base);
     assert!(share > 0.5 && share < 1.0, "cracks on the new picture: {share}");
     assert_eq!((state(&app, entity).damage, state(&app, entity).nodes), (damage, nodes));
