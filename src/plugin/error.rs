@@ -45,7 +45,10 @@ pub enum CrackError {
         actual: u64,
     },
     /// The picture or the frame of the sprite has no texels, or too many.
-    #[error("a surface of {width} x {height} texels cannot crack")]
+    #[error(
+        "a picture of {width} x {height} texels cannot crack: empty, or shown in parts (`rect`, atlas) and larger than \
+         `CrackBudget::max_side` or the device allows"
+    )]
     Size {
         /// Width, texels.
         width: u32,

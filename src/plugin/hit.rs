@@ -5,7 +5,7 @@ use super::{
     budget::FrameClock,
     queue::{HitQueue, QueuedHit},
 };
-use bevy::prelude::*;
+use bevy::{ecs::query::QueryEntityError, prelude::*};
 
 /// One hit on a [`CrackSurface`]: trigger it as an entity event, or write it as a message when there are many.
 ///
@@ -112,7 +112,15 @@ pub(super) fn collect_hits(
     let mut inbox = core::mem::take(&mut queue.inbox);
     for hit in inbox.iter().chain(messages.read()) {
         stats.sent += 1;
-        match localize(hit, &surfaces) {
+        let at = match surfaces.get(hit.entity) {
+            Ok(transform) => localize(hit, transform),
+            Err(QueryEntityError::NotSpawned(_)) => {
+                queue.miss(hit.entity, &mut stats);
+                continue;
+            }
+            Err(_) => Err("the entity has no `CrackSurface`"),
+        };
+        match at {
             Err(reason) => queue.reject(hit.entity, reason, &mut stats),
             Ok(_) if hit.energy == 0.0 => stats.ignored += 1,
             Ok(at) => {
@@ -127,11 +135,7 @@ pub(super) fn collect_hits(
 }
 
 /// World points become local ones at once: the surface may move before the hit's turn comes.
-fn localize(
-    hit: &CrackHit,
-    surfaces: &Query<Option<&GlobalTransform>, With<CrackSurface>>,
-) -> Result<HitPoint, &'static str> {
-    let transform = surfaces.get(hit.entity).map_err(|_| "the entity is gone or has no `CrackSurface`")?;
+fn localize(hit: &CrackHit, transform: Option<&GlobalTransform>) -> Result<HitPoint, &'static str> {
     if !hit.is_finite() {
         return Err("a coordinate, the energy or the direction is not finite");
     }

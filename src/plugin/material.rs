@@ -7,7 +7,12 @@ use super::{
     shards::Plane,
     surfaces::Active,
 };
-use bevy::{asset::UntypedHandle, ecs::component::Mutable, math::Affine2, prelude::*};
+use bevy::{
+    asset::{LoadState, UntypedHandle},
+    ecs::component::Mutable,
+    math::Affine2,
+    prelude::*,
+};
 
 /// A material that can show cracks.
 pub(super) trait CrackMaterial: Asset + Clone {
@@ -64,7 +69,9 @@ fn inspect<S: MaterialSlot>(world: &World, entity: Entity) -> Found {
     let Some(materials) = world.get_resource::<Assets<S::Material>>() else {
         return Found::Unusable(CrackError::NoMaterials { material: S::Material::short_type_path().to_owned() });
     };
-    let Some(material) = materials.get(slot.material()) else { return Found::Waiting };
+    let Some(material) = materials.get(slot.material()).filter(|_| !is_mesh_loading(world, entity)) else {
+        return Found::Waiting;
+    };
     let [diffuse, normal, depth] = material.pictures();
     Found::Shown(Box::new(Shown {
         asset: slot.material().clone().untyped(),
@@ -75,6 +82,18 @@ fn inspect<S: MaterialSlot>(world: &World, entity: Entity) -> Found {
         proportions: Vec2::ONE,
         maps: S::Material::MAPS,
     }))
+}
+
+/// Whether the mesh of an entity is on its way. Hits wait for it: where they land, and tangents, are found on it.
+fn is_mesh_loading(world: &World, entity: Entity) -> bool {
+    let server = world.get_resource::<AssetServer>();
+    let state = server.zip(mesh_of(world, entity)).and_then(|(server, mesh)| server.get_load_state(mesh));
+    matches!(state, Some(LoadState::NotLoaded | LoadState::Loading))
+}
+
+fn mesh_of(world: &World, entity: Entity) -> Option<&Handle<Mesh>> {
+    let mesh_2d = world.get::<Mesh2d>(entity).map(|mesh| &mesh.0);
+    mesh_2d.or_else(|| world.get::<Mesh3d>(entity).map(|mesh| &mesh.0))
 }
 
 fn attach<S: MaterialSlot>(
@@ -143,8 +162,7 @@ fn detach<S: MaterialSlot>(world: &mut World, entity: Entity, carrier: &Carrier)
 }
 
 fn locate<S: MaterialSlot>(world: &World, entity: Entity, local: Vec3) -> Result<Vec2, &'static str> {
-    let mesh_2d = world.get::<Mesh2d>(entity).map(|mesh| &mesh.0);
-    let mesh = mesh_2d.or_else(|| world.get::<Mesh3d>(entity).map(|mesh| &mesh.0)).ok_or("there is no mesh")?;
+    let mesh = mesh_of(world, entity).ok_or("there is no mesh")?;
     let meshes = world.get_resource::<Assets<Mesh>>().ok_or("there are no mesh assets")?;
     let uv = closest_uv(meshes.get(mesh).ok_or("the mesh is not loaded")?, local)?;
     let material = world.get::<S>(entity).ok_or("the material is gone")?;
@@ -154,8 +172,7 @@ fn locate<S: MaterialSlot>(world: &World, entity: Entity, local: Vec3) -> Result
 }
 
 fn plane<S: MaterialSlot>(world: &World, entity: Entity, _: &Active) -> Result<Plane, &'static str> {
-    let mesh_2d = world.get::<Mesh2d>(entity).map(|mesh| &mesh.0);
-    let mesh = mesh_2d.or_else(|| world.get::<Mesh3d>(entity).map(|mesh| &mesh.0)).ok_or("there is no mesh")?;
+    let mesh = mesh_of(world, entity).ok_or("there is no mesh")?;
     let mesh =
         world.get_resource::<Assets<Mesh>>().and_then(|meshes| meshes.get(mesh)).ok_or("its mesh is not loaded")?;
     let material = world.get::<S>(entity).ok_or("the material is gone")?;

@@ -74,18 +74,24 @@ pub(super) fn closest_uv(mesh: &Mesh, point: Vec3) -> Result<Vec2, &'static str>
     Ok(uv)
 }
 
-/// The point of the first triangle that has these texture coordinates, and the way it faces, in the mesh's space.
+/// The point that has these texture coordinates, and the way the mesh faces there, in the mesh's space. Of the triangles that hold
+/// them the one that has least of the picture: those at the seam of a ball may have all of it from one side to the other.
 pub(super) fn place_of(mesh: &Mesh, uv: Vec2) -> Option<(Vec3, Vec3)> {
+    const SLACK: f32 = -1e-4;
     let triangles = Triangles::of(mesh).ok()?;
-    (0..triangles.len()).filter_map(|i| triangles.get(i)).find_map(|([a, b, c], [uv_a, uv_b, uv_c])| {
-        const SLACK: f32 = -1e-4;
+    let mut best: Option<(f32, (Vec3, Vec3))> = None;
+    for ([a, b, c], [uv_a, uv_b, uv_c]) in (0..triangles.len()).filter_map(|i| triangles.get(i)) {
         let (ab, ac, to) = (uv_b - uv_a, uv_c - uv_a, uv - uv_a);
         let area = ab.perp_dot(ac);
         let (v, w) = (to.perp_dot(ac) / area, ab.perp_dot(to) / area);
-        // Not a number where the triangle has no area.
-        (v >= SLACK && w >= SLACK && 1.0 - v - w >= SLACK)
-            .then(|| (a + (b - a) * v + (c - a) * w, (b - a).cross(c - a).normalize_or_zero()))
-    })
+        // Not a number where the triangle has no area. The first of equals wins, as far as rounding lets them be equal.
+        if v >= SLACK && w >= SLACK && 1.0 - v - w >= SLACK && best.is_none_or(|(least, _)| area.abs() < 0.999 * least)
+        {
+            let normal = (b - a).cross(c - a).normalize_or_zero();
+            best = Some((area.abs(), (a + (b - a) * v + (c - a) * w, normal)));
+        }
+    }
+    best.map(|(_, place)| place)
 }
 
 /// Texture coordinates within 0..=1: those beyond are of a texture that repeats.
@@ -148,6 +154,22 @@ mod tests {
         assert_eq!(uv(0.5, 0.0, 0.1), Ok(Vec2::new(0.75, 0.5)), "above the face");
         assert_eq!(uv(1.2, -0.6, 0.0), Ok(Vec2::ONE), "just off a corner");
         assert!(uv(5.0, 0.0, 0.0).is_err(), "far off");
+    }
+
+    /// Some triangles at the seam of a ball run over the picture from one side to the other.
+    #[test]
+    fn places_on_a_ball_are_where_the_picture_is() {
+        let mesh = Sphere::new(0.5).mesh().ico(5).unwrap();
+        for i in 0..40 {
+            for k in 1..20 {
+                let uv = Vec2::new((i as f32 + 0.5) / 40.0, k as f32 / 20.0);
+                let Some((at, normal)) = place_of(&mesh, uv) else { continue };
+                let found = closest_uv(&mesh, at).unwrap();
+                let around = (found.x - uv.x).abs();
+                assert!(around.min(1.0 - around) < 0.02 && (found.y - uv.y).abs() < 0.02, "{uv}: {at} has {found}");
+                assert!(normal.dot(at.normalize()) > 0.9, "{uv}: {normal}");
+            }
+        }
     }
 
     #[test]

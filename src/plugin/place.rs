@@ -50,8 +50,9 @@ pub struct CrackPlaces<'w, 's> {
 impl CrackPlaces<'_, '_> {
     /// The place at `uv` (0..=1, v down) of a surface's picture or sprite frame, as transforms were last propagated.
     ///
-    /// `None` if the entity is no surface or its picture or mesh is not there. On a mesh: in the first triangle whose own
-    /// coordinates (`UV_0`) hold `uv`, every triangle before it being looked at; a material's `uv_transform` is not.
+    /// `None` if the entity is no surface or its picture or mesh is not there. On a mesh: in the triangle whose own coordinates
+    /// (`UV_0`) hold `uv`, all of them being looked at; if there are some, in that with the least of the picture, or the first of them. A
+    /// material's `uv_transform` is not looked at.
     #[must_use]
     pub fn at(&self, entity: Entity, uv: Vec2) -> Option<CrackPlace> {
         let (local, normal) = self.local(entity, uv)?;

@@ -33,6 +33,7 @@ pub(super) struct HitQueue {
     /// Surfaces with hits whose pictures are loading, each once.
     parked: Vec<Entity>,
     warned: EntityHashSet,
+    has_missed: bool,
 }
 
 impl HitQueue {
@@ -53,6 +54,14 @@ impl HitQueue {
         {
             nearest.energy = (nearest.energy + hit.energy).min(f32::MAX);
             stats.merged += 1;
+        }
+    }
+
+    /// Counts a hit on what is gone. Games hit what goes in the same frame all the time: it is said once, whatever is hit.
+    pub(super) fn miss(&mut self, entity: Entity, stats: &mut CrackStats) {
+        stats.rejected += 1;
+        if !core::mem::replace(&mut self.has_missed, true) {
+            warn!("a hit on {entity} is refused: the entity is gone (other hits on what is gone will only be counted)");
         }
     }
 

@@ -32,14 +32,18 @@ use std::sync::Arc;
 ///
 /// ```
 /// use bevy::prelude::*;
-/// use bevy_crack::prelude::*;
+/// use bevy_crack::{prelude::*, shatter::Anchor};
 ///
 /// fn pane(mut commands: Commands, assets: Res<AssetServer>) {
 ///     commands.spawn((
 ///         Sprite::from_image(assets.load("pane.png")),
 ///         CrackSurface::new(CrackPreset::GLASS),
-///         // What does not touch the frame falls when the cracks of a hit have come to their end.
-///         ShatterCracks { when: ShatterWhen::AtDamage(0.1), ..default() },
+///         // What the lower edge does not hold falls when the cracks of a hit have come to their end.
+///         ShatterCracks {
+///             when: ShatterWhen::AtDamage(0.1),
+///             anchor: Anchor::Sides([false, false, false, true]),
+///             ..default()
+///         },
 ///     ));
 /// }
 ///

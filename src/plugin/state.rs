@@ -78,7 +78,8 @@ pub struct CellClosed {
 }
 
 /// The cracks of a surface have come to an end, and all of them are shown: once after a hit, however often a
-/// [`CrackClock`](super::CrackClock) runs over the end.
+/// [`CrackClock`](super::CrackClock) runs over the end. A hit that widens what is there already is one of them: under hammering this
+/// comes again and again.
 #[derive(EntityEvent, Reflect, Clone, Copy, Debug, PartialEq)]
 #[reflect(Event)]
 pub struct CrackFinished {

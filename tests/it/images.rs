@@ -634,6 +634,51 @@ fn t7_hits_wait_until_the_picture_is_there() {
     assert_eq!(counts(&app).rejected, 0);
 }
 
+/// A mesh in a file: any byte.
+#[derive(TypePath)]
+struct QuadLoader(Gate);
+
+impl AssetLoader for QuadLoader {
+    type Asset = Mesh;
+    type Settings = ();
+    type Error = std::io::Error;
+
+    async fn load(&self, _: &mut dyn Reader, (): &(), _: &mut LoadContext<'_>) -> Result<Mesh, std::io::Error> {
+        self.0.pass().await;
+        Ok(Mesh::from(Rectangle::new(2.0, 1.0)))
+    }
+
+    fn extensions(&self) -> &[&str] {
+        &["quad"]
+    }
+}
+
+#[test]
+fn t7_hits_wait_until_the_mesh_is_there() {
+    let (mut app, dir, gate) = gated_app();
+    app.init_asset::<Mesh>().init_asset::<ColorMaterial>().register_asset_loader(QuadLoader(gate.clone()));
+    dir.insert_asset(Path::new("wall.quad"), vec![0]);
+    let image = add(&mut app, picture(UVec2::splat(24)));
+    let material = add(&mut app, ColorMaterial::from(image));
+    let mesh = app.world().resource::<AssetServer>().load("gated://wall.quad");
+    let shown = (Mesh2d(mesh), MeshMaterial2d(material), Transform::default());
+    let entity = app.world_mut().spawn((shown, CrackSurface::default())).id();
+    step(&mut app);
+    let heard = warnings(|| {
+        for i in 1..=5 {
+            hit(&mut app, CrackHit::world(entity, Vec3::new(0.1 * i as f32, 0.0, 0.0)));
+            let stats = step(&mut app);
+            assert_eq!((stats.queued, stats.rejected), (i, 0), "{stats:?}");
+            assert_eq!(state(&app, entity).status, CrackStatus::Waiting);
+        }
+    });
+    assert!(heard.is_empty(), "nothing is wrong: {heard:?}");
+    gate.open();
+    wait_for(&mut app, "the mesh", |app| counts(app).queued == 0);
+    settle(&mut app, entity);
+    assert_eq!(counts(&app).rejected, 0);
+}
+
 #[test]
 fn t8_a_picture_that_does_not_load_fails_with_its_path_and_again_has_its_chance() {
     let (mut app, dir, gate) = gated_app();
