@@ -3,7 +3,7 @@
 //! `cargo bench --bench frame` builds the engine as games ship it; with `--profile dev` the build that `cargo test` uses serves.
 //! `growing/*`: 100 surfaces of 512 x 512 that were hit at once, one step a frame each; the time of an idle frame of the same
 //! app is taken off. "10,000 ...": a frame with cracked surfaces of 32 x 32 that have come to an end, in turns with one with
-//! plain sprites. "only ...": parts of the first that no program could do without. `baking`: what of each frame the crate's systems
+//! plain sprites. "... first hits": on surfaces that show the same picture. "only ...": parts of the first that no program could do without. `baking`: what of each frame the crate's systems
 //! take while guided cracks are baked, 60 frames a second, from the first frame to ten after the last crack; `front`, `widen`: while they
 //! appear within a second. `shards/*`: what
 //! the crate's own systems take of the main thread in the three frames in which a pane becomes 500 shards for the first time, 60 a second
@@ -49,6 +49,8 @@ const SIDE: u32 = 512;
 const BAKES: usize = 8;
 /// Growing frames that are measured, after the one in which the textures are made.
 const FRAMES: u32 = 12;
+/// Surfaces that are hit for the first time, all at once.
+const FIRST_HITS: u64 = 300;
 /// Runs of which each frame is taken at its best.
 const RUNS: usize = 8;
 
@@ -289,6 +291,32 @@ fn budgeted_frames() -> Frames {
             return systems;
         }
     }
+}
+
+/// First hits on surfaces that show the same picture, all sent at once, under the default budget: how many frames they take, and the
+/// systems for each.
+fn first_hits(resolution: CrackResolution, name: &str) {
+    let mut app = app();
+    measure_systems(&mut app);
+    app.insert_resource(CrackBudget { max_texture_bytes: 1 << 34, ..default() });
+    let image = app.world_mut().resource_mut::<Assets<Image>>().add(picture(SIDE));
+    let surfaces: Vec<Entity> = (0..FIRST_HITS)
+        .map(|seed| {
+            let surface = CrackSurface::new(CrackPreset::CONCRETE).with_seed(seed);
+            let sprite = Sprite::from_image(image.clone());
+            app.world_mut().spawn((sprite, CrackSurface { resolution, ..surface })).id()
+        })
+        .collect();
+    (0..3).for_each(|_| app.update());
+    for surface in surfaces {
+        app.world_mut().trigger(CrackHit::uv(surface, Vec2::splat(0.5)));
+    }
+    let mut costs = Costs::default();
+    while costs.times.is_empty() || app.world().resource::<CrackStats>().queued > 0 {
+        costs.measure(&mut app, 1);
+    }
+    let each = costs.systems.iter().sum::<Duration>().as_secs_f64() * 1e3 / FIRST_HITS as f64;
+    println!("{FIRST_HITS} first hits, textures {name}: {} frames, {each:.3} ms each", costs.times.len());
 }
 
 #[derive(Resource, Default)]
@@ -667,6 +695,10 @@ fn frame(c: &mut Criterion) {
     }
     let budgeted = percentiles(&budgeted_frames(), Run::OnThreads);
     println!("growing, the systems under the default budget: {budgeted}");
+    for _ in 0..3 {
+        first_hits(CrackResolution::Fixed(UVec2::splat(128)), "of 128 x 128");
+        first_hits(CrackResolution::Picture, "of 512 x 512");
+    }
     let mut group = c.benchmark_group("growing");
     group.sample_size(10);
     group.bench_function("100 surfaces", |b| {
