@@ -568,26 +568,35 @@ impl Gate {
     }
 }
 
-/// A picture in a file: width, height, then one byte for all texels.
+/// Makes assets of files, when the gate is open.
 #[derive(TypePath)]
-struct FlatLoader(Gate);
+struct GatedLoader<A: Asset> {
+    gate: Gate,
+    extension: [&'static str; 1],
+    make: fn(&[u8]) -> Option<A>,
+}
 
-impl AssetLoader for FlatLoader {
-    type Asset = Image;
+impl<A: Asset> AssetLoader for GatedLoader<A> {
+    type Asset = A;
     type Settings = ();
     type Error = std::io::Error;
 
-    async fn load(&self, reader: &mut dyn Reader, (): &(), _: &mut LoadContext<'_>) -> Result<Image, std::io::Error> {
+    async fn load(&self, reader: &mut dyn Reader, (): &(), _: &mut LoadContext<'_>) -> Result<A, std::io::Error> {
         let mut bytes = Vec::new();
         reader.read_to_end(&mut bytes).await?;
-        self.0.pass().await;
-        let [width, height, shade] = bytes[..] else { return Err(std::io::Error::other("no picture")) };
-        Ok(solid(UVec2::new(u32::from(width), u32::from(height)), [shade, shade, shade, 255]))
+        self.gate.pass().await;
+        (self.make)(&bytes).ok_or_else(|| std::io::Error::other("no such file"))
     }
 
     fn extensions(&self) -> &[&str] {
-        &["flat"]
+        &self.extension
     }
+}
+
+/// A picture in a file: width, height, then one byte for all texels.
+fn flat_picture(bytes: &[u8]) -> Option<Image> {
+    let &[width, height, shade] = bytes else { return None };
+    Some(solid(UVec2::new(u32::from(width), u32::from(height)), [shade, shade, shade, 255]))
 }
 
 /// An app whose files lie in memory, and come when the gate is opened.
@@ -597,7 +606,7 @@ fn gated_app() -> (App, Dir, Gate) {
     let mut app = App::new();
     app.register_asset_source("gated", AssetSourceBuilder::new(move || Box::new(reader.clone())));
     app.add_plugins((MinimalPlugins, TransformPlugin, AssetPlugin::default(), ImagePlugin::default(), CrackPlugins));
-    app.register_asset_loader(FlatLoader(gate.clone()));
+    app.register_asset_loader(GatedLoader { gate: gate.clone(), extension: ["flat"], make: flat_picture });
     start(&mut app);
     single_threaded(&mut app);
     (app, dir, gate)
@@ -634,29 +643,12 @@ fn t7_hits_wait_until_the_picture_is_there() {
     assert_eq!(counts(&app).rejected, 0);
 }
 
-/// A mesh in a file: any byte.
-#[derive(TypePath)]
-struct QuadLoader(Gate);
-
-impl AssetLoader for QuadLoader {
-    type Asset = Mesh;
-    type Settings = ();
-    type Error = std::io::Error;
-
-    async fn load(&self, _: &mut dyn Reader, (): &(), _: &mut LoadContext<'_>) -> Result<Mesh, std::io::Error> {
-        self.0.pass().await;
-        Ok(Mesh::from(Rectangle::new(2.0, 1.0)))
-    }
-
-    fn extensions(&self) -> &[&str] {
-        &["quad"]
-    }
-}
-
 #[test]
 fn t7_hits_wait_until_the_mesh_is_there() {
     let (mut app, dir, gate) = gated_app();
-    app.init_asset::<Mesh>().init_asset::<ColorMaterial>().register_asset_loader(QuadLoader(gate.clone()));
+    let make = |_: &[u8]| Some(Mesh::from(Rectangle::new(2.0, 1.0)));
+    app.init_asset::<Mesh>().init_asset::<ColorMaterial>();
+    app.register_asset_loader(GatedLoader { gate: gate.clone(), extension: ["quad"], make });
     dir.insert_asset(Path::new("wall.quad"), vec![0]);
     let image = add(&mut app, picture(UVec2::splat(24)));
     let material = add(&mut app, ColorMaterial::from(image));
