@@ -3,7 +3,7 @@
 //! `cargo bench --bench frame` builds the engine as games ship it; with `--profile dev` the build that `cargo test` uses serves.
 //! `growing/*`: 100 surfaces of 512 x 512 that were hit at once, one step a frame each; the time of an idle frame of the same
 //! app is taken off. "10,000 ...": a frame with cracked surfaces of 32 x 32 that have come to an end, in turns with one with
-//! plain sprites. "... first hits": on surfaces that show the same picture. "only ...": parts of the first that no program could do without. `baking`: what of each frame the crate's systems
+//! plain sprites. "a first hit": on a surface with a picture of its own. "... first hits": on surfaces that show the same picture. "only ...": parts of the first that no program could do without. `baking`: what of each frame the crate's systems
 //! take while guided cracks are baked, 60 frames a second, from the first frame to ten after the last crack; `front`, `widen`: while they
 //! appear within a second. `shards/*`: what
 //! the crate's own systems take of the main thread in the three frames in which a pane becomes 500 shards for the first time, 60 a second
@@ -278,19 +278,60 @@ fn growing_frames() -> Costs {
 }
 
 /// The main world's systems in each frame from the hits to the last crack, under the default budget.
-fn budgeted_frames() -> Frames {
+fn budgeted_frames(run: Run) -> Frames {
     let (mut app, _) = growing(CrackBudget { max_texture_bytes: 1 << 34, ..default() });
+    run.arrange(&mut app);
     let mut systems = Vec::new();
     loop {
         let mut frame = Costs::default();
         frame.measure(&mut app, 1);
-        systems.extend(frame.systems.into_iter().zip(frame.cpu).map(<[Duration; 2]>::from));
+        // The tasks beside the frames have the time that they have in a game.
+        std::thread::sleep((Duration::from_secs(1) / 60).saturating_sub(frame.times[0]));
+        let OurSystems(_, time, cpu) = *app.world().resource::<OurSystems>();
+        systems.push([time, cpu]);
         let mut states = app.world_mut().query::<&CrackState>();
         let is_done = states.iter(app.world()).all(|state| state.status == CrackStatus::Done);
         if is_done && states.iter(app.world()).count() == SURFACES {
             return systems;
         }
     }
+}
+
+/// A first hit on a sprite of this size with a picture of its own, 60 frames a second, under the default budget: how much longer than an
+/// idle frame the longest one is, what the systems take of theirs, and after how many frames a crack shows.
+fn first_hit(side: u32) {
+    let (mut longest, mut systems, mut frames) = (Vec::new(), Vec::new(), Vec::new());
+    for seed in 0..5 {
+        let mut app = app();
+        measure_systems(&mut app);
+        app.insert_resource(CrackBudget { max_texture_bytes: 1 << 34, ..default() });
+        let image = app.world_mut().resource_mut::<Assets<Image>>().add(picture(side));
+        let surface = CrackSurface::new(CrackPreset::CONCRETE).with_seed(seed);
+        let entity = app.world_mut().spawn((Sprite::from_image(image), surface)).id();
+        let pace = |app: &mut App, costs: &mut Costs| {
+            costs.measure(app, 1);
+            let frame = costs.times.last().copied().unwrap_or_default();
+            std::thread::sleep((Duration::from_secs(1) / 60).saturating_sub(frame));
+        };
+        let (mut idle, mut hit) = (Costs::default(), Costs::default());
+        (0..20).for_each(|_| pace(&mut app, &mut idle));
+        app.world_mut().trigger(CrackHit::uv(entity, Vec2::splat(0.5)));
+        let shows = |app: &App| app.world().get::<CrackState>(entity).is_some_and(|state| state.nodes > 0);
+        while !shows(&app) {
+            pace(&mut app, &mut hit);
+        }
+        frames.push(hit.times.len());
+        longest.extend(hit.times.iter().max().map(|time| time.saturating_sub(median(&idle.times))));
+        systems.extend(hit.systems.iter().max().copied());
+    }
+    frames.sort_unstable();
+    println!(
+        "a first hit, {side} x {side}: the longest frame over an idle one {}; the systems {}; a crack shows in frame {} to {}",
+        least_and_median(longest),
+        least_and_median(systems),
+        frames[0],
+        frames[frames.len() - 1]
+    );
 }
 
 /// First hits on surfaces that show the same picture, all sent at once, under the default budget: how many frames they take, and the
@@ -489,10 +530,18 @@ fn many(cracked: bool) -> App {
 /// How the systems of a frame run.
 #[derive(Clone, Copy, PartialEq)]
 enum Run {
-    /// One after the other, so that work is measured, and not what they wait for threads that a bake keeps busy.
+    /// One after the other, so that work is measured, and not what they wait for threads that tasks keep busy.
     InARow,
     /// As the engine has them.
     OnThreads,
+}
+
+impl Run {
+    fn arrange(self, app: &mut App) {
+        if self == Self::InARow {
+            app.edit_schedule(PostUpdate, |schedule| _ = schedule.set_executor(SingleThreadedExecutor::new()));
+        }
+    }
 }
 
 /// Time and CPU time of the crate's systems in each frame.
@@ -502,9 +551,7 @@ type Frames = Vec<[Duration; 2]>;
 fn baking_frames(side: u32, appearance: GuidedAppearance, run: Run) -> ([Frames; 2], usize) {
     let mut app = app();
     measure_systems(&mut app);
-    if run == Run::InARow {
-        app.edit_schedule(PostUpdate, |schedule| _ = schedule.set_executor(SingleThreadedExecutor::new()));
-    }
+    run.arrange(&mut app);
     app.insert_resource(CrackBudget { max_texture_bytes: 1 << 34, ..default() });
     let cross = |at: UVec2| f32::from(u8::from((24..40).contains(&at.x) || (24..40).contains(&at.y)));
     let texels = (0..64 * 64).map(|i| cross(UVec2::new(i % 64, i / 64))).collect();
@@ -568,9 +615,7 @@ fn percentiles(frames: &Frames, run: Run) -> String {
 fn panes(count: usize, run: Run) -> (App, Vec<Entity>) {
     let mut app = app();
     measure_shards(&mut app);
-    if run == Run::InARow {
-        app.edit_schedule(PostUpdate, |schedule| _ = schedule.set_executor(SingleThreadedExecutor::new()));
-    }
+    run.arrange(&mut app);
     app.world_mut().resource_mut::<CrackBudget>().max_shards = 10_000;
     let panes: Vec<Entity> = (0..count as u64)
         .map(|seed| {
@@ -693,8 +738,11 @@ fn frame(c: &mut Criterion) {
     if let Some(times) = whole.checked_div(bytes) {
         println!("bytes a frame: {bytes}, whole images: {whole}, {times} times fewer");
     }
-    let budgeted = percentiles(&budgeted_frames(), Run::OnThreads);
-    println!("growing, the systems under the default budget: {budgeted}");
+    for (name, run) in [("in a row", Run::InARow), ("on threads", Run::OnThreads)] {
+        let budgeted = percentiles(&budgeted_frames(run), run);
+        println!("growing under the default budget, systems {name}: {budgeted}");
+    }
+    [256, 512, 1024, 2048].into_iter().for_each(first_hit);
     for _ in 0..3 {
         first_hits(CrackResolution::Fixed(UVec2::splat(128)), "of 128 x 128");
         first_hits(CrackResolution::Picture, "of 512 x 512");

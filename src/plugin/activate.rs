@@ -1,36 +1,29 @@
 //! From hits to cracks: a surface gets its growth and textures at its first hit.
 
 use super::{
-    CrackBudget, CrackClock, CrackError, CrackFailed, CrackMaps, CrackResolution, CrackState, CrackStats, CrackStatus,
-    CrackSurface, CrackTextures, HitPoint,
+    CrackBudget, CrackClock, CrackError, CrackFailed, CrackState, CrackStats, CrackStatus, CrackTextures, HitPoint,
     budget::FrameClock,
-    carrier::{self, Carrier, Found, Kind, Shown, Untouched},
-    mask,
-    picture::{self, BaseKey, BasePicture, BasePictures, Space},
+    carrier::{self, Found, Kind},
+    mask, picture,
+    plan::{Blank, Draft, Plan, Readings},
+    prepare,
     queue::{HitQueue, QueuedHit},
     shards::Struck,
-    surfaces::{Active, Ground, Surfaces},
+    surfaces::{Active, Surfaces},
     textures::{self, TextureKind},
     upload::Uploads,
 };
-use crate::{
-    CrackPreset,
-    growth::{CrackGrowth, HitOutcome},
-    paint::LookTable,
-    pattern::SurfaceFrame,
-    raster::{DepthField, TexelRect},
-};
-use bevy::{image::ImageSampler, prelude::*, render::renderer::RenderDevice};
-use std::sync::Arc;
+use crate::{CrackPreset, growth::HitOutcome, paint::LookTable, pattern::SurfaceFrame, raster::TexelRect};
+use bevy::prelude::*;
 
 /// Share of the frame's budget after which no further hit is applied.
 const SHARE: f32 = 0.4;
 
-/// Longer side of the textures of a surface without a picture, texels.
-const DEFAULT_SIDE: f32 = 512.0;
+/// So many surfaces in line are looked at that may be made beside the frames.
+const MAX_OTHERS: usize = 16;
 
-/// Textures are not made coarser than this to fit the budget, texels.
-const MIN_SIDE: u32 = 64;
+/// So many surfaces that are not ready are looked at when there is no time.
+const MAX_LOOKS: usize = 64;
 
 /// The largest depth of parallax that still looks like depth, in units of the texture.
 const MAX_PARALLAX: f32 = 0.1;
@@ -39,22 +32,47 @@ const MAX_PARALLAX: f32 = 0.1;
 pub(super) fn apply_hits(world: &mut World) {
     let timer = world.resource::<FrameClock>().start(world.resource::<CrackBudget>(), SHARE);
     world.resource_mut::<HitQueue>().unpark();
+    let (mut looks, mut has_worked) = (0, false);
     while let Some(entity) = world.resource::<HitQueue>().next() {
         // A hit beside a surface makes nothing for it.
-        let ready = if is_missed(world, entity) { Ok(true) } else { make_ready(world, entity) };
+        let ready = if is_missed(world, entity) { Ok(true) } else { prepare::make_ready(world, entity) };
+        let is_ready = !matches!(ready, Ok(false));
         match ready {
+            // Observers may have healed it.
+            _ if world.resource::<HitQueue>().next() != Some(entity) => {}
             Ok(true) => apply_next(world, entity),
             Ok(false) => {
                 set_status(world, entity, CrackStatus::Waiting);
                 world.resource_mut::<HitQueue>().park();
+                looks += 1;
             }
             Err(error) => fail(world, entity, error),
         }
-        if timer.is_over() {
+        has_worked |= is_ready;
+        // Those that wait are not to keep others from the one hit that every frame has time for.
+        if timer.is_over() && (has_worked || looks >= MAX_LOOKS) {
+            make_others(world);
             break;
         }
     }
     world.resource_mut::<FrameClock>().stop(&timer);
+}
+
+/// Has surfaces made beside the frames for whose hits this one has no time.
+fn make_others(world: &mut World) {
+    // The first of them comes in the next frame in any case.
+    let others: Vec<Entity> = world.resource::<HitQueue>().turns().skip(1).take(MAX_OTHERS).collect();
+    for entity in others {
+        // An observer of another may have healed it.
+        if world.resource::<HitQueue>().first(entity).is_none() || is_missed(world, entity) {
+            continue;
+        }
+        match prepare::make_beside(world, entity) {
+            Ok(true) => set_status(world, entity, CrackStatus::Waiting),
+            Ok(false) => {}
+            Err(error) => fail(world, entity, error),
+        }
+    }
 }
 
 /// Applies the first hit of the surface in turn, which is ready.
@@ -144,6 +162,7 @@ pub(super) fn set_status(world: &mut World, entity: Entity, status: CrackStatus)
 
 /// Gives up a surface: refuses its hits and says why, once for each cause.
 pub(super) fn fail(world: &mut World, entity: Entity, error: CrackError) {
+    prepare::cancel(world, entity);
     world.resource_scope(|world, mut queue: Mut<HitQueue>| {
         queue.purge(entity, &mut world.resource_mut::<CrackStats>());
     });
@@ -157,32 +176,22 @@ pub(super) fn fail(world: &mut World, entity: Entity, error: CrackError) {
 }
 
 /// Makes growth and textures for a surface that has none; `false` if its pictures are not there yet.
-pub(super) fn make_ready(world: &mut World, entity: Entity) -> Result<bool, CrackError> {
+pub(super) fn make_ready_now(world: &mut World, entity: Entity) -> Result<bool, CrackError> {
     if world.resource::<Surfaces>().active.contains_key(&entity) {
         return Ok(true);
     }
-    let Some(untouched) = carrier::untouched(world, entity)? else { return Ok(false) };
-    let Untouched { surface, preset, kind, shown } = untouched;
-    let Some(draft) = draft(world, &surface, &shown, 0)? else { return Ok(false) };
-    let Some(mask) = mask::resolve(world, &surface, &shown, &draft)? else { return Ok(false) };
-    let frame = frame(draft.plan.rect)?;
-    let mut growth = CrackGrowth::new(preset.growth.clone(), frame.extent(), surface.seed)
-        .map_err(|error| CrackError::Preset { reason: error.to_string() })?;
-    let look = look(&preset, frame)?;
-    if surface.alpha_mask {
-        growth.set_density(draft.base.density(draft.plan.rect));
-    }
-    let mut field = DepthField::new(frame);
-    field.forbid(&mask);
-    growth.set_mask(mask);
+    Plan::new(world, entity)?.map_or(Ok(false), |plan| make_now(world, entity, plan))
+}
+
+/// Makes growth and textures in this frame; `false` if its mask is not there yet.
+pub(super) fn make_now(world: &mut World, entity: Entity, plan: Plan) -> Result<bool, CrackError> {
+    let draft = plan.pictures.clone().draft(world, &plan.shown)?;
+    let Some(mask) = mask::resolve(world, &plan.surface, &plan.shown, &draft)? else { return Ok(false) };
+    let read = Readings { base: draft.base.clone(), mask };
+    let Blank { growth, field, look } = Blank::new(&plan.surface, &plan.preset, &read, plan.pictures.rect)?;
     let textures = make_textures(world, &draft, None)?;
-    let Draft { base, plan: PicturePlan { rect, bytes, .. } } = draft;
-    let active = Active::new(
-        Ground { surface, preset, look, base, textures, carrier: Carrier::new(kind, shown), bytes, rect },
-        growth,
-        field,
-    );
-    install(world, entity, active);
+    let ground = plan.ground(world, read, look, textures);
+    install(world, entity, Active::new(ground, growth, field));
     Ok(true)
 }
 
@@ -196,143 +205,21 @@ pub(super) fn install(world: &mut World, entity: Entity, mut active: Active) {
     surfaces.bytes += active.bytes;
     surfaces.own(entity, &active);
     surfaces.active.insert(entity, active);
+    tell_textures(world, entity);
 }
 
 /// Makes the entity show the surface's textures.
 pub(super) fn attach(world: &mut World, entity: Entity, active: &mut Active) {
     let relief = (active.preset.look.relief / active.field.frame.extent().max_element()).min(MAX_PARALLAX);
     (active.carrier.kind.attach)(world, entity, &mut active.carrier, &active.textures, relief);
-    if let Ok(mut entity) = world.get_entity_mut(entity) {
-        entity.insert(active.textures.clone());
+}
+
+/// Gives the entity the component that names its textures. Observers and commands that wait run then, and may heal the surface.
+pub(super) fn tell_textures(world: &mut World, entity: Entity) {
+    let textures = world.resource::<Surfaces>().active.get(&entity).map(|active| active.textures.clone());
+    if let (Some(textures), Ok(mut entity)) = (textures, world.get_entity_mut(entity)) {
+        entity.insert(textures);
     }
-}
-
-/// The pictures of a surface, ready to be cracked.
-pub(super) struct Draft {
-    pub(super) base: Arc<BasePicture>,
-    pub(super) plan: PicturePlan,
-}
-
-/// What the pictures of a surface will be.
-#[derive(Clone)]
-pub(super) struct PicturePlan {
-    pub(super) size: UVec2,
-    /// The part of the image that is shown.
-    pub(super) rect: TexelRect,
-    /// Bytes of the textures and of what belongs to them.
-    pub(super) bytes: u64,
-    pub(super) sampler: ImageSampler,
-    pub(super) maps: CrackMaps,
-}
-
-impl PicturePlan {
-    /// The pictures, read.
-    pub(super) fn read(&self, [diffuse, normal, depth]: [Option<&Image>; 3]) -> Result<BasePicture, CrackError> {
-        let n = self.size.x as usize * self.size.y as usize;
-        let read =
-            |image: Option<&Image>| image.map(|image| picture::read(image, Space::Linear, self.size)).transpose();
-        let diffuse = match diffuse {
-            Some(image) => picture::read_shown(image, self.size)?,
-            None => vec![255; n * 4],
-        };
-        let normal = if self.maps.normal { read(normal)? } else { None };
-        let depth = if self.maps.depth { read(depth)?.map(|rgba| picture::red(&rgba)) } else { None };
-        Ok(BasePicture::new(self.size, diffuse, normal, depth))
-    }
-}
-
-/// Plans the pictures of a surface; `None` if they are not there yet. `owned` bytes of the budget are its own already.
-pub(super) fn plan_pictures(
-    world: &World,
-    surface: &CrackSurface,
-    shown: &Shown,
-    owned: u64,
-) -> Result<Option<PicturePlan>, CrackError> {
-    let images = world.get_resource::<Assets<Image>>().ok_or(CrackError::NoImages)?;
-    for picture in shown.pictures() {
-        if !picture::is_loaded(world, picture)? {
-            return Ok(None);
-        }
-    }
-    let maps = CrackMaps {
-        diffuse: surface.write.diffuse && shown.maps.diffuse,
-        normal: surface.write.normal && shown.maps.normal,
-        depth: surface.write.depth && shown.maps.depth,
-    };
-    let image = shown.diffuse.as_ref().and_then(|picture| images.get(picture));
-    let size = size(world, surface, shown, image, maps, owned)?;
-    let whole = TexelRect::whole(size);
-    let rect = shown.rect.map_or(whole, |rect| TexelRect { min: rect.min, max: rect.max }.intersect(whole));
-    let sampler = image.map_or(ImageSampler::Default, |image| image.sampler.clone());
-    Ok(Some(PicturePlan { size, rect, bytes: bytes(size, maps), sampler, maps }))
-}
-
-/// Reads the pictures of a surface; `None` if they are not there yet. `owned` as in [`plan_pictures`].
-pub(super) fn draft(
-    world: &mut World,
-    surface: &CrackSurface,
-    shown: &Shown,
-    owned: u64,
-) -> Result<Option<Draft>, CrackError> {
-    let Some(plan) = plan_pictures(world, surface, shown, owned)? else { return Ok(None) };
-    let maps = [(&shown.diffuse, true), (&shown.normal, plan.maps.normal), (&shown.depth, plan.maps.depth)];
-    let maps = maps.map(|(map, is_needed)| map.as_ref().filter(|_| is_needed));
-    let key = BaseKey { pictures: maps.map(|map| map.map(Handle::id)), size: plan.size };
-    let base = world.resource_scope(|world, mut bases: Mut<BasePictures>| {
-        let images = world.get_resource::<Assets<Image>>().ok_or(CrackError::NoImages)?;
-        bases.get(key, || plan.read(maps.map(|map| map.and_then(|picture| images.get(picture)))))
-    })?;
-    Ok(Some(Draft { base, plan }))
-}
-
-/// Bytes of the textures on the CPU and the GPU, the base picture, as if no other surface had the same, and the depth field.
-fn bytes(size: UVec2, maps: CrackMaps) -> u64 {
-    let texel = 4 + 2 + 8 * u64::from(maps.diffuse) + 8 * u64::from(maps.normal) + 2 * u64::from(maps.depth);
-    u64::from(size.x) * u64::from(size.y) * texel
-}
-
-/// Size of the textures: what is asked for, made smaller until it fits device and budget.
-fn size(
-    world: &World,
-    surface: &CrackSurface,
-    shown: &Shown,
-    image: Option<&Image>,
-    maps: CrackMaps,
-    owned: u64,
-) -> Result<UVec2, CrackError> {
-    let own_size = match image {
-        Some(image) => picture::readable_size(image)?,
-        None => {
-            let proportions = shown.proportions.abs();
-            let size = proportions * (DEFAULT_SIDE / proportions.max_element());
-            if size.is_finite() { size.as_uvec2().max(UVec2::ONE) } else { UVec2::splat(512) }
-        }
-    };
-    let mut size = match surface.resolution {
-        CrackResolution::Fixed(size) if shown.rect.is_none() => size,
-        _ => own_size,
-    };
-    if size.min_element() == 0 {
-        return Err(CrackError::Size { width: size.x, height: size.y });
-    }
-    let budget = world.resource::<CrackBudget>();
-    let device = world.get_resource::<RenderDevice>().map_or(u32::MAX, |d| d.limits().max_texture_dimension_2d);
-    let max_side = budget.max_side.clamp(1, device.clamp(1, crate::pattern::MAX_SIDE));
-    if size.max_element() > max_side {
-        if shown.rect.is_some() {
-            return Err(CrackError::Size { width: size.x, height: size.y });
-        }
-        let scale = f64::from(max_side) / f64::from(size.max_element());
-        size = (size.as_dvec2() * scale).as_uvec2().clamp(UVec2::ONE, UVec2::splat(max_side));
-    }
-    let left = budget.max_texture_bytes.saturating_sub(world.resource::<Surfaces>().bytes.saturating_sub(owned));
-    while bytes(size, maps) > left {
-        if shown.rect.is_some() || size.max_element() <= MIN_SIDE {
-            return Err(CrackError::TextureBudget { needed: bytes(size, maps), left });
-        }
-        size = (size / 2).max(UVec2::ONE);
-    }
-    Ok(size)
 }
 
 /// Where the cracks of a surface lie that shows `rect`.

@@ -4,15 +4,13 @@ mod begin;
 mod finish;
 mod job;
 mod land;
-mod read;
 
 use super::{
-    BakeProgress, CrackBaked, CrackBudget, CrackError, CrackFailed, CrackSurface, CrackTextures,
-    activate::PicturePlan,
+    BakeProgress, CrackBaked, CrackBudget, CrackError, CrackFailed,
     budget::FrameClock,
-    carrier::{self, Found, Kind, Shown},
+    plan::Plan,
+    read::{self, Read, Reading},
 };
-use crate::CrackPreset;
 use begin::begin;
 use bevy::{
     prelude::*,
@@ -21,7 +19,6 @@ use bevy::{
 use finish::{Finish, Finished, Next};
 use job::{Lines, MAPPED, MapJob};
 use land::{land, order};
-use read::{Read, Reading};
 use std::{
     panic::{AssertUnwindSafe, catch_unwind},
     sync::{
@@ -72,27 +69,6 @@ impl Work {
     }
 }
 
-/// A surface that has not cracked, as it was when its pictures were read.
-struct Plan {
-    surface: CrackSurface,
-    preset: CrackPreset,
-    kind: &'static Kind,
-    shown: Shown,
-    pictures: PicturePlan,
-    /// Its textures, without texels.
-    textures: Option<CrackTextures>,
-    /// Whether a picture has changed since.
-    is_outdated: bool,
-}
-
-impl Plan {
-    /// Whether the entity still shows what it showed.
-    fn is_current(&self, world: &World, entity: Entity) -> bool {
-        world.get::<CrackSurface>(entity) == Some(&self.surface)
-            && matches!(carrier::inspect(world, entity), (_, Found::Shown(shown)) if *shown == self.shown)
-    }
-}
-
 impl Bakes {
     /// Begins a bake anew.
     pub(super) fn want(&mut self, entity: Entity) {
@@ -107,10 +83,10 @@ impl Bakes {
         self.cancelled.push(entity);
     }
 
-    /// The picture is another one now.
-    pub(super) fn forget_picture(&mut self, picture: AssetId<Image>) {
+    /// What was read of the picture before this frame is another one now.
+    pub(super) fn forget_picture(&mut self, picture: AssetId<Image>, frame: u64) {
         for plan in self.list.iter_mut().filter_map(|(_, bake)| bake.plan.as_mut()) {
-            plan.is_outdated = plan.is_outdated || plan.shown.pictures().any(|shown| shown.id() == picture);
+            plan.forget_picture(picture, frame);
         }
     }
 
@@ -195,9 +171,17 @@ fn work(mut job: Job, line: &Line, home: ThreadId) -> Outcome {
 
 /// A panic becomes an error: in a task it would end the app.
 pub(super) fn guarded<T>(run: impl FnOnce() -> Result<T, CrackError>) -> Result<T, CrackError> {
+    guarded_as(|reason| CrackError::Bake { reason }, run)
+}
+
+/// The same, of another kind.
+pub(super) fn guarded_as<T>(
+    error: impl FnOnce(String) -> CrackError,
+    run: impl FnOnce() -> Result<T, CrackError>,
+) -> Result<T, CrackError> {
     catch_unwind(AssertUnwindSafe(run)).unwrap_or_else(|panic| {
         let text = panic.downcast_ref::<&str>().copied().or(panic.downcast_ref::<String>().map(String::as_str));
-        Err(CrackError::Bake { reason: format!("it panicked: {}", text.unwrap_or("unknown")) })
+        Err(error(format!("it panicked: {}", text.unwrap_or("unknown"))))
     })
 }
 

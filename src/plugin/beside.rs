@@ -29,6 +29,15 @@ impl<W: Send + 'static, T: Send + 'static> Beside<W, T> {
         }
     }
 
+    /// What comes of it, once, if a task has done it; or if no thread has begun it and it `is_late`.
+    pub(super) fn take_if_done(&mut self, is_late: bool) -> Option<T> {
+        match (self.is_done(), is_late) {
+            (true, _) => self.task.take().and_then(block_on),
+            (false, true) => self.take_back().map(self.run),
+            (false, false) => None,
+        }
+    }
+
     /// Whether a task has done it.
     pub(super) fn is_done(&self) -> bool {
         self.task.as_ref().is_some_and(Task::is_finished)
@@ -79,5 +88,32 @@ mod tests {
             *if who == thread::current().id() { &mut here } else { &mut there } += 1;
         }
         assert!(there >= 100 && here + there == 200, "{here} {there}");
+    }
+
+    #[test]
+    fn what_is_late_is_done_here_unless_a_thread_has_begun_it() {
+        AsyncComputeTaskPool::get_or_init(TaskPool::new);
+        for is_late in [false, true] {
+            let (free, wait) = mpsc::channel::<()>();
+            let (begin, begun) = mpsc::channel();
+            let mut beside = Beside::start((wait, begin), |(wait, begin)| {
+                begin.send(()).expect("someone listens");
+                wait.recv().is_err()
+            });
+            begun.recv().expect("it begins");
+            assert_eq!(beside.take_if_done(is_late), None, "a thread is at it");
+            drop(free);
+            while !beside.is_done() {
+                thread::yield_now();
+            }
+            assert_eq!(beside.take_if_done(is_late), Some(true));
+            assert_eq!(beside.take_if_done(is_late), None, "once");
+        }
+        // No thread will ever begin this one.
+        let work = Arc::new(Mutex::new(Some(4)));
+        let mut beside = Beside { work, run: |number| 2 * number, task: None };
+        assert_eq!(beside.take_if_done(false), None);
+        assert_eq!(beside.take_if_done(true), Some(8));
+        assert_eq!(beside.take_if_done(true), None);
     }
 }

@@ -27,6 +27,14 @@ impl Shown {
     pub(super) fn pictures(&self) -> impl Iterator<Item = &Handle<Image>> {
         [&self.diffuse, &self.normal, &self.depth].into_iter().flatten()
     }
+
+    /// Whether the same pictures are shown, as large a part of them, wherever that lies: another frame of an animation.
+    pub(super) fn is_like(&self, other: &Self) -> bool {
+        let moved = Self { rect: other.rect, proportions: other.proportions, ..self.clone() };
+        let is_as_large = self.rect.map(|rect| rect.size()) == other.rect.map(|rect| rect.size());
+        // Proportions make no difference to a picture.
+        moved == *other && is_as_large && (self.diffuse.is_some() || self.proportions == other.proportions)
+    }
 }
 
 /// What a look at an entity finds.

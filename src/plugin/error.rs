@@ -83,6 +83,12 @@ pub enum CrackError {
         /// Which one and why.
         reason: String,
     },
+    /// Its textures could not be made.
+    #[error("its textures could not be made: {reason}")]
+    Textures {
+        /// Why.
+        reason: String,
+    },
     /// A parameter of the preset is out of its range.
     #[error("{reason}")]
     Preset {

@@ -3,6 +3,7 @@
 use super::{
     CrackState, CrackStats, CrackTextures, ShatterRequest, bake,
     carrier::{self, Found},
+    prepare::{self, Preparations},
     queue::HitQueue,
     shards::{Request, drop_shards},
     surfaces::Surfaces,
@@ -14,6 +15,14 @@ use bevy::{
 
 /// Commands for surfaces.
 pub trait CrackCommandsExt {
+    /// Makes a surface ready for its first hit: for what is sure to be hit, while a level loads. It has its textures then, which begin
+    /// to be shown when they are complete ([`CrackTextures`] is added in that frame), and takes the memory of a cracked surface; the
+    /// first hit finds all there is to find. Without it the crack of a first hit shows in the frame of the hit on pictures of up to
+    /// 512 x 512 texels, unless many are hit for the first time at once, and some frames later on larger ones: they are made beside the
+    /// frames. Surfaces that are hit come first. Does nothing on entities without a [`CrackSurface`](super::CrackSurface), or with cracks; one that cannot crack says so with
+    /// [`CrackFailed`](super::CrackFailed). Healing takes it back.
+    fn prepare_cracks(&mut self) -> &mut Self;
+
     /// Takes all cracks away, those of [`GuidedCracks`](super::GuidedCracks) too, and all shards and holes: the surface shows its
     /// own pictures again, its textures and its growth are dropped, hits
     /// that wait on it are refused. Does nothing on entities without cracks.
@@ -34,6 +43,16 @@ pub trait CrackCommandsExt {
 }
 
 impl CrackCommandsExt for EntityCommands<'_> {
+    fn prepare_cracks(&mut self) -> &mut Self {
+        let entity = self.id();
+        self.commands().queue(move |world: &mut World| {
+            if let Some(mut preparations) = world.get_resource_mut::<Preparations>() {
+                preparations.want(entity);
+            }
+        });
+        self
+    }
+
     fn heal_cracks(&mut self) -> &mut Self {
         let entity = self.id();
         self.commands().queue(move |world: &mut World| heal(world, entity));
@@ -93,6 +112,7 @@ fn purge(world: &mut World, entity: Entity) {
 /// Drops growth and textures and gives the entity back what it showed before.
 fn forget(world: &mut World, entity: Entity) {
     bake::cancel(world, entity);
+    prepare::cancel(world, entity);
     let Some(mut surfaces) = world.get_resource_mut::<Surfaces>() else { return };
     let Some(mut active) = surfaces.remove(entity) else { return };
     drop_shards(world, entity, &mut active);

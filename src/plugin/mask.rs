@@ -2,9 +2,9 @@
 
 use super::{
     CrackError, CrackSurface,
-    activate::{Draft, PicturePlan},
     carrier::Shown,
     picture::{self, BasePicture, Space},
+    plan::{Draft, PicturePlan},
 };
 use crate::{
     Grid,
@@ -36,6 +36,17 @@ pub enum CrackMaskSource {
         /// What they never enter: where the image is lighter than half.
         forbidden: Option<Handle<Image>>,
     },
+}
+
+impl CrackMaskSource {
+    /// Its images.
+    pub(super) fn images(&self) -> impl Iterator<Item = &Handle<Image>> {
+        let layers = match self {
+            Self::Images { weak, strong, forbidden } => [weak, strong, forbidden].map(Option::as_ref),
+            Self::None | Self::FromPicture => [None; 3],
+        };
+        layers.into_iter().flatten()
+    }
 }
 
 /// The masks of pictures. Made beside the frames: reading a picture takes longer than a frame may.
@@ -74,6 +85,7 @@ impl PictureMasks {
 
     pub(super) fn remember(&mut self, key: Key, mask: &Arc<CrackMask>) {
         self.made.retain(|(known, mask)| *known != key && mask.strong_count() > 0);
+        self.in_work.retain(|(known, _)| *known != key);
         self.made.push((key, Arc::downgrade(mask)));
     }
 
@@ -135,7 +147,7 @@ pub(super) fn resolve(
             Ok(world.resource_mut::<PictureMasks>().get(key, &draft.base))
         }
         CrackMaskSource::Images { weak, strong, forbidden } => {
-            for image in [weak, strong, forbidden].into_iter().flatten() {
+            for image in surface.mask.images() {
                 if !picture::is_loaded(world, image)? {
                     return Ok(None);
                 }

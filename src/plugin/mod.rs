@@ -42,8 +42,11 @@ mod paint;
 mod picture;
 #[cfg(any(feature = "2d", feature = "3d"))]
 mod place;
+mod plan;
+mod prepare;
 mod preset;
 mod queue;
+mod read;
 mod shards;
 #[cfg(feature = "2d")]
 mod sprite;
@@ -157,6 +160,7 @@ impl Plugin for CrackPlugin {
             .init_resource::<picture::BasePictures>()
             .init_resource::<surfaces::Surfaces>()
             .init_resource::<bake::Bakes>()
+            .init_resource::<prepare::Preparations>()
             .add_message::<CrackHit>()
             .add_observer(hit::receive_hit)
             .configure_sets(
@@ -184,6 +188,7 @@ impl Plugin for CrackPlugin {
                         ),
                         watch::update_changed.run_if(watch::any_changed),
                         hit::collect_hits,
+                        prepare::prepare_surfaces.run_if(prepare::any_preparing),
                         activate::apply_hits.run_if(queue::any_queued),
                     )
                         .chain()

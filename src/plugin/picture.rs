@@ -74,15 +74,24 @@ impl BasePictures {
         key: BaseKey,
         read: impl FnOnce() -> Result<BasePicture, CrackError>,
     ) -> Result<Arc<BasePicture>, CrackError> {
-        if let Some(base) = self.0.get(&key).and_then(Weak::upgrade) {
+        if let Some(base) = self.find(key) {
             return Ok(base);
         }
         let base = Arc::new(read()?);
+        self.remember(key, &base);
+        Ok(base)
+    }
+
+    /// The one that is in use.
+    pub(super) fn find(&self, key: BaseKey) -> Option<Arc<BasePicture>> {
+        self.0.get(&key).and_then(Weak::upgrade)
+    }
+
+    pub(super) fn remember(&mut self, key: BaseKey, base: &Arc<BasePicture>) {
         if self.0.len() == self.0.capacity() {
             self.0.retain(|_, base| base.strong_count() > 0);
         }
-        self.0.insert(key, Arc::downgrade(&base));
-        Ok(base)
+        self.0.insert(key, Arc::downgrade(base));
     }
 
     /// The picture is another one now.

@@ -30,7 +30,7 @@ pub(super) struct HitQueue {
     hits: EntityHashMap<VecDeque<QueuedHit>>,
     /// Surfaces with hits that can be worked on, each once.
     turns: VecDeque<Entity>,
-    /// Surfaces with hits whose pictures are loading, each once.
+    /// Surfaces with hits whose pictures are loading or whose textures are being made, each once.
     parked: Vec<Entity>,
     warned: EntityHashSet,
     has_missed: bool,
@@ -91,6 +91,11 @@ impl HitQueue {
     /// The next surface in turn.
     pub(super) fn next(&self) -> Option<Entity> {
         self.turns.front().copied()
+    }
+
+    /// The surfaces in line.
+    pub(super) fn turns(&self) -> impl Iterator<Item = Entity> + '_ {
+        self.turns.iter().copied()
     }
 
     /// Takes the first hit of the surface in turn, which goes to the end of the line.

@@ -42,7 +42,7 @@ pub enum CrackStatus {
     /// Not hit yet, or healed.
     #[default]
     Untouched,
-    /// Hit, but its picture is still loading. The hits wait.
+    /// Hit, but its picture is still loading, or its textures are being made, which takes some frames if they are large. The hits wait.
     Waiting,
     /// Cracks are growing, or a clock has not shown their end yet.
     Growing,

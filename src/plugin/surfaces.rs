@@ -87,6 +87,8 @@ pub(super) struct Active {
     pub(super) is_open: bool,
     /// Whether its pictures have changed since they were read.
     pub(super) is_outdated: bool,
+    /// The frame in which they were read, by [`Surfaces::frame`].
+    pub(super) read_at: u64,
     /// Nodes that were there when tips were last listed.
     pub(super) tips_from: usize,
     pub(super) cells: CellTracker,
@@ -114,12 +116,13 @@ pub(super) struct Ground {
     pub(super) carrier: Carrier,
     pub(super) bytes: u64,
     pub(super) rect: TexelRect,
+    pub(super) read_at: u64,
 }
 
 impl Active {
     /// A surface whose textures show what is in the field.
     pub(super) fn new(ground: Ground, growth: CrackGrowth, field: DepthField) -> Self {
-        let Ground { surface, preset, look, base, textures, carrier, bytes, rect } = ground;
+        let Ground { surface, preset, look, base, textures, carrier, bytes, rect, read_at } = ground;
         let frame = field.frame;
         let mut active = Self {
             growth,
@@ -146,6 +149,7 @@ impl Active {
             is_dirty: false,
             is_open: false,
             is_outdated: false,
+            read_at,
             frozen: None,
             tips_from: 0,
             cells: CellTracker::new(frame.extent()),
@@ -287,6 +291,8 @@ pub(super) struct Surfaces {
     pub(super) sources: HashMap<AssetId<Image>, Vec<Entity>>,
     /// Bytes of all textures.
     pub(super) bytes: u64,
+    /// Number of frames so far.
+    pub(super) frame: u64,
 }
 
 /// The most surfaces that are worked on at once.

@@ -1,6 +1,11 @@
 //! [`CrackTextures`]: a surface's own pictures.
 
-use super::{CrackMaps, picture::BasePicture};
+use super::{
+    CrackMaps,
+    picture::BasePicture,
+    upload::{Staged, Stager, Uploads},
+};
+use crate::raster::TexelRect;
 use bevy::{
     asset::RenderAssetUsages,
     image::ImageSampler,
@@ -83,5 +88,47 @@ impl TextureKind {
         let mut image = Image::new_uninit(extent, TextureDimension::D2, self.format, RenderAssetUsages::default());
         image.sampler = sampler.clone();
         (size.min_element() > 0).then_some(image)
+    }
+}
+
+/// The texels of a texture, and the same where the renderer can read them.
+pub(super) struct Picture {
+    pub(super) texels: Vec<u8>,
+    staged: Option<Staged>,
+}
+
+/// Texels of textures of this size, in the order of [`KINDS`], brought to the renderer if there is one.
+pub(super) fn stage(texels: [Option<Vec<u8>>; 3], size: UVec2, stager: Option<&Stager>) -> [Option<Picture>; 3] {
+    let mut kinds = KINDS.iter();
+    texels.map(|texels| {
+        let texel = kinds.next().map_or(0, TextureKind::texel);
+        let texels = texels?;
+        let staged = stager.and_then(|stager| stager.stage(&texels, size, texel, &[TexelRect::whole(size)]));
+        Some(Picture { texels, staged })
+    })
+}
+
+impl CrackTextures {
+    /// Gives them their texels, and the renderer; `pictures` have what they had before then.
+    pub(super) fn fill(&self, world: &mut World, pictures: &mut [Option<Picture>; 3]) {
+        world.resource_scope(|world, mut uploads: Mut<Uploads>| {
+            let Some(mut images) = world.get_resource_mut::<Assets<Image>>() else { return };
+            for (texture, picture) in self.all().into_iter().zip(pictures) {
+                // Without an asset event, which would upload the whole image once more.
+                if let (Some(texture), Some(picture)) = (texture, picture)
+                    && let Some(image) = images.get_mut_untracked(texture)
+                {
+                    let before = image.data.replace(core::mem::take(&mut picture.texels));
+                    picture.texels = before.unwrap_or_default();
+                    uploads.push_whole(texture.id(), image.size(), picture.staged.take());
+                }
+            }
+        });
+    }
+
+    /// Whether the renderer has yet to take up what they were filled with.
+    pub(super) fn are_staged(&self, world: &World) -> bool {
+        let uploads = world.resource::<Uploads>();
+        self.handles().any(|texture| uploads.is_staged(texture.id()))
     }
 }

@@ -2,12 +2,14 @@
 
 use super::{
     CrackError, CrackMaskSource, CrackState, CrackStatus, CrackSurface, CrackTextures,
-    activate::{attach, draft, fail, frame, look, make_textures, set_status},
+    activate::{attach, fail, frame, look, make_textures, set_status, tell_textures},
     bake::Bakes,
     carrier::{self, Carrier, Found, Shown},
     mask::{self, PictureMasks},
     paint::stamp_anew,
     picture::BasePictures,
+    plan::draft,
+    prepare::Preparations,
     preset,
     shards::drop_shards,
     surfaces::{Active, Added, Surfaces},
@@ -45,19 +47,33 @@ pub(super) fn watch_pictures(
     mut masks: ResMut<PictureMasks>,
     mut bases: ResMut<BasePictures>,
     mut bakes: ResMut<Bakes>,
+    mut preparations: ResMut<Preparations>,
 ) {
+    let Surfaces { active, changed, sources, frame, .. } = &mut *surfaces;
+    *frame += 1;
     let Some(mut events) = events else { return };
-    let Surfaces { active, changed, sources, .. } = &mut *surfaces;
+    let mut removed = Vec::new();
     for event in events.read() {
-        if let AssetEvent::Modified { id } | AssetEvent::Added { id } = event {
-            masks.forget(*id);
-            bases.forget(*id);
-            bakes.forget_picture(*id);
-            for entity in sources.get(id).into_iter().flatten() {
+        let (id, before) = match event {
+            AssetEvent::Modified { id } => (id, *frame),
+            // Who has read it in the frame in which it came has read what came, unless it came back.
+            AssetEvent::Added { id } => (id, if removed.contains(id) { *frame } else { *frame - 1 }),
+            AssetEvent::Removed { id } => {
+                removed.push(*id);
+                masks.forget(*id);
+                bases.forget(*id);
+                continue;
+            }
+            AssetEvent::Unused { .. } | AssetEvent::LoadedWithDependencies { .. } => continue,
+        };
+        masks.forget(*id);
+        bases.forget(*id);
+        bakes.forget_picture(*id, before);
+        preparations.forget_picture(*id, before);
+        for entity in sources.get(id).into_iter().flatten() {
+            if let Some(active) = active.get_mut(entity).filter(|active| active.read_at < before) {
+                active.is_outdated = true;
                 changed.push(*entity);
-                if let Some(active) = active.get_mut(entity) {
-                    active.is_outdated = true;
-                }
             }
         }
     }
@@ -75,14 +91,19 @@ pub(super) fn update_changed(world: &mut World) {
     changed.dedup();
     changed.retain(|entity| {
         let Some(mut active) = take(world, *entity) else { return false };
+        let before = (active.base.clone(), active.textures.clone());
         let outcome = update(world, *entity, &mut active);
         let is_growing = active.growth.is_growing();
+        let has_new_textures = !Arc::ptr_eq(&before.0, &active.base) || before.1 != active.textures;
         let mut surfaces = world.resource_mut::<Surfaces>();
         surfaces.own(*entity, &active);
         surfaces.active.insert(*entity, active);
         surfaces.soil(*entity);
         if is_growing {
             surfaces.start_growing(*entity);
+        }
+        if has_new_textures {
+            tell_textures(world, *entity);
         }
         match outcome {
             Ok(is_done) => {
@@ -260,6 +281,7 @@ fn update_picture(world: &mut World, entity: Entity, active: &mut Active, shown:
     let bytes = drop_shards(world, entity, active);
     world.resource_mut::<Surfaces>().bytes -= bytes;
     active.is_outdated = false;
+    active.read_at = world.resource::<Surfaces>().frame;
     if let Some(growth) = regrown {
         active.frozen = None;
         active.cells = CellTracker::new(frame.extent());

@@ -25,6 +25,8 @@ mod masks;
 mod pictures;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod plugin;
+#[cfg(all(feature = "2d", feature = "3d"))]
+mod prepare;
 #[cfg(feature = "serde")]
 mod presets;
 mod replay;

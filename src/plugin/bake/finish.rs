@@ -10,8 +10,8 @@ use super::{
         paint::stamp_all,
         picture::BasePicture,
         surfaces::{Active, Added, Touched},
-        textures::{self, TextureKind},
-        upload::{Staged, Stager},
+        textures::{self, Picture, TextureKind},
+        upload::Stager,
         watch::{Past, grown_anew},
     },
     job::{Lines, SLICE},
@@ -126,11 +126,6 @@ pub(super) struct Finished {
     pub(super) pictures: [Option<Picture>; 3],
 }
 
-pub(super) struct Picture {
-    pub(super) texels: Vec<u8>,
-    pub(super) staged: Option<Staged>,
-}
-
 /// A slice further.
 pub(super) enum Next {
     More(Box<Finish>),
@@ -156,7 +151,7 @@ impl Finish {
             Stage::Paint { growth, cells, drawn, texels, .. } => {
                 let Drawn { field, touched, look, replay } = *drawn;
                 let film = replay.is_some().then(|| Box::new(Film::new(&growth, &texels)));
-                let pictures = order.stage(texels);
+                let pictures = textures::stage(texels, order.base.size, order.stager.as_ref());
                 return Ok(Next::Done(Box::new(Finished {
                     order,
                     added,
@@ -221,16 +216,5 @@ impl Order {
         let mut targets = PaintTargets { diffuse, normal, depth };
         paint_rects(self.base.texels(), &drawn.field, &drawn.look, &[band], self.rect.min, &mut targets);
         end
-    }
-
-    fn stage(&self, texels: [Option<Vec<u8>>; 3]) -> [Option<Picture>; 3] {
-        let mut kinds = textures::KINDS.iter();
-        texels.map(|texels| {
-            let (texel, size) = (kinds.next().map_or(0, TextureKind::texel), self.base.size);
-            let texels = texels?;
-            let stager = self.stager.as_ref();
-            let staged = stager.and_then(|stager| stager.stage(&texels, size, texel, &[TexelRect::whole(size)]));
-            Some(Picture { texels, staged })
-        })
     }
 }

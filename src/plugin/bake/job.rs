@@ -1,14 +1,13 @@
 //! From guides to a network: what a bake does before it knows of its surface.
 
 use super::super::{
-    CrackError, GuidedAppearance, GuidedCracks,
-    activate::PicturePlan,
-    mask::{self, Key},
+    CrackError, GuidedAppearance, GuidedCracks, mask,
     picture::{self, BasePicture, Space},
+    plan::{RawSurface, Readings},
 };
 use crate::{
     Grid,
-    pattern::{CrackMask, Network},
+    pattern::Network,
     raster::TexelRect,
     voronoi::{self, Guide, Seams, VoronoiBake},
 };
@@ -55,30 +54,9 @@ pub(super) struct MapJob {
 pub(super) enum Surface {
     /// Its picture and the part that is shown.
     Known(Arc<BasePicture>, TexelRect),
-    /// It has not cracked yet: its pictures are the first of the copies.
+    /// It has not cracked yet.
     Raw(Box<RawSurface>),
-    Read(Ground, TexelRect),
-}
-
-pub(super) struct RawSurface {
-    pub(super) plan: PicturePlan,
-    /// Indices of its pictures.
-    pub(super) pictures: [Option<usize>; 3],
-    pub(super) mask: RawMask,
-}
-
-pub(super) enum RawMask {
-    Made(Arc<CrackMask>),
-    FromPicture(Key),
-    /// Indices of the images of its layers.
-    Images([Option<usize>; 3]),
-}
-
-/// What was read of a surface.
-#[derive(Clone)]
-pub(super) struct Ground {
-    pub(super) base: Arc<BasePicture>,
-    pub(super) mask: Arc<CrackMask>,
+    Read(Readings, TexelRect),
 }
 
 /// A guide that is not read yet.
@@ -96,7 +74,7 @@ pub(super) struct Lines {
     pub(super) network: Network,
     pub(super) opening: u32,
     pub(super) covered: Option<f32>,
-    pub(super) ground: Option<Ground>,
+    pub(super) ground: Option<Readings>,
 }
 
 impl MapJob {
@@ -143,7 +121,7 @@ impl MapJob {
             Source::Grid(grid) => return Ok(Arc::unwrap_or_clone(grid)),
             Source::Own => {
                 let (base, rect) = match &self.surface {
-                    Surface::Known(base, rect) | Surface::Read(Ground { base, .. }, rect) => (base, *rect),
+                    Surface::Known(base, rect) | Surface::Read(Readings { base, .. }, rect) => (base, *rect),
                     Surface::Raw(_) => return Err("it was not read".into()),
                 };
                 let rgba = mask::part(&base.diffuse, base.size, rect);
@@ -159,22 +137,6 @@ impl MapJob {
         let size = picture::readable_size(image).map_err(|error| error.to_string())?;
         let rgba = picture::read(image, Space::Srgb, size).map_err(|error| error.to_string())?;
         Ok(voronoi::ink(size, &rgba).ok_or("its size is wrong")?)
-    }
-}
-
-impl RawSurface {
-    fn read(&self, copies: &[Image]) -> Result<Ground, CrackError> {
-        let copy = |index: Option<usize>| index.and_then(|index| copies.get(index));
-        let base = Arc::new(self.plan.read(self.pictures.map(copy))?);
-        let mask = match &self.mask {
-            RawMask::Made(mask) => mask.clone(),
-            RawMask::FromPicture(key) => key.make(&base.diffuse),
-            RawMask::Images(layers) => {
-                let [weak, strong, forbidden] = layers.map(|index| copy(index).map(mask::layer).transpose());
-                Arc::new(CrackMask { weak: weak?, strong: strong?, forbidden: forbidden? })
-            }
-        };
-        Ok(Ground { base, mask })
     }
 }
 

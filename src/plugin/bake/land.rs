@@ -2,33 +2,27 @@
 
 use super::{
     super::{
-        CrackBudget, CrackClock, CrackError, CrackMaskSource, CrackStatus, CrackTextures, GuidedAppearance,
-        GuidedCracks,
-        activate::{install, make_ready, set_status},
+        CrackClock, CrackError, CrackStatus, CrackTextures, GuidedAppearance, GuidedCracks,
+        activate::{install, make_ready_now, set_status},
         beside::throw_away,
-        carrier::Carrier,
         clock::First,
         film::Film,
-        mask::{Key, PictureMasks},
+        plan::{Plan, Readings},
+        prepare::MAX_LANDING,
         shards::drop_shards,
-        surfaces,
         surfaces::{Active, Surfaces},
-        textures::{self, TextureKind},
         upload::Uploads,
         watch::Past,
     },
-    Bake, Job, Plan, Work,
+    Bake, Job, Work,
     finish::{Finish, Finished, Next, Order},
-    job::{Ground, Lines},
+    job::Lines,
 };
 use crate::raster::TexelRect;
 use bevy::{prelude::*, render::renderer::RenderDevice};
 
 /// So often the surface may change while its cracks are made beside the frames; then they are made between two of them.
 const MAX_ROUNDS: u32 = 8;
-
-/// Frames that a picture on its way to the renderer is waited for: it may have stopped to draw.
-const MAX_LANDING: u32 = 16;
 
 /// The seconds in which cracks appear; `None` = at once.
 fn seconds(world: &World, entity: Entity) -> Option<f32> {
@@ -48,7 +42,7 @@ pub(super) fn order(world: &mut World, entity: Entity, bake: &mut Bake, lines: L
         if !plan.is_current(world, entity) {
             return Ok(());
         }
-        if has_room(world, plan) {
+        if plan.has_room(world) {
             let clock = world.get::<CrackClock>(entity).copied();
             let order = Order {
                 surface: plan.surface.clone(),
@@ -65,13 +59,13 @@ pub(super) fn order(world: &mut World, entity: Entity, bake: &mut Bake, lines: L
                 stager,
             };
             if plan.textures.is_none() {
-                plan.textures = Some(make_room(world, plan)?);
+                plan.make_room(world)?;
             }
             bake.work = Work::Ready(Job::Finish(Box::new(Finish::new(order, lines))));
             return Ok(());
         }
         // Coarser textures, or an error.
-        if !make_ready(world, entity)? {
+        if !make_ready_now(world, entity)? {
             return Ok(());
         }
     }
@@ -80,27 +74,6 @@ pub(super) fn order(world: &mut World, entity: Entity, bake: &mut Bake, lines: L
         bake.work = Work::Ready(Job::Finish(Box::new(Finish::new(order, lines))));
     }
     Ok(())
-}
-
-/// Whether the textures of a surface have room in the budget.
-fn has_room(world: &World, plan: &Plan) -> bool {
-    let left = world.resource::<CrackBudget>().max_texture_bytes.saturating_sub(world.resource::<Surfaces>().bytes);
-    plan.pictures.bytes <= left
-}
-
-/// Makes textures without texels, so that the renderer has room for them when they come.
-fn make_room(world: &mut World, plan: &Plan) -> Result<CrackTextures, CrackError> {
-    let mut images = world.get_resource_mut::<Assets<Image>>().ok_or(CrackError::NoImages)?;
-    let UVec2 { x: width, y: height } = plan.pictures.size;
-    let mut add = |kind: &TextureKind| -> Result<Option<Handle<Image>>, CrackError> {
-        if !(kind.is_wanted)(plan.pictures.maps) {
-            return Ok(None);
-        }
-        let image = kind.empty(plan.pictures.size, &plan.pictures.sampler).ok_or(CrackError::Size { width, height })?;
-        Ok(Some(images.add(image)))
-    };
-    let [diffuse, normal, depth] = textures::KINDS.each_ref().map(&mut add);
-    Ok(CrackTextures { diffuse: diffuse?, normal: normal?, depth: depth? })
 }
 
 /// Takes up what was made; `None` if it has to wait for the renderer, or be made anew.
@@ -124,15 +97,14 @@ pub(super) fn land(
         (None, Some(mut plan))
             if finished.order.is_new
                 && finished.order.has_clock == world.get::<CrackClock>(entity).is_some()
-                && has_room(world, &plan)
+                && plan.has_room(world)
                 && plan.is_current(world, entity) =>
         {
             let textures = plan.textures.take().unwrap_or_default();
             if frames == 0 {
-                fill(world, &textures, &mut finished);
+                textures.fill(world, &mut finished.pictures);
             }
-            let uploads = world.resource::<Uploads>();
-            if frames < MAX_LANDING && textures.handles().any(|texture| uploads.is_staged(texture.id())) {
+            if frames < MAX_LANDING && textures.are_staged(world) {
                 plan.textures = Some(textures);
                 bake.plan = Some(plan);
                 bake.work = Work::Landing(finished, frames + 1);
@@ -151,7 +123,7 @@ pub(super) fn land(
 fn again(world: &mut World, entity: Entity, bake: &mut Bake, finished: Finished) -> Result<(), CrackError> {
     let Finished { order: past, added, covered, growth, cells, field, pictures, replay, .. } = finished;
     throw_away((growth, cells, field, pictures, replay));
-    let ground = Ground { base: past.base, mask: past.mask };
+    let ground = Readings { base: past.base, mask: past.mask };
     let ground = past.is_new.then_some(ground);
     order(world, entity, bake, Lines { network: added.network, opening: added.opening, covered, ground })?;
     bake.rounds += 1;
@@ -173,42 +145,18 @@ fn again(world: &mut World, entity: Entity, bake: &mut Bake, finished: Finished)
     Ok(())
 }
 
-/// Gives textures their texels, and the renderer; what they had before is in `finished` then.
-fn fill(world: &mut World, textures: &CrackTextures, finished: &mut Finished) {
-    world.resource_scope(|world, mut uploads: Mut<Uploads>| {
-        let Some(mut images) = world.get_resource_mut::<Assets<Image>>() else { return };
-        let CrackTextures { diffuse, normal, depth } = textures;
-        for (texture, picture) in [diffuse, normal, depth].into_iter().zip(&mut finished.pictures) {
-            // Without an asset event, which would upload the whole image once more.
-            if let (Some(texture), Some(picture)) = (texture, picture)
-                && let Some(image) = images.get_mut_untracked(texture)
-            {
-                let before = image.data.replace(core::mem::take(&mut picture.texels));
-                picture.texels = before.unwrap_or_default();
-                uploads.push_whole(texture.id(), image.size(), picture.staged.take());
-            }
-        }
-    });
-}
-
 /// Makes a surface of one that has not cracked before, whose textures are where they are shown from.
 fn settle(world: &mut World, entity: Entity, plan: Plan, textures: CrackTextures, finished: Finished) {
     let seconds = seconds(world, entity);
-    let Plan { surface, preset, kind, shown, pictures, is_outdated, .. } = plan;
+    let is_outdated = plan.is_outdated;
     let Finished { order, added, growth, cells, field, touched, look, replay, film, .. } = finished;
-    if let (CrackMaskSource::FromPicture, Some(picture)) = (&surface.mask, &shown.diffuse) {
-        world.resource_mut::<PictureMasks>().remember(Key::new(picture, &pictures), &order.mask);
-    }
-    let carrier = Carrier::new(kind, shown);
-    let (bytes, rect) = (pictures.bytes, pictures.rect);
-    let ground = surfaces::Ground { surface, preset, look, base: order.base, textures, carrier, bytes, rect };
+    let ground = plan.ground(world, Readings { base: order.base, mask: order.mask }, look, textures);
     let mut active = Active::new(ground, growth, field);
     (active.touched, active.cells, active.added, active.is_outdated) = (touched, cells, Some(added), is_outdated);
     active.show_made(replay, seconds);
     install(world, entity, active);
-    if is_outdated {
-        world.resource_mut::<Surfaces>().changed.push(entity);
-    }
+    // It may show another part of its pictures, or they have changed.
+    world.resource_mut::<Surfaces>().changed.push(entity);
     begin_to_show(world, entity, film);
 }
 
@@ -218,7 +166,8 @@ fn replace(world: &mut World, entity: Entity, mut active: Active, mut finished: 
     active.drop_film();
     // Shards are of the cells that were.
     let bytes = drop_shards(world, entity, &mut active);
-    fill(world, &active.textures, &mut finished);
+    let textures = active.textures.clone();
+    textures.fill(world, &mut finished.pictures);
     let Finished { order, added, growth, cells, field, touched, look, replay, film, pictures, .. } = finished;
     // Steps that it has grown since are made up for.
     active.due += f64::from(Past::of(&active).steps.saturating_sub(order.past.steps));

@@ -1,19 +1,19 @@
 //! Copies of pictures that are made beside the frames, as far as that goes: the engine's images are where the frames are, so they are
 //! copied there, a little in each frame, into memory that a task has got ready.
 
-use bevy::{
-    prelude::*,
-    tasks::{AsyncComputeTaskPool, Task, futures::check_ready},
-};
+use super::beside::Beside;
+use bevy::{prelude::*, tasks::AsyncComputeTaskPool};
 
-/// The most bytes that are copied in a frame, of all bakes together.
+/// Bytes that are copied without a look at the clock: by all bakes together no more in a frame.
 pub(super) const MAX_BYTES: usize = 1 << 19;
 
 /// Pictures of which some is copied.
 pub(super) struct Reading {
     copies: Vec<Copy>,
+    /// Whether a task got the memory ready.
+    pub(super) has_task: bool,
     /// The memory for the copies, in order.
-    memory: Option<Task<Vec<Vec<u8>>>>,
+    memory: Option<Beside<Vec<usize>, Vec<Vec<u8>>>>,
 }
 
 struct Copy {
@@ -38,16 +38,25 @@ impl Reading {
         let copies: Option<Vec<Copy>> = pictures.into_iter().map(|picture| Copy::new(picture, images)).collect();
         let copies = copies?;
         let lengths: Vec<usize> = copies.iter().map(|copy| copy.length).collect();
+        // What is copied at a stroke is not worth a task.
+        let is_much = lengths.iter().sum::<usize>() > MAX_BYTES;
+        let has_task = has_threads && is_much && AsyncComputeTaskPool::try_get().is_some();
         // Written once: the first write to memory is the dear one.
-        let get_ready = move || lengths.into_iter().map(|length| vec![1; length]).collect();
-        let pool = AsyncComputeTaskPool::try_get().filter(|_| has_threads);
-        Some(Self { copies, memory: pool.map(|pool| pool.spawn(async move { get_ready() })) })
+        let get_ready = |lengths: Vec<usize>| lengths.into_iter().map(|length| vec![1; length]).collect();
+        Some(Self { copies, has_task, memory: has_task.then(|| Beside::start(lengths, get_ready)) })
+    }
+
+    /// Does without the task that gets memory ready, if no thread has begun it.
+    pub(super) fn wait_no_more(&mut self) {
+        if self.memory.take_if(|task| task.take_back().is_some()).is_some() {
+            self.has_task = false;
+        }
     }
 
     /// Copies what there is to copy, no more bytes than are `left` of this frame.
     pub(super) fn step(&mut self, images: &Assets<Image>, left: &mut usize) -> Read {
         if let Some(task) = &mut self.memory {
-            let Some(memory) = check_ready(task) else { return Read::More };
+            let Some(memory) = task.take_if_done(false) else { return Read::More };
             self.memory = None;
             for (copy, mut memory) in self.copies.iter_mut().zip(memory) {
                 memory.clear();

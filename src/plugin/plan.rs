@@ -1,0 +1,384 @@
+//! [`Plan`]: what a surface will be, before anything of it is made.
+
+use super::{
+    CrackBudget, CrackError, CrackMaps, CrackMaskSource, CrackResolution, CrackSurface, CrackTextures,
+    activate::{frame, look},
+    carrier::{self, Carrier, Found, Kind, Shown, Untouched},
+    mask::{self, Key, PictureMasks},
+    picture::{self, BaseKey, BasePicture, BasePictures, Space},
+    preset,
+    surfaces::{Ground, Surfaces},
+    textures::{self, TextureKind},
+};
+use crate::{
+    CrackPreset,
+    growth::CrackGrowth,
+    paint::LookTable,
+    pattern::CrackMask,
+    raster::{DepthField, TexelRect},
+};
+use bevy::{image::ImageSampler, prelude::*, render::renderer::RenderDevice};
+use std::sync::Arc;
+
+/// Longer side of the textures of a surface without a picture, texels.
+const DEFAULT_SIDE: f32 = 512.0;
+
+/// Textures are not made coarser than this to fit the budget, texels.
+const MIN_SIDE: u32 = 64;
+
+/// A surface that has not cracked, as it is to be made.
+pub(super) struct Plan {
+    pub(super) surface: CrackSurface,
+    pub(super) preset: CrackPreset,
+    kind: &'static Kind,
+    pub(super) shown: Shown,
+    pub(super) pictures: PicturePlan,
+    /// Its textures, without texels.
+    pub(super) textures: Option<CrackTextures>,
+    /// The frame in which it was made: its pictures are read from then on.
+    read_at: u64,
+    /// Whether a picture has changed since.
+    pub(super) is_outdated: bool,
+    /// Whether an image of its mask has changed since.
+    pub(super) has_other_mask: bool,
+}
+
+impl Plan {
+    /// `None` if some of what it is made from is not there yet.
+    pub(super) fn new(world: &World, entity: Entity) -> Result<Option<Self>, CrackError> {
+        let Some(Untouched { surface, preset, kind, shown }) = carrier::untouched(world, entity)? else {
+            return Ok(None);
+        };
+        let pictures = plan_pictures(world, &surface, &shown, 0)?;
+        let read_at = world.resource::<Surfaces>().frame;
+        Ok(pictures.map(|pictures| Self {
+            surface,
+            preset,
+            kind,
+            shown,
+            pictures,
+            textures: None,
+            read_at,
+            is_outdated: false,
+            has_other_mask: false,
+        }))
+    }
+
+    /// What its pictures are read from.
+    pub(super) fn key(&self) -> BaseKey {
+        self.pictures.key(&self.shown)
+    }
+
+    /// What was read of the picture before this frame is another one now.
+    pub(super) fn forget_picture(&mut self, picture: AssetId<Image>, frame: u64) {
+        let is = |image: &Handle<Image>| image.id() == picture;
+        if self.read_at < frame {
+            self.is_outdated |= self.shown.pictures().any(is);
+            self.has_other_mask |= self.surface.mask.images().any(is);
+        }
+    }
+
+    /// Whether the entity still is what it was, but for the part of its pictures that it shows.
+    pub(super) fn is_current(&self, world: &World, entity: Entity) -> bool {
+        world.get::<CrackSurface>(entity) == Some(&self.surface)
+            && matches!(carrier::inspect(world, entity), (_, Found::Shown(shown)) if shown.is_like(&self.shown))
+            && matches!(preset::resolve(world, &self.surface.preset), Ok(Some(preset)) if preset == self.preset)
+    }
+
+    /// Whether its textures have room in the budget.
+    pub(super) fn has_room(&self, world: &World) -> bool {
+        let left = world.resource::<CrackBudget>().max_texture_bytes.saturating_sub(world.resource::<Surfaces>().bytes);
+        self.pictures.bytes <= left
+    }
+
+    /// Makes its textures, without texels, so that the renderer has room for them when they come.
+    pub(super) fn make_room(&mut self, world: &mut World) -> Result<(), CrackError> {
+        let mut images = world.get_resource_mut::<Assets<Image>>().ok_or(CrackError::NoImages)?;
+        let PicturePlan { size, maps, sampler, .. } = &self.pictures;
+        let mut add = |kind: &TextureKind| -> Result<Option<Handle<Image>>, CrackError> {
+            if !(kind.is_wanted)(*maps) {
+                return Ok(None);
+            }
+            let UVec2 { x: width, y: height } = *size;
+            let image = kind.empty(*size, sampler).ok_or(CrackError::Size { width, height })?;
+            Ok(Some(images.add(image)))
+        };
+        let [diffuse, normal, depth] = textures::KINDS.each_ref().map(&mut add);
+        self.textures = Some(CrackTextures { diffuse: diffuse?, normal: normal?, depth: depth? });
+        Ok(())
+    }
+
+    /// What has to be read for it, which can be read; `None` if its masks are not there yet.
+    pub(super) fn raw(&self, world: &World, copies: &mut Copies) -> Result<Option<RawSurface>, CrackError> {
+        for image in self.surface.mask.images() {
+            if !picture::is_loaded(world, image)? {
+                return Ok(None);
+            }
+        }
+        let base = match world.resource::<BasePictures>().find(self.key()) {
+            Some(base) => RawBase::Read(base),
+            None => RawBase::Pictures(self.pictures.needed(&self.shown).map(|map| map.map(|map| copies.add(map)))),
+        };
+        let mask = match &self.surface.mask {
+            CrackMaskSource::FromPicture => match &self.shown.diffuse {
+                Some(picture) => {
+                    let key = Key::new(picture, &self.pictures);
+                    world.resource::<PictureMasks>().find(key).map_or(RawMask::FromPicture(key), RawMask::Made)
+                }
+                None => RawMask::Made(Arc::default()),
+            },
+            CrackMaskSource::None => RawMask::Made(Arc::default()),
+            CrackMaskSource::Images { weak, strong, forbidden } => {
+                RawMask::Images([weak, strong, forbidden].map(|image| image.as_ref().map(|image| copies.add(image))))
+            }
+        };
+        let images = world.get_resource::<Assets<Image>>().ok_or(CrackError::NoImages)?;
+        for image in copies.0.iter().filter_map(|image| images.get(image)) {
+            picture::readable_size(image)?;
+        }
+        Ok(Some(RawSurface { plan: self.pictures.clone(), base, mask }))
+    }
+
+    /// Takes up what was read for it: others who show the same need not read it again.
+    pub(super) fn ground(self, world: &mut World, read: Readings, look: LookTable, textures: CrackTextures) -> Ground {
+        let key = self.key();
+        let Self { surface, preset, kind, shown, pictures, read_at, is_outdated, .. } = self;
+        let Readings { base, mask } = read;
+        if !is_outdated {
+            world.resource_mut::<BasePictures>().remember(key, &base);
+            if let (CrackMaskSource::FromPicture, Some(picture)) = (&surface.mask, &shown.diffuse) {
+                world.resource_mut::<PictureMasks>().remember(Key::new(picture, &pictures), &mask);
+            }
+        }
+        let (bytes, rect) = (pictures.bytes, pictures.rect);
+        Ground { surface, preset, look, base, textures, carrier: Carrier::new(kind, shown), bytes, rect, read_at }
+    }
+}
+
+/// The pictures of which a copy is needed, each once.
+#[derive(Default)]
+pub(super) struct Copies(pub(super) Vec<Handle<Image>>);
+
+impl Copies {
+    pub(super) fn add(&mut self, picture: &Handle<Image>) -> usize {
+        self.0.iter().position(|known| known == picture).unwrap_or_else(|| {
+            self.0.push(picture.clone());
+            self.0.len() - 1
+        })
+    }
+}
+
+/// What a surface is to be read from, by any thread.
+pub(super) struct RawSurface {
+    pub(super) plan: PicturePlan,
+    base: RawBase,
+    mask: RawMask,
+}
+
+enum RawBase {
+    Read(Arc<BasePicture>),
+    /// Indices of the copies.
+    Pictures([Option<usize>; 3]),
+}
+
+enum RawMask {
+    Made(Arc<CrackMask>),
+    FromPicture(Key),
+    /// Indices of the copies of its layers.
+    Images([Option<usize>; 3]),
+}
+
+/// What was read of a surface.
+#[derive(Clone)]
+pub(super) struct Readings {
+    pub(super) base: Arc<BasePicture>,
+    pub(super) mask: Arc<CrackMask>,
+}
+
+impl RawSurface {
+    pub(super) fn read(&self, copies: &[Image]) -> Result<Readings, CrackError> {
+        let copy = |index: Option<usize>| index.and_then(|index| copies.get(index));
+        let base = match &self.base {
+            RawBase::Read(base) => base.clone(),
+            RawBase::Pictures(pictures) => Arc::new(self.plan.read(pictures.map(copy))?),
+        };
+        let mask = match &self.mask {
+            RawMask::Made(mask) => mask.clone(),
+            RawMask::FromPicture(key) => key.make(&base.diffuse),
+            RawMask::Images(layers) => {
+                let [weak, strong, forbidden] = layers.map(|index| copy(index).map(mask::layer).transpose());
+                Arc::new(CrackMask { weak: weak?, strong: strong?, forbidden: forbidden? })
+            }
+        };
+        Ok(Readings { base, mask })
+    }
+}
+
+/// What cracks grow and are drawn in, before the first.
+pub(super) struct Blank {
+    pub(super) growth: CrackGrowth,
+    pub(super) field: DepthField,
+    pub(super) look: LookTable,
+}
+
+impl Blank {
+    pub(super) fn new(
+        surface: &CrackSurface,
+        preset: &CrackPreset,
+        Readings { base, mask }: &Readings,
+        rect: TexelRect,
+    ) -> Result<Self, CrackError> {
+        let frame = frame(rect)?;
+        let look = look(preset, frame)?;
+        let mut growth = CrackGrowth::new(preset.growth.clone(), frame.extent(), surface.seed)
+            .map_err(|error| CrackError::Preset { reason: error.to_string() })?;
+        if surface.alpha_mask {
+            growth.set_density(base.density(rect));
+        }
+        growth.set_mask(mask.clone());
+        let mut field = DepthField::new(frame);
+        field.forbid(mask);
+        Ok(Self { growth, field, look })
+    }
+}
+
+/// The pictures of a surface, ready to be cracked.
+pub(super) struct Draft {
+    pub(super) base: Arc<BasePicture>,
+    pub(super) plan: PicturePlan,
+}
+
+/// What the pictures of a surface will be.
+#[derive(Clone)]
+pub(super) struct PicturePlan {
+    pub(super) size: UVec2,
+    /// The part of the image that is shown.
+    pub(super) rect: TexelRect,
+    /// Bytes of the textures and of what belongs to them.
+    pub(super) bytes: u64,
+    pub(super) sampler: ImageSampler,
+    pub(super) maps: CrackMaps,
+}
+
+impl PicturePlan {
+    /// The pictures that are needed.
+    fn needed<'a>(&self, shown: &'a Shown) -> [Option<&'a Handle<Image>>; 3] {
+        let maps = [(&shown.diffuse, true), (&shown.normal, self.maps.normal), (&shown.depth, self.maps.depth)];
+        maps.map(|(map, is_needed)| map.as_ref().filter(|_| is_needed))
+    }
+
+    fn key(&self, shown: &Shown) -> BaseKey {
+        BaseKey { pictures: self.needed(shown).map(|map| map.map(Handle::id)), size: self.size }
+    }
+
+    /// Reads the pictures, unless somebody else has.
+    pub(super) fn draft(self, world: &mut World, shown: &Shown) -> Result<Draft, CrackError> {
+        let base = world.resource_scope(|world, mut bases: Mut<BasePictures>| {
+            let images = world.get_resource::<Assets<Image>>().ok_or(CrackError::NoImages)?;
+            let picture = |map: Option<&Handle<Image>>| map.and_then(|picture| images.get(picture));
+            bases.get(self.key(shown), || self.read(self.needed(shown).map(picture)))
+        })?;
+        Ok(Draft { base, plan: self })
+    }
+
+    /// The pictures, read.
+    fn read(&self, [diffuse, normal, depth]: [Option<&Image>; 3]) -> Result<BasePicture, CrackError> {
+        let n = self.size.x as usize * self.size.y as usize;
+        let read =
+            |image: Option<&Image>| image.map(|image| picture::read(image, Space::Linear, self.size)).transpose();
+        let diffuse = match diffuse {
+            Some(image) => picture::read_shown(image, self.size)?,
+            None => vec![255; n * 4],
+        };
+        let normal = if self.maps.normal { read(normal)? } else { None };
+        let depth = if self.maps.depth { read(depth)?.map(|rgba| picture::red(&rgba)) } else { None };
+        Ok(BasePicture::new(self.size, diffuse, normal, depth))
+    }
+}
+
+/// Plans the pictures of a surface; `None` if they are not there yet. `owned` bytes of the budget are its own already.
+fn plan_pictures(
+    world: &World,
+    surface: &CrackSurface,
+    shown: &Shown,
+    owned: u64,
+) -> Result<Option<PicturePlan>, CrackError> {
+    let images = world.get_resource::<Assets<Image>>().ok_or(CrackError::NoImages)?;
+    for picture in shown.pictures() {
+        if !picture::is_loaded(world, picture)? {
+            return Ok(None);
+        }
+    }
+    let maps = CrackMaps {
+        diffuse: surface.write.diffuse && shown.maps.diffuse,
+        normal: surface.write.normal && shown.maps.normal,
+        depth: surface.write.depth && shown.maps.depth,
+    };
+    let image = shown.diffuse.as_ref().and_then(|picture| images.get(picture));
+    let size = size(world, surface, shown, image, maps, owned)?;
+    let whole = TexelRect::whole(size);
+    let rect = shown.rect.map_or(whole, |rect| TexelRect { min: rect.min, max: rect.max }.intersect(whole));
+    let sampler = image.map_or(ImageSampler::Default, |image| image.sampler.clone());
+    Ok(Some(PicturePlan { size, rect, bytes: bytes(size, maps), sampler, maps }))
+}
+
+/// Reads the pictures of a surface; `None` if they are not there yet. `owned` as in [`plan_pictures`].
+pub(super) fn draft(
+    world: &mut World,
+    surface: &CrackSurface,
+    shown: &Shown,
+    owned: u64,
+) -> Result<Option<Draft>, CrackError> {
+    let plan = plan_pictures(world, surface, shown, owned)?;
+    plan.map(|plan| plan.draft(world, shown)).transpose()
+}
+
+/// Bytes of the textures on the CPU and the GPU, the base picture, as if no other surface had the same, and the depth field.
+fn bytes(size: UVec2, maps: CrackMaps) -> u64 {
+    let texel = 4 + 2 + 8 * u64::from(maps.diffuse) + 8 * u64::from(maps.normal) + 2 * u64::from(maps.depth);
+    u64::from(size.x) * u64::from(size.y) * texel
+}
+
+/// Size of the textures: what is asked for, made smaller until it fits device and budget.
+fn size(
+    world: &World,
+    surface: &CrackSurface,
+    shown: &Shown,
+    image: Option<&Image>,
+    maps: CrackMaps,
+    owned: u64,
+) -> Result<UVec2, CrackError> {
+    let own_size = match image {
+        Some(image) => picture::readable_size(image)?,
+        None => {
+            let proportions = shown.proportions.abs();
+            let size = proportions * (DEFAULT_SIDE / proportions.max_element());
+            if size.is_finite() { size.as_uvec2().max(UVec2::ONE) } else { UVec2::splat(512) }
+        }
+    };
+    let mut size = match surface.resolution {
+        CrackResolution::Fixed(size) if shown.rect.is_none() => size,
+        _ => own_size,
+    };
+    if size.min_element() == 0 {
+        return Err(CrackError::Size { width: size.x, height: size.y });
+    }
+    let budget = world.resource::<CrackBudget>();
+    let device = world.get_resource::<RenderDevice>().map_or(u32::MAX, |d| d.limits().max_texture_dimension_2d);
+    let max_side = budget.max_side.clamp(1, device.clamp(1, crate::pattern::MAX_SIDE));
+    if size.max_element() > max_side {
+        if shown.rect.is_some() {
+            return Err(CrackError::Size { width: size.x, height: size.y });
+        }
+        let scale = f64::from(max_side) / f64::from(size.max_element());
+        size = (size.as_dvec2() * scale).as_uvec2().clamp(UVec2::ONE, UVec2::splat(max_side));
+    }
+    let left = budget.max_texture_bytes.saturating_sub(world.resource::<Surfaces>().bytes.saturating_sub(owned));
+    while bytes(size, maps) > left {
+        if shown.rect.is_some() || size.max_element() <= MIN_SIDE {
+            return Err(CrackError::TextureBudget { needed: bytes(size, maps), left });
+        }
+        size = (size / 2).max(UVec2::ONE);
+    }
+    Ok(size)
+}
