@@ -23,6 +23,9 @@ const MAX_AT_ONCE: u64 = 512 * 512;
 /// Share of the frame's budget after which no more is copied.
 const SHARE: f32 = 0.3;
 
+/// Texels up to which a surface is never made beside the frames: a task would cost more.
+const MIN_BESIDE: u64 = 128 * 128;
+
 /// Texels of the larger ones that are on their way at once for each thread, if there is more than one.
 const PER_THREAD: u64 = 4 << 20;
 
@@ -185,7 +188,7 @@ fn ready(world: &mut World, entity: Entity, is_wanted: bool) -> Result<bool, Cra
     let (is_late, is_one_of_many) = (preparations.has_changed_often(entity), preparations.has_small());
     let Some(plan) = Plan::new(world, entity)? else { return Ok(false) };
     match threads(world) {
-        Some(threads) if !is_late && (is_one_of_many || is_wanted || !is_small(&plan)) => {
+        Some(threads) if !is_late && !is_tiny(&plan) && (is_one_of_many || is_wanted || !is_small(&plan)) => {
             begin(world, entity, plan, is_wanted, threads).and(Ok(false))
         }
         _ => {
@@ -195,7 +198,7 @@ fn ready(world: &mut World, entity: Entity, is_wanted: bool) -> Result<bool, Cra
     }
 }
 
-/// Has a surface made beside the frames, of whatever size; `false` if nothing was begun.
+/// Has a surface made beside the frames that is worth it; `false` if nothing was begun.
 pub(super) fn make_beside(world: &mut World, entity: Entity) -> Result<bool, CrackError> {
     let preparations = world.resource::<Preparations>();
     let is_known = preparations.is_making(entity) || preparations.has_changed_often(entity);
@@ -203,8 +206,10 @@ pub(super) fn make_beside(world: &mut World, entity: Entity) -> Result<bool, Cra
     if world.resource::<Surfaces>().active.contains_key(&entity) {
         return Ok(false);
     }
-    let Some(plan) = Plan::new(world, entity)? else { return Ok(false) };
-    begin(world, entity, plan, false, threads)
+    match Plan::new(world, entity)? {
+        Some(plan) if !is_tiny(&plan) => begin(world, entity, plan, false, threads),
+        _ => Ok(false),
+    }
 }
 
 fn texels(plan: &Plan) -> u64 {
@@ -213,6 +218,10 @@ fn texels(plan: &Plan) -> u64 {
 
 fn is_small(plan: &Plan) -> bool {
     texels(plan) <= MAX_AT_ONCE
+}
+
+fn is_tiny(plan: &Plan) -> bool {
+    texels(plan) <= MIN_BESIDE
 }
 
 /// How many threads there are beside the frames; `None` if frames may take any time, or all threads would stop them.

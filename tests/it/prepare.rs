@@ -322,10 +322,17 @@ fn e12_a_hit_does_not_wait_for_a_busy_pool() {
 fn i7_first_hits_on_many_surfaces_are_all_applied() {
     let mut app = app();
     app.insert_resource(CrackBudget { milliseconds: 0.0, ..default() });
-    let shared = add(&mut app, picture(UVec2::splat(60)));
+    let shared = add(&mut app, picture(UVec2::splat(160)));
+    let tiny = add(&mut app, picture(UVec2::splat(60)));
     let surfaces: Vec<Entity> = (0..60)
         .map(|i| {
-            let image = if i % 2 == 0 { shared.clone() } else { add(&mut app, picture(UVec2::new(50, 40))) };
+            let image = if i % 6 == 0 {
+                tiny.clone()
+            } else if i % 2 == 0 {
+                shared.clone()
+            } else {
+                add(&mut app, picture(UVec2::new(150, 140)))
+            };
             app.world_mut().spawn((Sprite::from_image(image), surface())).id()
         })
         .collect();
