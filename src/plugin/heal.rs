@@ -15,12 +15,25 @@ use bevy::{
 
 /// Commands for surfaces.
 pub trait CrackCommandsExt {
-    /// Makes a surface ready for its first hit: for what is sure to be hit, while a level loads. It has its textures then, which begin
-    /// to be shown when they are complete ([`CrackTextures`] is added in that frame), and takes the memory of a cracked surface; the
-    /// first hit finds all there is to find. Without it the crack of a first hit shows in the frame of the hit on pictures of up to
-    /// 512 x 512 texels, unless many are hit for the first time at once, and some frames later on larger ones: they are made beside the
-    /// frames. Surfaces that are hit come first. Does nothing on entities without a [`CrackSurface`](super::CrackSurface), or with cracks; one that cannot crack says so with
-    /// [`CrackFailed`](super::CrackFailed). Healing takes it back.
+    /// Makes a surface ready for its first hit: for what is sure to be hit, while a level loads.
+    ///
+    /// Without it the crack of a first hit shows in the frame of the hit on pictures of up to 512 x 512 texels, unless many are hit for
+    /// the first time at once, and some frames later on larger ones: they are made beside the frames. A surface that is prepared takes
+    /// the memory of one that has cracked, and shows its textures from the frame on in which [`CrackTextures`] is added. Surfaces that are
+    /// hit come first. Does nothing on entities without a [`CrackSurface`](super::CrackSurface), or with cracks; one that cannot crack says
+    /// so with [`CrackFailed`](super::CrackFailed). Healing takes it back.
+    ///
+    /// ```
+    /// use bevy::prelude::*;
+    /// use bevy_crack::prelude::*;
+    ///
+    /// fn prepare(mut commands: Commands, walls: Query<Entity, Added<CrackSurface>>) {
+    ///     for wall in &walls {
+    ///         commands.entity(wall).prepare_cracks();
+    ///     }
+    /// }
+    /// bevy::ecs::system::assert_is_system(prepare);
+    /// ```
     fn prepare_cracks(&mut self) -> &mut Self;
 
     /// Takes all cracks away, those of [`GuidedCracks`](super::GuidedCracks) too, and all shards and holes: the surface shows its
