@@ -95,15 +95,25 @@ fn apply_next(world: &mut World, entity: Entity) {
     }
 }
 
-/// Whether the first hit of a surface without cracks is to be refused for where it lands.
-fn is_missed(world: &World, entity: Entity) -> bool {
+/// Whether the first hit of a surface without cracks is to be refused for where it lands. If not, the hit knows its place from then on: it
+/// may have to wait, and a mesh has many triangles to look at.
+fn is_missed(world: &mut World, entity: Entity) -> bool {
     if world.resource::<Surfaces>().active.contains_key(&entity) {
         return false;
     }
     let Some(hit) = world.resource::<HitQueue>().first(entity) else { return false };
     let (Some(kind), Found::Shown(shown)) = carrier::inspect(world, entity) else { return false };
     let is_there = shown.pictures().all(|picture| matches!(picture::is_loaded(world, picture), Ok(true)));
-    is_there && locate(world, entity, kind, hit.at).is_err()
+    if !is_there {
+        return false;
+    }
+    match locate(world, entity, kind, hit.at) {
+        Ok(uv) => {
+            world.resource_mut::<HitQueue>().place_first(entity, uv);
+            false
+        }
+        Err(_) => true,
+    }
 }
 
 /// Texture coordinates of a hit, within the surface.

@@ -10,7 +10,7 @@ use super::{
     plan::{Blank, Copies, Plan, RawSurface, Readings},
     read::{MAX_BYTES, Read, Reading},
     surfaces::{Active, Surfaces},
-    textures::{self, Picture, TextureKind},
+    textures::{self, Picture},
     upload::{Stager, Uploads},
 };
 use crate::{CrackPreset, raster::TexelRect};
@@ -162,8 +162,7 @@ impl Work {
                 let Self { raw, copies, surface, preset, stager } = self;
                 let read = raw.read(&copies)?;
                 let blank = Blank::new(&surface, &preset, &read, raw.plan.rect)?;
-                let texels = |kind: &TextureKind| (kind.is_wanted)(raw.plan.maps).then(|| (kind.texels)(&read.base));
-                let texels = textures::KINDS.each_ref().map(texels);
+                let texels = textures::texels(raw.plan.maps, &read.base);
                 let pictures = textures::stage(texels, read.base.size, stager.as_ref());
                 Ok(Box::new(Made { read, blank, pictures }))
             },

@@ -88,6 +88,13 @@ impl HitQueue {
         self.hits.get(&entity)?.front()
     }
 
+    /// Says where that hit is.
+    pub(super) fn place_first(&mut self, entity: Entity, uv: Vec2) {
+        if let Some(hit) = self.hits.get_mut(&entity).and_then(VecDeque::front_mut) {
+            hit.at = HitPoint::Uv(uv);
+        }
+    }
+
     /// The next surface in turn.
     pub(super) fn next(&self) -> Option<Entity> {
         self.turns.front().copied()

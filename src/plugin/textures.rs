@@ -91,6 +91,11 @@ impl TextureKind {
     }
 }
 
+/// The texels of the uncracked textures that are wanted, in the order of [`KINDS`].
+pub(super) fn texels(maps: CrackMaps, base: &BasePicture) -> [Option<Vec<u8>>; 3] {
+    KINDS.each_ref().map(|kind| (kind.is_wanted)(maps).then(|| (kind.texels)(base)))
+}
+
 /// The texels of a texture, and the same where the renderer can read them.
 pub(super) struct Picture {
     pub(super) texels: Vec<u8>,

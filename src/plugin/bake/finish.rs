@@ -10,7 +10,7 @@ use super::{
         paint::stamp_all,
         picture::BasePicture,
         surfaces::{Active, Added, Touched},
-        textures::{self, Picture, TextureKind},
+        textures::{self, Picture},
         upload::Stager,
         watch::{Past, grown_anew},
     },
@@ -203,8 +203,7 @@ impl Order {
             }
         };
         let drawn = Box::new(Drawn { field, touched, look: look(&self.preset, frame)?, replay });
-        let texels = |kind: &TextureKind| (kind.is_wanted)(self.maps).then(|| (kind.texels)(&self.base));
-        Ok(Stage::Paint { growth, cells, drawn, texels: textures::KINDS.each_ref().map(texels), row: 0 })
+        Ok(Stage::Paint { growth, cells, drawn, texels: textures::texels(self.maps, &self.base), row: 0 })
     }
 
     /// Paints some rows from `row` on; returns the next one.
