@@ -33,6 +33,10 @@ pub struct CrackPreset {
     pub look: Look,
     /// Steps of growth a second, 0..=10000.
     pub steps_per_second: f32,
+    /// Whether cracks follow the lines of the picture (mortar, joints) and keep off what is transparent: a surface without a mask of
+    /// its own gets the one [from its picture](crate::pattern::CrackMask::from_picture).
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub follows_lines: bool,
 }
 
 impl CrackPreset {
@@ -89,6 +93,7 @@ impl CrackPreset {
         },
         look: Look::GROOVE,
         steps_per_second: 60.0,
+        follows_lines: false,
     };
 
     /// Plaster: thin, long cracks that wander and hardly branch.
@@ -118,9 +123,10 @@ impl CrackPreset {
         profile: Profile { depth: 1.0, full_width: 0.008, wall: 0.3, rim_width: 0.008, rim_depth: 0.2, faintest: 0.6 },
         look: Look::GROOVE,
         steps_per_second: 60.0,
+        follows_lines: false,
     };
 
-    /// Brick: wide cracks, one or two, that keep to the mortar where a [mask](crate::growth::CrackGrowth::set_mask) shows it.
+    /// Brick: wide cracks, one or two, that keep to the mortar of the picture.
     pub const BRICK: Self = Self {
         growth: GrowthParams {
             kill_distance: 0.06,
@@ -148,6 +154,7 @@ impl CrackPreset {
         profile: Profile { depth: 1.0, full_width: 0.01, wall: 0.3, rim_width: 0.006, rim_depth: 0.16, faintest: 0.6 },
         look: Look::GROOVE,
         steps_per_second: 60.0,
+        follows_lines: true,
     };
 
     /// Annealed window glass: a crushed core, a few long uneven radials up to the edge, few rings with gaps.
@@ -185,6 +192,7 @@ impl CrackPreset {
         profile: Profile { depth: 1.0, full_width: 0.003, wall: 0.3, rim_width: 0.004, rim_depth: 0.3, faintest: 0.6 },
         look: Look { relief: 0.004, glint: 0.5, ..Look::FROSTED },
         steps_per_second: 120.0,
+        follows_lines: false,
     };
 
     /// Tempered glass: the whole pane goes to small dice, from the hit outward.
@@ -217,6 +225,7 @@ impl CrackPreset {
         profile: Profile { depth: 1.0, full_width: 0.0035, wall: 0.3, rim_width: 0.003, rim_depth: 0.3, faintest: 0.6 },
         look: Look { relief: 0.004, glint: 0.5, ..Look::FROSTED },
         steps_per_second: 240.0,
+        follows_lines: false,
     };
 
     /// Laminated glass: a dense web of radials and rings around the hit, which holds together.
@@ -249,6 +258,7 @@ impl CrackPreset {
         profile: Profile { depth: 1.0, full_width: 0.004, wall: 0.3, rim_width: 0.006, rim_depth: 0.3, faintest: 0.6 },
         look: Look { relief: 0.004, glint: 0.5, ..Look::FROSTED },
         steps_per_second: 120.0,
+        follows_lines: false,
     };
 
     /// Dry clay: long cracks first, shorter ones between them, which end at them: cells that do not all close.
@@ -285,6 +295,7 @@ impl CrackPreset {
         profile: Profile { depth: 1.0, full_width: 0.014, wall: 0.5, rim_width: 0.012, rim_depth: 0.12, faintest: 0.6 },
         look: Look::GROOVE,
         steps_per_second: 40.0,
+        follows_lines: false,
     };
 
     /// Mud: wide cracks that close into rounded cells.
@@ -317,6 +328,7 @@ impl CrackPreset {
         profile: Profile { depth: 1.0, full_width: 0.016, wall: 0.6, rim_width: 0.014, rim_depth: 0.12, faintest: 0.6 },
         look: Look::GROOVE,
         steps_per_second: 40.0,
+        follows_lines: false,
     };
 
     /// The glaze of pottery: fine, nearly straight cracks, each ending at an older one.
@@ -351,6 +363,7 @@ impl CrackPreset {
         profile: Profile { depth: 0.8, full_width: 0.006, wall: 0.4, rim_width: 0.0, rim_depth: 0.0, faintest: 0.6 },
         look: Look { relief: 0.003, ..Look::GROOVE },
         steps_per_second: 60.0,
+        follows_lines: false,
     };
 
     /// Ice: a crushed white spot, long straight bright cracks that run far and meet at clear angles, fine ones between them.
@@ -389,6 +402,7 @@ impl CrackPreset {
         },
         look: Look { relief: 0.004, ..Look::FROSTED },
         steps_per_second: 90.0,
+        follows_lines: false,
     };
 
     /// Cartoon: few bold, smooth, tapering cracks with an outline.
@@ -413,6 +427,7 @@ impl CrackPreset {
         profile: Profile { depth: 1.0, full_width: 0.012, wall: 0.2, rim_width: 0.0, rim_depth: 0.0, faintest: 0.0 },
         look: Look::TOON,
         steps_per_second: 30.0,
+        follows_lines: false,
     };
 
     /// The same material seen from nearer (`by` above 1) or further away: every length times `by`, as
@@ -434,7 +449,7 @@ impl CrackPreset {
         let by = growth.step_length / self.growth.step_length;
         let Profile { full_width, rim_width, .. } = self.profile;
         let profile = Profile { full_width: full_width * by, rim_width: rim_width * by, ..self.profile };
-        Self { growth, profile, look: self.look.clone(), steps_per_second: self.steps_per_second }
+        Self { growth, profile, ..self.clone() }
     }
 
     /// The preset of this name (lower case), see [`NAMES`](Self::NAMES).

@@ -47,9 +47,10 @@ pub(crate) struct Options {
     /// Where they never go
     #[arg(long)]
     forbidden: Option<PathBuf>,
-    /// Cracks like to run in the lines of the base picture (mortar, joints) and never where it is transparent
-    #[arg(long)]
-    mask_from_picture: bool,
+    /// Cracks like to run in the lines of the base picture (mortar, joints) and never where it is transparent; by default as the
+    /// preset has it
+    #[arg(long, num_args = 0..=1, default_missing_value = "true")]
+    mask_from_picture: Option<bool>,
     /// Another look than the preset's: groove, frosted or toon
     #[arg(long)]
     look: Option<String>,
@@ -107,8 +108,8 @@ pub(crate) fn bake(options: &Options) -> Result<(Network, RgbaImage), Box<dyn Er
 
     let frame = SurfaceFrame::new(size)?;
     let mut growth = CrackGrowth::new(preset.growth.clone(), frame.extent(), options.seed)?;
-    let mut layers =
-        if options.mask_from_picture { CrackMask::from_picture(size, base.as_raw())? } else { CrackMask::default() };
+    let follows_lines = options.mask_from_picture.unwrap_or(preset.follows_lines);
+    let mut layers = if follows_lines { CrackMask::from_picture(size, base.as_raw())? } else { CrackMask::default() };
     for (layer, path) in [
         (&mut layers.weak, &options.weak),
         (&mut layers.strong, &options.strong),

@@ -62,10 +62,7 @@ fn moments(preset: &CrackPreset, name: &str, seed: u64, side: u32) -> Result<Vec
     let (small, side) = (side, UVec2::splat(2 * side));
     let base = fitted(read_picture(&own_picture(name))?, side);
     let behind = fitted(read_picture(&own_picture("clay"))?, side);
-    let mask = match name {
-        "brick" => CrackMask::from_picture(side, base.as_raw())?,
-        _ => CrackMask::default(),
-    };
+    let mask = if preset.follows_lines { CrackMask::from_picture(side, base.as_raw())? } else { CrackMask::default() };
     let mask = Arc::new(mask);
     let frame = SurfaceFrame::new(side)?;
     let mut growth = CrackGrowth::new(preset.growth.clone(), frame.extent(), seed)?;

@@ -74,13 +74,12 @@ fn setup(mut commands: Commands, assets: Res<AssetServer>) {
                 OnCanvas { picture: behind, size },
             ));
         }
-        let mask = if name == "brick" { CrackMaskSource::FromPicture } else { CrackMaskSource::None };
         commands
             .spawn((
                 Pane,
                 Sprite { image: picture.clone(), custom_size: Some(size), ..default() },
                 Transform::from_translation(at.extend(0.0)),
-                CrackSurface::new(preset).with_seed(i as u64).with_mask(mask),
+                CrackSurface::new(preset).with_seed(i as u64),
                 OnCanvas { picture, size },
                 Pickable::default(),
             ))

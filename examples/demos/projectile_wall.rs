@@ -77,7 +77,7 @@ fn setup(
     commands.spawn(Camera2d);
     let quad = meshes.add(Rectangle::new(SIDE, SIDE));
     // Walls crack along their mortar, the light lines of the picture.
-    let brick = CrackSurface::new(CrackPreset::BRICK).with_seed(1).with_mask(CrackMaskSource::FromPicture);
+    let brick = CrackSurface::new(CrackPreset::BRICK).with_seed(1);
     let concrete = CrackSurface::new(CrackPreset::CONCRETE).with_seed(2);
     for (x, name, surface) in [(-430.0, "brick_red", brick), (0.0, "concrete_fine", concrete)] {
         let (picture, normal) = with_normals(&assets, name);

@@ -57,7 +57,7 @@ fn setup(
     let right = Quat::from_rotation_y(-std::f32::consts::FRAC_PI_2);
     let floor = Quat::from_rotation_x(-std::f32::consts::FRAC_PI_2);
     // Walls crack along their mortar, the light lines of the picture.
-    let of_brick = CrackSurface::new(CrackPreset::BRICK).with_mask(CrackMaskSource::FromPicture);
+    let of_brick = CrackSurface::new(CrackPreset::BRICK);
     let of_concrete = CrackSurface::new(CrackPreset::CONCRETE);
     let sides = [
         (Transform::from_xyz(0.0, 0.0, -HALF), concrete.clone(), of_concrete.clone().with_seed(1)),

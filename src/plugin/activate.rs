@@ -196,7 +196,7 @@ pub(super) fn make_ready_now(world: &mut World, entity: Entity) -> Result<bool, 
 /// Makes growth and textures in this frame; `false` if its mask is not there yet.
 pub(super) fn make_now(world: &mut World, entity: Entity, plan: Plan) -> Result<bool, CrackError> {
     let draft = plan.pictures.clone().draft(world, &plan.shown)?;
-    let Some(mask) = mask::resolve(world, &plan.surface, &plan.shown, &draft)? else { return Ok(false) };
+    let Some(mask) = mask::resolve(world, plan.mask(), &plan.shown, &draft)? else { return Ok(false) };
     let read = Readings { base: draft.base.clone(), mask };
     let Blank { growth, field, look } = Blank::new(&plan.surface, &plan.preset, &read, plan.pictures.rect)?;
     let textures = make_textures(world, &draft, None)?;

@@ -85,8 +85,13 @@ impl Bakes {
 
     /// What was read of the picture before this frame is another one now.
     pub(super) fn forget_picture(&mut self, picture: AssetId<Image>, frame: u64) {
-        for plan in self.list.iter_mut().filter_map(|(_, bake)| bake.plan.as_mut()) {
-            plan.forget_picture(picture, frame);
+        for (_, Bake { work, plan, .. }) in &mut self.list {
+            let is_past = plan.as_mut().is_none_or(|plan| plan.forget_picture(picture, frame));
+            if let Work::Reading(reading, _) = work
+                && is_past
+            {
+                reading.forget(picture);
+            }
         }
     }
 

@@ -10,9 +10,9 @@ use std::sync::{Mutex, PoisonError};
 #[derive(Resource, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Resource, Default)]
 pub struct CrackBudget {
-    /// Time for hits, growth and painting in one frame, milliseconds, however many threads grow and paint; default 2. What is left
-    /// over waits for the next frame; at least one hit, one step and one surface are done in each. NaN and values below zero count
-    /// as 0.
+    /// Time for hits, growth and painting in one frame, and for what goes on around them, milliseconds, however many threads grow and
+    /// paint; default 2. What is left over waits for the next frame; at least one hit, one step and one surface are done in each. NaN
+    /// and values below zero count as 0.
     ///
     /// With a second or more nothing that a frame shows is put off: for recordings, whose frames may take any time.
     pub milliseconds: f32,
@@ -65,13 +65,31 @@ impl CrackBudget {
     pub(super) fn is_boundless(&self) -> bool {
         self.milliseconds >= 1000.0
     }
+
+    /// A share of the time in a frame.
+    fn share(&self, share: f32) -> Duration {
+        Duration::from_secs_f32((self.milliseconds.max(0.0) * share / 1000.0).min(3600.0))
+    }
 }
 
 /// Time spent in this frame by the systems of this crate.
 #[derive(Resource, Default)]
 pub(super) struct FrameClock {
     spent: Duration,
+    start: Option<Instant>,
+    /// What a frame takes besides, mostly: for what comes before, between and after what is measured. It counts as spent from the
+    /// start of the next one.
+    besides: Duration,
 }
+
+/// Share of a frame's budget that counts as spent at the start at the most: what a game's own systems do in between is not ours.
+const MAX_BESIDES: f32 = 0.25;
+
+/// Share of it that must be spent for the frame to tell what others take besides.
+const BUSY: f32 = 0.25;
+
+/// Weight of a frame in [`FrameClock::besides`].
+const WEIGHT: f32 = 0.125;
 
 /// Measures one system.
 pub(super) struct Timer {
@@ -83,8 +101,7 @@ pub(super) struct Timer {
 impl FrameClock {
     /// Starts to measure a system that must end when `share` of the frame's budget is spent.
     pub(super) fn start(&self, budget: &CrackBudget, share: f32) -> Timer {
-        let seconds = (budget.milliseconds.max(0.0) * share / 1000.0).min(3600.0);
-        Timer { start: Instant::now(), before: self.spent, limit: Duration::from_secs_f32(seconds) }
+        Timer { start: Instant::now(), before: self.spent, limit: budget.share(share) }
     }
 
     /// Adds what the system has spent.
@@ -124,13 +141,58 @@ pub(super) fn share_out<S: Send>(shares: impl ExactSizeIterator<Item = S> + Send
 }
 
 pub(super) fn start_frame(mut clock: ResMut<FrameClock>) {
-    clock.spent = Duration::ZERO;
+    clock.start = Some(Instant::now());
+    clock.spent = clock.besides;
+}
+
+/// Learns from a busy frame what it takes besides what is measured.
+pub(super) fn end_frame(mut clock: ResMut<FrameClock>, budget: Res<CrackBudget>) {
+    let Some(start) = clock.start.take() else { return };
+    let measured = clock.spent.saturating_sub(clock.besides);
+    if measured >= budget.share(BUSY) {
+        let now = start.elapsed().saturating_sub(measured).min(budget.share(MAX_BESIDES));
+        clock.besides = clock.besides.mul_f32(1.0 - WEIGHT) + now.mul_f32(WEIGHT);
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bevy::tasks::TaskPool;
+    use bevy::{ecs::system::RunSystemOnce, tasks::TaskPool};
+    use std::thread::sleep;
+
+    #[test]
+    fn what_frames_take_besides_counts_as_spent() {
+        let mut world = World::new();
+        world.init_resource::<FrameClock>();
+        world.insert_resource(CrackBudget { milliseconds: 4.0, ..default() });
+        let millisecond = Duration::from_millis(1);
+        let mut frame = |busy: u32, besides: u32| {
+            let _ = world.run_system_once(start_frame);
+            sleep(besides * millisecond);
+            let (mut clock, budget) =
+                (world.remove_resource::<FrameClock>().unwrap_or_default(), CrackBudget::default());
+            let timer = clock.start(&budget, 1.0);
+            sleep(busy * millisecond);
+            clock.stop(&timer);
+            world.insert_resource(clock);
+            let _ = world.run_system_once(end_frame);
+            let clock = world.resource::<FrameClock>();
+            (clock.spent.as_secs_f32() * 1e3, clock.besides.as_secs_f32() * 1e3)
+        };
+        assert_eq!(frame(0, 2).1, 0.0, "an idle frame tells nothing");
+        let (_, first) = frame(2, 3);
+        // A quarter of the budget, at the weight of one frame.
+        assert!((0.12..0.13).contains(&first), "{first}");
+        let (mut last, mut spent) = (first, 0.0);
+        for _ in 0..20 {
+            let before = last;
+            (spent, last) = frame(2, 3);
+            assert!(last > before && last <= 1.0, "{last}");
+            assert!(spent >= 2.0 + before, "{spent}");
+        }
+        assert!(spent > 2.8, "{spent}");
+    }
 
     #[test]
     fn every_share_is_done_once() {

@@ -187,14 +187,19 @@ impl Active {
         }
     }
 
-    /// Makes a step of growth if one is due.
-    pub(super) fn step_if_due(&mut self) -> bool {
+    /// Whether a step of growth is due.
+    pub(super) fn is_due(&self) -> bool {
         let is_due = match (self.ruler(), &self.playback) {
             (Ruler::Speed(_) | Ruler::Appearing(_), Some(playback)) => playback.want > self.end(),
             (Ruler::Closing(_), _) => false,
             _ => self.due >= 1.0,
         };
-        if !(is_due && self.growth.is_growing()) {
+        is_due && self.growth.is_growing()
+    }
+
+    /// Makes a step of growth if one is due.
+    pub(super) fn step_if_due(&mut self) -> bool {
+        if !self.is_due() {
             return false;
         }
         self.due = (self.due - 1.0).max(0.0);

@@ -46,10 +46,8 @@ pub(super) fn grow_surfaces(
             active.pass(seconds);
         }
     }
-    // Surfaces in a row that had nothing to do and are still in the list.
-    let mut idle = 0;
-    let mut left = Vec::new();
-    while left.is_empty() && idle < growing.len() {
+    let (mut left, mut idle) = (Vec::new(), Vec::new());
+    while left.is_empty() && !growing.is_empty() {
         let mut jobs = batch(active, growing, |entity, active| {
             active.is_growing.then_some(Job { entity, active, has_grown: None })
         });
@@ -65,18 +63,16 @@ pub(super) fn grow_surfaces(
                 left.push(entity);
                 continue;
             };
-            if has_grown {
-                idle = 0;
-            }
-            if !active.is_at_rest() {
-                idle += usize::from(!has_grown);
-                growing.push_back(entity);
-            } else {
+            if active.is_at_rest() {
                 active.is_growing = false;
                 active.due = 0.0;
                 if active.has_closed() {
                     commands.entity(entity).heal_cracks();
                 }
+            } else if active.is_due() {
+                growing.push_back(entity);
+            } else {
+                idle.push(entity);
             }
             let is_news = has_grown || active.is_behind() || (!active.is_growing && active.is_open);
             if is_news && !active.is_dirty {
@@ -89,5 +85,6 @@ pub(super) fn grow_surfaces(
         }
     }
     left.into_iter().rev().for_each(|entity| growing.push_front(entity));
+    growing.extend(idle);
     clock.stop(&timer);
 }

@@ -4,6 +4,7 @@ use super::{
     CrackBudget, CrackStats, CrackSurface,
     budget::FrameClock,
     queue::{HitQueue, QueuedHit},
+    space,
 };
 use bevy::{ecs::query::QueryEntityError, prelude::*};
 
@@ -143,10 +144,9 @@ fn localize(hit: &CrackHit, transform: Option<&GlobalTransform>) -> Result<HitPo
         return Err("the energy is negative");
     }
     let HitPoint::World(point) = hit.at else { return Ok(hit.at) };
-    let affine = transform.ok_or("the surface has no `GlobalTransform`")?.affine();
-    if affine.matrix3.determinant() == 0.0 {
-        return Err("the surface's transform has a scale of zero");
-    }
-    let local = affine.inverse().transform_point3(point);
-    if local.is_finite() { Ok(HitPoint::Local(local)) } else { Err("the surface's transform cannot be inverted") }
+    let transform = transform.ok_or("the surface has no `GlobalTransform`")?;
+    let back =
+        space::to_local(transform).ok_or("the surface's transform has a scale of zero, or cannot be inverted")?;
+    let local = back.transform_point3(point);
+    if local.is_finite() { Ok(HitPoint::Local(local)) } else { Err("the point is too far away") }
 }

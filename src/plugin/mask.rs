@@ -1,13 +1,13 @@
 //! [`CrackMaskSource`]: where a surface's masks come from.
 
 use super::{
-    CrackError, CrackSurface,
+    CrackError,
     carrier::Shown,
     picture::{self, BasePicture, Space},
     plan::{Draft, PicturePlan},
 };
 use crate::{
-    Grid,
+    CrackPreset, Grid,
     pattern::{CrackMask, MaskError},
     raster::TexelRect,
 };
@@ -20,8 +20,11 @@ use std::sync::{Arc, Weak};
 /// Where cracks like to run, where they do not, and where they never go. See [`CrackMask`].
 #[derive(Reflect, Clone, Debug, Default, PartialEq)]
 pub enum CrackMaskSource {
-    /// Everywhere alike.
+    /// As the preset has it: [`FromPicture`](Self::FromPicture) if its cracks follow lines
+    /// ([`CrackPreset::follows_lines`], as those of brick do), else [`None`](Self::None).
     #[default]
+    Auto,
+    /// Everywhere alike.
     None,
     /// By the surface's own picture: cracks follow its lines (mortar, joints of tiles and planks, old cracks) and keep off
     /// what is less than half opaque. It is read once for each picture, beside the frames; the first hit waits for that.
@@ -39,11 +42,20 @@ pub enum CrackMaskSource {
 }
 
 impl CrackMaskSource {
+    /// What it is on a surface with this preset; never [`Auto`](Self::Auto).
+    pub(super) const fn with(&self, preset: &CrackPreset) -> &Self {
+        match self {
+            Self::Auto if preset.follows_lines => &Self::FromPicture,
+            Self::Auto => &Self::None,
+            own => own,
+        }
+    }
+
     /// Its images.
     pub(super) fn images(&self) -> impl Iterator<Item = &Handle<Image>> {
         let layers = match self {
             Self::Images { weak, strong, forbidden } => [weak, strong, forbidden].map(Option::as_ref),
-            Self::None | Self::FromPicture => [None; 3],
+            Self::Auto | Self::None | Self::FromPicture => [None; 3],
         };
         layers.into_iter().flatten()
     }
@@ -131,15 +143,15 @@ pub(super) fn part(rgba: &[u8], size: UVec2, rect: TexelRect) -> Vec<u8> {
     (rect.min.y..rect.max.y).flat_map(row).copied().collect()
 }
 
-/// The mask of a surface; `None` if it is not there yet.
+/// The mask from a source; `None` if it is not there yet.
 pub(super) fn resolve(
     world: &mut World,
-    surface: &CrackSurface,
+    source: &CrackMaskSource,
     shown: &Shown,
     draft: &Draft,
 ) -> Result<Option<Arc<CrackMask>>, CrackError> {
-    match &surface.mask {
-        CrackMaskSource::None => Ok(Some(Arc::default())),
+    match source {
+        CrackMaskSource::Auto | CrackMaskSource::None => Ok(Some(Arc::default())),
         CrackMaskSource::FromPicture => {
             // Without a picture there is nothing to go by.
             let Some(picture) = &shown.diffuse else { return Ok(Some(Arc::default())) };
@@ -147,7 +159,7 @@ pub(super) fn resolve(
             Ok(world.resource_mut::<PictureMasks>().get(key, &draft.base))
         }
         CrackMaskSource::Images { weak, strong, forbidden } => {
-            for image in surface.mask.images() {
+            for image in source.images() {
                 if !picture::is_loaded(world, image)? {
                     return Ok(None);
                 }

@@ -48,6 +48,7 @@ mod preset;
 mod queue;
 mod read;
 mod shards;
+mod space;
 #[cfg(feature = "2d")]
 mod sprite;
 mod state;
@@ -197,7 +198,7 @@ impl Plugin for CrackPlugin {
                         .chain()
                         .in_set(Grow),
                     (film::show_films.run_if(film::any_filmed), paint::paint_surfaces).chain().in_set(Paint),
-                    upload::drop_unwanted.in_set(Upload),
+                    (upload::drop_unwanted, budget::end_frame).chain().in_set(Upload),
                 ),
             );
         #[cfg(feature = "2d")]

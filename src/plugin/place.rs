@@ -1,6 +1,6 @@
 //! [`CrackPlaces`]: from points of a crack to points of the world.
 
-use super::mesh::place_of;
+use super::{mesh::place_of, space};
 #[cfg(feature = "2d")]
 use bevy::sprite::Anchor;
 use bevy::{ecs::system::SystemParam, prelude::*};
@@ -56,10 +56,10 @@ impl CrackPlaces<'_, '_> {
     #[must_use]
     pub fn at(&self, entity: Entity, uv: Vec2) -> Option<CrackPlace> {
         let (local, normal) = self.local(entity, uv)?;
-        let affine = self.transforms.get(entity).ok()?.affine();
+        let transform = self.transforms.get(entity).ok()?;
         // Normals of what is scaled turn the other way.
-        let normal = (affine.matrix3.inverse().transpose() * normal).normalize_or_zero();
-        let position = affine.transform_point3(local);
+        let normal = (space::to_local(transform)?.matrix3.transpose() * normal).normalize_or_zero();
+        let position = transform.transform_point(local);
         (position.is_finite() && normal.is_finite()).then_some(CrackPlace { position, normal })
     }
 

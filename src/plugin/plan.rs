@@ -39,8 +39,6 @@ pub(super) struct Plan {
     read_at: u64,
     /// Whether a picture has changed since.
     pub(super) is_outdated: bool,
-    /// Whether an image of its mask has changed since.
-    pub(super) has_other_mask: bool,
 }
 
 impl Plan {
@@ -60,8 +58,12 @@ impl Plan {
             textures: None,
             read_at,
             is_outdated: false,
-            has_other_mask: false,
         }))
+    }
+
+    /// Where its mask comes from.
+    pub(super) const fn mask(&self) -> &CrackMaskSource {
+        self.surface.mask.with(&self.preset)
     }
 
     /// What its pictures are read from.
@@ -69,13 +71,11 @@ impl Plan {
         self.pictures.key(&self.shown)
     }
 
-    /// What was read of the picture before this frame is another one now.
-    pub(super) fn forget_picture(&mut self, picture: AssetId<Image>, frame: u64) {
-        let is = |image: &Handle<Image>| image.id() == picture;
-        if self.read_at < frame {
-            self.is_outdated |= self.shown.pictures().any(is);
-            self.has_other_mask |= self.surface.mask.images().any(is);
-        }
+    /// What was read of the picture before this frame is another one now; whether some of it may have been read.
+    pub(super) fn forget_picture(&mut self, picture: AssetId<Image>, frame: u64) -> bool {
+        let is_past = self.read_at < frame;
+        self.is_outdated |= is_past && self.shown.pictures().any(|image| image.id() == picture);
+        is_past
     }
 
     /// Whether the entity still is what it was, but for the part of its pictures that it shows.
@@ -119,7 +119,7 @@ impl Plan {
             Some(base) => RawBase::Read(base),
             None => RawBase::Pictures(self.pictures.needed(&self.shown).map(|map| map.map(|map| copies.add(map)))),
         };
-        let mask = match &self.surface.mask {
+        let mask = match self.mask() {
             CrackMaskSource::FromPicture => match &self.shown.diffuse {
                 Some(picture) => {
                     let key = Key::new(picture, &self.pictures);
@@ -127,7 +127,7 @@ impl Plan {
                 }
                 None => RawMask::Made(Arc::default()),
             },
-            CrackMaskSource::None => RawMask::Made(Arc::default()),
+            CrackMaskSource::Auto | CrackMaskSource::None => RawMask::Made(Arc::default()),
             CrackMaskSource::Images { weak, strong, forbidden } => {
                 RawMask::Images([weak, strong, forbidden].map(|image| image.as_ref().map(|image| copies.add(image))))
             }
@@ -146,7 +146,7 @@ impl Plan {
         let Readings { base, mask } = read;
         if !is_outdated {
             world.resource_mut::<BasePictures>().remember(key, &base);
-            if let (CrackMaskSource::FromPicture, Some(picture)) = (&surface.mask, &shown.diffuse) {
+            if let (CrackMaskSource::FromPicture, Some(picture)) = (surface.mask.with(&preset), &shown.diffuse) {
                 world.resource_mut::<PictureMasks>().remember(Key::new(picture, &pictures), &mask);
             }
         }

@@ -64,7 +64,13 @@ impl Preparations {
 
     /// What was read of the picture before this frame is another one now.
     pub(super) fn forget_picture(&mut self, picture: AssetId<Image>, frame: u64) {
-        self.list.iter_mut().for_each(|(_, preparation)| preparation.plan.forget_picture(picture, frame));
+        for (_, Preparation { plan, stage, .. }) in &mut self.list {
+            if plan.forget_picture(picture, frame)
+                && let Stage::Reading(reading, _) = stage
+            {
+                reading.forget(picture);
+            }
+        }
     }
 
     /// Whether there is room for one more: of those that are hit small ones and others do not wait for one another, and neither
@@ -317,8 +323,6 @@ impl Preparation {
                     }
                     let images = world.get_resource::<Assets<Image>>().ok_or(CrackError::NoImages)?;
                     match turn.copy(&mut reading, images) {
-                        // Half of an image of its mask may be of before.
-                        _ if plan.has_other_mask => return Ok(Next::Again),
                         Read::More => {
                             let stage = Stage::Reading(reading, raw);
                             return Ok(Next::On(Self { plan, key, stage, since, is_wanted }));

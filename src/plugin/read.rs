@@ -7,6 +7,9 @@ use bevy::{prelude::*, tasks::AsyncComputeTaskPool};
 /// Bytes that are copied without a look at the clock: by all bakes together no more in a frame.
 pub(super) const MAX_BYTES: usize = 1 << 19;
 
+/// How often a picture is copied anew that changes while it is copied: one that changes in every frame would never be read.
+const MAX_RESTARTS: u32 = 8;
+
 /// Pictures of which some is copied.
 pub(super) struct Reading {
     copies: Vec<Copy>,
@@ -21,6 +24,7 @@ struct Copy {
     image: Image,
     data: Vec<u8>,
     length: usize,
+    restarts: u32,
 }
 
 /// How far it is.
@@ -50,6 +54,15 @@ impl Reading {
     pub(super) fn wait_no_more(&mut self) {
         if self.memory.take_if(|task| task.take_back().is_some()).is_some() {
             self.has_task = false;
+        }
+    }
+
+    /// A picture has changed: half of the copy may be of before.
+    pub(super) fn forget(&mut self, picture: AssetId<Image>) {
+        let begun = |copy: &&mut Copy| copy.picture.id() == picture && !copy.data.is_empty();
+        for copy in self.copies.iter_mut().filter(begun).filter(|copy| copy.restarts < MAX_RESTARTS) {
+            copy.data.clear();
+            copy.restarts += 1;
         }
     }
 
@@ -84,7 +97,7 @@ impl Copy {
         let (length, format) = (data.as_ref()?.len(), texture_descriptor.format);
         let mut copy = Image::new_uninit(texture_descriptor.size, texture_descriptor.dimension, format, *asset_usage);
         copy.texture_descriptor.mip_level_count = texture_descriptor.mip_level_count;
-        Some(Self { picture, image: copy, data: Vec::new(), length })
+        Some(Self { picture, image: copy, data: Vec::new(), length, restarts: 0 })
     }
 
     /// False if it cannot be copied as it was to be.
@@ -139,6 +152,28 @@ mod tests {
         for (copy, picture) in reading.finish().iter().zip(&pictures) {
             assert!(images.get(picture).is_some_and(|image| image.data == copy.data), "a copy equals its picture");
         }
+    }
+
+    #[test]
+    fn a_picture_that_changes_meanwhile_is_copied_anew() {
+        let mut images = Assets::<Image>::default();
+        let [changing, other] = [600, 500].map(|side| images.add(picture(side)));
+        let mut reading = Reading::new(vec![changing.clone(), other], &images, false).expect("it is there");
+        let mut change = |reading: &mut Reading, value| {
+            let image = images.get_mut(&changing).expect("it is there").into_inner();
+            image.data.iter_mut().flatten().for_each(|byte| *byte = value);
+            reading.forget(changing.id());
+            reading.step(&images, &mut 1000)
+        };
+        assert_eq!(change(&mut reading, 5), Read::More);
+        assert_eq!(change(&mut reading, 6), Read::More);
+        assert_eq!(change(&mut reading, 7), Read::More);
+        assert_eq!(reading.copies[0].data, [7; 1000], "no half of what was before");
+        // One that never stands still is read as it comes.
+        let frames = (8..=255).take_while(|value| change(&mut reading, *value) == Read::More).count();
+        assert_eq!(frames, 255 - 7);
+        assert!(reading.copies[0].data.len() > 100_000);
+        assert_eq!(reading.step(&images, &mut (1 << 30)), Read::Done);
     }
 
     #[test]

@@ -31,7 +31,7 @@ pub struct CrackSurface {
     pub write: CrackMaps,
     /// Whether transparent texels refuse hits and attract no cracks; default true.
     pub alpha_mask: bool,
-    /// Where cracks like to run and where they never go. A change takes effect after healing.
+    /// Where cracks like to run and where they never go; by default as the preset has it. A change takes effect after healing.
     pub mask: CrackMaskSource,
 }
 
@@ -46,7 +46,7 @@ impl CrackSurface {
             resolution: CrackResolution::Picture,
             write: CrackMaps { diffuse: true, normal: true, depth: true },
             alpha_mask: true,
-            mask: CrackMaskSource::None,
+            mask: CrackMaskSource::Auto,
         }
     }
 

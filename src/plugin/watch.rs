@@ -271,7 +271,8 @@ pub(super) fn grown_anew(
 fn update_picture(world: &mut World, entity: Entity, active: &mut Active, shown: Shown) -> Result<bool, CrackError> {
     active.is_outdated = true;
     let Some(draft) = draft(world, &active.surface, &shown, active.bytes)? else { return Ok(false) };
-    let Some(mask) = mask::resolve(world, &active.surface, &shown, &draft)? else { return Ok(false) };
+    let source = active.surface.mask.with(&active.preset);
+    let Some(mask) = mask::resolve(world, source, &shown, &draft)? else { return Ok(false) };
     let frame = frame(draft.plan.rect)?;
     let look = look(&active.preset, frame)?;
     active.recall();
@@ -298,7 +299,7 @@ fn update_picture(world: &mut World, entity: Entity, active: &mut Active, shown:
     active.bytes = draft.plan.bytes;
     active.base = draft.base;
     // What the mask forbids may be elsewhere now.
-    if frame != active.field.frame || active.surface.mask != CrackMaskSource::None {
+    if frame != active.field.frame || *active.surface.mask.with(&active.preset) != CrackMaskSource::None {
         active.look = look;
         active.field = DepthField::new(frame);
         active.field.forbid(&mask);

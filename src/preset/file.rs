@@ -18,12 +18,13 @@ struct Form {
     profile: Profile,
     look: Look,
     steps_per_second: f32,
+    follows_lines: bool,
 }
 
 impl Default for Form {
     fn default() -> Self {
-        let CrackPreset { growth, profile, look, steps_per_second } = CrackPreset::default();
-        Self { base: DEFAULT_BASE.into(), growth, profile, look, steps_per_second }
+        let CrackPreset { growth, profile, look, steps_per_second, follows_lines } = CrackPreset::default();
+        Self { base: DEFAULT_BASE.into(), growth, profile, look, steps_per_second, follows_lines }
     }
 }
 
@@ -39,12 +40,13 @@ struct Patch {
     profile: Fields,
     look: Fields,
     steps_per_second: Option<f32>,
+    follows_lines: Option<bool>,
 }
 
 impl Default for Patch {
     fn default() -> Self {
         let [growth, profile, look] = <[Fields; 3]>::default();
-        Self { base: DEFAULT_BASE.into(), growth, profile, look, steps_per_second: None }
+        Self { base: DEFAULT_BASE.into(), growth, profile, look, steps_per_second: None, follows_lines: None }
     }
 }
 
@@ -124,6 +126,7 @@ impl CrackPreset {
             profile: patched(&base.profile, patch.profile)?,
             look: patched(&base.look, patch.look)?,
             steps_per_second: patch.steps_per_second.unwrap_or(base.steps_per_second),
+            follows_lines: patch.follows_lines.unwrap_or(base.follows_lines),
         };
         preset.validate()?;
         Ok(preset)

@@ -476,6 +476,14 @@ fn i10_transforms_that_cannot_be_inverted_are_refused() {
     app.world_mut().entity_mut(bare).remove::<GlobalTransform>();
     hit(&mut app, CrackHit::world(bare, Vec3::ZERO));
     assert_eq!(step(&mut app).rejected, rejected + 1);
+    // What is flat along z alone looks as ever, and can be hit.
+    let flat = spawn_sprite(&mut app, &image);
+    let transform = Transform::from_xyz(100.0, 0.0, 5.0).with_scale(Vec3::new(2.0, 1.0, 0.0));
+    app.world_mut().entity_mut(flat).insert(transform);
+    hit(&mut app, CrackHit::world(flat, Vec3::new(146.0, 20.0, 5.0)));
+    hit(&mut app, CrackHit::world(flat, Vec3::new(150.0, 0.0, 5.0)));
+    let after = step(&mut app);
+    assert_eq!((after.applied, after.rejected), (rejected + 1, rejected + 2));
 }
 
 /// Where a surface of the size of its picture is cracked, in texels from the top left.

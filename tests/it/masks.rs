@@ -390,12 +390,18 @@ mod in_apps {
             diffuse
         };
         let mut painted = Vec::new();
-        for (source, mask) in [(CrackMaskSource::FromPicture, own), (CrackMaskSource::None, Arc::default())] {
+        let stubborn = CrackPreset { follows_lines: false, ..preset.clone() };
+        for (preset, source, mask) in [
+            (&preset, CrackMaskSource::Auto, &own),
+            (&preset, CrackMaskSource::None, &Arc::default()),
+            (&stubborn, CrackMaskSource::Auto, &Arc::default()),
+            (&stubborn, CrackMaskSource::FromPicture, &own),
+        ] {
             let entity = spawn(&mut app, image(size, picture.as_raw().clone()), preset.clone(), source);
             hit(&mut app, CrackHit::uv(entity, at));
             settle(&mut app, entity);
             let shown = shown(&app, entity);
-            assert!(shown == expected(&mask), "other texels than without the engine");
+            assert!(shown == expected(mask), "other texels than without the engine");
             painted.push(shown);
         }
         assert!(painted[0] != painted[1], "the mask makes a difference");

@@ -45,6 +45,7 @@ fn what_a_file_leaves_out_is_as_in_its_base() {
         assert_eq!(read(""), base);
         assert_eq!(read("growth: (), profile: (), look: ()"), base);
         assert_eq!(read("steps_per_second: 7"), CrackPreset { steps_per_second: 7.0, ..base.clone() });
+        assert_eq!(read("follows_lines: true"), CrackPreset { follows_lines: true, ..base.clone() });
         let growth = GrowthParams {
             markers: MarkerLayout::DartThrowing { spacing: 0.25 },
             starts: StartLayout::Point,

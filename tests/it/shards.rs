@@ -534,6 +534,25 @@ fn what_cannot_shatter_says_so_and_stays_whole() {
 }
 
 #[test]
+fn what_is_flat_along_z_shatters() {
+    let mut app = app();
+    listen::<ShatterFailed>(&mut app);
+    for scale in [Vec3::new(2.0, 2.0, 0.0), Vec3::ZERO] {
+        let entity = cracked(&mut app, UVec2::splat(64), loose());
+        app.world_mut().entity_mut(entity).insert(Transform::from_scale(scale));
+        steps(&mut app, 1);
+        let direction = Some(Vec3::new(1.0, 0.5, -1.0));
+        shatter(&mut app, entity, ShatterRequest { direction, ..ShatterRequest::ALL });
+        steps(&mut app, 3);
+        assert!(heard::<ShatterFailed>(&mut app).is_empty(), "{scale}");
+        let shards = shards(&mut app);
+        assert!(!shards.is_empty(), "{scale}");
+        assert!(shards.iter().all(|shard| get::<Transform>(&app, *shard).is_finite()), "{scale}");
+        app.world_mut().despawn(entity);
+    }
+}
+
+#[test]
 fn another_picture_makes_the_surface_whole() {
     let mut app = app();
     let entity = cracked(&mut app, UVec2::splat(64), loose());

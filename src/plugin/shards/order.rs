@@ -10,7 +10,7 @@ use crate::{
     Grid,
     math::mix,
     pattern::{Network, SurfaceFrame},
-    plugin::{picture::BasePicture, surfaces::Active},
+    plugin::{picture::BasePicture, space, surfaces::Active},
     raster::{DirtyTiles, TexelRect},
     shatter::{BreakAgain, Burst, Cuts, Flight, RimLook, Shards, ShatterError, Support, shatter},
 };
@@ -127,9 +127,8 @@ impl Order {
         let from = request.uv.map_or(pos, |uv| uv * extent);
         let plane =
             (active.carrier.kind.plane)(world, entity, active).map_err(|reason| ShardsError::NotFlat { reason })?;
-        let to_local =
-            world.get::<GlobalTransform>(entity).map_or(Mat3::IDENTITY, |at| at.affine().matrix3.inverse().into());
-        let direction = plane.rotation.inverse() * (to_local * request.direction.unwrap_or(direction));
+        let back = world.get::<GlobalTransform>(entity).and_then(space::to_local).unwrap_or_default();
+        let direction = plane.rotation.inverse() * back.transform_vector3(request.direction.unwrap_or(direction));
         let broken = active.broken.as_deref();
         let released = broken.map_or(0, |broken| broken.released);
         let seed = active.surface.seed;

@@ -1,0 +1,37 @@
+//! From the world into a surface's own space.
+
+use bevy::{math::Affine3A, prelude::*};
+
+/// The way back from the world; `None` if there is none. Scale 0 along z alone makes a picture no smaller and counts as 1.
+pub(super) fn to_local(transform: &GlobalTransform) -> Option<Affine3A> {
+    let mut affine = transform.affine();
+    let axes = &mut affine.matrix3;
+    if axes.z_axis.length_squared() == 0.0 {
+        axes.z_axis = axes.x_axis.cross(axes.y_axis).normalize_or_zero();
+    }
+    let is_flat = axes.determinant() == 0.0;
+    let inverse = affine.inverse();
+    (!is_flat && inverse.is_finite()).then_some(inverse)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_flat_along_z_alone_can_be_hit() {
+        let of = |scale: [f32; 3]| {
+            let rotation = Quat::from_rotation_y(0.3);
+            let at = Transform { translation: Vec3::new(1.0, 2.0, 3.0), rotation, scale: scale.into() };
+            let at = GlobalTransform::from(at);
+            let point = at.transform_point(Vec3::new(0.5, -0.25, 0.0));
+            to_local(&at).map(|back| back.transform_point3(point))
+        };
+        for scale in [[2.0, -3.0, 0.0], [2.0, 3.0, 0.5]] {
+            assert!(of(scale).is_some_and(|point| point.distance(Vec3::new(0.5, -0.25, 0.0)) < 1e-5), "{scale:?}");
+        }
+        for scale in [[0.0, 1.0, 1.0], [1.0, 0.0, 0.0], [0.0; 3], [f32::NAN, 1.0, 1.0], [1.0, f32::INFINITY, 0.0]] {
+            assert_eq!(of(scale), None, "{scale:?}");
+        }
+    }
+}
