@@ -11,8 +11,8 @@ use std::sync::{Mutex, PoisonError};
 #[reflect(Resource, Default)]
 pub struct CrackBudget {
     /// Time for hits, growth and painting in one frame, and for what goes on around them, milliseconds, however many threads grow and
-    /// paint; default 2. What is left over waits for the next frame; at least one hit, one step and one surface are done in each. NaN
-    /// and values below zero count as 0.
+    /// paint; default 2. What is left over waits for the next frame; at least one hit, one step and one surface are done in each. Where
+    /// more cracks grow than there is time for, all of them grow more slowly. NaN and values below zero count as 0.
     ///
     /// With a second or more nothing that a frame shows is put off: for recordings, whose frames may take any time.
     pub milliseconds: f32,

@@ -86,6 +86,10 @@ impl CrackClock {
 /// The most steps that can be due: after a long pause a surface does not make up for all of it.
 const MAX_DUE: f64 = 64.0;
 
+/// Frames whose steps a surface makes up for when it was not painted meanwhile. All of a crack gets wider at each step: to paint many steps
+/// at once costs half as much as to paint each, but is seen to jump.
+const MAX_LATE: f64 = 4.0;
+
 /// The most steps a second that baked cracks appear in.
 const MOST_STEPS: f64 = 1e6;
 
@@ -177,6 +181,8 @@ impl Active {
             (Ruler::Closing(rate), Some(playback)) => playback.advance(-rate * f64::from(seconds), end),
             (Ruler::Appearing(rate), Some(playback)) => playback.advance(rate * f64::from(seconds), end),
             (Ruler::Speed(speed), Some(playback)) => playback.advance(speed * steps, end),
+            // It waits to be painted.
+            _ if self.is_late => self.due = self.due.max((self.due + steps).min(MAX_LATE * steps)),
             _ => self.due = (self.due + steps).min(MAX_DUE),
         }
         if let Some(playback) = &mut self.playback

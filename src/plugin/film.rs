@@ -130,7 +130,7 @@ impl Film {
             changed: Vec::new(),
             staged: [const { None }; 3],
         });
-        active.is_dirty = true;
+        (active.is_dirty, active.is_late) = (true, false);
         self.shot = Some(Out::start(shot, has_threads));
     }
 

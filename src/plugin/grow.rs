@@ -53,8 +53,9 @@ pub(super) fn grow_surfaces(
         });
         share_out(jobs.chunks_mut(SHARE).enumerate(), |(i, jobs)| {
             for (k, job) in jobs.iter_mut().enumerate() {
-                if (i, k) == (0, 0) || !timer.is_over() {
-                    job.has_grown = Some(job.active.step_if_due());
+                let is_first = (i, k) == (0, 0);
+                if is_first || !timer.is_over() {
+                    job.has_grown = Some((is_first || !job.active.is_late) && job.active.step_if_due());
                 }
             }
         });
@@ -69,7 +70,7 @@ pub(super) fn grow_surfaces(
                 if active.has_closed() {
                     commands.entity(entity).heal_cracks();
                 }
-            } else if active.is_due() {
+            } else if active.is_due() && !active.is_late {
                 growing.push_back(entity);
             } else {
                 idle.push(entity);

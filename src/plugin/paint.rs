@@ -88,6 +88,11 @@ pub(super) fn paint_surfaces(
         }
     }
     left.into_iter().rev().for_each(|entity| dirty.push_front(entity));
+    for entity in &*dirty {
+        if let Some(active) = active.get_mut(entity) {
+            active.is_late = true;
+        }
+    }
     clock.stop(&timer);
 }
 
@@ -230,7 +235,7 @@ pub(super) fn tell_painted(
     states: &mut Query<&mut CrackState>,
     commands: &mut Commands,
 ) {
-    active.is_dirty = false;
+    (active.is_dirty, active.is_late) = (false, false);
     active.painted += 1;
     let is_done = active.is_open && active.is_complete();
     tell_cells(active, entity, commands);

@@ -83,6 +83,8 @@ pub(super) struct Active {
     pub(super) is_growing: bool,
     /// Whether it is in the dirty list.
     pub(super) is_dirty: bool,
+    /// Whether a frame had no time to paint it: its growth waits for that.
+    pub(super) is_late: bool,
     /// Whether its end has not been told yet.
     pub(super) is_open: bool,
     /// Whether its pictures have changed since they were read.
@@ -147,6 +149,7 @@ impl Active {
             touched: Touched::new(frame.size()),
             is_growing: false,
             is_dirty: false,
+            is_late: false,
             is_open: false,
             is_outdated: false,
             read_at,

@@ -94,6 +94,41 @@ fn same_hits_same_texels() {
     assert_eq!(run(20, 0.5, 100), reference, "side by side with as many as there is time for");
 }
 
+/// Where frames have no time to paint a surface, it waits and makes up for four frames at most: no crack jumps.
+#[test]
+fn what_waits_to_be_painted_grows_on_where_it_was() {
+    let mut app = app();
+    let image = add(&mut app, picture(UVec2::splat(64)));
+    let surfaces: Vec<Entity> = (0..60)
+        .map(|seed| {
+            let entity = app.world_mut().spawn((Sprite::from_image(image.clone()), surface().with_seed(seed))).id();
+            hit(&mut app, center(entity));
+            entity
+        })
+        .collect();
+    (0..4).for_each(|_| app.update());
+    let times = |app: &App| surfaces.iter().map(|entity| state(app, *entity).time).collect::<Vec<f32>>();
+    let before = times(&app);
+    // All are to be painted, and each frame paints one.
+    for entity in &surfaces {
+        let mut surface = app.world_mut().get_mut::<CrackSurface>(*entity).unwrap();
+        surface.preset.as_mut().unwrap().look.glint = 0.9;
+    }
+    app.world_mut().resource_mut::<CrackBudget>().milliseconds = 0.0;
+    (0..20).for_each(|_| app.update());
+    app.world_mut().resource_mut::<CrackBudget>().milliseconds = 1e6;
+    // One frame paints them, the next one lets them grow on.
+    (0..2).for_each(|_| app.update());
+    let gained: Vec<f32> = times(&app).iter().zip(&before).map(|(now, before)| now - before).collect();
+    // The steps of four frames, and those of this one and of the one in which they were not late yet.
+    let late = gained.iter().filter(|gain| **gain <= 6.0).count();
+    assert!(late >= 36, "{gained:?}");
+    let is_done = |entity| state(&app, entity).status == CrackStatus::Done;
+    assert!(surfaces.iter().zip(&gained).all(|(entity, gain)| *gain >= 5.0 || is_done(*entity)), "{gained:?}");
+    // Without a hurry they come to the same end.
+    surfaces.iter().for_each(|entity| settle(&mut app, *entity));
+}
+
 /// I9, I1, I4, I10: hits on nothing, with broken numbers, with broken transforms: refused, counted, no panic.
 #[test]
 fn broken_hits_are_counted() {
