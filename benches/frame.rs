@@ -285,8 +285,11 @@ fn budgeted_frames(run: Run) -> (Frames, f64) {
     let (mut systems, mut changes) = (Vec::new(), 0);
     loop {
         let mut frame = Costs::default();
-        let mut nodes = |app: &mut App| -> Vec<u32> {
-            app.world_mut().query::<&CrackState>().iter(app.world()).map(|state| state.nodes).collect()
+        let nodes = |app: &mut App| -> Vec<(Entity, u32)> {
+            let mut states = app.world_mut().query::<(Entity, &CrackState)>();
+            let mut nodes: Vec<_> = states.iter(app.world()).map(|(entity, state)| (entity, state.nodes)).collect();
+            nodes.sort_unstable();
+            nodes
         };
         let before = nodes(&mut app);
         frame.measure(&mut app, 1);

@@ -10,9 +10,10 @@ use std::sync::{Mutex, PoisonError};
 #[derive(Resource, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Resource, Default)]
 pub struct CrackBudget {
-    /// Time for hits, growth and painting in one frame, and for what goes on around them, milliseconds, however many threads grow and
-    /// paint; default 2. What is left over waits for the next frame; at least one hit, one step and one surface are done in each. Where
-    /// more cracks grow than there is time for, all of them grow more slowly. NaN and values below zero count as 0.
+    /// Time for hits, growth and painting in one frame, milliseconds, however many threads grow and paint; default 2. Up to a quarter of it
+    /// counts as spent on what runs between them. What is left over waits for the next frame; at least one hit, one step and one surface
+    /// are done in each. Where more cracks grow than there is time for, all of them grow more slowly. NaN and values below zero count
+    /// as 0.
     ///
     /// With a second or more nothing that a frame shows is put off: for recordings, whose frames may take any time.
     pub milliseconds: f32,
@@ -77,8 +78,8 @@ impl CrackBudget {
 pub(super) struct FrameClock {
     spent: Duration,
     start: Option<Instant>,
-    /// What a frame takes besides, mostly: for what comes before, between and after what is measured. It counts as spent from the
-    /// start of the next one.
+    /// What a busy frame takes between the first of this crate's systems and the last, beside what they measure: on average of the
+    /// last ones. It counts as spent when a frame starts.
     besides: Duration,
 }
 
@@ -99,9 +100,10 @@ pub(super) struct Timer {
 }
 
 impl FrameClock {
-    /// Starts to measure a system that must end when `share` of the frame's budget is spent.
+    /// Starts to measure a system that must end when `share` of the frame's budget is spent, of what is left beside others.
     pub(super) fn start(&self, budget: &CrackBudget, share: f32) -> Timer {
-        Timer { start: Instant::now(), before: self.spent, limit: budget.share(share) }
+        let rest = budget.share(1.0).saturating_sub(self.besides);
+        Timer { start: Instant::now(), before: self.spent, limit: self.besides + rest.mul_f32(share) }
     }
 
     /// Adds what the system has spent.
@@ -140,8 +142,10 @@ pub(super) fn share_out<S: Send>(shares: impl ExactSizeIterator<Item = S> + Send
     }
 }
 
-pub(super) fn start_frame(mut clock: ResMut<FrameClock>) {
+pub(super) fn start_frame(mut clock: ResMut<FrameClock>, budget: Res<CrackBudget>) {
     clock.start = Some(Instant::now());
+    // It may have been learned under a larger budget.
+    clock.besides = clock.besides.min(budget.share(MAX_BESIDES));
     clock.spent = clock.besides;
 }
 
@@ -165,13 +169,13 @@ mod tests {
     fn what_frames_take_besides_counts_as_spent() {
         let mut world = World::new();
         world.init_resource::<FrameClock>();
-        world.insert_resource(CrackBudget { milliseconds: 4.0, ..default() });
         let millisecond = Duration::from_millis(1);
-        let mut frame = |busy: u32, besides: u32| {
+        let mut frame = |milliseconds: f32, busy: u32, besides: u32| {
+            let budget = CrackBudget { milliseconds, ..default() };
+            world.insert_resource(budget.clone());
             let _ = world.run_system_once(start_frame);
             sleep(besides * millisecond);
-            let (mut clock, budget) =
-                (world.remove_resource::<FrameClock>().unwrap_or_default(), CrackBudget::default());
+            let mut clock = world.remove_resource::<FrameClock>().unwrap_or_default();
             let timer = clock.start(&budget, 1.0);
             sleep(busy * millisecond);
             clock.stop(&timer);
@@ -180,18 +184,20 @@ mod tests {
             let clock = world.resource::<FrameClock>();
             (clock.spent.as_secs_f32() * 1e3, clock.besides.as_secs_f32() * 1e3)
         };
-        assert_eq!(frame(0, 2).1, 0.0, "an idle frame tells nothing");
-        let (_, first) = frame(2, 3);
+        assert_eq!(frame(4.0, 0, 2).1, 0.0, "an idle frame tells nothing");
+        let (_, first) = frame(4.0, 2, 3);
         // A quarter of the budget, at the weight of one frame.
         assert!((0.12..0.13).contains(&first), "{first}");
         let (mut last, mut spent) = (first, 0.0);
         for _ in 0..20 {
             let before = last;
-            (spent, last) = frame(2, 3);
+            (spent, last) = frame(4.0, 2, 3);
             assert!(last > before && last <= 1.0, "{last}");
             assert!(spent >= 2.0 + before, "{spent}");
         }
         assert!(spent > 2.8, "{spent}");
+        // A smaller budget holds at once.
+        assert!(frame(1.0, 0, 0).1 <= 0.25);
     }
 
     #[test]

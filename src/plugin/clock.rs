@@ -86,8 +86,8 @@ impl CrackClock {
 /// The most steps that can be due: after a long pause a surface does not make up for all of it.
 const MAX_DUE: f64 = 64.0;
 
-/// Frames whose steps a surface makes up for when it was not painted meanwhile. All of a crack gets wider at each step: to paint many steps
-/// at once costs half as much as to paint each, but is seen to jump.
+/// Frames whose steps a surface makes up for when frames had no time to let it grow or to paint it. All of a crack gets wider at each step: to
+/// paint many steps at once costs half as much as to paint each, but is seen to jump.
 const MAX_LATE: f64 = 4.0;
 
 /// The most steps a second that baked cracks appear in.
@@ -108,9 +108,10 @@ impl Playback {
         self.replay = Replay::new(frame.size(), profile);
     }
 
-    fn advance(&mut self, steps: f64, end: f64) {
+    /// No more than `most` steps beyond the end are asked for.
+    fn advance(&mut self, steps: f64, end: f64, most: f64) {
         if steps > 0.0 {
-            self.want = (self.want + steps).min(self.want.max(end + MAX_DUE));
+            self.want = (self.want + steps).min(self.want.max(end + most));
         } else if steps < 0.0 {
             self.want = (self.want.min(end) + steps).max(0.0);
         }
@@ -177,13 +178,20 @@ impl Active {
     pub(super) fn pass(&mut self, seconds: f32) {
         let steps = f64::from(if self.rate.is_finite() { self.rate.max(0.0) * seconds } else { 0.0 });
         let (ruler, end, is_growing) = (self.ruler(), self.end(), self.growth.is_growing());
+        // What earlier frames had no time for is made up for a little.
+        let is_late = self.is_late;
+        let most = |is_left: bool, steps: f64| if is_late || is_left { MAX_LATE * steps } else { MAX_DUE };
         match (ruler, &mut self.playback) {
-            (Ruler::Closing(rate), Some(playback)) => playback.advance(-rate * f64::from(seconds), end),
-            (Ruler::Appearing(rate), Some(playback)) => playback.advance(rate * f64::from(seconds), end),
-            (Ruler::Speed(speed), Some(playback)) => playback.advance(speed * steps, end),
-            // It waits to be painted.
-            _ if self.is_late => self.due = self.due.max((self.due + steps).min(MAX_LATE * steps)),
-            _ => self.due = (self.due + steps).min(MAX_DUE),
+            (Ruler::Closing(rate), Some(playback)) => playback.advance(-rate * f64::from(seconds), end, MAX_DUE),
+            (Ruler::Appearing(rate), Some(playback)) => playback.advance(rate * f64::from(seconds), end, MAX_DUE),
+            (Ruler::Speed(speed), Some(playback)) => {
+                let steps = speed * steps;
+                playback.advance(steps, end, most(playback.want > end, steps));
+            }
+            _ => {
+                let due = (self.due + steps).min(most(self.due >= 1.0, steps));
+                self.due = self.due.max(due).min(MAX_DUE);
+            }
         }
         if let Some(playback) = &mut self.playback
             && !is_growing

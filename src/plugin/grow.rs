@@ -24,7 +24,8 @@ struct Job<'a> {
     has_grown: Option<bool>,
 }
 
-/// Makes the steps that are due, some surfaces at once, one step each in turn, until none is due or the budget is spent.
+/// Makes the steps that are due, some surfaces at once, one step each in turn, until none is due or the budget is spent. Those that wait to be
+/// painted do not grow meanwhile.
 pub(super) fn grow_surfaces(
     _main_thread: NonSendMarker,
     mut commands: Commands,
@@ -53,6 +54,7 @@ pub(super) fn grow_surfaces(
         });
         share_out(jobs.chunks_mut(SHARE).enumerate(), |(i, jobs)| {
             for (k, job) in jobs.iter_mut().enumerate() {
+                // Every frame makes one step, whatever waits.
                 let is_first = (i, k) == (0, 0);
                 if is_first || !timer.is_over() {
                     job.has_grown = Some((is_first || !job.active.is_late) && job.active.step_if_due());

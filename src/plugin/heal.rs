@@ -18,7 +18,8 @@ pub trait CrackCommandsExt {
     /// Makes a surface ready for its first hit: for what is sure to be hit, while a level loads.
     ///
     /// Without it the crack of a first hit shows in the frame of the hit on pictures of up to 512 x 512 texels, unless many are hit for
-    /// the first time at once, and some frames later on larger ones: they are made beside the frames. A surface that is prepared takes
+    /// the first time at once or its lines are to be read (those of brick, see [`CrackMaskSource`](super::CrackMaskSource)), and some frames
+    /// later on larger ones: they are made beside the frames. A surface that is prepared takes
     /// the memory of one that has cracked, and shows its textures from the frame on in which [`CrackTextures`] is added. Surfaces that are
     /// hit come first. Does nothing on entities without a [`CrackSurface`](super::CrackSurface), or with cracks; one that cannot crack says
     /// so with [`CrackFailed`](super::CrackFailed). Healing takes it back.

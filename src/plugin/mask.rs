@@ -1,7 +1,8 @@
 //! [`CrackMaskSource`]: where a surface's masks come from.
 
 use super::{
-    CrackError,
+    CrackBudget, CrackError,
+    beside::Beside,
     carrier::Shown,
     picture::{self, BasePicture, Space},
     plan::{Draft, PicturePlan},
@@ -11,17 +12,17 @@ use crate::{
     pattern::{CrackMask, MaskError},
     raster::TexelRect,
 };
-use bevy::{
-    prelude::*,
-    tasks::{AsyncComputeTaskPool, Task, futures::check_ready},
+use bevy::{platform::time::Instant, prelude::*, tasks::AsyncComputeTaskPool};
+use std::{
+    sync::{Arc, Weak},
+    time::Duration,
 };
-use std::sync::{Arc, Weak};
 
 /// Where cracks like to run, where they do not, and where they never go. See [`CrackMask`].
 #[derive(Reflect, Clone, Debug, Default, PartialEq)]
 pub enum CrackMaskSource {
-    /// As the preset has it: [`FromPicture`](Self::FromPicture) if its cracks follow lines
-    /// ([`CrackPreset::follows_lines`], as those of brick do), else [`None`](Self::None).
+    /// As the preset has it: cracks of brick, and of every preset that [follows lines](CrackPreset::follows_lines), follow the lines of the
+    /// surface's own picture, which are read as those of [`FromPicture`](Self::FromPicture); else [`None`](Self::None).
     #[default]
     Auto,
     /// Everywhere alike.
@@ -41,51 +42,100 @@ pub enum CrackMaskSource {
     },
 }
 
+/// What a mask is made from.
+#[derive(Clone, Copy)]
+pub(super) enum MaskFrom<'a> {
+    Nothing,
+    Picture(PicturePart),
+    /// The layers: weak, strong, forbidden.
+    Images([Option<&'a Handle<Image>>; 3]),
+}
+
+/// What of a picture makes a mask.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum PicturePart {
+    Lines,
+    /// What is transparent is forbidden.
+    LinesAndAlpha,
+}
+
 impl CrackMaskSource {
-    /// What it is on a surface with this preset; never [`Auto`](Self::Auto).
-    pub(super) const fn with(&self, preset: &CrackPreset) -> &Self {
+    /// What the mask of a surface with this preset is made from.
+    pub(super) fn with(&self, preset: &CrackPreset) -> MaskFrom<'_> {
         match self {
-            Self::Auto if preset.follows_lines => &Self::FromPicture,
-            Self::Auto => &Self::None,
-            own => own,
+            // What is transparent is the matter of `CrackSurface::alpha_mask`.
+            Self::Auto if preset.follows_lines => MaskFrom::Picture(PicturePart::Lines),
+            Self::Auto | Self::None => MaskFrom::Nothing,
+            Self::FromPicture => MaskFrom::Picture(PicturePart::LinesAndAlpha),
+            Self::Images { weak, strong, forbidden } => MaskFrom::Images([weak, strong, forbidden].map(Option::as_ref)),
         }
     }
+}
 
+impl<'a> MaskFrom<'a> {
     /// Its images.
-    pub(super) fn images(&self) -> impl Iterator<Item = &Handle<Image>> {
+    pub(super) fn images(self) -> impl Iterator<Item = &'a Handle<Image>> {
         let layers = match self {
-            Self::Images { weak, strong, forbidden } => [weak, strong, forbidden].map(Option::as_ref),
-            Self::Auto | Self::None | Self::FromPicture => [None; 3],
+            Self::Images(layers) => layers,
+            Self::Nothing | Self::Picture(_) => [None; 3],
         };
         layers.into_iter().flatten()
     }
 }
+
+/// So long a task may take to begin with a mask; then the frame makes it.
+const PATIENCE: Duration = Duration::from_millis(50);
+
+/// So often a mask is begun anew whose picture changes; then the one that is being made has to do.
+const MAX_RESTARTS: u32 = 8;
+
+/// So long a mask is kept for those who have asked for it and do not come for it.
+const KEPT: Duration = Duration::from_secs(5);
 
 /// The masks of pictures. Made beside the frames: reading a picture takes longer than a frame may.
 #[derive(Resource, Default)]
 pub(super) struct PictureMasks {
     /// Those that a surface uses, for others with the same picture.
     made: Vec<(Key, Weak<CrackMask>)>,
-    in_work: Vec<(Key, Task<Arc<CrackMask>>)>,
+    in_work: Vec<InWork>,
 }
 
-/// A part of a picture, at the size at which it is cracked.
+/// A mask that is being made.
+struct InWork {
+    key: Key,
+    /// Its picture, which is not to be read twice meanwhile; `None` = it has changed, and nobody has asked since.
+    task: Option<(Arc<BasePicture>, Beside<(Key, Arc<BasePicture>), Arc<CrackMask>>)>,
+    since: Instant,
+    asked: Instant,
+    restarts: u32,
+    /// Whether the picture has changed since it was begun for the last time.
+    is_outdated: bool,
+}
+
+/// A part of a picture, at the size at which it is cracked, and what of it makes a mask.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) struct Key {
     picture: AssetId<Image>,
     size: UVec2,
     rect: TexelRect,
+    part: PicturePart,
 }
 
 impl Key {
-    pub(super) fn new(picture: &Handle<Image>, plan: &PicturePlan) -> Self {
-        Self { picture: picture.id(), size: plan.size, rect: plan.rect }
+    pub(super) fn new(picture: &Handle<Image>, plan: &PicturePlan, part: PicturePart) -> Self {
+        Self { picture: picture.id(), size: plan.size, rect: plan.rect, part }
     }
 
     /// The mask of the picture.
     pub(super) fn make(self, base: &[u8]) -> Arc<CrackMask> {
-        let part = part(base, self.size, self.rect);
-        Arc::new(CrackMask::from_picture(self.rect.size(), &part).unwrap_or_default())
+        let (size, texels) = (self.rect.size(), part(base, self.size, self.rect));
+        let mask = match self.part {
+            PicturePart::Lines => {
+                CrackMask::weak_from_picture(size, &texels).map(|weak| CrackMask { weak, ..CrackMask::default() })
+            }
+            PicturePart::LinesAndAlpha => CrackMask::from_picture(size, &texels),
+        };
+        Arc::new(mask.unwrap_or_default())
     }
 }
 
@@ -97,35 +147,47 @@ impl PictureMasks {
 
     pub(super) fn remember(&mut self, key: Key, mask: &Arc<CrackMask>) {
         self.made.retain(|(known, mask)| *known != key && mask.strong_count() > 0);
-        self.in_work.retain(|(known, _)| *known != key);
+        self.in_work.retain(|work| work.key != key);
         self.made.push((key, Arc::downgrade(mask)));
     }
 
     /// The picture is another one now.
     pub(super) fn forget(&mut self, picture: AssetId<Image>) {
         self.made.retain(|(key, _)| key.picture != picture);
-        self.in_work.retain(|(key, _)| key.picture != picture);
+        for work in self.in_work.iter_mut().filter(|work| work.key.picture == picture) {
+            if work.restarts < MAX_RESTARTS {
+                work.task = None;
+                work.restarts += 1;
+            } else {
+                work.is_outdated = true;
+            }
+        }
     }
 
-    fn get(&mut self, key: Key, base: &Arc<BasePicture>) -> Option<Arc<CrackMask>> {
+    /// The mask of a picture; `None` if it is being made, which it is not if the frame `has_time`.
+    fn get(&mut self, key: Key, base: &Arc<BasePicture>, has_time: bool) -> Option<Arc<CrackMask>> {
         if let Some(mask) = self.find(key) {
             return Some(mask);
         }
-        let mask = match self.in_work.iter().position(|(known, _)| *known == key) {
-            Some(index) => {
-                let mask = check_ready(&mut self.in_work[index].1)?;
-                drop(self.in_work.swap_remove(index));
-                mask
-            }
-            None => match AsyncComputeTaskPool::try_get() {
-                Some(pool) => {
-                    let base = base.clone();
-                    self.in_work.push((key, pool.spawn(async move { key.make(&base.diffuse) })));
-                    return None;
-                }
-                None => key.make(&base.diffuse),
-            },
-        };
+        let now = Instant::now();
+        self.in_work.retain(|work| work.key == key || now - work.asked < KEPT);
+        if has_time || AsyncComputeTaskPool::try_get().is_none() {
+            let mask = key.make(&base.diffuse);
+            self.remember(key, &mask);
+            return Some(mask);
+        }
+        let index = self.in_work.iter().position(|work| work.key == key).unwrap_or_else(|| {
+            self.in_work.push(InWork { key, task: None, since: now, asked: now, restarts: 0, is_outdated: false });
+            self.in_work.len() - 1
+        });
+        let work = &mut self.in_work[index];
+        work.asked = now;
+        let begin = || (base.clone(), Beside::start((key, base.clone()), |(key, base)| key.make(&base.diffuse)));
+        let (_, task) = work.task.get_or_insert_with(begin);
+        let mask = task.take_if_done(now - work.since >= PATIENCE)?;
+        if self.in_work.swap_remove(index).is_outdated {
+            return Some(mask);
+        }
         self.remember(key, &mask);
         Some(mask)
     }
@@ -143,33 +205,32 @@ pub(super) fn part(rgba: &[u8], size: UVec2, rect: TexelRect) -> Vec<u8> {
     (rect.min.y..rect.max.y).flat_map(row).copied().collect()
 }
 
-/// The mask from a source; `None` if it is not there yet.
+/// The mask of a surface; `None` if it is not there yet.
 pub(super) fn resolve(
     world: &mut World,
-    source: &CrackMaskSource,
+    from: MaskFrom<'_>,
     shown: &Shown,
     draft: &Draft,
 ) -> Result<Option<Arc<CrackMask>>, CrackError> {
-    match source {
-        CrackMaskSource::Auto | CrackMaskSource::None => Ok(Some(Arc::default())),
-        CrackMaskSource::FromPicture => {
-            // Without a picture there is nothing to go by.
-            let Some(picture) = &shown.diffuse else { return Ok(Some(Arc::default())) };
-            let key = Key::new(picture, &draft.plan);
-            Ok(world.resource_mut::<PictureMasks>().get(key, &draft.base))
+    for image in from.images() {
+        if !picture::is_loaded(world, image)? {
+            return Ok(None);
         }
-        CrackMaskSource::Images { weak, strong, forbidden } => {
-            for image in source.images() {
-                if !picture::is_loaded(world, image)? {
-                    return Ok(None);
-                }
-            }
+    }
+    match (from, &shown.diffuse) {
+        (MaskFrom::Picture(part), Some(picture)) => {
+            let has_time = world.resource::<CrackBudget>().is_boundless();
+            let key = Key::new(picture, &draft.plan, part);
+            Ok(world.resource_mut::<PictureMasks>().get(key, &draft.base, has_time))
+        }
+        // Without a picture there is nothing to go by.
+        (MaskFrom::Nothing | MaskFrom::Picture(_), _) => Ok(Some(Arc::default())),
+        (MaskFrom::Images(layers), _) => {
             let images = world.get_resource::<Assets<Image>>().ok_or(CrackError::NoImages)?;
-            let layer = |image: &Option<Handle<Image>>| {
-                image.as_ref().and_then(|image| images.get(image)).map(layer).transpose()
-            };
-            let mask = CrackMask { weak: layer(weak)?, strong: layer(strong)?, forbidden: layer(forbidden)? };
-            Ok(Some(Arc::new(mask)))
+            let layer =
+                |image: Option<&Handle<Image>>| image.and_then(|image| images.get(image)).map(layer).transpose();
+            let [weak, strong, forbidden] = layers.map(layer);
+            Ok(Some(Arc::new(CrackMask { weak: weak?, strong: strong?, forbidden: forbidden? })))
         }
     }
 }

@@ -1,10 +1,10 @@
 //! [`Plan`]: what a surface will be, before anything of it is made.
 
 use super::{
-    CrackBudget, CrackError, CrackMaps, CrackMaskSource, CrackResolution, CrackSurface, CrackTextures,
+    CrackBudget, CrackError, CrackMaps, CrackResolution, CrackSurface, CrackTextures,
     activate::{frame, look},
     carrier::{self, Carrier, Found, Kind, Shown, Untouched},
-    mask::{self, Key, PictureMasks},
+    mask::{self, Key, MaskFrom, PictureMasks},
     picture::{self, BaseKey, BasePicture, BasePictures, Space},
     preset,
     surfaces::{Ground, Surfaces},
@@ -62,7 +62,7 @@ impl Plan {
     }
 
     /// Where its mask comes from.
-    pub(super) const fn mask(&self) -> &CrackMaskSource {
+    pub(super) fn mask(&self) -> MaskFrom<'_> {
         self.surface.mask.with(&self.preset)
     }
 
@@ -110,7 +110,7 @@ impl Plan {
 
     /// What has to be read for it, which can be read; `None` if its masks are not there yet.
     pub(super) fn raw(&self, world: &World, copies: &mut Copies) -> Result<Option<RawSurface>, CrackError> {
-        for image in self.surface.mask.images() {
+        for image in self.mask().images() {
             if !picture::is_loaded(world, image)? {
                 return Ok(None);
             }
@@ -119,18 +119,13 @@ impl Plan {
             Some(base) => RawBase::Read(base),
             None => RawBase::Pictures(self.pictures.needed(&self.shown).map(|map| map.map(|map| copies.add(map)))),
         };
-        let mask = match self.mask() {
-            CrackMaskSource::FromPicture => match &self.shown.diffuse {
-                Some(picture) => {
-                    let key = Key::new(picture, &self.pictures);
-                    world.resource::<PictureMasks>().find(key).map_or(RawMask::FromPicture(key), RawMask::Made)
-                }
-                None => RawMask::Made(Arc::default()),
-            },
-            CrackMaskSource::Auto | CrackMaskSource::None => RawMask::Made(Arc::default()),
-            CrackMaskSource::Images { weak, strong, forbidden } => {
-                RawMask::Images([weak, strong, forbidden].map(|image| image.as_ref().map(|image| copies.add(image))))
+        let mask = match (self.mask(), &self.shown.diffuse) {
+            (MaskFrom::Picture(part), Some(picture)) => {
+                let key = Key::new(picture, &self.pictures, part);
+                world.resource::<PictureMasks>().find(key).map_or(RawMask::FromPicture(key), RawMask::Made)
             }
+            (MaskFrom::Nothing | MaskFrom::Picture(_), _) => RawMask::Made(Arc::default()),
+            (MaskFrom::Images(layers), _) => RawMask::Images(layers.map(|image| image.map(|image| copies.add(image)))),
         };
         let images = world.get_resource::<Assets<Image>>().ok_or(CrackError::NoImages)?;
         for image in copies.0.iter().filter_map(|image| images.get(image)) {
@@ -146,8 +141,8 @@ impl Plan {
         let Readings { base, mask } = read;
         if !is_outdated {
             world.resource_mut::<BasePictures>().remember(key, &base);
-            if let (CrackMaskSource::FromPicture, Some(picture)) = (surface.mask.with(&preset), &shown.diffuse) {
-                world.resource_mut::<PictureMasks>().remember(Key::new(picture, &pictures), &mask);
+            if let (MaskFrom::Picture(part), Some(picture)) = (surface.mask.with(&preset), &shown.diffuse) {
+                world.resource_mut::<PictureMasks>().remember(Key::new(picture, &pictures, part), &mask);
             }
         }
         let (bytes, rect) = (pictures.bytes, pictures.rect);

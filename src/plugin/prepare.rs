@@ -400,7 +400,7 @@ impl Turn<'_> {
             let read = reading.step(images, &mut left);
             self.must_copy &= left == room;
             // Something is left if more has to be waited for.
-            if read != Read::More || left > 0 || !may_copy {
+            if read != Read::More || left > 0 || !may_copy || reading.is_whole() {
                 return read;
             }
         }

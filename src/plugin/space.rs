@@ -2,7 +2,8 @@
 
 use bevy::{math::Affine3A, prelude::*};
 
-/// The way back from the world; `None` if there is none. Scale 0 along z alone makes a picture no smaller and counts as 1.
+/// The way back from the world; `None` if there is none. Scale 0 along z alone makes a picture no smaller and counts as 1; which side of it
+/// looks at the viewer is guessed then, as if it were not mirrored.
 pub(super) fn to_local(transform: &GlobalTransform) -> Option<Affine3A> {
     let mut affine = transform.affine();
     let axes = &mut affine.matrix3;

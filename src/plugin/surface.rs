@@ -31,7 +31,8 @@ pub struct CrackSurface {
     pub write: CrackMaps,
     /// Whether transparent texels refuse hits and attract no cracks; default true.
     pub alpha_mask: bool,
-    /// Where cracks like to run and where they never go; by default as the preset has it. A change takes effect after healing.
+    /// Where cracks like to run and where they never go; by default as the preset has it. A change takes effect as one of `resolution`, and so
+    /// does one of what the preset has.
     pub mask: CrackMaskSource,
 }
 

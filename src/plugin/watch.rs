@@ -1,7 +1,7 @@
 //! Changes from outside: other presets, other pictures, another frame of an animation.
 
 use super::{
-    CrackError, CrackMaskSource, CrackState, CrackStatus, CrackSurface, CrackTextures,
+    CrackError, CrackState, CrackStatus, CrackSurface, CrackTextures,
     activate::{attach, fail, frame, look, make_textures, set_status, tell_textures},
     bake::Bakes,
     carrier::{self, Carrier, Found, Shown},
@@ -271,8 +271,8 @@ pub(super) fn grown_anew(
 fn update_picture(world: &mut World, entity: Entity, active: &mut Active, shown: Shown) -> Result<bool, CrackError> {
     active.is_outdated = true;
     let Some(draft) = draft(world, &active.surface, &shown, active.bytes)? else { return Ok(false) };
-    let source = active.surface.mask.with(&active.preset);
-    let Some(mask) = mask::resolve(world, source, &shown, &draft)? else { return Ok(false) };
+    let from = active.surface.mask.with(&active.preset);
+    let Some(mask) = mask::resolve(world, from, &shown, &draft)? else { return Ok(false) };
     let frame = frame(draft.plan.rect)?;
     let look = look(&active.preset, frame)?;
     active.recall();
@@ -293,13 +293,14 @@ fn update_picture(world: &mut World, entity: Entity, active: &mut Active, shown:
     if active.surface.alpha_mask {
         active.growth.set_density(draft.base.density(draft.plan.rect));
     }
+    let had_mask = !active.growth.mask().is_empty();
     active.growth.set_mask(mask.clone());
     world.resource_mut::<Surfaces>().bytes += draft.plan.bytes;
     world.resource_mut::<Surfaces>().bytes -= active.bytes;
     active.bytes = draft.plan.bytes;
     active.base = draft.base;
     // What the mask forbids may be elsewhere now.
-    if frame != active.field.frame || *active.surface.mask.with(&active.preset) != CrackMaskSource::None {
+    if frame != active.field.frame || had_mask || !mask.is_empty() {
         active.look = look;
         active.field = DepthField::new(frame);
         active.field.forbid(&mask);

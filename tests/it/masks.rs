@@ -285,7 +285,7 @@ fn odd_layers_are_refused_or_harmless() {
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod in_apps {
     use super::texture;
-    use crate::support::{add, app, center, counts, hit, settle, shown, solid, state, steps, wait_for};
+    use crate::support::{add, app, center, counts, hit, settle, shown, solid, state, step, steps, wait_for};
     use bevy::{
         asset::RenderAssetUsages,
         prelude::*,
@@ -405,6 +405,34 @@ mod in_apps {
             painted.push(shown);
         }
         assert!(painted[0] != painted[1], "the mask makes a difference");
+    }
+
+    /// Where frames may take any time the first hit waits for nothing; where the picture changes in every frame, not for ever.
+    #[test]
+    fn brick_cracks_at_once_or_soon() {
+        let (size, picture) = (UVec2::splat(512), texture("brick_red.png"));
+        let mut app = app();
+        let entity = spawn(&mut app, image(size, picture.as_raw().clone()), CrackPreset::BRICK, CrackMaskSource::Auto);
+        step(&mut app);
+        hit(&mut app, center(entity));
+        step(&mut app);
+        assert!(state(&app, entity).nodes > 0, "{:?}", state(&app, entity));
+
+        app.insert_resource(CrackBudget::default());
+        let film = add(&mut app, image(size, picture.as_raw().clone()));
+        let entity =
+            app.world_mut().spawn((Sprite::from_image(film.clone()), CrackSurface::new(CrackPreset::BRICK))).id();
+        step(&mut app);
+        hit(&mut app, center(entity));
+        let mut frames = 0;
+        while state(&app, entity).nodes == 0 {
+            let mut images = app.world_mut().resource_mut::<Assets<Image>>();
+            images.get_mut(&film).unwrap().into_inner().data.as_mut().unwrap()[0] ^= 1;
+            step(&mut app);
+            std::thread::sleep(std::time::Duration::from_millis(10));
+            frames += 1;
+            assert!(frames < 500, "{:?}", state(&app, entity));
+        }
     }
 
     #[test]

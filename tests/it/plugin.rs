@@ -117,14 +117,17 @@ fn what_waits_to_be_painted_grows_on_where_it_was() {
     app.world_mut().resource_mut::<CrackBudget>().milliseconds = 0.0;
     (0..20).for_each(|_| app.update());
     app.world_mut().resource_mut::<CrackBudget>().milliseconds = 1e6;
+    let gained = |app: &App| times(app).iter().zip(&before).map(|(now, before)| now - before).collect::<Vec<f32>>();
     // One frame paints them, the next one lets them grow on.
-    (0..2).for_each(|_| app.update());
-    let gained: Vec<f32> = times(&app).iter().zip(&before).map(|(now, before)| now - before).collect();
-    // The steps of four frames, and those of this one and of the one in which they were not late yet.
-    let late = gained.iter().filter(|gain| **gain <= 6.0).count();
-    assert!(late >= 36, "{gained:?}");
+    app.update();
+    let waiting = gained(&app).iter().filter(|gain| **gain <= 1.0).count();
+    assert!(waiting >= 36, "{:?}", gained(&app));
+    app.update();
+    let gained = gained(&app);
+    // The steps of four frames, and those of this one and of two in which they were on time.
+    assert!(gained.iter().all(|gain| *gain <= 7.0), "{gained:?}");
     let is_done = |entity| state(&app, entity).status == CrackStatus::Done;
-    assert!(surfaces.iter().zip(&gained).all(|(entity, gain)| *gain >= 5.0 || is_done(*entity)), "{gained:?}");
+    assert!(surfaces.iter().zip(&gained).all(|(entity, gain)| *gain >= 4.0 || is_done(*entity)), "{gained:?}");
     // Without a hurry they come to the same end.
     surfaces.iter().for_each(|entity| settle(&mut app, *entity));
 }

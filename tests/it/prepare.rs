@@ -73,6 +73,11 @@ const CASES: &[(&str, Spawn)] = &[
         let surface = surface().with_mask(CrackMaskSource::FromPicture);
         app.world_mut().spawn((Sprite::from_image(image), surface)).id()
     }),
+    ("brick", |app| {
+        let image = add(app, tiles());
+        let brick = CrackPreset { follows_lines: true, ..CrackPreset::CONCRETE };
+        app.world_mut().spawn((Sprite::from_image(image), CrackSurface { preset: brick.into(), ..surface() })).id()
+    }),
     ("masks of their own", |app| {
         let mut lines = tiles();
         // Red lines on black.
@@ -197,6 +202,59 @@ fn t11_what_changes_meanwhile_is_what_cracks() {
             assert!(is_same || (*name == "another seed" && frames > 1), "{name}, {frames} frames");
         }
     }
+}
+
+/// A mask that changes while it is read is the old one or the new one, and no mixture.
+#[test]
+fn t9_masks_that_change_meanwhile_are_not_torn() {
+    // Stripes that forbid a half, in two ways. The last part of the reading is the lower half of it.
+    let size = UVec2::new(700, 154);
+    let stripes = |phase: u32| {
+        let mut image = solid(size, [0, 0, 0, 255]);
+        for (i, texel) in (0..).zip(image.data.iter_mut().flat_map(|data| data.as_chunks_mut::<4>().0)) {
+            let (x, y) = (i % size.x, i / size.x);
+            let is_middle = x.abs_diff(size.x / 2) < 12 && y.abs_diff(size.y / 2) < 4;
+            *texel = [if (x / 40 + phase).is_multiple_of(2) && !is_middle { 255 } else { 0 }; 4];
+        }
+        image
+    };
+    let spawn = |app: &mut App| {
+        let [image, forbidden] = [tiles(), stripes(0)].map(|image| add(app, image));
+        let mask = CrackMaskSource::Images { weak: None, strong: None, forbidden: Some(forbidden.clone()) };
+        (app.world_mut().spawn((Sprite::from_image(image), surface().with_mask(mask))).id(), forbidden)
+    };
+    let change = |app: &mut App, mask: &Handle<Image>| {
+        assert!(app.world_mut().resource_mut::<Assets<Image>>().insert(mask, stripes(1)).is_ok());
+    };
+    let expected = [false, true].map(|is_new| {
+        let mut app = app();
+        let (entity, mask) = spawn(&mut app);
+        if is_new {
+            change(&mut app, &mask);
+        }
+        hit(&mut app, center(entity).with_energy(0.5));
+        settle(&mut app, entity);
+        textures(&app, entity)
+    });
+    assert!(expected[0] != expected[1], "the masks make a difference");
+    let mut found = [0, 0];
+    for frames in 0..10 {
+        let mut app = hasty();
+        // So that each copies as little as it may.
+        app.world_mut().resource_mut::<CrackBudget>().milliseconds = 0.0;
+        let (entity, mask) = spawn(&mut app);
+        hit_large(&mut app, entity);
+        for _ in 0..frames {
+            std::thread::sleep(FRAME / 4);
+            step(&mut app);
+        }
+        change(&mut app, &mask);
+        settle(&mut app, entity);
+        let cracked = textures(&app, entity);
+        let which = expected.iter().position(|expected| *expected == cracked);
+        found[which.unwrap_or_else(|| panic!("after {frames} frames the mask is torn"))] += 1;
+    }
+    assert!(found[0] > 0 && found[1] > 0, "{found:?}");
 }
 
 #[test]
