@@ -114,7 +114,12 @@ impl FrameClock {
 
 impl Timer {
     pub(super) fn is_over(&self) -> bool {
-        self.before + self.start.elapsed() >= self.limit
+        self.has_no_time_for(Duration::ZERO)
+    }
+
+    /// Whether the time would be over after `more`.
+    pub(super) fn has_no_time_for(&self, more: Duration) -> bool {
+        self.before + self.start.elapsed() + more >= self.limit
     }
 }
 

@@ -12,7 +12,11 @@ use crate::{
     pattern::{Moment, NO_PARENT, SegmentId},
     raster::{DOT_DEPTH, DepthField, Profile, Redrawn, TexelRect, stamp_dot, stamp_path, stamp_path_with},
 };
-use bevy::{ecs::system::NonSendMarker, prelude::*};
+use bevy::{ecs::system::NonSendMarker, platform::time::Instant, prelude::*};
+use std::{
+    sync::atomic::{AtomicU64, Ordering},
+    time::Duration,
+};
 
 /// Share of the frame's budget after which nothing further is painted: the rest is for what is under way then, and for telling of it.
 const BUDGET_SHARE: f32 = 0.9;
@@ -65,12 +69,17 @@ pub(super) fn paint_surfaces(
         let shares = jobs.len().div_ceil(SHARE);
         let known = scratch.len().max(shares);
         scratch.resize_with(known, Scratch::default);
+        // What the last one took, whoever painted it, the next one will take, about.
+        let last = AtomicU64::new(0);
         uploads.pack(shares, |packers| {
             let shares = jobs.chunks_mut(SHARE).zip(&mut *scratch).zip(packers).enumerate();
             share_out(shares, |(i, ((jobs, scratch), packer))| {
                 for (k, job) in jobs.iter_mut().enumerate() {
-                    if (i, k) == (0, 0) || !timer.is_over() {
+                    let expected = Duration::from_nanos(last.load(Ordering::Relaxed));
+                    if (i, k) == (0, 0) || !timer.has_no_time_for(expected) {
+                        let start = Instant::now();
                         job.paint(scratch, packer);
+                        last.store(start.elapsed().as_nanos() as u64, Ordering::Relaxed);
                     }
                 }
             });
