@@ -172,8 +172,8 @@ fn fill(canvas: &mut RgbaImage, [a, b, c]: [Vec2; 3], color: impl Fn(Vec3) -> Rg
             if weights.min_element() >= 0.0 {
                 let (over, under) = (color(weights).0, canvas.get_pixel_mut(x, y));
                 let alpha = f32::from(over[3]) / 255.0;
-                for k in 0..3 {
-                    under.0[k] = (f32::from(over[k]) * alpha + f32::from(under.0[k]) * (1.0 - alpha)) as u8;
+                for (under, over) in under.0.iter_mut().zip(over).take(3) {
+                    *under = (f32::from(over) * alpha + f32::from(*under) * (1.0 - alpha)) as u8;
                 }
             }
         }
