@@ -433,7 +433,7 @@ impl CrackPreset {
     /// The same material seen from nearer (`by` above 1) or further away: every length times `by`, as
     /// [`GrowthParams::scaled`].
     ///
-    /// Lengths are shares of the surface's shorter side, so on a wall four times as long as another the same preset looks four times as
+    /// Lengths are shares of the surface's shorter side, so on a wall that is four times as large as another, both ways, the same preset looks four times as
     /// coarse: `CrackPreset::MUD.scaled(0.25)` there.
     ///
     /// ```

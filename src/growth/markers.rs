@@ -6,7 +6,7 @@ use crate::{
     math::{Rng, hash_unit, mix, ops},
     pattern::CrackMask,
 };
-use glam::Vec2;
+use glam::{UVec2, Vec2};
 use std::f32::consts::TAU;
 
 /// The ring-shaped part of a surface that one hit populates.
@@ -67,7 +67,7 @@ pub(super) fn lay_out(
     };
     match params.markers {
         MarkerLayout::PseudoGrid { occupancy, jitter } => {
-            let (columns, lines) = (params.num_columns_grid, params.num_lines_grid);
+            let [columns, lines] = grid(params, region.extent).to_array();
             let cell = region.extent / Vec2::new(columns as f32, lines as f32);
             let (x0, x1) = span(region.center.x, region.outer, cell.x, columns);
             let (y0, y1) = span(region.center.y, region.outer, cell.y, lines);
@@ -156,12 +156,16 @@ pub(super) fn lay_out(
     }
 }
 
+/// Columns and lines of the grid on a surface: as many more as it is larger than the unit square.
+fn grid(params: &GrowthParams, extent: Vec2) -> UVec2 {
+    let count = |number: u32, length: f32| ((number as f32 * length).round() as u32).max(1);
+    UVec2::new(count(params.num_columns_grid, extent.x), count(params.num_lines_grid, extent.y))
+}
+
 /// About how far the markers of a layout lie from each other.
 fn spacing(params: &GrowthParams, extent: Vec2) -> f32 {
     match params.markers {
-        MarkerLayout::PseudoGrid { .. } => {
-            (extent / Vec2::new(params.num_columns_grid as f32, params.num_lines_grid as f32)).max_element()
-        }
+        MarkerLayout::PseudoGrid { .. } => (extent / grid(params, extent).as_vec2()).max_element(),
         MarkerLayout::DartThrowing { spacing } => spacing,
         MarkerLayout::Polar { rings, .. } => params.reach / rings as f32,
     }

@@ -11,10 +11,10 @@
 //! ```
 //! use bevy_crack::growth::{CrackGrowth, GrowthParams, MarkerLayout};
 //!
-//! // Six markers in a row, and a hit at their left end: the crack runs to the right.
+//! // A marker in each square of a row of six, and a hit in the first: the crack runs to the right.
 //! let params = GrowthParams {
 //!     num_lines_grid: 1,
-//!     num_columns_grid: 6,
+//!     num_columns_grid: 1,
 //!     markers: MarkerLayout::PseudoGrid { occupancy: 1.0, jitter: 0.0 },
 //!     reach: 8.0,
 //!     crack_radius: 1.5,

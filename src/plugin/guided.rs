@@ -24,6 +24,8 @@ use std::sync::Arc;
 ///
 /// The cracks take the place of those of an earlier bake. To hits they are older cracks: new ones start from them and, where the preset has
 /// [`arrest`](crate::growth::GrowthParams::arrest), stop at them. Cracks that hits made before are grown anew around them, from the same places.
+/// The guide is a picture, dark strokes on light or the other way round: a word is one that your game draws or loads (the crate has no
+/// fonts; the example `writing_on_the_wall` draws its own).
 /// A [`CrackClock`](super::CrackClock) moves them as it moves all cracks. A changed picture keeps them, stretched if its
 /// proportions are others; removing the component keeps them too. Healing takes them away, for good until the component is changed.
 ///

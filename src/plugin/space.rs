@@ -2,13 +2,14 @@
 
 use bevy::{math::Affine3A, prelude::*};
 
-/// The way back from the world; `None` if there is none. Scale 0 along z alone makes a picture no smaller and counts as 1; which side of it
-/// looks at the viewer is guessed then, as if it were not mirrored.
+/// The way back from the world; `None` if there is none. Scale 0 along z alone makes a picture no smaller and counts as 1; its front is
+/// the side that looks along the world's z then, as that of sprites does.
 pub(super) fn to_local(transform: &GlobalTransform) -> Option<Affine3A> {
     let mut affine = transform.affine();
     let axes = &mut affine.matrix3;
     if axes.z_axis.length_squared() == 0.0 {
-        axes.z_axis = axes.x_axis.cross(axes.y_axis).normalize_or_zero();
+        let across = axes.x_axis.cross(axes.y_axis).normalize_or_zero();
+        axes.z_axis = if across.z < 0.0 { -across } else { across };
     }
     let is_flat = axes.determinant() == 0.0;
     let inverse = affine.inverse();
@@ -30,6 +31,11 @@ mod tests {
         };
         for scale in [[2.0, -3.0, 0.0], [2.0, 3.0, 0.5]] {
             assert!(of(scale).is_some_and(|point| point.distance(Vec3::new(0.5, -0.25, 0.0)) < 1e-5), "{scale:?}");
+        }
+        for scale in [[-2.0, 1.0, 0.0], [2.0, -1.0, 0.0], [2.0, 1.0, 0.0]] {
+            let at = GlobalTransform::from(Transform::from_scale(scale.into()));
+            let front = to_local(&at).map(|back| back.matrix3.transpose() * Vec3::Z);
+            assert!(front.is_some_and(|front| front.z > 0.0), "{scale:?}");
         }
         for scale in [[0.0, 1.0, 1.0], [1.0, 0.0, 0.0], [0.0; 3], [f32::NAN, 1.0, 1.0], [1.0, f32::INFINITY, 0.0]] {
             assert_eq!(of(scale), None, "{scale:?}");
