@@ -156,9 +156,12 @@ pub(super) fn lay_out(
     }
 }
 
+/// The most lines or columns of a grid, however long the surface.
+const MAX_LINES: u32 = 4096;
+
 /// Columns and lines of the grid on a surface: as many more as it is larger than the unit square.
 fn grid(params: &GrowthParams, extent: Vec2) -> UVec2 {
-    let count = |number: u32, length: f32| ((number as f32 * length).round() as u32).max(1);
+    let count = |number: u32, length: f32| ((number as f32 * length).round() as u32).clamp(1, MAX_LINES);
     UVec2::new(count(params.num_columns_grid, extent.x), count(params.num_lines_grid, extent.y))
 }
 

@@ -97,9 +97,9 @@ pub struct GrowthParams {
     pub crack_radius: f32,
     /// Steps of growth after each hit, 1..=100000.
     pub num_iterations: u32,
-    /// Lines of the marker grid on a square surface, 1..=512; on a higher one as many more.
+    /// Lines of the marker grid on a square surface, 1..=512; on a higher one as many more, up to 4096.
     pub num_lines_grid: u32,
-    /// Columns of the marker grid on a square surface, 1..=512; on a wider one as many more.
+    /// Columns of the marker grid on a square surface, 1..=512; on a wider one as many more, up to 4096.
     pub num_columns_grid: u32,
     /// How markers are laid out.
     pub markers: MarkerLayout,

@@ -1,7 +1,13 @@
 //! Work that is done beside the frames.
 
 use bevy::tasks::{AsyncComputeTaskPool, Task, block_on};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::{
+    sync::{Arc, Mutex, PoisonError},
+    time::Duration,
+};
+
+/// So long work may wait for a thread to begin it, before a frame does it.
+pub(super) const PATIENCE: Duration = Duration::from_millis(50);
 
 /// Work that a task does, unless its result is wanted before the task has begun.
 pub(super) struct Beside<W, T> {

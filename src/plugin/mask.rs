@@ -2,10 +2,11 @@
 
 use super::{
     CrackBudget, CrackError,
-    beside::Beside,
+    beside::{Beside, PATIENCE},
     carrier::Shown,
     picture::{self, BasePicture, Space},
     plan::{Draft, PicturePlan},
+    read::MAX_RESTARTS,
 };
 use crate::{
     CrackPreset, Grid,
@@ -83,12 +84,6 @@ impl<'a> MaskFrom<'a> {
     }
 }
 
-/// So long a task may take to begin with a mask; then the frame makes it.
-const PATIENCE: Duration = Duration::from_millis(50);
-
-/// So often a mask is begun anew whose picture changes; then the one that is being made has to do.
-const MAX_RESTARTS: u32 = 8;
-
 /// So long a mask is kept for those who have asked for it and do not come for it.
 const KEPT: Duration = Duration::from_secs(5);
 
@@ -107,6 +102,7 @@ struct InWork {
     task: Option<(Arc<BasePicture>, Beside<(Key, Arc<BasePicture>), Arc<CrackMask>>)>,
     since: Instant,
     asked: Instant,
+    /// Up to [`MAX_RESTARTS`]; then the one that is being made has to do.
     restarts: u32,
     /// Whether the picture has changed since it was begun for the last time.
     is_outdated: bool,

@@ -4,7 +4,7 @@ use super::{
     CrackBudget, CrackError, CrackSurface,
     activate::{fail, install, make_now},
     bake::{Bakes, guarded_as},
-    beside::{Beside, throw_away},
+    beside::{Beside, PATIENCE, throw_away},
     budget::{FrameClock, Timer},
     picture::{BaseKey, BasePictures},
     plan::{Blank, Copies, Plan, RawSurface, Readings},
@@ -15,7 +15,7 @@ use super::{
 };
 use crate::{CrackPreset, raster::TexelRect};
 use bevy::{ecs::entity::EntityHashMap, platform::time::Instant, prelude::*, render::renderer::RenderDevice};
-use std::{collections::VecDeque, time::Duration};
+use std::collections::VecDeque;
 
 /// Texels up to which the frame of the first hit makes a surface itself.
 const MAX_AT_ONCE: u64 = 512 * 512;
@@ -37,9 +37,6 @@ const MAX_ROUNDS: u32 = 3;
 
 /// So many of those that are wanted are looked at in a frame.
 const MAX_WANTED: usize = 16;
-
-/// So long a task may wait for a thread that gets on with none of them, before a frame does its work.
-const PATIENCE: Duration = Duration::from_millis(50);
 
 /// Frames that a picture on its way to the renderer is waited for: it may have stopped to draw.
 pub(super) const MAX_LANDING: u32 = 16;
@@ -447,7 +444,7 @@ mod tests {
                 |(_, preparation): &&(Entity, Preparation)| matches!(preparation.stage, Stage::Reading(..));
             let readers = app.world().resource::<Preparations>().list.iter().filter(is_reading).count();
             assert!(readers <= 1, "{readers} read the picture at once");
-            assert!(start.elapsed() < Duration::from_secs(60), "they never come");
+            assert!(start.elapsed() < std::time::Duration::from_secs(60), "they never come");
         }
         let active = &app.world().resource::<Surfaces>().active;
         let bases: Vec<_> =

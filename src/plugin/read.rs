@@ -7,8 +7,8 @@ use bevy::{prelude::*, tasks::AsyncComputeTaskPool};
 /// Bytes that are copied without a look at the clock: by all bakes together no more in a frame.
 pub(super) const MAX_BYTES: usize = 1 << 19;
 
-/// How often a picture is copied anew that changes while it is copied: one that changes in every frame would never be read.
-const MAX_RESTARTS: u32 = 8;
+/// How often what changes while it is read is read anew: a picture that changes in every frame would never be there.
+pub(super) const MAX_RESTARTS: u32 = 8;
 
 /// Pictures of which some is copied.
 pub(super) struct Reading {
