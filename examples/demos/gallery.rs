@@ -95,7 +95,8 @@ fn setup(mut commands: Commands, assets: Res<AssetServer>) {
 
 /// The scripted run: every pane is hit, one after the other, and again.
 fn play_script(mut commands: Commands, script: Script, panes: Query<Entity, With<Pane>>) {
-    let panes: Vec<_> = panes.iter().collect();
+    // Sorted: as panes crack they get components, and a query lists them in another order.
+    let panes: Vec<_> = panes.iter().sort::<Entity>().collect();
     for i in script.due(HITS * panes.len() as u32, 0.0..0.8) {
         let pane = panes[i as usize % panes.len()];
         let at = Vec2::new((0.45 + i as f32 * 0.618).fract(), (0.5 + i as f32 * 0.755).fract()) * 0.6 + 0.2;

@@ -214,7 +214,8 @@ fn listen(mut crackles: MessageReader<Crackle>, mut meter: Query<(&mut Meter, &m
 /// The scripted run: each wall is hit a few times.
 fn play_script(mut commands: Commands, script: Script, walls: Query<Entity, With<Wall>>) {
     for i in script.due(HITS, 0.0..0.8) {
-        let wall = walls.iter().nth(i as usize % 2);
+        // Sorted: a wall that cracks gets components, and a query lists the two in another order.
+        let wall = walls.iter().sort::<Entity>().nth(i as usize % 2);
         let at = Vec2::new((0.31 + i as f32 * 0.618).fract(), (0.42 + i as f32 * 0.755).fract()) * 0.7 + 0.15;
         if let Some(wall) = wall {
             commands.trigger(CrackHit::uv(wall, at).with_energy(1.0 + 0.3 * i as f32));

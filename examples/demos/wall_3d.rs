@@ -100,7 +100,8 @@ fn move_lamp(time: Res<Time>, mut lamp: Query<&mut Transform, With<Lamp>>) {
 fn play_script(mut commands: Commands, script: Script, walls: Query<(Entity, &GlobalTransform), With<Wall>>) {
     for i in script.due(SHOTS, 0.0..0.7) {
         let golden = |k: f32| ((i as f32 * k).fract() - 0.5) * 2.4;
-        let Some((wall, at)) = walls.iter().nth(i as usize % 4) else { continue };
+        // Sorted: a wall that cracks gets components, and a query lists the walls in another order.
+        let Some((wall, at)) = walls.iter().sort::<Entity>().nth(i as usize % 4) else { continue };
         let point = at.transform_point(Vec3::new(golden(0.618), golden(0.755), 0.0));
         commands.trigger(CrackHit::world(wall, point).with_energy([1.0, 2.0, 0.7][i as usize % 3]));
     }
