@@ -5,6 +5,8 @@
 
 pub mod ops;
 mod rng;
+mod widest;
 
 pub use rng::Rng;
 pub(crate) use rng::{hash_unit, mix};
+pub(crate) use widest::widest;

@@ -88,6 +88,7 @@ fn noise(x: u32, y: u32) -> [f32; BLOCK] {
 ///
 /// First all are those of the picture, and blocks that are touched go on a list; then those are painted. To find and paint them
 /// one by one takes longer: a processor that guesses wrong which one is touched cannot begin it while it is at the one before.
+#[inline(always)]
 pub(super) fn diffuse_patch<const ROOM: usize>(
     out: &mut [Rgba],
     frame: &Frame<'_>,
@@ -127,6 +128,7 @@ pub(super) fn diffuse_patch<const ROOM: usize>(
 }
 
 /// The same of one that is narrower than a block.
+#[inline(always)]
 fn narrow_patch<const ROOM: usize>(
     out: &mut [Rgba],
     frame: &Frame<'_>,

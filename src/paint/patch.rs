@@ -65,6 +65,7 @@ impl<const ROOM: usize> Patch<ROOM> {
     }
 
     /// Finds what is touched, and the slopes by Sobel's operator; a wall that goes down to the right leans to the right.
+    #[inline(always)]
     pub(super) fn measure(&mut self, scale: f32) {
         let n = self.len;
         let place = |row: usize, column: usize| &self.depth[row * self.stride + column..][..n];
@@ -85,17 +86,20 @@ impl<const ROOM: usize> Patch<ROOM> {
     }
 
     /// Whether a texel of the block at a place is touched, or one beside it.
+    #[inline(always)]
     pub(super) fn is_touched(&self, place: usize) -> bool {
         self.touch[place..].first_chunk::<BLOCK>().is_some_and(|touch| *touch != [0; BLOCK])
     }
 
     /// The places of a row.
+    #[inline(always)]
     pub(super) fn row(&self, row: usize) -> Range<usize> {
         let first = row * self.stride;
         first..first + self.width
     }
 
     /// The depths of a row.
+    #[inline(always)]
     pub(super) fn depths(&self, row: usize) -> &[u16] {
         &self.depth[self.stride + 1..][self.row(row)]
     }

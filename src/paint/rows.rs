@@ -18,6 +18,7 @@ fn normal_bytes(x: f32, y: f32, z: f32, alpha: u32) -> u32 {
 }
 
 /// Normals over an even base.
+#[inline(always)]
 pub(super) fn flat_row<const ROOM: usize>(out: &mut [Rgba], patch: &Patch<ROOM>, row: usize) {
     let (x, y, inv_len) = (&patch.x[patch.row(row)], &patch.y[patch.row(row)], &patch.inv_len[patch.row(row)]);
     for (((out, &x), &y), &inv_len) in out.iter_mut().zip(x).zip(y).zip(inv_len) {
@@ -26,6 +27,7 @@ pub(super) fn flat_row<const ROOM: usize>(out: &mut [Rgba], patch: &Patch<ROOM>,
 }
 
 /// Normals over base normals: the slopes of base and crack add up, which is exact for heights that add up.
+#[inline(always)]
 pub(super) fn tilted_row<const ROOM: usize>(out: &mut [Rgba], base: &[Rgba], patch: &Patch<ROOM>, row: usize) {
     let (x, y) = (&patch.x[patch.row(row)], &patch.y[patch.row(row)]);
     for (((out, &base), &x), &y) in out.iter_mut().zip(base).zip(x).zip(y) {
@@ -42,6 +44,7 @@ pub(super) fn tilted_row<const ROOM: usize>(out: &mut [Rgba], base: &[Rgba], pat
     }
 }
 
+#[inline(always)]
 pub(super) fn depth_row(out: &mut [u8], base: Option<&[u8]>, depths: &[u16]) {
     let byte = |depth: u16| (u32::from(depth).wrapping_mul(255).wrapping_add(32_895) >> 16) as u8;
     match base {

@@ -12,7 +12,10 @@ use super::{
     patch::{BLOCK, Patch},
     rows::{Rgba, depth_row, flat_row, tilted_row},
 };
-use crate::raster::{DepthField, TexelRect};
+use crate::{
+    math::widest,
+    raster::{DepthField, TexelRect},
+};
 use glam::UVec2;
 use std::ops::Range;
 
@@ -211,6 +214,14 @@ impl Job<'_> {
     }
 
     fn paint_patch<const ROOM: usize>(&mut self, patch: &mut Patch<ROOM>, rect: TexelRect) {
+        widest(
+            #[inline(always)]
+            || self.paint_texels(patch, rect),
+        );
+    }
+
+    #[inline(always)]
+    fn paint_texels<const ROOM: usize>(&mut self, patch: &mut Patch<ROOM>, rect: TexelRect) {
         if self.diffuse_out.is_some() || self.normal_out.is_some() {
             patch.measure(self.look.slope);
         }

@@ -1,6 +1,9 @@
 //! The lines of a picture: what is lighter (or darker) than both its sides, over a length.
 
-use crate::{Grid, math::ops};
+use crate::{
+    Grid,
+    math::{ops, widest},
+};
 use glam::{IVec2, UVec2, Vec2};
 
 /// The shorter side at which lines are looked for, texels.
@@ -35,7 +38,11 @@ pub(super) fn find(size: UVec2, lightness: impl Fn(usize) -> f32) -> Option<Grid
     let picture = Padded::new(size, lightness);
     let mut responses = [vec![0.0_f32; picture.texels()], vec![0.0; picture.texels()]];
     for width in WIDTHS {
-        respond(&picture.blurred(0.4 * width), width, &mut responses);
+        let blurred = picture.blurred(0.4 * width);
+        widest(
+            #[inline(always)]
+            || respond(&blurred, width, &mut responses),
+        );
     }
     // A texture without lines has as many light ones as dark ones. So the weaker kind tells what is noise.
     let [light, dark] = &responses;
@@ -134,6 +141,7 @@ fn shifted<'a>(from: &'a [f32], to: &'a mut [f32], by: i32) -> (&'a [f32], &'a m
 }
 
 /// Raises `responses` (light, dark) to those of lines `width` texels wide, of the best direction at each texel.
+#[inline(always)]
 fn respond(picture: &Padded, width: f32, responses: &mut [Vec<f32>; 2]) {
     let (columns, stride) = (picture.size.x as usize, picture.stride);
     let reach = (3.0 + 2.0 * width) as i32;

@@ -6,18 +6,18 @@ use super::Profile;
 pub(super) const MAX_RADIUS: f32 = 1.0e6;
 
 /// The larger one; unlike `f32::max` without regard to NaN, so that it is one instruction on every machine.
-#[inline]
+#[inline(always)]
 pub(super) fn max(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
 /// The smaller one; as [`max`].
-#[inline]
+#[inline(always)]
 pub(super) fn min(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
-#[inline]
+#[inline(always)]
 pub(super) fn clamp01(x: f32) -> f32 {
     min(max(x, 0.0), 1.0)
 }

@@ -19,10 +19,13 @@ use super::{
     DepthField, DirtyTiles, Profile, TexelRect,
     section::{MAX_RADIUS, Section, at_door, clamp01, max, min},
 };
-use crate::pattern::{PathPoint, SegmentPath, SurfaceFrame};
+use crate::{
+    math::widest,
+    pattern::{PathPoint, SegmentPath, SurfaceFrame},
+};
 use glam::{DVec2, UVec2, Vec2, Vec4};
 
-/// Texels computed at once. Eight `f32` are two SSE registers; 16 spill, 4 leave half of the latency of `sqrt` unused.
+/// Texels computed at once. Eight `f32` are one AVX register or two of SSE; 16 spill there, 4 leave half of the latency of `sqrt` unused.
 const LANES: usize = 8;
 
 /// So many blocks in a row are few.
@@ -166,17 +169,21 @@ impl Capsule {
         if rect.is_empty() {
             return TexelRect::default();
         }
-        match (self.r_gain != 0.0, section.rim_depth > 0.0) {
-            (false, false) => self.stamp_rows::<TELL, false, false>(field, section, rect, changed),
-            (false, true) => self.stamp_rows::<TELL, false, true>(field, section, rect, changed),
-            (true, false) => self.stamp_rows::<TELL, true, false>(field, section, rect, changed),
-            (true, true) => self.stamp_rows::<TELL, true, true>(field, section, rect, changed),
-        }
+        widest(
+            #[inline(always)]
+            || match (self.r_gain != 0.0, section.rim_depth > 0.0) {
+                (false, false) => self.stamp_rows::<TELL, false, false>(field, section, rect, changed),
+                (false, true) => self.stamp_rows::<TELL, false, true>(field, section, rect, changed),
+                (true, false) => self.stamp_rows::<TELL, true, false>(field, section, rect, changed),
+                (true, true) => self.stamp_rows::<TELL, true, true>(field, section, rect, changed),
+            },
+        );
         rect
     }
 
     /// Blocks of [`LANES`] texels and at most one of half as many, row by row. A block may stick out of `rect`: the values there are
     /// zero.
+    #[inline(always)]
     fn stamp_rows<const TELL: bool, const TAPER: bool, const RIM: bool>(
         &self,
         field: &mut DepthField,
@@ -248,6 +255,7 @@ impl Capsule {
     }
 
     /// As many blocks in every row: where they are few, the processor guesses right how it goes on.
+    #[inline(always)]
     fn stamp_blocks<const TELL: bool, const TAPER: bool, const RIM: bool>(
         &self,
         field: &mut DepthField,

@@ -1,6 +1,9 @@
 //! The noise that makes cracks wander: [`Noise`].
 
-use crate::{math::hash_unit, pattern::SurfaceFrame};
+use crate::{
+    math::{hash_unit, widest},
+    pattern::SurfaceFrame,
+};
 
 /// Octaves; the finest features are 1/32 of the largest.
 const OCTAVES: usize = 6;
@@ -76,13 +79,18 @@ impl Noise {
 
     /// Writes row `y`, 0..=65535.
     pub(super) fn fill_row(&mut self, y: usize, out: &mut [u16]) {
-        self.sum.fill(0.0);
-        for octave in &mut self.octaves {
-            octave.add_row(y, &mut self.sum);
-        }
-        for (out, &sum) in out.iter_mut().zip(&self.sum) {
-            *out = (((sum - 0.5) * CONTRAST + 0.5) * 65535.0) as u16;
-        }
+        widest(
+            #[inline(always)]
+            || {
+                self.sum.fill(0.0);
+                for octave in &mut self.octaves {
+                    octave.add_row(y, &mut self.sum);
+                }
+                for (out, &sum) in out.iter_mut().zip(&self.sum) {
+                    *out = (((sum - 0.5) * CONTRAST + 0.5) * 65535.0) as u16;
+                }
+            },
+        );
     }
 }
 
@@ -93,6 +101,7 @@ impl Octave {
         }
     }
 
+    #[inline(always)]
     fn add_row(&mut self, y: usize, sum: &mut [f32]) {
         let place = (y as f32 + 0.5) * self.frequency;
         let row = place as u32;
