@@ -4,6 +4,7 @@ use super::{
     CrackBudget, CrackClock, CrackError, CrackFailed, CrackState, CrackStats, CrackStatus, CrackTextures, HitPoint,
     budget::FrameClock,
     carrier::{self, Found, Kind},
+    error::Called,
     mask, picture,
     plan::{Blank, Draft, Plan, Readings},
     prepare,
@@ -84,8 +85,10 @@ fn apply_next(world: &mut World, entity: Entity) {
                 Ok(HitOutcome::Started(_)) => stats.applied += 1,
                 Ok(HitOutcome::Merged(_)) => stats.merged += 1,
                 Ok(HitOutcome::Nothing) => stats.ignored += 1,
-                Ok(HitOutcome::Rejected(reason)) => queue.reject(entity, &reason.to_string(), &mut stats),
-                Err(reason) => queue.reject(entity, reason, &mut stats),
+                Ok(HitOutcome::Rejected(reason)) => {
+                    queue.reject(&Called::of(world, entity), &reason.to_string(), &mut stats);
+                }
+                Err(reason) => queue.reject(&Called::of(world, entity), reason, &mut stats),
             }
         }
         *world.resource_mut::<CrackStats>() = stats;
@@ -180,7 +183,7 @@ pub(super) fn fail(world: &mut World, entity: Entity, error: CrackError) {
     let Some(mut state) = world.get_mut::<CrackState>(entity) else { return };
     if state.status != status {
         state.status = status;
-        warn!("{entity} cannot crack: {error}");
+        warn!("{} cannot crack: {error}", Called::of(world, entity));
         world.trigger(CrackFailed { entity, error });
     }
 }

@@ -8,6 +8,7 @@ mod land;
 use super::{
     BakeProgress, CrackBaked, CrackBudget, CrackError, CrackFailed,
     budget::FrameClock,
+    error::Called,
     plan::Plan,
     read::{self, Read, Reading},
 };
@@ -352,7 +353,7 @@ fn end(world: &mut World, entity: Entity, result: Result<Option<f32>, CrackError
             world.trigger(CrackBaked { entity, covered });
         }
         Err(error) => {
-            warn!("the guided cracks of {entity} are not made: {error}");
+            warn!("the guided cracks of {} are not made: {error}", Called::of(world, entity));
             world.trigger(CrackFailed { entity, error });
         }
     }

@@ -17,8 +17,8 @@ pub(super) struct Shown {
     pub(super) depth: Option<Handle<Image>>,
     /// The part of the image that is shown; `None` = all of it. Its size cannot change then.
     pub(super) rect: Option<URect>,
-    /// Proportions, where there is no picture.
-    pub(super) proportions: Vec2,
+    /// The size that it was given, where there is no picture.
+    pub(super) size: Option<Vec2>,
     /// Maps that it can make use of.
     pub(super) maps: CrackMaps,
 }
@@ -30,10 +30,9 @@ impl Shown {
 
     /// Whether the same pictures are shown, as large a part of them, wherever that lies: another frame of an animation.
     pub(super) fn is_like(&self, other: &Self) -> bool {
-        let moved = Self { rect: other.rect, proportions: other.proportions, ..self.clone() };
+        let moved = Self { rect: other.rect, size: other.size, ..self.clone() };
         let is_as_large = self.rect.map(|rect| rect.size()) == other.rect.map(|rect| rect.size());
-        // Proportions make no difference to a picture.
-        moved == *other && is_as_large && (self.diffuse.is_some() || self.proportions == other.proportions)
+        moved == *other && is_as_large && (self.diffuse.is_some() || self.size == other.size)
     }
 }
 
@@ -55,6 +54,8 @@ pub(super) struct Kind {
     pub(super) attach: fn(&mut World, Entity, &mut Carrier, &CrackTextures, relief: f32),
     /// Gives back what the entity showed before.
     pub(super) detach: fn(&mut World, Entity, &Carrier),
+    /// Width of the whole picture over its height, as it is shown in the world; `None` where there is no telling.
+    pub(super) aspect: fn(&World, Entity) -> Option<f32>,
     /// Texture coordinates in the shown part of a point in the entity's own space.
     pub(super) locate: fn(&World, Entity, Vec3) -> Result<Vec2, &'static str>,
     /// Whether its shards have thickness.

@@ -1,6 +1,7 @@
 //! [`CrackError`]: why a surface cannot crack.
 
 use bevy::prelude::*;
+use std::fmt;
 
 /// Why a surface cannot crack.
 #[derive(Clone, Debug, PartialEq, Reflect, thiserror::Error)]
@@ -95,4 +96,25 @@ pub enum CrackError {
         /// Which one and why.
         reason: String,
     },
+}
+
+/// An entity as warnings call it: by its `Name`, if it has one.
+pub(super) struct Called<'a> {
+    pub(super) entity: Entity,
+    pub(super) name: Option<&'a Name>,
+}
+
+impl<'a> Called<'a> {
+    pub(super) fn of(world: &'a World, entity: Entity) -> Self {
+        Self { entity, name: world.get(entity) }
+    }
+}
+
+impl fmt::Display for Called<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.name {
+            Some(name) => write!(f, "{name} ({})", self.entity),
+            None => self.entity.fmt(f),
+        }
+    }
 }

@@ -3,6 +3,7 @@
 use super::{
     CrackBudget, CrackStats, CrackSurface,
     budget::FrameClock,
+    error::Called,
     queue::{HitQueue, QueuedHit},
     space,
 };
@@ -104,6 +105,7 @@ pub(super) fn collect_hits(
     budget: Res<CrackBudget>,
     mut clock: ResMut<FrameClock>,
     surfaces: Query<Option<&GlobalTransform>, With<CrackSurface>>,
+    names: Query<&Name>,
 ) {
     if queue.inbox.is_empty() && messages.is_empty() {
         return;
@@ -122,7 +124,10 @@ pub(super) fn collect_hits(
             Err(_) => Err("the entity has no `CrackSurface`"),
         };
         match at {
-            Err(reason) => queue.reject(hit.entity, reason, &mut stats),
+            Err(reason) => {
+                let surface = Called { entity: hit.entity, name: names.get(hit.entity).ok() };
+                queue.reject(&surface, reason, &mut stats);
+            }
             Ok(_) if hit.energy == 0.0 => stats.ignored += 1,
             Ok(at) => {
                 let waiting = QueuedHit { at, energy: hit.energy, direction: hit.direction };

@@ -3,14 +3,15 @@
 use super::{
     CrackError, CrackMaps, CrackTextures, Shard,
     carrier::{Carrier, Clothes, Found, Kind, Shown},
-    mesh::{closest_uv, place_of, wrap},
+    error::Called,
+    mesh::{aspect_of, closest_uv, place_of, wrap},
     shards::Plane,
     surfaces::Active,
 };
 use bevy::{
     asset::{LoadState, UntypedHandle},
     ecs::component::Mutable,
-    math::Affine2,
+    math::{Affine2, Mat3A},
     prelude::*,
 };
 
@@ -50,6 +51,7 @@ pub(super) const fn kind<S: MaterialSlot>() -> Kind {
         inspect: inspect::<S>,
         attach: attach::<S>,
         detach: detach::<S>,
+        aspect: aspect::<S>,
         locate: locate::<S>,
         is_solid: S::Material::MAPS.depth,
         plane: plane::<S>,
@@ -79,7 +81,7 @@ fn inspect<S: MaterialSlot>(world: &World, entity: Entity) -> Found {
         normal,
         depth,
         rect: None,
-        proportions: Vec2::ONE,
+        size: None,
         maps: S::Material::MAPS,
     }))
 }
@@ -141,7 +143,8 @@ fn give_tangents(world: &mut World, entity: Entity) -> Option<(Handle<Mesh>, Han
             Some((before, own))
         }
         Err(error) => {
-            warn!("the normals of the cracks on {entity} will not show, its mesh has no tangents: {error}");
+            let surface = Called::of(world, entity);
+            warn!("the normals of the cracks on {surface} will not show, its mesh has no tangents: {error}");
             None
         }
     }
@@ -159,6 +162,13 @@ fn detach<S: MaterialSlot>(world: &mut World, entity: Entity, carrier: &Carrier)
     {
         mesh.0 = before.clone();
     }
+}
+
+fn aspect<S: MaterialSlot>(world: &World, entity: Entity) -> Option<f32> {
+    let mesh = world.get_resource::<Assets<Mesh>>()?.get(mesh_of(world, entity)?)?;
+    let material = world.get_resource::<Assets<S::Material>>()?.get(world.get::<S>(entity)?.material())?;
+    let place = world.get::<GlobalTransform>(entity).map_or(Mat3A::IDENTITY, |place| place.affine().matrix3);
+    aspect_of(mesh, place, material.uv_transform())
 }
 
 fn locate<S: MaterialSlot>(world: &World, entity: Entity, local: Vec3) -> Result<Vec2, &'static str> {

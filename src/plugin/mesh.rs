@@ -1,6 +1,7 @@
 //! From points on a mesh to texture coordinates.
 
 use bevy::{
+    math::{Affine2, Mat3A},
     mesh::{Indices, PrimitiveTopology, VertexAttributeValues},
     prelude::*,
 };
@@ -94,6 +95,37 @@ pub(super) fn place_of(mesh: &Mesh, uv: Vec2) -> Option<(Vec3, Vec3)> {
     best.map(|(_, place)| place)
 }
 
+/// Triangles that are looked at for the proportions of a mesh.
+const SAMPLES: usize = 1024;
+
+/// Width of a picture over its height, as a mesh in a `place` shows it whose texture coordinates `to_picture` makes those of the picture.
+///
+/// The median over the area: what most of the mesh shows counts, on a box its broad sides. `None` where nothing has an area.
+pub(super) fn aspect_of(mesh: &Mesh, place: Mat3A, to_picture: Affine2) -> Option<f32> {
+    let triangles = Triangles::of(mesh).ok()?;
+    let mut aspects = Vec::new();
+    let mut all = 0.0;
+    for i in (0..triangles.len()).step_by(triangles.len().div_ceil(SAMPLES).max(1)) {
+        let Some(([a, b, c], [uv_a, uv_b, uv_c])) = triangles.get(i) else { continue };
+        let (ab, ac) = (place * (b - a), place * (c - a));
+        let (uv_ab, uv_ac) = (to_picture.transform_vector2(uv_b - uv_a), to_picture.transform_vector2(uv_c - uv_a));
+        // How far the surface goes on, times the same, for each unit along the picture and down it.
+        let (right, down) = (ab * uv_ac.y - ac * uv_ab.y, ac * uv_ab.x - ab * uv_ac.x);
+        let (aspect, area) = (right.length() / down.length(), ab.cross(ac).length());
+        if aspect.is_normal() && area.is_normal() {
+            aspects.push((aspect, area));
+            all += area;
+        }
+    }
+    aspects.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+    let mut sum = 0.0;
+    let is_half = |&(_, area): &(f32, f32)| {
+        sum += area;
+        2.0 * sum >= all
+    };
+    aspects.into_iter().find(is_half).map(|(aspect, _)| aspect)
+}
+
 /// Texture coordinates within 0..=1: those beyond are of a texture that repeats.
 pub(super) fn wrap(uv: Vec2) -> Vec2 {
     const SLACK: f32 = 1e-4;
@@ -171,6 +203,29 @@ mod tests {
             found += 1;
         }
         assert!(found > 400, "{found} of 480 places");
+    }
+
+    #[test]
+    fn proportions_are_those_of_what_is_shown() {
+        let aspect = |mesh: Mesh, scale, to_picture| aspect_of(&mesh, Mat3A::from_diagonal(scale), to_picture);
+        let as_it_is = |mesh: Mesh| aspect(mesh, Vec3::ONE, Affine2::IDENTITY);
+        let near = |a: Option<f32>, b: f32| a.is_some_and(|a| (a / b - 1.0).abs() < 1e-5);
+        assert!(near(as_it_is(Rectangle::new(6.0, 2.0).into()), 3.0));
+        assert!(near(as_it_is(Cuboid::new(4.0, 1.0, 0.2).into()), 4.0), "its broad sides count");
+        assert!(near(as_it_is(Plane3d::new(Vec3::Y, Vec2::new(1.0, 2.0)).into()), 0.5));
+        let quad = || Mesh::from(Rectangle::new(1.0, 1.0));
+        assert!(near(aspect(quad(), Vec3::new(-5.0, 2.0, 0.0), Affine2::IDENTITY), 2.5), "scaled and mirrored");
+        // Twice as many tiles along as down.
+        let tiles = Affine2::from_scale(Vec2::new(8.0, 4.0));
+        assert!(near(aspect(quad(), Vec3::new(2.0, 1.0, 1.0), tiles), 1.0));
+        let turned = Affine2::from_angle(core::f32::consts::FRAC_PI_2);
+        assert!(near(aspect(Rectangle::new(3.0, 1.0).into(), Vec3::ONE, turned), 1.0 / 3.0));
+        let ball = as_it_is(Sphere::new(0.5).mesh().uv(64, 32)).unwrap();
+        assert!((1.5..2.0).contains(&ball), "{ball}: twice as wide as high at the equator, less elsewhere");
+        assert_eq!(aspect(quad(), Vec3::new(0.0, 1.0, 1.0), Affine2::IDENTITY), None, "no width");
+        assert_eq!(aspect(quad(), Vec3::splat(f32::NAN), Affine2::IDENTITY), None);
+        assert_eq!(aspect(quad(), Vec3::ONE, Affine2::from_scale(Vec2::ZERO)), None);
+        assert_eq!(as_it_is(quad().with_removed_attribute(Mesh::ATTRIBUTE_UV_0)), None);
     }
 
     #[test]

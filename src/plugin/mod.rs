@@ -220,6 +220,7 @@ impl Plugin for CrackPlugin {
     }
 
     fn finish(&self, app: &mut App) {
+        app.insert_resource(picture::NearestByDefault::of(app));
         preset::add_assets(app);
         upload::connect(app);
         #[cfg(feature = "2d")]

@@ -4,6 +4,7 @@ use super::CrackError;
 use crate::{Grid, paint::BaseTexels, raster::TexelRect};
 use bevy::{
     asset::{AssetServer, LoadState},
+    image::{ImageFilterMode, ImageSampler, ImageSamplerDescriptor},
     platform::collections::HashMap,
     prelude::*,
     render::render_resource::{TextureDimension, TextureFormat},
@@ -159,6 +160,29 @@ pub(super) fn is_loaded(world: &World, picture: &Handle<Image>) -> Result<bool, 
             Err(CrackError::LoadFailed { reason })
         }
         _ => Ok(false),
+    }
+}
+
+/// Whether pictures that say nothing about it show their texels as squares, as those of pixel art.
+#[derive(Resource, Default)]
+pub(super) struct NearestByDefault(bool);
+
+impl NearestByDefault {
+    /// What the app's [`ImagePlugin`] says.
+    pub(super) fn of(app: &App) -> Self {
+        Self(app.get_added_plugins::<ImagePlugin>().iter().any(|plugin| shows_squares(&plugin.default_sampler)))
+    }
+}
+
+fn shows_squares(sampler: &ImageSamplerDescriptor) -> bool {
+    sampler.mag_filter == ImageFilterMode::Nearest
+}
+
+/// Whether the texels of a picture are shown as squares: between them nothing is made up then.
+pub(super) fn is_nearest(world: &World, image: &Image) -> bool {
+    match &image.sampler {
+        ImageSampler::Default => world.get_resource::<NearestByDefault>().is_some_and(|nearest| nearest.0),
+        ImageSampler::Descriptor(sampler) => shows_squares(sampler),
     }
 }
 

@@ -23,6 +23,12 @@ use std::sync::Arc;
 /// Longer side of the textures of a surface without a picture, texels.
 const DEFAULT_SIDE: f32 = 512.0;
 
+/// A picture that is shown so much wider or higher than it is gets textures with more columns or rows, on which cracks are not stretched.
+const STRETCHED: f32 = 1.4;
+
+/// Textures have no more columns or rows than their picture if they would have more texels than this.
+const MOST_TEXELS: f64 = 4_194_304.0;
+
 /// Textures are not made coarser than this to fit the budget, texels.
 const MIN_SIDE: u32 = 64;
 
@@ -47,7 +53,7 @@ impl Plan {
         let Some(Untouched { surface, preset, kind, shown }) = carrier::untouched(world, entity)? else {
             return Ok(None);
         };
-        let pictures = plan_pictures(world, &surface, &shown, 0)?;
+        let pictures = plan_pictures(world, &surface, &shown, (kind.aspect)(world, entity), 0)?;
         let read_at = world.resource::<Surfaces>().frame;
         Ok(pictures.map(|pictures| Self {
             surface,
@@ -291,11 +297,13 @@ impl PicturePlan {
     }
 }
 
-/// Plans the pictures of a surface; `None` if they are not there yet. `owned` bytes of the budget are its own already.
+/// Plans the pictures of a surface that is shown in the proportions `aspect`; `None` if they are not there yet. `owned` bytes of
+/// the budget are its own already.
 fn plan_pictures(
     world: &World,
     surface: &CrackSurface,
     shown: &Shown,
+    aspect: Option<f32>,
     owned: u64,
 ) -> Result<Option<PicturePlan>, CrackError> {
     let images = world.get_resource::<Assets<Image>>().ok_or(CrackError::NoImages)?;
@@ -310,21 +318,22 @@ fn plan_pictures(
         depth: surface.write.depth && shown.maps.depth,
     };
     let image = shown.diffuse.as_ref().and_then(|picture| images.get(picture));
-    let size = size(world, surface, shown, image, maps, owned)?;
+    let size = size(world, surface, shown, image, aspect, maps, owned)?;
     let whole = TexelRect::whole(size);
     let rect = shown.rect.map_or(whole, |rect| TexelRect { min: rect.min, max: rect.max }.intersect(whole));
     let sampler = image.map_or(ImageSampler::Default, |image| image.sampler.clone());
     Ok(Some(PicturePlan { size, rect, bytes: bytes(size, maps), sampler, maps }))
 }
 
-/// Reads the pictures of a surface; `None` if they are not there yet. `owned` as in [`plan_pictures`].
+/// Reads the pictures of a surface; `None` if they are not there yet. `aspect` and `owned` as in [`plan_pictures`].
 pub(super) fn draft(
     world: &mut World,
     surface: &CrackSurface,
     shown: &Shown,
+    aspect: Option<f32>,
     owned: u64,
 ) -> Result<Option<Draft>, CrackError> {
-    let plan = plan_pictures(world, surface, shown, owned)?;
+    let plan = plan_pictures(world, surface, shown, aspect, owned)?;
     plan.map(|plan| plan.draft(world, shown)).transpose()
 }
 
@@ -340,27 +349,34 @@ fn size(
     surface: &CrackSurface,
     shown: &Shown,
     image: Option<&Image>,
+    aspect: Option<f32>,
     maps: CrackMaps,
     owned: u64,
 ) -> Result<UVec2, CrackError> {
+    let aspect = aspect.filter(|aspect| aspect.is_normal());
     let own_size = match image {
         Some(image) => picture::readable_size(image)?,
         None => {
-            let proportions = shown.proportions.abs();
-            let size = proportions * (DEFAULT_SIDE / proportions.max_element());
-            if size.is_finite() { size.as_uvec2().max(UVec2::ONE) } else { UVec2::splat(512) }
+            let aspect = aspect.unwrap_or(1.0);
+            (Vec2::new(aspect, 1.0) * (DEFAULT_SIDE / aspect.max(1.0))).as_uvec2().max(UVec2::ONE)
         }
     };
+    let budget = world.resource::<CrackBudget>();
+    let device = world.get_resource::<RenderDevice>().map_or(u32::MAX, |d| d.limits().max_texture_dimension_2d);
+    let max_side = budget.max_side.clamp(1, device.clamp(1, crate::pattern::MAX_SIDE));
+    let left = budget.max_texture_bytes.saturating_sub(world.resource::<Surfaces>().bytes.saturating_sub(owned));
     let mut size = match surface.resolution {
         CrackResolution::Fixed(size) if shown.rect.is_none() => size,
+        CrackResolution::Picture if shown.rect.is_none() => {
+            let is_smooth = image.is_some_and(|image| !picture::is_nearest(world, image));
+            let size = aspect.filter(|_| is_smooth).map(|aspect| unstretched(own_size, aspect, max_side));
+            size.filter(|size| bytes(*size, maps) <= left).unwrap_or(own_size)
+        }
         _ => own_size,
     };
     if size.min_element() == 0 {
         return Err(CrackError::Size { width: size.x, height: size.y });
     }
-    let budget = world.resource::<CrackBudget>();
-    let device = world.get_resource::<RenderDevice>().map_or(u32::MAX, |d| d.limits().max_texture_dimension_2d);
-    let max_side = budget.max_side.clamp(1, device.clamp(1, crate::pattern::MAX_SIDE));
     if size.max_element() > max_side {
         if shown.rect.is_some() {
             return Err(CrackError::Size { width: size.x, height: size.y });
@@ -368,7 +384,6 @@ fn size(
         let scale = f64::from(max_side) / f64::from(size.max_element());
         size = (size.as_dvec2() * scale).as_uvec2().clamp(UVec2::ONE, UVec2::splat(max_side));
     }
-    let left = budget.max_texture_bytes.saturating_sub(world.resource::<Surfaces>().bytes.saturating_sub(owned));
     while bytes(size, maps) > left {
         if shown.rect.is_some() || size.max_element() <= MIN_SIDE {
             return Err(CrackError::TextureBudget { needed: bytes(size, maps), left });
@@ -376,4 +391,45 @@ fn size(
         size = (size / 2).max(UVec2::ONE);
     }
     Ok(size)
+}
+
+/// Size of the textures of a picture of this size that is shown in the proportions `aspect`: all its columns and rows, and more of those
+/// that are shown stretched, as far as they have room.
+fn unstretched(size: UVec2, aspect: f32, max_side: u32) -> UVec2 {
+    let UVec2 { x: width, y: height } = size;
+    // How much wider than high a texel is shown.
+    let stretch = aspect * height as f32 / width as f32;
+    if (STRETCHED.recip()..=STRETCHED).contains(&stretch) {
+        return size;
+    }
+    let longer = |side: u32, other: u32, by: f32| {
+        let most = (MOST_TEXELS / f64::from(other)).min(f64::from(max_side)).max(f64::from(side));
+        (f64::from(side) * f64::from(by)).min(most).round() as u32
+    };
+    if stretch > 1.0 {
+        UVec2::new(longer(width, height, stretch), height)
+    } else {
+        UVec2::new(width, longer(height, width, stretch.recip()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stretched_pictures_get_more_columns_or_rows() {
+        let of = |width, height, aspect| unstretched(UVec2::new(width, height), aspect, 8192).to_array();
+        assert_eq!(of(512, 512, 1.0), [512, 512]);
+        assert_eq!(of(512, 512, 1.39), [512, 512], "nobody sees it");
+        assert_eq!(of(512, 512, 4.0), [2048, 512]);
+        assert_eq!(of(512, 512, 0.25), [512, 2048]);
+        assert_eq!(of(512, 128, 4.0), [512, 128]);
+        assert_eq!(of(512, 128, 1.0), [512, 512]);
+        assert_eq!(of(1024, 1024, 100.0), [4096, 1024], "no more than four million texels");
+        assert_eq!(of(4096, 2048, 9.0), [4096, 2048], "nor fewer than the picture has");
+        assert_eq!(of(100, 100, 200.0), [8192, 100]);
+        assert_eq!(of(1, 1, f32::MAX), [8192, 1]);
+        assert_eq!(of(1, 1, f32::MIN_POSITIVE), [1, 8192]);
+    }
 }

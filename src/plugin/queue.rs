@@ -1,6 +1,6 @@
 //! [`HitQueue`]: hits that wait for their turn.
 
-use super::{CrackHit, CrackStats, HitPoint};
+use super::{CrackHit, CrackStats, HitPoint, error::Called};
 use bevy::{
     ecs::entity::{EntityHashMap, EntityHashSet},
     prelude::*,
@@ -66,10 +66,10 @@ impl HitQueue {
     }
 
     /// Counts a hit as refused and says why, once for each surface.
-    pub(super) fn reject(&mut self, entity: Entity, reason: &str, stats: &mut CrackStats) {
+    pub(super) fn reject(&mut self, surface: &Called<'_>, reason: &str, stats: &mut CrackStats) {
         stats.rejected += 1;
-        if self.warned.len() < MAX_WARNED && self.warned.insert(entity) {
-            warn!("a hit on {entity} is refused: {reason} (further ones will only be counted)");
+        if self.warned.len() < MAX_WARNED && self.warned.insert(surface.entity) {
+            warn!("a hit on {surface} is refused: {reason} (further ones will only be counted)");
         }
     }
 

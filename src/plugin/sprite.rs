@@ -7,12 +7,13 @@ use super::{
     shards::Plane,
     surfaces::Active,
 };
-use bevy::{asset::UntypedHandle, prelude::*, sprite::Anchor};
+use bevy::{asset::UntypedHandle, math::Mat3A, prelude::*, sprite::Anchor};
 
 pub(super) const KIND: Kind = Kind {
     inspect,
     attach,
     detach,
+    aspect,
     locate,
     is_solid: false,
     plane,
@@ -57,7 +58,7 @@ fn inspect(world: &World, entity: Entity) -> Found {
         depth: None,
         // Texels that a border between two pixels cuts belong to the frame.
         rect: rect.map(|rect| URect { min: rect.min.floor().as_uvec2(), max: rect.max.ceil().as_uvec2() }),
-        proportions: sprite.custom_size.unwrap_or(Vec2::ONE),
+        size: sprite.custom_size,
         maps: CrackMaps { diffuse: true, normal: true, depth: false },
     }))
 }
@@ -91,6 +92,14 @@ fn give_size_back(sprite: &mut Sprite, given: Option<Vec2>) {
     if given.is_some() && sprite.custom_size == given {
         sprite.custom_size = None;
     }
+}
+
+fn aspect(world: &World, entity: Entity) -> Option<f32> {
+    let sprite = world.get::<Sprite>(entity)?;
+    let picture = || world.get_resource::<Assets<Image>>()?.get(&sprite.image).map(Image::size_f32);
+    let size = sprite.custom_size.or_else(picture)?;
+    let place = world.get::<GlobalTransform>(entity).map_or(Mat3A::IDENTITY, |place| place.affine().matrix3);
+    Some((size.x * place.x_axis.length() / (size.y * place.y_axis.length())).abs())
 }
 
 fn locate(world: &World, entity: Entity, local: Vec3) -> Result<Vec2, &'static str> {

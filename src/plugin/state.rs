@@ -4,6 +4,9 @@ use super::CrackError;
 use bevy::prelude::*;
 
 /// How a surface is doing. Written by the crate, read by games.
+///
+/// Written in `PostUpdate`, in [`CrackSystems::Paint`](super::CrackSystems::Paint): a system in `Update` reads what was so at the end of the
+/// frame before.
 #[derive(Component, Reflect, Clone, Debug, Default, PartialEq)]
 #[reflect(Component, Default)]
 #[component(clone_behavior = Ignore)]
@@ -11,6 +14,9 @@ pub struct CrackState {
     /// What it is at.
     pub status: CrackStatus,
     /// Share of the surface's tiles of 8 x 8 texels that a crack has touched, 0..=1.
+    ///
+    /// One ordinary hit on a square of 512 x 512 gives 0.1 to 0.25 where cracks run out from it (glass, concrete, plaster, ice; brick and toon
+    /// less), and 0.4 to 0.9 where they come everywhere (tempered glass, clay, mud, glaze). Tiles being of texels, it is more on coarser textures.
     pub damage: f32,
     /// Nodes of the crack network, at most [`max_nodes`](crate::growth::GrowthParams::max_nodes).
     pub nodes: u32,

@@ -58,6 +58,20 @@ impl CrackSurface {
         self
     }
 
+    /// The same with textures of another size.
+    #[must_use]
+    pub fn with_resolution(mut self, resolution: CrackResolution) -> Self {
+        self.resolution = resolution;
+        self
+    }
+
+    /// The same with only these maps.
+    #[must_use]
+    pub fn with_maps(mut self, maps: CrackMaps) -> Self {
+        self.write = maps;
+        self
+    }
+
     /// The same with a mask.
     #[must_use]
     pub fn with_mask(mut self, mask: CrackMaskSource) -> Self {
@@ -75,13 +89,14 @@ impl Default for CrackSurface {
 /// Size of a surface's textures.
 #[derive(Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum CrackResolution {
-    /// As its picture. Where there is none, 512 texels along the longer side of a sprite's `custom_size`, 512 x 512 on a mesh. Where a
-    /// picture is shown in other proportions than its own, as on a long wall, cracks are stretched with it: [`Fixed`](Self::Fixed) gives
-    /// the textures those of the wall. A texel takes 14 to 24 bytes in all, and for a
-    /// coin [`Fixed`](Self::Fixed) of 64 x 64 is plenty.
+    /// As its picture; with more columns or rows where it is shown stretched by more than 1.4, so that the cracks are not, however the
+    /// sprite's `custom_size`, the mesh's texture coordinates or a scale stretch it. That is seen to when the textures are made, up to four
+    /// million texels, and not for pictures whose sampler shows texels as squares. Without a picture, 512 texels along the longer side.
+    ///
+    /// A texel takes 14 to 24 bytes in all, and for a coin [`Fixed`](Self::Fixed) of 64 x 64 is plenty.
     #[default]
     Picture,
-    /// This size, the picture being resampled. Sprites with a `rect` or an atlas keep the size of their picture.
+    /// This size, the picture being resampled; cracks are stretched with a picture that is. Sprites with a `rect` or an atlas keep the size of their picture.
     Fixed(UVec2),
 }
 

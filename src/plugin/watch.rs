@@ -5,6 +5,7 @@ use super::{
     activate::{attach, fail, frame, look, make_textures, set_status, tell_textures},
     bake::Bakes,
     carrier::{self, Carrier, Found, Shown},
+    error::Called,
     mask::{self, PictureMasks},
     paint::stamp_anew,
     picture::BasePictures,
@@ -188,7 +189,7 @@ fn update_settings(world: &World, entity: Entity, active: &mut Active) -> bool {
     active.has_new_settings = false;
     match preset.and_then(|preset| preset.map_or(Ok(()), |preset| update_preset(active, preset))) {
         Ok(()) => {}
-        Err(error) => warn!("the changed preset of {entity} is not used: {error}"),
+        Err(error) => warn!("the changed preset of {} is not used: {error}", Called::of(world, entity)),
     }
     true
 }
@@ -270,7 +271,8 @@ pub(super) fn grown_anew(
 /// Reads the pictures anew and paints the cracks over them; `false` if they are not there yet.
 fn update_picture(world: &mut World, entity: Entity, active: &mut Active, shown: Shown) -> Result<bool, CrackError> {
     active.is_outdated = true;
-    let Some(draft) = draft(world, &active.surface, &shown, active.bytes)? else { return Ok(false) };
+    let aspect = (active.carrier.kind.aspect)(world, entity);
+    let Some(draft) = draft(world, &active.surface, &shown, aspect, active.bytes)? else { return Ok(false) };
     let from = active.surface.mask.with(&active.preset);
     let Some(mask) = mask::resolve(world, from, &shown, &draft)? else { return Ok(false) };
     let frame = frame(draft.plan.rect)?;

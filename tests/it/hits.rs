@@ -574,3 +574,28 @@ fn i3_hits_that_miss_make_nothing() {
         settle(&mut app, entity);
     }
 }
+
+#[test]
+fn warnings_call_a_surface_by_its_name() {
+    let mut app = app();
+    single_threaded(&mut app);
+    let image = add(&mut app, picture(UVec2::splat(32)));
+    let [named, nameless, empty] = [(); 3].map(|()| spawn_sprite(&mut app, &image));
+    app.world_mut().entity_mut(named).insert(Name::new("the old wall"));
+    app.world_mut().entity_mut(empty).remove::<Sprite>().insert(Name::new("nothing"));
+    let heard = warnings(|| {
+        hit(&mut app, center(named).with_energy(-1.0));
+        hit(&mut app, center(nameless).with_energy(-1.0));
+        hit(&mut app, center(empty));
+        step(&mut app);
+    });
+    let expected = [
+        format!("a hit on the old wall ({named}) is refused"),
+        format!("a hit on {nameless} is refused"),
+        format!("nothing ({empty}) cannot crack"),
+    ];
+    assert_eq!(heard.len(), expected.len(), "{heard:?}");
+    for expected in expected {
+        assert!(heard.iter().any(|warning| warning.contains(&expected)), "{expected}: {heard:?}");
+    }
+}

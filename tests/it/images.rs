@@ -10,7 +10,7 @@ use bevy::{
             memory::{Dir, MemoryAssetReader},
         },
     },
-    image::{TextureAtlas, TextureAtlasLayout},
+    image::{ImageSampler, TextureAtlas, TextureAtlasLayout},
     prelude::*,
     reflect::TypePath,
     render::{
@@ -27,7 +27,7 @@ use std::{
 };
 
 fn surface_of(resolution: CrackResolution) -> CrackSurface {
-    CrackSurface { resolution, ..CrackSurface::default() }
+    CrackSurface::default().with_resolution(resolution)
 }
 
 fn spawn_with(app: &mut App, image: &Handle<Image>, resolution: CrackResolution) -> Entity {
@@ -994,13 +994,77 @@ fn t4_a_sprite_of_one_colour_without_a_size() {
     let entity = app.world_mut().spawn((sprite.clone(), scale, CrackSurface::default())).id();
     hit(&mut app, CrackHit::world(entity, Vec3::new(20.0, 10.0, 0.0)));
     settle(&mut app, entity);
-    assert_eq!(size_of(&app, &image_of(&app, entity)), UVec2::splat(512), "cracks have room");
-    assert!(share_untouched(&shown(&app, entity), &[255; 512 * 512 * 4]) > 0.5, "most of it is as it was");
+    assert_eq!(size_of(&app, &image_of(&app, entity)), UVec2::new(512, 341), "cracks have room and are not stretched");
+    assert!(share_untouched(&shown(&app, entity), &[255; 512 * 341 * 4]) > 0.5, "most of it is as it was");
     assert_eq!(get::<Sprite>(&app, entity).custom_size, Some(Vec2::ONE), "it is as large as before");
     app.world_mut().commands().entity(entity).heal_cracks();
     step(&mut app);
     let healed = get::<Sprite>(&app, entity);
     assert_eq!((healed.image, healed.custom_size), (sprite.image, None));
+}
+
+#[test]
+fn t4_cracks_are_not_stretched_with_their_picture() {
+    let mut app = app();
+    let squares = add(&mut app, picture(UVec2::splat(64)));
+    let image = add(&mut app, Image { sampler: ImageSampler::Default, ..picture(UVec2::splat(64)) });
+    let [long, square] = [4.0, 1.0].map(|width| add(&mut app, Mesh::from(Rectangle::new(width, 1.0))));
+    let flat = add(&mut app, ColorMaterial::from(image.clone()));
+    let solid = add(&mut app, StandardMaterial { base_color_texture: Some(image.clone()), ..default() });
+    let plain = add(&mut app, StandardMaterial::default());
+    let sprite = |image: &Handle<Image>, size| Sprite { custom_size: size, ..Sprite::from_image(image.clone()) };
+    let size = |width, height| Some(Vec2::new(width, height));
+    let wide = Transform::from_scale(Vec3::new(-3.0, 1.0, 1.0));
+    let all = [
+        (app.world_mut().spawn(sprite(&image, size(400.0, 100.0))).id(), [256, 64]),
+        (app.world_mut().spawn(sprite(&image, size(50.0, 150.0))).id(), [64, 192]),
+        (app.world_mut().spawn(sprite(&image, size(130.0, 100.0))).id(), [64, 64]),
+        (app.world_mut().spawn((sprite(&image, None), wide)).id(), [192, 64]),
+        (app.world_mut().spawn(sprite(&squares, size(400.0, 100.0))).id(), [64, 64]),
+        (app.world_mut().spawn((Mesh2d(long.clone()), MeshMaterial2d(flat))).id(), [256, 64]),
+        (app.world_mut().spawn((Mesh3d(square), MeshMaterial3d(solid), wide)).id(), [192, 64]),
+        (app.world_mut().spawn((Mesh3d(long), MeshMaterial3d(plain))).id(), [512, 128]),
+    ];
+    for (entity, expected) in all {
+        app.world_mut().entity_mut(entity).insert(CrackSurface::default());
+        step(&mut app);
+        let before = get_size(&app, entity);
+        hit(&mut app, center(entity));
+        settle(&mut app, entity);
+        let diffuse = get::<CrackTextures>(&app, entity).diffuse.expect("a picture");
+        assert_eq!(size_of(&app, &diffuse).to_array(), expected, "{entity}");
+        assert_eq!(get_size(&app, entity), before, "as large on the screen");
+        let painted = texels(&app, &diffuse);
+        // What is shown in other proportions later stays as it is.
+        let mut transform = app.world_mut().get_mut::<Transform>(entity).expect("a place");
+        transform.scale.y *= 7.0;
+        steps(&mut app, 3);
+        assert_eq!(get::<CrackTextures>(&app, entity).diffuse.as_ref(), Some(&diffuse));
+        assert!(texels(&app, &diffuse) == painted);
+    }
+    // Where there is no room for it, they are stretched rather than refused.
+    app.world_mut().resource_mut::<CrackBudget>().max_texture_bytes = 4_000_000;
+    let left = app.world_mut().spawn((sprite(&image, size(900.0, 1.0)), CrackSurface::default())).id();
+    hit(&mut app, center(left));
+    settle(&mut app, left);
+    assert_eq!(size_of(&app, &image_of(&app, left)), UVec2::splat(64));
+
+    // Where all pictures show their texels as squares.
+    let mut app = App::new();
+    let pictures = ImagePlugin::default_nearest();
+    app.add_plugins((MinimalPlugins, TransformPlugin, AssetPlugin::default(), pictures, CrackPlugins));
+    start(&mut app);
+    let image = add(&mut app, Image { sampler: ImageSampler::Default, ..picture(UVec2::splat(64)) });
+    let entity = app.world_mut().spawn((sprite(&image, size(400.0, 100.0)), CrackSurface::default())).id();
+    hit(&mut app, center(entity));
+    settle(&mut app, entity);
+    assert_eq!(size_of(&app, &image_of(&app, entity)), UVec2::splat(64));
+}
+
+/// The size on the screen that a sprite is given, or has by its picture.
+fn get_size(app: &App, entity: Entity) -> Option<Vec2> {
+    let sprite = app.world().get::<Sprite>(entity)?;
+    sprite.custom_size.or_else(|| Some(size_of(app, &sprite.image).as_vec2()))
 }
 
 #[test]

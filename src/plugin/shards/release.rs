@@ -11,6 +11,7 @@ use crate::{
     plugin::{
         CrackBudget, CrackState, CrackStatus,
         beside::Beside,
+        error::Called,
         paint::paint_now,
         surfaces::{Active, Surfaces},
         textures,
@@ -119,7 +120,7 @@ pub(in crate::plugin) fn shatter_surfaces(world: &mut World) {
         world.trigger(event);
     }
     for event in failed {
-        warn!("{} cannot shatter: {}", event.entity, event.error);
+        warn!("{} cannot shatter: {}", Called::of(world, event.entity), event.error);
         world.trigger(event);
     }
 }
