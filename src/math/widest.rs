@@ -3,13 +3,17 @@
 #[cfg(target_arch = "x86_64")]
 use fearless_simd::{Level, Simd};
 
-/// Runs `work` as it is compiled for the widest vectors that the processor at hand has: AVX2 on x86-64, if it is there; elsewhere
-/// a build assumes no less than there is.
+/// Runs `work` as it is compiled for the widest vectors that the processor at hand has: AVX2 on x86-64, if it is there; elsewhere as the build
+/// assumes.
 ///
 /// The bits are the same either way: the same operations in the same order, each rounded as it stands, none fused with another.
 /// Only what is inlined into `work` gains, so its loops are `#[inline(always)]`, and so is the closure.
 #[inline(always)]
 pub(crate) fn widest<R>(work: impl FnOnce() -> R) -> R {
+    #[cfg(test)]
+    if tests::IS_PLAIN.get() {
+        return work();
+    }
     #[cfg(target_arch = "x86_64")]
     if let Some(avx2) = Level::new().as_avx2() {
         return avx2.vectorize(work);
@@ -19,32 +23,88 @@ pub(crate) fn widest<R>(work: impl FnOnce() -> R) -> R {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-    use crate::math::Rng;
+    use crate::{
+        math::Rng,
+        paint::{BaseTexels, Look, LookTable, PaintTargets, paint_into},
+        pattern::{CrackMask, PathPoint, SegmentPath, SurfaceFrame},
+        raster::{DepthField, Profile, TexelRect, stamp_path},
+        voronoi::{VoronoiParams, voronoi_map},
+    };
+    use glam::{UVec2, Vec2};
+    use std::{cell::Cell, ops::ControlFlow};
 
-    /// Products that are added, a root, a quotient, a choice and whole numbers, of which a fused or reordered one would differ.
-    #[inline(always)]
-    fn kernel(a: &[f32], b: &[f32], out: &mut [u32]) {
-        for ((out, &a), &b) in out.iter_mut().zip(a).zip(b) {
-            let sum = a * b + a * a + b * 0.3;
-            let value = sum / (sum.abs().sqrt() + 0.1) - if sum > 1.0 { a } else { b };
-            *out = (value.to_bits() ^ (value as i32 as u32)).wrapping_mul(0x9E37_79B1);
+    std::thread_local! {
+        /// Whether work is done as on a processor without wide vectors.
+        pub(super) static IS_PLAIN: Cell<bool> = const { Cell::new(false) };
+    }
+
+    /// What is made of random numbers with wide vectors and without.
+    fn both<T>(seed: u64, make: impl Fn(&mut Rng) -> T) -> [T; 2] {
+        [false, true].map(|is_plain| {
+            IS_PLAIN.set(is_plain);
+            let made = make(&mut Rng::new(seed));
+            IS_PLAIN.set(false);
+            made
+        })
+    }
+
+    fn field(rng: &mut Rng) -> DepthField {
+        let mut field = DepthField::new(SurfaceFrame::new(UVec2::new(150, 97)).unwrap());
+        for _ in 0..12 {
+            let mut point = || PathPoint {
+                pos: Vec2::new(rng.range(-0.1, 1.6), rng.range(-0.1, 1.1)),
+                width: 0.1 * rng.unit() * rng.unit(),
+            };
+            let path = SegmentPath::straight(point(), point());
+            let rim_width = if rng.unit() < 0.5 { 0.0 } else { 0.03 };
+            let profile = Profile { wall: rng.unit(), rim_width, rim_depth: rng.unit(), ..Profile::DEFAULT };
+            stamp_path(&mut field, &profile, &path);
+        }
+        field
+    }
+
+    #[test]
+    fn stamps_and_painted_texels_are_the_same_without_wide_vectors() {
+        for seed in 0..40 {
+            let [wide, plain] = both(seed, |rng| {
+                let field = field(rng);
+                let n = 150 * 97;
+                let mut bytes = |n: usize| (0..n).map(|_| rng.next_u32() as u8).collect::<Vec<_>>();
+                let (diffuse, normal, depth) = (bytes(4 * n), bytes(4 * n), bytes(n));
+                let normal = (seed % 2 == 0).then_some(&*normal);
+                let base = BaseTexels { size: UVec2::new(150, 97), diffuse: &diffuse, normal, depth: Some(&depth) };
+                let look = &[Look::GROOVE, Look::FROSTED, Look::TOON][seed as usize % 3];
+                let look = LookTable::new(look, 97.0).unwrap();
+                let [mut diffuse, mut normal, mut depth] = [vec![0; 4 * n], vec![0; 4 * n], vec![0; n]];
+                let mut targets =
+                    PaintTargets { diffuse: Some(&mut diffuse), normal: Some(&mut normal), depth: Some(&mut depth) };
+                paint_into(base, &field, &look, TexelRect::whole(UVec2::new(150, 97)), UVec2::ZERO, &mut targets);
+                (field, diffuse, normal, depth)
+            });
+            assert!(wide.0.depth.as_slice().iter().any(|&depth| depth > 0), "something is stamped");
+            assert!(wide == plain, "seed {seed}");
         }
     }
 
     #[test]
-    fn the_widest_vectors_give_the_same_bits() {
-        let mut rng = Rng::new(12);
-        for n in [0, 1, 7, 8, 31, 1000] {
-            let mut values = || (0..n).map(|_| rng.range(-100.0, 100.0)).collect::<Vec<_>>();
-            let (a, b) = (values(), values());
-            let (mut plain, mut wide) = (vec![0; n], vec![0; n]);
-            kernel(&a, &b, &mut plain);
-            widest(
-                #[inline(always)]
-                || kernel(&a, &b, &mut wide),
-            );
-            assert_eq!(plain, wide);
+    fn lines_of_pictures_and_maps_are_the_same_without_wide_vectors() {
+        for seed in 0..4 {
+            let [wide, plain] = both(seed, |rng| {
+                let size = UVec2::new(140, 90);
+                let texel = |i: u32, noise: u32| match (i % 140) % 30 < 3 || (i / 140) % 24 < 3 {
+                    true => 180 + noise % 40,
+                    false => 60 + noise % 40,
+                };
+                let texels = (0..140 * 90).map(|i| texel(i, rng.next_u32()) as u8);
+                let rgba: Vec<u8> = texels.flat_map(|level| [level, level, level, 255]).collect();
+                let lines = CrackMask::weak_from_picture(size, &rgba).unwrap().expect("lines");
+                let map =
+                    voronoi_map(&VoronoiParams::default(), &[], size, seed, |_| ControlFlow::Continue(())).unwrap();
+                let costs: Vec<_> =
+                    (0..size.y).flat_map(|y| (0..size.x).map(move |x| (x, y))).map(|(x, y)| map.edges(x, y)).collect();
+                (lines, map.regions(), costs)
+            });
+            assert!(wide == plain, "seed {seed}");
         }
     }
 }

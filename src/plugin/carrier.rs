@@ -1,11 +1,16 @@
 //! [`Carrier`]: what shows a surface's pictures, a sprite or a material.
 
-use super::{CrackError, CrackMaps, CrackSurface, CrackTextures, Shard, preset, shards::Plane, surfaces::Active};
+use super::{
+    CrackError, CrackMaps, CrackSurface, CrackTextures, Shard, layout::Layout, preset, shards::Plane, surfaces::Active,
+};
 use crate::CrackPreset;
+#[cfg(feature = "2d")]
+use bevy::sprite::SpriteImageMode;
 use bevy::{
     asset::{UntypedAssetId, UntypedHandle},
     prelude::*,
 };
+use std::sync::Arc;
 
 /// What an entity shows.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,6 +22,8 @@ pub(super) struct Shown {
     pub(super) depth: Option<Handle<Image>>,
     /// The part of the image that is shown; `None` = all of it. Its size cannot change then.
     pub(super) rect: Option<URect>,
+    /// How the picture is laid out, if it is not merely stretched.
+    pub(super) layout: Option<Arc<Layout>>,
     /// The size that it was given, where there is no picture.
     pub(super) size: Option<Vec2>,
     /// Maps that it can make use of.
@@ -54,8 +61,9 @@ pub(super) struct Kind {
     pub(super) attach: fn(&mut World, Entity, &mut Carrier, &CrackTextures, relief: f32),
     /// Gives back what the entity showed before.
     pub(super) detach: fn(&mut World, Entity, &Carrier),
-    /// Width of the whole picture over its height, as it is shown in the world; `None` where there is no telling.
-    pub(super) aspect: fn(&World, Entity) -> Option<f32>,
+    /// Width of the whole picture over its height, as it is shown in the world, the picture having this size and the crate having given
+    /// that to a sprite; `None` where there is no telling.
+    pub(super) aspect: fn(&World, Entity, picture: Option<Vec2>, given: Option<Vec2>) -> Option<f32>,
     /// Texture coordinates in the shown part of a point in the entity's own space.
     pub(super) locate: fn(&World, Entity, Vec3) -> Result<Vec2, &'static str>,
     /// Whether its shards have thickness.
@@ -112,12 +120,23 @@ pub(super) struct Carrier {
     pub(super) mesh: Option<(Handle<Mesh>, Handle<Mesh>)>,
     /// The size that was given to the sprite.
     pub(super) size: Option<Vec2>,
+    /// How the sprite laid out its picture, if its texture has it laid out.
+    #[cfg(feature = "2d")]
+    pub(super) mode: Option<SpriteImageMode>,
 }
 
 impl Carrier {
     /// It still shows what it showed.
     pub(super) fn new(kind: &'static Kind, shown: Shown) -> Self {
-        Self { kind, shown, own: None, mesh: None, size: None }
+        Self {
+            kind,
+            shown,
+            own: None,
+            mesh: None,
+            size: None,
+            #[cfg(feature = "2d")]
+            mode: None,
+        }
     }
 
     /// Ids of the pictures it was made from.

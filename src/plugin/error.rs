@@ -56,8 +56,10 @@ pub enum CrackError {
         /// Height, texels.
         height: u32,
     },
-    /// The sprite is sliced, tiled or scaled into its size.
-    #[error("`SpriteImageMode` {mode} is not supported: use `Auto`")]
+    /// The sprite is scaled into its size, or it is sliced or tiled and shows a part of its picture.
+    #[error(
+        "`SpriteImageMode` {mode} is not supported here: use `Auto`, or `Sliced` or `Tiled` without `rect` and atlas"
+    )]
     SpriteMode {
         /// Name of the mode.
         mode: String,

@@ -17,7 +17,7 @@ use bevy::{
 pub trait CrackCommandsExt {
     /// Makes a surface ready for its first hit: for what is sure to be hit, while a level loads.
     ///
-    /// Without it the crack of a first hit shows in the frame of the hit on pictures of up to 512 x 512 texels, unless many are hit for
+    /// Without it the crack of a first hit shows in the frame of the hit with textures of up to 512 x 512 texels, unless many are hit for
     /// the first time at once or its lines are to be read (those of brick, see [`CrackMaskSource`](super::CrackMaskSource)), and some frames
     /// later on larger ones: they are made beside the frames. A surface that is prepared takes
     /// the memory of one that has cracked, and shows its textures from the frame on in which [`CrackTextures`] is added. Surfaces that are

@@ -4,6 +4,7 @@ use super::{
     CrackBudget, CrackError,
     beside::{Beside, PATIENCE},
     carrier::Shown,
+    layout::Layout,
     picture::{self, BasePicture, Space},
     plan::{Draft, PicturePlan},
     read::MAX_RESTARTS,
@@ -115,11 +116,12 @@ pub(super) struct Key {
     size: UVec2,
     rect: TexelRect,
     part: PicturePart,
+    layout: Option<Layout>,
 }
 
 impl Key {
     pub(super) fn new(picture: &Handle<Image>, plan: &PicturePlan, part: PicturePart) -> Self {
-        Self { picture: picture.id(), size: plan.size, rect: plan.rect, part }
+        Self { picture: picture.id(), size: plan.size, rect: plan.rect, part, layout: plan.layout.as_deref().copied() }
     }
 
     /// The mask of the picture.

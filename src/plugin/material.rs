@@ -81,6 +81,7 @@ fn inspect<S: MaterialSlot>(world: &World, entity: Entity) -> Found {
         normal,
         depth,
         rect: None,
+        layout: None,
         size: None,
         maps: S::Material::MAPS,
     }))
@@ -164,7 +165,7 @@ fn detach<S: MaterialSlot>(world: &mut World, entity: Entity, carrier: &Carrier)
     }
 }
 
-fn aspect<S: MaterialSlot>(world: &World, entity: Entity) -> Option<f32> {
+fn aspect<S: MaterialSlot>(world: &World, entity: Entity, _: Option<Vec2>, _: Option<Vec2>) -> Option<f32> {
     let mesh = world.get_resource::<Assets<Mesh>>()?.get(mesh_of(world, entity)?)?;
     let material = world.get_resource::<Assets<S::Material>>()?.get(world.get::<S>(entity)?.material())?;
     let place = world.get::<GlobalTransform>(entity).map_or(Mat3A::IDENTITY, |place| place.affine().matrix3);

@@ -31,6 +31,7 @@ mod guided;
 mod headless;
 mod heal;
 mod hit;
+mod layout;
 #[cfg(feature = "2d")]
 mod lit;
 mod mask;
@@ -201,6 +202,9 @@ impl Plugin for CrackPlugin {
                     (upload::drop_unwanted, budget::end_frame).chain().in_set(Upload),
                 ),
             );
+        // What a sprite shows changes before the engine cuts it into parts.
+        #[cfg(feature = "2d")]
+        app.configure_sets(PostUpdate, Hit.before(bevy::sprite_render::SpriteSystems::ComputeSlices));
         #[cfg(feature = "2d")]
         app.add_systems(
             PostUpdate,

@@ -1,10 +1,10 @@
 //! Reading pictures: [`BasePicture`].
 
-use super::CrackError;
+use super::{CrackError, layout::Layout};
 use crate::{Grid, paint::BaseTexels, raster::TexelRect};
 use bevy::{
     asset::{AssetServer, LoadState},
-    image::{ImageFilterMode, ImageSampler, ImageSamplerDescriptor},
+    image::{ImageAddressMode, ImageFilterMode, ImageSampler, ImageSamplerDescriptor},
     platform::collections::HashMap,
     prelude::*,
     render::render_resource::{TextureDimension, TextureFormat},
@@ -66,6 +66,7 @@ pub(super) struct BasePictures(HashMap<BaseKey, Weak<BasePicture>>);
 pub(super) struct BaseKey {
     pub(super) pictures: [Option<AssetId<Image>>; 3],
     pub(super) size: UVec2,
+    pub(super) layout: Option<Layout>,
 }
 
 impl BasePictures {
@@ -237,12 +238,29 @@ pub(super) fn read(image: &Image, space: Space, size: UVec2) -> Result<Vec<u8>, 
             texels
         }
     };
-    Ok(if size == own_size { texels } else { resample(&texels, own_size, size) })
+    Ok(if size == own_size { texels } else { Sampling::of(image, space).resample(&texels, own_size, size) })
 }
 
-/// As [`read`] in sRGB, as the renderer shows the picture: one channel is red, not grey.
-pub(super) fn read_shown(image: &Image, size: UVec2) -> Result<Vec<u8>, CrackError> {
-    let mut texels = read(image, Space::Srgb, size)?;
+/// As [`read`] in sRGB, as the renderer shows the picture: one channel is red, not grey, and it is laid out, its texels as squares if
+/// `is_nearest`.
+pub(super) fn read_shown(
+    image: &Image,
+    size: UVec2,
+    layout: Option<&Layout>,
+    is_nearest: bool,
+) -> Result<Vec<u8>, CrackError> {
+    let mut texels = match layout {
+        None => read(image, Space::Srgb, size)?,
+        Some(layout) => {
+            let own_size = readable_size(image)?;
+            let texels = read(image, Space::Srgb, own_size)?;
+            let places = layout.places(own_size, size);
+            Sampling::of(image, Space::Srgb).sample(&texels, own_size, size, |x, y| {
+                let place = places(x, y);
+                if is_nearest { place.floor() + 0.5 } else { place }
+            })
+        }
+    };
     if image.texture_descriptor.format.components() == 1 {
         texels.as_chunks_mut::<4>().0.iter_mut().for_each(|texel| (texel[1], texel[2]) = (0, 0));
     }
@@ -260,27 +278,90 @@ fn to_byte(value: f32) -> u8 {
     (value.clamp(0.0, 1.0) * 255.0 + 0.5) as u8
 }
 
-/// Bilinear resampling, texel centres at half-integers, edges held.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "coordinates lie inside the picture")]
-fn resample(texels: &[u8], from: UVec2, to: UVec2) -> Vec<u8> {
-    let scale = from.as_vec2() / to.as_vec2();
-    let last = from - UVec2::ONE;
-    let mut out = Vec::with_capacity(to.x as usize * to.y as usize * 4);
-    for y in 0..to.y {
-        for x in 0..to.x {
-            let at = ((UVec2::new(x, y).as_vec2() + 0.5) * scale - 0.5).clamp(Vec2::ZERO, last.as_vec2());
-            let (low, part) = (at.as_uvec2(), at.fract());
-            let high = (low + UVec2::ONE).min(last);
-            let texel =
-                |x: u32, y: u32, c: usize| f32::from(texels[(y as usize * from.x as usize + x as usize) * 4 + c]);
-            for c in 0..4 {
-                let top = texel(low.x, low.y, c).lerp(texel(high.x, low.y, c), part.x);
-                let bottom = texel(low.x, high.y, c).lerp(texel(high.x, high.y, c), part.x);
-                out.push((top.lerp(bottom, part.y) + 0.5) as u8);
+/// How a picture is read between its texels: bilinear, as the renderer does.
+struct Sampling {
+    /// Whether it goes on at the other side beyond an edge, across and down; else the edge is held.
+    repeats: [bool; 2],
+    /// The light of each level.
+    light: [f32; 256],
+    /// The level of each light, by its root.
+    level: Vec<u8>,
+}
+
+impl Sampling {
+    /// Lights that are told apart: ten or more for each level.
+    const LIGHTS: f32 = 4095.0;
+
+    fn of(image: &Image, space: Space) -> Self {
+        let repeats = match &image.sampler {
+            ImageSampler::Default => [false; 2],
+            ImageSampler::Descriptor(sampler) => {
+                [sampler.address_mode_u, sampler.address_mode_v].map(|mode| mode == ImageAddressMode::Repeat)
             }
+        };
+        Self::new(repeats, space)
+    }
+
+    #[expect(clippy::cast_possible_truncation, reason = "the number of lights")]
+    fn new(repeats: [bool; 2], space: Space) -> Self {
+        let light = |level: u8| match space {
+            Space::Srgb => Color::srgb_u8(level, 0, 0).to_linear().red,
+            Space::Linear => f32::from(level) / 255.0,
+        };
+        let level = |root: u32| {
+            let light = (root as f32 / Self::LIGHTS).powi(2);
+            to_byte(match space {
+                Space::Srgb => Srgba::from(LinearRgba::rgb(light, 0.0, 0.0)).red,
+                Space::Linear => light,
+            })
+        };
+        Self {
+            repeats,
+            light: core::array::from_fn(|i| light(i as u8)),
+            level: (0..=Self::LIGHTS as u32).map(level).collect(),
         }
     }
-    out
+
+    /// A picture at another size, its edges where they were.
+    fn resample(&self, texels: &[u8], from: UVec2, to: UVec2) -> Vec<u8> {
+        let scale = from.as_vec2() / to.as_vec2();
+        self.sample(texels, from, to, |x, y| (UVec2::new(x, y).as_vec2() + 0.5) * scale)
+    }
+
+    /// The colours `at` the places of other texels; texel centres are at half-integers.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "coordinates lie inside the picture")]
+    fn sample(&self, texels: &[u8], from: UVec2, to: UVec2, at: impl Fn(u32, u32) -> Vec2) -> Vec<u8> {
+        // The texels before and after a place along an axis, and how far it is from the one to the other.
+        let beside = |at: f32, axis: usize| {
+            let last = from[axis] - 1;
+            if self.repeats[axis] {
+                let at = (at - 0.5).rem_euclid(from[axis] as f32);
+                let low = (at as u32).min(last);
+                (low, if low == last { 0 } else { low + 1 }, at.fract())
+            } else {
+                let at = (at - 0.5).clamp(0.0, last as f32);
+                let low = at as u32;
+                (low, (low + 1).min(last), at.fract())
+            }
+        };
+        let (rows, mut out) = (texels.as_chunks::<4>().0, Vec::with_capacity(to.x as usize * to.y as usize * 4));
+        for y in 0..to.y {
+            for x in 0..to.x {
+                let place = at(x, y);
+                let ((left, right, across), (top, bottom, down)) = (beside(place.x, 0), beside(place.y, 1));
+                let texel = |x: u32, y: u32| rows[y as usize * from.x as usize + x as usize];
+                let corners = [texel(left, top), texel(right, top), texel(left, bottom), texel(right, bottom)];
+                let mix = |[a, b, c, d]: [f32; 4]| a.lerp(b, across).lerp(c.lerp(d, across), down);
+                for c in 0..3 {
+                    let light = mix(corners.map(|texel| self.light[usize::from(texel[c])]));
+                    let root = (light.sqrt() * Self::LIGHTS + 0.5) as usize;
+                    out.push(self.level[root.min(self.level.len() - 1)]);
+                }
+                out.push((mix(corners.map(|texel| f32::from(texel[3]))) + 0.5) as u8);
+            }
+        }
+        out
+    }
 }
 
 #[cfg(test)]
@@ -291,7 +372,7 @@ mod tests {
     fn a_base_picture_in_use_is_read_once() {
         let mut bases = BasePictures::default();
         let id = AssetId::from(bevy::asset::uuid::Uuid::from_u128(7));
-        let key = |side: u32| BaseKey { pictures: [None, Some(id), None], size: UVec2::splat(side) };
+        let key = |side| BaseKey { pictures: [None, Some(id), None], size: UVec2::splat(side), layout: None };
         let white = |side: u32| BasePicture::new(UVec2::splat(side), vec![255; 4 * (side * side) as usize], None, None);
         let unread = || -> Result<BasePicture, CrackError> { panic!("it is in use") };
         assert_eq!(bases.get(key(1), || Err(CrackError::NoCpuData)), Err(CrackError::NoCpuData));
@@ -309,9 +390,25 @@ mod tests {
     }
 
     #[test]
-    fn resampling_keeps_even_pictures_and_halves_steps() {
-        assert_eq!(resample(&[7; 3 * 2 * 4], UVec2::new(3, 2), UVec2::new(5, 4)), [7; 5 * 4 * 4]);
-        let step = resample(&[0, 0, 0, 0, 100, 100, 100, 100], UVec2::new(2, 1), UVec2::new(4, 1));
-        assert_eq!(red(&step), [0, 25, 75, 100]);
+    fn resampling_keeps_even_pictures() {
+        for (space, level) in
+            [Space::Srgb, Space::Linear].into_iter().flat_map(|space| (0..=255).map(move |i| (space, i)))
+        {
+            let even = Sampling::new([level % 2 == 0, true], space);
+            assert_eq!(even.resample(&[level; 3 * 2 * 4], UVec2::new(3, 2), UVec2::new(5, 4)), [level; 5 * 4 * 4]);
+        }
+    }
+
+    #[test]
+    fn steps_are_halved_as_the_renderer_halves_them() {
+        let step = |space, repeats, high: u8| {
+            let texels = [0, 0, 0, 0, high, high, high, high];
+            Sampling::new([repeats; 2], space).resample(&texels, UVec2::new(2, 1), UVec2::new(4, 1))
+        };
+        assert_eq!(red(&step(Space::Linear, false, 100)), [0, 25, 75, 100]);
+        assert_eq!(red(&step(Space::Linear, true, 100)), [25, 25, 75, 75], "it goes on at the other side");
+        // A quarter and three quarters of the light of white.
+        assert_eq!(red(&step(Space::Srgb, false, 255)), [0, 137, 225, 255]);
+        assert_eq!(step(Space::Srgb, false, 255)[7], 64, "alpha is no light");
     }
 }

@@ -4,10 +4,11 @@ use super::{
     CrackBudget, CrackError, CrackMaps, CrackResolution, CrackSurface, CrackTextures,
     activate::{frame, look},
     carrier::{self, Carrier, Found, Kind, Shown, Untouched},
+    layout::Layout,
     mask::{self, Key, MaskFrom, PictureMasks},
     picture::{self, BaseKey, BasePicture, BasePictures, Space},
     preset,
-    surfaces::{Ground, Surfaces},
+    surfaces::{Active, Ground, Surfaces},
     textures::{self, TextureKind},
 };
 use crate::{
@@ -23,11 +24,14 @@ use std::sync::Arc;
 /// Longer side of the textures of a surface without a picture, texels.
 const DEFAULT_SIDE: f32 = 512.0;
 
+/// The shorter side of those of a long one.
+const DEFAULT_SHORTER: f32 = 256.0;
+
 /// A picture that is shown so much wider or higher than it is gets textures with more columns or rows, on which cracks are not stretched.
 const STRETCHED: f32 = 1.4;
 
 /// Textures have no more columns or rows than their picture if they would have more texels than this.
-const MOST_TEXELS: f64 = 4_194_304.0;
+const MOST_TEXELS: f64 = 2_097_152.0;
 
 /// Textures are not made coarser than this to fit the budget, texels.
 const MIN_SIDE: u32 = 64;
@@ -53,7 +57,8 @@ impl Plan {
         let Some(Untouched { surface, preset, kind, shown }) = carrier::untouched(world, entity)? else {
             return Ok(None);
         };
-        let pictures = plan_pictures(world, &surface, &shown, (kind.aspect)(world, entity), 0)?;
+        let aspect = |picture| (kind.aspect)(world, entity, picture, None);
+        let pictures = plan_pictures(world, &surface, &shown, &Stretch { aspect: &aspect, kept: None }, 0)?;
         let read_at = world.resource::<Surfaces>().frame;
         Ok(pictures.map(|pictures| Self {
             surface,
@@ -151,8 +156,9 @@ impl Plan {
                 world.resource_mut::<PictureMasks>().remember(Key::new(picture, &pictures, part), &mask);
             }
         }
-        let (bytes, rect) = (pictures.bytes, pictures.rect);
-        Ground { surface, preset, look, base, textures, carrier: Carrier::new(kind, shown), bytes, rect, read_at }
+        let PicturePlan { bytes, rect, unstretched, .. } = pictures;
+        let carrier = Carrier::new(kind, shown);
+        Ground { surface, preset, look, base, textures, carrier, bytes, rect, unstretched, read_at }
     }
 }
 
@@ -259,6 +265,12 @@ pub(super) struct PicturePlan {
     pub(super) bytes: u64,
     pub(super) sampler: ImageSampler,
     pub(super) maps: CrackMaps,
+    /// The size that the textures would have if the picture were not shown stretched; `None` if they have a size that was asked for.
+    pub(super) unstretched: Option<UVec2>,
+    /// How the picture is laid out in its textures.
+    pub(super) layout: Option<Arc<Layout>>,
+    /// Whether its texels are shown as squares.
+    is_nearest: bool,
 }
 
 impl PicturePlan {
@@ -269,7 +281,8 @@ impl PicturePlan {
     }
 
     fn key(&self, shown: &Shown) -> BaseKey {
-        BaseKey { pictures: self.needed(shown).map(|map| map.map(Handle::id)), size: self.size }
+        let pictures = self.needed(shown).map(|map| map.map(Handle::id));
+        BaseKey { pictures, size: self.size, layout: self.layout.as_deref().copied() }
     }
 
     /// Reads the pictures, unless somebody else has.
@@ -288,7 +301,7 @@ impl PicturePlan {
         let read =
             |image: Option<&Image>| image.map(|image| picture::read(image, Space::Linear, self.size)).transpose();
         let diffuse = match diffuse {
-            Some(image) => picture::read_shown(image, self.size)?,
+            Some(image) => picture::read_shown(image, self.size, self.layout.as_deref(), self.is_nearest)?,
             None => vec![255; n * 4],
         };
         let normal = if self.maps.normal { read(normal)? } else { None };
@@ -297,13 +310,21 @@ impl PicturePlan {
     }
 }
 
-/// Plans the pictures of a surface that is shown in the proportions `aspect`; `None` if they are not there yet. `owned` bytes of
-/// the budget are its own already.
+/// How a picture is shown in the world.
+pub(super) struct Stretch<'a> {
+    /// Its width over its height there, its own size being given; see [`Kind::aspect`].
+    pub(super) aspect: &'a dyn Fn(Option<Vec2>) -> Option<f32>,
+    /// The size that the surface's textures would have had without it, and what they have: as long as the former is the same, so is the
+    /// latter, however it is shown now.
+    pub(super) kept: Option<(UVec2, UVec2)>,
+}
+
+/// Plans the pictures of a surface; `None` if they are not there yet. `owned` bytes of the budget are its own already.
 fn plan_pictures(
     world: &World,
     surface: &CrackSurface,
     shown: &Shown,
-    aspect: Option<f32>,
+    stretch: &Stretch<'_>,
     owned: u64,
 ) -> Result<Option<PicturePlan>, CrackError> {
     let images = world.get_resource::<Assets<Image>>().ok_or(CrackError::NoImages)?;
@@ -318,22 +339,26 @@ fn plan_pictures(
         depth: surface.write.depth && shown.maps.depth,
     };
     let image = shown.diffuse.as_ref().and_then(|picture| images.get(picture));
-    let size = size(world, surface, shown, image, aspect, maps, owned)?;
+    let is_nearest = image.is_some_and(|image| picture::is_nearest(world, image));
+    let (size, unstretched) = size(world, surface, shown, image, stretch, is_nearest, maps, owned)?;
     let whole = TexelRect::whole(size);
     let rect = shown.rect.map_or(whole, |rect| TexelRect { min: rect.min, max: rect.max }.intersect(whole));
     let sampler = image.map_or(ImageSampler::Default, |image| image.sampler.clone());
-    Ok(Some(PicturePlan { size, rect, bytes: bytes(size, maps), sampler, maps }))
+    let (bytes, layout) = (bytes(size, maps), shown.layout.clone());
+    Ok(Some(PicturePlan { size, rect, bytes, sampler, maps, unstretched, layout, is_nearest }))
 }
 
-/// Reads the pictures of a surface; `None` if they are not there yet. `aspect` and `owned` as in [`plan_pictures`].
+/// Reads the pictures of a surface of this kind anew; `None` if they are not there yet. `owned` as in [`plan_pictures`].
 pub(super) fn draft(
     world: &mut World,
-    surface: &CrackSurface,
+    entity: Entity,
+    active: &Active,
     shown: &Shown,
-    aspect: Option<f32>,
-    owned: u64,
 ) -> Result<Option<Draft>, CrackError> {
-    let plan = plan_pictures(world, surface, shown, aspect, owned)?;
+    let aspect = |picture| (active.carrier.kind.aspect)(world, entity, picture, active.carrier.size);
+    let kept = active.unstretched.map(|unstretched| (unstretched, active.base.size));
+    let stretch = Stretch { aspect: &aspect, kept };
+    let plan = plan_pictures(world, &active.surface, shown, &stretch, active.bytes)?;
     plan.map(|plan| plan.draft(world, shown)).transpose()
 }
 
@@ -343,33 +368,44 @@ fn bytes(size: UVec2, maps: CrackMaps) -> u64 {
     u64::from(size.x) * u64::from(size.y) * texel
 }
 
-/// Size of the textures: what is asked for, made smaller until it fits device and budget.
+/// Size of the textures: what is asked for, made smaller until it fits device and budget; and what it would be if the picture were not
+/// shown stretched, unless another was asked for.
 fn size(
     world: &World,
     surface: &CrackSurface,
     shown: &Shown,
     image: Option<&Image>,
-    aspect: Option<f32>,
+    stretch: &Stretch<'_>,
+    is_nearest: bool,
     maps: CrackMaps,
     owned: u64,
-) -> Result<UVec2, CrackError> {
-    let aspect = aspect.filter(|aspect| aspect.is_normal());
+) -> Result<(UVec2, Option<UVec2>), CrackError> {
+    let aspect = |picture| (stretch.aspect)(picture).filter(|aspect| aspect.is_normal());
     let own_size = match image {
-        Some(image) => picture::readable_size(image)?,
+        Some(image) => {
+            let size = picture::readable_size(image)?;
+            shown.layout.as_ref().map_or(size, |layout| layout.texels(size))
+        }
         None => {
-            let aspect = aspect.unwrap_or(1.0);
-            (Vec2::new(aspect, 1.0) * (DEFAULT_SIDE / aspect.max(1.0))).as_uvec2().max(UVec2::ONE)
+            let aspect = aspect(None).unwrap_or(1.0);
+            let longer = DEFAULT_SIDE
+                .max(DEFAULT_SHORTER * aspect.max(aspect.recip()))
+                .min(MOST_TEXELS as f32 / DEFAULT_SHORTER);
+            (Vec2::new(aspect, 1.0) * (longer / aspect.max(1.0))).as_uvec2().max(UVec2::ONE)
         }
     };
+    let unstretched = (surface.resolution == CrackResolution::Picture).then_some(own_size);
     let budget = world.resource::<CrackBudget>();
     let device = world.get_resource::<RenderDevice>().map_or(u32::MAX, |d| d.limits().max_texture_dimension_2d);
     let max_side = budget.max_side.clamp(1, device.clamp(1, crate::pattern::MAX_SIDE));
     let left = budget.max_texture_bytes.saturating_sub(world.resource::<Surfaces>().bytes.saturating_sub(owned));
     let mut size = match surface.resolution {
         CrackResolution::Fixed(size) if shown.rect.is_none() => size,
-        CrackResolution::Picture if shown.rect.is_none() => {
-            let is_smooth = image.is_some_and(|image| !picture::is_nearest(world, image));
-            let size = aspect.filter(|_| is_smooth).map(|aspect| unstretched(own_size, aspect, max_side));
+        CrackResolution::Picture if shown.rect.is_none() && !is_nearest => {
+            let is_same = |(before, size): &(UVec2, UVec2)| *before == own_size && size.cmpge(own_size).all();
+            let kept = stretch.kept.filter(is_same).map(|(_, size)| size);
+            let fit = |image: &Image| Some(stretched(own_size, aspect(Some(image.size_f32()))?, max_side));
+            let size = kept.or_else(|| image.and_then(fit));
             size.filter(|size| bytes(*size, maps) <= left).unwrap_or(own_size)
         }
         _ => own_size,
@@ -390,12 +426,12 @@ fn size(
         }
         size = (size / 2).max(UVec2::ONE);
     }
-    Ok(size)
+    Ok((size, unstretched))
 }
 
 /// Size of the textures of a picture of this size that is shown in the proportions `aspect`: all its columns and rows, and more of those
 /// that are shown stretched, as far as they have room.
-fn unstretched(size: UVec2, aspect: f32, max_side: u32) -> UVec2 {
+fn stretched(size: UVec2, aspect: f32, max_side: u32) -> UVec2 {
     let UVec2 { x: width, y: height } = size;
     // How much wider than high a texel is shown.
     let stretch = aspect * height as f32 / width as f32;
@@ -419,14 +455,14 @@ mod tests {
 
     #[test]
     fn stretched_pictures_get_more_columns_or_rows() {
-        let of = |width, height, aspect| unstretched(UVec2::new(width, height), aspect, 8192).to_array();
+        let of = |width, height, aspect| stretched(UVec2::new(width, height), aspect, 8192).to_array();
         assert_eq!(of(512, 512, 1.0), [512, 512]);
         assert_eq!(of(512, 512, 1.39), [512, 512], "nobody sees it");
         assert_eq!(of(512, 512, 4.0), [2048, 512]);
         assert_eq!(of(512, 512, 0.25), [512, 2048]);
         assert_eq!(of(512, 128, 4.0), [512, 128]);
         assert_eq!(of(512, 128, 1.0), [512, 512]);
-        assert_eq!(of(1024, 1024, 100.0), [4096, 1024], "no more than four million texels");
+        assert_eq!(of(512, 1024, 100.0), [2048, 1024], "no more than two million texels");
         assert_eq!(of(4096, 2048, 9.0), [4096, 2048], "nor fewer than the picture has");
         assert_eq!(of(100, 100, 200.0), [8192, 100]);
         assert_eq!(of(1, 1, f32::MAX), [8192, 1]);

@@ -254,7 +254,7 @@ fn begin(world: &mut World, entity: Entity, mut plan: Plan, is_wanted: bool, thr
     let preparation = Preparation { plan, key, stage, since: Instant::now(), is_wanted };
     let turn = &mut Turn { timer: None, must_copy: false, may_make: false };
     if let Next::On(preparation) = preparation.step(world, entity, turn)? {
-        world.resource_mut::<Preparations>().list.push((entity, preparation));
+        world.resource_mut::<Preparations>().list.push((entity, *preparation));
     }
     Ok(true)
 }
@@ -270,7 +270,7 @@ pub(super) fn prepare_surfaces(world: &mut World) {
         let outcome = preparation.step(world, entity, turn);
         let mut preparations = world.resource_mut::<Preparations>();
         match outcome {
-            Ok(Next::On(preparation)) => preparations.list.push((entity, preparation)),
+            Ok(Next::On(preparation)) => preparations.list.push((entity, *preparation)),
             Ok(Next::Again) => *preparations.rounds.entry(entity).or_default() += 1,
             Ok(Next::Over) => _ = preparations.rounds.remove(&entity),
             Err(error) => fail(world, entity, error),
@@ -295,7 +295,7 @@ pub(super) fn prepare_surfaces(world: &mut World) {
 
 /// What has become of a surface on its way.
 enum Next {
-    On(Preparation),
+    On(Box<Preparation>),
     /// It is another one now.
     Again,
     Over,
@@ -322,7 +322,7 @@ impl Preparation {
                     match turn.copy(&mut reading, images) {
                         Read::More => {
                             let stage = Stage::Reading(reading, raw);
-                            return Ok(Next::On(Self { plan, key, stage, since, is_wanted }));
+                            return Ok(Next::On(Box::new(Self { plan, key, stage, since, is_wanted })));
                         }
                         Read::Changed => return Ok(Next::Again),
                         Read::Done => {
@@ -334,7 +334,7 @@ impl Preparation {
                             let (surface, preset) = (plan.surface.clone(), plan.preset.clone());
                             let work = Work { raw, copies: reading.finish(), surface, preset, stager };
                             let stage = Stage::Making(Beside::start(work, Work::make));
-                            return Ok(Next::On(Self { plan, key, stage, since, is_wanted }));
+                            return Ok(Next::On(Box::new(Self { plan, key, stage, since, is_wanted })));
                         }
                     }
                 }
@@ -343,7 +343,7 @@ impl Preparation {
                     match making.take_if_done(is_late && turn.may_make) {
                         None => {
                             let stage = Stage::Making(making);
-                            return Ok(Next::On(Self { plan, key, stage, since, is_wanted }));
+                            return Ok(Next::On(Box::new(Self { plan, key, stage, since, is_wanted })));
                         }
                         Some(Err(_)) if !plan.is_current(world, entity) => return Ok(Next::Again),
                         Some(made) => {
@@ -368,7 +368,7 @@ impl Preparation {
                     let is_staged = plan.textures.as_ref().is_some_and(|textures| textures.are_staged(world));
                     if is_staged && frames < MAX_LANDING {
                         let stage = Stage::Landing(made, frames + 1);
-                        return Ok(Next::On(Self { plan, key, stage, since, is_wanted }));
+                        return Ok(Next::On(Box::new(Self { plan, key, stage, since, is_wanted })));
                     }
                     settle(world, entity, *plan, *made);
                     return Ok(Next::Over);

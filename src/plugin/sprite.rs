@@ -3,11 +3,18 @@
 use super::{
     CrackError, CrackMaps, CrackTextures,
     carrier::{Carrier, Found, Kind, Shown},
+    layout::Layout,
     material,
     shards::Plane,
     surfaces::Active,
 };
-use bevy::{asset::UntypedHandle, math::Mat3A, prelude::*, sprite::Anchor};
+use bevy::{
+    asset::UntypedHandle,
+    math::Mat3A,
+    prelude::*,
+    sprite::{Anchor, SliceScaleMode},
+};
+use std::sync::Arc;
 
 pub(super) const KIND: Kind = Kind {
     inspect,
@@ -29,14 +36,23 @@ pub(super) const KIND: Kind = Kind {
 
 fn inspect(world: &World, entity: Entity) -> Found {
     let Some(sprite) = world.get::<Sprite>(entity) else { return Found::Other };
-    if !matches!(sprite.image_mode, SpriteImageMode::Auto) {
-        let mode = match sprite.image_mode {
-            SpriteImageMode::Sliced(_) => "Sliced",
-            SpriteImageMode::Tiled { .. } => "Tiled",
-            _ => "Scale",
-        };
+    let is_part = sprite.rect.is_some() || sprite.texture_atlas.is_some();
+    let refused = match sprite.image_mode {
+        SpriteImageMode::Auto | SpriteImageMode::Tiled { tile_x: false, tile_y: false, .. } => None,
+        SpriteImageMode::Sliced(_) => is_part.then_some("Sliced"),
+        SpriteImageMode::Tiled { .. } => is_part.then_some("Tiled"),
+        SpriteImageMode::Scale(_) => Some("Scale"),
+    };
+    if let Some(mode) = refused {
         return Found::Unusable(CrackError::SpriteMode { mode: mode.to_owned() });
     }
+    let picture = || world.get_resource::<Assets<Image>>()?.get(&sprite.image).map(Image::size_f32);
+    let layout = match sprite.image_mode {
+        SpriteImageMode::Sliced(_) | SpriteImageMode::Tiled { .. } => {
+            picture().and_then(|picture| layout(&sprite.image_mode, sprite.custom_size.unwrap_or(picture), picture))
+        }
+        _ => None,
+    };
     let layouts = world.get_resource::<Assets<TextureAtlasLayout>>();
     let frame = match &sprite.texture_atlas {
         Some(atlas) => {
@@ -58,9 +74,43 @@ fn inspect(world: &World, entity: Entity) -> Found {
         depth: None,
         // Texels that a border between two pixels cuts belong to the frame.
         rect: rect.map(|rect| URect { min: rect.min.floor().as_uvec2(), max: rect.max.ceil().as_uvec2() }),
+        layout: layout.map(Arc::new),
         size: sprite.custom_size,
         maps: CrackMaps { diffuse: true, normal: true, depth: false },
     }))
+}
+
+/// The whole picture, stretched: as [`SpriteImageMode::Auto`], and the engine forgets the parts that it has drawn before.
+const WHOLE: SpriteImageMode = SpriteImageMode::Tiled { tile_x: false, tile_y: false, stretch_value: 1.0 };
+
+/// How a sprite of this size lays out its picture; `None` if it merely stretches it, as it does where its borders leave no room.
+pub(super) fn layout(mode: &SpriteImageMode, size: Vec2, picture: Vec2) -> Option<Layout> {
+    let stretch = |mode: SliceScaleMode| match mode {
+        SliceScaleMode::Stretch => None,
+        SliceScaleMode::Tile { stretch_value } => Some(stretch_value),
+    };
+    let layout = match mode {
+        SpriteImageMode::Tiled { tile_x, tile_y, stretch_value } => Layout {
+            size,
+            low: Vec2::ZERO,
+            high: Vec2::ZERO,
+            max_scale: 1.0,
+            sides: None,
+            middle: [tile_x, tile_y].map(|is_tiled| is_tiled.then_some(*stretch_value)),
+        },
+        SpriteImageMode::Sliced(slicer) => Layout {
+            size,
+            low: slicer.border.min_inset,
+            high: slicer.border.max_inset,
+            max_scale: slicer.max_corner_scale,
+            sides: stretch(slicer.sides_scale_mode),
+            middle: [stretch(slicer.center_scale_mode); 2],
+        },
+        SpriteImageMode::Auto | SpriteImageMode::Scale(_) => return None,
+    };
+    let has_room = (layout.low + layout.high).cmplt(picture).all() && size.is_finite() && size.min_element() > 0.0;
+    let is_stretched = layout.low + layout.high == Vec2::ZERO && layout.middle == [None; 2];
+    (has_room && !is_stretched).then_some(layout)
 }
 
 fn attach(world: &mut World, entity: Entity, carrier: &mut Carrier, textures: &CrackTextures, _relief: f32) {
@@ -71,6 +121,11 @@ fn attach(world: &mut World, entity: Entity, carrier: &mut Carrier, textures: &C
     let (before, now) = (size(&carrier.shown.asset.clone().typed()), size(own));
     let Some(mut sprite) = world.get_mut::<Sprite>(entity) else { return };
     sprite.image = own.clone();
+    if carrier.shown.layout.is_some() {
+        // Its texture has it laid out.
+        carrier.mode.get_or_insert_with(|| sprite.image_mode.clone());
+        sprite.image_mode = WHOLE;
+    }
     give_size_back(&mut sprite, carrier.size.take());
     // Textures of another size must not change the size of the sprite.
     if sprite.custom_size.is_none() && before != now {
@@ -84,6 +139,9 @@ fn detach(world: &mut World, entity: Entity, carrier: &Carrier) {
     if carrier.is_showing(&sprite.image.clone().untyped()) {
         sprite.image = carrier.shown.asset.clone().typed();
     }
+    if let Some(mode) = carrier.mode.as_ref().filter(|_| sprite.image_mode == WHOLE) {
+        sprite.image_mode = mode.clone();
+    }
     give_size_back(&mut sprite, carrier.size);
 }
 
@@ -94,10 +152,9 @@ fn give_size_back(sprite: &mut Sprite, given: Option<Vec2>) {
     }
 }
 
-fn aspect(world: &World, entity: Entity) -> Option<f32> {
-    let sprite = world.get::<Sprite>(entity)?;
-    let picture = || world.get_resource::<Assets<Image>>()?.get(&sprite.image).map(Image::size_f32);
-    let size = sprite.custom_size.or_else(picture)?;
+fn aspect(world: &World, entity: Entity, picture: Option<Vec2>, given: Option<Vec2>) -> Option<f32> {
+    let size = world.get::<Sprite>(entity)?.custom_size.filter(|size| Some(*size) != given);
+    let size = size.or(picture).unwrap_or(Vec2::ONE);
     let place = world.get::<GlobalTransform>(entity).map_or(Mat3A::IDENTITY, |place| place.affine().matrix3);
     Some((size.x * place.x_axis.length() / (size.y * place.y_axis.length())).abs())
 }

@@ -5,8 +5,8 @@ use bevy::prelude::*;
 
 /// How a surface is doing. Written by the crate, read by games.
 ///
-/// Written in `PostUpdate`, in [`CrackSystems::Paint`](super::CrackSystems::Paint): a system in `Update` reads what was so at the end of the
-/// frame before.
+/// Damage, time, tips and the end are written in [`CrackSystems::Paint`](super::CrackSystems::Paint), the status also in the sets before it, all
+/// in `PostUpdate`: a system in `Update` reads what was so at the end of the frame before. Healing sets it back at once.
 #[derive(Component, Reflect, Clone, Debug, Default, PartialEq)]
 #[reflect(Component, Default)]
 #[component(clone_behavior = Ignore)]

@@ -89,9 +89,11 @@ impl Default for CrackSurface {
 /// Size of a surface's textures.
 #[derive(Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum CrackResolution {
-    /// As its picture; with more columns or rows where it is shown stretched by more than 1.4, so that the cracks are not, however the
-    /// sprite's `custom_size`, the mesh's texture coordinates or a scale stretch it. That is seen to when the textures are made, up to four
-    /// million texels, and not for pictures whose sampler shows texels as squares. Without a picture, 512 texels along the longer side.
+    /// As its picture; with more columns or rows where it is shown stretched by more than 1.4, so that the cracks are not, be it the sprite's
+    /// `custom_size`, the mesh's texture coordinates or a scale that stretches it. That is seen to when the textures are made, as far as two
+    /// million texels and the memory allow, and not for sprites with a `rect` or an atlas, nor for pictures whose sampler shows texels as
+    /// squares. Where a sprite repeats its picture or shows it in nine parts, as many texels as it shows of it, up to four million. Without a picture,
+    /// 512 texels along the longer side, or 256 along the shorter one if that is more.
     ///
     /// A texel takes 14 to 24 bytes in all, and for a coin [`Fixed`](Self::Fixed) of 64 x 64 is plenty.
     #[default]

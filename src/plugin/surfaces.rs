@@ -91,6 +91,8 @@ pub(super) struct Active {
     pub(super) is_outdated: bool,
     /// The frame in which they were read, by [`Surfaces::frame`].
     pub(super) read_at: u64,
+    /// The size that its textures would have if its picture were not shown stretched; `None` if another was asked for.
+    pub(super) unstretched: Option<UVec2>,
     /// Nodes that were there when tips were last listed.
     pub(super) tips_from: usize,
     pub(super) cells: CellTracker,
@@ -118,13 +120,14 @@ pub(super) struct Ground {
     pub(super) carrier: Carrier,
     pub(super) bytes: u64,
     pub(super) rect: TexelRect,
+    pub(super) unstretched: Option<UVec2>,
     pub(super) read_at: u64,
 }
 
 impl Active {
     /// A surface whose textures show what is in the field.
     pub(super) fn new(ground: Ground, growth: CrackGrowth, field: DepthField) -> Self {
-        let Ground { surface, preset, look, base, textures, carrier, bytes, rect, read_at } = ground;
+        let Ground { surface, preset, look, base, textures, carrier, bytes, rect, unstretched, read_at } = ground;
         let frame = field.frame;
         let mut active = Self {
             growth,
@@ -153,6 +156,7 @@ impl Active {
             is_open: false,
             is_outdated: false,
             read_at,
+            unstretched,
             frozen: None,
             tips_from: 0,
             cells: CellTracker::new(frame.extent()),

@@ -150,9 +150,12 @@ fn update(world: &mut World, entity: Entity, active: &mut Active) -> Result<bool
         Found::Other => return Ok(true),
     };
     if active.carrier.is_showing(&shown.asset) {
-        if active.is_outdated {
+        // A part of the picture is shown as it is, not of textures of another size.
+        let is_part = shown.rect.is_some() && active.unstretched.is_some_and(|size| active.base.size.cmpgt(size).any());
+        if active.is_outdated || is_part {
             // What it shows now are our textures; the pictures are those it was made from.
-            let original = Shown { rect: shown.rect, ..active.carrier.shown.clone() };
+            let layout = active.carrier.shown.layout.clone().filter(|_| !is_part);
+            let original = Shown { rect: shown.rect, layout, ..active.carrier.shown.clone() };
             return update_picture(world, entity, active, original);
         }
         let whole = TexelRect::whole(active.base.size);
@@ -163,6 +166,11 @@ fn update(world: &mut World, entity: Entity, active: &mut Active) -> Result<bool
         return Ok(true);
     }
     // Somebody gave it another picture.
+    if active.carrier.shown.layout.take().is_some() {
+        // To be laid out as the one before, unless somebody said otherwise.
+        (active.carrier.kind.detach)(world, entity, &active.carrier);
+        return update(world, entity, active);
+    }
     let Some(kind) = kind else { return Ok(true) };
     let size = active.carrier.size;
     let mesh = active.carrier.mesh.take();
@@ -271,8 +279,7 @@ pub(super) fn grown_anew(
 /// Reads the pictures anew and paints the cracks over them; `false` if they are not there yet.
 fn update_picture(world: &mut World, entity: Entity, active: &mut Active, shown: Shown) -> Result<bool, CrackError> {
     active.is_outdated = true;
-    let aspect = (active.carrier.kind.aspect)(world, entity);
-    let Some(draft) = draft(world, &active.surface, &shown, aspect, active.bytes)? else { return Ok(false) };
+    let Some(draft) = draft(world, entity, active, &shown)? else { return Ok(false) };
     let from = active.surface.mask.with(&active.preset);
     let Some(mask) = mask::resolve(world, from, &shown, &draft)? else { return Ok(false) };
     let frame = frame(draft.plan.rect)?;
@@ -300,6 +307,7 @@ fn update_picture(world: &mut World, entity: Entity, active: &mut Active, shown:
     world.resource_mut::<Surfaces>().bytes += draft.plan.bytes;
     world.resource_mut::<Surfaces>().bytes -= active.bytes;
     active.bytes = draft.plan.bytes;
+    active.unstretched = draft.plan.unstretched;
     active.base = draft.base;
     // What the mask forbids may be elsewhere now.
     if frame != active.field.frame || had_mask || !mask.is_empty() {

@@ -10,13 +10,14 @@ use bevy::{
             memory::{Dir, MemoryAssetReader},
         },
     },
-    image::{ImageSampler, TextureAtlas, TextureAtlasLayout},
+    image::{ImageAddressMode, ImageSampler, ImageSamplerDescriptor, TextureAtlas, TextureAtlasLayout},
     prelude::*,
     reflect::TypePath,
     render::{
         render_asset::RenderAssetBytesPerFrame,
         render_resource::{AstcBlock, AstcChannel, Extent3d, TextureDimension, TextureFormat},
     },
+    sprite::{BorderRect, SliceScaleMode},
 };
 use bevy_crack::{math::Rng, plugin::CrackUploadStats, prelude::*};
 use std::{
@@ -261,13 +262,14 @@ fn t4_frames_flips_and_sizes_of_sprites() {
 fn t4_what_sprites_cannot_do_is_named() {
     let mut app = app();
     let image = add(&mut app, picture(UVec2::splat(48)));
+    let part = Some(Rect::new(0.0, 0.0, 20.0, 20.0));
     let modes = [
-        (SpriteImageMode::Sliced(TextureSlicer::default()), "Sliced"),
-        (SpriteImageMode::Tiled { tile_x: true, tile_y: true, stretch_value: 1.0 }, "Tiled"),
-        (SpriteImageMode::Scale(SpriteScalingMode::FillCenter), "Scale"),
+        (SpriteImageMode::Sliced(TextureSlicer::default()), part, "Sliced"),
+        (SpriteImageMode::Tiled { tile_x: true, tile_y: true, stretch_value: 1.0 }, part, "Tiled"),
+        (SpriteImageMode::Scale(SpriteScalingMode::FillCenter), None, "Scale"),
     ];
-    for (image_mode, name) in modes {
-        let sprite = Sprite { image_mode, ..Sprite::from_image(image.clone()) };
+    for (image_mode, rect, name) in modes {
+        let sprite = Sprite { image_mode, rect, ..Sprite::from_image(image.clone()) };
         let entity = app.world_mut().spawn((sprite, CrackSurface::default())).id();
         assert_eq!(assert_fails(&mut app, entity), CrackError::SpriteMode { mode: name.to_owned() });
     }
@@ -297,6 +299,164 @@ fn t4_what_sprites_cannot_do_is_named() {
         hit(&mut app, CrackHit::world(entity, Vec3::new(1.0, 1.0, 0.0)));
         step(&mut app);
         assert_cracks(&mut app, entity);
+    }
+}
+
+/// Sprites that repeat their picture, or show it in nine parts.
+fn laid_out(image: &Handle<Image>, size: Vec2) -> Vec<Sprite> {
+    let nine = |center_scale_mode, sides_scale_mode| {
+        let border = BorderRect { min_inset: Vec2::new(3.0, 4.0), max_inset: Vec2::new(5.0, 2.0) };
+        SpriteImageMode::Sliced(TextureSlicer { border, center_scale_mode, sides_scale_mode, max_corner_scale: 2.0 })
+    };
+    let tiled = |tile_x, tile_y, stretch_value| SpriteImageMode::Tiled { tile_x, tile_y, stretch_value };
+    let tile = SliceScaleMode::Tile { stretch_value: 1.0 };
+    let modes = [
+        tiled(true, true, 1.0),
+        // Not such that the middle of a pixel lies where two texels meet.
+        tiled(true, false, 0.8),
+        tiled(false, true, 2.0),
+        nine(SliceScaleMode::Stretch, SliceScaleMode::Stretch),
+        nine(tile, SliceScaleMode::Stretch),
+        nine(SliceScaleMode::Stretch, tile),
+        tiled(false, false, 0.3),
+    ];
+    let sprite = |image_mode| Sprite { image_mode, custom_size: Some(size), ..Sprite::from_image(image.clone()) };
+    modes.into_iter().map(sprite).collect()
+}
+
+/// What the crate changes of a sprite.
+fn seen(sprite: &Sprite) -> (Handle<Image>, SpriteImageMode, Option<Vec2>) {
+    (sprite.image.clone(), sprite.image_mode.clone(), sprite.custom_size)
+}
+
+#[test]
+fn t4_repeated_and_sliced_sprites_crack_and_heal() {
+    let mut app = app();
+    let image = add(&mut app, picture(UVec2::new(24, 16)));
+    let size = Vec2::new(96.0, 64.0);
+    for sprite in laid_out(&image, size) {
+        let entity = app.world_mut().spawn((sprite.clone(), CrackSurface::default())).id();
+        step(&mut app);
+        hit(&mut app, CrackHit::world(entity, Vec3::new(-24.0, 16.0, 0.0)));
+        settle(&mut app, entity);
+        let textures = size_of(&app, &image_of(&app, entity)).as_vec2();
+        let is_laid_out =
+            sprite.image_mode != SpriteImageMode::Tiled { tile_x: false, tile_y: false, stretch_value: 0.3 };
+        assert_eq!(textures == Vec2::new(24.0, 16.0), !is_laid_out, "{:?}: {textures}", sprite.image_mode);
+        assert_eq!(get::<Sprite>(&app, entity).custom_size, Some(size));
+
+        // A clone shows the picture as the first one did; another picture is laid out as it was.
+        let clone = app.world_mut().entity_mut(entity).clone_and_spawn();
+        step(&mut app);
+        assert_eq!(seen(&get(&app, clone)), seen(&sprite));
+        let other = add(&mut app, solid(UVec2::new(24, 16), [90, 60, 30, 255]));
+        app.world_mut().get_mut::<Sprite>(entity).expect("the sprite").image = other.clone();
+        steps(&mut app, 2);
+        settle(&mut app, entity);
+        assert!(image_of(&app, entity) != other, "it is cracked as well");
+        assert_eq!(size_of(&app, &image_of(&app, entity)).as_vec2(), textures);
+        app.world_mut().commands().entity(entity).heal_cracks();
+        step(&mut app);
+        assert_eq!(seen(&get(&app, entity)), seen(&Sprite { image: other, ..sprite }));
+    }
+}
+
+#[test]
+fn t4_repeated_and_sliced_sprites_look_as_before() {
+    let Some((_one, mut app)) = gpu_app() else { return };
+    let side = UVec2::new(128, 96);
+    let target = spawn_camera(&mut app, side);
+    let image = add(&mut app, picture(UVec2::new(24, 16)));
+    for sprite in laid_out(&image, Vec2::new(96.0, 64.0)) {
+        let entity = app.world_mut().spawn((sprite.clone(), CrackSurface::default())).id();
+        steps(&mut app, 3);
+        let before = drawn(&mut app, &target);
+        assert!(
+            before.as_chunks::<4>().0.iter().filter(|texel| texel[0] > 100).count() == 96 * 64,
+            "the sprite is there"
+        );
+        // In no frame is it drawn in other parts than before.
+        let film = film(&mut app, &target, 30, |app, i| {
+            if i == 5 {
+                hit(app, CrackHit::uv(entity, Vec2::new(0.7, 0.5)).with_energy(0.02));
+            }
+        });
+        let changed = |after: &[u8]| {
+            let pairs = after.as_chunks::<4>().0.iter().zip(before.as_chunks::<4>().0);
+            pairs.filter(|(a, b)| difference(&a[..], &b[..]) > 2).count()
+        };
+        let most = film.iter().map(|frame| changed(frame)).max();
+        assert!((1..1500).contains(&changed(&film[29])), "{:?}: {}", sprite.image_mode, changed(&film[29]));
+        assert!(most < Some(1500), "{:?}: {most:?} texels", sprite.image_mode);
+        app.world_mut().commands().entity(entity).heal_cracks();
+        steps(&mut app, 2);
+        assert_eq!(changed(&drawn(&mut app, &target)), 0, "{:?}", sprite.image_mode);
+        app.world_mut().despawn(entity);
+        step(&mut app);
+    }
+}
+
+#[test]
+fn t4_a_stretched_picture_looks_as_before() {
+    let Some((_one, mut app)) = gpu_app() else { return };
+    let target = spawn_camera(&mut app, UVec2::new(80, 32));
+    let mut rng = Rng::new(3);
+    for mode in [ImageAddressMode::ClampToEdge, ImageAddressMode::Repeat] {
+        let mut image = picture(UVec2::splat(16));
+        let level = |rng: &mut Rng| if rng.unit() < 0.5 { 20 } else { 240 };
+        image.data =
+            Some((0..16 * 16).flat_map(|_| [level(&mut rng), level(&mut rng), level(&mut rng), 255]).collect());
+        let sampler =
+            ImageSamplerDescriptor { address_mode_u: mode, address_mode_v: mode, ..ImageSamplerDescriptor::linear() };
+        image.sampler = ImageSampler::Descriptor(sampler);
+        let image = add(&mut app, image);
+        let sprite = Sprite { custom_size: Some(Vec2::new(64.0, 16.0)), ..Sprite::from_image(image) };
+        let entity = app.world_mut().spawn((sprite, CrackSurface::default())).id();
+        steps(&mut app, 3);
+        let before = drawn(&mut app, &target);
+        hit(&mut app, CrackHit::uv(entity, Vec2::new(0.9, 0.5)).with_energy(0.02));
+        settle(&mut app, entity);
+        let after = drawn(&mut app, &target);
+        let changed = |x: usize, y: usize| {
+            let i = 4 * (y * 80 + x);
+            difference(&before[i..i + 4], &after[i..i + 4])
+        };
+        let untouched = (0..32).flat_map(|y| (0..50).map(move |x| (x, y)));
+        let most = untouched.map(|(x, y)| changed(x, y)).max();
+        assert!(most <= Some(2), "{mode:?}: a texel far from the crack has changed by {most:?}");
+        assert!((50..80).any(|x| changed(x, 16) > 20), "it has cracked");
+        app.world_mut().despawn(entity);
+        step(&mut app);
+    }
+}
+
+#[test]
+fn t4_repeated_and_sliced_sprites_of_wild_numbers_are_harmless() {
+    let mut app = app();
+    let image = add(&mut app, picture(UVec2::new(9, 7)));
+    let wild = [0.0, -3.0, 1e-30, 0.7, 40.0, 1e30, f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
+    let mut rng = Rng::new(17);
+    let mut any = || wild[rng.next_u32() as usize % wild.len()];
+    for round in 0..120 {
+        let image_mode = if round % 2 == 0 {
+            SpriteImageMode::Tiled { tile_x: true, tile_y: round % 4 == 0, stretch_value: any() }
+        } else {
+            SpriteImageMode::Sliced(TextureSlicer {
+                border: BorderRect { min_inset: Vec2::new(any(), any()), max_inset: Vec2::new(any(), any()) },
+                center_scale_mode: SliceScaleMode::Tile { stretch_value: any() },
+                sides_scale_mode: SliceScaleMode::Tile { stretch_value: any() },
+                max_corner_scale: any(),
+            })
+        };
+        let custom_size = (round % 3 > 0).then(|| Vec2::new(any(), any()));
+        let sprite = Sprite { image_mode, custom_size, ..Sprite::from_image(image.clone()) };
+        let surface = CrackSurface::new(small_preset());
+        app.world_mut().resource_mut::<CrackBudget>().max_side = 64;
+        let entity = app.world_mut().spawn((sprite, surface)).id();
+        hit(&mut app, center(entity));
+        steps(&mut app, 2);
+        assert!(state(&app, entity).hits == 1, "{:?}: {:?}", get::<Sprite>(&app, entity), state(&app, entity).status);
+        app.world_mut().despawn(entity);
     }
 }
 
@@ -746,7 +906,10 @@ fn t9_a_changed_picture_of_the_same_size_keeps_its_cracks() {
 #[test]
 fn t10_a_changed_picture_of_another_size_is_cracked_anew_in_the_same_places() {
     let mut app = app();
-    for new_size in [UVec2::splat(128), UVec2::splat(31), UVec2::new(128, 64), UVec2::new(40, 90)] {
+    let samplers = [ImageSampler::nearest(), ImageSampler::linear()];
+    let sizes = [UVec2::splat(128), UVec2::splat(31), UVec2::new(128, 64), UVec2::new(40, 90)];
+    for (sampler, new_size) in samplers.into_iter().flat_map(|sampler| sizes.map(|size| (sampler.clone(), size))) {
+        let solid = |size, texel| Image { sampler: sampler.clone(), ..solid(size, texel) };
         let image = add(&mut app, solid(UVec2::splat(64), [90, 90, 90, 255]));
         let entity = spawn_sprite(&mut app, &image);
         hit(&mut app, CrackHit::uv(entity, Vec2::new(0.75, 0.25)).with_energy(0.04));
@@ -1010,7 +1173,7 @@ fn t4_cracks_are_not_stretched_with_their_picture() {
     let image = add(&mut app, Image { sampler: ImageSampler::Default, ..picture(UVec2::splat(64)) });
     let [long, square] = [4.0, 1.0].map(|width| add(&mut app, Mesh::from(Rectangle::new(width, 1.0))));
     let flat = add(&mut app, ColorMaterial::from(image.clone()));
-    let solid = add(&mut app, StandardMaterial { base_color_texture: Some(image.clone()), ..default() });
+    let thick = add(&mut app, StandardMaterial { base_color_texture: Some(image.clone()), ..default() });
     let plain = add(&mut app, StandardMaterial::default());
     let sprite = |image: &Handle<Image>, size| Sprite { custom_size: size, ..Sprite::from_image(image.clone()) };
     let size = |width, height| Some(Vec2::new(width, height));
@@ -1022,8 +1185,8 @@ fn t4_cracks_are_not_stretched_with_their_picture() {
         (app.world_mut().spawn((sprite(&image, None), wide)).id(), [192, 64]),
         (app.world_mut().spawn(sprite(&squares, size(400.0, 100.0))).id(), [64, 64]),
         (app.world_mut().spawn((Mesh2d(long.clone()), MeshMaterial2d(flat))).id(), [256, 64]),
-        (app.world_mut().spawn((Mesh3d(square), MeshMaterial3d(solid), wide)).id(), [192, 64]),
-        (app.world_mut().spawn((Mesh3d(long), MeshMaterial3d(plain))).id(), [512, 128]),
+        (app.world_mut().spawn((Mesh3d(square), MeshMaterial3d(thick), wide)).id(), [192, 64]),
+        (app.world_mut().spawn((Mesh3d(long), MeshMaterial3d(plain))).id(), [1024, 256]),
     ];
     for (entity, expected) in all {
         app.world_mut().entity_mut(entity).insert(CrackSurface::default());
@@ -1042,8 +1205,39 @@ fn t4_cracks_are_not_stretched_with_their_picture() {
         assert_eq!(get::<CrackTextures>(&app, entity).diffuse.as_ref(), Some(&diffuse));
         assert!(texels(&app, &diffuse) == painted);
     }
+    // Nor does a picture that is loaded anew change that, or what the crate or a game has given the sprite since.
+    let [long, pulled] = [all[0].0, all[3].0];
+    for entity in [long, pulled] {
+        let (own, network) = (image_of(&app, entity), state(&app, entity).nodes);
+        replace(
+            &mut app,
+            &image,
+            Image { sampler: ImageSampler::Default, ..solid(UVec2::splat(64), [99, 99, 99, 255]) },
+        );
+        steps(&mut app, 3);
+        assert_eq!(state(&app, entity).nodes, network);
+        assert_eq!(size_of(&app, &image_of(&app, entity)), size_of(&app, &own));
+    }
+    // A picture of another size is shown in proportions of its own where nobody has given the sprite others.
+    let own = add(&mut app, Image { sampler: ImageSampler::Default, ..picture(UVec2::splat(64)) });
+    let plain = app.world_mut().spawn((sprite(&own, None), CrackSurface::default())).id();
+    let wide = app.world_mut().spawn((sprite(&own, None), wide, CrackSurface::default())).id();
+    for entity in [plain, wide] {
+        hit(&mut app, center(entity));
+        settle(&mut app, entity);
+    }
+    replace(&mut app, &own, Image { sampler: ImageSampler::Default, ..picture(UVec2::new(128, 64)) });
+    steps(&mut app, 3);
+    for (entity, expected) in [(plain, [128, 64]), (wide, [384, 64])] {
+        assert_eq!(size_of(&app, &image_of(&app, entity)).to_array(), expected);
+        assert_eq!(get_size(&app, entity), Some(Vec2::new(128.0, 64.0)));
+    }
+    // A part of the picture is not one of the textures that have more columns.
+    app.world_mut().get_mut::<Sprite>(long).expect("the sprite").rect = Some(Rect::new(0.0, 0.0, 32.0, 64.0));
+    steps(&mut app, 2);
+    assert_eq!(size_of(&app, &image_of(&app, long)), UVec2::splat(64));
     // Where there is no room for it, they are stretched rather than refused.
-    app.world_mut().resource_mut::<CrackBudget>().max_texture_bytes = 4_000_000;
+    app.world_mut().resource_mut::<CrackBudget>().max_texture_bytes = 9_000_000;
     let left = app.world_mut().spawn((sprite(&image, size(900.0, 1.0)), CrackSurface::default())).id();
     hit(&mut app, center(left));
     settle(&mut app, left);

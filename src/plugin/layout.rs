@@ -1,0 +1,207 @@
+//! [`Layout`]: a picture that is laid out over what shows it, repeated or in nine parts.
+
+use bevy::prelude::*;
+use std::hash::{Hash, Hasher};
+
+/// The smallest share of its own size at which a picture is repeated, as the engine has it.
+const LEAST_STRETCH: f32 = 0.001;
+
+/// Textures of a picture that is laid out have no more texels than this.
+const MOST_TEXELS: f32 = 4_194_304.0;
+
+/// How a picture is laid out over a sprite: its borders as they are, what lies between them stretched or repeated.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Layout {
+    /// Size of the sprite.
+    pub(super) size: Vec2,
+    /// Widths of the borders at the left and the top, texels of the picture.
+    pub(super) low: Vec2,
+    /// The same at the right and the bottom.
+    pub(super) high: Vec2,
+    /// The most that the borders are scaled by.
+    pub(super) max_scale: f32,
+    /// The size at which borders are repeated along the sides, as a share of their own; `None` = they are stretched.
+    pub(super) sides: Option<f32>,
+    /// The same of what lies between them, along and down.
+    pub(super) middle: [Option<f32>; 2],
+}
+
+/// Two are the same if their numbers are, bit for bit.
+impl PartialEq for Layout {
+    fn eq(&self, other: &Self) -> bool {
+        self.bits() == other.bits()
+    }
+}
+
+impl Eq for Layout {}
+
+impl Hash for Layout {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        self.bits().hash(state);
+    }
+}
+
+impl Layout {
+    fn bits(&self) -> [Option<u32>; 10] {
+        let Self { size, low, high, max_scale, sides, middle: [across, down] } = *self;
+        let [a, b, c, d, e, f, g] = [size.x, size.y, low.x, low.y, high.x, high.y, max_scale].map(Some);
+        [a, b, c, d, e, f, g, sides, across, down].map(|value| value.map(f32::to_bits))
+    }
+
+    /// What the borders of a picture of this size are scaled by.
+    fn scale(&self, picture: Vec2) -> f32 {
+        (self.size / picture).min_element().min(self.max_scale)
+    }
+
+    /// Size of textures that show as much as the picture has.
+    pub(super) fn texels(&self, picture: UVec2) -> UVec2 {
+        let picture = picture.as_vec2();
+        let has_borders = self.low + self.high != Vec2::ZERO;
+        // The finest of its parts.
+        let density = |axis: usize| {
+            let border = has_borders.then(|| self.scale(picture));
+            let finest = [border, self.sides, self.middle[axis]].into_iter().flatten().reduce(f32::min);
+            finest.map_or(picture[axis] / self.size[axis], |scale| scale.max(LEAST_STRETCH).recip())
+        };
+        let texels = self.size * Vec2::new(density(0), density(1));
+        let shrink = (MOST_TEXELS / texels.element_product()).sqrt().min(1.0);
+        (texels * shrink).round().as_uvec2().max(UVec2::ONE)
+    }
+
+    /// For each texel of textures of this size the place in the picture that is shown there, in texels.
+    pub(super) fn places(&self, picture: UVec2, texels: UVec2) -> impl Fn(u32, u32) -> Vec2 {
+        let scale = self.scale(picture.as_vec2());
+        let axis = |axis: usize, tile| self.along(axis, picture[axis] as f32, texels[axis], scale, tile);
+        let [columns, rows] = [0, 1].map(|i| [axis(i, self.middle[i]), axis(i, self.sides)]);
+        move |x, y| {
+            let ((across, is_side), (down, is_end)) = (columns[0][x as usize], rows[0][y as usize]);
+            // Along a border it is repeated as borders are.
+            Vec2::new(
+                if is_end { columns[1][x as usize].0 } else { across },
+                if is_side { rows[1][y as usize].0 } else { down },
+            )
+        }
+    }
+
+    /// The place in the picture along one axis, and whether it is in a border, for each of so many texels.
+    fn along(&self, axis: usize, picture: f32, texels: u32, scale: f32, tile: Option<f32>) -> Vec<(f32, bool)> {
+        let (size, low, high) = (self.size[axis], self.low[axis], self.high[axis]);
+        let (start, end) = (low * scale, size - high * scale);
+        let (length, between) = (end - start, picture - low - high);
+        let period = tile.map_or(length, |stretch| (between * stretch.max(LEAST_STRETCH)).max(1.0).min(length));
+        let place = |i: u32| {
+            let at = (i as f32 + 0.5) / texels as f32 * size;
+            let (place, is_border) = if at < start {
+                (at / scale, true)
+            } else if at >= end {
+                (picture - (size - at) / scale, true)
+            } else {
+                (low + (at - start) % period / period * between, false)
+            };
+            // Of wild numbers anything may come.
+            (if place.is_finite() { place } else { 0.0 }, is_border)
+        };
+        (0..texels).map(place).collect()
+    }
+}
+
+#[cfg(all(test, feature = "2d"))]
+mod tests {
+    use super::*;
+    use crate::{math::Rng, plugin::sprite};
+    use bevy::sprite::{BorderRect, SliceScaleMode, SpriteImageMode, TextureSlice, TextureSlicer};
+
+    /// The parts into which the engine cuts a sprite.
+    fn parts(mode: &SpriteImageMode, picture: Vec2, size: Vec2) -> Vec<TextureSlice> {
+        let texture_rect = Rect { min: Vec2::ZERO, max: picture };
+        match mode {
+            SpriteImageMode::Sliced(slicer) => slicer.compute_slices(texture_rect, Some(size)),
+            SpriteImageMode::Tiled { tile_x, tile_y, stretch_value } => {
+                TextureSlice { texture_rect, draw_size: size, offset: Vec2::ZERO }
+                    .tiled(*stretch_value, (*tile_x, *tile_y))
+            }
+            _ => Vec::new(),
+        }
+    }
+
+    /// The place in the picture that one of the parts shows at a point of the sprite (from its top left).
+    fn shown(parts: &[TextureSlice], size: Vec2, at: Vec2) -> Option<Vec2> {
+        let at = (at - size / 2.0) * Vec2::new(1.0, -1.0);
+        parts.iter().find_map(|part| {
+            let share = (at - part.offset) * Vec2::new(1.0, -1.0) / part.draw_size + 0.5;
+            let is_inside = share.cmpge(Vec2::ZERO).all() && share.cmple(Vec2::ONE).all();
+            is_inside.then(|| part.texture_rect.min + share * part.texture_rect.size())
+        })
+    }
+
+    #[test]
+    fn places_are_those_of_the_parts_that_the_engine_draws() {
+        let mut rng = Rng::new(5);
+        let (mut checked, mut cut) = (0, 0);
+        for round in 0..300 {
+            let picture = UVec2::new(8 + rng.next_u32() % 60, 8 + rng.next_u32() % 60);
+            let size = Vec2::new(rng.range(5.0, 300.0), rng.range(5.0, 300.0));
+            let mut scale_mode = || match rng.next_u32() % 2 {
+                0 => SliceScaleMode::Stretch,
+                _ => SliceScaleMode::Tile { stretch_value: rng.range(0.2, 2.0) },
+            };
+            let (center_scale_mode, sides_scale_mode) = (scale_mode(), scale_mode());
+            let mode = if round % 2 == 0 {
+                let mut inset = || Vec2::new(rng.range(0.5, 3.9), rng.range(0.5, 3.9));
+                SpriteImageMode::Sliced(TextureSlicer {
+                    border: BorderRect { min_inset: inset(), max_inset: inset() },
+                    center_scale_mode,
+                    sides_scale_mode,
+                    max_corner_scale: rng.range(0.3, 2.0),
+                })
+            } else {
+                let [tile_x, tile_y] = [(); 2].map(|()| rng.unit() < 0.5);
+                SpriteImageMode::Tiled { tile_x, tile_y, stretch_value: rng.range(0.1, 2.0) }
+            };
+            let parts = parts(&mode, picture.as_vec2(), size);
+            let Some(layout) = sprite::layout(&mode, size, picture.as_vec2()) else {
+                assert!(matches!(mode, SpriteImageMode::Tiled { tile_x: false, tile_y: false, .. }));
+                continue;
+            };
+            let texels = UVec2::new(1 + rng.next_u32() % 90, 1 + rng.next_u32() % 90);
+            let places = layout.places(picture, texels);
+            for _ in 0..60 {
+                let texel = UVec2::new(rng.next_u32() % texels.x, rng.next_u32() % texels.y);
+                let at = (texel.as_vec2() + 0.5) / texels.as_vec2() * size;
+                // Where parts meet, rounding decides; so only what is the same a little to all sides is compared.
+                let [want, ..] = [Vec2::ZERO, Vec2::X, Vec2::Y, -Vec2::X, -Vec2::Y]
+                    .map(|side| shown(&parts, size, at + 1e-3 * side));
+                let near = [Vec2::X, Vec2::Y, -Vec2::X, -Vec2::Y].map(|side| shown(&parts, size, at + 1e-3 * side));
+                let Some(want) = want else { continue };
+                if near.iter().any(|near| near.is_none_or(|near| near.distance(want) > 0.1)) {
+                    cut += 1;
+                    continue;
+                }
+                let got = places(texel.x, texel.y);
+                assert!(got.distance(want) < 0.05, "{mode:?} {picture} {size} {texel} of {texels}: {got}, not {want}");
+                checked += 1;
+            }
+        }
+        assert!(checked > 50 * cut && checked > 10_000, "{checked} places checked, {cut} lie where parts meet");
+    }
+
+    #[test]
+    fn textures_show_as_much_as_the_picture_has() {
+        let size = Vec2::new(300.0, 100.0);
+        let texels = |mode: &SpriteImageMode, size| {
+            sprite::layout(mode, size, Vec2::splat(64.0)).unwrap().texels(UVec2::splat(64)).to_array()
+        };
+        let tiled = |stretch_value, tile_y| SpriteImageMode::Tiled { tile_x: true, tile_y, stretch_value };
+        assert_eq!(texels(&tiled(1.0, true), size), [300, 100]);
+        assert_eq!(texels(&tiled(0.5, true), size), [600, 200]);
+        assert_eq!(texels(&tiled(2.0, false), size), [150, 64]);
+        let nine = SpriteImageMode::Sliced(TextureSlicer { border: BorderRect::all(8.0), ..default() });
+        assert_eq!(texels(&nine, size), [300, 100]);
+        assert_eq!(texels(&nine, Vec2::new(300.0, 32.0)), [600, 64], "its corners are shown at half their size");
+        let fine = SliceScaleMode::Tile { stretch_value: 0.25 };
+        let nine = TextureSlicer { border: BorderRect::all(8.0), center_scale_mode: fine, ..default() };
+        assert_eq!(texels(&SpriteImageMode::Sliced(nine), size), [1200, 400], "its middle at a quarter");
+        let [width, height] = texels(&tiled(0.001, true), Vec2::splat(1.0e9));
+        assert!(width == height && width * height <= 4_194_304, "{width} x {height}");
+    }
+}
