@@ -3,7 +3,6 @@
 use super::{
     CrackError, CrackMaps, CrackTextures, Shard,
     carrier::{Carrier, Clothes, Found, Kind, Shown},
-    error::Called,
     mesh::{aspect_of, closest_uv, place_of, wrap},
     shards::Plane,
     surfaces::Active,
@@ -144,7 +143,7 @@ fn give_tangents(world: &mut World, entity: Entity) -> Option<(Handle<Mesh>, Han
             Some((before, own))
         }
         Err(error) => {
-            let surface = Called::of(world, entity);
+            let surface = super::error::Called::of(world, entity);
             warn!("the normals of the cracks on {surface} will not show, its mesh has no tangents: {error}");
             None
         }
