@@ -136,6 +136,24 @@ fn no_two_cracks_cross_and_junctions_are_steep() {
     assert!(angles.len() > 800, "only {} T-junctions", angles.len());
 }
 
+#[test]
+fn cracks_of_the_presets_do_not_cross() {
+    let mut pairs = 0;
+    for preset in CrackPreset::NAMES.iter().filter_map(|name| CrackPreset::named(name)) {
+        for seed in 0..12 {
+            let mut rng = Rng::new(seed).stream("presets");
+            let extent = if seed % 3 == 0 { Vec2::new(3.0, 1.0) } else { Vec2::ONE };
+            let mut growth = CrackGrowth::new(preset.growth.clone(), extent, seed).unwrap();
+            for _ in 0..3 {
+                growth.hit(Vec2::new(rng.unit(), rng.unit()) * extent, rng.range(0.5, 2.0));
+                while growth.step().grew() {}
+            }
+            pairs += assert_planar(&growth, seed);
+        }
+    }
+    assert!(pairs > 1_000_000, "only {pairs} pairs of pieces");
+}
+
 /// A ray of glass runs away from its hit until it ends or meets an older crack: it turns neither aside nor back.
 #[test]
 fn rays_keep_to_their_way() {
