@@ -23,6 +23,8 @@ pub(crate) fn widest<R>(work: impl FnOnce() -> R) -> R {
 
 #[cfg(test)]
 mod tests {
+    #[cfg(target_arch = "x86_64")]
+    use super::Level;
     use crate::{
         math::Rng,
         paint::{BaseTexels, Look, LookTable, PaintTargets, paint_into},
@@ -40,6 +42,13 @@ mod tests {
 
     /// What is made of random numbers with wide vectors and without.
     fn both<T>(seed: u64, make: impl Fn(&mut Rng) -> T) -> [T; 2] {
+        #[cfg(target_arch = "x86_64")]
+        let has_wide = Level::new().as_avx2().is_some();
+        #[cfg(not(target_arch = "x86_64"))]
+        let has_wide = false;
+        if !has_wide {
+            eprintln!("PASSED OVER: this processor has no wider vectors than the build assumes");
+        }
         [false, true].map(|is_plain| {
             IS_PLAIN.set(is_plain);
             let made = make(&mut Rng::new(seed));

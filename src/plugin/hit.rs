@@ -40,7 +40,8 @@ pub enum HitPoint {
     /// A point of the world, as it is when the frame's transforms are propagated. Sprites ignore the depth along their
     /// own z; meshes take the closest point of their triangles.
     World(Vec3),
-    /// Texture coordinates in the surface's picture or sprite frame, 0..=1, v down.
+    /// Texture coordinates in the surface's picture or sprite frame, 0..=1, v down; on a sprite that repeats or slices its picture in the whole of it,
+    /// here and wherever texture coordinates are spoken of.
     Uv(Vec2),
     /// A point in the entity's own space.
     Local(Vec3),

@@ -7,13 +7,13 @@ use std::hash::{Hash, Hasher};
 const LEAST_STRETCH: f32 = 0.001;
 
 /// Textures of a picture that is laid out have no more texels than this.
-const MOST_TEXELS: f32 = 4_194_304.0;
+const MOST_TEXELS: f32 = 2_097_152.0;
 
 /// How a picture is laid out over a sprite: its borders as they are, what lies between them stretched or repeated.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Layout {
-    /// Size of the sprite.
-    pub(super) size: Vec2,
+    /// Size of the sprite; `None` = that of its picture.
+    pub(super) size: Option<Vec2>,
     /// Widths of the borders at the left and the top, texels of the picture.
     pub(super) low: Vec2,
     /// The same at the right and the bottom.
@@ -44,35 +44,63 @@ impl Hash for Layout {
 impl Layout {
     fn bits(&self) -> [Option<u32>; 10] {
         let Self { size, low, high, max_scale, sides, middle: [across, down] } = *self;
-        let [a, b, c, d, e, f, g] = [size.x, size.y, low.x, low.y, high.x, high.y, max_scale].map(Some);
+        let [c, d, e, f, g] = [low.x, low.y, high.x, high.y, max_scale].map(Some);
+        let (a, b) = (size.map(|size| size.x), size.map(|size| size.y));
         [a, b, c, d, e, f, g, sides, across, down].map(|value| value.map(f32::to_bits))
     }
 
-    /// What the borders of a picture of this size are scaled by.
-    fn scale(&self, picture: Vec2) -> f32 {
-        (self.size / picture).min_element().min(self.max_scale)
+    /// For a picture of this size: where its borders leave no room it is merely stretched.
+    fn fit(self, picture: UVec2) -> Fitted {
+        let picture = picture.as_vec2();
+        let size = self.size.unwrap_or(picture);
+        let layout = if (self.low + self.high).cmpge(picture).any() {
+            Self { low: Vec2::ZERO, high: Vec2::ZERO, sides: None, middle: [None; 2], ..self }
+        } else {
+            self
+        };
+        Fitted { layout, picture, size, scale: (size / picture).min_element().min(self.max_scale) }
     }
 
-    /// Size of textures that show as much as the picture has.
+    /// Size of textures that show as much as a picture of this size has.
     pub(super) fn texels(&self, picture: UVec2) -> UVec2 {
-        let picture = picture.as_vec2();
-        let has_borders = self.low + self.high != Vec2::ZERO;
+        self.fit(picture).texels()
+    }
+
+    /// For each texel of textures of this size the place in the picture that is shown there, in texels.
+    pub(super) fn places(&self, picture: UVec2, texels: UVec2) -> impl Fn(u32, u32) -> Vec2 + use<> {
+        self.fit(picture).places(texels)
+    }
+}
+
+/// A [`Layout`] of a picture.
+struct Fitted {
+    layout: Layout,
+    /// Size of the picture, texels.
+    picture: Vec2,
+    /// Size of the sprite.
+    size: Vec2,
+    /// What the borders are scaled by.
+    scale: f32,
+}
+
+impl Fitted {
+    fn texels(&self) -> UVec2 {
+        let Layout { low, high, sides, middle, .. } = self.layout;
+        let has_borders = low + high != Vec2::ZERO && self.scale > 0.0;
         // The finest of its parts.
         let density = |axis: usize| {
-            let border = has_borders.then(|| self.scale(picture));
-            let finest = [border, self.sides, self.middle[axis]].into_iter().flatten().reduce(f32::min);
-            finest.map_or(picture[axis] / self.size[axis], |scale| scale.max(LEAST_STRETCH).recip())
+            let parts = [has_borders.then_some(self.scale), sides.filter(|_| has_borders), middle[axis]];
+            let finest = parts.into_iter().flatten().reduce(f32::min);
+            finest.map_or(self.picture[axis] / self.size[axis], |scale| scale.max(LEAST_STRETCH).recip())
         };
         let texels = self.size * Vec2::new(density(0), density(1));
         let shrink = (MOST_TEXELS / texels.element_product()).sqrt().min(1.0);
         (texels * shrink).round().as_uvec2().max(UVec2::ONE)
     }
 
-    /// For each texel of textures of this size the place in the picture that is shown there, in texels.
-    pub(super) fn places(&self, picture: UVec2, texels: UVec2) -> impl Fn(u32, u32) -> Vec2 {
-        let scale = self.scale(picture.as_vec2());
-        let axis = |axis: usize, tile| self.along(axis, picture[axis] as f32, texels[axis], scale, tile);
-        let [columns, rows] = [0, 1].map(|i| [axis(i, self.middle[i]), axis(i, self.sides)]);
+    fn places(&self, texels: UVec2) -> impl Fn(u32, u32) -> Vec2 + use<> {
+        let Layout { sides, middle, .. } = self.layout;
+        let [columns, rows] = [0, 1].map(|axis| [middle[axis], sides].map(|tile| self.along(axis, texels[axis], tile)));
         move |x, y| {
             let ((across, is_side), (down, is_end)) = (columns[0][x as usize], rows[0][y as usize]);
             // Along a border it is repeated as borders are.
@@ -84,8 +112,9 @@ impl Layout {
     }
 
     /// The place in the picture along one axis, and whether it is in a border, for each of so many texels.
-    fn along(&self, axis: usize, picture: f32, texels: u32, scale: f32, tile: Option<f32>) -> Vec<(f32, bool)> {
-        let (size, low, high) = (self.size[axis], self.low[axis], self.high[axis]);
+    fn along(&self, axis: usize, texels: u32, tile: Option<f32>) -> Vec<(f32, bool)> {
+        let (picture, size, scale) = (self.picture[axis], self.size[axis], self.scale);
+        let (low, high) = (self.layout.low[axis], self.layout.high[axis]);
         let (start, end) = (low * scale, size - high * scale);
         let (length, between) = (end - start, picture - low - high);
         let period = tile.map_or(length, |stretch| (between * stretch.max(LEAST_STRETCH)).max(1.0).min(length));
@@ -159,7 +188,7 @@ mod tests {
                 SpriteImageMode::Tiled { tile_x, tile_y, stretch_value: rng.range(0.1, 2.0) }
             };
             let parts = parts(&mode, picture.as_vec2(), size);
-            let Some(layout) = sprite::layout(&mode, size, picture.as_vec2()) else {
+            let Some(layout) = sprite::layout(&mode, Some(size)) else {
                 assert!(matches!(mode, SpriteImageMode::Tiled { tile_x: false, tile_y: false, .. }));
                 continue;
             };
@@ -189,7 +218,7 @@ mod tests {
     fn textures_show_as_much_as_the_picture_has() {
         let size = Vec2::new(300.0, 100.0);
         let texels = |mode: &SpriteImageMode, size| {
-            sprite::layout(mode, size, Vec2::splat(64.0)).unwrap().texels(UVec2::splat(64)).to_array()
+            sprite::layout(mode, Some(size)).unwrap().texels(UVec2::splat(64)).to_array()
         };
         let tiled = |stretch_value, tile_y| SpriteImageMode::Tiled { tile_x: true, tile_y, stretch_value };
         assert_eq!(texels(&tiled(1.0, true), size), [300, 100]);
@@ -198,10 +227,15 @@ mod tests {
         let nine = SpriteImageMode::Sliced(TextureSlicer { border: BorderRect::all(8.0), ..default() });
         assert_eq!(texels(&nine, size), [300, 100]);
         assert_eq!(texels(&nine, Vec2::new(300.0, 32.0)), [600, 64], "its corners are shown at half their size");
+        let hidden = TextureSlicer { border: BorderRect::all(8.0), max_corner_scale: 0.0, ..default() };
+        assert_eq!(texels(&SpriteImageMode::Sliced(hidden), size), [64, 64], "its borders are not shown");
+        let crowded = SpriteImageMode::Sliced(TextureSlicer { border: BorderRect::all(32.0), ..default() });
+        assert_eq!(texels(&crowded, size), [64, 64], "its borders leave no room");
+        assert_eq!(sprite::layout(&tiled(0.5, true), None).unwrap().texels(UVec2::new(64, 32)), UVec2::new(128, 64));
         let fine = SliceScaleMode::Tile { stretch_value: 0.25 };
         let nine = TextureSlicer { border: BorderRect::all(8.0), center_scale_mode: fine, ..default() };
         assert_eq!(texels(&SpriteImageMode::Sliced(nine), size), [1200, 400], "its middle at a quarter");
         let [width, height] = texels(&tiled(0.001, true), Vec2::splat(1.0e9));
-        assert!(width == height && width * height <= 4_194_304, "{width} x {height}");
+        assert!(width == height && width * height <= 2_097_152, "{width} x {height}");
     }
 }

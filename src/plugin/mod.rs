@@ -202,9 +202,9 @@ impl Plugin for CrackPlugin {
                     (upload::drop_unwanted, budget::end_frame).chain().in_set(Upload),
                 ),
             );
-        // What a sprite shows changes before the engine cuts it into parts.
+        // What a sprite shows changes by hits, by bakes and when cracks have closed, and then the engine cuts it into parts.
         #[cfg(feature = "2d")]
-        app.configure_sets(PostUpdate, Hit.before(bevy::sprite_render::SpriteSystems::ComputeSlices));
+        app.configure_sets(PostUpdate, (Hit, Grow).before(bevy::sprite_render::SpriteSystems::ComputeSlices));
         #[cfg(feature = "2d")]
         app.add_systems(
             PostUpdate,

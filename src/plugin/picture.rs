@@ -9,7 +9,7 @@ use bevy::{
     prelude::*,
     render::render_resource::{TextureDimension, TextureFormat},
 };
-use std::sync::{Arc, Weak};
+use std::sync::{Arc, LazyLock, Weak};
 
 /// The untouched pictures of a surface, all of one size.
 #[derive(Clone, Debug, PartialEq)]
@@ -282,16 +282,21 @@ fn to_byte(value: f32) -> u8 {
 struct Sampling {
     /// Whether it goes on at the other side beyond an edge, across and down; else the edge is held.
     repeats: [bool; 2],
+    levels: &'static Levels,
+}
+
+/// What the levels of a picture stand for.
+struct Levels {
     /// The light of each level.
     light: [f32; 256],
     /// The level of each light, by its root.
     level: Vec<u8>,
 }
 
-impl Sampling {
-    /// Lights that are told apart: ten or more for each level.
-    const LIGHTS: f32 = 4095.0;
+static SRGB: LazyLock<Levels> = LazyLock::new(|| Levels::new(Space::Srgb));
+static LINEAR: LazyLock<Levels> = LazyLock::new(|| Levels::new(Space::Linear));
 
+impl Sampling {
     fn of(image: &Image, space: Space) -> Self {
         let repeats = match &image.sampler {
             ImageSampler::Default => [false; 2],
@@ -302,24 +307,12 @@ impl Sampling {
         Self::new(repeats, space)
     }
 
-    #[expect(clippy::cast_possible_truncation, reason = "the number of lights")]
     fn new(repeats: [bool; 2], space: Space) -> Self {
-        let light = |level: u8| match space {
-            Space::Srgb => Color::srgb_u8(level, 0, 0).to_linear().red,
-            Space::Linear => f32::from(level) / 255.0,
+        let levels = match space {
+            Space::Srgb => &SRGB,
+            Space::Linear => &LINEAR,
         };
-        let level = |root: u32| {
-            let light = (root as f32 / Self::LIGHTS).powi(2);
-            to_byte(match space {
-                Space::Srgb => Srgba::from(LinearRgba::rgb(light, 0.0, 0.0)).red,
-                Space::Linear => light,
-            })
-        };
-        Self {
-            repeats,
-            light: core::array::from_fn(|i| light(i as u8)),
-            level: (0..=Self::LIGHTS as u32).map(level).collect(),
-        }
+        Self { repeats, levels }
     }
 
     /// A picture at another size, its edges where they were.
@@ -353,14 +346,36 @@ impl Sampling {
                 let corners = [texel(left, top), texel(right, top), texel(left, bottom), texel(right, bottom)];
                 let mix = |[a, b, c, d]: [f32; 4]| a.lerp(b, across).lerp(c.lerp(d, across), down);
                 for c in 0..3 {
-                    let light = mix(corners.map(|texel| self.light[usize::from(texel[c])]));
-                    let root = (light.sqrt() * Self::LIGHTS + 0.5) as usize;
-                    out.push(self.level[root.min(self.level.len() - 1)]);
+                    let light = mix(corners.map(|texel| self.levels.light[usize::from(texel[c])]));
+                    let root = (light.sqrt() * Levels::LIGHTS + 0.5) as usize;
+                    out.push(self.levels.level[root.min(self.levels.level.len() - 1)]);
                 }
                 out.push((mix(corners.map(|texel| f32::from(texel[3]))) + 0.5) as u8);
             }
         }
         out
+    }
+}
+
+impl Levels {
+    /// Lights that are told apart: ten or more for each level.
+    const LIGHTS: f32 = 4095.0;
+
+    #[expect(clippy::cast_possible_truncation, reason = "the number of lights")]
+    fn new(space: Space) -> Self {
+        let light = |level: u8| match space {
+            Space::Srgb => Color::srgb_u8(level, 0, 0).to_linear().red,
+            Space::Linear => f32::from(level) / 255.0,
+        };
+        let level = |root: u32| {
+            let light = (root as f32 / Self::LIGHTS).powi(2);
+            to_byte(match space {
+                Space::Srgb => Srgba::from(LinearRgba::rgb(light, 0.0, 0.0)).red,
+                Space::Linear => light,
+            })
+        };
+        let light = core::array::from_fn(|i| light(i as u8));
+        Self { light, level: (0..=Self::LIGHTS as u32).map(level).collect() }
     }
 }
 

@@ -38,7 +38,7 @@ fn inspect(world: &World, entity: Entity) -> Found {
     let Some(sprite) = world.get::<Sprite>(entity) else { return Found::Other };
     let is_part = sprite.rect.is_some() || sprite.texture_atlas.is_some();
     let refused = match sprite.image_mode {
-        SpriteImageMode::Auto | SpriteImageMode::Tiled { tile_x: false, tile_y: false, .. } => None,
+        SpriteImageMode::Auto => None,
         SpriteImageMode::Sliced(_) => is_part.then_some("Sliced"),
         SpriteImageMode::Tiled { .. } => is_part.then_some("Tiled"),
         SpriteImageMode::Scale(_) => Some("Scale"),
@@ -46,13 +46,6 @@ fn inspect(world: &World, entity: Entity) -> Found {
     if let Some(mode) = refused {
         return Found::Unusable(CrackError::SpriteMode { mode: mode.to_owned() });
     }
-    let picture = || world.get_resource::<Assets<Image>>()?.get(&sprite.image).map(Image::size_f32);
-    let layout = match sprite.image_mode {
-        SpriteImageMode::Sliced(_) | SpriteImageMode::Tiled { .. } => {
-            picture().and_then(|picture| layout(&sprite.image_mode, sprite.custom_size.unwrap_or(picture), picture))
-        }
-        _ => None,
-    };
     let layouts = world.get_resource::<Assets<TextureAtlasLayout>>();
     let frame = match &sprite.texture_atlas {
         Some(atlas) => {
@@ -74,7 +67,7 @@ fn inspect(world: &World, entity: Entity) -> Found {
         depth: None,
         // Texels that a border between two pixels cuts belong to the frame.
         rect: rect.map(|rect| URect { min: rect.min.floor().as_uvec2(), max: rect.max.ceil().as_uvec2() }),
-        layout: layout.map(Arc::new),
+        layout: layout(&sprite.image_mode, sprite.custom_size).map(Arc::new),
         size: sprite.custom_size,
         maps: CrackMaps { diffuse: true, normal: true, depth: false },
     }))
@@ -83,8 +76,8 @@ fn inspect(world: &World, entity: Entity) -> Found {
 /// The whole picture, stretched: as [`SpriteImageMode::Auto`], and the engine forgets the parts that it has drawn before.
 const WHOLE: SpriteImageMode = SpriteImageMode::Tiled { tile_x: false, tile_y: false, stretch_value: 1.0 };
 
-/// How a sprite of this size lays out its picture; `None` if it merely stretches it, as it does where its borders leave no room.
-pub(super) fn layout(mode: &SpriteImageMode, size: Vec2, picture: Vec2) -> Option<Layout> {
+/// How a sprite that was given this size lays out its picture; `None` if it merely stretches it.
+pub(super) fn layout(mode: &SpriteImageMode, size: Option<Vec2>) -> Option<Layout> {
     let stretch = |mode: SliceScaleMode| match mode {
         SliceScaleMode::Stretch => None,
         SliceScaleMode::Tile { stretch_value } => Some(stretch_value),
@@ -108,9 +101,9 @@ pub(super) fn layout(mode: &SpriteImageMode, size: Vec2, picture: Vec2) -> Optio
         },
         SpriteImageMode::Auto | SpriteImageMode::Scale(_) => return None,
     };
-    let has_room = (layout.low + layout.high).cmplt(picture).all() && size.is_finite() && size.min_element() > 0.0;
+    let has_size = size.is_none_or(|size| size.is_finite() && size.min_element() > 0.0);
     let is_stretched = layout.low + layout.high == Vec2::ZERO && layout.middle == [None; 2];
-    (has_room && !is_stretched).then_some(layout)
+    (has_size && !is_stretched).then_some(layout)
 }
 
 fn attach(world: &mut World, entity: Entity, carrier: &mut Carrier, textures: &CrackTextures, _relief: f32) {
@@ -123,8 +116,10 @@ fn attach(world: &mut World, entity: Entity, carrier: &mut Carrier, textures: &C
     sprite.image = own.clone();
     if carrier.shown.layout.is_some() {
         // Its texture has it laid out.
-        carrier.mode.get_or_insert_with(|| sprite.image_mode.clone());
-        sprite.image_mode = WHOLE;
+        let mode = core::mem::replace(&mut sprite.image_mode, WHOLE);
+        if mode != WHOLE {
+            carrier.mode = Some(mode);
+        }
     }
     give_size_back(&mut sprite, carrier.size.take());
     // Textures of another size must not change the size of the sprite.

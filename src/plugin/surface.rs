@@ -14,7 +14,8 @@ use bevy::{
 ///
 /// `Sprite::image` and the material in `MeshMaterial2d` or `MeshMaterial3d` are the surface's own while it is cracked. A
 /// copy of a material is changed through the handle that the entity has then, not through the one it was spawned with, and is dropped
-/// by healing; another image or material put in its place is cracked as the first one was.
+/// by healing; another image or material put in its place is cracked as the first one was. A sprite that repeats or slices its picture shows
+/// it laid out in its texture while it is cracked, at the size that it had when that was made, and its `image_mode` is `Tiled` without tiles.
 #[derive(Component, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Component, Default)]
 #[require(CrackState)]
@@ -92,7 +93,7 @@ pub enum CrackResolution {
     /// As its picture; with more columns or rows where it is shown stretched by more than 1.4, so that the cracks are not, be it the sprite's
     /// `custom_size`, the mesh's texture coordinates or a scale that stretches it. That is seen to when the textures are made, as far as two
     /// million texels and the memory allow, and not for sprites with a `rect` or an atlas, nor for pictures whose sampler shows texels as
-    /// squares. Where a sprite repeats its picture or shows it in nine parts, as many texels as it shows of it, up to four million. Without a picture,
+    /// squares. Where a sprite repeats its picture or shows it in nine parts, as many texels as it shows of it, up to two million. Without a picture,
     /// 512 texels along the longer side, or 256 along the shorter one if that is more.
     ///
     /// A texel takes 14 to 24 bytes in all, and for a coin [`Fixed`](Self::Fixed) of 64 x 64 is plenty.

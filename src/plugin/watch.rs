@@ -142,7 +142,14 @@ fn update(world: &mut World, entity: Entity, active: &mut Active) -> Result<bool
     if !update_settings(world, entity, active) {
         return Ok(false);
     }
-    let (kind, found) = carrier::inspect(world, entity);
+    let (mut kind, mut found) = carrier::inspect(world, entity);
+    if active.carrier.shown.layout.is_some()
+        && matches!(&found, Found::Shown(shown) if !active.carrier.is_showing(&shown.asset))
+    {
+        // Another picture is laid out as the one before, unless somebody says otherwise.
+        (active.carrier.kind.detach)(world, entity, &active.carrier);
+        (kind, found) = carrier::inspect(world, entity);
+    }
     let shown = match found {
         Found::Shown(shown) => *shown,
         Found::Waiting => return Ok(false),
@@ -152,9 +159,12 @@ fn update(world: &mut World, entity: Entity, active: &mut Active) -> Result<bool
     if active.carrier.is_showing(&shown.asset) {
         // A part of the picture is shown as it is, not of textures of another size.
         let is_part = shown.rect.is_some() && active.unstretched.is_some_and(|size| active.base.size.cmpgt(size).any());
-        if active.is_outdated || is_part {
+        // Somebody has it laid out in another way.
+        let is_laid_out = shown.layout.is_some() && active.carrier.own.is_some();
+        if active.is_outdated || is_part || is_laid_out {
             // What it shows now are our textures; the pictures are those it was made from.
-            let layout = active.carrier.shown.layout.clone().filter(|_| !is_part);
+            let is_new = is_laid_out || active.carrier.own.is_none();
+            let layout = if is_new { shown.layout } else { active.carrier.shown.layout.clone() };
             let original = Shown { rect: shown.rect, layout, ..active.carrier.shown.clone() };
             return update_picture(world, entity, active, original);
         }
@@ -166,15 +176,11 @@ fn update(world: &mut World, entity: Entity, active: &mut Active) -> Result<bool
         return Ok(true);
     }
     // Somebody gave it another picture.
-    if active.carrier.shown.layout.take().is_some() {
-        // To be laid out as the one before, unless somebody said otherwise.
-        (active.carrier.kind.detach)(world, entity, &active.carrier);
-        return update(world, entity, active);
-    }
     let Some(kind) = kind else { return Ok(true) };
     let size = active.carrier.size;
     let mesh = active.carrier.mesh.take();
     active.carrier = Carrier { mesh, size, ..Carrier::new(kind, shown.clone()) };
+    active.unstretched = None;
     update_picture(world, entity, active, shown)
 }
 

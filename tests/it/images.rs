@@ -324,6 +324,9 @@ fn laid_out(image: &Handle<Image>, size: Vec2) -> Vec<Sprite> {
     modes.into_iter().map(sprite).collect()
 }
 
+/// The whole picture in one part.
+const WHOLE: SpriteImageMode = SpriteImageMode::Tiled { tile_x: false, tile_y: false, stretch_value: 1.0 };
+
 /// What the crate changes of a sprite.
 fn seen(sprite: &Sprite) -> (Handle<Image>, SpriteImageMode, Option<Vec2>) {
     (sprite.image.clone(), sprite.image_mode.clone(), sprite.custom_size)
@@ -355,9 +358,34 @@ fn t4_repeated_and_sliced_sprites_crack_and_heal() {
         settle(&mut app, entity);
         assert!(image_of(&app, entity) != other, "it is cracked as well");
         assert_eq!(size_of(&app, &image_of(&app, entity)).as_vec2(), textures);
+        // So is one that comes later, and one that is loaded anew.
+        let late = app.world().resource::<Assets<Image>>().reserve_handle();
+        app.world_mut().get_mut::<Sprite>(entity).expect("the sprite").image = late.clone();
+        steps(&mut app, 2);
+        let new = solid(UVec2::new(24, 16), [30, 90, 60, 255]);
+        app.world_mut().resource_mut::<Assets<Image>>().insert(&late, new.clone()).expect("a handle that is held");
+        steps(&mut app, 2);
+        settle(&mut app, entity);
+        let has_own = |app: &App, size: Vec2| {
+            let (image, mode, _) = seen(&get(app, entity));
+            assert!(image != late && size_of(app, &image).as_vec2() == size, "{:?}", sprite.image_mode);
+            assert_eq!(mode, if is_laid_out { WHOLE } else { sprite.image_mode.clone() });
+        };
+        has_own(&app, textures);
+        replace(&mut app, &late, new);
+        steps(&mut app, 2);
+        has_own(&app, textures);
+        let mut sprite = Sprite { image: late.clone(), ..sprite.clone() };
+        if is_laid_out {
+            // Somebody has it laid out in another way.
+            sprite.image_mode = SpriteImageMode::Tiled { tile_x: true, tile_y: true, stretch_value: 0.25 };
+            app.world_mut().get_mut::<Sprite>(entity).expect("the sprite").image_mode = sprite.image_mode.clone();
+            steps(&mut app, 2);
+            has_own(&app, 4.0 * size);
+        }
         app.world_mut().commands().entity(entity).heal_cracks();
         step(&mut app);
-        assert_eq!(seen(&get(&app, entity)), seen(&Sprite { image: other, ..sprite }));
+        assert_eq!(seen(&get(&app, entity)), seen(&sprite));
     }
 }
 
@@ -388,9 +416,14 @@ fn t4_repeated_and_sliced_sprites_look_as_before() {
         let most = film.iter().map(|frame| changed(frame)).max();
         assert!((1..1500).contains(&changed(&film[29])), "{:?}: {}", sprite.image_mode, changed(&film[29]));
         assert!(most < Some(1500), "{:?}: {most:?} texels", sprite.image_mode);
-        app.world_mut().commands().entity(entity).heal_cracks();
-        steps(&mut app, 2);
-        assert_eq!(changed(&drawn(&mut app, &target)), 0, "{:?}", sprite.image_mode);
+        let film = self::film(&mut app, &target, 20, |app, i| {
+            if i == 2 {
+                app.world_mut().commands().entity(entity).close_cracks(0.1);
+            }
+        });
+        let most = film.iter().map(|frame| changed(frame)).max();
+        assert!(most < Some(1500), "{:?}, as its cracks close: {most:?} texels", sprite.image_mode);
+        assert_eq!(changed(&film[19]), 0, "{:?}", sprite.image_mode);
         app.world_mut().despawn(entity);
         step(&mut app);
     }
