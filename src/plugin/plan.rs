@@ -348,7 +348,7 @@ fn plan_pictures(
     Ok(Some(PicturePlan { size, rect, bytes, sampler, maps, unstretched, layout, is_nearest }))
 }
 
-/// Reads the pictures of a surface of this kind anew; `None` if they are not there yet. `owned` as in [`plan_pictures`].
+/// Reads the pictures of a cracked surface anew; `None` if they are not there yet. `owned` as in [`plan_pictures`].
 pub(super) fn draft(
     world: &mut World,
     entity: Entity,
