@@ -485,3 +485,33 @@ fn baked_pictures_reach_the_gpu_in_one_copy_each() {
     }
     assert_eq!(told(&app).failed, []);
 }
+
+#[test]
+fn a_wall_of_tiles_is_baked_as_a_whole() {
+    let Some((_one, app)) = gpu_app() else { return };
+    let mut app = listening(app);
+    let target = spawn_camera(&mut app, UVec2::new(96, 64));
+    let image = add(&mut app, solid(UVec2::splat(16), [180, 180, 180, 255]));
+    let image_mode = SpriteImageMode::Tiled { tile_x: true, tile_y: true, stretch_value: 0.5 };
+    let sprite = Sprite { image_mode, custom_size: Some(Vec2::new(96.0, 64.0)), ..Sprite::from_image(image) };
+    let surface = CrackSurface::new(CrackPreset::CONCRETE);
+    let entity = app.world_mut().spawn((sprite.clone(), surface, guided())).id();
+    bake(&mut app, entity);
+    steps(&mut app, 3);
+    assert!(told(&app).failed.is_empty(), "{:?}", told(&app));
+    let own = image_of(&app, entity);
+    let size = app.world().resource::<Assets<Image>>().get(&own).expect("its texture").size();
+    assert_eq!(size, UVec2::new(192, 128), "each tile of 8 x 8 units has its 16 x 16 texels");
+    // The cross is on the whole wall, once, and is drawn there.
+    let drawn = drawn(&mut app, &target);
+    let dark = |x: u32, y: u32| drawn[4 * (y * 96 + x) as usize] < 90;
+    let share = |columns: std::ops::Range<u32>, rows: std::ops::Range<u32>| {
+        let all = rows.flat_map(|y| columns.clone().map(move |x| (x, y)));
+        all.clone().filter(|&(x, y)| dark(x, y)).count() as f32 / all.count() as f32
+    };
+    let (middle, corner) = (share(40..56, 24..40), share(0..14, 0..9));
+    assert!(middle > 0.1 && middle > 2.0 * corner, "{middle} of the middle is dark, {corner} of a corner");
+    app.world_mut().commands().entity(entity).heal_cracks();
+    step(&mut app);
+    assert_eq!(get::<Sprite>(&app, entity).image_mode, sprite.image_mode);
+}
