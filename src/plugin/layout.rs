@@ -1,13 +1,11 @@
 //! [`Layout`]: a picture that is laid out over what shows it, repeated or in nine parts.
 
+use super::plan::MOST_TEXELS;
 use bevy::prelude::*;
 use std::hash::{Hash, Hasher};
 
 /// The smallest share of its own size at which a picture is repeated, as the engine has it.
 const LEAST_STRETCH: f32 = 0.001;
-
-/// Textures of a picture that is laid out have no more texels than this.
-const MOST_TEXELS: f32 = 2_097_152.0;
 
 /// How a picture is laid out over a sprite: its borders as they are, what lies between them stretched or repeated.
 #[derive(Clone, Copy, Debug)]

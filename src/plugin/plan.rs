@@ -30,8 +30,8 @@ const DEFAULT_SHORTER: f32 = 256.0;
 /// A picture that is shown so much wider or higher than it is gets textures with more columns or rows, on which cracks are not stretched.
 const STRETCHED: f32 = 1.4;
 
-/// Textures have no more columns or rows than their picture if they would have more texels than this.
-const MOST_TEXELS: f64 = 2_097_152.0;
+/// Textures in which a picture is stretched or laid out have no more texels than this, unless the picture itself has.
+pub(super) const MOST_TEXELS: f32 = 2_097_152.0;
 
 /// Textures are not made coarser than this to fit the budget, texels.
 const MIN_SIDE: u32 = 64;
@@ -388,9 +388,8 @@ fn size(
         }
         None => {
             let aspect = aspect(None).unwrap_or(1.0);
-            let longer = DEFAULT_SIDE
-                .max(DEFAULT_SHORTER * aspect.max(aspect.recip()))
-                .min(MOST_TEXELS as f32 / DEFAULT_SHORTER);
+            let longer =
+                DEFAULT_SIDE.max(DEFAULT_SHORTER * aspect.max(aspect.recip())).min(MOST_TEXELS / DEFAULT_SHORTER);
             (Vec2::new(aspect, 1.0) * (longer / aspect.max(1.0))).as_uvec2().max(UVec2::ONE)
         }
     };
@@ -439,7 +438,7 @@ fn stretched(size: UVec2, aspect: f32, max_side: u32) -> UVec2 {
         return size;
     }
     let longer = |side: u32, other: u32, by: f32| {
-        let most = (MOST_TEXELS / f64::from(other)).min(f64::from(max_side)).max(f64::from(side));
+        let most = f64::from(MOST_TEXELS / other as f32).min(f64::from(max_side)).max(f64::from(side));
         (f64::from(side) * f64::from(by)).min(most).round() as u32
     };
     if stretch > 1.0 {
