@@ -104,6 +104,10 @@ impl Arrest {
         self.sealed[node as usize]
     }
 
+    pub(super) fn seal(&mut self, node: u32) {
+        self.sealed[node as usize] = true;
+    }
+
     pub(super) const fn is_running(&self) -> bool {
         !self.runners.is_empty()
     }
@@ -182,7 +186,7 @@ impl CrackGrowth {
 
     fn seal(&mut self, node: u32) {
         if let Some(arrest) = &mut self.arrest {
-            arrest.sealed[node as usize] = true;
+            arrest.seal(node);
         }
     }
 
@@ -272,6 +276,11 @@ impl CrackGrowth {
 
     /// Bears a node at `to` if its line touches no other; if it does, joins the crack that is in the way.
     pub(super) fn extend(&mut self, from: u32, to: Vec2, is_sealed: bool) -> Option<u32> {
+        self.extend_of(self.network.nodes[from as usize].impact, from, to, is_sealed)
+    }
+
+    /// The same for an impact of which the node that it grows from may not be.
+    pub(super) fn extend_of(&mut self, impact: u32, from: u32, to: Vec2, is_sealed: bool) -> Option<u32> {
         let node = self.network.nodes[from as usize];
         let child = self.network.nodes.len() as u32;
         if self.room() == 0 {
@@ -287,7 +296,7 @@ impl CrackGrowth {
         match self.free_line(SegmentId::Branch(child), (from, u32::MAX), (node.pos, to)) {
             Ok((bend, path)) => {
                 let on_border = (to.cmpeq(Vec2::ZERO) | to.cmpeq(extent)).any();
-                self.bear(to, from, node.generation.saturating_add(1), node.impact, bend);
+                self.bear(to, from, node.generation.saturating_add(1), impact, bend);
                 if let Some(arrest) = &mut self.arrest {
                     arrest.walls.add((from, child), &path);
                     arrest.sealed[child as usize] = is_sealed || on_border;
@@ -368,11 +377,6 @@ impl CrackGrowth {
             (Some(crack), Some(border)) => Some(if border.0 < crack.0 { border } else { crack }),
             (crack, border) => crack.or(border),
         }
-    }
-
-    /// Whether a crack or the border lies within `reach` of a node in this direction.
-    pub(super) fn is_near_crack(&self, from: u32, way: Vec2, reach: f32) -> bool {
-        self.goal_ahead(from, way, reach, AHEAD).is_some()
     }
 
     fn border_ahead(&self, pos: Vec2, heading: Vec2, reach: f32, ahead: f32) -> Option<(f32, Goal)> {

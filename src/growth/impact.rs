@@ -22,6 +22,14 @@ const WIDE: f32 = 0.1;
 /// Room is made for so many nodes at least.
 const FEW_NODES: usize = 64;
 
+/// How much further a hit reaches, as a share, where it has next to no room.
+const MORE_REACH: f32 = 0.4;
+
+/// How many times wider the cracks of an impact are than those of one of energy 1.
+fn widening(energy: f32) -> f32 {
+    energy.sqrt().sqrt().clamp(0.25, 2.0)
+}
+
 /// One impact on a growth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Impact {
@@ -31,7 +39,7 @@ pub struct Impact {
     pub energy: f32,
     /// Energy of the first of them.
     pub first_energy: f32,
-    /// How many times wider its cracks are, for the hits merged into it.
+    /// How many times wider its cracks are than those of an impact of energy 1: the fourth root of its energy.
     pub widening: f32,
 }
 
@@ -109,15 +117,15 @@ impl CrackGrowth {
             let (center, after) = (impact.pos, impact.energy);
             if after > before {
                 self.widen(index);
-                self.populate(index, center, self.reach(before), self.reach(after));
+                self.populate(index, center, self.reach(center, before), self.reach(center, after));
                 self.steps_left = self.params.num_iterations;
             }
             return HitOutcome::Merged(index);
         }
         let index = self.impacts.len() as u32;
         let energy = energy.min(MAX_ENERGY);
-        self.impacts.push(Impact { pos, energy, first_energy: energy, widening: 1.0 });
-        let reach = self.reach(energy);
+        self.impacts.push(Impact { pos, energy, first_energy: energy, widening: widening(energy) });
+        let reach = self.reach(pos, energy);
         let first = self.network.nodes.len() as u32;
         let seed = mix(self.seed ^ mix(u64::from(index)));
         for place in markers::starts(self.params.starts, (pos, energy), reach, extent, seed) {
@@ -130,6 +138,8 @@ impl CrackGrowth {
             self.sprout(pos, index);
         } else if matches!(self.params.starts, StartLayout::Crushed { .. }) {
             self.crush(first);
+        } else if let StartLayout::Arms { count } = self.params.starts {
+            self.branch_out(first, markers::arms(count, (pos, energy), reach, extent, seed));
         }
         for node in first..self.network.nodes.len() as u32 {
             self.field.visit(node, &self.network.nodes, &self.nodes);
@@ -144,8 +154,33 @@ impl CrackGrowth {
         HitOutcome::Started(index)
     }
 
-    fn reach(&self, energy: f32) -> f32 {
-        self.params.reach * energy.sqrt()
+    /// How far a hit reaches: further where the border leaves it less room.
+    fn reach(&self, pos: Vec2, energy: f32) -> f32 {
+        let room = markers::room(pos, self.params.reach, self.network.extent());
+        self.params.reach * energy.sqrt() * (1.0 + MORE_REACH * (1.0 - room))
+    }
+
+    /// The first segment of each arm of a hit. What else is around the hit is left to them.
+    fn branch_out(&mut self, start: u32, directions: Vec<Vec2>) {
+        let pos = self.network.nodes[start as usize].pos;
+        let born = self.network.nodes.len();
+        for direction in directions {
+            let to = pos + self.params.direct(direction) * self.params.step_length;
+            let is_inside = to.cmpge(Vec2::ZERO).all() && to.cmple(self.network.extent()).all();
+            if !is_inside || self.room() == 0 {
+                continue;
+            }
+            if self.arrest.is_some() {
+                self.extend(start, to, false);
+            } else {
+                self.bear(to, start, 1, self.network.nodes[start as usize].impact, 1.0);
+            }
+        }
+        if self.network.nodes.len() > born + 1
+            && let Some(arrest) = &mut self.arrest
+        {
+            arrest.seal(start);
+        }
     }
 
     fn populate(&mut self, impact: u32, center: Vec2, inner: f32, outer: f32) {
@@ -253,10 +288,10 @@ impl CrackGrowth {
         }
     }
 
-    /// Widens the cracks of an impact that was hit again: by the fourth root of the energy that it has gathered, up to twice.
+    /// Widens the cracks of an impact that was hit again, as if all had come at once.
     fn widen(&mut self, impact: u32) {
-        let Impact { energy, first_energy, widening, .. } = self.impacts[impact as usize];
-        let wider = (energy / first_energy).sqrt().sqrt().min(2.0);
+        let Impact { energy, widening, .. } = self.impacts[impact as usize];
+        let wider = self::widening(energy);
         // In steps that can be seen, so that a thousand little hits do not repaint it all a thousand times.
         if wider < 1.05 * widening {
             return;
@@ -289,11 +324,7 @@ impl CrackGrowth {
             // Out of the crack, however wide it is.
             let way_out = length.max(0.5 * (node.width + length));
             for way in [across, -across] {
-                let born = self.network.nodes.len();
-                self.extend(index, node.pos + way * way_out, false);
-                if let Some(child) = self.network.nodes.get_mut(born) {
-                    child.impact = impact;
-                }
+                self.extend_of(impact, index, node.pos + way * way_out, false);
             }
             if self.network.nodes.len() > first {
                 break;

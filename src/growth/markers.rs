@@ -232,6 +232,54 @@ fn by_energy(count: u32, energy: f32, most: u32) -> u32 {
 /// Rings of a crushed core.
 const CORE_RINGS: u32 = 3;
 
+/// Directions in which the room around a hit is measured.
+const DIRECTIONS: usize = 64;
+
+/// How much of `reach` there is on the surface in each direction from `center`, 0..=1.
+fn rooms(center: Vec2, reach: f32, extent: Vec2) -> [f32; DIRECTIONS] {
+    std::array::from_fn(|i| {
+        let way = ops::unit(TAU * i as f32 / DIRECTIONS as f32);
+        let to_border = |center: f32, way: f32, extent: f32| match way {
+            way if way > 1e-6 => (extent - center) / way,
+            way if way < -1e-6 => -center / way,
+            _ => f32::INFINITY,
+        };
+        let far = to_border(center.x, way.x, extent.x).min(to_border(center.y, way.y, extent.y));
+        (far / reach).clamp(0.0, 1.0)
+    })
+}
+
+/// Share of the surroundings of a hit that lies on the surface, 0..=1.
+pub(super) fn room(center: Vec2, reach: f32, extent: Vec2) -> f32 {
+    rooms(center, reach, extent).iter().sum::<f32>() / DIRECTIONS as f32
+}
+
+/// The directions of the arms of a hit: spread evenly, each a little off its place, over those in which there is room.
+pub(super) fn arms(count: u32, (center, energy): (Vec2, f32), reach: f32, extent: Vec2, seed: u64) -> Vec<Vec2> {
+    let mut rng = Rng::new(seed).stream("arms");
+    let rooms = rooms(center, reach, extent);
+    // An arm that has hardly any room would not be seen.
+    let weights = rooms.map(|room| if room < 0.12 { 1e-4 } else { room });
+    let total: f32 = weights.iter().sum();
+    let share = 0.45 + 0.55 * rooms.iter().sum::<f32>() / DIRECTIONS as f32;
+    let count = ops::powf(energy, 1.0 / 3.0) * count as f32 * share;
+    let count = ((count + 0.5) as u32).clamp(2, 1024);
+    let turn = rng.unit();
+    let angle = |place: f32| {
+        // The direction before which so much of the room lies.
+        let mut left = place.rem_euclid(1.0) * total;
+        for (i, weight) in weights.iter().enumerate() {
+            if left < *weight {
+                return TAU * (i as f32 - 0.5 + left / weight) / DIRECTIONS as f32;
+            }
+            left -= weight;
+        }
+        0.0
+    };
+    let mut places = (0..count).map(|i| (i as f32 + turn + 0.3 * rng.signed()) / count as f32).collect::<Vec<_>>();
+    places.iter_mut().map(|place| ops::unit(angle(*place))).collect()
+}
+
 /// The places of the first nodes of a hit.
 pub(super) fn starts(
     layout: StartLayout,
@@ -245,7 +293,7 @@ pub(super) fn starts(
         (0..count).map(|_| center + ops::unit(TAU * rng.unit()) * (radius * rng.unit().sqrt())).collect::<Vec<_>>()
     };
     let mut places = match layout {
-        StartLayout::Point => vec![center],
+        StartLayout::Point | StartLayout::Arms { .. } => vec![center],
         StartLayout::Points { count } => {
             let mut places = scatter(((count as f32 * energy).ceil() as u32).clamp(1, 1024), reach);
             places[0] = center;

@@ -43,7 +43,6 @@ mod markers;
 mod nodes;
 mod params;
 mod pull;
-mod spurs;
 mod step;
 #[cfg(test)]
 mod tests;

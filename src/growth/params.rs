@@ -61,6 +61,12 @@ pub enum StartLayout {
         /// Nodes at energy 1, 1..=1024.
         count: u32,
     },
+    /// One node at the hit and a segment from it for each of `count` arms, in proportion to the cube root of the energy, spread over the
+    /// directions in which there is room: fewer where the border is near.
+    Arms {
+        /// Arms at energy 1, 1..=1024.
+        count: u32,
+    },
     /// `count` nodes evenly on a circle around the hit.
     Ring {
         /// 1..=1024.
@@ -113,20 +119,18 @@ pub struct GrowthParams {
     pub starts: StartLayout,
     /// Width of a crack at its tip. Pattern units, 0.0005..=0.2.
     pub line_width: f32,
-    /// How fast width grows with what hangs on a node; 0 = constant. 0..=16.
+    /// How fast width grows with what hangs on a node; 0 = not at all. With `n` nodes behind it, itself included, a node is
+    /// `1 + line_growth (n^(1/murray) - 1)` times as wide as [`line_width`](Self::line_width). 0..=16.
     pub line_growth: f32,
-    /// Exponent of the pipe model: a node with `n` nodes behind it is as wide as `n^(1/murray)` tips. 1..=8.
+    /// Exponent of the pipe model: at a `line_growth` of 1 a node with `n` nodes behind it is as wide as `n^(1/murray)` tips. 1..=8.
     pub murray: f32,
-    /// The widest that what hangs on it makes a crack. Pattern units, at least `line_width`, at most 0.4. Hammering on the
-    /// same spot makes it up to twice as wide.
+    /// The widest that what hangs on it makes a crack at energy 1. Pattern units, at least `line_width`, at most 0.4. All widths go with the
+    /// fourth root of the energy: 16 makes them twice as wide.
     pub max_width: f32,
-    /// How much narrower free ends are, 0..=0.9, as a share; over the last few nodes.
+    /// Segments over which a free end narrows to a needle; an end that meets another crack does not. 0 = it is as wide as `line_width`. 0..=64.
     pub tip_taper: f32,
-    /// How much the width varies along a crack, 0..=0.9, as a share of it.
+    /// How much the width varies along a crack, 0..=0.9: it is by up to this share narrower than without.
     pub unevenness: f32,
-    /// Share of the length of thin cracks at which they are hairlines, too fine to be seen from afar, 0..=0.6: pictures of them fall
-    /// into pieces there, while the network goes on. Wide cracks have fewer.
-    pub hairlines: f32,
     /// How much a crack keeps its direction, against the pull of the markers: 0 = not at all, 1 = as much as it follows them. In
     /// what a [mask](crate::pattern::CrackMask) marks as weak it keeps less of it, or none: there the joint leads. 0..=8. With polar
     /// markers and [`arrest`](Self::arrest) cracks are rays then: they follow what lies within 20 degrees of their way and of that from the hit,
@@ -157,17 +161,12 @@ pub struct GrowthParams {
     pub arrest: f32,
     /// Share of tips that stop short of the crack that they would have met, 0..=1.
     pub open_ends: f32,
-    /// Share of nodes beside which a short side crack starts that ends by itself, 0..=1: 0.55 to 1.1 segments long, 53 to 90 degrees
-    /// off, only where no other crack is near.
-    pub spurs: f32,
     /// Cracks that begin by themselves where markers are out of every crack's reach: how many for each step of growth, 0..=64.
     /// They come late, so they end at the older ones.
     pub nucleation: f32,
-    /// How much one surface differs from the next, by its seed: roughness, the spacing of markers, the number of starts and
-    /// of free ends, the axis. 0 = not at all; at 1 each differs by a factor of about 2 either way. 0..=1.
+    /// How much one surface differs from the next, by its seed: widths, roughness, the spacing of markers, the number of starts and
+    /// of free ends, the axis. 0 = not at all; at 1 each differs by a factor of up to 2 either way, mostly much less. 0..=1.
     pub variety: f32,
-    /// How much widths alone differ from one surface to the next; as [`variety`](Self::variety). 0..=1.
-    pub width_variety: f32,
     /// Whether the markers themselves are drawn.
     pub draw_markers: bool,
     /// The most nodes that a surface has at once, 1..=1000000. In the engine a hit for which less than a quarter of them is left freezes
@@ -193,9 +192,8 @@ impl GrowthParams {
         line_growth: 0.4,
         murray: 3.0,
         max_width: 0.03,
-        tip_taper: 0.0,
+        tip_taper: 4.0,
         unevenness: 0.0,
-        hairlines: 0.0,
         inertia: 0.0,
         axis: 0.0,
         directed: 0.0,
@@ -208,11 +206,9 @@ impl GrowthParams {
         draw_islands: false,
         island_distance: 0.03,
         open_ends: 0.0,
-        spurs: 0.0,
         arrest: 0.0,
         nucleation: 0.0,
         variety: 0.0,
-        width_variety: 0.0,
         draw_markers: false,
         max_nodes: 20_000,
     };
@@ -296,9 +292,8 @@ impl GrowthParams {
         line_growth: f32 = 0.0, 16.0;
         murray: f32 = 1.0, 8.0;
         max_width: f32 = 0.0005, 0.4;
-        tip_taper: f32 = 0.0, 0.9;
+        tip_taper: f32 = 0.0, 64.0;
         unevenness: f32 = 0.0, 0.9;
-        hairlines: f32 = 0.0, 0.6;
         inertia: f32 = 0.0, 8.0;
         axis: f32 = -7.0, 7.0;
         directed: f32 = 0.0, 1.0;
@@ -309,11 +304,9 @@ impl GrowthParams {
         connection_every: u32 = 1.0, 1000.0;
         island_distance: f32 = 0.0, 1.0;
         open_ends: f32 = 0.0, 1.0;
-        spurs: f32 = 0.0, 1.0;
         arrest: f32 = 0.0, 1.0;
         nucleation: f32 = 0.0, 64.0;
         variety: f32 = 0.0, 1.0;
-        width_variety: f32 = 0.0, 1.0;
         max_nodes: u32 = 1.0, 1_000_000.0;
     }
 
@@ -337,7 +330,9 @@ impl GrowthParams {
         };
         let starts: &[_] = match self.starts {
             StartLayout::Point => &[],
-            StartLayout::Points { count } => &[("start_count", f64::from(count), 1.0, 1024.0)],
+            StartLayout::Points { count } | StartLayout::Arms { count } => {
+                &[("start_count", f64::from(count), 1.0, 1024.0)]
+            }
             StartLayout::Ring { count, radius }
             | StartLayout::Crushed { count, radius }
             | StartLayout::Disc { count, radius } => {
@@ -362,7 +357,7 @@ impl GrowthParams {
     /// Sets one parameter from text, by the name of its field or by the paper's own (`D`).
     ///
     /// Besides the fields: `markers` (`grid`, `darts`, `polar`), `occupancy`, `jitter`, `spacing`, `sectors`, `rings`,
-    /// `ring_growth` of the present layout; `venation` (`open`, `closed`), `starts` (`point`, `points`, `ring`, `crushed`, `disc`), `start_count`, `start_radius`.
+    /// `ring_growth` of the present layout; `venation` (`open`, `closed`), `starts` (`point`, `points`, `arms`, `ring`, `crushed`, `disc`), `start_count`, `start_radius`.
     ///
     /// ```
     /// use bevy_crack::growth::GrowthParams;
@@ -407,6 +402,7 @@ impl GrowthParams {
                 self.starts = match text {
                     "point" => StartLayout::Point,
                     "points" => StartLayout::Points { count: 8 },
+                    "arms" => StartLayout::Arms { count: 5 },
                     "ring" => StartLayout::Ring { count: 12, radius: 0.02 },
                     "crushed" => StartLayout::Crushed { count: 16, radius: 0.02 },
                     "disc" => StartLayout::Disc { count: 12, radius: 0.03 },
@@ -427,6 +423,7 @@ impl GrowthParams {
                 "start_count",
                 _,
                 StartLayout::Points { count }
+                | StartLayout::Arms { count }
                 | StartLayout::Ring { count, .. }
                 | StartLayout::Crushed { count, .. }
                 | StartLayout::Disc { count, .. },
@@ -490,7 +487,7 @@ impl GrowthParams {
             MarkerLayout::Polar { .. } => {}
         }
         match &mut scaled.starts {
-            StartLayout::Point | StartLayout::Points { .. } => {}
+            StartLayout::Point | StartLayout::Points { .. } | StartLayout::Arms { .. } => {}
             StartLayout::Ring { radius, .. }
             | StartLayout::Crushed { radius, .. }
             | StartLayout::Disc { radius, .. } => length(radius, 0.0, 1.0),
@@ -503,13 +500,12 @@ impl GrowthParams {
     #[must_use]
     pub fn varied(&self, seed: u64) -> Self {
         let mut varied = self.clone();
-        if self.variety <= 0.0 && self.width_variety <= 0.0 {
+        if self.variety <= 0.0 {
             return varied;
         }
         let mut rng = Rng::new(seed).stream("variety");
-        let mut factor = |variety: f32| ops::exp(variety * 0.7 * (rng.signed() + rng.signed()));
-        let width = factor(self.width_variety);
-        let [rough, stray, spacing, starts, free] = [self.variety; 5].map(factor);
+        let [width, rough, stray, spacing, starts, free] =
+            [self.variety; 6].map(|variety| ops::exp(variety * 0.35 * (rng.signed() + rng.signed())));
         varied.line_width = (self.line_width * width).clamp(0.0005, 0.2);
         varied.max_width = (self.max_width * width).clamp(varied.line_width, 0.4);
         varied.roughness = (self.roughness * rough).min(0.5);
@@ -533,6 +529,7 @@ impl GrowthParams {
         match &mut varied.starts {
             StartLayout::Point => {}
             StartLayout::Points { count: n }
+            | StartLayout::Arms { count: n }
             | StartLayout::Ring { count: n, .. }
             | StartLayout::Crushed { count: n, .. }
             | StartLayout::Disc { count: n, .. } => {
@@ -547,8 +544,7 @@ impl GrowthParams {
     /// Each new node either kills a marker or brings one closer by at least `D²/4` of squared distance, and no marker
     /// begins further than [`crack_radius`](Self::crack_radius) from the node that it attracts. With closed venation a marker
     /// attracts no more than six nodes at once, and for no longer than twice as many steps. With arrest a marker counts for each
-    /// time that it may be given up, every node may be a tip that runs on, and with nucleation every marker a start;
-    /// each node may have a spur.
+    /// time that it may be given up, every node may be a tip that runs on, and with nucleation every marker a start.
     #[must_use]
     pub fn most_nodes(&self, markers: u64, starts: u64) -> u64 {
         let approaches = ((self.crack_radius / self.step_length).powi(2) / PROGRESS).ceil() as u64;
@@ -557,11 +553,10 @@ impl GrowthParams {
             births = 6 * markers * u64::from(super::closed::patience(self));
         }
         let starts = starts + if self.nucleation > 0.0 { markers } else { 0 };
-        let each = if self.spurs > 0.0 { 2 } else { 1 };
         if self.arrest <= 0.0 {
-            return each * (starts + births);
+            return starts + births;
         }
         let run = u64::from(super::arrest::steps_for(self.arrest.max(self.island_distance), self.step_length)) + 2;
-        each * (starts + births * u64::from(super::field::MOST_GIVEN_UP)) * (1 + run)
+        (starts + births * u64::from(super::field::MOST_GIVEN_UP)) * (1 + run)
     }
 }

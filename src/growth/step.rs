@@ -190,7 +190,7 @@ impl CrackGrowth {
     fn bear_thin(&mut self, pos: Vec2, parent: u32, generation: u32, impact: u32, bend: f32) {
         let node = self.network.nodes.len() as u64;
         let wider = self.impacts.get(impact as usize).map_or(1.0, |impact| impact.widening);
-        let width = self.widths.tip(parent, |what| hash_unit(self.seed ^ what, node), wider);
+        let width = self.widths.tip(parent, || hash_unit(self.seed ^ 0x1D, node), wider);
         if let Some(arrest) = &mut self.arrest {
             arrest.push_node(false);
         }
@@ -274,12 +274,12 @@ impl CrackGrowth {
         for node in first..last {
             self.field.visit(node, &self.network.nodes, &self.nodes);
         }
-        // They attract nothing.
-        self.spur(first..last);
-        self.newborn = first..self.network.nodes.len() as u32;
         self.join_newborn();
         if first == last && !any_stopped && !self.arrest.as_ref().is_some_and(Arrest::is_running) {
             self.steps_left = 0;
+        }
+        if self.steps_left == 0 {
+            self.widen_with(|widths, nodes, widened| widths.settle(nodes, widened));
         }
     }
 
@@ -364,8 +364,9 @@ impl CrackGrowth {
             let nodes = &self.network.nodes;
             if a != b && nodes[a as usize].parent != b && nodes[b as usize].parent != a && !self.stays_open(b) {
                 let width = nodes[a as usize].width.min(nodes[b as usize].width);
-                self.widen_end(b);
-                self.link(Link { a, b, width, birth: self.steps, kind: LinkKind::Meeting, bend: 1.0 });
+                if self.link(Link { a, b, width, birth: self.steps, kind: LinkKind::Meeting, bend: 1.0 }) {
+                    self.widen_end(b);
+                }
             }
         }
         if self.params.draw_connections {
@@ -381,8 +382,10 @@ impl CrackGrowth {
                 }
                 if self.arrest.is_some() {
                     self.run_on(tip, self.params.island_distance);
-                } else if let Some(link) = links::island(&self.params, &self.network, &self.nodes, tip) {
-                    self.link(link);
+                } else if let Some(link) = links::island(&self.params, &self.network, &self.nodes, tip)
+                    && self.link(link)
+                {
+                    self.widen_end(tip);
                 }
             }
         }

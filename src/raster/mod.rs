@@ -103,9 +103,10 @@ pub struct Profile {
     pub rim_width: f32,
     /// Depth of the rim where it meets the crack, falling to 0 outward. Range 0..=1; default 0.
     pub rim_depth: f32,
-    /// How far lines thinner than a texel fade: 0 = by their width, 1 = not at all. Range 0..=1; default 0.
+    /// How slowly lines thinner than a texel fade: they are full down to a width of `1 - faintest` texels, and fade by their width
+    /// from there: 0 = they cover as much as they are wide. Range 0..=1; default 0.
     ///
-    /// Keeps fine cracks visible on small pictures.
+    /// Keeps fine cracks visible on small pictures; the ends of needles fade all the same.
     pub faintest: f32,
 }
 

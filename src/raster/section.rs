@@ -38,8 +38,8 @@ pub(super) struct Section {
     rim: f32,
     pub(super) rim_depth: f32,
     pub(super) inv_rim: f32,
-    /// The least share of its depth that a thin line keeps.
-    faintest: f32,
+    /// What a texel of half width adds to the share of its depth that a thin line has.
+    strength: f32,
 }
 
 /// The cross-section where the half width is known.
@@ -66,7 +66,7 @@ impl Section {
             rim,
             rim_depth: if rim > 0.0 { at_door(profile.rim_depth, 1.0) } else { 0.0 },
             inv_rim: 1.0 / max(rim, 1.0),
-            faintest: at_door(profile.faintest, 1.0),
+            strength: 2.0 / max(1.0 - at_door(profile.faintest, 1.0), 1.0e-3),
         }
     }
 
@@ -78,7 +78,7 @@ impl Section {
             rim: 0.0,
             rim_depth: 0.0,
             inv_rim: 1.0,
-            faintest: 0.0,
+            strength: 2.0,
         }
     }
 
@@ -91,7 +91,7 @@ impl Section {
             reach: core + 0.5,
             inv_wall: 1.0 / (1.0 + self.wall * core),
             rim_reach: r + self.rim,
-            scale: 65535.0 * min(max(2.0 * r, self.faintest), 1.0),
+            scale: 65535.0 * min(self.strength * r, 1.0),
         }
     }
 

@@ -6,12 +6,12 @@
 //! ```text
 //! core = peak(r) * clamp((r + 1/2 - d) / (1 + wall * r), 0, 1)
 //! rim  = rim_depth * clamp((r + rim - d) / max(rim, 1), 0, 1)
-//! depth = max(core, rim) * clamp(2 r, faintest, 1)
+//! depth = max(core, rim) * min(2 r / (1 - faintest), 1)
 //! ```
 //!
 //! The core is a slot whose edge is one texel soft (`wall` 0) up to a V (`wall` 1). Lines thinner than a texel keep the
 //! cross-section of one texel (`r` = 1/2 in `core`) and only get fainter, by the last factor: a line 0.3 texels wide
-//! covers 0.3 texels of area wherever it lies between the texel centres, and is never dotted.
+//! covers 0.3 texels of area (`faintest` 0) wherever it lies between the texel centres, and is never dotted. A needle fades out.
 //!
 //! The value depends on the texel and the capsule alone, and grows with `r`: stamps may come in any order.
 
@@ -427,7 +427,8 @@ mod tests {
         let core = peak * ((shown + 0.5 - d) / (1.0 + f64::from(profile.wall) * shown)).clamp(0.0, 1.0);
         let rim = f64::from(profile.rim_width) * unit;
         let edge = if rim > 0.0 { ((r + rim - d) / rim.max(1.0)).clamp(0.0, 1.0) } else { 0.0 };
-        65535.0 * core.max(f64::from(profile.rim_depth) * edge) * (2.0 * r).clamp(f64::from(profile.faintest), 1.0)
+        let strength = (2.0 * r / (1.0 - f64::from(profile.faintest)).max(1.0e-3)).min(1.0);
+        65535.0 * core.max(f64::from(profile.rim_depth) * edge) * strength
     }
 
     #[test]

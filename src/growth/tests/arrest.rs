@@ -13,7 +13,7 @@ use glam::{UVec2, Vec2};
 use std::sync::Arc;
 
 /// Random parameters with arrest.
-fn random_arrest(rng: &mut Rng) -> GrowthParams {
+pub(super) fn random_arrest(rng: &mut Rng) -> GrowthParams {
     let params = random_params(rng, true);
     let step_length = rng.range(0.012, 0.05);
     let crack_radius = rng.range(0.08, 0.6).max(2.0 * step_length);
@@ -28,14 +28,12 @@ fn random_arrest(rng: &mut Rng) -> GrowthParams {
         open_ends: if rng.unit() < 0.5 { 0.0 } else { rng.unit() },
         // A crack that strays by more at every node has no direction that another could meet steeply.
         wander: params.wander.min(0.5),
-        tip_taper: 0.9 * rng.unit(),
+        tip_taper: 9.0 * rng.unit(),
         unevenness: 0.9 * rng.unit(),
         axis: 3.0 * rng.signed(),
         directed: if rng.unit() < 0.5 { 0.0 } else { rng.unit() },
         reach: rng.range(0.3, 1.5),
         max_nodes: 3000,
-        spurs: if rng.unit() < 0.7 { 0.0 } else { 0.4 * rng.unit() },
-        hairlines: 0.6 * rng.unit(),
         ..params
     }
 }

@@ -2,7 +2,7 @@
 
 mod arrest;
 mod reference;
-mod side;
+mod widths;
 
 use super::{CrackGrowth, GrowthParams, HitOutcome, MAX_ENERGY, MarkerLayout, Rejected, StartLayout, Venation};
 use crate::{
@@ -64,17 +64,14 @@ fn random_params(rng: &mut Rng, small: bool) -> GrowthParams {
         arrest: 0.0,
         venation: Venation::Open,
         nucleation: 0.0,
-        tip_taper: 0.0,
+        tip_taper: if rng.unit() < 0.3 { 0.0 } else { 12.0 * rng.unit() },
         unevenness: 0.0,
-        hairlines: 0.0,
         inertia: 0.0,
         axis: 0.0,
         directed: 0.0,
         variety: 0.0,
-        width_variety: 0.0,
         draw_markers: rng.unit() < 0.2,
         max_nodes: 1_000_000,
-        spurs: if small || rng.unit() < 0.5 { 0.0 } else { rng.unit() },
     };
     params.validate().expect("random parameters are valid");
     params
@@ -225,7 +222,7 @@ fn invariants_of_the_network() {
         for (index, node) in growth.network().nodes().iter().enumerate() {
             assert!(node.parent == NO_PARENT || (node.parent as usize) < index, "case {case}: no cycles");
             assert!(node.pos.cmpge(Vec2::ZERO).all() && node.pos.cmple(extent).all(), "case {case}: {node:?}");
-            assert!(node.width >= params.line_width && node.width <= params.max_width.max(params.line_width));
+            assert!(node.width > 0.0 && node.width <= params.max_width.max(params.line_width));
             if node.parent != NO_PARENT {
                 let parent = growth.network().nodes()[node.parent as usize];
                 assert_eq!(node.generation, parent.generation + 1);
