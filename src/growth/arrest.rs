@@ -2,10 +2,11 @@
 
 use super::{
     CrackGrowth, MarkerLayout, StartLayout,
+    pull::turned_at_most,
     walls::{Walls, crosses_itself},
 };
 use crate::math::hash_unit;
-use crate::pattern::{Link, LinkKind, NO_PARENT, Network, PathPoint, SegmentId, SegmentPath};
+use crate::pattern::{Link, LinkKind, NO_PARENT, Network, Node, PathPoint, SegmentId, SegmentPath};
 use glam::Vec2;
 
 /// Shares of the roughness that a line is tried with, until it touches no other.
@@ -128,7 +129,13 @@ impl CrackGrowth {
         let reach = self.params.arrest.max(TURN * length);
         // A ray turns to nothing: it runs straight on until it touches what is in its way.
         let goal = if self.are_rays() { None } else { self.goal_ahead(from, heading, reach, AHEAD) };
-        match goal {
+        // A crack that has turned already does not turn further.
+        let last = self.heading_of(from);
+        let is_ahead = |goal: Goal| {
+            let way = self.place_of(goal) - pos;
+            last == Vec2::ZERO || way.dot(last) >= AHEAD * way.length()
+        };
+        match goal.filter(|&(_, goal)| is_ahead(goal)) {
             None => {}
             Some((_, Goal::Node(_))) if self.stays_open(from) => {
                 self.seal(from);
@@ -139,7 +146,7 @@ impl CrackGrowth {
                 return Advance::Stopped(heading);
             }
             Some((_, goal)) => {
-                let to = pos + self.turned(pos, heading, goal) * length;
+                let to = pos + turned_at_most(last, self.turned(pos, heading, goal)) * length;
                 let Some(tip) = self.extend(from, to, true) else { return Advance::Stopped(heading) };
                 self.run(Runner { tip, goal, steps_left: steps_for(reach, length) });
                 return Advance::Grown;
@@ -210,14 +217,11 @@ impl CrackGrowth {
 
     fn advance_runner(&mut self, mut runner: Runner) -> Option<Runner> {
         let node = self.network.nodes[runner.tip as usize];
-        let heading = match self.network.nodes.get(node.parent as usize) {
-            Some(parent) => (node.pos - parent.pos).normalize_or_zero(),
-            None => Vec2::ZERO,
-        };
+        let heading = self.heading_of(runner.tip);
         let length = self.params.step_length;
         let mut distance = self.place_of(runner.goal).distance(node.pos);
         // A crack that has come nearer is met sooner.
-        if let Some((nearer, goal)) = self.goal_ahead(runner.tip, heading, distance, 0.3) {
+        if let Some((nearer, goal)) = self.goal_ahead(runner.tip, heading, distance, AHEAD) {
             (distance, runner.goal) = (nearer, goal);
         }
         if distance <= LAST * length {
@@ -225,9 +229,15 @@ impl CrackGrowth {
             return None;
         }
         runner.steps_left = runner.steps_left.checked_sub(1)?;
-        let to = node.pos + self.turned(node.pos, heading, runner.goal) * length;
+        let to = node.pos + turned_at_most(heading, self.turned(node.pos, heading, runner.goal)) * length;
         runner.tip = self.extend(runner.tip, to, true)?;
         Some(runner)
+    }
+
+    /// The direction of the segment to a node; zero for a start.
+    pub(super) fn heading_of(&self, node: u32) -> Vec2 {
+        let Node { pos, parent, .. } = self.network.nodes[node as usize];
+        self.network.nodes.get(parent as usize).map_or(Vec2::ZERO, |parent| (pos - parent.pos).normalize_or_zero())
     }
 
     fn place_of(&self, goal: Goal) -> Vec2 {

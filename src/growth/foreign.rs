@@ -78,6 +78,7 @@ impl CrackGrowth {
         }
         self.nodes.push(node.pos);
         self.pull_of.push(NO_PULL);
+        self.courses.push(Vec2::ZERO);
         self.changes.push_node(node.parent);
         self.network.nodes.push(node);
     }

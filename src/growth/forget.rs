@@ -56,6 +56,7 @@ impl CrackGrowth {
         self.widths.forget(&self.network.nodes);
         self.linker.forget(forgotten);
         self.pull_of.drain(..first);
+        self.courses.drain(..first);
         self.unshown = self.unshown.iter().filter_map(|&node| number(node)).collect();
         self.newborn = self.newborn.start.saturating_sub(forgotten)..self.newborn.end.saturating_sub(forgotten);
         if let Some(before) = self.arrest.take() {

@@ -23,7 +23,7 @@ const WIDE: f32 = 0.1;
 const FEW_NODES: usize = 64;
 
 /// How much further a hit reaches, as a share, where it has next to no room.
-const MORE_REACH: f32 = 0.4;
+const MORE_REACH: f32 = 1.4;
 
 /// How many times wider the cracks of an impact are than those of one of energy 1.
 fn widening(energy: f32) -> f32 {
@@ -139,7 +139,7 @@ impl CrackGrowth {
         } else if matches!(self.params.starts, StartLayout::Crushed { .. }) {
             self.crush(first);
         } else if let StartLayout::Arms { count } = self.params.starts {
-            self.branch_out(first, markers::arms(count, (pos, energy), reach, extent, seed));
+            self.branch_out(first, markers::arms(count, (pos, energy), self.params.reach, extent, seed));
         }
         for node in first..self.network.nodes.len() as u32 {
             self.field.visit(node, &self.network.nodes, &self.nodes);
@@ -165,15 +165,21 @@ impl CrackGrowth {
         let pos = self.network.nodes[start as usize].pos;
         let born = self.network.nodes.len();
         for direction in directions {
-            let to = pos + self.params.direct(direction) * self.params.step_length;
-            let is_inside = to.cmpge(Vec2::ZERO).all() && to.cmple(self.network.extent()).all();
-            if !is_inside || self.room() == 0 {
-                continue;
-            }
-            if self.arrest.is_some() {
-                self.extend(start, to, false);
-            } else {
-                self.bear(to, start, 1, self.network.nodes[start as usize].impact, 1.0);
+            // Where another is too near, a little further on.
+            for turn in [0.0f32, 0.15, -0.15, 0.3, -0.3] {
+                let direction = direction + direction.perp() * turn;
+                let to = pos + self.params.direct(direction).normalize_or(direction) * self.params.step_length;
+                let is_inside = to.cmpgt(Vec2::ZERO).all() && to.cmplt(self.network.extent()).all();
+                if !is_inside || self.room() == 0 {
+                    continue;
+                }
+                if self.arrest.is_none() {
+                    self.bear(to, start, 1, self.network.nodes[start as usize].impact, 1.0);
+                    break;
+                }
+                if self.extend(start, to, false).is_some() {
+                    break;
+                }
             }
         }
         if self.network.nodes.len() > born + 1
@@ -226,6 +232,7 @@ impl CrackGrowth {
         self.nodes.reserve(expected);
         self.widths.reserve(expected);
         self.pull_of.reserve(expected);
+        self.courses.reserve(expected);
         self.changes.reserve(expected);
         self.timeline.reserve(expected);
         if let Some(arrest) = &mut self.arrest {

@@ -235,6 +235,9 @@ const CORE_RINGS: u32 = 3;
 /// Directions in which the room around a hit is measured.
 const DIRECTIONS: usize = 64;
 
+/// Directions to either side of an arm in which there should be as much room as on its way: 17 degrees.
+const BESIDE: usize = 3;
+
 /// How much of `reach` there is on the surface in each direction from `center`, 0..=1.
 fn rooms(center: Vec2, reach: f32, extent: Vec2) -> [f32; DIRECTIONS] {
     std::array::from_fn(|i| {
@@ -258,12 +261,15 @@ pub(super) fn room(center: Vec2, reach: f32, extent: Vec2) -> f32 {
 pub(super) fn arms(count: u32, (center, energy): (Vec2, f32), reach: f32, extent: Vec2, seed: u64) -> Vec<Vec2> {
     let mut rng = Rng::new(seed).stream("arms");
     let rooms = rooms(center, reach, extent);
-    // An arm that has hardly any room would not be seen.
-    let weights = rooms.map(|room| if room < 0.12 { 1e-4 } else { room });
+    // An arm that has hardly any room would not be seen, one that runs along the border would soon run into it.
+    let weights: [f32; DIRECTIONS] = std::array::from_fn(|i| {
+        let beside = (0..=2 * BESIDE).map(|k| rooms[(i + DIRECTIONS + k - BESIDE) % DIRECTIONS]);
+        beside.fold(1.0, f32::min).powi(2) + 1e-4
+    });
     let total: f32 = weights.iter().sum();
-    let share = 0.45 + 0.55 * rooms.iter().sum::<f32>() / DIRECTIONS as f32;
+    let share = 0.65 + 0.35 * rooms.iter().sum::<f32>() / DIRECTIONS as f32;
     let count = ops::powf(energy, 1.0 / 3.0) * count as f32 * share;
-    let count = ((count + 0.5) as u32).clamp(2, 1024);
+    let count = ((count + 0.5 + 0.55 * rng.signed()) as u32).clamp(2, 1024);
     let turn = rng.unit();
     let angle = |place: f32| {
         // The direction before which so much of the room lies.
@@ -276,7 +282,7 @@ pub(super) fn arms(count: u32, (center, energy): (Vec2, f32), reach: f32, extent
         }
         0.0
     };
-    let mut places = (0..count).map(|i| (i as f32 + turn + 0.3 * rng.signed()) / count as f32).collect::<Vec<_>>();
+    let mut places = (0..count).map(|i| (i as f32 + turn + 0.2 * rng.signed()) / count as f32).collect::<Vec<_>>();
     places.iter_mut().map(|place| ops::unit(angle(*place))).collect()
 }
 

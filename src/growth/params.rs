@@ -111,7 +111,7 @@ pub struct GrowthParams {
     pub markers: MarkerLayout,
     /// How cracks share the markers.
     pub venation: Venation,
-    /// How much denser markers are near the hit: 0 = even, 4 = nearly all in the inner half. 0..=4.
+    /// How much denser markers and forks are near the hit: 0 = even, 4 = nearly all in the inner half. 0..=4.
     pub focus: f32,
     /// Radius around a hit of energy 1 that markers populate; grows with the root of the energy. Pattern units, 0.01..=64.
     pub reach: f32,
@@ -140,8 +140,16 @@ pub struct GrowthParams {
     pub axis: f32,
     /// How much they keep to [`axis`](Self::axis): 0 = not at all, 1 = nearly straight along it. 0..=1.
     pub directed: f32,
-    /// How much the direction of growth strays at each node, radians, 0..=1.
+    /// How much the direction of growth strays, radians, 0..=1.
     pub wander: f32,
+    /// Size of the grains that cracks go round: within each a crack runs straight, and at its border it kinks by up to twice
+    /// [`wander`](Self::wander). Pattern units, 0..=1; 0 = none, cracks stray at every node.
+    pub grain: f32,
+    /// Share of nodes at which a tip forks, 0..=1: a side branch sets out ahead, if markers lie there; [`focus`](Self::focus) makes
+    /// forks rarer away from the hit, as it does markers. Only with [`arrest`](Self::arrest).
+    pub forks: f32,
+    /// Angle between the two ways of a fork, radians, 0.2..=1.6; each by up to a quarter more or less.
+    pub fork_angle: f32,
     /// How rough the line between two nodes is, as a share of its length, 0..=0.5.
     pub roughness: f32,
     /// Whether nodes born of the same parent generation are joined (the rings of glass).
@@ -198,6 +206,9 @@ impl GrowthParams {
         axis: 0.0,
         directed: 0.0,
         wander: 0.1,
+        grain: 0.0,
+        forks: 0.0,
+        fork_angle: 0.7,
         roughness: 0.12,
         draw_connections: false,
         connection_gaps: 0.3,
@@ -298,6 +309,9 @@ impl GrowthParams {
         axis: f32 = -7.0, 7.0;
         directed: f32 = 0.0, 1.0;
         wander: f32 = 0.0, 1.0;
+        grain: f32 = 0.0, 1.0;
+        forks: f32 = 0.0, 1.0;
+        fork_angle: f32 = 0.2, 1.6;
         roughness: f32 = 0.0, 0.5;
         connection_gaps: f32 = 0.0, 1.0;
         chips: f32 = 0.0, 1.0;
@@ -476,6 +490,7 @@ impl GrowthParams {
         length(&mut scaled.max_width, scaled.line_width, 0.4);
         length(&mut scaled.island_distance, 0.0, 1.0);
         length(&mut scaled.arrest, 0.0, 1.0);
+        length(&mut scaled.grain, 0.0, 1.0);
         // So many on the same surface.
         let count = |count: u32| ((count as f32 / by).round() as u32).clamp(1, 512);
         match &mut scaled.markers {
@@ -527,9 +542,8 @@ impl GrowthParams {
             MarkerLayout::Polar { sectors, .. } => *sectors = count(*sectors, 1.0 / spacing, 360),
         }
         match &mut varied.starts {
-            StartLayout::Point => {}
+            StartLayout::Point | StartLayout::Arms { .. } => {}
             StartLayout::Points { count: n }
-            | StartLayout::Arms { count: n }
             | StartLayout::Ring { count: n, .. }
             | StartLayout::Crushed { count: n, .. }
             | StartLayout::Disc { count: n, .. } => {
@@ -544,7 +558,8 @@ impl GrowthParams {
     /// Each new node either kills a marker or brings one closer by at least `D²/4` of squared distance, and no marker
     /// begins further than [`crack_radius`](Self::crack_radius) from the node that it attracts. With closed venation a marker
     /// attracts no more than six nodes at once, and for no longer than twice as many steps. With arrest a marker counts for each
-    /// time that it may be given up, every node may be a tip that runs on, and with nucleation every marker a start.
+    /// time that it may be given up, every node may be a tip that runs on, and with nucleation every marker a start;
+    /// each node may fork.
     #[must_use]
     pub fn most_nodes(&self, markers: u64, starts: u64) -> u64 {
         let approaches = ((self.crack_radius / self.step_length).powi(2) / PROGRESS).ceil() as u64;
@@ -557,6 +572,7 @@ impl GrowthParams {
             return starts + births;
         }
         let run = u64::from(super::arrest::steps_for(self.arrest.max(self.island_distance), self.step_length)) + 2;
-        (starts + births * u64::from(super::field::MOST_GIVEN_UP)) * (1 + run)
+        let each = if self.forks > 0.0 { 2 } else { 1 };
+        each * (starts + births * u64::from(super::field::MOST_GIVEN_UP)) * (1 + run)
     }
 }

@@ -1,8 +1,8 @@
 //! Where growth is pulled to: eq. 2 of Couto et al.
 
-use super::{CrackGrowth, Impact, MarkerLayout, params::PROGRESS};
+use super::{CrackGrowth, Impact, MarkerLayout, StartLayout, changes::Kin, params::PROGRESS};
 use crate::{
-    math::hash_unit,
+    math::{hash_unit, mix, ops},
     pattern::{CrackMask, NO_PARENT, Node},
 };
 use glam::Vec2;
@@ -17,6 +17,15 @@ pub(super) struct Pull {
     closest_sq: f32,
     closest_id: u32,
     pub(super) child: Vec2,
+    /// The way to the child, but for a kink.
+    pub(super) course: Vec2,
+    /// The direction of the segment to the node.
+    heading: Vec2,
+    /// The angle at which the node forks, to the left of its way and to the right, where there are markers for it; 0 if it does not.
+    fork: f32,
+    has_markers: [bool; 2],
+    /// Where the side branch begins.
+    pub(super) side: Option<Vec2>,
     pub(super) serves: bool,
     /// Where nothing grows from the node any more: its markers on that side are given up.
     pub(super) stopped: Option<Vec2>,
@@ -24,6 +33,24 @@ pub(super) struct Pull {
 
 /// Cosine of the angle to its way and to the hit's direction beyond which a marker does not draw a ray with inertia: 20 degrees.
 const ASIDE: f32 = 0.94;
+
+/// The same for the arms of a hit and their side branches: cosine of 60 degrees to their way, and to what that was some segments before.
+const IN_SIGHT: f32 = 0.5;
+
+/// So many segments before.
+const BEFORE: u32 = 8;
+
+/// They may run aside of the hit's direction by the angle of a fork and so much more, or by so much at least; radians.
+const OFF_HIT: (f32, f32) = (0.4, 1.3);
+
+/// Cosine and sine of the most that a crack turns from one segment to the next: 60 degrees.
+const MOST_TURN: (f32, f32) = (0.5, 0.866_025_4);
+
+/// How far off the way of a fork a marker for it may lie, radians.
+const FOR_FORK: f32 = 0.45;
+
+/// Within a grain a crack strays by this much of what it strays from grain to grain.
+const WITHIN_GRAIN: f32 = 0.3;
 
 const FIXED: f32 = 16_777_216.0;
 pub(super) const NO_PULL: u32 = u32::MAX;
@@ -34,19 +61,45 @@ impl CrackGrowth {
         self.arrest.is_some() && self.params.inertia > 0.0 && matches!(self.params.markers, MarkerLayout::Polar { .. })
     }
 
+    /// How far aside a marker may lie that draws a crack, as cosines: of the angle to its way, to that from the hit, and to
+    /// its way some segments before.
+    fn sight(&self) -> Option<[f32; 3]> {
+        let are_arms = self.arrest.is_some()
+            && self.params.inertia > 0.0
+            && matches!(self.params.starts, StartLayout::Arms { .. })
+            && self.mask.is_empty();
+        if self.are_rays() {
+            return Some([ASIDE, ASIDE, -1.0]);
+        }
+        let off_hit = (self.params.fork_angle + OFF_HIT.0).max(OFF_HIT.1);
+        are_arms.then(|| [IN_SIGHT, ops::cos(off_hit), IN_SIGHT])
+    }
+
+    /// The direction of a crack that is on its way in `course` at `pos`: straight within a grain, another one in the next.
+    fn strayed(&self, course: Vec2, pos: Vec2, child: u64) -> Vec2 {
+        // A draw per child, frozen by its index.
+        let mut stray = 2.0 * hash_unit(self.seed ^ 0x57A6, child) - 1.0;
+        if self.params.grain > 0.0 {
+            let cell = (pos / self.params.grain).as_uvec2();
+            let draw = hash_unit(self.seed ^ 0x6A41, u64::from(cell.y) << 32 | u64::from(cell.x));
+            stray = WITHIN_GRAIN * stray + 2.0 * draw - 1.0;
+        }
+        (course + course.perp() * (self.params.wander * stray)).normalize_or_zero()
+    }
+
     /// Collects `S(c)` of every node, and the order of the nodes.
     pub(super) fn gather_pulls(&mut self) {
         self.field.grow_older();
         self.field.sweep();
-        let are_rays = self.are_rays();
-        let Self { field, network, impacts, pulls, ways, pull_of, .. } = self;
+        let sight = self.sight();
+        let Self { field, network, impacts, pulls, ways, courses, pull_of, changes, .. } = self;
         ways.clear();
         field.each_pull(&network.nodes, |index, node, distance_sq| {
             let slot = &mut pull_of[node as usize];
             if *slot == NO_PULL {
                 *slot = pulls.len() as u32;
-                if are_rays {
-                    ways.push(kept(&network.nodes, node, impacts));
+                if sight.is_some() {
+                    ways.push(kept(&network.nodes, node, courses, &changes.kin, impacts));
                 }
                 pulls.push(Pull {
                     node,
@@ -55,6 +108,11 @@ impl CrackGrowth {
                     closest_sq: f32::INFINITY,
                     closest_id: u32::MAX,
                     child: Vec2::ZERO,
+                    course: Vec2::ZERO,
+                    heading: Vec2::ZERO,
+                    fork: 0.0,
+                    has_markers: [false; 2],
+                    side: None,
                     serves: false,
                     stopped: None,
                 });
@@ -64,8 +122,11 @@ impl CrackGrowth {
             let way = marker.pos - network.nodes[node as usize].pos;
             // What lies aside of a ray is left to others.
             let distance = distance_sq.sqrt();
-            if ways.is_none_or(|ways| ways.iter().all(|&kept| kept == Vec2::ZERO || kept.dot(way) >= ASIDE * distance))
-            {
+            let is_seen = |ways: &[Vec2; 3]| {
+                let sight = sight.unwrap_or([-1.0; 3]);
+                ways.iter().zip(sight).all(|(&kept, cos)| kept == Vec2::ZERO || kept.dot(way) >= cos * distance)
+            };
+            if ways.is_none_or(is_seen) {
                 let towards = way * (FIXED / distance);
                 pull.sum[0] += i64::from(towards.x as i32);
                 pull.sum[1] += i64::from(towards.y as i32);
@@ -87,28 +148,34 @@ impl CrackGrowth {
         // A crack does not turn on its heel: what it cannot serve on its way is left to others.
         let keeps_on = self.arrest.is_some() && (self.params.inertia > 0.0 || !self.mask.is_empty());
         for (child, &(_, slot)) in (next..).zip(&self.order) {
-            let pull = &mut self.pulls[slot as usize];
+            let pull = self.pulls[slot as usize];
             let from = self.network.nodes[pull.node as usize].pos;
-            let mut direction = Vec2::new(pull.sum[0] as f32, pull.sum[1] as f32).normalize_or_zero();
-            if self.params.inertia > 0.0
-                && let Some(before) = self.network.nodes.get(self.network.nodes[pull.node as usize].parent as usize)
-            {
-                let heading = (from - before.pos).normalize_or_zero();
-                // A side branch has left that heading already, and in a joint the joint leads.
-                if heading.dot(direction) > 0.0 {
-                    let inertia = self.params.inertia * (1.0 - self.mask.weak_at(from / extent));
-                    direction = (direction + heading * inertia).normalize_or_zero();
-                }
+            let before = self.courses[pull.node as usize];
+            let mut course = Vec2::new(pull.sum[0] as f32, pull.sum[1] as f32).normalize_or_zero();
+            // A side branch has left that heading already, and in a joint the joint leads.
+            if self.params.inertia > 0.0 && before.dot(course) > 0.0 {
+                let inertia = self.params.inertia * (1.0 - self.mask.weak_at(from / extent));
+                course = (course + before * inertia).normalize_or_zero();
             }
-            direction = self.params.direct(direction);
+            course = self.params.direct(course);
+            let mut direction = course;
             if self.params.wander > 0.0 {
-                // A draw per child, frozen by its index.
-                let stray = self.params.wander * (2.0 * hash_unit(self.seed ^ 0x57A6, child) - 1.0);
-                direction = (direction + direction.perp() * stray).normalize_or_zero();
+                direction = self.strayed(course, from, child);
             }
+            let heading = self.heading_of(pull.node);
             if !self.mask.is_empty() {
                 direction = steer(from, direction, length, &self.mask, extent);
+            } else if self.arrest.is_some() {
+                direction = turned_at_most(heading, direction);
             }
+            let fork = if self.is_fork(pull.node) {
+                let draw = hash_unit(self.seed ^ 0xF02E, u64::from(pull.node));
+                self.params.fork_angle * (0.75 + 0.5 * draw)
+            } else {
+                0.0
+            };
+            let pull = &mut self.pulls[slot as usize];
+            (pull.course, pull.heading, pull.fork) = (course, heading, fork);
             pull.child = up_to_border(from, direction, length, kill, extent);
         }
         let Self { field, network, pulls, pull_of, .. } = self;
@@ -118,9 +185,29 @@ impl CrackGrowth {
                 let left_sq = field.marker(index).pos.distance_squared(pull.child);
                 pull.serves = left_sq <= kill * kill || left_sq <= distance_sq - PROGRESS * length * length;
             }
+            if pull.fork > 0.0 {
+                let way = field.marker(index).pos - network.nodes[node as usize].pos;
+                let (along, across) = (pull.heading.dot(way), pull.heading.perp_dot(way));
+                let angle = ops::atan2(across.abs(), along);
+                pull.has_markers[usize::from(across < 0.0)] |=
+                    (angle - pull.fork).abs() <= FOR_FORK && distance_sq > 4.0 * length * length;
+            }
         });
+        for pull in &mut self.pulls {
+            let side = match pull.has_markers {
+                [true, true] => hash_unit(self.seed ^ 0xF05, u64::from(pull.node)) < 0.5,
+                [left, _] => left,
+            };
+            if pull.has_markers != [false; 2] {
+                let (cos, sin) = (ops::cos(pull.fork), ops::sin(pull.fork));
+                let across = if side { pull.heading.perp() } else { -pull.heading.perp() };
+                let to = self.network.nodes[pull.node as usize].pos + (pull.heading * cos + across * sin) * length;
+                let is_inside = to.cmpgt(Vec2::ZERO).all() && to.cmplt(extent).all();
+                pull.side = is_inside.then_some(to);
+            }
+        }
         for (slot, pull) in self.pulls.iter_mut().enumerate() {
-            if pull.sum == [0, 0] && self.ways.get(slot).is_some_and(|ways| *ways != [Vec2::ZERO; 2]) {
+            if pull.sum == [0, 0] && self.ways.get(slot).is_some_and(|ways| *ways != [Vec2::ZERO; 3]) {
                 pull.serves = false;
                 continue;
             }
@@ -135,13 +222,54 @@ impl CrackGrowth {
     }
 }
 
-/// What a ray must keep to: its heading, and the way from the hit; zero for a start, which may turn anywhere.
-fn kept(nodes: &[Node], node: u32, impacts: &[Impact]) -> [Vec2; 2] {
+impl CrackGrowth {
+    /// Whether a side branch may set out from a tip: some way from the last one, and more rarely further from the hit.
+    fn is_fork(&self, node: u32) -> bool {
+        let Node { parent, generation, pos, impact, .. } = self.network.nodes[node as usize];
+        let mut chance = self.params.forks;
+        if self.params.focus > 0.0
+            && let Some(impact) = self.impacts.get(impact as usize)
+        {
+            let share = pos.distance(impact.pos) / (self.params.reach * impact.energy.sqrt());
+            chance *= ops::powf((1.0 - share).max(0.0), self.params.focus);
+        }
+        self.params.forks > 0.0
+            && self.arrest.is_some()
+            && generation > 1
+            && self.child_of(node) == NO_PARENT
+            && parent != NO_PARENT
+            && self.child_of(parent) == node
+            && self.changes.kin[node as usize].sibling == NO_PARENT
+            && hash_unit(mix(self.seed ^ 0xF0), u64::from(node)) < chance
+    }
+}
+
+/// `direction`, or as much of it as a crack that comes in `heading` may turn.
+pub(super) fn turned_at_most(heading: Vec2, direction: Vec2) -> Vec2 {
+    if heading == Vec2::ZERO || heading.dot(direction) >= MOST_TURN.0 {
+        return direction;
+    }
+    let across = if heading.perp_dot(direction) < 0.0 { -heading.perp() } else { heading.perp() };
+    heading * MOST_TURN.0 + across * MOST_TURN.1
+}
+
+/// What a crack must keep to: its way, that from the hit, and its way some segments before, or where its branch began; zero for a
+/// start, which may turn anywhere.
+fn kept(nodes: &[Node], node: u32, courses: &[Vec2], kin: &[Kin], impacts: &[Impact]) -> [Vec2; 3] {
     let Node { pos, parent, impact, .. } = nodes[node as usize];
-    let Some(before) = nodes.get(parent as usize) else { return [Vec2::ZERO; 2] };
-    let heading = (pos - before.pos).normalize_or_zero();
+    let Some(before) = nodes.get(parent as usize) else { return [Vec2::ZERO; 3] };
+    let heading = courses[node as usize];
     let hit = impacts.get(impact as usize).map_or(before.pos, |impact| impact.pos);
-    [heading, (pos - hit).normalize_or(heading)]
+    let mut earlier = node;
+    for _ in 0..BEFORE {
+        let Node { parent, .. } = nodes[earlier as usize];
+        let is_first_child = kin[earlier as usize].sibling == NO_PARENT;
+        if !is_first_child || nodes.get(parent as usize).is_none_or(|before| before.parent == NO_PARENT) {
+            break;
+        }
+        earlier = parent;
+    }
+    [heading, (pos - hit).normalize_or(heading), courses[earlier as usize]]
 }
 
 /// Turns `direction` by up to 80 degrees towards what is weak and away from what is strong or forbidden.

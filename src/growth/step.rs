@@ -90,7 +90,9 @@ pub struct CrackGrowth {
     pub(super) timeline: Timeline,
     pub(super) pulls: Vec<Pull>,
     /// Where cracks are rays: what each of `pulls` must keep to.
-    pub(super) ways: Vec<[Vec2; 2]>,
+    pub(super) ways: Vec<[Vec2; 3]>,
+    /// Per node: the direction in which its crack runs, but for its kinks; zero for a start.
+    pub(super) courses: Vec<Vec2>,
     /// Node and entry in `pulls`, in order of the nodes.
     pub(super) order: Vec<(u32, u32)>,
     /// Per node: its entry in `pulls` during a step.
@@ -137,6 +139,7 @@ impl CrackGrowth {
             timeline: Timeline::default(),
             pulls: Vec::new(),
             ways: Vec::new(),
+            courses: Vec::new(),
             order: Vec::new(),
             pull_of: Vec::new(),
             widened: Vec::new(),
@@ -196,6 +199,8 @@ impl CrackGrowth {
         }
         self.network.nodes.push(Node { pos, width, parent, generation, birth: self.steps, impact, bend });
         self.nodes.push(pos);
+        let from = self.network.nodes.get(parent as usize).map_or(pos, |parent| parent.pos);
+        self.courses.push((pos - from).normalize_or_zero());
         self.pull_of.push(NO_PULL);
         self.changes.push_node(parent);
         self.timeline.add_node(width);
@@ -296,8 +301,19 @@ impl CrackGrowth {
                 let closest = self.field.marker(self.pulls[slot as usize].closest).pos;
                 Some((closest - self.network.nodes[node as usize].pos).normalize_or_zero())
             } else {
-                match self.advance(node, self.pulls[slot as usize].child) {
-                    Advance::Grown => None,
+                let born = self.network.nodes.len();
+                let Pull { child, course, side, .. } = self.pulls[slot as usize];
+                let advanced = self.advance(node, child);
+                if self.params.grain > 0.0 && self.network.nodes.get(born).is_some_and(|born| born.pos == child) {
+                    self.courses[born] = course;
+                }
+                match advanced {
+                    Advance::Grown => {
+                        if let Some(side) = side {
+                            self.extend(node, side, false);
+                        }
+                        None
+                    }
                     Advance::Stopped(direction) => Some(direction),
                 }
             };

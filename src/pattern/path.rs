@@ -1,6 +1,6 @@
 //! The rough line of one segment.
 
-use crate::math::{Rng, hash_unit};
+use crate::math::Rng;
 use glam::Vec2;
 
 /// The most points that a [`SegmentPath`] has.
@@ -67,14 +67,20 @@ impl SegmentPath {
     }
 }
 
-/// Pieces of a rough line are about this long (pattern units): 8 texels of a 512-texel surface, the length at which
+/// Pieces of a rough line are about this long (pattern units): 4 texels of a 512-texel surface, half the length at which
 /// the roughness of real cracks is measured.
-const PIECE: f32 = 1.0 / 72.0;
+const PIECE: f32 = 1.0 / 120.0;
 
-/// A line from one point to the other by midpoint displacement, kept inside `0..=extent`.
+/// How far from the middle of a piece its kink may lie, as a share of its length.
+const OFF_MIDDLE: f32 = 0.18;
+
+/// The sharpest kink moves a point across its piece by so many times the roughness.
+const SHARPEST: f32 = 1.7;
+
+/// A line from one point to the other by displacement of points near the middle, kept inside `0..=extent`.
 ///
-/// Each level halves the pieces and moves the new points across the line by up to `roughness` of the piece's length.
-/// Widths vary by up to a third on the way.
+/// Each level cuts the pieces in two and moves the new points across the line, mostly by a little, at times by up to `1.7 roughness` of
+/// the piece's length: straight runs with sharp kinks. Widths go evenly from one end to the other.
 pub(super) fn rough_path(
     (from, to): (Vec2, Vec2),
     (w0, w1): (f32, f32),
@@ -101,16 +107,12 @@ pub(super) fn rough_path(
         let half = span / 2;
         for left in (0..n).step_by(span) {
             let (a, b) = (path.points[left], path.points[left + span]);
-            let across = (b.pos - a.pos).perp() * (roughness * rng.signed());
-            let pos = ((a.pos + b.pos) * 0.5 + across).clamp(Vec2::ZERO, extent);
-            path.points[left + half] = PathPoint { pos, width: 0.0 };
+            let (kink, along) = (rng.signed(), 0.5 + OFF_MIDDLE * rng.signed());
+            let across = (b.pos - a.pos).perp() * (SHARPEST * roughness * kink * kink.abs());
+            let pos = (a.pos + (b.pos - a.pos) * along + across).clamp(Vec2::ZERO, extent);
+            path.points[left + half] = PathPoint { pos, width: a.width + (b.width - a.width) * along };
         }
         span = half;
-    }
-    for i in 1..n {
-        let t = i as f32 / n as f32;
-        let vary = 1.0 + 0.66 * (hash_unit(seed ^ salt, i as u64) - 0.5);
-        path.points[i].width = (w0 + (w1 - w0) * t) * vary;
     }
     path
 }

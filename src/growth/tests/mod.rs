@@ -1,6 +1,7 @@
 //! Growth: its end, its hits, and its frozen patterns.
 
 mod arrest;
+mod energy;
 mod reference;
 mod widths;
 
@@ -53,6 +54,9 @@ fn random_params(rng: &mut Rng, small: bool) -> GrowthParams {
         murray: rng.range(1.0, 8.0),
         max_width: line_width + 0.2 * rng.unit(),
         wander: if rng.unit() < 0.5 { 0.0 } else { rng.unit() },
+        grain: 0.0,
+        forks: 0.0,
+        fork_angle: 0.7,
         roughness: 0.5 * rng.unit(),
         draw_connections: rng.unit() < 0.5,
         connection_gaps: rng.unit(),

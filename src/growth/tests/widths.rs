@@ -205,7 +205,7 @@ fn each_parameter_of_widths_does_something_in_every_preset() {
             let mut widths: Vec<f32> = nodes.iter().map(|node| node.width).collect();
             widths.sort_by(f32::total_cmp);
             let at = |share: f32| widths[((widths.len() - 1) as f32 * share) as usize];
-            (at(0.1), at(0.5), at(0.98))
+            (at(0.0), at(0.5), at(0.98))
         };
         let asked = preset.growth.line_growth;
         let base = widths(&|_| {});

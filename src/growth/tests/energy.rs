@@ -1,0 +1,134 @@
+//! What energy does, and what the seed: the presets as they ship, hit once.
+
+use crate::{
+    CrackPreset,
+    growth::CrackGrowth,
+    math::Rng,
+    pattern::{NO_PARENT, SegmentId},
+};
+use glam::Vec2;
+
+/// The presets for which this is promised: those whose cracks run from the hit. Not tempered glass, of which the whole pane goes at once.
+const PRESETS: [&str; 4] = ["concrete", "plaster", "brick", "toon"];
+
+/// Seeds of which a median is taken.
+const SEEDS: u64 = 24;
+
+fn grown(name: &str, seed: u64, pos: Vec2, energy: f32) -> CrackGrowth {
+    let preset = CrackPreset::named(name).unwrap();
+    let mut growth = CrackGrowth::new(preset.growth, Vec2::ONE, seed).unwrap();
+    growth.hit(pos, energy);
+    while growth.step().grew() {}
+    growth
+}
+
+/// Length of all lines, and the area that they cover.
+fn extent_of(growth: &CrackGrowth) -> (f32, f32) {
+    let network = growth.network();
+    let segments: Vec<SegmentId> = network.segments().collect();
+    segments.into_iter().fold((0.0, 0.0), |(length, area), segment| {
+        let path = network.path(segment).unwrap();
+        let pieces = path.points().windows(2).map(|pair| {
+            let long = pair[0].pos.distance(pair[1].pos);
+            (long, long * 0.5 * (pair[0].width + pair[1].width))
+        });
+        pieces.fold((length, area), |(length, area), (long, covered)| (length + long, area + covered))
+    })
+}
+
+fn median(mut values: Vec<f32>) -> f32 {
+    values.sort_by(f32::total_cmp);
+    values[values.len() / 2]
+}
+
+/// Lengths and areas of many seeds at one energy, hit anywhere but near the border.
+fn of_seeds(name: &str, energy: f32) -> (Vec<f32>, Vec<f32>) {
+    (0..SEEDS)
+        .map(|seed| {
+            let mut rng = Rng::new(seed).stream("where");
+            let pos = Vec2::new(rng.range(0.3, 0.7), rng.range(0.3, 0.7));
+            extent_of(&grown(name, seed, pos, energy))
+        })
+        .unzip()
+}
+
+#[test]
+fn the_seed_does_not_outweigh_the_energy() {
+    for name in PRESETS {
+        for energy in [0.5, 1.0, 4.0] {
+            let (lengths, _) = of_seeds(name, energy);
+            let mean = lengths.iter().sum::<f32>() / lengths.len() as f32;
+            let variance = lengths.iter().map(|length| (length - mean).powi(2)).sum::<f32>() / lengths.len() as f32;
+            let variation = variance.sqrt() / mean;
+            println!("{name} at {energy}: {mean:.2} long, varying by {variation:.2}");
+            assert!(variation <= 0.25, "{name} at {energy}: {lengths:?}");
+        }
+    }
+}
+
+#[test]
+fn more_energy_is_more_of_everything() {
+    for name in PRESETS {
+        let mut before = (0.0, 0.0);
+        let mut at_one = (0.0, 0.0);
+        for energy in [0.5, 1.0, 2.0, 4.0, 8.0] {
+            let (lengths, areas) = of_seeds(name, energy);
+            let now = (median(lengths), median(areas));
+            println!("{name} at {energy}: {:.2} long, {:.2} % covered", now.0, 100.0 * now.1);
+            assert!(now.0 > before.0 && now.1 > before.1, "{name} at {energy}: {now:?} after {before:?}");
+            before = now;
+            if energy == 1.0 {
+                at_one = now;
+            }
+        }
+        assert!(before.0 >= 2.5 * at_one.0 && before.1 >= 2.5 * at_one.1, "{name}: {before:?} from {at_one:?}");
+    }
+}
+
+/// 400 hits, most of them near a border or in a corner: each leaves at least half of what is usual.
+#[test]
+fn no_hit_is_a_dud() {
+    for name in PRESETS {
+        let usual = median(of_seeds(name, 1.0).0);
+        let mut duds = Vec::new();
+        for seed in 0..400u64 {
+            let mut rng = Rng::new(seed).stream("border");
+            let near = |rng: &mut Rng| if rng.unit() < 0.5 { 0.06 * rng.unit() } else { 1.0 - 0.06 * rng.unit() };
+            let pos = match seed % 4 {
+                0 => Vec2::new(rng.unit(), rng.unit()),
+                1 => Vec2::new(near(&mut rng), rng.unit()),
+                2 => Vec2::new(rng.unit(), near(&mut rng)),
+                _ => Vec2::new(near(&mut rng), near(&mut rng)),
+            };
+            let pos = if seed % 40 == 3 { pos.round() } else { pos };
+            let (length, _) = extent_of(&grown(name, seed, pos, 1.0));
+            if length < 0.5 * usual {
+                duds.push((pos, length));
+            }
+        }
+        println!("{name}: {} duds of 400, usual {usual:.2}", duds.len());
+        assert!(duds.is_empty(), "{name}: usual {usual}, but {duds:?}");
+    }
+}
+
+/// Arms from the hit, and how sharply cracks turn.
+#[test]
+fn arms_go_with_the_energy_and_no_tip_turns_sharply() {
+    for (name, at_one, at_four) in [("concrete", 4..=6, 6..=9), ("toon", 4..=7, 5..=10), ("plaster", 3..=6, 5..=9)] {
+        for (energy, arms) in [(1.0, at_one), (4.0, at_four)] {
+            for seed in 0..SEEDS {
+                let growth = grown(name, seed, Vec2::new(0.45, 0.55), energy);
+                let nodes = growth.network().nodes();
+                let from_hit = nodes.iter().filter(|node| node.parent == 0).count();
+                assert!(arms.contains(&from_hit), "{name} {seed} at {energy}: {from_hit} arms");
+                for node in nodes.iter().filter(|node| node.parent != NO_PARENT) {
+                    let parent = nodes[node.parent as usize];
+                    let Some(before) = nodes.get(parent.parent as usize) else { continue };
+                    let turn = (parent.pos - before.pos).angle_to(node.pos - parent.pos).to_degrees().abs();
+                    let most = growth.params().fork_angle.to_degrees() * 1.25 + 0.5;
+                    assert!(turn <= most.max(60.5), "{name} {seed}: {turn} degrees at {}", parent.pos);
+                }
+            }
+        }
+    }
+}
