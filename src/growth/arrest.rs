@@ -128,7 +128,8 @@ impl CrackGrowth {
         }
         let reach = self.params.arrest.max(TURN * length);
         // A ray turns to nothing: it runs straight on until it touches what is in its way.
-        let goal = if self.are_rays() { None } else { self.goal_ahead(from, heading, reach, AHEAD) };
+        let goal =
+            if self.are_rays() || self.masonry.is_some() { None } else { self.goal_ahead(from, heading, reach, AHEAD) };
         // A crack that has turned already does not turn further.
         let last = self.heading_of(from);
         let is_ahead = |goal: Goal| {
@@ -155,6 +156,7 @@ impl CrackGrowth {
         let Some(node) = self.extend(from, to, false) else { return Advance::Stopped(heading) };
         // It may have come to lie close beside a crack that was not ahead.
         if !self.are_rays()
+            && self.masonry.is_none()
             && let Some((_, beside)) = self.foreign(node, None, BESIDE * length, AHEAD)
         {
             let way = self.network.nodes[beside as usize].pos - self.network.nodes[node as usize].pos;
@@ -270,8 +272,10 @@ impl CrackGrowth {
     fn join_near(&mut self, tip: u32, heading: Vec2, reach: f32) -> bool {
         let length = self.params.step_length;
         let mut nearby = Vec::new();
+        // In a joint, what lies in it.
+        let least = if self.masonry.is_some() { 0.97 * heading.length() } else { 0.0 };
         self.each_foreign(tip, reach * length, |node, distance_sq, way| {
-            if way.dot(heading) > 0.0 {
+            if way.dot(heading) > least * distance_sq.sqrt() {
                 let end = self.network.nodes[node as usize];
                 let place = |node: u32| self.network.nodes.get(node as usize).map_or(end.pos, |node| node.pos);
                 let along = (place(self.child_of(node)) - place(end.parent)).normalize_or_zero();

@@ -23,7 +23,7 @@ const WIDE: f32 = 0.1;
 const FEW_NODES: usize = 64;
 
 /// How much further a hit reaches, as a share, where it has next to no room.
-const MORE_REACH: f32 = 1.4;
+const MORE_REACH: f32 = 1.6;
 
 /// How many times wider the cracks of an impact are than those of one of energy 1.
 fn widening(energy: f32) -> f32 {
@@ -129,6 +129,7 @@ impl CrackGrowth {
         let first = self.network.nodes.len() as u32;
         let seed = mix(self.seed ^ mix(u64::from(index)));
         for place in markers::starts(self.params.starts, (pos, energy), reach, extent, seed) {
+            let place = self.masonry.as_ref().and_then(|masonry| masonry.nearest(place)).unwrap_or(place);
             let is_free = !self.nodes.any_within(place, 1e-4) && !self.is_on_crack(place, index);
             if is_free && !self.mask.is_forbidden(place / extent) {
                 self.bear(place, NO_PARENT, 0, index, 1.0);
@@ -164,6 +165,18 @@ impl CrackGrowth {
     fn branch_out(&mut self, start: u32, directions: Vec<Vec2>) {
         let pos = self.network.nodes[start as usize].pos;
         let born = self.network.nodes.len();
+        if let Some(masonry) = self.masonry.clone() {
+            let ways = masonry.ways(pos);
+            // Up or down; the arms to the left and the right go the other way round the bricks.
+            let upright: Vec2 = ways.iter().map(|(way, _)| *way * Vec2::Y).sum();
+            for way in ways {
+                let child = self.extend(start, masonry.end(pos, way, self.params.step_length), false);
+                if let Some(child) = child.filter(|_| way.0.x != 0.0) {
+                    self.courses[child as usize] = (way.0 - 0.7 * upright).normalize_or(way.0);
+                }
+            }
+            return;
+        }
         for direction in directions {
             // Where another is too near, a little further on.
             for turn in [0.0f32, 0.15, -0.15, 0.3, -0.3] {
@@ -307,7 +320,7 @@ impl CrackGrowth {
         for node in 0..self.network.nodes.len() as u32 {
             let this = &mut self.network.nodes[node as usize];
             if this.impact == impact {
-                this.width = (this.width * (wider / widening)).min(0.4);
+                this.width = self.widths.at_most(this.width * (wider / widening)).min(0.4).max(this.width);
                 self.widths.scale(node, wider / widening);
                 let (width, parent) = (this.width, this.parent);
                 self.changes.widened(node, parent != NO_PARENT);

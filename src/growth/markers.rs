@@ -267,7 +267,7 @@ pub(super) fn arms(count: u32, (center, energy): (Vec2, f32), reach: f32, extent
         beside.fold(1.0, f32::min).powi(2) + 1e-4
     });
     let total: f32 = weights.iter().sum();
-    let share = 0.65 + 0.35 * rooms.iter().sum::<f32>() / DIRECTIONS as f32;
+    let share = 0.7 + 0.3 * rooms.iter().sum::<f32>() / DIRECTIONS as f32;
     let count = ops::powf(energy, 1.0 / 3.0) * count as f32 * share;
     let count = ((count + 0.5 + 0.55 * rng.signed()) as u32).clamp(2, 1024);
     let turn = rng.unit();

@@ -40,6 +40,7 @@ mod forget;
 mod impact;
 mod links;
 mod markers;
+mod masonry;
 mod nodes;
 mod params;
 mod pull;

@@ -175,6 +175,9 @@ pub struct GrowthParams {
     /// How much one surface differs from the next, by its seed: widths, roughness, the spacing of markers, the number of starts and
     /// of free ends, the axis. 0 = not at all; at 1 each differs by a factor of up to 2 either way, mostly much less. 0..=1.
     pub variety: f32,
+    /// Height of the courses of bricks in whose joints cracks run, where the [mask](crate::pattern::CrackMask) shows no lines; where it shows
+    /// courses of bricks, those. Then no crack is wider than a joint. Pattern units, 0..=1; 0 = the surface is no masonry.
+    pub courses: f32,
     /// Whether the markers themselves are drawn.
     pub draw_markers: bool,
     /// The most nodes that a surface has at once, 1..=1000000. In the engine a hit for which less than a quarter of them is left freezes
@@ -220,6 +223,7 @@ impl GrowthParams {
         arrest: 0.0,
         nucleation: 0.0,
         variety: 0.0,
+        courses: 0.0,
         draw_markers: false,
         max_nodes: 20_000,
     };
@@ -321,6 +325,7 @@ impl GrowthParams {
         arrest: f32 = 0.0, 1.0;
         nucleation: f32 = 0.0, 64.0;
         variety: f32 = 0.0, 1.0;
+        courses: f32 = 0.0, 1.0;
         max_nodes: u32 = 1.0, 1_000_000.0;
     }
 
@@ -491,6 +496,7 @@ impl GrowthParams {
         length(&mut scaled.island_distance, 0.0, 1.0);
         length(&mut scaled.arrest, 0.0, 1.0);
         length(&mut scaled.grain, 0.0, 1.0);
+        length(&mut scaled.courses, 0.0, 1.0);
         // So many on the same surface.
         let count = |count: u32| ((count as f32 / by).round() as u32).clamp(1, 512);
         match &mut scaled.markers {

@@ -1,6 +1,11 @@
 //! Where growth is pulled to: eq. 2 of Couto et al.
 
-use super::{CrackGrowth, Impact, MarkerLayout, StartLayout, changes::Kin, params::PROGRESS};
+use super::{
+    CrackGrowth, Impact, MarkerLayout, StartLayout,
+    changes::Kin,
+    masonry::{Masonry, Way},
+    params::PROGRESS,
+};
 use crate::{
     math::{hash_unit, mix, ops},
     pattern::{CrackMask, NO_PARENT, Node},
@@ -52,6 +57,15 @@ const FOR_FORK: f32 = 0.45;
 /// Within a grain a crack strays by this much of what it strays from grain to grain.
 const WITHIN_GRAIN: f32 = 0.3;
 
+/// A crack in masonry runs along a bed joint for so many bricks, and then takes the next head joint.
+const LONGEST_RUN: f32 = 0.9;
+
+/// What is near to a hit, as a share of its reach.
+const NEAR_HIT: f32 = 0.2;
+
+/// Share of the nodes along a brick at which a hairline splits it.
+const SPLIT: f32 = 0.03;
+
 const FIXED: f32 = 16_777_216.0;
 pub(super) const NO_PULL: u32 = u32::MAX;
 
@@ -67,7 +81,7 @@ impl CrackGrowth {
         let are_arms = self.arrest.is_some()
             && self.params.inertia > 0.0
             && matches!(self.params.starts, StartLayout::Arms { .. })
-            && self.mask.is_empty();
+            && (self.mask.is_empty() || self.masonry.is_some());
         if self.are_rays() {
             return Some([ASIDE, ASIDE, -1.0]);
         }
@@ -163,6 +177,14 @@ impl CrackGrowth {
                 direction = self.strayed(course, from, child);
             }
             let heading = self.heading_of(pull.node);
+            if let Some(masonry) = &self.masonry {
+                let (child, side) = self.way_in_joints(masonry, pull.node, course);
+                let pull = &mut self.pulls[slot as usize];
+                (pull.course, pull.child, pull.side) = (course, child, side);
+                // Joints lead round bricks; each is taken once, so that ends too.
+                pull.serves = (child - from).dot(course) > -0.3 * from.distance(child);
+                continue;
+            }
             if !self.mask.is_empty() {
                 direction = steer(from, direction, length, &self.mask, extent);
             } else if self.arrest.is_some() {
@@ -212,7 +234,7 @@ impl CrackGrowth {
                 continue;
             }
             let is_start = self.network.nodes[pull.node as usize].parent == NO_PARENT;
-            if !pull.serves && (is_start || !keeps_on) {
+            if !pull.serves && (is_start || !keeps_on) && self.masonry.is_none() {
                 let (from, to) = (self.network.nodes[pull.node as usize].pos, self.field.marker(pull.closest).pos);
                 let distance = pull.closest_sq.sqrt();
                 pull.child = if distance <= length { to } else { from + (to - from) * (length / distance) };
@@ -223,6 +245,64 @@ impl CrackGrowth {
 }
 
 impl CrackGrowth {
+    /// Where a crack in masonry runs on from a node, and where a side branch of it begins.
+    fn way_in_joints(&self, masonry: &Masonry, node: u32, course: Vec2) -> (Vec2, Option<Vec2>) {
+        let Node { pos, parent, impact, .. } = self.network.nodes[node as usize];
+        let (heading, length) = (self.heading_of(node), self.params.step_length);
+        // What has split a brick ends at the next joint.
+        let is_split = |node: &Node| !masonry.is_in_joint(0.5 * (node.pos + pos));
+        if self.network.nodes.get(parent as usize).is_some_and(is_split) {
+            return (pos, None);
+        }
+        let draw = |what: u64| hash_unit(self.seed ^ what, u64::from(node));
+        // How far it has run along a bed joint.
+        let (mut run, mut at) = (0.0, node);
+        while let Some(before) = self.network.nodes.get(self.network.nodes[at as usize].parent as usize) {
+            let way = self.network.nodes[at as usize].pos - before.pos;
+            if way.y.abs() > way.x.abs() || run > 2.0 * masonry.brick() {
+                break;
+            }
+            run += way.x.abs();
+            at = self.network.nodes[at as usize].parent;
+        }
+        // From a hit cracks run both ways.
+        if self.network.nodes[at as usize].parent == NO_PARENT {
+            run *= 2.0;
+        }
+        let mut ways: Vec<(f32, Way)> = masonry
+            .ways(pos)
+            .into_iter()
+            .filter(|(way, _)| way.dot(heading) > -0.5)
+            .map(|(way, far)| {
+                let is_level = way.x != 0.0;
+                let too_far = is_level && run > LONGEST_RUN * masonry.brick();
+                let liking = way.dot(course) + 0.3 * draw(if is_level { 0xB2 } else { 0xB3 });
+                (liking - if too_far { 4.0 } else { 0.0 }, (way, far))
+            })
+            .collect();
+        ways.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let Some(&(_, best)) = ways.first() else { return (pos, None) };
+        let is_tip = self.child_of(node) == NO_PARENT;
+        // Near the hit a crack takes both ways at the end of a head joint.
+        let is_near_hit = self.impacts.get(impact as usize).is_some_and(|impact| {
+            let near = (NEAR_HIT * self.params.reach * impact.energy.sqrt()).max(0.7 * masonry.brick());
+            impact.pos.distance(pos) < near
+        });
+        let is_level = best.0.x != 0.0 && heading.x != 0.0;
+        let side = if !is_tip {
+            None
+        } else if ways.len() > 1 && ways[1].0 > -0.3 && (is_near_hit && heading.y != 0.0 || self.is_fork(node)) {
+            Some(masonry.end(pos, ways[1].1, length))
+        } else if ways.len() == 1 && is_level && draw(0xB4) < SPLIT {
+            // Through the brick above or below.
+            let up = if course.y.abs() > 0.3 { course.y.signum() } else { (draw(0xB5) - 0.5).signum() };
+            masonry.across(pos, up)
+        } else {
+            None
+        };
+        (masonry.end(pos, best, length), side)
+    }
+
     /// Whether a side branch may set out from a tip: some way from the last one, and more rarely further from the hit.
     fn is_fork(&self, node: u32) -> bool {
         let Node { parent, generation, pos, impact, .. } = self.network.nodes[node as usize];

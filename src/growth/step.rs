@@ -6,6 +6,7 @@ use super::{
     changes::Changes,
     field::{ANY_IMPACT, MarkerField},
     links::{self, Linker},
+    masonry::Masonry,
     nodes::NodeGrid,
     pull::{NO_PULL, Pull},
     width::Widths,
@@ -72,6 +73,8 @@ pub struct CrackGrowth {
     pub(super) impacts: Vec<Impact>,
     pub(super) density: Option<Grid<f32>>,
     pub(super) mask: Arc<CrackMask>,
+    /// The joints in which cracks run.
+    pub(super) masonry: Option<Arc<Masonry>>,
     pub(super) steps: u32,
     pub(super) steps_left: u32,
     /// Cracks that began by themselves, and markers that were tried for it.
@@ -116,7 +119,7 @@ impl CrackGrowth {
         }
         let params = params.varied(seed);
         let network = Network::new(extent, params.roughness, seed);
-        Ok(Self {
+        let mut growth = Self {
             arrest: (params.arrest > 0.0).then(|| Arrest::new(&network, params.step_length)),
             network,
             field: MarkerField::new(extent, &params),
@@ -126,6 +129,7 @@ impl CrackGrowth {
             impacts: Vec::new(),
             density: None,
             mask: Arc::default(),
+            masonry: None,
             steps: 0,
             steps_left: 0,
             nucleated: 0,
@@ -145,7 +149,9 @@ impl CrackGrowth {
             widened: Vec::new(),
             params,
             seed,
-        })
+        };
+        growth.lay_bricks();
+        Ok(growth)
     }
 
     /// Where markers of later hits may be: a probability 0..=1 over the whole surface, at any resolution, sampled at the
@@ -161,6 +167,20 @@ impl CrackGrowth {
     pub fn set_mask(&mut self, mask: impl Into<Arc<CrackMask>>) {
         self.mask = mask.into();
         self.mind_others();
+        self.lay_bricks();
+    }
+
+    /// Finds the joints in which cracks run.
+    fn lay_bricks(&mut self) {
+        let (extent, courses) = (self.network.extent(), self.params.courses);
+        let is_masonry = courses > 0.0 && self.params.arrest > 0.0;
+        self.masonry = match &self.mask.weak {
+            _ if !is_masonry => None,
+            Some(weak) => Masonry::find(weak, extent),
+            None => Some(Masonry::regular(extent, courses, self.seed)),
+        }
+        .map(Arc::new);
+        self.widths.set_widest(self.masonry.as_ref().map_or(f32::INFINITY, |masonry| masonry.joint()));
     }
 
     /// Keeps account of lines if cracks must not cross, or if there are places that they must not enter.
@@ -304,13 +324,21 @@ impl CrackGrowth {
                 let born = self.network.nodes.len();
                 let Pull { child, course, side, .. } = self.pulls[slot as usize];
                 let advanced = self.advance(node, child);
-                if self.params.grain > 0.0 && self.network.nodes.get(born).is_some_and(|born| born.pos == child) {
+                if (self.params.grain > 0.0 || self.masonry.is_some())
+                    && self.network.nodes.get(born).is_some_and(|born| born.pos == child)
+                {
                     self.courses[born] = course;
                 }
                 match advanced {
                     Advance::Grown => {
                         if let Some(side) = side {
-                            self.extend(node, side, false);
+                            let from = self.network.nodes[node as usize].pos;
+                            let branch = self.extend(node, side, false);
+                            // Round the bricks it goes on as before, aside.
+                            if let Some(branch) = branch.filter(|_| self.masonry.is_some()) {
+                                let way = (side - from).normalize_or_zero();
+                                self.courses[branch as usize] = (way + course).normalize_or(way);
+                            }
                         }
                         None
                     }
@@ -486,6 +514,7 @@ impl CrackGrowth {
         self.widths.set_params(&params);
         self.params = params;
         self.mind_others();
+        self.lay_bricks();
         Ok(())
     }
 }

@@ -35,6 +35,8 @@ pub(super) struct Widths {
     notches: Vec<(u32, f32)>,
     /// How much widths vary along a crack, as a share.
     unevenness: f32,
+    /// No node becomes wider.
+    widest: f32,
     /// Nodes beyond the end of a crack that is free no longer.
     beyond: u32,
     pipes: Vec<Pipe>,
@@ -109,6 +111,7 @@ impl Widths {
         Self {
             notches,
             unevenness: params.unevenness,
+            widest: f32::INFINITY,
             beyond: beyond(params),
             pipes: Vec::new(),
             forms: Vec::new(),
@@ -137,6 +140,16 @@ impl Widths {
         self.waiting = 0;
     }
 
+    /// No node becomes wider from now on, pattern units.
+    pub(super) const fn set_widest(&mut self, widest: f32) {
+        self.widest = widest;
+    }
+
+    /// The most that a node that was so wide may become.
+    pub(super) fn at_most(&self, width: f32) -> f32 {
+        width.min(self.widest)
+    }
+
     pub(super) fn reserve(&mut self, nodes: usize) {
         self.pipes.reserve(nodes);
         self.forms.reserve(nodes);
@@ -158,7 +171,7 @@ impl Widths {
             factor = factor.clamp(1.0 - self.unevenness, 1.0);
         }
         self.place(parent, Form { factor, wider, counts: 1 });
-        self.notches[0].1 * factor * wider
+        self.at_most(self.notches[0].1 * factor * wider)
     }
 
     /// Prepares the place of a node that comes with a width of its own, and counts for nothing.
@@ -263,7 +276,7 @@ impl Widths {
         let notch = self.notch(self.pipes[node as usize].behind);
         self.pipes[node as usize].due = self.notches[notch + 1].0;
         let form = self.forms[node as usize];
-        let (this, width) = (&mut nodes[node as usize], self.notches[notch].1 * form.factor * form.wider);
+        let (this, width) = (&mut nodes[node as usize], self.at_most(self.notches[notch].1 * form.factor * form.wider));
         if width > this.width {
             this.width = width;
             widened(node);

@@ -74,6 +74,7 @@ fn random_params(rng: &mut Rng, small: bool) -> GrowthParams {
         axis: 0.0,
         directed: 0.0,
         variety: 0.0,
+        courses: 0.0,
         draw_markers: rng.unit() < 0.2,
         max_nodes: 1_000_000,
     };

@@ -1,0 +1,211 @@
+//! Courses of bricks, and the ways that their joints leave to cracks.
+
+use crate::{Grid, math::hash_unit};
+use glam::Vec2;
+
+/// Share of a row (column) of a course that is weak where a joint runs along it.
+const JOINT: f32 = 0.45;
+
+/// Bricks are so many times as long as a course is high.
+const BRICK: f32 = 3.0;
+
+/// Share of a course that is joint, where the picture tells nothing.
+const THIN: f32 = 0.14;
+
+/// Places closer than this (pattern units) are one.
+const SAME: f32 = 1e-4;
+
+/// The joints of a wall: bed joints run from side to side, head joints from bed to bed.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Masonry {
+    extent: Vec2,
+    /// Where bed joints lie, from the top.
+    beds: Vec<f32>,
+    /// Of each course, from the one above the first bed: where its head joints lie, from the left.
+    heads: Vec<Vec<f32>>,
+    /// How wide joints are, pattern units.
+    joint: f32,
+    /// How long bricks are, pattern units.
+    brick: f32,
+}
+
+/// A way along a joint: its direction, and how far it is to where another joint meets it.
+pub(super) type Way = (Vec2, f32);
+
+impl Masonry {
+    /// A wall without a picture: courses of this height, each half a brick off the one below.
+    pub(super) fn regular(extent: Vec2, course: f32, seed: u64) -> Self {
+        let uneven = |i: u64| 0.06 * (hash_unit(seed ^ 0xB1, i) - 0.5);
+        let count = |length: f32, of: f32| ((length / of) as u32).clamp(1, 4096);
+        let first = course * (0.3 + 0.4 * hash_unit(seed ^ 0xB0, 0));
+        let beds: Vec<f32> = (0..count(extent.y - first, course))
+            .map(|i| first + course * (i as f32 + uneven(u64::from(i))))
+            .filter(|y| *y > SAME && *y < extent.y - SAME)
+            .collect();
+        let brick = BRICK * course;
+        let heads = (0..=beds.len() as u64)
+            .map(|i| {
+                let half = 0.5 * (i % 2) as f32 + hash_unit(seed ^ 0xB0, 1);
+                (0..=count(extent.x, brick))
+                    .map(|k| brick * (k as f32 + half.fract() + uneven(i << 32 | u64::from(k))))
+                    .filter(|x| *x > SAME && *x < extent.x - SAME)
+                    .collect()
+            })
+            .collect();
+        Self { extent, beds, heads, joint: THIN * course, brick }
+    }
+
+    /// The joints of a picture in which these places are weak; `None` if it shows no courses of bricks.
+    pub(super) fn find(weak: &Grid<f32>, extent: Vec2) -> Option<Self> {
+        let size = weak.size();
+        let scale = extent / size.as_vec2();
+        let (columns, rows) = (size.x as usize, size.y as usize);
+        let of_rows: Vec<f32> = (0..rows).map(|y| mean(weak.row(y).iter().copied())).collect();
+        let beds = ridges(&of_rows);
+        if beds.len() < 2 {
+            return None;
+        }
+        let edges: Vec<usize> =
+            std::iter::once(0).chain(beds.iter().map(|&(y, _)| y as usize)).chain(std::iter::once(rows)).collect();
+        let thick = (beds.iter().map(|&(_, thick)| thick).sum::<f32>() / beds.len() as f32).max(1.0);
+        let heads: Vec<Vec<f32>> = edges
+            .windows(2)
+            .map(|pair| {
+                let margin = thick.ceil() as usize;
+                let (top, bottom) = (pair[0] + margin, pair[1].saturating_sub(margin));
+                if bottom < top + 2 {
+                    return Vec::new();
+                }
+                let of_columns: Vec<f32> = (0..columns).map(|x| mean((top..bottom).map(|y| weak.row(y)[x]))).collect();
+                ridges(&of_columns).iter().map(|&(x, _)| x * scale.x).collect()
+            })
+            .collect();
+        let with_heads = heads.iter().filter(|heads| !heads.is_empty()).count();
+        let gaps: Vec<f32> = heads.iter().flat_map(|heads| heads.windows(2).map(|pair| pair[1] - pair[0])).collect();
+        if 2 * with_heads < heads.len() || gaps.is_empty() {
+            return None;
+        }
+        Some(Self {
+            extent,
+            beds: beds.iter().map(|&(y, _)| y * scale.y).collect(),
+            heads,
+            joint: thick * scale.min_element(),
+            brick: gaps.iter().sum::<f32>() / gaps.len() as f32,
+        })
+    }
+
+    pub(super) const fn joint(&self) -> f32 {
+        self.joint
+    }
+
+    pub(super) const fn brick(&self) -> f32 {
+        self.brick
+    }
+
+    /// The course that a height lies in, or that above the bed joint which it is.
+    fn course(&self, y: f32) -> usize {
+        self.beds.partition_point(|bed| *bed < y - SAME)
+    }
+
+    /// The bed joint on which a place lies.
+    fn bed(&self, y: f32) -> Option<usize> {
+        let bed = self.course(y);
+        self.beds.get(bed).is_some_and(|bed| (bed - y).abs() <= SAME).then_some(bed)
+    }
+
+    fn is_head(&self, course: usize, x: f32) -> bool {
+        self.heads.get(course).is_some_and(|heads| heads.iter().any(|head| (head - x).abs() <= SAME))
+    }
+
+    /// Whether a place lies in a joint's middle.
+    pub(super) fn is_in_joint(&self, pos: Vec2) -> bool {
+        self.bed(pos.y).is_some() || self.is_head(self.course(pos.y), pos.x)
+    }
+
+    /// The nearest place at which joints meet, if there is any.
+    pub(super) fn nearest(&self, pos: Vec2) -> Option<Vec2> {
+        let near = |a: &f32, b: &f32, to: f32| (a - to).abs().total_cmp(&(b - to).abs());
+        let bed = (0..self.beds.len()).min_by(|&a, &b| near(&self.beds[a], &self.beds[b], pos.y))?;
+        let heads = self.heads[bed].iter().chain(&self.heads[bed + 1]);
+        let x = heads.min_by(|a, b| near(a, b, pos.x))?;
+        Some(Vec2::new(*x, self.beds[bed]))
+    }
+
+    /// The ways from a place: along its joints; within a brick up and down.
+    pub(super) fn ways(&self, pos: Vec2) -> Vec<Way> {
+        let mut ways = Vec::with_capacity(4);
+        let course = self.course(pos.y);
+        // From the joint or the brick at `pos` up and down to the next bed.
+        let up = |course: usize| pos.y - course.checked_sub(1).map_or(0.0, |bed| self.beds[bed]);
+        let down = |course: usize| self.beds.get(course).copied().unwrap_or(self.extent.y) - pos.y;
+        if let Some(bed) = self.bed(pos.y) {
+            let meeting = self.heads[bed].iter().chain(&self.heads[bed + 1]);
+            let left = meeting.clone().filter(|x| **x < pos.x - SAME).fold(0.0f32, |a, b| a.max(*b));
+            let right = meeting.filter(|x| **x > pos.x + SAME).fold(self.extent.x, |a, b| a.min(*b));
+            ways.extend([(Vec2::NEG_X, pos.x - left), (Vec2::X, right - pos.x)]);
+            if self.is_head(bed, pos.x) {
+                ways.push((Vec2::NEG_Y, up(bed)));
+            }
+            if self.is_head(bed + 1, pos.x) {
+                ways.push((Vec2::Y, down(bed + 1)));
+            }
+        } else {
+            ways.extend([(Vec2::NEG_Y, up(course)), (Vec2::Y, down(course))]);
+        }
+        ways.retain(|&(_, far)| far > SAME);
+        ways
+    }
+
+    /// The place straight above (`up` -1) or below (1) a bed joint where a split of the brick there ends; none near the brick's ends.
+    pub(super) fn across(&self, pos: Vec2, up: f32) -> Option<Vec2> {
+        let bed = self.bed(pos.y)?;
+        let (course, y) = if up < 0.0 {
+            (bed, bed.checked_sub(1).map_or(0.0, |bed| self.beds[bed]))
+        } else {
+            (bed + 1, self.beds.get(bed + 1).copied().unwrap_or(self.extent.y))
+        };
+        let is_near = |head: &f32| (head - pos.x).abs() < 0.25 * self.brick;
+        (!self.heads[course].iter().any(is_near)).then_some(Vec2::new(pos.x, y))
+    }
+
+    /// Where a segment of about `length` ends that takes a way.
+    pub(super) fn end(&self, from: Vec2, (way, far): Way, length: f32) -> Vec2 {
+        let end = if far <= 1.45 * length { far } else { length };
+        let mut to = (from + way * end).clamp(Vec2::ZERO, self.extent);
+        // Exactly in the middle, whatever rounding has made of it.
+        if let Some(bed) = self.bed(to.y) {
+            to.y = self.beds[bed];
+        }
+        to
+    }
+}
+
+fn mean(values: impl Iterator<Item = f32>) -> f32 {
+    let (sum, count) = values.fold((0.0, 0u32), |(sum, count), value| (sum + value, count + 1));
+    sum / count.max(1) as f32
+}
+
+/// Runs of high values: the middle of each, weighed by them, and how long it is.
+fn ridges(values: &[f32]) -> Vec<(f32, f32)> {
+    let highest = values.iter().copied().fold(0.0, f32::max);
+    let least = JOINT.max(0.5 * highest);
+    let mut found = Vec::new();
+    let mut start = 0;
+    while start < values.len() {
+        if values[start] < least {
+            start += 1;
+            continue;
+        }
+        let end = (start..values.len()).find(|&i| values[i] < least).unwrap_or(values.len());
+        // With its slopes.
+        let (low, high) = (start.saturating_sub(1), (end + 1).min(values.len()));
+        let weight: f32 = values[low..high].iter().sum();
+        let middle = (low..high).map(|i| (i as f32 + 0.5) * values[i]).sum::<f32>() / weight;
+        // What lies at the border is half a joint at most.
+        if start > 0 && end < values.len() {
+            found.push((middle, weight / highest));
+        }
+        start = end;
+    }
+    found
+}
