@@ -23,7 +23,7 @@ const WIDE: f32 = 0.1;
 const FEW_NODES: usize = 64;
 
 /// How much further a hit reaches, as a share, where it has next to no room.
-const MORE_REACH: f32 = 1.6;
+const MORE_REACH: f32 = 1.8;
 
 /// How many times wider the cracks of an impact are than those of one of energy 1.
 fn widening(energy: f32) -> f32 {
@@ -204,6 +204,8 @@ impl CrackGrowth {
 
     fn populate(&mut self, impact: u32, center: Vec2, inner: f32, outer: f32) {
         let extent = self.network.extent();
+        // In masonry cracks begin in a joint.
+        let center = self.masonry.as_ref().and_then(|masonry| masonry.nearest(center)).unwrap_or(center);
         let energy = self.impacts[impact as usize].first_energy;
         let region = Region { center, energy, inner, outer, extent };
         let seed = mix(self.seed ^ mix(u64::from(impact) | 1 << 40));

@@ -12,6 +12,9 @@ const BRICK: f32 = 3.0;
 /// Share of a course that is joint, where the picture tells nothing.
 const THIN: f32 = 0.14;
 
+/// A hit at the border counts places there as further away by so many times what they lack of room.
+const OFF_BORDER: f32 = 2.0;
+
 /// Places closer than this (pattern units) are one.
 const SAME: f32 = 1e-4;
 
@@ -89,7 +92,8 @@ impl Masonry {
             extent,
             beds: beds.iter().map(|&(y, _)| y * scale.y).collect(),
             heads,
-            joint: thick * scale.min_element(),
+            // The lines of a picture are found a little wider than they are.
+            joint: 0.7 * thick * scale.min_element(),
             brick: gaps.iter().sum::<f32>() / gaps.len() as f32,
         })
     }
@@ -122,12 +126,16 @@ impl Masonry {
         self.bed(pos.y).is_some() || self.is_head(self.course(pos.y), pos.x)
     }
 
-    /// The nearest place at which joints meet, if there is any.
+    /// The nearest place at which joints meet, if there is any; where it would be at the border, rather one further inside.
     pub(super) fn nearest(&self, pos: Vec2) -> Option<Vec2> {
-        let near = |a: &f32, b: &f32, to: f32| (a - to).abs().total_cmp(&(b - to).abs());
-        let bed = (0..self.beds.len()).min_by(|&a, &b| near(&self.beds[a], &self.beds[b], pos.y))?;
+        let off = |at: f32, to: f32, extent: f32, room: f32| {
+            (at - to).abs() + OFF_BORDER * (room - at.min(extent - at)).clamp(0.0, 0.5 * extent)
+        };
+        let rows = |bed: &usize| off(self.beds[*bed], pos.y, self.extent.y, 0.8 * self.brick);
+        let bed = (0..self.beds.len()).min_by(|a, b| rows(a).total_cmp(&rows(b)))?;
+        let columns = |x: &f32| off(*x, pos.x, self.extent.x, 1.1 * self.brick);
         let heads = self.heads[bed].iter().chain(&self.heads[bed + 1]);
-        let x = heads.min_by(|a, b| near(a, b, pos.x))?;
+        let x = heads.min_by(|a, b| columns(a).total_cmp(&columns(b)))?;
         Some(Vec2::new(*x, self.beds[bed]))
     }
 

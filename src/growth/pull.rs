@@ -61,7 +61,7 @@ const WITHIN_GRAIN: f32 = 0.3;
 const LONGEST_RUN: f32 = 0.9;
 
 /// What is near to a hit, as a share of its reach.
-const NEAR_HIT: f32 = 0.2;
+const NEAR_HIT: f32 = 0.35;
 
 /// Share of the nodes along a brick at which a hairline splits it.
 const SPLIT: f32 = 0.03;
@@ -282,18 +282,19 @@ impl CrackGrowth {
             .collect();
         ways.sort_by(|a, b| b.0.total_cmp(&a.0));
         let Some(&(_, best)) = ways.first() else { return (pos, None) };
-        let is_tip = self.child_of(node) == NO_PARENT;
+        // What else there is ahead is for the sides of its forks.
+        if self.child_of(node) != NO_PARENT {
+            return (pos, None);
+        }
         // Near the hit a crack takes both ways at the end of a head joint.
         let is_near_hit = self.impacts.get(impact as usize).is_some_and(|impact| {
             let near = (NEAR_HIT * self.params.reach * impact.energy.sqrt()).max(0.7 * masonry.brick());
             impact.pos.distance(pos) < near
         });
         let is_level = best.0.x != 0.0 && heading.x != 0.0;
-        let side = if !is_tip {
-            None
-        } else if ways.len() > 1 && ways[1].0 > -0.3 && (is_near_hit && heading.y != 0.0 || self.is_fork(node)) {
+        let side = if ways.len() > 1 && ways[1].0 > -0.3 && (is_near_hit && heading.y != 0.0 || self.is_fork(node)) {
             Some(masonry.end(pos, ways[1].1, length))
-        } else if ways.len() == 1 && is_level && draw(0xB4) < SPLIT {
+        } else if ways.len() == 1 && is_level && self.child_of(parent) == node && draw(0xB4) < SPLIT {
             // Through the brick above or below.
             let up = if course.y.abs() > 0.3 { course.y.signum() } else { (draw(0xB5) - 0.5).signum() };
             masonry.across(pos, up)

@@ -132,3 +132,52 @@ fn arms_go_with_the_energy_and_no_tip_turns_sharply() {
         }
     }
 }
+
+/// The rules of every preset, with its numbers anything up to twice as much or half: growth ends by itself, within its bound.
+#[test]
+fn always_ends_with_the_rules_of_the_presets() {
+    let names = CrackPreset::NAMES;
+    for case in 0..10_000u64 {
+        let mut rng = Rng::new(case).stream("rules");
+        let mut params = CrackPreset::named(names[case as usize % names.len()]).unwrap().growth;
+        let mut by = || crate::math::ops::exp(0.7 * rng.signed());
+        for number in [
+            &mut params.step_length,
+            &mut params.kill_distance,
+            &mut params.crack_radius,
+            &mut params.inertia,
+            &mut params.arrest,
+            &mut params.nucleation,
+            &mut params.grain,
+            &mut params.courses,
+        ] {
+            *number *= by();
+        }
+        params.wander = (params.wander * by()).min(1.0);
+        params.forks = (params.forks * by()).min(1.0);
+        params.fork_angle = (params.fork_angle * by()).clamp(0.2, 1.6);
+        params.crack_radius = params.crack_radius.max(params.kill_distance);
+        // Coarse, so that there is time for many.
+        params.step_length = params.step_length.max(0.015);
+        params.reach = params.reach.min(0.35);
+        params.num_iterations = 100_000;
+        params.max_nodes = 1_000_000;
+        params.validate().unwrap();
+        let mut growth = CrackGrowth::new(params, Vec2::new(1.0, 0.7), case).unwrap();
+        for _ in 0..1 + case % 2 {
+            growth.hit(Vec2::new(rng.unit(), 0.7 * rng.unit()), rng.range(0.1, 3.0));
+            for _ in 0..rng.next_u32() % 30 {
+                growth.step();
+            }
+        }
+        let starts = growth.network().nodes().iter().filter(|node| node.parent == NO_PARENT).count() as u64;
+        let bound = growth.params().most_nodes(u64::from(growth.census().total), starts);
+        while growth.step().grew() {
+            assert!((growth.network().nodes().len() as u64) < bound, "case {case}");
+        }
+        let census = growth.census();
+        assert!(!growth.is_growing() && growth.steps() < 100_000, "case {case}");
+        assert_eq!(census.attracting, 0, "case {case}");
+        assert_eq!(census.killed + census.waiting, census.total, "case {case}");
+    }
+}

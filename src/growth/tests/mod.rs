@@ -2,6 +2,7 @@
 
 mod arrest;
 mod energy;
+mod masonry;
 mod reference;
 mod widths;
 

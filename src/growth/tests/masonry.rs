@@ -1,0 +1,88 @@
+//! Cracks in masonry: as brick ships, on walls with a picture and without.
+
+use crate::{
+    CrackPreset,
+    growth::CrackGrowth,
+    math::Rng,
+    pattern::{CrackMask, NO_PARENT},
+};
+use glam::{UVec2, Vec2};
+
+/// A wall of `rows` courses as a picture: light joints between dark bricks. Also how wide a joint is.
+fn wall(rows: u32) -> (UVec2, Vec<u8>, f32) {
+    let size = UVec2::splat(512);
+    let (course, brick, joint) = (512 / rows, 3 * 512 / rows, 512 / rows / 7);
+    let mut rng = Rng::new(u64::from(rows));
+    let texels = (0..size.x * size.y).flat_map(|i| {
+        let (x, y) = (i % 512, i / 512);
+        let shift = if (y / course) % 2 == 0 { 0 } else { brick / 2 };
+        let is_joint = y % course < joint || (x + shift) % brick < joint;
+        let value = (if is_joint { 190.0 } else { 90.0 } + 14.0 * rng.signed()) as u8;
+        [value, value, value, 255]
+    });
+    (size, texels.collect(), joint as f32 / 512.0)
+}
+
+/// At least 95 of 100 parts of the length lie in joints but for hairlines through bricks, no crack is wider than a joint, and no run is
+/// longer than two bricks.
+#[test]
+fn cracks_keep_to_the_joints_of_a_picture() {
+    for rows in [12, 16] {
+        let (size, texels, joint) = wall(rows);
+        let mask = std::sync::Arc::new(CrackMask::from_picture(size, &texels).unwrap());
+        let (course, brick) = (1.0 / rows as f32, 3.0 / rows as f32);
+        let (mut within, mut all, mut split, mut courses) = (0.0, 0.0, 0.0, 0.0);
+        for seed in 0..24 {
+            for energy in [1.0, 4.0] {
+                let mut growth = CrackGrowth::new(CrackPreset::BRICK.growth, Vec2::ONE, seed).unwrap();
+                growth.set_mask(mask.clone());
+                let mut rng = Rng::new(seed);
+                growth.hit(Vec2::new(rng.range(0.2, 0.8), rng.range(0.2, 0.8)), energy);
+                while growth.step().grew() {}
+                let nodes = growth.network().nodes();
+                let light = |pos: Vec2| {
+                    let at = (pos * 512.0).as_uvec2().min(UVec2::splat(511));
+                    texels[4 * (at.y * 512 + at.x) as usize] > 140
+                };
+                for segment in growth.network().segments() {
+                    let path = growth.network().path(segment).unwrap();
+                    let (a, b) = growth.network().ends(segment).unwrap();
+                    let straight = nodes[b as usize].pos - nodes[a as usize].pos;
+                    let is_split = straight.y.abs() > 0.7 * course && !light(nodes[a as usize].pos + 0.5 * straight);
+                    for pair in path.points().windows(2) {
+                        let long = pair[0].pos.distance(pair[1].pos);
+                        if is_split {
+                            split += long;
+                            continue;
+                        }
+                        all += long;
+                        within += if light(0.5 * (pair[0].pos + pair[1].pos)) { long } else { 0.0 };
+                        assert!(pair[0].width <= 1.001 * joint, "{} in a joint of {joint}", pair[0].width);
+                    }
+                }
+                // From each node back along its joint.
+                for node in nodes {
+                    let (mut run, mut at) = (0.0f32, *node);
+                    while at.parent != NO_PARENT {
+                        let before = nodes[at.parent as usize];
+                        let way = at.pos - before.pos;
+                        if way.y.abs() > way.x.abs() {
+                            break;
+                        }
+                        run += way.x.abs();
+                        at = before;
+                    }
+                    courses += 1.0;
+                    assert!(run <= 2.05 * brick, "seed {seed}: a run of {} bricks", run / brick);
+                }
+            }
+        }
+        println!(
+            "{rows} rows: {:.1} % in joints, {:.1} % through bricks",
+            100.0 * within / all,
+            100.0 * split / (all + split)
+        );
+        assert!(within >= 0.95 * all && split > 0.0 && split < 0.12 * all, "{within} of {all}, {split}");
+        assert!(courses > 1000.0);
+    }
+}
