@@ -3,6 +3,7 @@
 use super::{
     CrackGrowth, MarkerLayout, StartLayout,
     pull::turned_at_most,
+    rays::NO_RAY,
     walls::{Walls, crosses_itself},
 };
 use crate::math::hash_unit;
@@ -193,7 +194,7 @@ impl CrackGrowth {
         }
     }
 
-    fn seal(&mut self, node: u32) {
+    pub(super) fn seal(&mut self, node: u32) {
         if let Some(arrest) = &mut self.arrest {
             arrest.seal(node);
         }
@@ -269,8 +270,8 @@ impl CrackGrowth {
     }
 
     /// Links a tip to the node of another crack that lies best: near, and so that the two meet steeply. Says whether it did.
-    fn join_near(&mut self, tip: u32, heading: Vec2, reach: f32) -> bool {
-        let length = self.params.step_length;
+    pub(super) fn join_near(&mut self, tip: u32, heading: Vec2, reach: f32) -> bool {
+        let (length, has_rays) = (self.params.step_length, self.has_rays());
         let mut nearby = Vec::new();
         // In a joint, what lies in it.
         let least = if self.masonry.is_some() { 0.97 * heading.length() } else { 0.0 };
@@ -280,12 +281,17 @@ impl CrackGrowth {
                 let place = |node: u32| self.network.nodes.get(node as usize).map_or(end.pos, |node| node.pos);
                 let along = (place(self.child_of(node)) - place(end.parent)).normalize_or_zero();
                 let distance = distance_sq.sqrt();
-                let slant = along.dot(way / distance).abs();
+                // A ray goes straight on up to what it meets, others turn to meet it steeply.
+                let slant = if has_rays {
+                    1.0 - way.dot(heading) / (distance * heading.length())
+                } else {
+                    along.dot(way / distance).abs()
+                };
                 nearby.push((distance / length + 3.0 * slant, node));
             }
         });
         nearby.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        nearby.into_iter().take(5).any(|(_, node)| self.join(node, tip))
+        nearby.into_iter().take(5).any(|(_, node)| self.join(node, tip, LinkKind::Junction))
     }
 
     /// Bears a node at `to` if its line touches no other; if it does, joins the crack that is in the way.
@@ -322,7 +328,18 @@ impl CrackGrowth {
             }
             Err(()) if self.params.arrest <= 0.0 => None,
             Err(()) => {
-                self.join_near(from, to - node.pos, LAST_REACH);
+                // A ray comes nearer first, so that it need not turn to where it is joined.
+                let nearer = 0.5 * (node.pos + to);
+                let tip = if self.has_rays() && to.distance(node.pos) > 0.6 * self.params.step_length {
+                    self.extend(from, nearer, true)
+                } else {
+                    None
+                };
+                if let Some(tip) = tip {
+                    self.join_near(tip, to - nearer, LAST_REACH);
+                } else if self.network.nodes.len() == child as usize {
+                    self.join_near(from, to - node.pos, LAST_REACH);
+                }
                 None
             }
         }
@@ -350,8 +367,8 @@ impl CrackGrowth {
     }
 
     /// Links a tip to a node of another crack, unless a third is in the way; says whether it did.
-    fn join(&mut self, node: u32, tip: u32) -> bool {
-        let link = Link { a: node, b: tip, width: 0.0, birth: self.steps, kind: LinkKind::Junction, bend: 1.0 };
+    pub(super) fn join(&mut self, node: u32, tip: u32, kind: LinkKind) -> bool {
+        let link = Link { a: node, b: tip, width: 0.0, birth: self.steps, kind, bend: 1.0 };
         let joined = self.link(link);
         if joined {
             self.widen_end(tip);
@@ -442,6 +459,11 @@ impl CrackGrowth {
         let (a, b) = (&self.network.nodes[one as usize], &self.network.nodes[other as usize]);
         if a.impact != b.impact {
             return false;
+        }
+        if self.has_rays() {
+            let ray_of = |node: u32| self.field.ray_of.get(node as usize).copied().unwrap_or(NO_RAY);
+            return a.parent == NO_PARENT && b.parent == NO_PARENT
+                || ray_of(one) != NO_RAY && ray_of(one) == ray_of(other);
         }
         // The rays of a hit keep their distance by themselves.
         if matches!(self.params.markers, MarkerLayout::Polar { .. }) {

@@ -128,28 +128,41 @@ impl CrackGrowth {
         let reach = self.reach(pos, energy);
         let first = self.network.nodes.len() as u32;
         let seed = mix(self.seed ^ mix(u64::from(index)));
-        for place in markers::starts(self.params.starts, (pos, energy), reach, extent, seed) {
+        let plan = self.plan_rays(index, reach);
+        let places = match &plan {
+            Some(plan) => plan.rim.iter().map(|rim| rim.pos.clamp(Vec2::ZERO, extent)).collect(),
+            None => markers::starts(self.params.starts, (pos, energy), reach, extent, seed),
+        };
+        let mut born = Vec::new();
+        for (i, place) in places.into_iter().enumerate() {
             let place = self.masonry.as_ref().and_then(|masonry| masonry.nearest(place)).unwrap_or(place);
             let is_free = !self.nodes.any_within(place, 1e-4) && !self.is_on_crack(place, index);
             if is_free && !self.mask.is_forbidden(place / extent) {
+                born.push((i, self.network.nodes.len() as u32));
                 self.bear(place, NO_PARENT, 0, index, 1.0);
             }
         }
         if first == self.network.nodes.len() as u32 {
             self.sprout(pos, index);
+        } else if plan.is_some() {
+            // The rim is joined below.
         } else if matches!(self.params.starts, StartLayout::Crushed { .. }) {
             self.crush(first);
         } else if let StartLayout::Arms { count } = self.params.starts {
             self.branch_out(first, markers::arms(count, (pos, energy), self.params.reach, extent, seed));
         }
+        self.newborn = first..self.network.nodes.len() as u32;
+        let named = plan.map(|plan| (self.begin_rays(&plan, index, &born), plan));
         for node in first..self.network.nodes.len() as u32 {
             self.field.visit(node, &self.network.nodes, &self.nodes);
         }
-        self.newborn = first..self.network.nodes.len() as u32;
         if self.arrest.is_some() {
             self.unshown.push(first);
         }
         self.join_newborn();
+        if let Some((name, plan)) = named {
+            self.lay_out_rays(&plan, name);
+        }
         self.populate(index, pos, 0.0, reach);
         self.steps_left = self.params.num_iterations;
         HitOutcome::Started(index)

@@ -31,7 +31,7 @@ impl Region {
 }
 
 /// A probability over the surface, at any resolution.
-fn density_at(density: Option<&Grid<f32>>, pos: Vec2, extent: Vec2) -> f32 {
+pub(super) fn density_at(density: Option<&Grid<f32>>, pos: Vec2, extent: Vec2) -> f32 {
     let Some(grid) = density else { return 1.0 };
     let size = grid.size();
     let texel = (pos / extent * size.as_vec2()).as_uvec2();
@@ -66,6 +66,8 @@ pub(super) fn lay_out(
         }
     };
     match params.markers {
+        // They come with their plan.
+        MarkerLayout::Rays { .. } => {}
         MarkerLayout::PseudoGrid { occupancy, jitter } => {
             let [columns, lines] = grid(params, region.extent).to_array();
             let cell = region.extent / Vec2::new(columns as f32, lines as f32);
@@ -139,7 +141,8 @@ pub(super) fn lay_out(
             }
         }
     }
-    if region.inner == 0.0 && kept < FEWEST {
+    let has_rays = matches!(params.markers, MarkerLayout::Rays { .. });
+    if region.inner == 0.0 && kept < FEWEST && !has_rays {
         let mut rng = Rng::new(seed).stream("fewest");
         let turn = rng.unit();
         for i in 0..FEWEST {
@@ -171,6 +174,7 @@ fn spacing(params: &GrowthParams, extent: Vec2) -> f32 {
         MarkerLayout::PseudoGrid { .. } => (extent / grid(params, extent).as_vec2()).max_element(),
         MarkerLayout::DartThrowing { spacing } => spacing,
         MarkerLayout::Polar { rings, .. } => params.reach / rings as f32,
+        MarkerLayout::Rays { .. } => 0.5 * params.crack_radius,
     }
 }
 

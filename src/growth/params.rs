@@ -34,6 +34,22 @@ pub enum MarkerLayout {
         /// Probability that a place carries a marker, 0..=1.
         occupancy: f32,
     },
+    /// Straight rays around the hit, each with markers of its own, which attract its nodes alone (glass, ice). They start on the rim
+    /// of the crushed zone ([`StartLayout::Crushed`]), and with `draw_connections` rings join them: broken polygons, wider
+    /// apart further out, as far as the reach. Where the border is near there are fewer of them.
+    Rays {
+        /// Number of rays of a hit of energy 1, 1..=360; in proportion to the energy to the power of 0.4.
+        sectors: u32,
+        /// Unevenness of angles and rings, and how much the rays kink, 0..=1.
+        jitter: f32,
+        /// Share of the rays that run on until they meet the border or another crack, 0..=1. The others end within the reach, most
+        /// of them near the hit: at a ring if there are any, or free, which is the share [`open_ends`](GrowthParams::open_ends) of them.
+        through: f32,
+        /// How many times each of those that run through forks at energy 1, on average, 0..=8; in proportion to the energy to the power of 0.4.
+        forks: f32,
+        /// Angle of a fork, radians, 0.42..=1.5; up to a seventh less or more.
+        fork_angle: f32,
+    },
 }
 
 /// How cracks share the markers.
@@ -346,6 +362,13 @@ impl GrowthParams {
                 ("jitter", f64::from(jitter), 0.0, 1.0),
                 ("occupancy", f64::from(occupancy), 0.0, 1.0),
             ],
+            MarkerLayout::Rays { sectors, jitter, through, forks, fork_angle } => &[
+                ("sectors", f64::from(sectors), 1.0, 360.0),
+                ("jitter", f64::from(jitter), 0.0, 1.0),
+                ("through", f64::from(through), 0.0, 1.0),
+                ("forks", f64::from(forks), 0.0, 8.0),
+                ("fork_angle", f64::from(fork_angle), 0.42, 1.5),
+            ],
         };
         let starts: &[_] = match self.starts {
             StartLayout::Point => &[],
@@ -375,8 +398,8 @@ impl GrowthParams {
 
     /// Sets one parameter from text, by the name of its field or by the paper's own (`D`).
     ///
-    /// Besides the fields: `markers` (`grid`, `darts`, `polar`), `occupancy`, `jitter`, `spacing`, `sectors`, `rings`,
-    /// `ring_growth` of the present layout; `venation` (`open`, `closed`), `starts` (`point`, `points`, `arms`, `ring`, `crushed`, `disc`), `start_count`, `start_radius`.
+    /// Besides the fields: `markers` (`grid`, `darts`, `polar`, `rays`), `occupancy`, `jitter`, `spacing`, `sectors`, `rings`,
+    /// `ring_growth`, `through`, `forks`, `fork_angle` of the present layout; `venation` (`open`, `closed`), `starts` (`point`, `points`, `arms`, `ring`, `crushed`, `disc`), `start_count`, `start_radius`.
     ///
     /// ```
     /// use bevy_crack::growth::GrowthParams;
@@ -407,6 +430,9 @@ impl GrowthParams {
                     "polar" => {
                         MarkerLayout::Polar { sectors: 16, rings: 16, ring_growth: 1.1, jitter: 0.5, occupancy: 0.8 }
                     }
+                    "rays" => {
+                        MarkerLayout::Rays { sectors: 14, jitter: 0.6, through: 0.8, forks: 0.2, fork_angle: 0.45 }
+                    }
                     _ => return Err(unreadable()),
                 }
             }
@@ -431,11 +457,22 @@ impl GrowthParams {
             ("occupancy", MarkerLayout::PseudoGrid { occupancy, .. } | MarkerLayout::Polar { occupancy, .. }, _) => {
                 *occupancy = parse(name, text)?;
             }
-            ("jitter", MarkerLayout::PseudoGrid { jitter, .. } | MarkerLayout::Polar { jitter, .. }, _) => {
+            (
+                "jitter",
+                MarkerLayout::PseudoGrid { jitter, .. }
+                | MarkerLayout::Polar { jitter, .. }
+                | MarkerLayout::Rays { jitter, .. },
+                _,
+            ) => {
                 *jitter = parse(name, text)?;
             }
             ("spacing", MarkerLayout::DartThrowing { spacing }, _) => *spacing = parse(name, text)?,
-            ("sectors", MarkerLayout::Polar { sectors, .. }, _) => *sectors = parse(name, text)?,
+            ("sectors", MarkerLayout::Polar { sectors, .. } | MarkerLayout::Rays { sectors, .. }, _) => {
+                *sectors = parse(name, text)?;
+            }
+            ("through", MarkerLayout::Rays { through, .. }, _) => *through = parse(name, text)?,
+            ("forks", MarkerLayout::Rays { forks, .. }, _) => *forks = parse(name, text)?,
+            ("fork_angle", MarkerLayout::Rays { fork_angle, .. }, _) => *fork_angle = parse(name, text)?,
             ("rings", MarkerLayout::Polar { rings, .. }, _) => *rings = parse(name, text)?,
             ("ring_growth", MarkerLayout::Polar { ring_growth, .. }, _) => *ring_growth = parse(name, text)?,
             (
@@ -505,7 +542,7 @@ impl GrowthParams {
                 scaled.num_columns_grid = count(self.num_columns_grid);
             }
             MarkerLayout::DartThrowing { spacing } => length(spacing, 0.002, 1.0),
-            MarkerLayout::Polar { .. } => {}
+            MarkerLayout::Polar { .. } | MarkerLayout::Rays { .. } => {}
         }
         match &mut scaled.starts {
             StartLayout::Point | StartLayout::Points { .. } | StartLayout::Arms { .. } => {}
@@ -545,7 +582,9 @@ impl GrowthParams {
                 let furthest = (256.0 * self.step_length).min(32.0);
                 varied.crack_radius = (self.crack_radius * spacing.max(1.0)).min(furthest).max(self.crack_radius);
             }
-            MarkerLayout::Polar { sectors, .. } => *sectors = count(*sectors, 1.0 / spacing, 360),
+            MarkerLayout::Polar { sectors, .. } | MarkerLayout::Rays { sectors, .. } => {
+                *sectors = count(*sectors, 1.0 / spacing, 360);
+            }
         }
         match &mut varied.starts {
             StartLayout::Point | StartLayout::Arms { .. } => {}
@@ -572,6 +611,11 @@ impl GrowthParams {
         let mut births = markers * (2 + approaches);
         if self.venation == Venation::Closed {
             births = 6 * markers * u64::from(super::closed::patience(self));
+        }
+        if matches!(self.markers, MarkerLayout::Rays { .. }) {
+            // A first node, and a line from each ring.
+            let chord = u64::from(super::rays::chord_steps(super::plan::LONGEST_CHORD, self.step_length));
+            births += markers * (1 + u64::from(super::plan::MOST_RINGS) * chord);
         }
         let starts = starts + if self.nucleation > 0.0 { markers } else { 0 };
         if self.arrest <= 0.0 {

@@ -72,7 +72,8 @@ pub(super) const NO_PULL: u32 = u32::MAX;
 impl CrackGrowth {
     /// Whether cracks are rays that keep to their way.
     pub(super) fn are_rays(&self) -> bool {
-        self.arrest.is_some() && self.params.inertia > 0.0 && matches!(self.params.markers, MarkerLayout::Polar { .. })
+        let is_polar = self.params.inertia > 0.0 && matches!(self.params.markers, MarkerLayout::Polar { .. });
+        self.arrest.is_some() && (is_polar || self.has_rays())
     }
 
     /// How far aside a marker may lie that draws a crack, as cosines: of the angle to its way, to that from the hit, and to
@@ -83,7 +84,8 @@ impl CrackGrowth {
             && matches!(self.params.starts, StartLayout::Arms { .. })
             && (self.mask.is_empty() || self.masonry.is_some());
         if self.are_rays() {
-            return Some([ASIDE, ASIDE, -1.0]);
+            // A ray that has markers of its own may be a fork, which leads elsewhere than from the hit.
+            return Some([ASIDE, if self.has_rays() { -1.0 } else { ASIDE }, -1.0]);
         }
         let off_hit = (self.params.fork_angle + OFF_HIT.0).max(OFF_HIT.1);
         are_arms.then(|| [IN_SIGHT, ops::cos(off_hit), IN_SIGHT])
@@ -160,7 +162,7 @@ impl CrackGrowth {
         let (length, kill) = (self.params.step_length, self.params.kill_distance);
         let next = self.network.nodes.len() as u64;
         // A crack does not turn on its heel: what it cannot serve on its way is left to others.
-        let keeps_on = self.arrest.is_some() && (self.params.inertia > 0.0 || !self.mask.is_empty());
+        let keeps_on = self.arrest.is_some() && (self.params.inertia > 0.0 || self.has_rays() || !self.mask.is_empty());
         for (child, &(_, slot)) in (next..).zip(&self.order) {
             let pull = self.pulls[slot as usize];
             let from = self.network.nodes[pull.node as usize].pos;

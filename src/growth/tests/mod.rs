@@ -2,6 +2,7 @@
 
 mod arrest;
 mod energy;
+mod rays;
 mod reference;
 mod widths;
 
