@@ -102,7 +102,7 @@ fn rim_radius(params: &GrowthParams, energy: f32) -> f32 {
     match params.starts {
         StartLayout::Crushed { radius, .. } => radius * energy.sqrt().sqrt(),
         StartLayout::Ring { radius, .. } | StartLayout::Disc { radius, .. } => radius,
-        StartLayout::Point | StartLayout::Points { .. } => 0.5 * params.step_length,
+        StartLayout::Point | StartLayout::Points { .. } | StartLayout::Arms { .. } => 0.5 * params.step_length,
     }
 }
 
