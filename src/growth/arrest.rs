@@ -25,6 +25,9 @@ const TURN: f32 = 2.5;
 /// The node of a crack that is met lies no more than so many segment lengths away.
 const LAST_REACH: f32 = 1.5;
 
+/// A ray that would meet a crack within so many segment lengths ends at it at once.
+const SOON: f32 = 1.6;
+
 /// A node this many segment lengths from another crack beside it would run along it.
 const BESIDE: f32 = 0.7;
 
@@ -128,6 +131,10 @@ impl CrackGrowth {
             };
         }
         let reach = self.params.arrest.max(TURN * length);
+        if self.has_rays() && self.params.arrest > 0.0 && self.ends_soon(from, heading) {
+            self.seal(from);
+            return Advance::Stopped(heading);
+        }
         // A ray turns to nothing: it runs straight on until it touches what is in its way.
         let goal =
             if self.are_rays() || self.masonry.is_some() { None } else { self.goal_ahead(from, heading, reach, AHEAD) };
@@ -165,6 +172,17 @@ impl CrackGrowth {
             self.seal(node);
         }
         Advance::Grown
+    }
+
+    /// Joins the tip of a ray to the crack that it would meet with the next segment or the one after, if there is one.
+    pub(super) fn ends_soon(&mut self, from: u32, heading: Vec2) -> bool {
+        let pos = self.network.nodes[from as usize].pos;
+        let far = (pos + heading * (SOON * self.params.step_length)).clamp(Vec2::ZERO, self.network.extent());
+        let ahead = SegmentPath::straight(PathPoint { pos, width: 0.0 }, PathPoint { pos: far, width: 0.0 });
+        let is_in_the_way = |arrest: &Arrest| arrest.walls.touches_any((from, u32::MAX), &ahead);
+        far.distance(pos) > 1e-4
+            && self.arrest.as_ref().is_some_and(is_in_the_way)
+            && self.join_near(from, heading, SOON + 0.5)
     }
 
     /// Whether a tip is one of those that stop short of other cracks.
@@ -273,8 +291,13 @@ impl CrackGrowth {
     pub(super) fn join_near(&mut self, tip: u32, heading: Vec2, reach: f32) -> bool {
         let (length, has_rays) = (self.params.step_length, self.has_rays());
         let mut nearby = Vec::new();
-        // In a joint, what lies in it.
-        let least = if self.masonry.is_some() { 0.97 * heading.length() } else { 0.0 };
+        // In a joint, what lies in it; a ray hardly turns.
+        let least = match has_rays {
+            true => 0.5,
+            false if self.masonry.is_some() => 0.97,
+            false => 0.0,
+        };
+        let least = least * heading.length();
         self.each_foreign(tip, reach * length, |node, distance_sq, way| {
             if way.dot(heading) > least * distance_sq.sqrt() {
                 let end = self.network.nodes[node as usize];
@@ -313,6 +336,9 @@ impl CrackGrowth {
         let (low, high) =
             (node.pos.cmpeq(Vec2::ZERO) & to.cmpeq(Vec2::ZERO), node.pos.cmpeq(extent) & to.cmpeq(extent));
         let to = Vec2::select(low, inward, Vec2::select(high, extent - inward, to));
+        // As good as on the border is on it.
+        let to = Vec2::select(to.cmplt(Vec2::splat(1e-5)), Vec2::ZERO, to);
+        let to = Vec2::select(to.cmpgt(extent - 1e-5), extent, to);
         match self.free_line(SegmentId::Branch(child), (from, u32::MAX), (node.pos, to)) {
             Ok((bend, path)) => {
                 let on_border = (to.cmpeq(Vec2::ZERO) | to.cmpeq(extent)).any();

@@ -45,7 +45,7 @@ pub enum MarkerLayout {
         /// Share of the rays that run on until they meet the border or another crack, 0..=1. The others end within the reach, most
         /// of them near the hit: at a ring if there are any, or free, which is the share [`open_ends`](GrowthParams::open_ends) of them.
         through: f32,
-        /// How many times each of those that run through forks at energy 1, on average, 0..=8; in proportion to the energy to the power of 0.4.
+        /// How many times each of those that run through forks at energy 1, on average, 0..=8; in proportion to the energy to the power of 0.6.
         forks: f32,
         /// Angle of a fork, radians, 0.42..=1.5; up to a seventh less or more.
         fork_angle: f32,

@@ -8,6 +8,9 @@ use std::f32::consts::TAU;
 /// The number of rays goes by this power of the energy: four times as many at 32 times the energy.
 const BY_ENERGY: f32 = 0.4;
 
+/// And so do the forks of each.
+const FORKS_BY_ENERGY: f32 = 0.6;
+
 /// The most rays of one hit, forks included.
 const MOST_RAYS: usize = 400;
 
@@ -30,8 +33,8 @@ const RUN_GROWTH: f32 = 1.5;
 /// How much a ray turns between two runs, at most, radians.
 const KINK: f32 = 0.07;
 
-/// A ray forks only where, so far along the fork, no other ray is so near; pattern units.
-const ROOMY: (f32, f32) = (0.15, 0.045);
+/// A ray forks only where no other ray is so near to the fork when that is twice as far from the ray; pattern units.
+const ROOMY: f32 = 0.035;
 
 /// One ray.
 #[derive(Clone, Debug)]
@@ -143,7 +146,7 @@ impl Plan {
             let line = line(params, (start, angle), last, extent, jitter, &mut rng);
             plan.rays.push(Ray { from: None, line, last });
         }
-        plan.fork((forks * ops::powf(energy, BY_ENERGY), fork_angle), params, extent, jitter, &mut rng);
+        plan.fork((forks * ops::powf(energy, FORKS_BY_ENERGY), fork_angle), params, extent, jitter, &mut rng);
         plan.clip_rim(pos, radius, extent);
         if params.draw_connections && n > 1 {
             plan.add_rings(params, blow, radius, extent, jitter);
@@ -183,11 +186,11 @@ impl Plan {
                     // To the side where there is room.
                     let heading = ops::atan2(way.y, way.x);
                     let is_roomy = |heading: &f32| {
-                        let ahead = at + ops::unit(*heading) * ROOMY.0.min(0.7 * room);
+                        let ahead = at + ops::unit(*heading) * (2.0 * ROOMY / ops::sin(bend)).min(0.7 * room);
                         let others = self.rays.iter().enumerate().filter(|(i, _)| *i != next);
                         others
                             .flat_map(|(_, ray)| ray.line.windows(2))
-                            .all(|pair| gap(ahead, (pair[0], pair[1])) > ROOMY.1)
+                            .all(|pair| gap(ahead, (pair[0], pair[1])) > ROOMY)
                     };
                     let Some(heading) = [heading + side * bend, heading - side * bend].into_iter().find(is_roomy)
                     else {
@@ -273,7 +276,7 @@ impl Plan {
                 let (one, other) = (corners[i], corners[(i + 1) % n]);
                 let turn = (other.0 - one.0).rem_euclid(TAU);
                 let apart = one.3.distance(other.3);
-                if one.1 == other.1 || turn > WIDEST || apart > LONGEST_CHORD || apart < 2.0 * length {
+                if one.1 == other.1 || turn > WIDEST || apart > LONGEST_CHORD {
                     continue;
                 }
                 let draw = |what: u64| hash_unit(mix(blow.seed ^ what << 32 ^ u64::from(ring) << 16), one.1 as u64);
@@ -283,7 +286,7 @@ impl Plan {
                 let wide = turn / WIDEST;
                 let thin = 1.0 - (1.0 - out * out) * (1.0 - 0.5 * wide * wide);
                 let missing = params.connection_gaps + (1.0 - params.connection_gaps) * thin;
-                if draw(1) < missing && !ends && !other_ends {
+                if (draw(1) < missing || apart < 2.0 * length) && !ends && !other_ends {
                     continue;
                 }
                 // Some rings step at a ray instead of going on from the same place.
@@ -361,7 +364,8 @@ fn line(
             break;
         }
         if room <= length.min(left) {
-            line.push((pos + way * room).clamp(Vec2::ZERO, extent));
+            // Beyond it, or the marker would be reached before the border is.
+            line.push(pos + way * (room + 2.0 * params.kill_distance));
             break;
         }
         pos += way * length.min(left);

@@ -198,12 +198,12 @@ impl CrackGrowth {
         let extent = self.network.extent();
         for (i, ray) in (0u32..).zip(&plan.rays) {
             for &pos in ray.line.iter().skip(1) {
-                let pos = pos.clamp(Vec2::ZERO, extent);
                 if self.field.living_at_most() >= MAX_MARKERS || self.is_barren(pos) {
                     continue;
                 }
                 self.field.add(pos, name + i);
-                if self.params.draw_markers {
+                let is_inside = pos.cmpge(Vec2::ZERO).all() && pos.cmple(extent).all();
+                if self.params.draw_markers && is_inside {
                     self.shown_markers.push(pos);
                     self.timeline.add_dot(Dot { pos, radius: self.params.line_width });
                 }
@@ -280,6 +280,10 @@ impl CrackGrowth {
             return None;
         }
         walker.steps_left = walker.steps_left.checked_sub(1)?;
+        // Another crack may have come between.
+        if self.params.arrest > 0.0 && segments > 2.5 && self.ends_soon(walker.tip, (to - from).normalize_or_zero()) {
+            return None;
+        }
         // As many equal segments as it takes, each a little aside.
         let stray = self.params.wander * (2.0 * hash_unit(self.seed ^ 0xC1, self.network.nodes.len() as u64) - 1.0);
         let way = (to - from) / segments;
