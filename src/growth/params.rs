@@ -38,14 +38,15 @@ pub enum MarkerLayout {
     /// of the crushed zone ([`StartLayout::Crushed`]), and with `draw_connections` rings join them: broken polygons, wider
     /// apart further out, as far as the reach. Where the border is near there are fewer of them.
     Rays {
-        /// Number of rays of a hit of energy 1, 1..=360; in proportion to the energy to the power of 0.4.
+        /// Number of rays of a hit of energy 1, 1..=360; in proportion to the energy to the power of 0.45.
         sectors: u32,
         /// Unevenness of angles and rings, and how much the rays kink, 0..=1.
         jitter: f32,
         /// Share of the rays that run on until they meet the border or another crack, 0..=1. The others end within the reach, most
         /// of them near the hit: at a ring if there are any, or free, which is the share [`open_ends`](GrowthParams::open_ends) of them.
         through: f32,
-        /// How many times each of those that run through forks at energy 1, on average, 0..=8; in proportion to the energy to the power of 0.6.
+        /// How many times each of those that run through forks at energy 1, on average, 0..=8; in proportion to the energy to the power of 0.6. Forks
+        /// fork again, half as often.
         forks: f32,
         /// Angle of a fork, radians, 0.42..=1.5; up to a seventh less or more.
         fork_angle: f32,

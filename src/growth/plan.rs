@@ -5,8 +5,8 @@ use crate::math::{Rng, hash_unit, mix, ops};
 use glam::Vec2;
 use std::f32::consts::TAU;
 
-/// The number of rays goes by this power of the energy: four times as many at 32 times the energy.
-const BY_ENERGY: f32 = 0.4;
+/// The number of rays goes by this power of the energy: four times as many at 22 times the energy.
+const BY_ENERGY: f32 = 0.45;
 
 /// And so do the forks of each.
 const FORKS_BY_ENERGY: f32 = 0.6;
@@ -23,6 +23,9 @@ pub(super) const LONGEST_CHORD: f32 = 1.0;
 /// The widest angle between two rays that a ring bridges, radians: a line across a wider one would come too near to the hit.
 const WIDEST: f32 = 1.4;
 
+/// And no line of a ring is so many times longer than it is to the next ring.
+const WIDER: f32 = 2.5;
+
 /// A border nearer than this (pattern units) gets fewer rays.
 const NEAR: f32 = 0.3;
 
@@ -33,8 +36,8 @@ const RUN_GROWTH: f32 = 1.5;
 /// How much a ray turns between two runs, at most, radians.
 const KINK: f32 = 0.07;
 
-/// A ray forks only where no other ray is so near to the fork when that is twice as far from the ray; pattern units.
-const ROOMY: f32 = 0.035;
+/// A ray forks only where no other ray is so near to the first stretch of the fork; pattern units.
+const ROOMY: f32 = 0.045;
 
 /// One ray.
 #[derive(Clone, Debug)]
@@ -127,7 +130,7 @@ impl Plan {
             let room = to_border(pos, way, extent);
             // Few of them are long.
             let draw = rng.unit();
-            let length = reach * (0.16 + 0.84 * draw * draw * draw);
+            let length = reach * (0.16 + 0.84 * draw * draw * draw.sqrt());
             let ends = !runs_through(i) && length + 0.1 < room;
             let start = pos + way * radius;
             plan.rim.push(Rim { pos: start, ray: Some(i), goes_on: true });
@@ -160,7 +163,7 @@ impl Plan {
         let mut share = forks;
         let mut end = self.rays.len();
         // Those that have forked off may do so again, half as often.
-        for _ in 0..2 {
+        for _ in 0..3 {
             while next < end && self.rays.len() < MOST_RAYS {
                 let Ray { line: main, last, from } = &self.rays[next];
                 let arc: f32 = main.windows(2).map(|pair| pair[0].distance(pair[1])).sum();
@@ -186,11 +189,13 @@ impl Plan {
                     // To the side where there is room.
                     let heading = ops::atan2(way.y, way.x);
                     let is_roomy = |heading: &f32| {
-                        let ahead = at + ops::unit(*heading) * (2.0 * ROOMY / ops::sin(bend)).min(0.7 * room);
-                        let others = self.rays.iter().enumerate().filter(|(i, _)| *i != next);
-                        others
-                            .flat_map(|(_, ray)| ray.line.windows(2))
-                            .all(|pair| gap(ahead, (pair[0], pair[1])) > ROOMY)
+                        let clear = |far: f32| {
+                            let ahead = at + ops::unit(*heading) * (far * ROOMY / ops::sin(bend)).min(0.7 * room);
+                            let others = self.rays.iter().enumerate().filter(|(i, _)| *i != next);
+                            let mut pieces = others.flat_map(|(_, ray)| ray.line.windows(2));
+                            pieces.all(|pair| gap(ahead, (pair[0], pair[1])) > ROOMY)
+                        };
+                        clear(1.5) && clear(3.0)
                     };
                     let Some(heading) = [heading + side * bend, heading - side * bend].into_iter().find(is_roomy)
                     else {
@@ -258,6 +263,7 @@ impl Plan {
             if out > 1.0 {
                 break;
             }
+            let gap = params.connection_every as f32 * ring as f32;
             corners.clear();
             for (i, ray) in self.rays.iter().enumerate() {
                 let begins = ray.from.map_or(0, |(_, generation)| generation + 1);
@@ -276,7 +282,7 @@ impl Plan {
                 let (one, other) = (corners[i], corners[(i + 1) % n]);
                 let turn = (other.0 - one.0).rem_euclid(TAU);
                 let apart = one.3.distance(other.3);
-                if one.1 == other.1 || turn > WIDEST || apart > LONGEST_CHORD {
+                if one.1 == other.1 || turn > WIDEST || apart > LONGEST_CHORD.min(WIDER * gap * length) {
                     continue;
                 }
                 let draw = |what: u64| hash_unit(mix(blow.seed ^ what << 32 ^ u64::from(ring) << 16), one.1 as u64);
@@ -284,13 +290,12 @@ impl Plan {
                 let (ends, other_ends) = (self.rays[one.1].last == one.2, self.rays[other.1].last == other.2);
                 // Fewer further out, and across wide gaps.
                 let wide = turn / WIDEST;
-                let thin = 1.0 - (1.0 - out * out) * (1.0 - 0.5 * wide * wide);
+                let thin = 1.0 - (1.0 - out * out) * (1.0 - 0.8 * wide * wide);
                 let missing = params.connection_gaps + (1.0 - params.connection_gaps) * thin;
                 if (draw(1) < missing || apart < 2.0 * length) && !ends && !other_ends {
                     continue;
                 }
                 // Some rings step at a ray instead of going on from the same place.
-                let gap = params.connection_every as f32 * ring as f32;
                 let step = |is_end: bool, what: u64| {
                     let stray = if draw(what) < 0.3 * jitter { 0.5 * gap * (2.0 * draw(what + 1) - 1.0) } else { 0.0 };
                     if is_end { 0 } else { stray as i32 }
@@ -328,7 +333,7 @@ fn directions(blow: Blow, extent: Vec2, count: f32, jitter: f32, rng: &mut Rng) 
     if all <= 0.0 {
         return Vec::new();
     }
-    let count = (count * ops::powf(all / BINS as f32, 0.7)).round().clamp(2.0, 360.0) as usize;
+    let count = (count * ops::powf(all / BINS as f32, 0.6)).round().clamp(2.0, 360.0) as usize;
     let turn = rng.unit();
     let mut angles: Vec<f32> = (0..count)
         .map(|i| {
