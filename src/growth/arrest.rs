@@ -1,7 +1,7 @@
 //! Cracks that know older cracks: a tip that comes near one turns to meet it steeply and stops there.
 
 use super::{
-    CrackGrowth, MarkerLayout, StartLayout,
+    CrackGrowth, StartLayout,
     pull::turned_at_most,
     rays::NO_RAY,
     walls::{Walls, crosses_itself},
@@ -490,10 +490,6 @@ impl CrackGrowth {
             let ray_of = |node: u32| self.field.ray_of.get(node as usize).copied().unwrap_or(NO_RAY);
             return a.parent == NO_PARENT && b.parent == NO_PARENT
                 || ray_of(one) != NO_RAY && ray_of(one) == ray_of(other);
-        }
-        // The rays of a hit keep their distance by themselves.
-        if matches!(self.params.markers, MarkerLayout::Polar { .. }) {
-            return true;
         }
         let apart = (3.0 * self.params.arrest.max(self.params.island_distance) / self.params.step_length) as u32 + 2;
         // Up from both to the node where they meet; a parent is always older than its child.

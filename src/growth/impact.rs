@@ -8,7 +8,7 @@ use super::{
     params::MAX_MARKERS,
 };
 use crate::{
-    math::{hash_unit, mix},
+    math::mix,
     pattern::{Dot, Link, LinkKind, NO_PARENT, Node},
 };
 use glam::Vec2;
@@ -217,8 +217,7 @@ impl CrackGrowth {
 
     fn populate(&mut self, impact: u32, center: Vec2, inner: f32, outer: f32) {
         let extent = self.network.extent();
-        let energy = self.impacts[impact as usize].first_energy;
-        let region = Region { center, energy, inner, outer, extent };
+        let region = Region { center, inner, outer, extent };
         let seed = mix(self.seed ^ mix(u64::from(impact) | 1 << 40));
         // Darts keep their distance from each other, and from the markers of hits that no step has taken up yet.
         let mut darts = None;
@@ -230,7 +229,7 @@ impl CrackGrowth {
         let (timeline, radius) = (&mut self.timeline, self.params.line_width);
         let show = self.params.draw_markers;
         // The rays of a hit are its own: older cracks do not sprout towards them.
-        let is_loyal = self.params.arrest > 0.0 || matches!(self.params.markers, MarkerLayout::Polar { .. });
+        let is_loyal = self.params.arrest > 0.0;
         let loyal = if is_loyal { impact } else { ANY_IMPACT };
         let wishes = (self.density.as_ref(), &*self.mask);
         markers::lay_out(&self.params, region, wishes, seed, |pos, spacing| {
@@ -304,19 +303,19 @@ impl CrackGrowth {
         is_in
     }
 
-    /// Joins the nodes of a crushed core, from `first` on: each to the nearest before it, and most to the one after it.
+    /// Joins the nodes of a rim, from `first` on, to each other.
     fn crush(&mut self, first: u32) {
         let last = self.network.nodes.len() as u32;
-        for node in first + 1..last {
-            let pos = self.network.nodes[node as usize].pos;
-            let to = |other: u32| self.network.nodes[other as usize].pos.distance_squared(pos);
-            // The node before it is on its own ring.
-            let inner = (first..node.saturating_sub(1).max(first + 1)).min_by(|&a, &b| to(a).total_cmp(&to(b)));
-            let draw = hash_unit(self.seed ^ 0xC3, u64::from(node));
-            for other in [inner.filter(|_| draw < 0.8), Some(node - 1).filter(|_| draw > 0.15)].into_iter().flatten() {
+        let extent = self.network.extent();
+        for node in first..last {
+            let next = if node + 1 == last { first } else { node + 1 };
+            let at = |node: u32| self.network.nodes[node as usize].pos;
+            // Not along the border, and two are joined once.
+            let is_along = |border: Vec2| (at(node).cmpeq(border) & at(next).cmpeq(border)).any();
+            if next != node && !(next == first && last - first == 2) && !is_along(Vec2::ZERO) && !is_along(extent) {
                 let width = self.params.line_width;
                 let (birth, kind) = (self.steps, LinkKind::Connection);
-                self.link(Link { a: other, b: node, width, birth, kind, bend: 1.0 });
+                self.link(Link { a: next, b: node, width, birth, kind, bend: 0.0 });
             }
         }
     }

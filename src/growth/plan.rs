@@ -36,6 +36,12 @@ const RUN_GROWTH: f32 = 1.5;
 /// How much a ray turns between two runs, at most, radians.
 const KINK: f32 = 0.07;
 
+/// The share of a ray along which it forks.
+const FORKING: f32 = 0.6;
+
+/// The least angle of a fork, radians: at a narrower one both would be one crack.
+const LEAST_FORK: f32 = 0.42;
+
 /// A ray forks only where no other ray is so near to the first stretch of the fork; pattern units.
 const ROOMY: f32 = 0.045;
 
@@ -115,7 +121,7 @@ fn rim_radius(params: &GrowthParams, energy: f32) -> f32 {
 impl Plan {
     /// The rays of a hit, `None` if the layout has none.
     pub(super) fn new(params: &GrowthParams, blow: Blow, extent: Vec2) -> Option<Self> {
-        let MarkerLayout::Rays { sectors, jitter, through, forks, fork_angle } = params.markers else { return None };
+        let MarkerLayout::Rays { sectors, jitter, through } = params.markers else { return None };
         let mut rng = Rng::new(blow.seed).stream("rays");
         let Blow { pos, energy, reach, .. } = blow;
         let radius = rim_radius(params, energy);
@@ -149,7 +155,7 @@ impl Plan {
             let line = line(params, (start, angle), last, extent, jitter, &mut rng);
             plan.rays.push(Ray { from: None, line, last });
         }
-        plan.fork((forks * ops::powf(energy, FORKS_BY_ENERGY), fork_angle), params, extent, jitter, &mut rng);
+        plan.fork(params.forks * ops::powf(energy, FORKS_BY_ENERGY), params, extent, jitter, &mut rng);
         plan.clip_rim(pos, radius, extent);
         if params.draw_connections && n > 1 {
             plan.add_rings(params, blow, radius, extent, jitter);
@@ -158,9 +164,10 @@ impl Plan {
     }
 
     /// Lets rays that run through fork.
-    fn fork(&mut self, (forks, angle): (f32, f32), params: &GrowthParams, extent: Vec2, jitter: f32, rng: &mut Rng) {
+    fn fork(&mut self, forks: f32, params: &GrowthParams, extent: Vec2, jitter: f32, rng: &mut Rng) {
         let mut next = 0;
         let mut share = forks;
+        let angle = params.fork_angle.max(LEAST_FORK);
         let mut end = self.rays.len();
         // Those that have forked off may do so again, half as often.
         for _ in 0..3 {
@@ -170,9 +177,9 @@ impl Plan {
                 let base = from.map_or(0, |(_, generation)| generation);
                 let (main, last) = (main.clone(), *last);
                 let first_side = if rng.unit() < 0.5 { 1.0 } else { -1.0 };
-                let count = (share + rng.unit()) as u32;
+                let count = (share * FORKING * arc / params.step_length + rng.unit()) as u32;
                 for i in 0..count {
-                    let from = (0.16 + 0.6 * (i as f32 + rng.unit()) / count as f32) * arc;
+                    let from = (0.16 + FORKING * (i as f32 + rng.unit()) / count as f32) * arc;
                     let nodes = (from / params.step_length).round();
                     let generation = base + nodes as u32;
                     let bend = angle * rng.range(0.86, 1.14);
