@@ -345,7 +345,7 @@ impl CrackGrowth {
                 self.bear(to, from, node.generation.saturating_add(1), impact, bend);
                 if let Some(arrest) = &mut self.arrest {
                     arrest.walls.add((from, child), &path);
-                    arrest.sealed[child as usize] = is_sealed || on_border;
+                    arrest.sealed[child as usize] |= is_sealed || on_border;
                 }
                 if on_border {
                     self.widen_end(child);

@@ -168,6 +168,13 @@ impl CrackGrowth {
         HitOutcome::Started(index)
     }
 
+    /// How far the first hit of an impact reached.
+    #[cfg(test)]
+    pub(super) fn reach_of(&self, impact: u32) -> f32 {
+        let Impact { pos, first_energy, .. } = self.impacts[impact as usize];
+        self.reach(pos, first_energy)
+    }
+
     /// How far a hit reaches: further where the border leaves it less room.
     fn reach(&self, pos: Vec2, energy: f32) -> f32 {
         let room = markers::room(pos, self.params.reach, self.network.extent());

@@ -304,7 +304,7 @@ impl Plan {
                 }
                 // Some rings step at a ray instead of going on from the same place.
                 let step = |is_end: bool, what: u64| {
-                    let stray = if draw(what) < 0.3 * jitter { 0.5 * gap * (2.0 * draw(what + 1) - 1.0) } else { 0.0 };
+                    let stray = if draw(what) < 0.45 * jitter { 0.5 * gap * (2.0 * draw(what + 1) - 1.0) } else { 0.0 };
                     if is_end { 0 } else { stray as i32 }
                 };
                 let from = (one.1, one.2.saturating_add_signed(step(ends, 2)).max(1));

@@ -3,6 +3,7 @@
 mod arrest;
 mod energy;
 mod rays;
+mod rays_reference;
 mod reference;
 mod widths;
 
