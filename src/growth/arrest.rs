@@ -1,8 +1,9 @@
 //! Cracks that know older cracks: a tip that comes near one turns to meet it steeply and stops there.
 
 use super::{
-    CrackGrowth, MarkerLayout, StartLayout,
+    CrackGrowth, StartLayout,
     pull::turned_at_most,
+    rays::NO_RAY,
     walls::{Walls, crosses_itself},
 };
 use crate::math::hash_unit;
@@ -23,6 +24,9 @@ const TURN: f32 = 2.5;
 
 /// The node of a crack that is met lies no more than so many segment lengths away.
 const LAST_REACH: f32 = 1.5;
+
+/// A ray that would meet a crack within so many segment lengths ends at it at once.
+const SOON: f32 = 1.6;
 
 /// A node this many segment lengths from another crack beside it would run along it.
 const BESIDE: f32 = 0.7;
@@ -127,6 +131,10 @@ impl CrackGrowth {
             };
         }
         let reach = self.params.arrest.max(TURN * length);
+        if self.has_rays() && self.params.arrest > 0.0 && self.ends_soon(from, heading) {
+            self.seal(from);
+            return Advance::Stopped(heading);
+        }
         // A ray turns to nothing: it runs straight on until it touches what is in its way.
         let goal =
             if self.are_rays() || self.masonry.is_some() { None } else { self.goal_ahead(from, heading, reach, AHEAD) };
@@ -166,6 +174,17 @@ impl CrackGrowth {
         Advance::Grown
     }
 
+    /// Joins the tip of a ray to the crack that it would meet with the next segment or the one after, if there is one.
+    pub(super) fn ends_soon(&mut self, from: u32, heading: Vec2) -> bool {
+        let pos = self.network.nodes[from as usize].pos;
+        let far = (pos + heading * (SOON * self.params.step_length)).clamp(Vec2::ZERO, self.network.extent());
+        let ahead = SegmentPath::straight(PathPoint { pos, width: 0.0 }, PathPoint { pos: far, width: 0.0 });
+        let is_in_the_way = |arrest: &Arrest| arrest.walls.touches_any((from, u32::MAX), &ahead);
+        far.distance(pos) > 1e-4
+            && self.arrest.as_ref().is_some_and(is_in_the_way)
+            && self.join_near(from, heading, SOON + 0.5)
+    }
+
     /// Whether a tip is one of those that stop short of other cracks.
     pub(super) fn stays_open(&self, tip: u32) -> bool {
         self.params.open_ends > 0.0
@@ -193,7 +212,7 @@ impl CrackGrowth {
         }
     }
 
-    fn seal(&mut self, node: u32) {
+    pub(super) fn seal(&mut self, node: u32) {
         if let Some(arrest) = &mut self.arrest {
             arrest.seal(node);
         }
@@ -269,23 +288,33 @@ impl CrackGrowth {
     }
 
     /// Links a tip to the node of another crack that lies best: near, and so that the two meet steeply. Says whether it did.
-    fn join_near(&mut self, tip: u32, heading: Vec2, reach: f32) -> bool {
-        let length = self.params.step_length;
+    pub(super) fn join_near(&mut self, tip: u32, heading: Vec2, reach: f32) -> bool {
+        let (length, has_rays) = (self.params.step_length, self.has_rays());
         let mut nearby = Vec::new();
-        // In a joint, what lies in it.
-        let least = if self.masonry.is_some() { 0.97 * heading.length() } else { 0.0 };
+        // In a joint, what lies in it; a ray hardly turns.
+        let least = match has_rays {
+            true => 0.5,
+            false if self.masonry.is_some() => 0.97,
+            false => 0.0,
+        };
+        let least = least * heading.length();
         self.each_foreign(tip, reach * length, |node, distance_sq, way| {
             if way.dot(heading) > least * distance_sq.sqrt() {
                 let end = self.network.nodes[node as usize];
                 let place = |node: u32| self.network.nodes.get(node as usize).map_or(end.pos, |node| node.pos);
                 let along = (place(self.child_of(node)) - place(end.parent)).normalize_or_zero();
                 let distance = distance_sq.sqrt();
-                let slant = along.dot(way / distance).abs();
+                // A ray goes straight on up to what it meets, others turn to meet it steeply.
+                let slant = if has_rays {
+                    1.0 - way.dot(heading) / (distance * heading.length())
+                } else {
+                    along.dot(way / distance).abs()
+                };
                 nearby.push((distance / length + 3.0 * slant, node));
             }
         });
         nearby.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        nearby.into_iter().take(5).any(|(_, node)| self.join(node, tip))
+        nearby.into_iter().take(5).any(|(_, node)| self.join(node, tip, LinkKind::Junction))
     }
 
     /// Bears a node at `to` if its line touches no other; if it does, joins the crack that is in the way.
@@ -307,13 +336,16 @@ impl CrackGrowth {
         let (low, high) =
             (node.pos.cmpeq(Vec2::ZERO) & to.cmpeq(Vec2::ZERO), node.pos.cmpeq(extent) & to.cmpeq(extent));
         let to = Vec2::select(low, inward, Vec2::select(high, extent - inward, to));
+        // As good as on the border is on it.
+        let to = Vec2::select(to.cmplt(Vec2::splat(1e-5)), Vec2::ZERO, to);
+        let to = Vec2::select(to.cmpgt(extent - 1e-5), extent, to);
         match self.free_line(SegmentId::Branch(child), (from, u32::MAX), (node.pos, to)) {
             Ok((bend, path)) => {
                 let on_border = (to.cmpeq(Vec2::ZERO) | to.cmpeq(extent)).any();
                 self.bear(to, from, node.generation.saturating_add(1), impact, bend);
                 if let Some(arrest) = &mut self.arrest {
                     arrest.walls.add((from, child), &path);
-                    arrest.sealed[child as usize] = is_sealed || on_border;
+                    arrest.sealed[child as usize] |= is_sealed || on_border;
                 }
                 if on_border {
                     self.widen_end(child);
@@ -322,7 +354,18 @@ impl CrackGrowth {
             }
             Err(()) if self.params.arrest <= 0.0 => None,
             Err(()) => {
-                self.join_near(from, to - node.pos, LAST_REACH);
+                // A ray comes nearer first, so that it need not turn to where it is joined.
+                let nearer = 0.5 * (node.pos + to);
+                let tip = if self.has_rays() && to.distance(node.pos) > 0.6 * self.params.step_length {
+                    self.extend(from, nearer, true)
+                } else {
+                    None
+                };
+                if let Some(tip) = tip {
+                    self.join_near(tip, to - nearer, LAST_REACH);
+                } else if self.network.nodes.len() == child as usize {
+                    self.join_near(from, to - node.pos, LAST_REACH);
+                }
                 None
             }
         }
@@ -350,8 +393,8 @@ impl CrackGrowth {
     }
 
     /// Links a tip to a node of another crack, unless a third is in the way; says whether it did.
-    fn join(&mut self, node: u32, tip: u32) -> bool {
-        let link = Link { a: node, b: tip, width: 0.0, birth: self.steps, kind: LinkKind::Junction, bend: 1.0 };
+    pub(super) fn join(&mut self, node: u32, tip: u32, kind: LinkKind) -> bool {
+        let link = Link { a: node, b: tip, width: 0.0, birth: self.steps, kind, bend: 1.0 };
         let joined = self.link(link);
         if joined {
             self.widen_end(tip);
@@ -443,9 +486,10 @@ impl CrackGrowth {
         if a.impact != b.impact {
             return false;
         }
-        // The rays of a hit keep their distance by themselves.
-        if matches!(self.params.markers, MarkerLayout::Polar { .. }) {
-            return true;
+        if self.has_rays() {
+            let ray_of = |node: u32| self.field.ray_of.get(node as usize).copied().unwrap_or(NO_RAY);
+            return a.parent == NO_PARENT && b.parent == NO_PARENT
+                || ray_of(one) != NO_RAY && ray_of(one) == ray_of(other);
         }
         let apart = (3.0 * self.params.arrest.max(self.params.island_distance) / self.params.step_length) as u32 + 2;
         // Up from both to the node where they meet; a parent is always older than its child.

@@ -9,6 +9,7 @@ use super::{
     closed::{Bond, Relations},
     nodes::NodeGrid,
     params::Venation,
+    rays::RAY,
 };
 use crate::pattern::Node;
 use glam::{UVec2, Vec2};
@@ -56,10 +57,13 @@ pub(super) struct MarkerField {
     near_sq: Vec<f32>,
     node: Vec<u32>,
     id: Vec<u32>,
-    /// The impact whose nodes alone may win the marker, or [`ANY_IMPACT`]. Every node that reaches it kills it.
+    /// The impact whose nodes alone may win the marker, or [`ANY_IMPACT`]; every node that reaches it kills it. Or the ray, whose nodes
+    /// alone do either.
     loyal: Vec<u32>,
     /// How often the marker was given up.
     given_up: Vec<u8>,
+    /// Per node: the ray that it is on; may be shorter than there are nodes.
+    pub(super) ray_of: Vec<u32>,
     /// Closed venation: what each marker attracts besides its nearest node.
     pub(super) relations: Option<Relations>,
     /// Markers that lie in no cell yet.
@@ -90,6 +94,7 @@ impl MarkerField {
             id: Vec::new(),
             loyal: Vec::new(),
             given_up: Vec::new(),
+            ray_of: Vec::new(),
             relations: (params.venation == Venation::Closed).then(|| Relations::new(params)),
             newborn: Vec::new(),
             cells: UVec2::ONE,
@@ -297,12 +302,14 @@ impl MarkerField {
         if distance_sq >= self.near_sq[marker] {
             return;
         }
-        if distance_sq <= self.kill_sq {
+        let loyal = self.loyal[marker];
+        let is_own = self.is_own(loyal, index, node);
+        if distance_sq <= self.kill_sq && (is_own || !is_ray(loyal)) {
             self.near_sq[marker] = DEAD;
             self.killed += 1;
             return;
         }
-        if self.loyal[marker] != ANY_IMPACT && self.loyal[marker] != node.impact {
+        if !is_own {
             return;
         }
         if self.node[marker] == NO_NODE {
@@ -312,12 +319,19 @@ impl MarkerField {
         self.node[marker] = index;
     }
 
+    /// Whether a marker that is loyal so attracts a node.
+    fn is_own(&self, loyal: u32, index: u32, node: &Node) -> bool {
+        loyal == ANY_IMPACT
+            || loyal == node.impact
+            || (is_ray(loyal) && self.ray_of.get(index as usize) == Some(&loyal))
+    }
+
     /// Closed venation: shows a marker a node that may come to be among its relative neighbours.
     fn relate(&mut self, marker: usize, index: u32, nodes: &[Node], grid: &NodeGrid) {
         let (pos, node) = (Vec2::new(self.x[marker], self.y[marker]), &nodes[index as usize]);
         let distance_sq = distance_sq(pos.x, pos.y, node.pos);
+        let is_own = self.is_own(self.loyal[marker], index, node);
         let Some(relations) = self.relations.as_mut().filter(|_| distance_sq < self.near_sq[marker]) else { return };
-        let is_own = self.loyal[marker] == ANY_IMPACT || self.loyal[marker] == node.impact;
         let bond = relations.visit((self.id[marker], pos), (index, distance_sq, is_own), nodes, grid);
         self.bind(marker, bond);
     }
@@ -453,6 +467,11 @@ impl MarkerField {
             (from..to).any(|i| distance_sq(self.x[i], self.y[i], pos) < distance * distance)
         })
     }
+}
+
+/// Whether a marker belongs to a ray.
+const fn is_ray(loyal: u32) -> bool {
+    loyal != ANY_IMPACT && loyal & RAY != 0
 }
 
 /// Room for `n` values, written once: the first write to memory is the dear one.

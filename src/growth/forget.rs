@@ -55,6 +55,8 @@ impl CrackGrowth {
         }
         self.widths.forget(&self.network.nodes);
         self.linker.forget(forgotten);
+        self.rays.forget(forgotten);
+        self.field.ray_of.drain(..first.min(self.field.ray_of.len()));
         self.pull_of.drain(..first);
         self.courses.drain(..first);
         self.unshown = self.unshown.iter().filter_map(|&node| number(node)).collect();
@@ -70,7 +72,11 @@ impl CrackGrowth {
             }
         }
         let is_over = !self.is_growing();
-        self.field.forget_dead(&self.params, |loyal| is_over || is_left.get(loyal as usize) == Some(&false));
+        let Self { field, rays, params, .. } = self;
+        field.forget_dead(params, |loyal| {
+            let impact = rays.impact_of(loyal).unwrap_or(loyal);
+            is_over || is_left.get(impact as usize) == Some(&false)
+        });
         forgotten
     }
 }

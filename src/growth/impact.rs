@@ -8,7 +8,7 @@ use super::{
     params::MAX_MARKERS,
 };
 use crate::{
-    math::{hash_unit, mix},
+    math::mix,
     pattern::{Dot, Link, LinkKind, NO_PARENT, Node},
 };
 use glam::Vec2;
@@ -128,31 +128,51 @@ impl CrackGrowth {
         let reach = self.reach(pos, energy);
         let first = self.network.nodes.len() as u32;
         let seed = mix(self.seed ^ mix(u64::from(index)));
-        for place in markers::starts(self.params.starts, (pos, energy), reach, extent, seed) {
+        let plan = self.plan_rays(index, reach);
+        let places = match &plan {
+            Some(plan) => plan.rim.iter().map(|rim| rim.pos.clamp(Vec2::ZERO, extent)).collect(),
+            None => markers::starts(self.params.starts, (pos, energy), reach, extent, seed),
+        };
+        let mut born = Vec::new();
+        for (i, place) in places.into_iter().enumerate() {
             let place = self.masonry.as_ref().and_then(|masonry| masonry.nearest(place)).unwrap_or(place);
             let is_free = !self.nodes.any_within(place, 1e-4) && !self.is_on_crack(place, index);
             if is_free && !self.mask.is_forbidden(place / extent) {
+                born.push((i, self.network.nodes.len() as u32));
                 self.bear(place, NO_PARENT, 0, index, 1.0);
             }
         }
         if first == self.network.nodes.len() as u32 {
             self.sprout(pos, index);
+        } else if plan.is_some() {
+            // The rim is joined below.
         } else if matches!(self.params.starts, StartLayout::Crushed { .. }) {
             self.crush(first);
         } else if let StartLayout::Arms { count } = self.params.starts {
             self.branch_out(first, markers::arms(count, (pos, energy), self.params.reach, extent, seed));
         }
+        self.newborn = first..self.network.nodes.len() as u32;
+        let named = plan.map(|plan| (self.begin_rays(&plan, index, &born), plan));
         for node in first..self.network.nodes.len() as u32 {
             self.field.visit(node, &self.network.nodes, &self.nodes);
         }
-        self.newborn = first..self.network.nodes.len() as u32;
         if self.arrest.is_some() {
             self.unshown.push(first);
         }
         self.join_newborn();
+        if let Some((name, plan)) = named {
+            self.lay_out_rays(&plan, name);
+        }
         self.populate(index, pos, 0.0, reach);
         self.steps_left = self.params.num_iterations;
         HitOutcome::Started(index)
+    }
+
+    /// How far the first hit of an impact reached.
+    #[cfg(test)]
+    pub(super) fn reach_of(&self, impact: u32) -> f32 {
+        let Impact { pos, first_energy, .. } = self.impacts[impact as usize];
+        self.reach(pos, first_energy)
     }
 
     /// How far a hit reaches: further where the border leaves it less room.
@@ -206,8 +226,7 @@ impl CrackGrowth {
         let extent = self.network.extent();
         // In masonry cracks begin in a joint.
         let center = self.masonry.as_ref().and_then(|masonry| masonry.nearest(center)).unwrap_or(center);
-        let energy = self.impacts[impact as usize].first_energy;
-        let region = Region { center, energy, inner, outer, extent };
+        let region = Region { center, inner, outer, extent };
         let seed = mix(self.seed ^ mix(u64::from(impact) | 1 << 40));
         // Darts keep their distance from each other, and from the markers of hits that no step has taken up yet.
         let mut darts = None;
@@ -219,7 +238,7 @@ impl CrackGrowth {
         let (timeline, radius) = (&mut self.timeline, self.params.line_width);
         let show = self.params.draw_markers;
         // The rays of a hit are its own: older cracks do not sprout towards them.
-        let is_loyal = self.params.arrest > 0.0 || matches!(self.params.markers, MarkerLayout::Polar { .. });
+        let is_loyal = self.params.arrest > 0.0;
         let loyal = if is_loyal { impact } else { ANY_IMPACT };
         let wishes = (self.density.as_ref(), &*self.mask);
         markers::lay_out(&self.params, region, wishes, seed, |pos, spacing| {
@@ -293,19 +312,19 @@ impl CrackGrowth {
         is_in
     }
 
-    /// Joins the nodes of a crushed core, from `first` on: each to the nearest before it, and most to the one after it.
+    /// Joins the nodes of a rim, from `first` on, to each other.
     fn crush(&mut self, first: u32) {
         let last = self.network.nodes.len() as u32;
-        for node in first + 1..last {
-            let pos = self.network.nodes[node as usize].pos;
-            let to = |other: u32| self.network.nodes[other as usize].pos.distance_squared(pos);
-            // The node before it is on its own ring.
-            let inner = (first..node.saturating_sub(1).max(first + 1)).min_by(|&a, &b| to(a).total_cmp(&to(b)));
-            let draw = hash_unit(self.seed ^ 0xC3, u64::from(node));
-            for other in [inner.filter(|_| draw < 0.8), Some(node - 1).filter(|_| draw > 0.15)].into_iter().flatten() {
+        let extent = self.network.extent();
+        for node in first..last {
+            let next = if node + 1 == last { first } else { node + 1 };
+            let at = |node: u32| self.network.nodes[node as usize].pos;
+            // Not along the border, and two are joined once.
+            let is_along = |border: Vec2| (at(node).cmpeq(border) & at(next).cmpeq(border)).any();
+            if next != node && !(next == first && last - first == 2) && !is_along(Vec2::ZERO) && !is_along(extent) {
                 let width = self.params.line_width;
                 let (birth, kind) = (self.steps, LinkKind::Connection);
-                self.link(Link { a: other, b: node, width, birth, kind, bend: 1.0 });
+                self.link(Link { a: next, b: node, width, birth, kind, bend: 0.0 });
             }
         }
     }

@@ -50,38 +50,18 @@ impl Linker {
             self.ring.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
             // With two nodes there is one pair, not two.
             for i in 0..if n == 2 { 1 } else { n } {
-                let (a, mut b) = (self.ring[i].1, self.ring[(i + 1) % n].1);
-                let draw = |what| hash_unit(seed ^ what, u64::from(a));
+                let (a, b) = (self.ring[i].1, self.ring[(i + 1) % n].1);
                 let generation = network.nodes()[a as usize].generation;
-                // Each sector has its rings a little further in or out, so that none closes evenly.
-                let sector = (self.ring[i].0 * 1.6 + 16.0) as u64;
-                let shifted = generation + (3.0 * hash_unit(seed ^ 0xC2 ^ u64::from(index) << 8, sector)) as u32;
-                if !is_ring(shifted, params.connection_every) {
-                    continue;
-                }
                 let (from, beside) = (network.nodes()[a as usize].pos, network.nodes()[b as usize].pos);
+                // None spans a wide gap.
                 let radius = from.distance(impact.pos).max(params.step_length);
-                // Rings thin out on the way to the rim, and none spans a wide gap between radials.
-                let out = (radius / (params.reach * impact.energy.sqrt())).min(1.0);
-                // A soft hit makes fewer of them.
-                let few = (out * (2.0 - out)).max(1.0 - impact.energy.sqrt());
-                let gaps = params.connection_gaps + (1.0 - params.connection_gaps) * few;
                 let apart = generation != network.nodes()[b as usize].generation || from.distance(beside) > radius;
-                if apart || draw(0xC0) < gaps {
+                let is_left_out = hash_unit(seed ^ 0xC0, u64::from(a)) < params.connection_gaps;
+                if apart || is_left_out || !is_ring(generation, params.connection_every) {
                     continue;
-                }
-                // Real rings step from radial to radial instead of closing evenly.
-                let parent = network.nodes()[b as usize].parent;
-                if parent != NO_PARENT && draw(0xC1) < 0.4 {
-                    b = parent;
                 }
                 let width = 0.8 * params.line_width;
                 let birth = network.nodes()[first as usize].birth;
-                if parent != NO_PARENT && draw(0xC4) < params.chips {
-                    // A chip has come off between two ends of the ring.
-                    let other = if b == parent { self.ring[(i + 1) % n].1 } else { parent };
-                    self.links.push(Link { a, b: other, width, birth, kind: LinkKind::Connection, bend: 1.0 });
-                }
                 self.links.push(Link { a, b, width, birth, kind: LinkKind::Connection, bend: 1.0 });
             }
         }

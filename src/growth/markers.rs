@@ -13,8 +13,6 @@ use std::f32::consts::TAU;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Region {
     pub(super) center: Vec2,
-    /// Energy of the hit, when it came.
-    pub(super) energy: f32,
     /// What lies closer was populated before.
     pub(super) inner: f32,
     pub(super) outer: f32,
@@ -31,7 +29,7 @@ impl Region {
 }
 
 /// A probability over the surface, at any resolution.
-fn density_at(density: Option<&Grid<f32>>, pos: Vec2, extent: Vec2) -> f32 {
+pub(super) fn density_at(density: Option<&Grid<f32>>, pos: Vec2, extent: Vec2) -> f32 {
     let Some(grid) = density else { return 1.0 };
     let size = grid.size();
     let texel = (pos / extent * size.as_vec2()).as_uvec2();
@@ -66,6 +64,8 @@ pub(super) fn lay_out(
         }
     };
     match params.markers {
+        // They come with their plan.
+        MarkerLayout::Rays { .. } => {}
         MarkerLayout::PseudoGrid { occupancy, jitter } => {
             let [columns, lines] = grid(params, region.extent).to_array();
             let cell = region.extent / Vec2::new(columns as f32, lines as f32);
@@ -97,49 +97,9 @@ pub(super) fn lay_out(
                 }
             }
         }
-        MarkerLayout::Polar { sectors, rings, ring_growth, jitter, occupancy } => {
-            let turn = TAU * hash_unit(seed, 0);
-            let sectors = by_energy(sectors, region.energy, 360);
-            for ray in 0..sectors {
-                let mut rng = Rng::new(mix(seed ^ u64::from(ray)));
-                let mut angle = turn + TAU * (ray as f32 + jitter * (rng.unit() - 0.5)) / sectors as f32;
-                // Half of the rays end early: few of the radials of a pane reach its edge.
-                let (draw, early) = (rng.unit(), rng.unit() < 0.5);
-                let cut = if early { 0.55 + 0.4 * draw } else { 0.5 * draw };
-                let length = region.outer * (1.0 - jitter * cut);
-                let first = params.reach * ring_share(1, rings, ring_growth);
-                let mut radius = 0.0;
-                for ring in 1..=4 * rings {
-                    let gap = params.reach * ring_share(ring, rings, ring_growth) - radius;
-                    radius += gap;
-                    if radius >= length || gap <= 0.0 {
-                        break;
-                    }
-                    // A ray bends a little from ring to ring.
-                    angle += 0.06 * jitter * rng.signed() * (first / radius.max(first)).max(0.25);
-                    let along = radius + 0.5 * jitter * gap * rng.signed();
-                    let (pos, chance) = (region.center + params.direct(ops::unit(angle)) * along, rng.unit());
-                    offer(pos, chance, occupancy, None);
-                    if pos.clamp(Vec2::ZERO, region.extent) != pos {
-                        // A ray that leaves the surface runs up to its border.
-                        let arm = pos - region.center;
-                        let to_border = |center: f32, arm: f32, extent: f32| {
-                            if arm > 0.0 { (extent - center) / arm } else { -center / arm }
-                        };
-                        let share = to_border(region.center.x, arm.x, region.extent.x).min(to_border(
-                            region.center.y,
-                            arm.y,
-                            region.extent.y,
-                        ));
-                        let border = (region.center + arm * share).clamp(Vec2::ZERO, region.extent);
-                        offer(border, 0.0, occupancy, None);
-                        break;
-                    }
-                }
-            }
-        }
     }
-    if region.inner == 0.0 && kept < FEWEST {
+    let has_rays = matches!(params.markers, MarkerLayout::Rays { .. });
+    if region.inner == 0.0 && kept < FEWEST && !has_rays {
         let mut rng = Rng::new(seed).stream("fewest");
         let turn = rng.unit();
         for i in 0..FEWEST {
@@ -170,7 +130,7 @@ fn spacing(params: &GrowthParams, extent: Vec2) -> f32 {
     match params.markers {
         MarkerLayout::PseudoGrid { .. } => (extent / grid(params, extent).as_vec2()).max_element(),
         MarkerLayout::DartThrowing { spacing } => spacing,
-        MarkerLayout::Polar { rings, .. } => params.reach / rings as f32,
+        MarkerLayout::Rays { .. } => 0.5 * params.crack_radius,
     }
 }
 
@@ -208,15 +168,6 @@ fn towards_room(region: Region, arm: f32) -> Vec2 {
 /// Markers that even the weakest hit lays out, so that it shows.
 const FEWEST: u32 = 3;
 
-/// Radius of ring `ring` of `rings`, as a share of the reach; each gap is `growth` times the one before.
-fn ring_share(ring: u32, rings: u32, growth: f32) -> f32 {
-    if (growth - 1.0).abs() < 1e-3 {
-        ring as f32 / rings as f32
-    } else {
-        (ops::powf(growth, ring as f32) - 1.0) / (ops::powf(growth, rings as f32) - 1.0)
-    }
-}
-
 /// The cells of `0..count` that a circle of `radius` around `center` may touch.
 fn span(center: f32, radius: f32, cell: f32, count: u32) -> (u32, u32) {
     let low = ((center - radius) / cell - 1.0).max(0.0) as u32;
@@ -228,9 +179,6 @@ fn span(center: f32, radius: f32, cell: f32, count: u32) -> (u32, u32) {
 fn by_energy(count: u32, energy: f32, most: u32) -> u32 {
     ((count as f32 * energy.sqrt()).round() as u32).clamp(2, most.max(2))
 }
-
-/// Rings of a crushed core.
-const CORE_RINGS: u32 = 3;
 
 /// Directions in which the room around a hit is measured.
 const DIRECTIONS: usize = 64;
@@ -307,19 +255,10 @@ pub(super) fn starts(
         }
         StartLayout::Disc { count, radius } => scatter(count, radius),
         StartLayout::Crushed { count, radius } => {
-            // Rings around a centre, each node a little off its place.
             let (count, radius) = (by_energy(count, energy, 1024), radius * energy.sqrt().sqrt());
-            let mut places = vec![center];
-            for ring in 1..=CORE_RINGS {
-                let share = ring as f32 / CORE_RINGS as f32;
-                let n = ((count as f32 * share) as u32).max(3);
-                let turn = rng.unit();
-                places.extend((0..n).map(|i| {
-                    let angle = TAU * (i as f32 + turn + 0.35 * rng.signed()) / n as f32;
-                    center + ops::unit(angle) * (radius * share * (1.0 + 0.15 * rng.signed()))
-                }));
-            }
-            places
+            let turn = rng.unit();
+            let angle = |i, stray: f32| TAU * (i as f32 + turn + 0.35 * stray) / count as f32;
+            (0..count).map(|i| center + ops::unit(angle(i, rng.signed())) * radius).collect()
         }
         StartLayout::Ring { count, radius } => {
             let turn = rng.unit();

@@ -43,7 +43,9 @@ mod markers;
 mod masonry;
 mod nodes;
 mod params;
+mod plan;
 mod pull;
+mod rays;
 mod step;
 #[cfg(test)]
 mod tests;

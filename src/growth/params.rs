@@ -21,18 +21,17 @@ pub enum MarkerLayout {
         /// Least distance between markers, pattern units, 0.002..=1.
         spacing: f32,
     },
-    /// Rays around the hit, with rings of markers on them (glass). They attract the nodes of their own hit only.
-    Polar {
-        /// Number of rays of a hit of energy 1, 1..=360; in proportion to the root of the energy.
+    /// Straight rays around the hit, each with markers of its own, which attract its nodes alone (glass, ice). They start on the rim
+    /// of the crushed zone ([`StartLayout::Crushed`]), and with `draw_connections` rings join them: broken polygons, wider
+    /// apart further out, as far as the reach. Where the border is near there are fewer of them.
+    Rays {
+        /// Number of rays of a hit of energy 1, 1..=360; in proportion to the energy to the power of 0.45.
         sectors: u32,
-        /// Number of rings, 1..=256.
-        rings: u32,
-        /// How much further apart each ring is than the one before, 0.5..=2.
-        ring_growth: f32,
-        /// Unevenness of angles and radii, 0..=1.
+        /// Unevenness of angles and rings, and how much the rays kink, 0..=1.
         jitter: f32,
-        /// Probability that a place carries a marker, 0..=1.
-        occupancy: f32,
+        /// Share of the rays that run on until they meet the border or another crack, 0..=1. The others end within the reach, most
+        /// of them near the hit: at a ring if there are any, or free, which is the share [`open_ends`](GrowthParams::open_ends) of them.
+        through: f32,
     },
 }
 
@@ -74,11 +73,12 @@ pub enum StartLayout {
         /// Pattern units, 0..=1.
         radius: f32,
     },
-    /// A crushed core: a fine mesh around the hit, with `count` nodes on its rim, in proportion to the root of the energy.
+    /// The rim of a crushed zone, whose inside is left to the picture: nodes on a circle around the hit, joined to each other. One for each
+    /// ray that starts there with [`MarkerLayout::Rays`], else `count` of them, in proportion to the root of the energy.
     Crushed {
         /// Nodes on the rim at energy 1, 1..=1024.
         count: u32,
-        /// Radius at energy 1, pattern units, 0..=1.
+        /// Radius at energy 1, pattern units, 0..=1; goes with the fourth root of the energy.
         radius: f32,
     },
     /// `count` nodes scattered over a disc around the hit.
@@ -132,9 +132,7 @@ pub struct GrowthParams {
     /// How much the width varies along a crack, 0..=0.9: it is by up to this share narrower than without.
     pub unevenness: f32,
     /// How much a crack keeps its direction, against the pull of the markers: 0 = not at all, 1 = as much as it follows them. In
-    /// what a [mask](crate::pattern::CrackMask) marks as weak it keeps less of it, or none: there the joint leads. 0..=8. With polar
-    /// markers and [`arrest`](Self::arrest) cracks are rays then: they follow what lies within 20 degrees of their way and of that from the hit,
-    /// run straight into the crack that is ahead of them, and end otherwise.
+    /// what a [mask](crate::pattern::CrackMask) marks as weak it keeps less of it, or none: there the joint leads. 0..=8.
     pub inertia: f32,
     /// Direction in which cracks like to run, radians from the x axis (y runs down): across what pulls the surface apart. -7..=7.
     pub axis: f32,
@@ -146,7 +144,8 @@ pub struct GrowthParams {
     /// [`wander`](Self::wander). Pattern units, 0..=1; 0 = none, cracks stray at every node.
     pub grain: f32,
     /// Share of nodes at which a tip forks, 0..=1: a side branch sets out ahead, if markers lie there; [`focus`](Self::focus) makes
-    /// forks rarer away from the hit, as it does markers. Only with [`arrest`](Self::arrest).
+    /// forks rarer away from the hit, as it does markers. Only with [`arrest`](Self::arrest). With
+    /// [rays](MarkerLayout::Rays) it goes with the energy to the power of 0.6, forks fork again half as often, and the angle is 0.42 at least.
     pub forks: f32,
     /// Angle between the two ways of a fork, radians, 0.2..=1.6; each by up to a quarter more or less.
     pub fork_angle: f32,
@@ -156,8 +155,6 @@ pub struct GrowthParams {
     pub draw_connections: bool,
     /// Share of possible connections that are left out, 0..=1.
     pub connection_gaps: f32,
-    /// Share of the crossings of rings and rays where a chip has come off: a ring meets the ray twice there. 0..=1.
-    pub chips: f32,
     /// Generations to the first ring of connections; the next ones lie 2, 3, 4 ... times as far apart. 1..=1000.
     pub connection_every: u32,
     /// Whether close nodes of different branches are joined (the cells of clay).
@@ -215,7 +212,6 @@ impl GrowthParams {
         roughness: 0.12,
         draw_connections: false,
         connection_gaps: 0.3,
-        chips: 0.0,
         connection_every: 1,
         draw_islands: false,
         island_distance: 0.03,
@@ -318,7 +314,6 @@ impl GrowthParams {
         fork_angle: f32 = 0.2, 1.6;
         roughness: f32 = 0.0, 0.5;
         connection_gaps: f32 = 0.0, 1.0;
-        chips: f32 = 0.0, 1.0;
         connection_every: u32 = 1.0, 1000.0;
         island_distance: f32 = 0.0, 1.0;
         open_ends: f32 = 0.0, 1.0;
@@ -339,12 +334,10 @@ impl GrowthParams {
                 &[("occupancy", f64::from(occupancy), 0.0, 1.0), ("jitter", f64::from(jitter), 0.0, 1.0)]
             }
             MarkerLayout::DartThrowing { spacing } => &[("spacing", f64::from(spacing), 0.002, 1.0)],
-            MarkerLayout::Polar { sectors, rings, ring_growth, jitter, occupancy } => &[
+            MarkerLayout::Rays { sectors, jitter, through } => &[
                 ("sectors", f64::from(sectors), 1.0, 360.0),
-                ("rings", f64::from(rings), 1.0, 256.0),
-                ("ring_growth", f64::from(ring_growth), 0.5, 2.0),
                 ("jitter", f64::from(jitter), 0.0, 1.0),
-                ("occupancy", f64::from(occupancy), 0.0, 1.0),
+                ("through", f64::from(through), 0.0, 1.0),
             ],
         };
         let starts: &[_] = match self.starts {
@@ -375,8 +368,8 @@ impl GrowthParams {
 
     /// Sets one parameter from text, by the name of its field or by the paper's own (`D`).
     ///
-    /// Besides the fields: `markers` (`grid`, `darts`, `polar`), `occupancy`, `jitter`, `spacing`, `sectors`, `rings`,
-    /// `ring_growth` of the present layout; `venation` (`open`, `closed`), `starts` (`point`, `points`, `arms`, `ring`, `crushed`, `disc`), `start_count`, `start_radius`.
+    /// Besides the fields: `markers` (`grid`, `darts`, `rays`), `occupancy`, `jitter`, `spacing`, `sectors`, `through` of the
+    /// present layout; `venation` (`open`, `closed`), `starts` (`point`, `points`, `arms`, `ring`, `crushed`, `disc`), `start_count`, `start_radius`.
     ///
     /// ```
     /// use bevy_crack::growth::GrowthParams;
@@ -404,9 +397,7 @@ impl GrowthParams {
                 self.markers = match text {
                     "grid" => MarkerLayout::PseudoGrid { occupancy: 0.7, jitter: 0.8 },
                     "darts" => MarkerLayout::DartThrowing { spacing: 0.04 },
-                    "polar" => {
-                        MarkerLayout::Polar { sectors: 16, rings: 16, ring_growth: 1.1, jitter: 0.5, occupancy: 0.8 }
-                    }
+                    "rays" => MarkerLayout::Rays { sectors: 14, jitter: 0.6, through: 0.8 },
                     _ => return Err(unreadable()),
                 }
             }
@@ -428,16 +419,15 @@ impl GrowthParams {
                     _ => return Err(unreadable()),
                 }
             }
-            ("occupancy", MarkerLayout::PseudoGrid { occupancy, .. } | MarkerLayout::Polar { occupancy, .. }, _) => {
-                *occupancy = parse(name, text)?;
-            }
-            ("jitter", MarkerLayout::PseudoGrid { jitter, .. } | MarkerLayout::Polar { jitter, .. }, _) => {
+            ("occupancy", MarkerLayout::PseudoGrid { occupancy, .. }, _) => *occupancy = parse(name, text)?,
+            ("jitter", MarkerLayout::PseudoGrid { jitter, .. } | MarkerLayout::Rays { jitter, .. }, _) => {
                 *jitter = parse(name, text)?;
             }
             ("spacing", MarkerLayout::DartThrowing { spacing }, _) => *spacing = parse(name, text)?,
-            ("sectors", MarkerLayout::Polar { sectors, .. }, _) => *sectors = parse(name, text)?,
-            ("rings", MarkerLayout::Polar { rings, .. }, _) => *rings = parse(name, text)?,
-            ("ring_growth", MarkerLayout::Polar { ring_growth, .. }, _) => *ring_growth = parse(name, text)?,
+            ("sectors", MarkerLayout::Rays { sectors, .. }, _) => {
+                *sectors = parse(name, text)?;
+            }
+            ("through", MarkerLayout::Rays { through, .. }, _) => *through = parse(name, text)?,
             (
                 "start_count",
                 _,
@@ -505,7 +495,7 @@ impl GrowthParams {
                 scaled.num_columns_grid = count(self.num_columns_grid);
             }
             MarkerLayout::DartThrowing { spacing } => length(spacing, 0.002, 1.0),
-            MarkerLayout::Polar { .. } => {}
+            MarkerLayout::Rays { .. } => {}
         }
         match &mut scaled.starts {
             StartLayout::Point | StartLayout::Points { .. } | StartLayout::Arms { .. } => {}
@@ -545,7 +535,9 @@ impl GrowthParams {
                 let furthest = (256.0 * self.step_length).min(32.0);
                 varied.crack_radius = (self.crack_radius * spacing.max(1.0)).min(furthest).max(self.crack_radius);
             }
-            MarkerLayout::Polar { sectors, .. } => *sectors = count(*sectors, 1.0 / spacing, 360),
+            MarkerLayout::Rays { sectors, .. } => {
+                *sectors = count(*sectors, 1.0 / spacing, 360);
+            }
         }
         match &mut varied.starts {
             StartLayout::Point | StartLayout::Arms { .. } => {}
@@ -572,6 +564,11 @@ impl GrowthParams {
         let mut births = markers * (2 + approaches);
         if self.venation == Venation::Closed {
             births = 6 * markers * u64::from(super::closed::patience(self));
+        }
+        if matches!(self.markers, MarkerLayout::Rays { .. }) {
+            // A first node, and a line from each ring.
+            let chord = u64::from(super::rays::chord_steps(super::plan::LONGEST_CHORD, self.step_length));
+            births += markers * (1 + u64::from(super::plan::MOST_RINGS) * chord);
         }
         let starts = starts + if self.nucleation > 0.0 { markers } else { 0 };
         if self.arrest <= 0.0 {

@@ -1,7 +1,7 @@
 //! Where growth is pulled to: eq. 2 of Couto et al.
 
 use super::{
-    CrackGrowth, Impact, MarkerLayout, StartLayout,
+    CrackGrowth, Impact, StartLayout,
     changes::Kin,
     masonry::{Masonry, Way},
     params::PROGRESS,
@@ -36,7 +36,7 @@ pub(super) struct Pull {
     pub(super) stopped: Option<Vec2>,
 }
 
-/// Cosine of the angle to its way and to the hit's direction beyond which a marker does not draw a ray with inertia: 20 degrees.
+/// Cosine of the angle to its way beyond which a marker does not draw a ray: 20 degrees.
 const ASIDE: f32 = 0.94;
 
 /// The same for the arms of a hit and their side branches: cosine of 60 degrees to their way, and to what that was some segments before.
@@ -72,7 +72,7 @@ pub(super) const NO_PULL: u32 = u32::MAX;
 impl CrackGrowth {
     /// Whether cracks are rays that keep to their way.
     pub(super) fn are_rays(&self) -> bool {
-        self.arrest.is_some() && self.params.inertia > 0.0 && matches!(self.params.markers, MarkerLayout::Polar { .. })
+        self.arrest.is_some() && self.has_rays()
     }
 
     /// How far aside a marker may lie that draws a crack, as cosines: of the angle to its way, to that from the hit, and to
@@ -83,7 +83,7 @@ impl CrackGrowth {
             && matches!(self.params.starts, StartLayout::Arms { .. })
             && (self.mask.is_empty() || self.masonry.is_some());
         if self.are_rays() {
-            return Some([ASIDE, ASIDE, -1.0]);
+            return Some([ASIDE, -1.0, -1.0]);
         }
         let off_hit = (self.params.fork_angle + OFF_HIT.0).max(OFF_HIT.1);
         are_arms.then(|| [IN_SIGHT, ops::cos(off_hit), IN_SIGHT])
@@ -160,7 +160,7 @@ impl CrackGrowth {
         let (length, kill) = (self.params.step_length, self.params.kill_distance);
         let next = self.network.nodes.len() as u64;
         // A crack does not turn on its heel: what it cannot serve on its way is left to others.
-        let keeps_on = self.arrest.is_some() && (self.params.inertia > 0.0 || !self.mask.is_empty());
+        let keeps_on = self.arrest.is_some() && (self.params.inertia > 0.0 || self.has_rays() || !self.mask.is_empty());
         for (child, &(_, slot)) in (next..).zip(&self.order) {
             let pull = self.pulls[slot as usize];
             let from = self.network.nodes[pull.node as usize].pos;
@@ -315,6 +315,7 @@ impl CrackGrowth {
             chance *= ops::powf((1.0 - share).max(0.0), self.params.focus);
         }
         self.params.forks > 0.0
+            && !self.has_rays()
             && self.arrest.is_some()
             && generation > 1
             && self.child_of(node) == NO_PARENT

@@ -9,6 +9,7 @@ use super::{
     masonry::Masonry,
     nodes::NodeGrid,
     pull::{NO_PULL, Pull},
+    rays::Rays,
     width::Widths,
 };
 use crate::{
@@ -70,6 +71,7 @@ pub struct CrackGrowth {
     pub(super) arrest: Option<Arrest>,
     pub(super) widths: Widths,
     pub(super) linker: Linker,
+    pub(super) rays: Rays,
     pub(super) impacts: Vec<Impact>,
     pub(super) density: Option<Grid<f32>>,
     pub(super) mask: Arc<CrackMask>,
@@ -126,6 +128,7 @@ impl CrackGrowth {
             nodes: NodeGrid::new(extent, 2.0 * params.step_length.max(params.kill_distance)),
             widths: Widths::new(&params),
             linker: Linker::default(),
+            rays: Rays::default(),
             impacts: Vec::new(),
             density: None,
             mask: Arc::default(),
@@ -224,6 +227,7 @@ impl CrackGrowth {
         self.pull_of.push(NO_PULL);
         self.changes.push_node(parent);
         self.timeline.add_node(width);
+        self.inherit_ray(node as u32, parent);
     }
 
     /// A tip that has met a crack is as wide there as further back.
@@ -273,7 +277,7 @@ impl CrackGrowth {
         let room = self.room();
         // What comes when growth has ended takes a step of the timeline all the same.
         self.timeline.begin(self.steps.saturating_add(1));
-        if !self.pulls.is_empty() || self.arrest.as_ref().is_some_and(Arrest::is_running) {
+        if !self.pulls.is_empty() || self.is_running() {
             self.steps = self.steps.saturating_add(1);
         }
         let mut any_stopped = false;
@@ -294,18 +298,24 @@ impl CrackGrowth {
         if self.params.nucleation > 0.0 {
             self.nucleate();
         }
+        self.advance_rays(first);
         let last = self.network.nodes.len() as u32;
         self.newborn = first..last;
         for node in first..last {
             self.field.visit(node, &self.network.nodes, &self.nodes);
         }
         self.join_newborn();
-        if first == last && !any_stopped && !self.arrest.as_ref().is_some_and(Arrest::is_running) {
+        if first == last && !any_stopped && !self.is_running() {
             self.steps_left = 0;
         }
         if self.steps_left == 0 {
             self.widen_with(|widths, nodes, widened| widths.settle(nodes, widened));
         }
+    }
+
+    /// Whether a tip is on its way to a goal.
+    fn is_running(&self) -> bool {
+        self.rays.is_running() || self.arrest.as_ref().is_some_and(Arrest::is_running)
     }
 
     /// Grows from every node that is pulled, unless older cracks are in the way; then from those that are on their way to one.
@@ -413,7 +423,7 @@ impl CrackGrowth {
                 }
             }
         }
-        if self.params.draw_connections {
+        if self.params.draw_connections && !self.has_rays() {
             self.linker.rings(&self.params, &self.network, &self.impacts, newborn.clone(), self.seed);
             for link in self.linker.take_links() {
                 self.link(link);

@@ -101,7 +101,7 @@ fn growth_error(error: ParamError) -> PresetError {
     match error {
         ParamError::OutOfRange { name, value, min, max } => {
             let field = match name {
-                "occupancy" | "jitter" | "spacing" | "sectors" | "rings" | "ring_growth" => {
+                "occupancy" | "jitter" | "spacing" | "sectors" | "through" => {
                     format!("growth.markers.{name}")
                 }
                 "start_count" => "growth.starts.count".into(),

@@ -79,7 +79,7 @@ fn broken_files_say_where_and_what() {
         ("(growth: (),\n\n growth: ())", "line 3"),
         ("(growth: (kill_distance: \"0.1\"))", "line 1, column 26"),
         ("(growth: (kill_distance: 0.1, kill_distance: 0.1))", "kill_distance"),
-        ("(growth: (markers: Polar(sectors: 3)))", "rings"),
+        ("(growth: (markers: Rays(sectors: 3)))", "jitter"),
         ("(growth: (markers: Hexagons))", "Hexagons"),
         ("(growth: (num_iterations: -1))", "line 1"),
         ("(growth: {\"kill_distance\": 0.1})", "line 1"),

@@ -3,6 +3,8 @@
 mod arrest;
 mod energy;
 mod masonry;
+mod rays;
+mod rays_reference;
 mod reference;
 mod widths;
 
@@ -33,14 +35,7 @@ fn random_params(rng: &mut Rng, small: bool) -> GrowthParams {
         num_columns_grid: 1 + (rng.unit() * grid) as u32,
         markers: match rng.next_u32() % 4 {
             0 | 1 => MarkerLayout::PseudoGrid { occupancy: rng.unit(), jitter: rng.unit() },
-            2 => MarkerLayout::DartThrowing { spacing: 0.04 + 0.3 * rng.unit() },
-            _ => MarkerLayout::Polar {
-                sectors: 1 + rng.next_u32() % 20,
-                rings: 1 + rng.next_u32() % 14,
-                ring_growth: rng.range(0.5, 2.0),
-                jitter: rng.unit(),
-                occupancy: rng.unit(),
-            },
+            _ => MarkerLayout::DartThrowing { spacing: 0.04 + 0.3 * rng.unit() },
         },
         focus: if rng.unit() < 0.5 { 0.0 } else { 4.0 * rng.unit() },
         reach: log(rng, 0.1, 4.0),
@@ -61,7 +56,6 @@ fn random_params(rng: &mut Rng, small: bool) -> GrowthParams {
         roughness: 0.5 * rng.unit(),
         draw_connections: rng.unit() < 0.5,
         connection_gaps: rng.unit(),
-        chips: 0.3 * rng.unit(),
         connection_every: 1 + rng.next_u32() % 4,
         draw_islands: rng.unit() < 0.5,
         island_distance: 0.2 * rng.unit(),
