@@ -57,6 +57,9 @@ impl CrackGrowth {
         self.linker.forget(forgotten);
         self.pull_of.drain(..first);
         self.courses.drain(..first);
+        if let Some(division) = &mut self.division {
+            division.forget(forgotten);
+        }
         self.unshown = self.unshown.iter().filter_map(|&node| number(node)).collect();
         self.newborn = self.newborn.start.saturating_sub(forgotten)..self.newborn.end.saturating_sub(forgotten);
         if let Some(before) = self.arrest.take() {
