@@ -202,7 +202,7 @@ impl CrackPreset {
     /// Tempered glass: the whole pane goes to small dice, from the hit outward.
     pub const TEMPERED_GLASS: Self = Self {
         growth: GrowthParams {
-            kill_distance: 0.0115,
+            kill_distance: 0.011,
             step_length: 0.0085,
             crack_radius: 0.02,
             num_iterations: 400,

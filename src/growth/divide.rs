@@ -10,6 +10,7 @@ use super::{
     CrackGrowth, GrowthParams, StartLayout,
     arrest::{Advance, Arrest},
     params::{PROGRESS, Venation},
+    pull::steer,
 };
 use crate::{
     math::{hash_unit, ops},
@@ -25,7 +26,7 @@ const COARSER: f32 = 1.6;
 const NARROWER: f32 = 0.5;
 
 /// Axes along which the width of a domain is measured.
-const AXES: usize = 12;
+const AXES: usize = 8;
 
 /// How far the width of a domain is measured, in distances to its nearest crack.
 const FAR: f32 = 2.5;
@@ -111,6 +112,13 @@ pub(super) struct Candidate {
     pub(super) near_sq: f32,
     /// Distance to the hit.
     from_hit: f32,
+}
+
+/// Per axis: how far the nearest crack is one way, and how far from a right angle the axis meets it, 0..=1.
+#[derive(Clone, Copy, Debug)]
+struct Sight {
+    distance: [f32; AXES],
+    slant: [f32; AXES],
 }
 
 /// How a crack would divide a domain.
@@ -264,18 +272,22 @@ impl CrackGrowth {
             let (params, impacts, generation) = (&self.params, &self.impacts, division.generation);
             let is_last = u32::from(generation) + 1 >= params.generations;
             let narrow = if is_last { NARROW } else { 1.0 };
-            let finest =
-                if params.focus > 0.0 { params.loaded(generation, 0.0) } else { params.loaded(generation, 1.0) };
+            let finest = narrow * params.loaded(generation, 0.0);
+            let fronts: Vec<f32> = (0..impacts.len() as u32).map(|impact| self.front(impact)).collect();
             let mut nearest = f32::INFINITY;
-            self.field.each_beyond((narrow * finest) * (narrow * finest), |marker, id, pos, near_sq, impact| {
-                let from_hit = impacts.get(impact as usize).map_or(0.0, |impact| impact.pos.distance(pos));
+            self.field.each_beyond(finest * finest, |marker, id, pos, near_sq, impact| {
+                let (Some(hit), Some(&front)) = (impacts.get(impact as usize), fronts.get(impact as usize)) else {
+                    return;
+                };
+                let from_hit_sq = hit.pos.distance_squared(pos);
+                if !is_idle && from_hit_sq > front * front {
+                    return;
+                }
+                let from_hit = from_hit_sq.sqrt();
                 let loaded = narrow * params.loaded(generation, from_hit);
                 if near_sq > loaded * loaded {
-                    let ahead = from_hit - self.front(impact);
-                    nearest = nearest.min(ahead);
-                    if ahead <= 0.0 || is_idle {
-                        found.push(Candidate { marker, id, impact, pos, near_sq, from_hit });
-                    }
+                    nearest = nearest.min(from_hit - front);
+                    found.push(Candidate { marker, id, impact, pos, near_sq, from_hit });
                 }
             });
             if is_idle && nearest > 0.0 {
@@ -284,7 +296,7 @@ impl CrackGrowth {
                 found.retain(|candidate: &Candidate| candidate.from_hit - self.front(candidate.impact) <= leap);
             }
             // The next generation waits until this one has come to rest.
-            if !is_idle || nearest < f32::INFINITY || is_last {
+            if !is_idle || !found.is_empty() || is_last {
                 return found;
             }
             if let Some(division) = &mut self.division {
@@ -363,46 +375,54 @@ impl CrackGrowth {
         }
     }
 
+    /// The nearest cracks within `far` of a place, ahead and back along each axis.
+    fn look_around(&self, pos: Vec2, axes: &[Vec2; AXES], far: f32) -> [Sight; 2] {
+        let mut sight = [Sight { distance: [f32::INFINITY; AXES], slant: [0.0; AXES] }; 2];
+        let Some(arrest) = &self.arrest else { return sight };
+        arrest.walls.each_near(pos, far, |from, to| {
+            let (from, way) = (from - pos, to - from);
+            let length_sq = way.length_squared();
+            // For all axes alike, without a branch, so that they are taken at once.
+            for i in 0..AXES {
+                let (slope, across) = (axes[i].perp_dot(way), axes[i].perp_dot(from));
+                let share = -across / slope;
+                let distance = axes[i].dot(from) + share * axes[i].dot(way);
+                let slant = 1.0 - slope * slope / length_sq;
+                for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
+                    let sight = &mut sight[side];
+                    let ahead = sign * distance;
+                    let is_nearer = (share >= 0.0) & (share <= 1.0) & (ahead >= 0.0) & (ahead < sight.distance[i]);
+                    sight.distance[i] = if is_nearer { ahead } else { sight.distance[i] };
+                    sight.slant[i] = if is_nearer { slant } else { sight.slant[i] };
+                }
+            }
+        });
+        sight
+    }
+
     /// How a crack would divide the domain around a place, as far as can be seen from there; none where it could not end at others.
     fn across(&self, pos: Vec2, impact: u32, draws: u32, clearance: f32) -> Option<Across> {
         let draw = |what: u64| hash_unit(self.seed ^ what, u64::from(draws));
         let turn = PI * draw(0xA1);
         let axes: [Vec2; AXES] = std::array::from_fn(|i| ops::unit(turn + PI * i as f32 / AXES as f32));
         let far = FAR * clearance;
-        // Ahead and back along each axis.
-        let mut seen = [[(f32::INFINITY, 0.0); 2]; AXES];
-        if let Some(arrest) = &self.arrest {
-            arrest.walls.each_near(pos, far, |from, to| {
-                let (from, way) = (from - pos, to - from);
-                for (axis, seen) in axes.iter().zip(&mut seen) {
-                    let slope = axis.perp_dot(way);
-                    let share = -axis.perp_dot(from) / slope;
-                    if (0.0..=1.0).contains(&share) {
-                        let distance = axis.dot(from + way * share);
-                        let side = usize::from(distance < 0.0);
-                        if distance.abs() < seen[side].0 {
-                            seen[side] = (distance.abs(), 1.0 - slope * slope / way.length_squared());
-                        }
-                    }
-                }
-            });
-        }
+        let sight = self.look_around(pos, &axes, far);
         let (extent, hit) = (self.network.extent(), self.impacts.get(impact as usize).map_or(pos, |impact| impact.pos));
         let begun = self.division.as_ref().and_then(|division| division.begun.get(impact as usize));
         let reach = begun.map_or(f32::INFINITY, |begun| begun.1);
         let mut is_closed = [true; AXES];
-        for i in 0..AXES {
+        let mut seen = [[(0.0, 0.0); 2]; AXES];
+        for (i, seen) in seen.iter_mut().enumerate() {
             for (side, way) in [axes[i], -axes[i]].into_iter().enumerate() {
                 let (border, slant) = to_border(pos, way, extent);
-                if border < seen[i][side].0 {
-                    seen[i][side] = (border, slant);
-                }
-                let distance = seen[i][side].0;
+                let crack = sight[side].distance[i];
+                seen[side] = if border < crack { (border, slant) } else { (crack, sight[side].slant[i]) };
+                let distance = seen[side].0;
                 if distance > far {
                     let there = pos + way * distance.min(BEYOND * far) - hit;
                     let leaves = there.length() > rim_towards(there, reach, self.seed ^ u64::from(impact));
                     is_closed[i] &= !leaves;
-                    seen[i][side] = (if leaves { OPEN * far } else { far }, 0.5);
+                    seen[side] = (if leaves { OPEN * far } else { far }, 0.5);
                 }
             }
         }
@@ -443,7 +463,11 @@ impl CrackGrowth {
         let stray = self.params.wander * (2.0 * hash_unit(self.seed ^ 0x57A6, u64::from(child)) - 1.0);
         let drawn = self.drawn(this.pos, heading).map(|pull| {
             let direction = self.params.direct((pull + heading * self.params.inertia).normalize_or(heading));
-            this.pos + (direction + direction.perp() * stray).normalize_or_zero() * length
+            let mut direction = (direction + direction.perp() * stray).normalize_or_zero();
+            if !self.mask.is_empty() {
+                direction = steer(this.pos, direction, length, &self.mask, self.network.extent());
+            }
+            this.pos + direction * length
         });
         let to = drawn.filter(|&to| self.serves(this.pos, heading, to));
         if to.is_none() && !runs_out && self.has_left(node) {

@@ -1,8 +1,8 @@
 //! Growth: its end, its hits, and its frozen patterns.
 
 mod arrest;
-mod energy;
 mod divide;
+mod energy;
 mod reference;
 mod widths;
 
