@@ -365,7 +365,10 @@ impl CrackGrowth {
         let joined = self.link(link);
         if joined {
             self.is_met(node);
-            self.widen_end(tip);
+            // What closes a cell at the rim stays a needle.
+            if !self.divides() || !self.has_left(tip) {
+                self.widen_end(tip);
+            }
             let width = self.network.nodes[tip as usize].width;
             if let Some(link) = self.network.links.last_mut() {
                 link.width = width;
@@ -430,7 +433,7 @@ impl CrackGrowth {
     }
 
     /// The nearest node of another crack within `reach` of a node, ahead of it if it has a heading.
-    fn foreign(&self, from: u32, heading: Option<Vec2>, reach: f32, ahead: f32) -> Option<(f32, u32)> {
+    pub(super) fn foreign(&self, from: u32, heading: Option<Vec2>, reach: f32, ahead: f32) -> Option<(f32, u32)> {
         let mut best = (f32::INFINITY, u32::MAX, f32::INFINITY);
         let divides = self.divides();
         self.each_foreign(from, reach, |node, distance_sq, way| {

@@ -26,7 +26,7 @@ const COARSER: f32 = 1.6;
 const NARROWER: f32 = 0.5;
 
 /// Axes along which the width of a domain is measured.
-const AXES: usize = 8;
+pub(super) const AXES: usize = 8;
 
 /// How far the width of a domain is measured, in distances to its nearest crack.
 const FAR: f32 = 2.5;
@@ -116,8 +116,8 @@ pub(super) struct Candidate {
 
 /// Per axis: how far the nearest crack is one way, and how far from a right angle the axis meets it, 0..=1.
 #[derive(Clone, Copy, Debug)]
-struct Sight {
-    distance: [f32; AXES],
+pub(super) struct Sight {
+    pub(super) distance: [f32; AXES],
     slant: [f32; AXES],
 }
 
@@ -153,6 +153,18 @@ impl Division {
         self.generations.resize(node as usize, 0);
         self.generations.push(generation);
         self.share(node)
+    }
+
+    /// The generation of a node's crack.
+    #[cfg(test)]
+    pub(super) fn generation_of(&self, node: u32) -> u8 {
+        self.generations.get(node as usize).copied().unwrap_or(0)
+    }
+
+    /// How far an impact has loaded the surface.
+    #[cfg(test)]
+    pub(super) fn reach_of(&self, impact: u32) -> Option<f32> {
+        self.begun.get(impact as usize).map(|begun| begun.1)
     }
 
     /// Takes up the nodes of a hit.
@@ -376,7 +388,7 @@ impl CrackGrowth {
     }
 
     /// The nearest cracks within `far` of a place, ahead and back along each axis.
-    fn look_around(&self, pos: Vec2, axes: &[Vec2; AXES], far: f32) -> [Sight; 2] {
+    pub(super) fn look_around(&self, pos: Vec2, axes: &[Vec2; AXES], far: f32) -> [Sight; 2] {
         let mut sight = [Sight { distance: [f32::INFINITY; AXES], slant: [0.0; AXES] }; 2];
         let Some(arrest) = &self.arrest else { return sight };
         arrest.walls.each_near(pos, far, |from, to| {
@@ -533,7 +545,7 @@ impl CrackGrowth {
     }
 
     /// Whether a node has left what its hit has loaded.
-    fn has_left(&self, node: u32) -> bool {
+    pub(super) fn has_left(&self, node: u32) -> bool {
         let Node { pos, impact, .. } = self.network.nodes[node as usize];
         let rim = self.division.as_ref().and_then(|division| division.begun.get(impact as usize));
         match (rim, self.impacts.get(impact as usize)) {

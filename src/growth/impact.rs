@@ -217,13 +217,19 @@ impl CrackGrowth {
         let seed = mix(self.seed ^ mix(u64::from(impact) | 1 << 40));
         // Darts keep their distance from each other, and from the markers of hits that no step has taken up yet.
         let mut darts = None;
+        let divides = self.division.is_some();
+        // Where the markers of an earlier hit still wait they serve this one as well.
+        let apart = if divides { 0.5 * markers::spacing(&self.params, extent) } else { 0.0 };
+        if divides {
+            self.field.settle(&self.network.nodes, &self.nodes);
+        }
         if let MarkerLayout::DartThrowing { spacing } = self.params.markers {
             self.field.settle(&self.network.nodes, &self.nodes);
             darts = Some(NodeGrid::new(extent, spacing));
         }
         let (field, nodes, shown) = (&mut self.field, &self.nodes, &mut self.shown_markers);
         let (timeline, radius) = (&mut self.timeline, self.params.line_width);
-        let (show, divides) = (self.params.draw_markers, self.division.is_some());
+        let show = self.params.draw_markers;
         // The rays of a hit are its own: older cracks do not sprout towards them.
         let is_loyal = self.params.keeps_apart() || matches!(self.params.markers, MarkerLayout::Polar { .. });
         let loyal = if is_loyal { impact } else { ANY_IMPACT };
@@ -237,6 +243,9 @@ impl CrackGrowth {
                     return;
                 }
                 darts.push(pos);
+            }
+            if divides && field.any_within(pos, apart) {
+                return;
             }
             // The border is a crack too, and beyond the rim there is no stress.
             let relieved = if divides {
