@@ -443,7 +443,7 @@ impl CrackGrowth {
         let around = |i: usize| 0.5 * sum(i) + 0.25 * (sum(i + 1) + sum(i + AXES - 1));
         let score = |i: usize| {
             let slant = 1.0 + SLANT * (seen[i][0].1 + seen[i][1].1);
-            around(i) * slant * (1.0 + 2.0 * near_hit * (1.0 - axes[i].dot(out).abs()))
+            around(i) * slant * (1.0 + 1.2 * near_hit * (1.0 - axes[i].dot(out).abs()))
         };
         let may_leave = self.division.as_ref().is_none_or(|division| division.generation == 0);
         let best = (0..AXES).filter(|&i| may_leave || is_closed[i]).min_by(|&a, &b| score(a).total_cmp(&score(b)))?;
