@@ -14,7 +14,7 @@ use glam::Vec2;
 const BENDS: [f32; 3] = [1.0, 0.4, 0.0];
 
 /// Cosine of the angle to the heading within which a crack is ahead of a tip: 60 degrees.
-const AHEAD: f32 = 0.5;
+pub(super) const AHEAD: f32 = 0.5;
 
 /// A crack this many segment lengths away is met by the next segment.
 const LAST: f32 = 1.35;
@@ -113,6 +113,11 @@ impl Arrest {
         self.sealed[node as usize] = true;
     }
 
+    /// Tips on their way.
+    pub(super) fn running(&self) -> impl Iterator<Item = u32> + '_ {
+        self.runners.iter().map(|runner| runner.tip)
+    }
+
     pub(super) const fn is_running(&self) -> bool {
         !self.runners.is_empty()
     }
@@ -124,7 +129,7 @@ impl CrackGrowth {
         let pos = self.network.nodes[from as usize].pos;
         let heading = (to - pos).normalize_or_zero();
         let length = self.params.step_length;
-        if self.params.arrest <= 0.0 {
+        if !self.params.keeps_apart() {
             return match self.extend(from, to, false) {
                 Some(_) => Advance::Grown,
                 None => Advance::Stopped(heading),
@@ -192,18 +197,17 @@ impl CrackGrowth {
             && hash_unit(self.seed ^ 0x15, u64::from(tip)) < self.params.open_ends
     }
 
-    /// Sends a tip at rest on its way to the nearest crack ahead of it, if there is one within `distance`.
-    pub(super) fn run_on(&mut self, tip: u32, distance: f32) {
-        let node = self.network.nodes[tip as usize];
-        let Some(parent) = self.network.nodes.get(node.parent as usize) else { return };
-        let heading = (node.pos - parent.pos).normalize_or_zero();
+    /// Sends a tip at rest on its way to the nearest crack ahead of it, if there is one within `distance`; says whether there is.
+    pub(super) fn run_on(&mut self, tip: u32, heading: Vec2, distance: f32, ahead: f32) -> bool {
         if self.is_sealed(tip) {
-            return;
+            return false;
         }
-        if let Some((_, goal)) = self.goal_ahead(tip, heading, distance, AHEAD) {
+        let goal = self.goal_ahead(tip, heading, distance, ahead);
+        if let Some((_, goal)) = goal {
             self.seal(tip);
             self.run(Runner { tip, goal, steps_left: steps_for(distance, self.params.step_length) });
         }
+        goal.is_some()
     }
 
     fn run(&mut self, runner: Runner) {
@@ -270,14 +274,20 @@ impl CrackGrowth {
 
     /// The direction from `pos` that turns from `heading` towards the goal.
     fn turned(&self, pos: Vec2, heading: Vec2, goal: Goal) -> Vec2 {
-        let way = (self.place_of(goal) - pos).normalize_or_zero();
-        (0.5 * heading + way).normalize_or(way)
+        let way = self.place_of(goal) - pos;
+        // What divides a domain keeps to its way until it is near.
+        let keep = if self.divides() { (0.4 * way.length() / self.params.step_length).clamp(0.5, 2.0) } else { 0.5 };
+        let way = way.normalize_or_zero();
+        (keep * heading + way).normalize_or(way)
     }
 
     /// The last segment: onto the crack or the border.
     fn meet(&mut self, tip: u32, goal: Goal) {
         match goal {
-            Goal::Node(_) => {
+            Goal::Node(node) => {
+                if self.is_resting(node) && self.join(node, tip, LinkKind::Junction) {
+                    return;
+                }
                 let way = self.place_of(goal) - self.network.nodes[tip as usize].pos;
                 self.join_near(tip, way, LAST_REACH);
             }
@@ -352,7 +362,7 @@ impl CrackGrowth {
                 }
                 Some(child)
             }
-            Err(()) if self.params.arrest <= 0.0 => None,
+            Err(()) if !self.params.keeps_apart() => None,
             Err(()) => {
                 // A ray comes nearer first, so that it need not turn to where it is joined.
                 let nearer = 0.5 * (node.pos + to);
@@ -380,7 +390,7 @@ impl CrackGrowth {
     ) -> Result<(f32, SegmentPath), ()> {
         for bend in BENDS {
             let path = self.network.draft(segment, (from, to), (0.0, 0.0), bend);
-            let touches = self.params.arrest > 0.0
+            let touches = self.params.keeps_apart()
                 && self.arrest.as_ref().is_some_and(|arrest| arrest.walls.touches_any(ends, &path));
             let extent = self.network.extent();
             let touches = touches || crosses_itself(&path);
@@ -397,7 +407,11 @@ impl CrackGrowth {
         let link = Link { a: node, b: tip, width: 0.0, birth: self.steps, kind, bend: 1.0 };
         let joined = self.link(link);
         if joined {
-            self.widen_end(tip);
+            self.is_met(node);
+            // What closes a cell at the rim stays a needle.
+            if !self.divides() || !self.has_left(tip) {
+                self.widen_end(tip);
+            }
             let width = self.network.nodes[tip as usize].width;
             if let Some(link) = self.network.links.last_mut() {
                 link.width = width;
@@ -429,6 +443,9 @@ impl CrackGrowth {
     fn goal_ahead(&self, from: u32, heading: Vec2, reach: f32, ahead: f32) -> Option<(f32, Goal)> {
         let crack =
             self.foreign(from, Some(heading), reach, ahead).map(|(distance, node)| (distance, Goal::Node(node)));
+        if let Some((distance, tip)) = self.resting_ahead(from, heading, reach, ahead) {
+            return Some((distance, Goal::Node(tip)));
+        }
         let border = self.border_ahead(self.network.nodes[from as usize].pos, heading, reach, ahead);
         match (crack, border) {
             (Some(crack), Some(border)) => Some(if border.0 < crack.0 { border } else { crack }),
@@ -459,15 +476,27 @@ impl CrackGrowth {
     }
 
     /// The nearest node of another crack within `reach` of a node, ahead of it if it has a heading.
-    fn foreign(&self, from: u32, heading: Option<Vec2>, reach: f32, ahead: f32) -> Option<(f32, u32)> {
-        let mut best = (f32::INFINITY, u32::MAX);
+    pub(super) fn foreign(&self, from: u32, heading: Option<Vec2>, reach: f32, ahead: f32) -> Option<(f32, u32)> {
+        let mut best = (f32::INFINITY, u32::MAX, f32::INFINITY);
+        let divides = self.divides();
         self.each_foreign(from, reach, |node, distance_sq, way| {
-            let is_ahead = heading.is_none_or(|heading| way.dot(heading) >= ahead * distance_sq.sqrt());
-            if is_ahead && (distance_sq, node) < best {
-                best = (distance_sq, node);
+            let mut rank = distance_sq;
+            if let Some(heading) = heading {
+                let along = way.dot(heading);
+                let distance = distance_sq.sqrt();
+                if along < ahead * distance {
+                    return;
+                }
+                // A crack that divides a domain keeps to its way.
+                if divides {
+                    rank = distance_sq * distance / along.max(0.1 * distance);
+                }
+            }
+            if (rank, node) < (best.0, best.1) {
+                best = (rank, node, distance_sq);
             }
         });
-        (best.1 != u32::MAX).then(|| (best.0.sqrt(), best.1))
+        (best.1 != u32::MAX).then(|| (best.2.sqrt(), best.1))
     }
 
     /// Calls `visit` with each node of another crack within `reach`, its squared distance and the way to it.
@@ -481,7 +510,7 @@ impl CrackGrowth {
     }
 
     /// Whether two nodes are of the same crack: not so many generations from one another that between them a cell could lie.
-    fn is_kin(&self, one: u32, other: u32) -> bool {
+    pub(super) fn is_kin(&self, one: u32, other: u32) -> bool {
         let (a, b) = (&self.network.nodes[one as usize], &self.network.nodes[other as usize]);
         if a.impact != b.impact {
             return false;
@@ -500,7 +529,8 @@ impl CrackGrowth {
             if parent == NO_PARENT {
                 // The starts of a compact hit are of one crack.
                 let to_start = |node: u32| self.network.nodes[node as usize].generation;
-                return !matches!(self.params.starts, StartLayout::Points { .. })
+                return !self.divides()
+                    && !matches!(self.params.starts, StartLayout::Points { .. })
                     && to_start(one).saturating_add(to_start(other)) <= apart;
             }
             *later = parent;

@@ -40,6 +40,8 @@ struct Newborn {
     id: u32,
     loyal: u32,
     given_up: u8,
+    /// Squared distance beyond which nothing is nearer.
+    near_sq: f32,
 }
 
 /// A marker that was given up so often dies.
@@ -50,6 +52,8 @@ pub(super) struct MarkerField {
     extent: Vec2,
     radius: f32,
     kill_sq: f32,
+    /// Whether cracks divide domains: markers only know how far the nearest is, and attract those of which they are their own.
+    divides: bool,
     // Sorted by cell, one entry a marker, then as many dead ones as there are lanes.
     x: Vec<f32>,
     y: Vec<f32>,
@@ -86,7 +90,8 @@ impl MarkerField {
         Self {
             extent,
             radius: params.crack_radius,
-            kill_sq: params.kill_distance * params.kill_distance,
+            kill_sq: kill_sq(params),
+            divides: params.venation == Venation::Dividing,
             x: Vec::new(),
             y: Vec::new(),
             near_sq: Vec::new(),
@@ -110,7 +115,8 @@ impl MarkerField {
     /// Takes up other parameters; every marker looks for its nodes anew when it [settles](Self::settle).
     pub(super) fn set_params(&mut self, params: &GrowthParams) {
         self.radius = params.crack_radius;
-        self.kill_sq = params.kill_distance * params.kill_distance;
+        self.kill_sq = kill_sq(params);
+        self.divides = params.venation == Venation::Dividing;
         self.relations = (params.venation == Venation::Closed).then(|| {
             let mut relations = Relations::new(params);
             (0..self.next).for_each(|_| relations.add());
@@ -145,6 +151,7 @@ impl MarkerField {
             id: self.id[i],
             loyal: self.loyal[i],
             given_up: self.given_up[i],
+            near_sq: if self.divides { self.near_sq[i] } else { f32::INFINITY },
         };
         let living = living.map(marker).collect();
         for plane in [&mut self.x, &mut self.y, &mut self.near_sq] {
@@ -159,8 +166,9 @@ impl MarkerField {
         living
     }
 
-    pub(super) fn add(&mut self, pos: Vec2, loyal: u32) {
-        self.newborn.push(Newborn { pos, id: self.next, loyal, given_up: 0 });
+    pub(super) fn add(&mut self, pos: Vec2, loyal: u32, relieved: f32) {
+        let near_sq = relieved.max(0.0) * relieved;
+        self.newborn.push(Newborn { pos, id: self.next, loyal, given_up: 0, near_sq });
         self.next += 1;
         self.made += 1;
         if let Some(relations) = &mut self.relations {
@@ -225,12 +233,13 @@ impl MarkerField {
         self.node.resize(padded, NO_NODE);
         self.near_sq.resize(all.len(), self.radius * self.radius);
         self.near_sq.resize(padded, DEAD);
-        for (Newborn { pos, id, loyal, given_up }, home) in all.into_iter().zip(homes) {
+        for (Newborn { pos, id, loyal, given_up, near_sq }, home) in all.into_iter().zip(homes) {
             let slot = &mut next[home as usize];
             let i = *slot as usize;
             *slot += 1;
             (self.x[i], self.y[i], self.id[i], self.loyal[i]) = (pos.x, pos.y, id, loyal);
             self.given_up[i] = given_up;
+            self.near_sq[i] = self.near_sq[i].min(near_sq);
         }
         if let Some(relations) = &self.relations {
             // These have looked at all nodes already.
@@ -307,6 +316,10 @@ impl MarkerField {
         if distance_sq <= self.kill_sq && (is_own || !is_ray(loyal)) {
             self.near_sq[marker] = DEAD;
             self.killed += 1;
+            return;
+        }
+        if self.divides {
+            self.near_sq[marker] = distance_sq;
             return;
         }
         if !is_own {
@@ -433,6 +446,39 @@ impl MarkerField {
         Some((Vec2::new(self.x[i], self.y[i]), self.loyal[i]))
     }
 
+    /// Calls `visit` with each living marker that is further than this from all cracks: its place in the field, number, place, squared distance to
+    /// the nearest crack and impact.
+    pub(super) fn each_beyond(&self, least_sq: f32, mut visit: impl FnMut(u32, u32, Vec2, f32, u32)) {
+        for (i, &near_sq) in self.near_sq.iter().enumerate() {
+            if near_sq > least_sq {
+                visit(i as u32, self.id[i], Vec2::new(self.x[i], self.y[i]), near_sq, self.loyal[i]);
+            }
+        }
+    }
+
+    /// Calls `visit` with the place and squared distance of each marker within the radius that is nearer to the node at `pos` than to any other.
+    pub(super) fn each_own(&self, pos: Vec2, mut visit: impl FnMut(Vec2, f32)) {
+        for (from, to) in self.rows(pos, self.radius) {
+            for i in self.first[from] as usize..self.first[to] as usize {
+                let distance_sq = distance_sq(self.x[i], self.y[i], pos);
+                if distance_sq == self.near_sq[i] {
+                    visit(Vec2::new(self.x[i], self.y[i]), distance_sq);
+                }
+            }
+        }
+    }
+
+    /// Squared distance of a marker to the nearest crack; below zero if it is dead.
+    pub(super) fn near_sq(&self, index: u32) -> f32 {
+        self.near_sq[index as usize]
+    }
+
+    /// Takes a marker.
+    pub(super) fn take(&mut self, index: u32) {
+        self.near_sq[index as usize] = DEAD;
+        self.killed += 1;
+    }
+
     /// Markers in the cells, dead ones included.
     fn made_settled(&self) -> usize {
         self.x.len().saturating_sub(LANES)
@@ -472,6 +518,12 @@ impl MarkerField {
 /// Whether a marker belongs to a ray.
 const fn is_ray(loyal: u32) -> bool {
     loyal != ANY_IMPACT && loyal & RAY != 0
+}
+
+/// The least squared distance at which a marker dies.
+fn kill_sq(params: &GrowthParams) -> f32 {
+    let finest = if params.venation == Venation::Dividing { 1.0 + params.focus } else { 1.0 };
+    (params.kill_distance / finest) * (params.kill_distance / finest)
 }
 
 /// Room for `n` values, written once: the first write to memory is the dear one.

@@ -59,6 +59,9 @@ impl CrackGrowth {
         self.field.ray_of.drain(..first.min(self.field.ray_of.len()));
         self.pull_of.drain(..first);
         self.courses.drain(..first);
+        if let Some(division) = &mut self.division {
+            division.forget(forgotten);
+        }
         self.unshown = self.unshown.iter().filter_map(|&node| number(node)).collect();
         self.newborn = self.newborn.start.saturating_sub(forgotten)..self.newborn.end.saturating_sub(forgotten);
         if let Some(before) = self.arrest.take() {
@@ -224,7 +227,7 @@ mod tests {
                 for _ in 0..20 {
                     growth.step();
                 }
-                assert!(growth.network().nodes().len() <= 600 && growth.census().waiting < 5_000, "{name}");
+                assert!(growth.network().nodes().len() <= 600 && growth.census().waiting < 20_000, "{name}");
             }
             assert!(frozen > 100, "{name}: {frozen}");
         }

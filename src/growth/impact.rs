@@ -2,6 +2,7 @@
 
 use super::{
     CrackGrowth, MarkerLayout, StartLayout,
+    divide::rim_towards,
     field::ANY_IMPACT,
     markers::{self, Region},
     nodes::NodeGrid,
@@ -117,7 +118,11 @@ impl CrackGrowth {
             let (center, after) = (impact.pos, impact.energy);
             if after > before {
                 self.widen(index);
-                self.populate(index, center, self.reach(center, before), self.reach(center, after));
+                let reach = self.reach(center, after);
+                self.populate(index, center, self.reach(center, before), reach);
+                if let Some(division) = &mut self.division {
+                    division.go_on(index, reach);
+                }
                 self.steps_left = self.params.num_iterations;
             }
             return HitOutcome::Merged(index);
@@ -164,6 +169,9 @@ impl CrackGrowth {
             self.lay_out_rays(&plan, name);
         }
         self.populate(index, pos, 0.0, reach);
+        if let Some(division) = &mut self.division {
+            division.begin(self.newborn.clone(), self.steps, reach);
+        }
         self.steps_left = self.params.num_iterations;
         HitOutcome::Started(index)
     }
@@ -230,6 +238,12 @@ impl CrackGrowth {
         let seed = mix(self.seed ^ mix(u64::from(impact) | 1 << 40));
         // Darts keep their distance from each other, and from the markers of hits that no step has taken up yet.
         let mut darts = None;
+        let divides = self.division.is_some();
+        // Where the markers of an earlier hit still wait they serve this one as well.
+        let apart = if divides { 0.5 * markers::spacing(&self.params, extent) } else { 0.0 };
+        if divides {
+            self.field.settle(&self.network.nodes, &self.nodes);
+        }
         if let MarkerLayout::DartThrowing { spacing } = self.params.markers {
             self.field.settle(&self.network.nodes, &self.nodes);
             darts = Some(NodeGrid::new(extent, spacing));
@@ -238,7 +252,7 @@ impl CrackGrowth {
         let (timeline, radius) = (&mut self.timeline, self.params.line_width);
         let show = self.params.draw_markers;
         // The rays of a hit are its own: older cracks do not sprout towards them.
-        let is_loyal = self.params.arrest > 0.0;
+        let is_loyal = self.params.keeps_apart();
         let loyal = if is_loyal { impact } else { ANY_IMPACT };
         let wishes = (self.density.as_ref(), &*self.mask);
         markers::lay_out(&self.params, region, wishes, seed, |pos, spacing| {
@@ -251,7 +265,18 @@ impl CrackGrowth {
                 }
                 darts.push(pos);
             }
-            field.add(pos, loyal);
+            if divides && field.any_within(pos, apart) {
+                return;
+            }
+            // The border is a crack too, and beyond the rim there is no stress.
+            let relieved = if divides {
+                pos.min(extent - pos)
+                    .min_element()
+                    .min(rim_towards(pos - center, outer, self.seed ^ u64::from(impact)) - pos.distance(center))
+            } else {
+                f32::INFINITY
+            };
+            field.add(pos, loyal, relieved);
             if show {
                 shown.push(pos);
                 timeline.add_dot(Dot { pos, radius });
@@ -299,7 +324,7 @@ impl CrackGrowth {
 
     /// Whether a place lies on a crack, or as good as: at its line, or within the width of one of another impact.
     fn is_on_crack(&self, place: Vec2, impact: u32) -> bool {
-        let Some(arrest) = self.arrest.as_ref().filter(|_| self.params.arrest > 0.0) else { return false };
+        let Some(arrest) = self.arrest.as_ref().filter(|_| self.params.keeps_apart()) else { return false };
         arrest.walls.any_within(place, 0.3 * self.params.step_length) || self.is_in_wide_crack(place, impact)
     }
 

@@ -126,7 +126,7 @@ fn grid(params: &GrowthParams, extent: Vec2) -> UVec2 {
 }
 
 /// About how far the markers of a layout lie from each other.
-fn spacing(params: &GrowthParams, extent: Vec2) -> f32 {
+pub(super) fn spacing(params: &GrowthParams, extent: Vec2) -> f32 {
     match params.markers {
         MarkerLayout::PseudoGrid { .. } => (extent / grid(params, extent).as_vec2()).max_element(),
         MarkerLayout::DartThrowing { spacing } => spacing,

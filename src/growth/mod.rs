@@ -34,6 +34,7 @@
 mod arrest;
 mod changes;
 mod closed;
+mod divide;
 mod field;
 mod foreign;
 mod forget;

@@ -46,6 +46,9 @@ pub enum Venation {
     /// A marker attracts all its relative neighbours and dies when each has reached it (Runions et al. 2005): cracks come together
     /// and close cells.
     Closed,
+    /// Cracks do not branch. One begins at the marker that is farthest from all older cracks, across the shorter way of its domain, and runs both
+    /// ways until it meets older ones: each divides a domain, until all markers are within the kill distance of a crack.
+    Dividing,
 }
 
 /// The nodes with which a hit begins.
@@ -169,6 +172,11 @@ pub struct GrowthParams {
     /// Cracks that begin by themselves where markers are out of every crack's reach: how many for each step of growth, 0..=64.
     /// They come late, so they end at the older ones.
     pub nucleation: f32,
+    /// With [`Venation::Dividing`]: cracks come in so many generations, each in domains that are 1.6 times smaller, and half as wide as the one
+    /// before. 1..=4.
+    pub generations: u32,
+    /// With [`Venation::Dividing`]: how far cracks may begin from the hit, pattern units for each step since it; 0 = anywhere at once. 0..=1.
+    pub front: f32,
     /// How much one surface differs from the next, by its seed: widths, roughness, the spacing of markers, the number of starts and
     /// of free ends, the axis. 0 = not at all; at 1 each differs by a factor of up to 2 either way, mostly much less. 0..=1.
     pub variety: f32,
@@ -218,6 +226,8 @@ impl GrowthParams {
         open_ends: 0.0,
         arrest: 0.0,
         nucleation: 0.0,
+        generations: 1,
+        front: 0.0,
         variety: 0.0,
         courses: 0.0,
         draw_markers: false,
@@ -319,6 +329,8 @@ impl GrowthParams {
         open_ends: f32 = 0.0, 1.0;
         arrest: f32 = 0.0, 1.0;
         nucleation: f32 = 0.0, 64.0;
+        generations: u32 = 1.0, 4.0;
+        front: f32 = 0.0, 1.0;
         variety: f32 = 0.0, 1.0;
         courses: f32 = 0.0, 1.0;
         max_nodes: u32 = 1.0, 1_000_000.0;
@@ -369,7 +381,7 @@ impl GrowthParams {
     /// Sets one parameter from text, by the name of its field or by the paper's own (`D`).
     ///
     /// Besides the fields: `markers` (`grid`, `darts`, `rays`), `occupancy`, `jitter`, `spacing`, `sectors`, `through` of the
-    /// present layout; `venation` (`open`, `closed`), `starts` (`point`, `points`, `arms`, `ring`, `crushed`, `disc`), `start_count`, `start_radius`.
+    /// present layout; `venation` (`open`, `closed`, `dividing`), `starts` (`point`, `points`, `arms`, `ring`, `crushed`, `disc`), `start_count`, `start_radius`.
     ///
     /// ```
     /// use bevy_crack::growth::GrowthParams;
@@ -405,6 +417,7 @@ impl GrowthParams {
                 self.venation = match text {
                     "open" => Venation::Open,
                     "closed" => Venation::Closed,
+                    "dividing" => Venation::Dividing,
                     _ => return Err(unreadable()),
                 }
             }
@@ -451,6 +464,11 @@ impl GrowthParams {
         Ok(())
     }
 
+    /// Whether cracks must not cross.
+    pub(super) fn keeps_apart(&self) -> bool {
+        self.arrest > 0.0 || self.venation == Venation::Dividing
+    }
+
     /// Turns a direction towards the axis.
     pub(super) fn direct(&self, direction: Vec2) -> Vec2 {
         if self.directed <= 0.0 {
@@ -487,6 +505,7 @@ impl GrowthParams {
         length(&mut scaled.arrest, 0.0, 1.0);
         length(&mut scaled.grain, 0.0, 1.0);
         length(&mut scaled.courses, 0.0, 1.0);
+        length(&mut scaled.front, 0.0, 1.0);
         // So many on the same surface.
         let count = |count: u32| ((count as f32 / by).round() as u32).clamp(1, 512);
         match &mut scaled.markers {
@@ -570,8 +589,12 @@ impl GrowthParams {
             let chord = u64::from(super::rays::chord_steps(super::plan::LONGEST_CHORD, self.step_length));
             births += markers * (1 + u64::from(super::plan::MOST_RINGS) * chord);
         }
-        let starts = starts + if self.nucleation > 0.0 { markers } else { 0 };
-        if self.arrest <= 0.0 {
+        let starts = starts + if self.nucleation > 0.0 || self.venation == Venation::Dividing { markers } else { 0 };
+        if self.venation == Venation::Dividing {
+            // Each start has two tips, which may run straight on.
+            births += 2 * starts * (1 + u64::from(super::divide::STRAIGHT));
+        }
+        if !self.keeps_apart() {
             return starts + births;
         }
         let run = u64::from(super::arrest::steps_for(self.arrest.max(self.island_distance), self.step_length)) + 2;

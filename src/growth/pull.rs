@@ -355,7 +355,7 @@ fn kept(nodes: &[Node], node: u32, courses: &[Vec2], kin: &[Kin], impacts: &[Imp
 }
 
 /// Turns `direction` by up to 80 degrees towards what is weak and away from what is strong or forbidden.
-fn steer(from: Vec2, direction: Vec2, length: f32, mask: &CrackMask, extent: Vec2) -> Vec2 {
+pub(super) fn steer(from: Vec2, direction: Vec2, length: f32, mask: &CrackMask, extent: Vec2) -> Vec2 {
     // Cosine and sine of 0, 10, ... 80 degrees.
     const TURNS: [(f32, f32); 9] = [
         (1.0, 0.0),

@@ -201,7 +201,7 @@ impl CrackGrowth {
                 if self.field.living_at_most() >= MAX_MARKERS || self.is_barren(pos) {
                     continue;
                 }
-                self.field.add(pos, name + i);
+                self.field.add(pos, name + i, f32::INFINITY);
                 let is_inside = pos.cmpge(Vec2::ZERO).all() && pos.cmple(extent).all();
                 if self.params.draw_markers && is_inside {
                     self.shown_markers.push(pos);

@@ -2,8 +2,9 @@
 
 use super::{
     GrowthParams, Impact, ParamError, StartLayout,
-    arrest::{Advance, Arrest},
+    arrest::{AHEAD, Advance, Arrest},
     changes::Changes,
+    divide::Division,
     field::{ANY_IMPACT, MarkerField},
     links::{self, Linker},
     masonry::Masonry,
@@ -69,6 +70,8 @@ pub struct CrackGrowth {
     pub(super) nodes: NodeGrid,
     /// Only where cracks must not cross.
     pub(super) arrest: Option<Arrest>,
+    /// Only where cracks divide domains.
+    pub(super) division: Option<Division>,
     pub(super) widths: Widths,
     pub(super) linker: Linker,
     pub(super) rays: Rays,
@@ -122,7 +125,8 @@ impl CrackGrowth {
         let params = params.varied(seed);
         let network = Network::new(extent, params.roughness, seed);
         let mut growth = Self {
-            arrest: (params.arrest > 0.0).then(|| Arrest::new(&network, params.step_length)),
+            arrest: params.keeps_apart().then(|| Arrest::new(&network, params.step_length)),
+            division: Division::new(&params),
             network,
             field: MarkerField::new(extent, &params),
             nodes: NodeGrid::new(extent, 2.0 * params.step_length.max(params.kill_distance)),
@@ -188,7 +192,7 @@ impl CrackGrowth {
 
     /// Keeps account of lines if cracks must not cross, or if there are places that they must not enter.
     fn mind_others(&mut self) {
-        let must = self.params.arrest > 0.0 || self.mask.forbidden.is_some();
+        let must = self.params.keeps_apart() || self.mask.forbidden.is_some();
         if must != self.arrest.is_some() {
             self.arrest = must.then(|| Arrest::new(&self.network, self.params.step_length));
         }
@@ -216,6 +220,7 @@ impl CrackGrowth {
     fn bear_thin(&mut self, pos: Vec2, parent: u32, generation: u32, impact: u32, bend: f32) {
         let node = self.network.nodes.len() as u64;
         let wider = self.impacts.get(impact as usize).map_or(1.0, |impact| impact.widening);
+        let wider = self.division.as_mut().map_or(1.0, |division| division.bear(node as u32, parent)) * wider;
         let width = self.widths.tip(parent, || hash_unit(self.seed ^ 0x1D, node), wider);
         if let Some(arrest) = &mut self.arrest {
             arrest.push_node(false);
@@ -271,6 +276,10 @@ impl CrackGrowth {
     fn make_step(&mut self) {
         self.steps_left -= 1;
         self.field.settle(&self.network.nodes, &self.nodes);
+        if self.divides() {
+            self.divide();
+            return;
+        }
         self.gather_pulls();
         self.aim();
         let first = self.network.nodes.len() as u32;
@@ -435,7 +444,11 @@ impl CrackGrowth {
                     continue;
                 }
                 if self.arrest.is_some() {
-                    self.run_on(tip, self.params.island_distance);
+                    let node = self.network.nodes[tip as usize];
+                    if let Some(parent) = self.network.nodes.get(node.parent as usize) {
+                        let heading = (node.pos - parent.pos).normalize_or_zero();
+                        self.run_on(tip, heading, self.params.island_distance, AHEAD);
+                    }
                 } else if let Some(link) = links::island(&self.params, &self.network, &self.nodes, tip)
                     && self.link(link)
                 {
@@ -522,6 +535,8 @@ impl CrackGrowth {
         let params = params.varied(self.seed);
         self.field.set_params(&params);
         self.widths.set_params(&params);
+        let division = Division::new(&params).map(|new| self.division.take().unwrap_or(new));
+        self.division = division;
         self.params = params;
         self.mind_others();
         self.lay_bricks();

@@ -128,6 +128,19 @@ impl Walls {
         false
     }
 
+    /// Calls `visit` with the ends of each line that may pass within `distance` of `pos`, at least once.
+    pub(super) fn each_near(&self, pos: Vec2, distance: f32, mut visit: impl FnMut(Vec2, Vec2)) {
+        for slot in self.slots(pos - distance, pos + distance) {
+            let mut entry = self.head[slot];
+            while entry != NONE {
+                let (wall, next) = self.entries[entry as usize];
+                let Wall { first, len, .. } = self.walls[wall as usize];
+                visit(self.points[first as usize], self.points[(first + len - 1) as usize]);
+                entry = next;
+            }
+        }
+    }
+
     /// Whether a line passes within `distance` of `pos`.
     pub(super) fn any_within(&self, pos: Vec2, distance: f32) -> bool {
         let limit = f64::from(distance).powi(2);

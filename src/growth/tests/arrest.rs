@@ -21,7 +21,12 @@ pub(super) fn random_arrest(rng: &mut Rng) -> GrowthParams {
         step_length,
         crack_radius,
         kill_distance: rng.range(0.01, 0.07).min(crack_radius),
-        venation: if rng.unit() < 0.3 { Venation::Closed } else { Venation::Open },
+        venation: match rng.next_u32() % 6 {
+            0 | 1 => Venation::Closed,
+            2 | 3 => Venation::Dividing,
+            _ => Venation::Open,
+        },
+        front: if rng.unit() < 0.5 { 0.0 } else { rng.range(0.005, 0.1) },
         arrest: rng.range(0.01, 0.12),
         inertia: if rng.unit() < 0.3 { 0.0 } else { rng.range(0.0, 6.0) },
         nucleation: if rng.unit() < 0.5 { 0.0 } else { rng.range(0.0, 3.0) },

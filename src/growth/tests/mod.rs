@@ -1,6 +1,7 @@
 //! Growth: its end, its hits, and its frozen patterns.
 
 mod arrest;
+mod divide;
 mod energy;
 mod masonry;
 mod rays;
@@ -63,6 +64,8 @@ fn random_params(rng: &mut Rng, small: bool) -> GrowthParams {
         arrest: 0.0,
         venation: Venation::Open,
         nucleation: 0.0,
+        generations: 1 + rng.next_u32() % 3,
+        front: 0.0,
         tip_taper: if rng.unit() < 0.3 { 0.0 } else { 12.0 * rng.unit() },
         unevenness: 0.0,
         inertia: 0.0,
