@@ -346,7 +346,8 @@ impl CrackGrowth {
             let at = |node: u32| self.network.nodes[node as usize].pos;
             // Not along the border, and two are joined once.
             let is_along = |border: Vec2| (at(node).cmpeq(border) & at(next).cmpeq(border)).any();
-            if next != node && !(next == first && last - first == 2) && !is_along(Vec2::ZERO) && !is_along(extent) {
+            let is_joined = next == node || (next == first && last - first == 2);
+            if !(is_joined || is_along(Vec2::ZERO) || is_along(extent)) {
                 let width = self.params.line_width;
                 let (birth, kind) = (self.steps, LinkKind::Connection);
                 self.link(Link { a: next, b: node, width, birth, kind, bend: 0.0 });
