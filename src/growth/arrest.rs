@@ -360,7 +360,7 @@ impl CrackGrowth {
     }
 
     /// Links a tip to a node of another crack, unless a third is in the way; says whether it did.
-    fn join(&mut self, node: u32, tip: u32) -> bool {
+    pub(super) fn join(&mut self, node: u32, tip: u32) -> bool {
         let link = Link { a: node, b: tip, width: 0.0, birth: self.steps, kind: LinkKind::Junction, bend: 1.0 };
         let joined = self.link(link);
         if joined {
