@@ -297,7 +297,7 @@ impl CrackPreset {
             tip_taper: 8.0,
             ..GrowthParams::DEFAULT
         },
-        profile: Profile { depth: 1.0, full_width: 0.014, wall: 0.5, rim_width: 0.012, rim_depth: 0.12, faintest: 0.4 },
+        profile: Profile { depth: 1.0, full_width: 0.004, wall: 0.5, rim_width: 0.012, rim_depth: 0.12, faintest: 0.4 },
         look: Look::GROOVE,
         steps_per_second: 40.0,
         follows_lines: false,
@@ -330,7 +330,7 @@ impl CrackPreset {
             tip_taper: 8.0,
             ..GrowthParams::DEFAULT
         },
-        profile: Profile { depth: 1.0, full_width: 0.016, wall: 0.6, rim_width: 0.014, rim_depth: 0.12, faintest: 0.4 },
+        profile: Profile { depth: 1.0, full_width: 0.005, wall: 0.6, rim_width: 0.014, rim_depth: 0.12, faintest: 0.4 },
         look: Look::GROOVE,
         steps_per_second: 40.0,
         follows_lines: false,
@@ -361,7 +361,7 @@ impl CrackPreset {
             num_iterations: 400,
             ..GrowthParams::DEFAULT
         },
-        profile: Profile { depth: 0.8, full_width: 0.002, wall: 0.4, rim_width: 0.0, rim_depth: 0.0, faintest: 0.4 },
+        profile: Profile { depth: 0.8, full_width: 0.0012, wall: 0.4, rim_width: 0.0, rim_depth: 0.0, faintest: 0.4 },
         look: Look { relief: 0.003, ..Look::GROOVE },
         steps_per_second: 60.0,
         follows_lines: false,

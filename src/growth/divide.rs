@@ -58,6 +58,9 @@ const UNEVEN: f32 = 0.3;
 /// Kill distances within which a tip that has left the region of its hit closes a cell with what is there.
 const CLOSE: f32 = 2.5;
 
+/// Segment lengths within which an end that something was in the way of is joined to what is there.
+const STRANDED: f32 = 3.0;
+
 /// Cosine of the angle to its way up to which it looks for that.
 const ASIDE: f32 = 0.25;
 
@@ -530,10 +533,38 @@ impl CrackGrowth {
     fn run_out(&mut self) {
         let Some(division) = &mut self.division else { return };
         let resting = std::mem::take(&mut division.resting);
+        if resting.is_empty() && self.params.open_ends <= 0.0 {
+            self.join_stranded();
+        }
         for tip in resting {
             if !self.closes(tip.node) && self.params.open_ends <= 0.0 {
                 self.keep_tip(Tip { runs_out: true, ..tip });
             }
+        }
+    }
+
+    /// Joins the tips that something was in the way of to what is near, if it lies well.
+    fn join_stranded(&mut self) {
+        let mut is_joined = vec![false; self.network.nodes.len()];
+        for link in &self.network.links {
+            is_joined[link.a as usize] = true;
+            is_joined[link.b as usize] = true;
+        }
+        let extent = self.network.extent();
+        for tip in 0..self.network.nodes.len() as u32 {
+            let Node { pos, parent, .. } = self.network.nodes[tip as usize];
+            let is_end = parent != NO_PARENT && self.child_of(tip) == NO_PARENT && !is_joined[tip as usize];
+            if !is_end || (pos.cmpeq(Vec2::ZERO) | pos.cmpeq(extent)).any() {
+                continue;
+            }
+            let mut near = Vec::new();
+            self.nodes.within(pos, STRANDED * self.params.step_length, |node, distance_sq| {
+                if distance_sq > 0.0 && !self.is_kin(tip, node) {
+                    near.push((distance_sq, node));
+                }
+            });
+            near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            near.into_iter().any(|(_, node)| self.join(node, tip));
         }
     }
 

@@ -46,8 +46,11 @@ pub enum Venation {
     /// A marker attracts all its relative neighbours and dies when each has reached it (Runions et al. 2005): cracks come together
     /// and close cells.
     Closed,
-    /// Cracks do not branch. One begins at the marker that is farthest from all older cracks, across the shorter way of its domain, and runs both
-    /// ways until it meets older ones: each divides a domain, until all markers are within the kill distance of a crack.
+    /// Cracks do not branch. One begins where a marker is farthest from all older cracks, across the shorter way of the domain around it, and runs
+    /// both ways, drawn by the markers ahead of its tips, until it meets older ones: each divides a domain, until all markers are within the kill
+    /// distance of a crack. No two cross, as with [`arrest`](GrowthParams::arrest). [`nucleation`](GrowthParams::nucleation) is how many begin in
+    /// each step, [`focus`](GrowthParams::focus) how much finer domains are near the hit; with [`open_ends`](GrowthParams::open_ends)
+    /// at 0 even the ends that leave the reach of the hit run on until they meet something. Markers should lie closer than 0.7 kill distances.
     Dividing,
 }
 
