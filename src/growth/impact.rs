@@ -108,6 +108,7 @@ impl CrackGrowth {
             impact.energy = (before + energy).min(MAX_ENERGY);
             let (center, after) = (impact.pos, impact.energy);
             if after > before {
+                self.timeline.strike(index, center, before, after);
                 self.widen(index);
                 self.populate(index, center, self.reach(before), self.reach(after));
                 self.steps_left = self.params.num_iterations;
@@ -117,6 +118,7 @@ impl CrackGrowth {
         let index = self.impacts.len() as u32;
         let energy = energy.min(MAX_ENERGY);
         self.impacts.push(Impact { pos, energy, first_energy: energy, widening: 1.0 });
+        self.timeline.strike(index, pos, 0.0, energy);
         let reach = self.reach(energy);
         let first = self.network.nodes.len() as u32;
         let seed = mix(self.seed ^ mix(u64::from(index)));

@@ -1,6 +1,10 @@
 //! [`Look`]: what a crack does to the picture, as data.
 
-use crate::pattern::MAX_SIDE;
+use super::patch::Curve;
+use crate::{
+    pattern::MAX_SIDE,
+    raster::{Crushed, LayerPlan},
+};
 use glam::Vec4;
 use std::{
     borrow::Cow,
@@ -21,6 +25,39 @@ pub struct ColorStop {
     pub cover: f32,
 }
 
+/// Closed cells as plates of their own: each a little darker or brighter, tilted, and reflecting in its own way.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
+pub struct Facets {
+    /// How much darker or brighter plates are, at the most, as a share of the picture. 0..=1; default 0.1.
+    pub tone: f32,
+    /// Slope of the most tilted plates, in the normal map. 0..=1; default 0.1.
+    pub tilt: f32,
+    /// How far the picture behind a plate is moved, texels at the most. 0..=16; default 0.
+    pub shift: f32,
+    /// How much the brightest plates reflect: cover of [`sheen`](Self::sheen), which falls off across each. 0..=1; default 0.
+    pub gleam: f32,
+    /// Share of plates that flash; the others reflect a sixth of it at the most. 0..=1; default 0.1.
+    pub flash: f32,
+    /// Colour of what plates reflect, sRGB 0..=1; default that of a bright sky.
+    pub sheen: [f32; 3],
+    /// How much all of that is for plates near the hit: 0 = everywhere the same, 1 = next to nothing far away. Default 0.
+    pub near: f32,
+}
+
+impl Facets {
+    /// The default: plates of slightly different tone, without reflections.
+    pub const DEFAULT: Self =
+        Self { tone: 0.1, tilt: 0.1, shift: 0.0, gleam: 0.0, flash: 0.1, sheen: [0.88, 0.94, 1.0], near: 0.0 };
+}
+
+impl Default for Facets {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
+}
+
 /// What a crack does to the picture.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]
@@ -30,8 +67,15 @@ pub struct Look {
     ///
     /// Below the first stop its cover falls to zero; beyond the last one nothing changes.
     pub ramp: Cow<'static, [ColorStop]>,
+    /// How far colours of the ramp are shares of the picture's own: 0 = they are what they say, 1 = each is multiplied by the picture.
+    /// Default 1: a crack in brown clay is brown.
+    pub tint: f32,
     /// How much walls that face the light (from the upper left) brighten and the others darken, by their slope. 0..=4.
     pub glint: f32,
+    /// How much of that is a highlight of the crack's own, not a share of the colour that is there (glass). 0..=4; default 0.
+    pub gloss: f32,
+    /// How much the cover swells and fades along the way (glass, ice): up to this share of it is taken away. 0..=1; default 0.
+    pub sparkle: f32,
     /// How uneven the cover is from texel to texel (frosted glass): up to this share of it is taken away. 0..=1.
     pub grain: f32,
     /// Shift of the picture where the surface is tilted by the crack (refraction), texels at the steepest. 0..=16.
@@ -40,13 +84,36 @@ pub struct Look {
     ///
     /// Makes the slopes of the normal map, and those that [`glint`](Self::glint) and [`shift`](Self::shift) go by.
     pub relief: f32,
+    /// How far the rims of cracks curl up, as a share of [`relief`](Self::relief): the surface is highest at depth
+    /// [`curl_depth`](Self::curl_depth), and level with its surroundings at depth 0 and at twice that depth. 0..=1; default 0.
+    pub curl: f32,
+    /// See [`curl`](Self::curl); the profile's [`rim_depth`](crate::raster::Profile::rim_depth) as a rule. 0.001..=0.5; default 0.12.
+    pub curl_depth: f32,
+    /// Closed cells as plates of their own; default none.
+    pub facets: Option<Facets>,
+    /// What a hit crushes around it; default nothing.
+    pub crushed: Option<Crushed>,
     /// Whether cracks make a translucent picture opaque by their cover (glass panes). Fully transparent texels stay so.
     pub opaque: bool,
 }
 
 impl Look {
     /// The names that [`named`](Self::named) knows.
-    pub const NAMES: [&'static str; 3] = ["groove", "frosted", "toon"];
+    pub const NAMES: [&'static str; 13] = [
+        "groove",
+        "frosted",
+        "toon",
+        "glass",
+        "tempered_glass",
+        "laminated_glass",
+        "ice",
+        "concrete",
+        "plaster",
+        "brick",
+        "clay",
+        "mud",
+        "stain",
+    ];
 
     /// The look of this name (lower case), see [`NAMES`](Self::NAMES).
     #[must_use]
@@ -55,59 +122,109 @@ impl Look {
             "groove" => Some(Self::GROOVE),
             "frosted" => Some(Self::FROSTED),
             "toon" => Some(Self::TOON),
+            "glass" => Some(Self::GLASS),
+            "tempered_glass" => Some(Self::TEMPERED_GLASS),
+            "laminated_glass" => Some(Self::LAMINATED_GLASS),
+            "ice" => Some(Self::ICE),
+            "concrete" => Some(Self::CONCRETE),
+            "plaster" => Some(Self::PLASTER),
+            "brick" => Some(Self::BRICK),
+            "clay" => Some(Self::CLAY),
+            "mud" => Some(Self::MUD),
+            "stain" => Some(Self::STAIN),
             _ => None,
         }
     }
 
-    /// A dark groove: concrete, clay, plaster.
+    /// A groove whose walls are lit, filled with the dark of the surface's own colour: concrete, clay, plaster.
     pub const GROOVE: Self = Self {
         ramp: Cow::Borrowed(&[
-            stop(0.12, [0.30, 0.27, 0.24], 0.15),
-            stop(0.45, [0.13, 0.115, 0.10], 0.75),
-            stop(0.8, [0.05, 0.045, 0.04], 0.95),
-            stop(1.0, [0.025, 0.022, 0.02], 1.0),
+            stop(0.15, [0.62, 0.59, 0.56], 0.10),
+            stop(0.40, [0.42, 0.38, 0.34], 0.80),
+            stop(0.80, [0.25, 0.22, 0.19], 0.95),
+            stop(1.0, [0.10, 0.085, 0.073], 1.0),
         ]),
-        glint: 0.6,
-        grain: 0.15,
+        tint: 1.0,
+        glint: 0.9,
+        gloss: 0.0,
+        grain: 0.12,
+        sparkle: 0.0,
         shift: 0.0,
-        relief: 0.02,
+        relief: 0.012,
+        curl: 0.0,
+        curl_depth: 0.12,
+        facets: None,
+        crushed: None,
         opaque: false,
     };
 
-    /// Cracked glass, ice: a frosted rim, a bright edge, a thin darker core, and the picture behind shifted by the walls.
+    /// Cracked glass, ice: a bright hairline with a dark companion on the side that is turned away, and the picture behind shifted by the
+    /// walls.
     pub const FROSTED: Self = Self {
         ramp: Cow::Borrowed(&[
-            stop(0.1, [0.82, 0.86, 0.87], 0.12),
-            stop(0.35, [0.9, 0.94, 0.94], 0.5),
-            stop(0.6, [0.97, 0.99, 0.98], 0.9),
-            stop(0.82, [0.8, 0.88, 0.85], 0.85),
-            stop(1.0, [0.3, 0.42, 0.38], 0.8),
+            stop(0.10, [0.86, 0.91, 0.92], 0.06),
+            stop(0.40, [0.93, 0.97, 0.97], 0.55),
+            stop(0.75, [0.97, 0.99, 1.0], 0.85),
+            stop(1.0, [0.98, 1.0, 1.0], 0.95),
         ]),
-        glint: 1.0,
-        grain: 0.35,
-        shift: 2.0,
-        relief: 0.012,
+        tint: 0.0,
+        glint: 0.8,
+        gloss: 1.0,
+        grain: 0.10,
+        sparkle: 0.35,
+        shift: 1.5,
+        relief: 0.004,
         opaque: true,
+        ..Self::GROOVE
     };
 
-    /// A drawn crack: a hard black outline with one lighter colour inside.
+    /// A drawn crack: a hard black outline of even width, nearly black inside, with one lit wall.
     pub const TOON: Self = Self {
         ramp: Cow::Borrowed(&[
             stop(0.05, [0.0; 3], 0.0),
-            stop(0.2, [0.0; 3], 1.0),
-            stop(0.6, [0.0; 3], 1.0),
-            stop(0.7, [0.45, 0.42, 0.4], 1.0),
+            stop(0.2, [0.02, 0.02, 0.03], 1.0),
+            stop(0.6, [0.02, 0.02, 0.03], 1.0),
+            stop(0.7, [0.20, 0.18, 0.19], 1.0),
         ]),
+        tint: 0.0,
         glint: 0.0,
+        gloss: 0.0,
         grain: 0.0,
-        shift: 0.0,
         relief: 0.02,
         opaque: true,
+        ..Self::GROOVE
     };
+
+    /// What a field is to hold beside depths so that this look can show it. `seed` fixes what is random in it.
+    ///
+    /// ```
+    /// use bevy_crack::{
+    ///     CrackPreset,
+    ///     growth::CrackGrowth,
+    ///     pattern::{Moment, SurfaceFrame},
+    ///     raster::DepthField,
+    /// };
+    ///
+    /// let (preset, frame) = (CrackPreset::GLASS, SurfaceFrame::new([256, 256].into())?);
+    /// let mut growth = CrackGrowth::new(preset.growth.clone(), frame.extent(), 7)?;
+    /// growth.hit([0.5, 0.5].into(), 1.0);
+    /// while growth.step().grew() {}
+    ///
+    /// let mut field = DepthField::new(frame);
+    /// field.lay(preset.look.layer(7));
+    /// let (timeline, mut changed) = (growth.timeline(), Vec::new());
+    /// field.show_layer(growth.network(), timeline, Moment::after(timeline.end()), &mut changed);
+    /// assert!(!changed.is_empty());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub const fn layer(&self, seed: u64) -> LayerPlan {
+        LayerPlan { plates: self.facets.is_some(), crushed: self.crushed, seed }
+    }
 }
 
-/// Shortens the tables above.
-const fn stop(depth: f32, color: [f32; 3], cover: f32) -> ColorStop {
+/// Shortens tables.
+pub(super) const fn stop(depth: f32, color: [f32; 3], cover: f32) -> ColorStop {
     ColorStop { depth, color, cover }
 }
 
@@ -136,6 +253,9 @@ pub enum LookError {
 /// The most stops that a [`Look::ramp`] has.
 const MAX_STOPS: usize = 16;
 
+/// Bumps of what swells and fades along cracks, a pattern unit.
+const SPARKLES: f32 = 28.0;
+
 /// Steps of the baked ramp: one for each value of the high byte of a depth.
 const STEPS: usize = 256;
 
@@ -157,7 +277,17 @@ const MAX_SHARED: usize = 64;
 #[derive(Clone, Debug, PartialEq)]
 pub struct LookTable {
     ramp: Arc<Ramp>,
+    pub(super) tint: f32,
     pub(super) glint: f32,
+    pub(super) gloss: f32,
+    pub(super) sparkle: f32,
+    /// Bumps of it a texel.
+    pub(super) sparkle_scale: f32,
+    /// Where rims curl up.
+    pub(super) curve: Option<Box<Curve>>,
+    pub(super) facets: Option<Facets>,
+    /// Colour that plates reflect, 0..=255.
+    pub(super) sheen: [f32; 3],
     pub(super) grain: f32,
     pub(super) shift: f32,
     /// From the Sobel sum of `u16` depths to the slope of the surface.
@@ -182,10 +312,41 @@ impl Look {
             }
             within("ramp.cover", stop.cover, 0.0..=1.0, unit)?;
         }
+        within("tint", self.tint, 0.0..=1.0, unit)?;
         within("glint", self.glint, 0.0..=4.0, "0..=4")?;
+        within("gloss", self.gloss, 0.0..=4.0, "0..=4")?;
+        within("sparkle", self.sparkle, 0.0..=1.0, unit)?;
         within("grain", self.grain, 0.0..=1.0, unit)?;
         within("shift", self.shift, 0.0..=16.0, "0..=16")?;
-        within("relief", self.relief, 0.0..=1.0, unit)
+        within("relief", self.relief, 0.0..=1.0, unit)?;
+        within("curl", self.curl, 0.0..=1.0, unit)?;
+        within("curl_depth", self.curl_depth, 0.001..=0.5, "0.001..=0.5")?;
+        if let Some(facets) = &self.facets {
+            within("facets.tone", facets.tone, 0.0..=1.0, unit)?;
+            within("facets.tilt", facets.tilt, 0.0..=1.0, unit)?;
+            within("facets.shift", facets.shift, 0.0..=16.0, "0..=16")?;
+            within("facets.gleam", facets.gleam, 0.0..=1.0, unit)?;
+            within("facets.flash", facets.flash, 0.0..=1.0, unit)?;
+            for channel in facets.sheen {
+                within("facets.sheen", channel, 0.0..=1.0, unit)?;
+            }
+            within("facets.near", facets.near, 0.0..=1.0, unit)?;
+        }
+        match self.crushed.as_ref().and_then(Crushed::fault) {
+            Some((field, value, range)) => Err(LookError::OutOfRange { field, value, range }),
+            None => Ok(()),
+        }
+    }
+
+    /// How far down the surface is at each depth, 65536 = at the bottom.
+    fn curve(&self) -> Option<Box<Curve>> {
+        (self.curl > 0.0).then(|| {
+            Box::new(Curve(std::array::from_fn(|step| {
+                let depth = step as f32 / STEPS as f32;
+                let rim = (1.0 - (depth / self.curl_depth - 1.0).abs()).max(0.0);
+                ((depth - self.curl * rim) * 65535.0) as i32
+            })))
+        })
     }
 
     /// Colour and cover at `depth` (0..=1); before the first stop the cover rises from zero, after the last nothing changes.
@@ -254,8 +415,22 @@ impl LookTable {
         let ramp = look.shared_ramp();
         // Sobel's kernel weighs a slope of one depth step per texel with 8.
         let slope = look.relief * texels_per_unit / (8.0 * 65535.0);
-        let Look { glint, grain, shift, opaque, .. } = *look;
-        Ok(Self { ramp, glint, grain, shift, slope, opaque })
+        let Look { tint, glint, gloss, sparkle, grain, shift, opaque, facets, .. } = *look;
+        Ok(Self {
+            ramp,
+            tint,
+            glint,
+            gloss,
+            sparkle,
+            sparkle_scale: SPARKLES / texels_per_unit,
+            curve: look.curve(),
+            facets,
+            sheen: facets.map_or([0.0; 3], |facets| facets.sheen.map(|channel| 255.0 * channel)),
+            grain,
+            shift,
+            slope,
+            opaque,
+        })
     }
 
     /// What the ramp puts over the picture at `depth`, which lies so far [between](Self::between) two steps.

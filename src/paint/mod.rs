@@ -5,7 +5,9 @@
 //! painted texel is the base texel.
 
 mod diffuse;
+mod extras;
 mod look;
+mod looks;
 mod modulate;
 mod patch;
 mod rows;
@@ -13,6 +15,6 @@ mod rows;
 mod tests;
 mod texel;
 
-pub use look::{ColorStop, Look, LookError, LookTable};
+pub use look::{ColorStop, Facets, Look, LookError, LookTable};
 pub use modulate::{Modulation, modulate};
 pub use texel::{BaseTexels, PaintTargets, paint_into, paint_rects};

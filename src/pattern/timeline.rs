@@ -102,9 +102,21 @@ pub struct Timeline {
     links: Vec<LinkBirth>,
     widenings: Vec<Widening>,
     dots: Vec<(u32, Dot)>,
+    strikes: Vec<Strike>,
     /// The longest opening, and the step after which all that open are open.
     longest: u32,
     open: u32,
+}
+
+/// A hit that began an impact or added to one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Strike {
+    step: u32,
+    /// The impact, where it is in pattern units, and its energy before and after.
+    pub(crate) impact: u32,
+    pub(crate) pos: Vec2,
+    pub(crate) before: f32,
+    pub(crate) energy: f32,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -151,6 +163,7 @@ pub(crate) struct Entries {
     pub(crate) links: usize,
     pub(crate) widenings: usize,
     pub(crate) dots: usize,
+    pub(crate) strikes: usize,
 }
 
 impl Timeline {
@@ -204,6 +217,16 @@ impl Timeline {
         self.dots.push((self.now, dot));
     }
 
+    /// An impact at `pos` comes, or has more energy than `before`.
+    pub(crate) fn strike(&mut self, impact: u32, pos: Vec2, before: f32, energy: f32) {
+        self.strikes.push(Strike { step: self.now, impact, pos, before, energy });
+    }
+
+    /// All hits, in order; those in [`entries`](Self::entries) have come.
+    pub(crate) fn strikes(&self) -> &[Strike] {
+        &self.strikes
+    }
+
     /// Forgets the first nodes, and all links but those with the numbers `left`.
     pub(crate) fn forget(&mut self, first: u32, left: &[u32]) {
         self.nodes.drain(..first as usize);
@@ -230,6 +253,7 @@ impl Timeline {
             self.links.last().map(|birth| birth.step),
             self.widenings.last().map(|widening| widening.step),
             self.dots.last().map(|dot| dot.0),
+            self.strikes.last().map(|strike| strike.step),
         ];
         let is_empty = self.nodes.is_empty() && self.links.is_empty();
         last.into_iter().flatten().max().unwrap_or(0).max(if is_empty { 0 } else { self.open })
@@ -332,6 +356,7 @@ impl Timeline {
             links: self.links.partition_point(|birth| birth.step <= step),
             widenings: self.widenings.partition_point(|widening| widening.step <= step),
             dots: self.dots.partition_point(|dot| dot.0 <= step),
+            strikes: self.strikes.partition_point(|strike| strike.step <= step),
         }
     }
 }

@@ -5,6 +5,7 @@
 
 mod dirty;
 mod distance;
+mod layer;
 mod rect;
 mod replay;
 mod section;
@@ -12,13 +13,15 @@ mod stamp;
 
 pub use dirty::DirtyTiles;
 pub use distance::{MAX_DISTANCE, crack_distance};
+pub use layer::{Crushed, LayerPlan};
+pub(crate) use layer::{CrushedField, Layer, Plate, SLOPE_UNIT, Spot, noise};
 pub use rect::TexelRect;
 pub use replay::{DOT_DEPTH, Redrawn, Replay};
 pub use stamp::{stamp_dot, stamp_path, stamp_path_with};
 
 use crate::{
     Grid,
-    pattern::{CrackMask, SurfaceFrame},
+    pattern::{CrackMask, Moment, Network, SurfaceFrame, Timeline},
 };
 use glam::UVec2;
 
@@ -31,6 +34,7 @@ pub struct DepthField {
     pub depth: Grid<u16>,
     /// Texels that stay untouched.
     forbidden: Option<Grid<bool>>,
+    layer: Layer,
 }
 
 impl DepthField {
@@ -40,19 +44,45 @@ impl DepthField {
         // Written twice: new memory is dear at the first write of each page, which else comes when cracks grow.
         let mut depth = Grid::new(frame.size(), u16::MAX);
         std::hint::black_box(&mut depth).as_mut_slice().fill(0);
-        Self { frame, depth, forbidden: None }
+        Self { frame, depth, forbidden: None, layer: Layer::default() }
     }
 
     /// Takes the depths out, and leaves a field without texels in the same place, on which nothing is drawn.
     #[cfg(feature = "bevy")]
     pub(crate) fn take(&mut self) -> Self {
-        let empty = Self { frame: self.frame, depth: Grid::new(UVec2::ZERO, 0), forbidden: None };
+        let empty =
+            Self { frame: self.frame, depth: Grid::new(UVec2::ZERO, 0), forbidden: None, layer: Layer::default() };
         std::mem::replace(self, empty)
     }
 
     /// Makes all of it untouched. What is forbidden stays so.
     pub fn clear(&mut self) {
         self.depth.as_mut_slice().fill(0);
+        self.layer.clear(self.frame);
+    }
+
+    /// Lets it hold what `plan` says beside depths, of which nothing is there at first.
+    pub fn lay(&mut self, plan: LayerPlan) {
+        self.layer = Layer::new(plan, self.frame);
+    }
+
+    /// Makes what it holds beside depths that of `network` at `moment`; appends the rectangles of the texels that may be others now.
+    ///
+    /// Network and timeline must be those of one growth, which may have grown since the last time. What it holds depends on the moment
+    /// alone. A cell that closes costs its own area once, a hit its crushed zone. [`Replay::show`] does it by itself.
+    pub fn show_layer(&mut self, network: &Network, timeline: &Timeline, moment: Moment, changed: &mut Vec<TexelRect>) {
+        self.layer.show(network, timeline, moment, self.forbidden.as_ref(), changed);
+        changed.retain(|rect| !rect.is_empty());
+    }
+
+    /// Goes on with a network whose oldest part was forgotten: what is shown stays.
+    #[cfg_attr(not(feature = "bevy"), expect(dead_code, reason = "surfaces of the plugin forget"))]
+    pub(crate) fn freeze_layer(&mut self, network: &Network) {
+        self.layer.freeze(network);
+    }
+
+    pub(crate) const fn layer(&self) -> &Layer {
+        &self.layer
     }
 
     /// Keeps every texel whose centre `mask` forbids untouched from now on, and gives back those that are not.

@@ -107,7 +107,8 @@ pub struct Redrawn {
     pub cleared: Vec<TexelRect>,
     /// The texels of each segment that was stamped.
     pub stamped: Vec<TexelRect>,
-    /// What is not as before, disjoint, each within a tile.
+    /// What is not as before: of depths, disjoint rectangles that each lie within a tile, then those of cells that have closed or opened and
+    /// of hits.
     pub changed: Vec<TexelRect>,
 }
 
@@ -179,7 +180,7 @@ impl Replay {
     ) {
         self.begin(field, network, timeline, to, redrawn);
         while !self.draw(field, network, timeline, usize::MAX, redrawn) {}
-        self.end(field, redrawn);
+        self.end(field, network, timeline, redrawn);
     }
 
     /// The first part of [`show`](Self::show): clears what will be drawn anew.
@@ -340,8 +341,14 @@ impl Replay {
         self.drawn == self.marked.len()
     }
 
-    /// The last part: notes the texels of the marked tiles that differ from before.
-    pub(crate) fn end(&mut self, field: &DepthField, redrawn: &mut Redrawn) {
+    /// The last part: notes the texels of the marked tiles that differ from before, and makes all else that the field holds follow.
+    pub(crate) fn end(
+        &mut self,
+        field: &mut DepthField,
+        network: &Network,
+        timeline: &Timeline,
+        redrawn: &mut Redrawn,
+    ) {
         for (&tile, before) in self.marked.iter().zip(&self.before) {
             let rect = self.tile(tile);
             let mut changed = TexelRect::default();
@@ -358,6 +365,7 @@ impl Replay {
             }
         }
         self.marked.clear();
+        field.show_layer(network, timeline, self.at, &mut redrawn.changed);
     }
 
     /// Puts into the index what was written since the last time; returns how much was in it before.

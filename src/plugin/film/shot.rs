@@ -94,7 +94,7 @@ impl Shot {
             }
             Stage::Draw => {
                 if self.replay.draw(&mut self.field, network, timeline, SEGMENTS, &mut self.redrawn) {
-                    self.replay.end(&self.field, &mut self.redrawn);
+                    self.replay.end(&mut self.field, network, timeline, &mut self.redrawn);
                     self.stage = Stage::Paint(self.plan());
                 }
             }
