@@ -443,7 +443,8 @@ impl CrackPreset {
         let Profile { full_width, rim_width, .. } = self.profile;
         let profile = Profile { full_width: full_width * by, rim_width: rim_width * by, ..self.profile };
         let crushed = self.look.crushed.map(|crushed| crushed.scaled(by));
-        let look = Look { crushed, ..self.look.clone() };
+        let veil = self.look.veil.map(|veil| veil.scaled(by));
+        let look = Look { crushed, veil, ..self.look.clone() };
         Self { growth, profile, look, ..self.clone() }
     }
 

@@ -380,13 +380,15 @@ fn compose<const ROOM: usize>(
         let pale = f32::from(spot.pale) * (1.0 / 255.0);
         let dark = f32::from(spot.dark) * (1.0 / 255.0);
         let tone = 1.0 + f32::from(spot.shade) * (1.0 / 128.0);
+        let veil = f32::from(extras.veil(place + i)) * look.veil_cover;
         let (left, sheen) = (1.0 - over[3][i], sheen[i]);
         for c in 0..3 {
-            let below = look.sheen[c] * sheen * (1.0 - pale) + extras.color[c] * tone * pale;
+            let veiled = look.sheen[c] * sheen * (1.0 - veil) + look.veil[c] * veil;
+            let below = veiled * (1.0 - pale) + extras.color[c] * tone * pale;
             let crack = over[c][i] + below * left;
             over[c][i] = crack * (1.0 - dark) + HOLE * under[c][i] * dark;
         }
-        let cover = over[3][i] + left * (1.0 - (1.0 - sheen) * (1.0 - pale));
+        let cover = over[3][i] + left * (1.0 - (1.0 - sheen) * (1.0 - veil) * (1.0 - pale));
         over[3][i] = cover * (1.0 - dark) + dark;
     }
 }

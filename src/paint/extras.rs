@@ -16,6 +16,7 @@ pub(super) struct Extras<'a, const ROOM: usize> {
     crushed: Option<&'a CrushedField>,
     /// Colour of what is crushed, 0..=255.
     pub(super) color: [f32; 3],
+    veils: Option<&'a Grid<u8>>,
     room: Box<Room<ROOM>>,
     /// The plate that was looked at last: most texels beside it are its own.
     last: Cell<(u16, Facet)>,
@@ -27,6 +28,7 @@ pub(super) struct Extras<'a, const ROOM: usize> {
 struct Room<const ROOM: usize> {
     plate: [u16; ROOM],
     spot: [Spot; ROOM],
+    veil: [u8; ROOM],
 }
 
 impl<'a, const ROOM: usize> Extras<'a, ROOM> {
@@ -34,14 +36,15 @@ impl<'a, const ROOM: usize> Extras<'a, ROOM> {
     pub(super) fn of(field: &'a DepthField, look: &'a LookTable) -> Option<Self> {
         let layer = field.layer();
         let plates = layer.plates().filter(|_| look.facets.is_some());
-        let crushed = layer.crushed();
-        (plates.is_some() || crushed.is_some()).then(|| Self {
+        let (crushed, veils) = (layer.crushed(), layer.veil().filter(|_| look.veil_cover > 0.0));
+        (plates.is_some() || crushed.is_some() || veils.is_some()).then(|| Self {
             facets: look.facets.as_ref().filter(|_| plates.is_some()),
             ids: plates.map(|plates| plates.ids()),
             plates: plates.map_or(&[], |plates| plates.plates()),
             crushed,
             color: crushed.map_or([0.0; 3], |crushed| crushed.settings().color.map(|channel| 255.0 * channel)),
-            room: Box::new(Room { plate: [0; ROOM], spot: [Spot::default(); ROOM] }),
+            veils,
+            room: Box::new(Room { plate: [0; ROOM], spot: [Spot::default(); ROOM], veil: [0; ROOM] }),
             last: Cell::new((0, Facet::NONE)),
             stride: 0,
             height: 0,
@@ -51,9 +54,10 @@ impl<'a, const ROOM: usize> Extras<'a, ROOM> {
     /// Whether anything is in a rectangle.
     pub(super) fn touches(&self, rect: TexelRect) -> bool {
         let columns = rect.min.x as usize..rect.max.x as usize;
-        let mut rows = rect.min.y as usize..rect.max.y as usize;
+        let rows = || rect.min.y as usize..rect.max.y as usize;
         self.crushed.is_some_and(|crushed| crushed.touches(rect))
-            || self.ids.is_some_and(|ids| rows.any(|y| ids.row(y)[columns.clone()].iter().any(|&id| id != 0)))
+            || self.ids.is_some_and(|ids| rows().any(|y| ids.row(y)[columns.clone()].iter().any(|&id| id != 0)))
+            || self.veils.is_some_and(|veils| rows().any(|y| veils.row(y)[columns.clone()].iter().any(|&v| v != 0)))
     }
 
     /// Reads what is there.
@@ -61,9 +65,13 @@ impl<'a, const ROOM: usize> Extras<'a, ROOM> {
     pub(super) fn load(&mut self, rect: TexelRect) {
         let size = rect.size().as_usizevec2();
         (self.stride, self.height) = (size.x + 2, size.y);
-        let Room { plate, spot } = &mut *self.room;
+        let Room { plate, spot, veil } = &mut *self.room;
         let rows = plate.chunks_exact_mut(self.stride).zip(spot.chunks_exact_mut(self.stride));
-        for ((plate, spot), y) in rows.zip(rect.min.y..rect.max.y) {
+        for (((plate, spot), veil), y) in rows.zip(veil.chunks_exact_mut(self.stride)).zip(rect.min.y..rect.max.y) {
+            if let Some(veils) = self.veils {
+                veil[..size.x].copy_from_slice(&veils.row(y as usize)[rect.min.x as usize..rect.max.x as usize]);
+            }
+            veil[size.x..].fill(0);
             if let Some(ids) = self.ids {
                 plate[..size.x].copy_from_slice(&ids.row(y as usize)[rect.min.x as usize..rect.max.x as usize]);
             }
@@ -82,6 +90,11 @@ impl<'a, const ROOM: usize> Extras<'a, ROOM> {
         if self.ids.is_some() {
             for (touch, id) in patch.touch[..n].iter_mut().zip(&self.room.plate) {
                 *touch |= id;
+            }
+        }
+        if self.veils.is_some() {
+            for (touch, &veil) in patch.touch[..n].iter_mut().zip(&self.room.veil) {
+                *touch |= u16::from(veil);
             }
         }
         if self.crushed.is_some() {
@@ -122,7 +135,12 @@ impl<'a, const ROOM: usize> Extras<'a, ROOM> {
 
     #[inline(always)]
     pub(super) fn is_untouched(&self, place: usize) -> bool {
-        self.room.plate[place] == 0 && self.room.spot[place] == Spot::default()
+        self.room.plate[place] == 0 && self.room.veil[place] == 0 && self.room.spot[place] == Spot::default()
+    }
+
+    #[inline(always)]
+    pub(super) fn veil(&self, place: usize) -> u8 {
+        self.room.veil[place]
     }
 
     #[inline(always)]

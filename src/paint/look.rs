@@ -3,7 +3,7 @@
 use super::patch::Curve;
 use crate::{
     pattern::MAX_SIDE,
-    raster::{Crushed, LayerPlan},
+    raster::{Crushed, LayerPlan, Veil},
 };
 use glam::Vec4;
 use std::{
@@ -93,6 +93,8 @@ pub struct Look {
     pub facets: Option<Facets>,
     /// What a hit crushes around it; default nothing.
     pub crushed: Option<Crushed>,
+    /// Translucent sheets along cracks, to one side; default none.
+    pub veil: Option<Veil>,
     /// Whether cracks make a translucent picture opaque by their cover (glass panes). Fully transparent texels stay so.
     pub opaque: bool,
 }
@@ -155,6 +157,7 @@ impl Look {
         curl_depth: 0.12,
         facets: None,
         crushed: None,
+        veil: None,
         opaque: false,
     };
 
@@ -219,7 +222,7 @@ impl Look {
     /// ```
     #[must_use]
     pub const fn layer(&self, seed: u64) -> LayerPlan {
-        LayerPlan { plates: self.facets.is_some(), crushed: self.crushed, seed }
+        LayerPlan { plates: self.facets.is_some(), crushed: self.crushed, veil: self.veil, seed }
     }
 }
 
@@ -288,6 +291,9 @@ pub struct LookTable {
     pub(super) facets: Option<Facets>,
     /// Colour that plates reflect, 0..=255.
     pub(super) sheen: [f32; 3],
+    /// Colour of veils, 0..=255, and what a step of their density covers; nothing if there are none.
+    pub(super) veil: [f32; 3],
+    pub(super) veil_cover: f32,
     pub(super) grain: f32,
     pub(super) shift: f32,
     /// From the Sobel sum of `u16` depths to the slope of the surface.
@@ -332,7 +338,7 @@ impl Look {
             }
             within("facets.near", facets.near, 0.0..=1.0, unit)?;
         }
-        match self.crushed.as_ref().and_then(Crushed::fault) {
+        match self.crushed.as_ref().and_then(Crushed::fault).or(self.veil.as_ref().and_then(Veil::fault)) {
             Some((field, value, range)) => Err(LookError::OutOfRange { field, value, range }),
             None => Ok(()),
         }
@@ -426,6 +432,8 @@ impl LookTable {
             curve: look.curve(),
             facets,
             sheen: facets.map_or([0.0; 3], |facets| facets.sheen.map(|channel| 255.0 * channel)),
+            veil: look.veil.map_or([0.0; 3], |veil| veil.color.map(|channel| 255.0 * channel)),
+            veil_cover: look.veil.map_or(0.0, |veil| veil.cover * (1.0 / 255.0)),
             grain,
             shift,
             slope,

@@ -1,7 +1,7 @@
 //! The looks of the presets.
 
 use super::{Facets, Look, look::stop};
-use crate::raster::Crushed;
+use crate::raster::{Crushed, Veil};
 use std::borrow::Cow;
 
 impl Look {
@@ -109,6 +109,7 @@ impl Look {
             stop(1.0, [0.98, 1.0, 1.0], 0.92),
         ]),
         sparkle: 0.5,
+        veil: Some(Veil { cover: 0.6, ..Veil::DEFAULT }),
         facets: Some(Facets {
             tone: 0.07,
             tilt: 0.05,

@@ -13,7 +13,7 @@ mod stamp;
 
 pub use dirty::DirtyTiles;
 pub use distance::{MAX_DISTANCE, crack_distance};
-pub use layer::{Crushed, LayerPlan};
+pub use layer::{Crushed, LayerPlan, Veil};
 pub(crate) use layer::{CrushedField, Layer, Plate, SLOPE_UNIT, Spot, noise};
 pub use rect::TexelRect;
 pub use replay::{DOT_DEPTH, Redrawn, Replay};
@@ -109,9 +109,17 @@ impl DepthField {
         for y in rect.min.y..rect.max.y {
             let texels = rect.min.x as usize..rect.max.x as usize;
             let depth = &mut self.depth.row_mut(y as usize)[texels.clone()];
-            for (depth, forbidden) in depth.iter_mut().zip(&forbidden.row(y as usize)[texels]) {
+            for (depth, forbidden) in depth.iter_mut().zip(&forbidden.row(y as usize)[texels.clone()]) {
                 if *forbidden {
                     *depth = 0;
+                }
+            }
+            if let Some(veil) = &mut self.layer.veil {
+                let veil = &mut veil.density_mut().row_mut(y as usize)[texels.clone()];
+                for (veil, forbidden) in veil.iter_mut().zip(&forbidden.row(y as usize)[texels]) {
+                    if *forbidden {
+                        *veil = 0;
+                    }
                 }
             }
         }

@@ -341,7 +341,8 @@ impl<'a> Shape<'a> {
                 };
                 let Place { pale, shade, dark, .. } = places[at];
                 let spot = Spot {
-                    slope: [slope(1), slope(WIDE)],
+                    // Nothing is lit in a hole.
+                    slope: if dark > 0.5 { [0; 2] } else { [slope(1), slope(WIDE)] },
                     pale: (pale.clamp(0.0, 1.0) * 255.0 + 0.5) as u8,
                     shade: (shade * 128.0).clamp(-127.0, 127.0) as i8,
                     dark: (dark.clamp(0.0, 1.0) * 255.0 + 0.5) as u8,
@@ -379,12 +380,13 @@ impl<'a> Shape<'a> {
             place.shade = speckle * (0.6 * coarse + 0.3 * fine) * inside;
         }
         if flake > 1.0 {
-            self.add_flake(&mut place, way, q, seed);
+            self.add_flake(&mut place, way, distance / self.radius.max(0.5), seed);
         }
         if q > 1.0 - 0.2 * ragged && q < reach {
             let far = ((q - 1.0) / (reach - 1.0).max(0.05)).clamp(0.0, 1.0);
             let cloud = 0.65 + 0.35 * grain(6, 5.0 * self.grain);
-            place.pale = place.pale.max(dust * (1.0 - far) * (1.0 - far) * cloud * (1.0 - inside));
+            let dust = dust * (1.0 - far) * (1.0 - far) * cloud;
+            place.pale = place.pale.max(dust * (1.0 - inside));
             self.add_crumb(&mut place, at, chips * (1.0 - far) * (1.0 - far), seed);
         }
         if hole > 0.0 {
@@ -405,11 +407,11 @@ impl<'a> Shape<'a> {
         }
         let share = ((q - 1.0) / (reach - 1.0).max(0.05)).clamp(0.0, 1.0);
         // Arcs, wider apart outward; each a steep step and a gentle way back.
-        let arcs = 4.0 * share.sqrt() + 0.4 * noise(seed ^ 9, way.x * 2.0, way.y * 2.0);
+        let arcs = 5.0 * share.sqrt() + 0.4 * noise(seed ^ 9, way.x * 2.0, way.y * 2.0);
         let saw = arcs - arcs.floor();
         let strength = inside * (1.0 - 0.6 * share);
-        place.height -= 0.35 * self.depth * (1.0 - share) * inside + 0.08 * self.depth * saw * strength;
-        place.pale = place.pale.max(self.crushed.pale * strength * (0.10 + 0.35 * saw * saw * saw));
+        place.height -= 0.35 * self.depth * (1.0 - share) * inside + 0.25 * self.depth * saw * strength;
+        place.pale = place.pale.max(self.crushed.pale * strength * (0.06 + 0.4 * saw * saw * saw));
         // Its rim catches the light.
         let rim = (1.0 - ((reach - q) * self.radius - 1.0).abs() / 1.2).clamp(0.0, 1.0);
         place.pale = place.pale.max(0.5 * self.crushed.pale * rim);

@@ -1,11 +1,14 @@
-//! [`Layer`]: what a field holds beside depths, for looks that show it: plates and crushed zones.
+//! [`Layer`]: what a field holds beside depths, for looks that show it: plates, crushed zones and veils.
 
 mod crushed;
 mod plates;
+mod veil;
 
 pub use crushed::Crushed;
 pub(crate) use crushed::{CrushedField, SLOPE_UNIT, Spot};
 pub(crate) use plates::Plate;
+pub use veil::Veil;
+pub(super) use veil::VeilField;
 
 use super::TexelRect;
 use crate::{
@@ -21,6 +24,8 @@ pub struct LayerPlan {
     pub plates: bool,
     /// Crushed zones at the hits; default none.
     pub crushed: Option<Crushed>,
+    /// Sheets along cracks; default none.
+    pub veil: Option<Veil>,
     /// Fixes all that is random in it; default 0.
     pub seed: u64,
 }
@@ -29,7 +34,7 @@ impl LayerPlan {
     /// Bytes that it takes for each texel of the field, about; crushed zones take theirs where they are.
     #[must_use]
     pub const fn bytes_per_texel(&self) -> u64 {
-        if self.plates { 2 } else { 0 }
+        (if self.plates { 2 } else { 0 }) + (if self.veil.is_some() { 1 } else { 0 })
     }
 }
 
@@ -39,13 +44,15 @@ pub(crate) struct Layer {
     plan: LayerPlan,
     plates: Option<Box<PlateField>>,
     crushed: Option<Box<CrushedField>>,
+    pub(super) veil: Option<Box<VeilField>>,
 }
 
 impl Layer {
     pub(super) fn new(plan: LayerPlan, frame: SurfaceFrame) -> Self {
         let plates = plan.plates.then(|| Box::new(PlateField::new(frame, plan.seed)));
         let crushed = plan.crushed.as_ref().map(|crushed| Box::new(CrushedField::new(crushed, frame, plan.seed)));
-        Self { plan, plates, crushed }
+        let veil = plan.veil.as_ref().map(|veil| Box::new(VeilField::new(veil, frame, plan.seed)));
+        Self { plan, plates, crushed, veil }
     }
 
     /// As it was made.
@@ -75,6 +82,10 @@ impl Layer {
         if let Some(plates) = &mut self.plates {
             plates.freeze(network);
         }
+    }
+
+    pub(crate) fn veil(&self) -> Option<&Grid<u8>> {
+        self.veil.as_deref().map(VeilField::density)
     }
 
     pub(crate) fn plates(&self) -> Option<&PlateField> {
