@@ -417,7 +417,14 @@ impl CrackPreset {
             width_variety: 0.2,
             ..GrowthParams::DEFAULT
         },
-        profile: Profile { depth: 1.0, full_width: 0.012, wall: 0.2, rim_width: 0.0, rim_depth: 0.0, faintest: 0.0 },
+        profile: Profile {
+            depth: 1.0,
+            full_width: 0.0005,
+            wall: 1.0,
+            rim_width: 0.0055,
+            rim_depth: 0.5,
+            faintest: 0.0,
+        },
         look: Look::TOON,
         steps_per_second: 30.0,
         follows_lines: false,

@@ -95,13 +95,15 @@ pub struct Look {
     pub crushed: Option<Crushed>,
     /// Translucent sheets along cracks, to one side; default none.
     pub veil: Option<Veil>,
+    /// Light that cracks give off, over depth, as [`ramp`](Self::ramp): what is written to the emissive map. Default nothing.
+    pub glow: Cow<'static, [ColorStop]>,
     /// Whether cracks make a translucent picture opaque by their cover (glass panes). Fully transparent texels stay so.
     pub opaque: bool,
 }
 
 impl Look {
     /// The names that [`named`](Self::named) knows.
-    pub const NAMES: [&'static str; 13] = [
+    pub const NAMES: [&'static str; 15] = [
         "groove",
         "frosted",
         "toon",
@@ -115,6 +117,8 @@ impl Look {
         "clay",
         "mud",
         "stain",
+        "mirror",
+        "glowing",
     ];
 
     /// The look of this name (lower case), see [`NAMES`](Self::NAMES).
@@ -134,6 +138,8 @@ impl Look {
             "clay" => Some(Self::CLAY),
             "mud" => Some(Self::MUD),
             "stain" => Some(Self::STAIN),
+            "mirror" => Some(Self::MIRROR),
+            "glowing" => Some(Self::GLOWING),
             _ => None,
         }
     }
@@ -158,6 +164,7 @@ impl Look {
         facets: None,
         crushed: None,
         veil: None,
+        glow: Cow::Borrowed(&[]),
         opaque: false,
     };
 
@@ -184,16 +191,20 @@ impl Look {
     /// A drawn crack: a hard black outline of even width, nearly black inside, with one lit wall.
     pub const TOON: Self = Self {
         ramp: Cow::Borrowed(&[
-            stop(0.05, [0.0; 3], 0.0),
-            stop(0.2, [0.02, 0.02, 0.03], 1.0),
-            stop(0.6, [0.02, 0.02, 0.03], 1.0),
-            stop(0.7, [0.20, 0.18, 0.19], 1.0),
+            stop(0.04, [0.0; 3], 0.0),
+            stop(0.12, [0.02, 0.02, 0.03], 1.0),
+            stop(0.50, [0.02, 0.02, 0.03], 1.0),
+            stop(0.58, [0.17, 0.14, 0.17], 1.0),
+            stop(1.0, [0.07, 0.06, 0.08], 1.0),
         ]),
         tint: 0.0,
-        glint: 0.0,
-        gloss: 0.0,
+        glint: 1.5,
+        gloss: 0.7,
         grain: 0.0,
         relief: 0.02,
+        // The outline is the rim of the profile, and level; the walls begin at its inner edge.
+        curl: 0.5,
+        curl_depth: 0.5,
         opaque: true,
         ..Self::GROOVE
     };
@@ -280,6 +291,7 @@ const MAX_SHARED: usize = 64;
 #[derive(Clone, Debug, PartialEq)]
 pub struct LookTable {
     ramp: Arc<Ramp>,
+    glow: Option<Arc<Ramp>>,
     pub(super) tint: f32,
     pub(super) glint: f32,
     pub(super) gloss: f32,
@@ -308,15 +320,19 @@ impl Look {
     /// The first field that is out of its range or not finite.
     pub fn validate(&self) -> Result<(), LookError> {
         let unit = "0..=1";
-        within("ramp.len()", self.ramp.len() as f32, 0.0..=MAX_STOPS as f32, "0..=16")?;
-        let mut above = 0.0;
-        for stop in self.ramp.iter() {
-            within("ramp.depth", stop.depth, above..=1.0, "0..=1, not below the stop before")?;
-            above = stop.depth;
-            for channel in stop.color {
-                within("ramp.color", channel, 0.0..=1.0, unit)?;
+        let ramp = ["ramp.len()", "ramp.depth", "ramp.color", "ramp.cover"];
+        let glow = ["glow.len()", "glow.depth", "glow.color", "glow.cover"];
+        for ([len, depth, color, cover], stops) in [(ramp, &self.ramp), (glow, &self.glow)] {
+            within(len, stops.len() as f32, 0.0..=MAX_STOPS as f32, "0..=16")?;
+            let mut above = 0.0;
+            for stop in stops.iter() {
+                within(depth, stop.depth, above..=1.0, "0..=1, not below the stop before")?;
+                above = stop.depth;
+                for channel in stop.color {
+                    within(color, channel, 0.0..=1.0, unit)?;
+                }
+                within(cover, stop.cover, 0.0..=1.0, unit)?;
             }
-            within("ramp.cover", stop.cover, 0.0..=1.0, unit)?;
         }
         within("tint", self.tint, 0.0..=1.0, unit)?;
         within("glint", self.glint, 0.0..=4.0, "0..=4")?;
@@ -354,23 +370,23 @@ impl Look {
             })))
         })
     }
+}
 
-    /// Colour and cover at `depth` (0..=1); before the first stop the cover rises from zero, after the last nothing changes.
-    fn at(&self, depth: f32) -> ([f32; 3], f32) {
-        let Some(first) = self.ramp.first() else { return ([0.0; 3], 0.0) };
-        let mut low =
-            ColorStop { depth: 0.0, color: first.color, cover: if first.depth > 0.0 { 0.0 } else { first.cover } };
-        for &high in self.ramp.iter() {
-            if depth < high.depth {
-                let t = (depth - low.depth) / (high.depth - low.depth);
-                let mix = |a: f32, b: f32| a + (b - a) * t;
-                let color = std::array::from_fn(|i| mix(low.color[i], high.color[i]));
-                return (color, mix(low.cover, high.cover));
-            }
-            low = high;
+/// Colour and cover at `depth` (0..=1); before the first stop the cover rises from zero, after the last nothing changes.
+fn at(stops: &[ColorStop], depth: f32) -> ([f32; 3], f32) {
+    let Some(first) = stops.first() else { return ([0.0; 3], 0.0) };
+    let mut low =
+        ColorStop { depth: 0.0, color: first.color, cover: if first.depth > 0.0 { 0.0 } else { first.cover } };
+    for &high in stops {
+        if depth < high.depth {
+            let t = (depth - low.depth) / (high.depth - low.depth);
+            let mix = |a: f32, b: f32| a + (b - a) * t;
+            let color = std::array::from_fn(|i| mix(low.color[i], high.color[i]));
+            return (color, mix(low.cover, high.cover));
         }
-        (low.color, low.cover)
+        low = high;
     }
+    (low.color, low.cover)
 }
 
 pub(super) fn within(
@@ -382,32 +398,30 @@ pub(super) fn within(
     if allowed.contains(&value) { Ok(()) } else { Err(LookError::OutOfRange { field, value, range }) }
 }
 
-impl Look {
-    fn ramp(&self) -> Ramp {
-        let layer = |step: usize| {
-            let (color, cover) = self.at(step as f32 / STEPS as f32);
-            let [r, g, b] = color.map(|channel| 255.0 * channel * cover);
-            Layer::new(r, g, b, cover)
-        };
-        let mut ramp = [[Layer::ZERO; 2]; STEPS + 1];
-        for (step, place) in ramp[1..].iter_mut().enumerate() {
-            *place = [layer(step), layer(step + 1) - layer(step)];
+fn ramp(stops: &[ColorStop]) -> Ramp {
+    let layer = |step: usize| {
+        let (color, cover) = at(stops, step as f32 / STEPS as f32);
+        let [r, g, b] = color.map(|channel| 255.0 * channel * cover);
+        Layer::new(r, g, b, cover)
+    };
+    let mut ramp = [[Layer::ZERO; 2]; STEPS + 1];
+    for (step, place) in ramp[1..].iter_mut().enumerate() {
+        *place = [layer(step), layer(step + 1) - layer(step)];
+    }
+    ramp
+}
+
+fn shared_ramp(wanted: &Cow<'static, [ColorStop]>) -> Arc<Ramp> {
+    let mut ramps = RAMPS.lock().unwrap_or_else(PoisonError::into_inner);
+    let known = ramps.iter().find(|(stops, _)| stops == wanted).and_then(|(_, ramp)| ramp.upgrade());
+    known.unwrap_or_else(|| {
+        ramps.retain(|(_, ramp)| ramp.strong_count() > 0);
+        let ramp = Arc::new(ramp(wanted));
+        if ramps.len() < MAX_SHARED {
+            ramps.push((wanted.clone(), Arc::downgrade(&ramp)));
         }
         ramp
-    }
-
-    fn shared_ramp(&self) -> Arc<Ramp> {
-        let mut ramps = RAMPS.lock().unwrap_or_else(PoisonError::into_inner);
-        let known = ramps.iter().find(|(stops, _)| *stops == self.ramp).and_then(|(_, ramp)| ramp.upgrade());
-        known.unwrap_or_else(|| {
-            ramps.retain(|(_, ramp)| ramp.strong_count() > 0);
-            let ramp = Arc::new(self.ramp());
-            if ramps.len() < MAX_SHARED {
-                ramps.push((self.ramp.clone(), Arc::downgrade(&ramp)));
-            }
-            ramp
-        })
-    }
+    })
 }
 
 impl LookTable {
@@ -418,12 +432,14 @@ impl LookTable {
     pub fn new(look: &Look, texels_per_unit: f32) -> Result<Self, LookError> {
         look.validate()?;
         within("texels_per_unit", texels_per_unit, f32::MIN_POSITIVE..=MAX_SIDE as f32, "above 0, up to 16384")?;
-        let ramp = look.shared_ramp();
+        let ramp = shared_ramp(&look.ramp);
+        let glow = (!look.glow.is_empty()).then(|| shared_ramp(&look.glow));
         // Sobel's kernel weighs a slope of one depth step per texel with 8.
         let slope = look.relief * texels_per_unit / (8.0 * 65535.0);
         let Look { tint, glint, gloss, sparkle, grain, shift, opaque, facets, .. } = *look;
         Ok(Self {
             ramp,
+            glow,
             tint,
             glint,
             gloss,
@@ -439,6 +455,19 @@ impl LookTable {
             slope,
             opaque,
         })
+    }
+
+    /// Whether cracks give off light.
+    pub(super) const fn glows(&self) -> bool {
+        self.glow.is_some()
+    }
+
+    /// The light at a depth: three colours, 0..=255.
+    pub(super) fn light(&self, depth: u16) -> [f32; 3] {
+        let Some(glow) = &self.glow else { return [0.0; 3] };
+        let [low, gain] = glow[usize::from(depth >> 8) + usize::from(depth != 0)];
+        let [r, g, b, _] = (low + gain * Self::between(depth)).to_array();
+        [r, g, b]
     }
 
     /// What the ramp puts over the picture at `depth`, which lies so far [between](Self::between) two steps.
@@ -473,9 +502,10 @@ mod tests {
 
     #[test]
     fn the_constants_are_valid() {
-        for look in [Look::GROOVE, Look::FROSTED, Look::TOON] {
-            assert_eq!(refused(&look), None);
+        for name in Look::NAMES {
+            assert_eq!(refused(&Look::named(name).unwrap()), None, "{name}");
         }
+        assert_eq!(Look::named("no such"), None);
         assert_eq!(refused(&Look { ramp: vec![].into(), ..Look::GROOVE }), None);
     }
 
@@ -486,6 +516,43 @@ mod tests {
             assert_eq!(refused(&Look { grain: bad, ..Look::GROOVE }), Some("grain"));
             assert_eq!(refused(&Look { shift: bad, ..Look::GROOVE }), Some("shift"));
             assert_eq!(refused(&Look { relief: bad, ..Look::GROOVE }), Some("relief"));
+            assert_eq!(refused(&Look { tint: bad, ..Look::GROOVE }), Some("tint"));
+            assert_eq!(refused(&Look { gloss: bad, ..Look::GROOVE }), Some("gloss"));
+            assert_eq!(refused(&Look { sparkle: bad, ..Look::GROOVE }), Some("sparkle"));
+            assert_eq!(refused(&Look { curl: bad, ..Look::GROOVE }), Some("curl"));
+            assert_eq!(refused(&Look { curl_depth: bad, ..Look::GROOVE }), Some("curl_depth"));
+            let facets = |facets| refused(&Look { facets: Some(facets), ..Look::GROOVE });
+            assert_eq!(facets(Facets { tone: bad, ..Facets::DEFAULT }), Some("facets.tone"));
+            assert_eq!(facets(Facets { tilt: bad, ..Facets::DEFAULT }), Some("facets.tilt"));
+            assert_eq!(facets(Facets { shift: bad, ..Facets::DEFAULT }), Some("facets.shift"));
+            assert_eq!(facets(Facets { gleam: bad, ..Facets::DEFAULT }), Some("facets.gleam"));
+            assert_eq!(facets(Facets { flash: bad, ..Facets::DEFAULT }), Some("facets.flash"));
+            assert_eq!(facets(Facets { sheen: [0.0, 0.0, bad], ..Facets::DEFAULT }), Some("facets.sheen"));
+            assert_eq!(facets(Facets { near: bad, ..Facets::DEFAULT }), Some("facets.near"));
+            let crushed = |crushed| refused(&Look { crushed: Some(crushed), ..Look::GROOVE });
+            assert_eq!(crushed(Crushed { radius: bad, ..Crushed::DEFAULT }), Some("crushed.radius"));
+            assert_eq!(crushed(Crushed { ragged: bad, ..Crushed::DEFAULT }), Some("crushed.ragged"));
+            assert_eq!(crushed(Crushed { soft: bad, ..Crushed::DEFAULT }), Some("crushed.soft"));
+            assert_eq!(crushed(Crushed { hole: bad, ..Crushed::DEFAULT }), Some("crushed.hole"));
+            assert_eq!(crushed(Crushed { depth: bad, ..Crushed::DEFAULT }), Some("crushed.depth"));
+            assert_eq!(crushed(Crushed { rough: bad, ..Crushed::DEFAULT }), Some("crushed.rough"));
+            assert_eq!(crushed(Crushed { grain: bad, ..Crushed::DEFAULT }), Some("crushed.grain"));
+            assert_eq!(crushed(Crushed { color: [0.0, bad, 0.0], ..Crushed::DEFAULT }), Some("crushed.color"));
+            assert_eq!(crushed(Crushed { pale: bad, ..Crushed::DEFAULT }), Some("crushed.pale"));
+            assert_eq!(crushed(Crushed { speckle: bad, ..Crushed::DEFAULT }), Some("crushed.speckle"));
+            assert_eq!(crushed(Crushed { flake: bad, ..Crushed::DEFAULT }), Some("crushed.flake"));
+            assert_eq!(crushed(Crushed { dust: bad, ..Crushed::DEFAULT }), Some("crushed.dust"));
+            assert_eq!(crushed(Crushed { chips: bad, ..Crushed::DEFAULT }), Some("crushed.chips"));
+            assert_eq!(crushed(Crushed { reach: bad, ..Crushed::DEFAULT }), Some("crushed.reach"));
+            let veil = |veil| refused(&Look { veil: Some(veil), ..Look::GROOVE });
+            assert_eq!(veil(Veil { reach: bad, ..Veil::DEFAULT }), Some("veil.reach"));
+            assert_eq!(veil(Veil { full_width: bad, ..Veil::DEFAULT }), Some("veil.full_width"));
+            assert_eq!(veil(Veil { cover: bad, ..Veil::DEFAULT }), Some("veil.cover"));
+            assert_eq!(veil(Veil { color: [bad, 0.0, 0.0], ..Veil::DEFAULT }), Some("veil.color"));
+            let glow = |stops: &[ColorStop]| refused(&Look { glow: stops.to_vec().into(), ..Look::GROOVE });
+            assert_eq!(glow(&[stop(bad, [0.0; 3], 0.0)]), Some("glow.depth"));
+            assert_eq!(glow(&[stop(0.5, [bad, 0.0, 0.0], 0.0)]), Some("glow.color"));
+            assert_eq!(glow(&[stop(0.5, [0.0; 3], bad)]), Some("glow.cover"));
             let ramp = |stops: &[ColorStop]| refused(&Look { ramp: stops.to_vec().into(), ..Look::GROOVE });
             assert_eq!(ramp(&[stop(bad, [0.0; 3], 0.0)]), Some("ramp.depth"));
             assert_eq!(ramp(&[stop(0.5, [0.0, bad, 0.0], 0.0)]), Some("ramp.color"));
@@ -528,9 +595,10 @@ mod tests {
     fn the_ramp_is_linear_between_its_stops() {
         let ramp = vec![stop(0.25, [1.0, 0.0, 0.0], 0.5), stop(0.75, [0.0, 0.0, 1.0], 1.0)];
         let look = Look { ramp: ramp.into(), ..Look::GROOVE };
-        assert_eq!(look.at(0.125), ([1.0, 0.0, 0.0], 0.25));
-        assert_eq!(look.at(0.5), ([0.5, 0.0, 0.5], 0.75));
-        assert_eq!(look.at(1.0), ([0.0, 0.0, 1.0], 1.0));
+        let look_at = |depth| at(&look.ramp, depth);
+        assert_eq!(look_at(0.125), ([1.0, 0.0, 0.0], 0.25));
+        assert_eq!(look_at(0.5), ([0.5, 0.0, 0.5], 0.75));
+        assert_eq!(look_at(1.0), ([0.0, 0.0, 1.0], 1.0));
         let table = LookTable::new(&look, 512.0).unwrap();
         assert_eq!(layer(&table, 0), [0.0; 4]);
         assert_eq!(layer(&table, 0x8000), [0.5 * 0.75 * 255.0, 0.0, 0.5 * 0.75 * 255.0, 0.75]);

@@ -244,4 +244,39 @@ impl Look {
         relief: 0.0,
         ..Self::GROOVE
     };
+
+    /// A mirror: each piece reflects something else.
+    pub const MIRROR: Self = Self {
+        facets: Some(Facets {
+            tone: 0.20,
+            tilt: 0.16,
+            shift: 9.0,
+            gleam: 0.40,
+            flash: 0.22,
+            near: 0.25,
+            ..Facets::DEFAULT
+        }),
+        sparkle: 0.2,
+        ..Self::GLASS
+    };
+
+    /// Light through the cracks: lava, magic. The emissive map has it too.
+    pub const GLOWING: Self = Self {
+        ramp: Cow::Borrowed(&[
+            stop(0.10, [0.30, 0.10, 0.05], 0.20),
+            stop(0.35, [0.55, 0.10, 0.02], 0.85),
+            stop(0.60, [1.0, 0.42, 0.08], 1.0),
+            stop(1.0, [1.0, 0.92, 0.55], 1.0),
+        ]),
+        tint: 0.0,
+        glint: 0.25,
+        grain: 0.05,
+        sparkle: 0.25,
+        glow: Cow::Borrowed(&[
+            stop(0.10, [0.45, 0.06, 0.0], 0.25),
+            stop(0.40, [0.90, 0.22, 0.02], 0.85),
+            stop(1.0, [1.0, 0.75, 0.30], 1.0),
+        ]),
+        ..Self::GROOVE
+    };
 }

@@ -6,6 +6,7 @@
 
 mod diffuse;
 mod extras;
+mod glow;
 mod look;
 mod looks;
 mod modulate;
@@ -15,6 +16,7 @@ mod rows;
 mod tests;
 mod texel;
 
+pub use glow::paint_glow;
 pub use look::{ColorStop, Facets, Look, LookError, LookTable};
 pub use modulate::{Modulation, modulate};
 pub use texel::{BaseTexels, PaintTargets, paint_into, paint_rects};

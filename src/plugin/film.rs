@@ -202,6 +202,7 @@ impl Active {
         let frame = self.field.frame;
         self.field = DepthField::new(frame);
         self.field.forbid(self.growth.mask());
+        self.field.lay(self.preset.look.layer(self.surface.seed));
         self.touched = Touched::new(frame.size());
         let (profile, whole) = (self.profile, TexelRect::whole(frame.size()));
         if let Some(playback) = &mut self.playback {

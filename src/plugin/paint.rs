@@ -142,6 +142,8 @@ pub(super) fn stamp(active: &mut Active, scratch: &mut Scratch) {
             active.touched.mark(rect);
         }
     }
+    let timeline = active.growth.timeline();
+    active.field.show_layer(active.growth.network(), timeline, moment, &mut scratch.rects);
     scratch.rects.drain(..).for_each(|rect| active.mark(rect));
     active.growth.take_markers(&mut scratch.markers);
     let radius = active.growth.params().line_width;
@@ -180,6 +182,7 @@ pub(super) fn stamp_all(growth: &CrackGrowth, profile: &Profile, field: &mut Dep
             touched.mark(stamp_path(field, profile, &path));
         }
     }
+    field.show_layer(network, timeline, end, &mut Vec::new());
 }
 
 /// Paints in the middle of a frame what is dirty.

@@ -245,6 +245,7 @@ impl Blank {
         growth.set_mask(mask.clone());
         let mut field = DepthField::new(frame);
         field.forbid(mask);
+        field.lay(preset.look.layer(surface.seed));
         Ok(Self { growth, field, look })
     }
 }
@@ -362,9 +363,10 @@ pub(super) fn draft(
     plan.map(|plan| plan.draft(world, shown)).transpose()
 }
 
-/// Bytes of the textures on the CPU and the GPU, the base picture, as if no other surface had the same, and the depth field.
+/// Bytes of the textures on the CPU and the GPU, the base picture, as if no other surface had the same, and the depth field with what it
+/// may hold beside depths.
 fn bytes(size: UVec2, maps: CrackMaps) -> u64 {
-    let texel = 4 + 2 + 8 * u64::from(maps.diffuse) + 8 * u64::from(maps.normal) + 2 * u64::from(maps.depth);
+    let texel = 4 + 2 + 3 + 8 * u64::from(maps.diffuse) + 8 * u64::from(maps.normal) + 2 * u64::from(maps.depth);
     u64::from(size.x) * u64::from(size.y) * texel
 }
 

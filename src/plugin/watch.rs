@@ -216,8 +216,10 @@ fn update_preset(active: &mut Active, preset: CrackPreset) -> Result<(), CrackEr
         outcome.map_err(|error| CrackError::Preset { reason: error.to_string() })?;
     }
     active.look = look;
-    if active.profile != preset.profile {
+    let plan = preset.look.layer(active.surface.seed);
+    if active.profile != preset.profile || *active.field.plan() != plan {
         active.profile = preset.profile;
+        active.field.lay(plan);
         stamp_anew(active);
     }
     active.rate = preset.steps_per_second;
@@ -320,6 +322,7 @@ fn update_picture(world: &mut World, entity: Entity, active: &mut Active, shown:
         active.look = look;
         active.field = DepthField::new(frame);
         active.field.forbid(&mask);
+        active.field.lay(active.preset.look.layer(active.surface.seed));
         stamp_anew(active);
     }
     active.views.clear();

@@ -66,6 +66,12 @@ impl DepthField {
         self.layer = Layer::new(plan, self.frame);
     }
 
+    /// What it holds beside depths.
+    #[must_use]
+    pub const fn plan(&self) -> &LayerPlan {
+        self.layer.plan()
+    }
+
     /// Makes what it holds beside depths that of `network` at `moment`; appends the rectangles of the texels that may be others now.
     ///
     /// Network and timeline must be those of one growth, which may have grown since the last time. What it holds depends on the moment

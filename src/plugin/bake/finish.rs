@@ -189,6 +189,7 @@ impl Order {
         let frame = frame(self.rect)?;
         let (mut field, mut touched) = (DepthField::new(frame), Touched::new(frame.size()));
         field.forbid(&self.mask);
+        field.lay(self.preset.look.layer(self.surface.seed));
         let profile = self.preset.profile;
         let replay = match self.first.moment(growth.timeline().end()) {
             None => {

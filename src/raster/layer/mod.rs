@@ -84,6 +84,10 @@ impl Layer {
         }
     }
 
+    pub(super) const fn plan(&self) -> &LayerPlan {
+        &self.plan
+    }
+
     pub(crate) fn veil(&self) -> Option<&Grid<u8>> {
         self.veil.as_deref().map(VeilField::density)
     }
