@@ -274,5 +274,6 @@ pub(super) fn make_textures(
         diffuse: add(&textures::DIFFUSE, reuse.map(|t| &t.diffuse))?,
         normal: add(&textures::NORMAL, reuse.map(|t| &t.normal))?,
         depth: add(&textures::DEPTH, reuse.map(|t| &t.depth))?,
+        emissive: add(&textures::EMISSIVE, reuse.map(|t| &t.emissive))?,
     })
 }

@@ -274,7 +274,7 @@ mod flat {
     };
 
     impl CrackMaterial for ColorMaterial {
-        const MAPS: CrackMaps = CrackMaps { diffuse: true, normal: true, depth: false };
+        const MAPS: CrackMaps = CrackMaps { diffuse: true, normal: true, depth: false, emissive: false };
 
         fn pictures(&self) -> [Option<Handle<Image>>; 3] {
             [self.texture.clone(), None, None]
@@ -327,11 +327,11 @@ mod standard {
     use super::{Affine2, CrackMaps, CrackMaterial, CrackTextures, Handle, Image, MaterialSlot};
     use bevy::{
         pbr::ParallaxMappingMethod,
-        prelude::{AlphaMode, Color, Mesh3d, MeshMaterial3d, StandardMaterial},
+        prelude::{AlphaMode, Color, LinearRgba, Mesh3d, MeshMaterial3d, StandardMaterial},
     };
 
     impl CrackMaterial for StandardMaterial {
-        const MAPS: CrackMaps = CrackMaps { diffuse: true, normal: true, depth: true };
+        const MAPS: CrackMaps = CrackMaps { diffuse: true, normal: true, depth: true, emissive: true };
 
         fn pictures(&self) -> [Option<Handle<Image>>; 3] {
             [self.base_color_texture.clone(), self.normal_map_texture.clone(), self.depth_map.clone()]
@@ -343,6 +343,10 @@ mod standard {
             }
             if let Some(normal) = &textures.normal {
                 self.normal_map_texture = Some(normal.clone());
+            }
+            if let Some(emissive) = textures.emissive.as_ref().filter(|_| self.emissive_texture.is_none()) {
+                self.emissive_texture = Some(emissive.clone());
+                self.emissive = LinearRgba::WHITE;
             }
             let Some(depth) = &textures.depth else { return };
             if self.depth_map.is_none() {
@@ -381,6 +385,7 @@ mod standard {
                 emissive: color.to_linear() * (GLOW * share),
                 base_color_texture: None,
                 normal_map_texture: None,
+                emissive_texture: None,
                 depth_map: None,
                 ..self.clone()
             })

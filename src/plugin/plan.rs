@@ -114,8 +114,9 @@ impl Plan {
             let image = kind.empty(*size, sampler).ok_or(CrackError::Size { width, height })?;
             Ok(Some(images.add(image)))
         };
-        let [diffuse, normal, depth] = textures::KINDS.each_ref().map(&mut add);
-        self.textures = Some(CrackTextures { diffuse: diffuse?, normal: normal?, depth: depth? });
+        let [diffuse, normal, depth, emissive] = textures::KINDS.each_ref().map(&mut add);
+        let (diffuse, normal, depth, emissive) = (diffuse?, normal?, depth?, emissive?);
+        self.textures = Some(CrackTextures { diffuse, normal, depth, emissive });
         Ok(())
     }
 
@@ -338,6 +339,7 @@ fn plan_pictures(
         diffuse: surface.write.diffuse && shown.maps.diffuse,
         normal: surface.write.normal && shown.maps.normal,
         depth: surface.write.depth && shown.maps.depth,
+        emissive: surface.write.emissive && shown.maps.emissive,
     };
     let image = shown.diffuse.as_ref().and_then(|picture| images.get(picture));
     let is_nearest = image.is_some_and(|image| picture::is_nearest(world, image));
@@ -366,7 +368,8 @@ pub(super) fn draft(
 /// Bytes of the textures on the CPU and the GPU, the base picture, as if no other surface had the same, and the depth field with what it
 /// may hold beside depths.
 fn bytes(size: UVec2, maps: CrackMaps) -> u64 {
-    let texel = 4 + 2 + 3 + 8 * u64::from(maps.diffuse) + 8 * u64::from(maps.normal) + 2 * u64::from(maps.depth);
+    let whole = [maps.diffuse, maps.normal, maps.emissive].map(u64::from).iter().sum::<u64>();
+    let texel = 4 + 2 + 3 + 8 * whole + 2 * u64::from(maps.depth);
     u64::from(size.x) * u64::from(size.y) * texel
 }
 

@@ -69,7 +69,7 @@ fn inspect(world: &World, entity: Entity) -> Found {
         rect: rect.map(|rect| URect { min: rect.min.floor().as_uvec2(), max: rect.max.ceil().as_uvec2() }),
         layout: layout(&sprite.image_mode, sprite.custom_size).map(Arc::new),
         size: sprite.custom_size,
-        maps: CrackMaps { diffuse: true, normal: true, depth: false },
+        maps: CrackMaps { diffuse: true, normal: true, depth: false, emissive: false },
     }))
 }
 

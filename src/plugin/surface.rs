@@ -46,7 +46,7 @@ impl CrackSurface {
             preset: preset.into(),
             seed: 0,
             resolution: CrackResolution::Picture,
-            write: CrackMaps { diffuse: true, normal: true, depth: true },
+            write: CrackMaps { diffuse: true, normal: true, depth: true, emissive: false },
             alpha_mask: true,
             mask: CrackMaskSource::Auto,
         }
@@ -113,11 +113,14 @@ pub struct CrackMaps {
     pub normal: bool,
     /// Depth for parallax mapping: 3D meshes only.
     pub depth: bool,
+    /// Light that cracks give off, for looks that [glow](crate::paint::Look::glow): 3D meshes whose material has no emissive picture of its
+    /// own. Default no.
+    pub emissive: bool,
 }
 
 impl Default for CrackMaps {
     fn default() -> Self {
-        Self { diffuse: true, normal: true, depth: true }
+        Self { diffuse: true, normal: true, depth: true, emissive: false }
     }
 }
 

@@ -234,8 +234,15 @@ mod tests {
                 plates.show(&up_to(&network, step), Moment::after(step), None, &mut Vec::new());
                 let written = plates.written() - before.0;
                 let others = plates.ids.as_slice().iter().zip(before.1.as_slice()).filter(|(a, b)| a != b).count();
-                let area: f32 =
-                    plates.cells.closings().unwrap().all().iter().filter(|c| c.birth.max(1) == step).map(|c| c.area).sum();
+                let area: f32 = plates
+                    .cells
+                    .closings()
+                    .unwrap()
+                    .all()
+                    .iter()
+                    .filter(|c| c.birth.max(1) == step)
+                    .map(|c| c.area)
+                    .sum();
                 let area = area * frame.texels_per_unit() * frame.texels_per_unit();
                 // Islands inside were cells of their own before.
                 assert!(written >= others as u64, "step {step}");
