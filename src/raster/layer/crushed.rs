@@ -418,7 +418,7 @@ impl<'a> Shape<'a> {
         let saw = arcs - arcs.floor();
         let strength = inside * (1.0 - 0.6 * share);
         place.height -= 0.35 * self.depth * (1.0 - share) * inside + 0.25 * self.depth * saw * strength;
-        place.pale = place.pale.max(self.crushed.pale * strength * (0.06 + 0.4 * saw * saw * saw));
+        place.pale = place.pale.max(self.crushed.pale * strength * (0.04 + 0.30 * saw * saw * saw));
         // Its rim catches the light.
         let rim = (1.0 - ((reach - q) * self.radius - 1.0).abs() / 1.2).clamp(0.0, 1.0);
         place.pale = place.pale.max(0.5 * self.crushed.pale * rim);
