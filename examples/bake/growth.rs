@@ -9,9 +9,9 @@ use crate::{
 use bevy_crack::{
     CrackPreset,
     growth::{CrackGrowth, HitOutcome},
-    paint::{Look, LookTable},
+    paint::{Look, LookTable, paint_glow},
     pattern::{CrackMask, LinkKind, Moment, NO_PARENT, Network, SurfaceFrame},
-    raster::{DepthField, stamp_dot, stamp_path},
+    raster::{DepthField, TexelRect, stamp_dot, stamp_path},
 };
 use clap::Args;
 use glam::{UVec2, Vec2};
@@ -165,6 +165,11 @@ pub(crate) fn bake(options: &Options) -> Result<(Network, RgbaImage), Box<dyn Er
     let painted = clock.elapsed();
 
     write_maps(&options.out, &maps, &field)?;
+    if !preset.look.glow.is_empty() {
+        let mut light = RgbaImage::new(size.x, size.y);
+        paint_glow(None, size, &field, &table, &[TexelRect::whole(size)], UVec2::ZERO, &mut light);
+        light.save(options.out.join("emissive.png"))?;
+    }
     let network = growth.network();
     fs::write(options.out.join("network.json"), serde_json::to_string(&describe(network, options))?)?;
 

@@ -190,7 +190,7 @@ impl Facets {
         let lean = Vec2::new(b, c);
         let shift = (self.shift * weight * lean).round().as_ivec2().to_array();
         // A few flash; of the others those that lean to the light shine a little.
-        let strength = if d > 1.0 - 2.0 * self.flash { 0.45 + 0.55 * e.abs() } else { 0.16 * f.max(0.0) };
+        let strength = if d > 1.0 - 2.0 * self.flash { 0.45 + 0.55 * e.abs() } else { 0.25 * f.max(0.0) };
         let high = self.gleam * strength * weight.sqrt();
         let low = 0.25 * high;
         let gain = lean.normalize_or(Vec2::Y) * (high - low) * plate.inv_side;

@@ -38,7 +38,7 @@ pub struct Facets {
     pub shift: f32,
     /// How much the brightest plates reflect: cover of [`sheen`](Self::sheen), which falls off across each. 0..=1; default 0.
     pub gleam: f32,
-    /// Share of plates that flash; the others reflect a sixth of it at the most. 0..=1; default 0.1.
+    /// Share of plates that flash; the others reflect a quarter of it at the most. 0..=1; default 0.1.
     pub flash: f32,
     /// Colour of what plates reflect, sRGB 0..=1; default that of a bright sky.
     pub sheen: [f32; 3],
@@ -148,9 +148,9 @@ impl Look {
     pub const GROOVE: Self = Self {
         ramp: Cow::Borrowed(&[
             stop(0.15, [0.62, 0.59, 0.56], 0.10),
-            stop(0.40, [0.42, 0.38, 0.34], 0.80),
-            stop(0.80, [0.25, 0.22, 0.19], 0.95),
-            stop(1.0, [0.10, 0.085, 0.073], 1.0),
+            stop(0.40, [0.45, 0.41, 0.37], 0.80),
+            stop(0.80, [0.31, 0.275, 0.24], 0.95),
+            stop(1.0, [0.17, 0.148, 0.128], 1.0),
         ]),
         tint: 1.0,
         glint: 0.9,
@@ -178,12 +178,12 @@ impl Look {
             stop(1.0, [0.98, 1.0, 1.0], 0.95),
         ]),
         tint: 0.0,
-        glint: 0.8,
+        glint: 0.6,
         gloss: 1.0,
         grain: 0.10,
         sparkle: 0.35,
         shift: 1.5,
-        relief: 0.004,
+        relief: 0.003,
         opaque: true,
         ..Self::GROOVE
     };

@@ -8,7 +8,7 @@ impl Look {
     /// Window glass: bright hairlines, plates that reflect and shift what is behind them, a white crushed ring around a hole.
     pub const GLASS: Self = Self {
         facets: Some(Facets {
-            tone: 0.10,
+            tone: 0.13,
             tilt: 0.10,
             shift: 3.0,
             gleam: 0.55,
@@ -42,8 +42,10 @@ impl Look {
             stop(0.45, [0.88, 0.94, 0.93], 0.28),
             stop(1.0, [0.93, 0.98, 0.97], 0.62),
         ]),
+        glint: 0.5,
+        relief: 0.002,
         facets: Some(Facets {
-            tone: 0.22,
+            tone: 0.30,
             tilt: 0.22,
             shift: 3.0,
             gleam: 0.75,
@@ -108,8 +110,10 @@ impl Look {
             stop(0.40, [0.92, 0.97, 1.0], 0.55),
             stop(1.0, [0.98, 1.0, 1.0], 0.92),
         ]),
+        gloss: 0.6,
+        glint: 0.5,
         sparkle: 0.5,
-        veil: Some(Veil { cover: 0.8, ..Veil::DEFAULT }),
+        veil: Some(Veil { cover: 0.6, full_width: 0.012, ..Veil::DEFAULT }),
         facets: Some(Facets {
             tone: 0.07,
             tilt: 0.05,
@@ -234,9 +238,9 @@ impl Look {
     /// The glaze of pottery: ink that has gone into hairlines, darker the wider they are, without relief.
     pub const STAIN: Self = Self {
         ramp: Cow::Borrowed(&[
-            stop(0.30, [0.42, 0.35, 0.30], 0.38),
-            stop(0.60, [0.32, 0.26, 0.22], 0.60),
-            stop(1.0, [0.22, 0.175, 0.145], 0.80),
+            stop(0.35, [0.45, 0.38, 0.33], 0.32),
+            stop(0.60, [0.36, 0.29, 0.25], 0.48),
+            stop(1.0, [0.20, 0.155, 0.125], 0.75),
         ]),
         glint: 0.0,
         grain: 0.08,

@@ -21,6 +21,8 @@ mod hits;
 mod images;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod lifecycle;
+#[cfg(all(feature = "2d", feature = "3d"))]
+mod looks;
 mod masks;
 mod pictures;
 #[cfg(all(feature = "2d", feature = "3d"))]

@@ -257,7 +257,8 @@ impl CrushedField {
             let Some(zone) = zone.filter(|zone| !zone.bounds.intersect(rect).is_empty()) else { continue };
             let texels = texels.get_or_insert_with(|| Box::new([Spot::NONE; (TILE * TILE) as usize]));
             let shape = Shape::new(&self.crushed, self.frame.texels_per_unit(), self.radius(zone.energy));
-            shape.draw(texels, zone.pos, self.seed ^ (index as u32).wrapping_mul(0x9E37_79B1), rect);
+            let seed = self.seed ^ (index as u32).wrapping_mul(0x9E37_79B1);
+            shape.draw(texels, zone.pos, seed, rect);
         }
         if let (Some(texels), Some(forbidden)) = (&mut texels, forbidden) {
             for y in rect.min.y..rect.max.y {
@@ -298,6 +299,9 @@ impl CrushedField {
         }
     }
 }
+
+/// How far an outline strays at the most, for a raggedness of 1.
+const WIDEST: f32 = 1.1;
 
 /// A crushed zone in texels.
 struct Shape<'a> {
@@ -365,38 +369,44 @@ impl<'a> Shape<'a> {
         let Crushed { ragged, soft, hole, pale, speckle, flake, dust, chips, reach, .. } = *self.crushed;
         let mut place = Place { height: 0.0, pale: 0.0, shade: 0.0, dark: 0.0 };
         let distance = off.length();
-        if distance > self.radius * reach.max(flake).max(1.0 + ragged) + 1.0 {
+        let radii = distance / self.radius.max(0.5);
+        // No outline strays further than that.
+        let widest = 1.0 + WIDEST * ragged;
+        if radii > reach.max(flake).max(widest) + 0.1 {
             return place;
         }
         let way = off / distance.max(1.0e-3);
         let grain = |k: u32, size: f32| noise(seed ^ k, at.x / size, at.y / size);
         let round = |k: u32, times: f32| noise(seed ^ k, way.x * times + 17.0, way.y * times + 31.0);
-        let fine = grain(1, self.grain);
-        let edge = 1.0 + ragged * (0.55 * round(2, 1.3) + 0.35 * round(3, 3.7) + 0.2 * fine);
-        let outline = (self.radius * edge).max(0.5);
-        let q = distance / outline;
-        // One texel of soft edge.
-        let inside = ((1.0 - q) * outline + 0.5).clamp(0.0, 1.0);
-        if inside > 0.0 {
-            let coarse = grain(4, 2.3 * self.grain);
-            let rest = (1.0 - q).clamp(0.0, 1.0);
-            place.height = -self.depth * rest.sqrt() + inside * self.rough * (0.6 * coarse + 0.4 * fine);
-            let fade = inside + soft * ((1.5 * rest).min(1.0) - inside);
-            let grains = 1.0 - speckle * (0.5 + 0.5 * grain(5, 0.6 * self.grain)).clamp(0.0, 1.0);
-            place.pale = pale * fade * grains;
-            place.shade = speckle * (0.6 * coarse + 0.3 * fine) * inside;
+        let mut inside = 0.0;
+        if radii <= widest {
+            let fine = grain(1, self.grain);
+            let edge = 1.0 + ragged * (0.55 * round(2, 1.3) + 0.35 * round(3, 3.7) + 0.2 * fine);
+            let outline = (self.radius * edge).max(0.5);
+            // One texel of soft edge.
+            inside = (outline - distance + 0.5).clamp(0.0, 1.0);
+            if inside > 0.0 {
+                let coarse = grain(4, 2.3 * self.grain);
+                let rest = (1.0 - distance / outline).clamp(0.0, 1.0);
+                place.height = -self.depth * rest.sqrt() + inside * self.rough * (0.6 * coarse + 0.4 * fine);
+                let fade = inside + soft * ((1.5 * rest).min(1.0) - inside);
+                let grains = 1.0 - speckle * (0.5 + 0.5 * grain(5, 0.6 * self.grain)).clamp(0.0, 1.0);
+                place.pale = pale * fade * grains;
+                place.shade = speckle * (0.6 * coarse + 0.3 * fine) * inside;
+            }
         }
         if flake > 1.0 {
-            self.add_flake(&mut place, way, distance / self.radius.max(0.5), seed);
+            self.add_flake(&mut place, way, radii, seed);
         }
-        if q > 1.0 - 0.2 * ragged && q < reach {
-            let far = ((q - 1.0) / (reach - 1.0).max(0.05)).clamp(0.0, 1.0);
-            let cloud = 0.65 + 0.35 * grain(6, 5.0 * self.grain);
-            let dust = dust * (1.0 - far) * (1.0 - far) * cloud;
-            place.pale = place.pale.max(dust * (1.0 - inside));
-            self.add_crumb(&mut place, at, chips * (1.0 - far) * (1.0 - far), seed);
+        if inside < 1.0 && radii < reach {
+            let left = 1.0 - ((radii - 0.8) / (reach - 0.8)).clamp(0.0, 1.0);
+            if dust > 0.0 {
+                let cloud = 0.65 + 0.35 * grain(6, 5.0 * self.grain);
+                place.pale = place.pale.max(dust * left * left * cloud * (1.0 - inside));
+            }
+            self.add_crumb(&mut place, at, chips * left * left, seed);
         }
-        if hole > 0.0 {
+        if hole > 0.0 && radii <= hole * (1.0 + WIDEST * ragged) + 1.0 {
             let radius = self.radius * hole * (1.0 + 0.6 * ragged * (round(7, 1.9) + 0.5 * round(8, 4.3)));
             place.dark = (radius - distance + 0.5).clamp(0.0, 1.0);
         }
