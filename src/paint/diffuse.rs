@@ -285,9 +285,9 @@ impl Block<'_> {
             }
         }
         if look.sparkle > 0.0 && *self.depth != [0; BLOCK] {
-            for i in 0..BLOCK {
+            for (i, share) in share.iter_mut().enumerate() {
                 let (x, y) = ((at.x + i as u32) as f32 * look.sparkle_scale, at.y as f32 * look.sparkle_scale);
-                share[i] *= 1.0 - look.sparkle * (0.5 + 0.5 * smooth_noise(0x5EED, x, y));
+                *share *= 1.0 - look.sparkle * (0.5 + 0.5 * smooth_noise(0x5EED, x, y));
             }
         }
         if RICH && *self.depth == [0; BLOCK] {

@@ -282,7 +282,7 @@ type Ramp = [[Layer; 2]; STEPS + 1];
 
 /// Ramps in use, with the stops that they are made from. Surfaces with the same stops share one: so the processor's caches hold one
 /// while many surfaces are painted, and not each surface's own.
-static RAMPS: Mutex<Vec<(Cow<'static, [ColorStop]>, Weak<Ramp>)>> = Mutex::new(Vec::new());
+static RAMPS: Mutex<Vec<(Vec<ColorStop>, Weak<Ramp>)>> = Mutex::new(Vec::new());
 
 /// No more than so many are shared.
 const MAX_SHARED: usize = 64;
@@ -411,14 +411,14 @@ fn ramp(stops: &[ColorStop]) -> Ramp {
     ramp
 }
 
-fn shared_ramp(wanted: &Cow<'static, [ColorStop]>) -> Arc<Ramp> {
+fn shared_ramp(wanted: &[ColorStop]) -> Arc<Ramp> {
     let mut ramps = RAMPS.lock().unwrap_or_else(PoisonError::into_inner);
-    let known = ramps.iter().find(|(stops, _)| stops == wanted).and_then(|(_, ramp)| ramp.upgrade());
+    let known = ramps.iter().find(|(stops, _)| **stops == *wanted).and_then(|(_, ramp)| ramp.upgrade());
     known.unwrap_or_else(|| {
         ramps.retain(|(_, ramp)| ramp.strong_count() > 0);
         let ramp = Arc::new(ramp(wanted));
         if ramps.len() < MAX_SHARED {
-            ramps.push((wanted.clone(), Arc::downgrade(&ramp)));
+            ramps.push((wanted.to_vec(), Arc::downgrade(&ramp)));
         }
         ramp
     })

@@ -440,5 +440,7 @@ fn presets_that_grow_painted_where_they_change_equal_the_whole() {
                 assert!(painted == whole, "{name}, step {step}");
             }
         }
+        let anew = drawn(&preset, &growth, frame, Moment::after(growth.timeline().end()));
+        assert!(field.layer() == anew.layer(), "{name}: what has come step by step is not what comes at once");
     }
 }

@@ -8,7 +8,7 @@
 //!
 //! Directions are compared by exact cross products of whole numbers, never by angles.
 
-use super::{NO_PARENT, Network};
+use super::{NO_PARENT, Network, SegmentId, Timeline};
 use glam::Vec2;
 use std::{
     collections::{BTreeMap, HashMap},
@@ -179,7 +179,7 @@ pub(crate) struct Closings {
 /// A cell at the moment it closed. The first in the list is cell 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Closing {
-    /// Step in which the segment was born that closed it.
+    /// Step of the timeline in which the segment comes that closes it.
     pub(crate) birth: u32,
     /// The impact of that segment.
     pub(crate) impact: u32,
@@ -287,21 +287,9 @@ impl CellTracker {
             if let Some(link) = links.get(self.links)
                 && nodes.get(i).is_none_or(|node| link.birth < node.birth && (link.a.max(link.b) as usize) < i)
             {
-                self.links += 1;
-                if let (Some(a), Some(b)) = (nodes.get(link.a as usize), nodes.get(link.b as usize)) {
-                    let cause = Cause { birth: link.birth, impact: a.impact.max(b.impact) };
-                    self.join(self.vertex_of[link.a as usize], self.vertex_of[link.b as usize], cause);
-                }
+                self.add_link(network, link.birth);
             } else {
-                let node = nodes[i];
-                let vertex = self.add_vertex(i as u32, node.pos);
-                self.vertex_of.push(vertex);
-                if node.parent != NO_PARENT
-                    && let Some(&parent) = self.vertex_of.get(node.parent as usize)
-                {
-                    let impact = node.impact.max(nodes[node.parent as usize].impact);
-                    self.join(parent, vertex, Cause { birth: node.birth, impact });
-                }
+                self.add_node(network, nodes[i].birth);
             }
         }
         self.touched.sort_unstable();
@@ -310,6 +298,51 @@ impl CellTracker {
         touched.drain(..).for_each(|cell| self.measure(cell));
         self.touched = touched;
         first..self.cells.len() as u32
+    }
+
+    /// As [`update`](Self::update), in the order of a timeline, whose steps count as births: hits in the middle of growth do not change it
+    /// either.
+    pub(crate) fn follow(&mut self, network: &Network, timeline: &Timeline) {
+        let (nodes, links) = (network.nodes(), network.links());
+        while !self.cells.is_empty() && (self.vertex_of.len() < nodes.len() || self.links < links.len()) {
+            let (i, k) = (self.vertex_of.len() as u32, self.links as u32);
+            let is_next = links.get(self.links).is_some_and(|link| {
+                link.a.max(link.b) < i && timeline.nodes_before(k).is_none_or(|before| before <= i)
+            });
+            if is_next || i as usize >= nodes.len() {
+                self.add_link(network, timeline.step_of(SegmentId::Link(k)).unwrap_or(u32::MAX));
+            } else {
+                self.add_node(network, timeline.step_of(SegmentId::Branch(i)).unwrap_or(u32::MAX));
+            }
+        }
+        self.touched.clear();
+    }
+
+    /// Takes in the next link.
+    fn add_link(&mut self, network: &Network, birth: u32) {
+        let Some(link) = network.links().get(self.links) else { return };
+        self.links += 1;
+        let [a, b] = [link.a, link.b].map(|node| {
+            let vertex = self.vertex_of.get(node as usize)?;
+            Some((*vertex, network.nodes().get(node as usize)?.impact))
+        });
+        if let (Some((a, impact)), Some((b, other))) = (a, b) {
+            self.join(a, b, Cause { birth, impact: impact.max(other) });
+        }
+    }
+
+    /// Takes in the next node, with the branch that leads to it.
+    fn add_node(&mut self, network: &Network, birth: u32) {
+        let i = self.vertex_of.len();
+        let Some(node) = network.nodes().get(i) else { return };
+        let vertex = self.add_vertex(i as u32, node.pos);
+        self.vertex_of.push(vertex);
+        if node.parent != NO_PARENT
+            && let Some(&parent) = self.vertex_of.get(node.parent as usize)
+        {
+            let impact = network.nodes().get(node.parent as usize).map_or(node.impact, |parent| parent.impact);
+            self.join(parent, vertex, Cause { birth, impact: impact.max(node.impact) });
+        }
     }
 
     /// All cells by their number; the first is what no crack has cut off yet.

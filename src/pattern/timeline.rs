@@ -134,6 +134,8 @@ struct LinkBirth {
     step: u32,
     /// As of a node.
     opening: u32,
+    /// Nodes that came before it.
+    after: u32,
 }
 
 /// Width at `moment` of what comes in a step and opens to `width` in so many further ones, evenly from nothing at the start of the
@@ -195,7 +197,7 @@ impl Timeline {
 
     /// The next link comes, and opens to its width in so many further steps.
     pub(crate) fn add_opening_link(&mut self, opening: u32) {
-        self.links.push(LinkBirth { step: self.now, opening });
+        self.links.push(LinkBirth { step: self.now, opening, after: self.nodes.len() as u32 });
         self.opens(opening);
     }
 
@@ -231,6 +233,7 @@ impl Timeline {
     pub(crate) fn forget(&mut self, first: u32, left: &[u32]) {
         self.nodes.drain(..first as usize);
         self.links = left.iter().filter_map(|&link| self.links.get(link as usize).copied()).collect();
+        self.links.iter_mut().for_each(|link| link.after = link.after.saturating_sub(first));
         self.nodes.iter_mut().for_each(|birth| birth.latest = NONE);
         let since = self.nodes.first().map_or(u32::MAX, |birth| birth.step);
         self.dots.retain(|dot| dot.0 >= since);
@@ -272,7 +275,7 @@ impl Timeline {
         let widths = match segment {
             SegmentId::Branch(_) => (self.width_at(a, moment)?, self.width_at(b, moment)?),
             SegmentId::Link(i) => {
-                let LinkBirth { step, opening } = *self.links.get(i as usize)?;
+                let LinkBirth { step, opening, .. } = *self.links.get(i as usize)?;
                 let width = opened(network.links().get(i as usize)?.width, step, opening, moment);
                 (width, width)
             }
@@ -325,6 +328,11 @@ impl Timeline {
             SegmentId::Branch(node) => self.nodes.get(node as usize).map(|birth| birth.step),
             SegmentId::Link(link) => self.links.get(link as usize).map(|birth| birth.step),
         }
+    }
+
+    /// How many nodes came before a link.
+    pub(crate) fn nodes_before(&self, link: u32) -> Option<u32> {
+        self.links.get(link as usize).map(|link| link.after)
     }
 
     /// The nodes and the links that have come by the end of step `step` and open on after it.

@@ -58,7 +58,9 @@ impl Plan {
             return Ok(None);
         };
         let aspect = |picture| (kind.aspect)(world, entity, picture, None);
-        let pictures = plan_pictures(world, &surface, &shown, &Stretch { aspect: &aspect, kept: None }, 0)?;
+        let stretch = Stretch { aspect: &aspect, kept: None };
+        let layer = preset.look.layer(0).bytes_per_texel();
+        let pictures = plan_pictures(world, &surface, &shown, &stretch, layer, 0)?;
         let read_at = world.resource::<Surfaces>().frame;
         Ok(pictures.map(|pictures| Self {
             surface,
@@ -321,12 +323,13 @@ pub(super) struct Stretch<'a> {
     pub(super) kept: Option<(UVec2, UVec2)>,
 }
 
-/// Plans the pictures of a surface; `None` if they are not there yet. `owned` bytes of the budget are its own already.
+/// Plans the pictures of a surface; `None` if they are not there yet. Beside depths, a field takes `layer` bytes a texel; `owned` bytes of the budget are its own already.
 fn plan_pictures(
     world: &World,
     surface: &CrackSurface,
     shown: &Shown,
     stretch: &Stretch<'_>,
+    layer: u64,
     owned: u64,
 ) -> Result<Option<PicturePlan>, CrackError> {
     let images = world.get_resource::<Assets<Image>>().ok_or(CrackError::NoImages)?;
@@ -343,11 +346,11 @@ fn plan_pictures(
     };
     let image = shown.diffuse.as_ref().and_then(|picture| images.get(picture));
     let is_nearest = image.is_some_and(|image| picture::is_nearest(world, image));
-    let (size, unstretched) = size(world, surface, shown, image, stretch, is_nearest, maps, owned)?;
+    let (size, unstretched) = size(world, surface, shown, image, stretch, is_nearest, (maps, layer), owned)?;
     let whole = TexelRect::whole(size);
     let rect = shown.rect.map_or(whole, |rect| TexelRect { min: rect.min, max: rect.max }.intersect(whole));
     let sampler = image.map_or(ImageSampler::Default, |image| image.sampler.clone());
-    let (bytes, layout) = (bytes(size, maps), shown.layout.clone());
+    let (bytes, layout) = (bytes(size, (maps, layer)), shown.layout.clone());
     Ok(Some(PicturePlan { size, rect, bytes, sampler, maps, unstretched, layout, is_nearest }))
 }
 
@@ -361,15 +364,16 @@ pub(super) fn draft(
     let aspect = |picture| (active.carrier.kind.aspect)(world, entity, picture, active.carrier.size);
     let kept = active.unstretched.map(|unstretched| (unstretched, active.base.size));
     let stretch = Stretch { aspect: &aspect, kept };
-    let plan = plan_pictures(world, &active.surface, shown, &stretch, active.bytes)?;
+    let layer = active.preset.look.layer(0).bytes_per_texel();
+    let plan = plan_pictures(world, &active.surface, shown, &stretch, layer, active.bytes)?;
     plan.map(|plan| plan.draft(world, shown)).transpose()
 }
 
 /// Bytes of the textures on the CPU and the GPU, the base picture, as if no other surface had the same, and the depth field with what it
 /// may hold beside depths.
-fn bytes(size: UVec2, maps: CrackMaps) -> u64 {
+fn bytes(size: UVec2, (maps, layer): (CrackMaps, u64)) -> u64 {
     let whole = [maps.diffuse, maps.normal, maps.emissive].map(u64::from).iter().sum::<u64>();
-    let texel = 4 + 2 + 3 + 8 * whole + 2 * u64::from(maps.depth);
+    let texel = 4 + 2 + layer + 8 * whole + 2 * u64::from(maps.depth);
     u64::from(size.x) * u64::from(size.y) * texel
 }
 
@@ -382,7 +386,7 @@ fn size(
     image: Option<&Image>,
     stretch: &Stretch<'_>,
     is_nearest: bool,
-    maps: CrackMaps,
+    maps: (CrackMaps, u64),
     owned: u64,
 ) -> Result<(UVec2, Option<UVec2>), CrackError> {
     let aspect = |picture| (stretch.aspect)(picture).filter(|aspect| aspect.is_normal());

@@ -83,8 +83,8 @@ impl DepthField {
 
     /// Goes on with a network whose oldest part was forgotten: what is shown stays.
     #[cfg_attr(not(feature = "bevy"), expect(dead_code, reason = "surfaces of the plugin forget"))]
-    pub(crate) fn freeze_layer(&mut self, network: &Network) {
-        self.layer.freeze(network);
+    pub(crate) fn freeze_layer(&mut self, network: &Network, timeline: &Timeline) {
+        self.layer.freeze(network, timeline);
     }
 
     pub(crate) const fn layer(&self) -> &Layer {

@@ -124,13 +124,12 @@ pub(crate) struct Spot {
 impl Spot {
     const NONE: Self = Self { slope: [0; 2], pale: 0, shade: 0, dark: 0 };
 
-    /// Both, as if the order did not matter: what is deeper in the hole or paler shows.
+    /// Both, in any order: what is deeper in the hole or paler shows, and the steeper slope.
     fn with(self, other: Self) -> Self {
-        let stronger = |spot: Self| (spot.dark, spot.pale, spot.slope, spot.shade);
-        let (above, below) = if stronger(self) >= stronger(other) { (self, other) } else { (other, self) };
-        let steep = |slope: [i16; 2]| i32::from(slope[0]).pow(2) + i32::from(slope[1]).pow(2);
-        let slope = if steep(above.slope) >= steep(below.slope) { above.slope } else { below.slope };
-        Self { slope, ..above }
+        let strength = |spot: Self| (spot.dark, spot.pale, spot.shade);
+        let steep = |[x, y]: [i16; 2]| (i32::from(x).pow(2) + i32::from(y).pow(2), x, y);
+        let slope = if steep(self.slope) >= steep(other.slope) { self.slope } else { other.slope };
+        Self { slope, ..if strength(self) >= strength(other) { self } else { other } }
     }
 }
 
@@ -146,6 +145,13 @@ struct Zone {
     pos: Vec2,
     energy: f32,
     bounds: TexelRect,
+}
+
+/// Columns and rows of the tiles that a rectangle touches.
+fn tiles_of(rect: &TexelRect) -> impl Iterator<Item = UVec2> + use<> {
+    let (min, max) = (rect.min / TILE, rect.max.map(|end| end.div_ceil(TILE)));
+    let columns = if rect.is_empty() { 0..0 } else { min.x..max.x };
+    (min.y..max.y).flat_map(move |y| columns.clone().map(move |x| UVec2::new(x, y)))
 }
 
 /// Crushed zones of all impacts, in tiles that are only there where they are.
@@ -204,37 +210,54 @@ impl CrushedField {
         if self.shown == strikes.len() || self.crushed.radius <= 0.0 {
             return;
         }
-        let mut anew = Vec::new();
+        // Tiles of impacts that are others now are made anew; what is new is laid over them.
+        let (mut anew, mut new) = (Vec::new(), Vec::new());
         while self.shown > strikes.len() {
             self.shown -= 1;
             let Some(strike) = all.get(self.shown) else { continue };
-            anew.extend(self.set(strike, strike.before));
+            anew.push(self.set(strike, strike.before));
         }
         for strike in &strikes[self.shown..] {
             self.shown += 1;
-            anew.extend(self.set(strike, strike.energy));
+            let bounds = self.set(strike, strike.energy);
+            if strike.before > 0.0 {
+                anew.push(bounds);
+            } else {
+                new.push(strike.impact);
+            }
         }
-        for rect in anew {
-            let (min, max) = (rect.min / TILE, rect.max.map(|end| end.div_ceil(TILE)));
-            for y in min.y..max.y {
-                for x in min.x..max.x {
-                    self.draw(UVec2::new(x, y), forbidden);
+        let mut tiles: Vec<UVec2> = anew.iter().flat_map(tiles_of).collect();
+        tiles.sort_unstable_by_key(|tile| (tile.y, tile.x));
+        tiles.dedup();
+        for &tile in &tiles {
+            let slot = (tile.y * self.columns + tile.x) as usize;
+            self.used -= usize::from(self.tiles[slot].take().is_some());
+            for index in 0..self.zones.len() as u32 {
+                self.draw(index, tile, forbidden);
+            }
+        }
+        for index in new {
+            let Some(Some(zone)) = self.zones.get(index as usize).copied() else { continue };
+            for tile in tiles_of(&zone.bounds) {
+                if tiles.binary_search_by_key(&(tile.y, tile.x), |tile| (tile.y, tile.x)).is_err() {
+                    self.draw(index, tile, forbidden);
                 }
             }
-            changed.push(rect);
+            changed.push(zone.bounds);
         }
+        changed.extend(anew);
     }
 
     /// Gives the impact of a hit this energy; returns the texels that may be others now.
-    fn set(&mut self, strike: &Strike, energy: f32) -> Option<TexelRect> {
+    fn set(&mut self, strike: &Strike, energy: f32) -> TexelRect {
         let index = strike.impact as usize;
         if self.zones.len() <= index {
             self.zones.resize(index + 1, None);
         }
         let zone = (energy > 0.0).then(|| {
             let pos = self.frame.to_texel(strike.pos);
-            let radius =
-                self.radius(energy) * self.crushed.reach.max(self.crushed.flake).max(1.0 + self.crushed.ragged);
+            let Crushed { reach, flake, ragged, .. } = self.crushed;
+            let radius = self.radius(energy) * reach.max(flake).max(1.0 + WIDEST * ragged);
             let limit = self.frame.size().as_vec2();
             let min = (pos - radius - 2.0).floor().clamp(Vec2::ZERO, limit).as_uvec2();
             let max = (pos + radius + 2.0).ceil().clamp(Vec2::ZERO, limit).as_uvec2();
@@ -242,36 +265,35 @@ impl CrushedField {
         });
         let before = std::mem::replace(&mut self.zones[index], zone);
         let bounds = |zone: Option<Zone>| zone.map_or(TexelRect::default(), |zone| zone.bounds);
-        Some(bounds(before).union(bounds(zone))).filter(|rect| !rect.is_empty())
+        bounds(before).union(bounds(zone))
     }
 
     fn radius(&self, energy: f32) -> f32 {
         self.crushed.radius * self.frame.texels_per_unit() * energy.sqrt()
     }
 
-    /// Makes a tile anew, from all zones that touch it.
-    fn draw(&mut self, tile: UVec2, forbidden: Option<&Grid<bool>>) {
-        let rect = TexelRect { min: tile * TILE, max: (tile * TILE + TILE).min(self.frame.size()) };
-        let mut texels: Option<Box<Tile>> = None;
-        for (index, zone) in self.zones.iter().enumerate() {
-            let Some(zone) = zone.filter(|zone| !zone.bounds.intersect(rect).is_empty()) else { continue };
-            let texels = texels.get_or_insert_with(|| Box::new([Spot::NONE; (TILE * TILE) as usize]));
-            let shape = Shape::new(&self.crushed, self.frame.texels_per_unit(), self.radius(zone.energy));
-            let seed = self.seed ^ (index as u32).wrapping_mul(0x9E37_79B1);
-            shape.draw(texels, zone.pos, seed, rect);
+    /// Lays what an impact has crushed over a tile, if it touches it.
+    fn draw(&mut self, index: u32, tile: UVec2, forbidden: Option<&Grid<bool>>) {
+        let Some(Some(zone)) = self.zones.get(index as usize).copied() else { return };
+        let corner = tile * TILE;
+        let rect = TexelRect { min: corner, max: (corner + TILE).min(self.frame.size()) }.intersect(zone.bounds);
+        if rect.is_empty() {
+            return;
         }
-        if let (Some(texels), Some(forbidden)) = (&mut texels, forbidden) {
-            for y in rect.min.y..rect.max.y {
-                for x in rect.min.x..rect.max.x {
-                    if forbidden.get(x, y) == Some(true) {
-                        texels[((y - rect.min.y) * TILE + x - rect.min.x) as usize] = Spot::NONE;
-                    }
+        let radius = self.radius(zone.energy);
+        let slot = &mut self.tiles[(tile.y * self.columns + tile.x) as usize];
+        self.used += usize::from(slot.is_none());
+        let texels = slot.get_or_insert_with(|| Box::new([Spot::NONE; (TILE * TILE) as usize]));
+        let shape = Shape::new(&self.crushed, self.frame.texels_per_unit(), radius);
+        shape.draw(texels, zone.pos, self.seed ^ index.wrapping_mul(0x9E37_79B1), rect, corner);
+        let Some(forbidden) = forbidden else { return };
+        for y in rect.min.y..rect.max.y {
+            for x in rect.min.x..rect.max.x {
+                if forbidden.get(x, y) == Some(true) {
+                    texels[((y - corner.y) * TILE + x - corner.x) as usize] = Spot::NONE;
                 }
             }
         }
-        let slot = &mut self.tiles[(tile.y * self.columns + tile.x) as usize];
-        self.used = self.used + usize::from(texels.is_some()) - usize::from(slot.is_some());
-        *slot = texels;
     }
 
     /// Whether anything may be crushed in a rectangle.
@@ -332,19 +354,21 @@ impl<'a> Shape<'a> {
         }
     }
 
-    /// Lays it over the texels of a tile at `rect`.
-    fn draw(&self, texels: &mut Tile, centre: Vec2, seed: u32, rect: TexelRect) {
+    /// Lays it over the texels `rect` of a tile whose first texel is at `corner`.
+    fn draw(&self, texels: &mut Tile, centre: Vec2, seed: u32, rect: TexelRect, corner: UVec2) {
         const WIDE: usize = TILE as usize + 2;
         // Heights around each texel are needed for its slope.
         let mut places = [Place { height: 0.0, pale: 0.0, shade: 0.0, dark: 0.0 }; WIDE * WIDE];
-        let corner = rect.min.as_vec2() - 0.5;
-        for (i, place) in places.iter_mut().enumerate() {
-            let at = corner + Vec2::new((i % WIDE) as f32, (i / WIDE) as f32);
-            *place = self.place(at - centre, at, seed);
+        let (size, first) = (rect.size().as_usizevec2(), rect.min.as_vec2() - 0.5);
+        for y in 0..size.y + 2 {
+            for x in 0..size.x + 2 {
+                let at = first + Vec2::new(x as f32, y as f32);
+                places[y * WIDE + x] = self.place(at - centre, at, seed);
+            }
         }
-        let size = rect.size();
-        for y in 0..size.y as usize {
-            for x in 0..size.x as usize {
+        let corner = (rect.min - corner).as_usizevec2();
+        for y in 0..size.y {
+            for x in 0..size.x {
                 let at = (y + 1) * WIDE + x + 1;
                 let slope = |step: usize| {
                     let slope = 0.5 * (places[at - step].height - places[at + step].height);
@@ -358,7 +382,7 @@ impl<'a> Shape<'a> {
                     shade: (shade * 128.0).clamp(-127.0, 127.0) as i8,
                     dark: (dark.clamp(0.0, 1.0) * 255.0 + 0.5) as u8,
                 };
-                let texel = &mut texels[y * TILE as usize + x];
+                let texel = &mut texels[(y + corner.y) * TILE as usize + x + corner.x];
                 *texel = texel.with(spot);
             }
         }
@@ -388,8 +412,10 @@ impl<'a> Shape<'a> {
             if inside > 0.0 {
                 let coarse = grain(4, 2.3 * self.grain);
                 let rest = (1.0 - distance / outline).clamp(0.0, 1.0);
-                place.height = -self.depth * rest.sqrt() + inside * self.rough * (0.6 * coarse + 0.4 * fine);
                 let fade = inside + soft * ((1.5 * rest).min(1.0) - inside);
+                // A broken edge is steep, a soft one has none.
+                let bowl = rest.sqrt() + soft * (rest * rest - rest.sqrt());
+                place.height = -self.depth * bowl + fade * self.rough * (0.6 * coarse + 0.4 * fine);
                 let grains = 1.0 - speckle * (0.5 + 0.5 * grain(5, 0.6 * self.grain)).clamp(0.0, 1.0);
                 place.pale = pale * fade * grains;
                 place.shade = speckle * (0.6 * coarse + 0.3 * fine) * inside;

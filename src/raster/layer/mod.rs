@@ -69,7 +69,7 @@ impl Layer {
         changed: &mut Vec<TexelRect>,
     ) {
         if let Some(plates) = &mut self.plates {
-            plates.show(network, moment, forbidden, changed);
+            plates.show(network, timeline, moment, forbidden, changed);
         }
         if let Some(crushed) = &mut self.crushed {
             let count = timeline.entries(moment.begun()).strikes;
@@ -78,9 +78,9 @@ impl Layer {
     }
 
     /// Goes on with a network whose oldest part was forgotten.
-    pub(super) fn freeze(&mut self, network: &Network) {
+    pub(super) fn freeze(&mut self, network: &Network, timeline: &Timeline) {
         if let Some(plates) = &mut self.plates {
-            plates.freeze(network);
+            plates.freeze(network, timeline);
         }
     }
 

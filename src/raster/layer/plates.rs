@@ -4,7 +4,7 @@ use super::tracker;
 use crate::{
     Grid,
     math::mix,
-    pattern::{CellTracker, Closing, Moment, NO_IMPACT, Network, SurfaceFrame},
+    pattern::{CellTracker, Closing, Moment, Network, SurfaceFrame, Timeline},
     raster::TexelRect,
 };
 use glam::{UVec2, Vec2};
@@ -39,6 +39,9 @@ pub(crate) struct PlateField {
     frozen: usize,
     skipped: usize,
     crossings: Vec<(u32, f32)>,
+    /// Where each impact is, from so many hits.
+    hits: Vec<Vec2>,
+    strikes: usize,
     /// Texels that were written.
     written: u64,
 }
@@ -61,6 +64,8 @@ impl PlateField {
             frozen: 0,
             skipped: 0,
             crossings: Vec::new(),
+            hits: Vec::new(),
+            strikes: 0,
             written: 0,
         }
     }
@@ -87,16 +92,19 @@ impl PlateField {
     pub(super) fn show(
         &mut self,
         network: &Network,
+        timeline: &Timeline,
         moment: Moment,
         forbidden: Option<&Grid<bool>>,
         changed: &mut Vec<TexelRect>,
     ) {
-        self.cells.update(network);
+        let new = timeline.strikes().get(self.strikes..).unwrap_or_default();
+        self.strikes += new.len();
+        self.hits.extend(new.iter().filter(|strike| strike.before == 0.0).map(|strike| strike.pos));
+        self.cells.follow(network, timeline);
         let cells = std::mem::replace(&mut self.cells, CellTracker::new(Vec2::ZERO));
         if let Some(closings) = cells.closings() {
             let all = closings.all().get(self.skipped..).unwrap_or_default();
-            // What a hit makes at once comes in the first step after it.
-            let count = all.partition_point(|closing| closing.birth.max(1) <= moment.whole());
+            let count = all.partition_point(|closing| closing.birth <= moment.whole());
             let count = count.min((MAX_PLATES - 1).saturating_sub(self.frozen));
             while self.shown() > count {
                 let last = self.shown() - 1;
@@ -108,7 +116,7 @@ impl PlateField {
             for closing in all.get(self.shown()..count).unwrap_or_default() {
                 let (host, frozen) = (self.host(closing), self.frozen as u16);
                 let id = self.plates.len() as u16;
-                self.plates.push(self.plate(closing, network));
+                self.plates.push(self.plate(closing));
                 let is_host = |of: u16| of == host || (host == 0 && of <= frozen);
                 changed.push(self.fill(closings.outline(closing), is_host, id, forbidden));
             }
@@ -130,20 +138,17 @@ impl PlateField {
     }
 
     /// Keeps what is shown as it is, and goes on with what is left of the network.
-    pub(super) fn freeze(&mut self, network: &Network) {
+    pub(super) fn freeze(&mut self, network: &Network, timeline: &Timeline) {
         self.cells = tracker(self.frame);
-        self.cells.update(network);
+        self.cells.follow(network, timeline);
         self.frozen = self.plates.len() - 1;
         self.skipped = self.cells.closings().map_or(0, |closings| closings.all().len());
     }
 
-    fn plate(&self, closing: &Closing, network: &Network) -> Plate {
+    fn plate(&self, closing: &Closing) -> Plate {
         let unit = self.frame.texels_per_unit();
-        // The first node of an impact is at its hit, or near.
-        let nodes = network.nodes();
-        let first = nodes.partition_point(|node| node.impact < closing.impact);
-        let hit = nodes.get(first).filter(|_| closing.impact != NO_IMPACT);
-        let near = hit.map_or(0.0, |node| 1.0 / (1.0 + 6.0 * node.pos.distance(closing.centroid)));
+        let hit = self.hits.get(closing.impact as usize);
+        let near = hit.map_or(0.0, |hit| 1.0 / (1.0 + 6.0 * hit.distance(closing.centroid)));
         let mut state = mix(self.seed ^ mix(self.plates.len() as u64));
         let draws = std::array::from_fn(|_| {
             state = mix(state);
@@ -201,21 +206,23 @@ impl PlateField {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{
-        math::Rng,
-        pattern::{NO_PARENT, random::planar_network},
-    };
+    use crate::{math::Rng, pattern::random::planar_network};
 
     fn field(size: UVec2) -> PlateField {
         PlateField::new(SurfaceFrame::new(size).unwrap(), 3)
     }
 
-    /// A network that has only the nodes and links of the steps up to `step`.
-    fn up_to(network: &Network, step: u32) -> Network {
-        let mut part = network.clone();
-        part.nodes.retain(|node| node.birth <= step);
-        part.links.retain(|link| link.birth <= step);
-        part
+    /// A network that has only the nodes and links of the births up to `birth`, and its timeline: each comes in the step after.
+    fn up_to(network: &Network, birth: u32) -> (Network, Timeline) {
+        let (mut part, mut timeline) = (network.clone(), Timeline::default());
+        part.nodes.retain(|node| node.birth <= birth);
+        part.links.retain(|link| link.birth <= birth);
+        for now in 0..=birth {
+            timeline.begin(now + 1);
+            part.nodes.iter().filter(|node| node.birth == now).for_each(|node| timeline.add_node(node.width));
+            part.links.iter().filter(|link| link.birth == now).for_each(|_| timeline.add_link());
+        }
+        (part, timeline)
     }
 
     /// Every texel lies in the cell that the tracker finds at its centre, and every cell has cost its own area once.
@@ -231,18 +238,12 @@ mod tests {
             let (mut steps, mut plates) = (Vec::new(), field(size));
             for step in 0..=last {
                 let before = (plates.written(), plates.ids.clone());
-                plates.show(&up_to(&network, step), Moment::after(step), None, &mut Vec::new());
+                let (part, timeline) = up_to(&network, step);
+                plates.show(&part, &timeline, Moment::after(step + 1), None, &mut Vec::new());
                 let written = plates.written() - before.0;
                 let others = plates.ids.as_slice().iter().zip(before.1.as_slice()).filter(|(a, b)| a != b).count();
-                let area: f32 = plates
-                    .cells
-                    .closings()
-                    .unwrap()
-                    .all()
-                    .iter()
-                    .filter(|c| c.birth.max(1) == step)
-                    .map(|c| c.area)
-                    .sum();
+                let area: f32 =
+                    plates.cells.closings().unwrap().all().iter().filter(|c| c.birth == step + 1).map(|c| c.area).sum();
                 let area = area * frame.texels_per_unit() * frame.texels_per_unit();
                 // Islands inside were cells of their own before.
                 assert!(written >= others as u64, "step {step}");
@@ -261,17 +262,18 @@ mod tests {
             }
             // A centre on a crack may be counted to either side.
             assert!(wrong <= 4, "{wrong} texels are in another cell");
+            let (_, timeline) = up_to(&network, last);
             // Back and forth, in any steps, and all at once.
             for _ in 0..12 {
                 let step = rng.next_u32() % (last + 1);
-                plates.show(&network, Moment::after(step), None, &mut Vec::new());
+                plates.show(&network, &timeline, Moment::after(step + 1), None, &mut Vec::new());
                 assert!(plates.ids == steps[step as usize], "step {step}");
             }
             let mut at_once = field(size);
-            at_once.show(&network, Moment::after(last), None, &mut Vec::new());
+            at_once.show(&network, &timeline, Moment::after(last + 1), None, &mut Vec::new());
             assert!(at_once.ids == steps[last as usize]);
-            plates.show(&network, Moment::START, None, &mut Vec::new());
-            assert!(plates.ids.as_slice().iter().all(|&id| id == 0) || network.nodes()[0].parent != NO_PARENT);
+            plates.show(&network, &timeline, Moment::START, None, &mut Vec::new());
+            assert!(plates.ids.as_slice().iter().all(|&id| id == 0), "something is left at the start");
         }
         assert!(closed > 100, "{closed} cells");
     }
