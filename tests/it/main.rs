@@ -29,6 +29,8 @@ mod plugin;
 mod prepare;
 #[cfg(feature = "serde")]
 mod presets;
+#[cfg(all(feature = "2d", feature = "3d"))]
+mod random;
 mod replay;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod shards;
