@@ -7,6 +7,7 @@ use super::{
 };
 use crate::{
     plugin::{
+        CrackSurface,
         beside::throw_away,
         carrier::{Carrier, Clothes},
     },
@@ -31,8 +32,14 @@ pub(super) struct Body {
     origin: Origin,
 }
 
-/// Bodies of shards that are not shown any more, hidden, numbered as they came. They are kept as long as any surface is broken, and
-/// as they are: a piece that is shown once more has its own again if no other has taken it.
+/// So many bodies are kept for others while no shard is shown; else as many as are shown.
+const KEPT: usize = 256;
+
+/// No more go in a frame.
+const GOING: usize = 256;
+
+/// Bodies of shards that are not shown any more, hidden, numbered as they came. They are kept as long as any surface is broken, up to
+/// [`KEPT`] or as many as are shown, and as they are: a piece that is shown once more has its own again if no other has taken it.
 #[derive(Resource, Default)]
 pub(in crate::plugin) struct Spares {
     flat: BTreeMap<u64, Body>,
@@ -41,15 +48,37 @@ pub(in crate::plugin) struct Spares {
 }
 
 impl Spares {
-    /// Lets all go.
-    pub(super) fn clear(world: &mut World) {
-        let is_any = |spares: &Self| !(spares.flat.is_empty() && spares.solid.is_empty());
-        if world.get_resource().is_some_and(is_any) {
-            let mut spares = world.resource_mut::<Self>();
-            let (flat, solid) = (core::mem::take(&mut spares.flat), core::mem::take(&mut spares.solid));
-            for body in flat.into_values().chain(solid.into_values()) {
-                world.try_despawn(body.entity).ok();
-            }
+    fn len(&self) -> usize {
+        self.flat.len() + self.solid.len()
+    }
+
+    /// Takes out the oldest of all.
+    fn pop(&mut self) -> Option<Body> {
+        let first = |bodies: &BTreeMap<u64, Body>| bodies.first_key_value().map(|(number, _)| *number);
+        let is_flat = match (first(&self.flat), first(&self.solid)) {
+            (Some(flat), Some(solid)) => flat < solid,
+            (flat, _) => flat.is_some(),
+        };
+        self.of(!is_flat).pop_first().map(|(_, body)| body)
+    }
+
+    /// Lets the oldest go until there are no more than `most`.
+    pub(super) fn shrink_to(world: &mut World, most: usize) {
+        while let Some(mut spares) = world.get_resource_mut::<Self>()
+            && spares.len() > most
+            && let Some(body) = spares.pop()
+        {
+            world.try_despawn(body.entity).ok();
+        }
+    }
+
+    /// Lets those go, some in each frame, that will hardly be of use, so many shards being shown; without a broken surface all.
+    pub(super) fn trim(world: &mut World, is_any_broken: bool, shown: usize, is_boundless: bool) {
+        let len = world.get_resource().map_or(0, Self::len);
+        let most = if is_any_broken { shown.max(KEPT) } else { 0 };
+        if len > most {
+            let least = if is_boundless { 0 } else { len.saturating_sub(GOING) };
+            Self::shrink_to(world, most.max(least));
         }
     }
 
@@ -87,9 +116,14 @@ impl Body {
         is_there(self.entity) && self.sides.as_ref().is_none_or(|(sides, _)| is_there(*sides))
     }
 
-    /// Hides a body and keeps it for another shard. Returns its number among the spare ones.
+    /// Hides a body and keeps it for another shard. Returns its number among the spare ones. One that has been made a surface goes, with
+    /// all that was made for that.
     fn park(self, world: &mut World, carrier: &Carrier) -> Option<u64> {
         let mut entity = world.get_entity_mut(self.entity).ok()?;
+        if entity.contains::<CrackSurface>() {
+            entity.despawn();
+            return None;
+        }
         // Materials and their pictures are the surface's.
         (carrier.kind.undress)(&mut entity);
         if let Some(mut visibility) = entity.get_mut::<Visibility>() {
@@ -269,7 +303,7 @@ impl Broken {
 
     /// Thickness of shards in the entity's units.
     fn thickness(&self) -> f32 {
-        self.settings.thickness * self.plane.size.y.abs() / self.cut.extent().y
+        self.plane.thickness(self.settings.thickness, self.cut.extent())
     }
 
     /// How much of [`LEVELS`] is there.
