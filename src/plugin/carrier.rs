@@ -81,10 +81,10 @@ pub(super) struct Kind {
     pub(super) shard_material: fn(&mut World, Entity, &Carrier, &Handle<Image>, f32) -> Option<UntypedHandle>,
     /// The material of their sides, if they have any, of a picture of this mean colour (sRGB).
     pub(super) inside: fn(&mut World, &Carrier, [f32; 3], f32) -> Option<UntypedHandle>,
-    /// Makes entities of shards, all at a stroke.
-    pub(super) spawn: fn(&mut World, Vec<(Shard, Clothes)>) -> Vec<Entity>,
+    /// Makes entities of shards; `None` where their surface has gone meanwhile.
+    pub(super) spawn: fn(&mut World, Vec<(Shard, Clothes)>) -> Vec<Option<Entity>>,
     /// The same for their sides.
-    pub(super) spawn_sides: fn(&mut World, Vec<Clothes>) -> Vec<Entity>,
+    pub(super) spawn_sides: fn(&mut World, Vec<Clothes>) -> Vec<Option<Entity>>,
     /// Makes a shard, or the sides of one, of an entity that was one.
     pub(super) dress: fn(&mut EntityWorldMut, Option<Shard>, Clothes),
     /// Gives a shard another material.

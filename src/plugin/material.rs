@@ -287,14 +287,28 @@ fn inside<S: MaterialSlot>(world: &mut World, carrier: &Carrier, mean: [f32; 3],
     Some(materials.add(inside).untyped())
 }
 
-/// Makes entities of shards.
-pub(super) fn spawn<S: MaterialSlot>(world: &mut World, shards: Vec<(Shard, Clothes)>) -> Vec<Entity> {
-    world.spawn_batch(shards.into_iter().map(|(shard, clothes)| (shard, worn::<S>(clothes)))).collect()
+/// Makes entities of shards; `None` once their surface is gone.
+///
+/// One after the other, and each a child of its surface before it is a shard: observers of shards may despawn the surface, and the engine
+/// panics where that comes between a child and its parent.
+pub(super) fn spawn<S: MaterialSlot>(world: &mut World, shards: Vec<(Shard, Clothes)>) -> Vec<Option<Entity>> {
+    let spawn = |(shard, clothes)| {
+        let entity = spawn_one::<S>(world, clothes)?;
+        if let Ok(mut entity) = world.get_entity_mut(entity) {
+            entity.insert(shard);
+        }
+        Some(entity)
+    };
+    shards.into_iter().map(spawn).collect()
 }
 
-/// Makes entities of the sides of shards.
-pub(super) fn spawn_sides<S: MaterialSlot>(world: &mut World, sides: Vec<Clothes>) -> Vec<Entity> {
-    world.spawn_batch(sides.into_iter().map(worn::<S>)).collect()
+/// Makes entities of the sides of shards; `None` where the shard is gone.
+pub(super) fn spawn_sides<S: MaterialSlot>(world: &mut World, sides: Vec<Clothes>) -> Vec<Option<Entity>> {
+    sides.into_iter().map(|clothes| spawn_one::<S>(world, clothes)).collect()
+}
+
+fn spawn_one<S: MaterialSlot>(world: &mut World, clothes: Clothes) -> Option<Entity> {
+    world.get_entity(clothes.parent).is_ok().then(|| world.spawn(worn::<S>(clothes)).id())
 }
 
 /// All that is seen of a shard.
@@ -307,13 +321,17 @@ fn worn<S: MaterialSlot>(clothes: Clothes) -> (ChildOf, Transform, Visibility, S
 pub(super) fn dress<S: MaterialSlot>(entity: &mut EntityWorldMut, shard: Option<Shard>, clothes: Clothes) {
     let is_child = entity.get::<ChildOf>().is_some_and(|child| child.parent() == clothes.parent);
     let (parent, place, visibility, mesh, material) = worn::<S>(clothes);
-    let seen = (place, visibility, mesh, material);
-    match (shard, is_child) {
-        (Some(shard), true) => entity.insert((shard, seen)),
-        (Some(shard), false) => entity.insert((shard, parent, seen)),
-        (None, true) => entity.insert(seen),
-        (None, false) => entity.insert((parent, seen)),
-    };
+    let has_parent = is_child || entity.world().get_entity(parent.parent()).is_ok();
+    if !is_child && has_parent {
+        entity.insert(parent);
+    }
+    if !entity.is_despawned() {
+        entity.insert((place, visibility, mesh, material));
+    }
+    // Last, as in `spawn`.
+    if let Some(shard) = shard.filter(|_| has_parent && !entity.is_despawned()) {
+        entity.insert(shard);
+    }
 }
 
 /// Gives a shard another material.

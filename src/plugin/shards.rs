@@ -80,9 +80,11 @@ pub struct ShatterCracks {
     /// = 0.
     pub seek: Option<f32>,
     /// How pieces break again on their way, where the crate moves them; `None` (default) = they stay whole. Fragments are shards as all
-    /// others; time that runs backwards puts them together again.
+    /// others; time that runs backwards puts them together again. No more than [`CrackBudget::max_shards`](super::CrackBudget::max_shards)
+    /// lets there be: a piece without room for its fragments stays whole.
     pub again: Option<BreakAgain>,
-    /// How thick shards of 3D surfaces are, pattern units, 0..=10; default 0.03.
+    /// How thick shards of flat 3D surfaces are, pattern units, 0..=10; default 0.03. Those of a slab, a box at least four times as wide and
+    /// high as thick, are as thick as it is.
     pub thickness: f32,
     /// How their rims look; `None` (default) = as befits the preset: [`RimLook::GLASS`] where cracks are frosted,
     /// [`RimLook::PLAIN`] where they are drawn as in a cartoon, else [`RimLook::STONE`].
@@ -189,7 +191,8 @@ impl Default for ShatterRequest {
 /// A piece of a surface that has left it. Its entity is a child of the surface, its origin the shard's centre.
 ///
 /// Where the crate moves shards, their entities serve for others when they are gone, without this component meanwhile: take off again
-/// what you put on (observe `Remove` of `Shard`).
+/// what you put on (observe `Remove` of `Shard`). One that has a [`CrackSurface`](super::CrackSurface) then is despawned instead, with all that
+/// was made for it.
 ///
 /// With [`ShatterCracks::fly`] off, this is what a physics engine needs: colliders, mass and the velocity of the blow.
 #[derive(Component, Clone, Debug)]
@@ -282,8 +285,9 @@ pub enum ShardsError {
     /// A parameter of [`ShatterCracks`] or [`ShatterRequest`] is out of its range.
     #[error(transparent)]
     Parameter(#[from] ShatterError),
-    /// Only sprites and flat meshes that show their picture once can shatter.
-    #[error("only sprites and flat meshes that show the whole picture can shatter: {reason}")]
+    /// Only sprites, flat meshes that show their picture once, and slabs can shatter: boxes at least four times as wide and high as thick,
+    /// each of whose broad faces shows all of the picture, as those of a `Cuboid` do.
+    #[error("only sprites, and flat meshes and slabs that show the whole picture can shatter: {reason}")]
     NotFlat {
         /// What is wrong with it.
         reason: &'static str,

@@ -94,9 +94,9 @@ fn s2_what_is_asked_for_meanwhile_is_done() {
         let mut commands = world.commands();
         match what {
             0 => _ = commands.get_entity(first).map(|mut entity| _ = entity.heal_cracks()),
-            1 => _ = commands.get_entity(second).map(|mut entity| entity.despawn()),
+            1 => _ = commands.get_entity(second).map(|mut entity| entity.try_despawn()),
             2 => _ = commands.get_entity(second).map(|mut entity| _ = entity.close_cracks(0.0)),
-            3 => _ = commands.get_entity(first).map(|mut entity| _ = entity.remove::<CrackSurface>()),
+            3 => _ = commands.get_entity(first).map(|mut entity| _ = entity.try_remove::<CrackSurface>()),
             _ => _ = commands.get_entity(third).map(|mut entity| _ = entity.shatter_cracks(ShatterRequest::ALL)),
         }
     }
@@ -425,17 +425,20 @@ fn s7_what_turns_later_takes_its_shards_along() {
 #[test]
 fn s9_everything_goes() {
     let mut app = app();
-    // Few cracks, held on all sides, cut without being carried on.
-    for preset in [CrackPreset::GLASS, CrackPreset::CONCRETE, CrackPreset::BRICK] {
-        let settings = ShatterCracks { cut: ShatterParams::DEFAULT, anchor: Anchor::Border, ..loose() };
+    // Held on all sides; a few cracks cut nothing out, or pieces in the middle, unless they are carried on.
+    for (preset, carry_on) in [(CrackPreset::GLASS, true), (CrackPreset::GLASS, false), (CrackPreset::BRICK, true)] {
+        let cut = ShatterParams { carry_on, ..ShatterParams::DEFAULT };
+        let settings = ShatterCracks { cut, anchor: Anchor::Border, ..loose() };
         let image = add(&mut app, picture(UVec2::new(96, 64)));
         let surface = CrackSurface::new(preset).with_seed(4);
         let entity = app.world_mut().spawn((Sprite::from_image(image), surface, settings)).id();
-        hit(&mut app, CrackHit::uv(entity, Vec2::new(0.3, 0.4)).with_energy(0.5));
+        hit(&mut app, CrackHit::uv(entity, Vec2::new(0.3, 0.4)));
         settle(&mut app, entity);
-        shatter(&mut app, entity, ShatterRequest::ALL);
         let left = |app: &App| shown(app, entity).as_chunks::<4>().0.iter().filter(|texel| texel[3] != 0).count();
-        assert!(left(&app) > 96 * 64 / 4, "something is held");
+        if carry_on {
+            shatter(&mut app, entity, ShatterRequest::ALL);
+            assert!(left(&app) > 0, "something is held");
+        }
         shatter(&mut app, entity, ShatterRequest::EVERYTHING);
         assert_eq!(left(&app), 0, "nothing stays");
         let all: f32 = shards(&mut app).iter().map(|shard| get::<Shard>(&app, *shard).area()).sum();

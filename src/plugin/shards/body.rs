@@ -177,7 +177,7 @@ impl Broken {
         self.wear[level].clone()
     }
 
-    /// Makes the entities of pieces: of bodies that are there, then all others at a stroke. Returns them, and which pieces they are,
+    /// Makes the entities of pieces: of bodies that are there, then all others. Returns them, and which pieces they are,
     /// in order; not those for which something is missing.
     pub(super) fn spawn(
         &mut self,
@@ -210,6 +210,10 @@ impl Broken {
         let mut all = Vec::with_capacity(shown.len());
         for (Shown { index, pose, form }, own) in shown.into_iter().zip(own) {
             let form = if own.is_none() { form.map(|form| *form).or_else(|| forms.next()) } else { None };
+            // Who was told of the shards before has taken it away: this one comes in the next frame.
+            if own.as_ref().is_some_and(|body| !body.is_there(world)) {
+                continue;
+            }
             let level = self.level(carrier, pose);
             let Some(material) = self.material(world, surface, carrier, level) else { continue };
             let Some(place) = self.place(carrier, index, pose) else { continue };
@@ -234,11 +238,15 @@ impl Broken {
             let origin = origin(piece);
             match body {
                 Some(mut body) => {
-                    (carrier.kind.dress)(&mut world.entity_mut(body.entity), Some(shard), worn);
+                    if let Ok(mut entity) = world.get_entity_mut(body.entity) {
+                        (carrier.kind.dress)(&mut entity, Some(shard), worn);
+                    }
                     if let (Some((entity, kept)), Some((mesh, material))) = (&mut body.sides, side) {
                         let worn = Clothes { parent: body.entity, place: Transform::default(), mesh, material };
                         *kept = worn.mesh.clone();
-                        (carrier.kind.dress)(&mut world.entity_mut(*entity), None, worn);
+                        if let Ok(mut entity) = world.get_entity_mut(*entity) {
+                            (carrier.kind.dress)(&mut entity, None, worn);
+                        }
                     }
                     piece.body = Some(Body { mesh, origin, ..body });
                 }
@@ -252,6 +260,7 @@ impl Broken {
         let entities = (carrier.kind.spawn)(world, clothes);
         let mut with_sides = Vec::new();
         for (((index, mesh, origin), side), entity) in new.into_iter().zip(sides).zip(entities) {
+            let Some(entity) = entity else { continue };
             self.pieces[index].body = Some(Body { entity, mesh, sides: None, origin });
             with_sides.extend(side.map(|(mesh, material)| {
                 let clothes = Clothes { parent: entity, place: Transform::default(), mesh, material };
@@ -264,6 +273,7 @@ impl Broken {
             let clothes = with_sides.into_iter().map(|(_, clothes)| clothes).collect();
             let entities = (carrier.kind.spawn_sides)(world, clothes);
             for ((index, mesh), entity) in kept.into_iter().zip(entities) {
+                let Some(entity) = entity else { continue };
                 if let Some(body) = &mut self.pieces[index].body {
                     body.sides = Some((entity, mesh));
                 }

@@ -51,8 +51,10 @@ pub(in crate::plugin) struct Broken {
     pub(super) is_behind: bool,
     /// Whether pieces that had broken have faded away.
     pub(super) has_faded: bool,
-    /// When what waits was released, seconds since it broke.
+    /// When what waits was released, seconds since it broke: with the first that leave.
     pub(super) since: f64,
+    /// Whether any of it has left.
+    pub(super) has_begun: bool,
     /// Id for the next piece.
     pub(super) next: u32,
     /// How many pieces were released so far.
@@ -128,6 +130,7 @@ impl Broken {
             is_behind: false,
             has_faded: false,
             since: 0.0,
+            has_begun: false,
             next: 0,
             released: 0,
             time: 0.0,

@@ -227,7 +227,7 @@ fn release(world: &mut World, entity: Entity, active: &mut Active, made: Made, l
     (broken.cut, broken.support, broken.grown) = (cut, support, grown);
     (broken.settings, broken.plane, broken.rim) = (settings, plane, rim);
     broken.is_fresh = is_first;
-    (broken.waiting, broken.since) = (batches, broken.time);
+    (broken.waiting, broken.since, broken.has_begun) = (batches, broken.time, false);
     if is_first {
         active.bytes += broken.bytes;
     }
@@ -251,6 +251,9 @@ fn let_go(world: &mut World, entity: Entity, surfaces: &mut Surfaces) -> Option<
     make_room(world, surfaces, new);
     let active = surfaces.active.get_mut(&entity)?;
     let mut broken = active.broken.take()?;
+    if !core::mem::replace(&mut broken.has_begun, true) {
+        broken.since = broken.time;
+    }
     let shards = match broken.waiting.pop_front() {
         Some(batch) => depart(world, entity, active, &mut broken, batch, most),
         None => Vec::new(),
