@@ -35,9 +35,13 @@ mod replay;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod shards;
 #[cfg(all(feature = "2d", feature = "3d"))]
+mod shards_bounds;
+#[cfg(all(feature = "2d", feature = "3d"))]
 mod shards_life;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod shards_order;
+#[cfg(all(feature = "2d", feature = "3d"))]
+mod solids;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod support;
 mod voronoi;
