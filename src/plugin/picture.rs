@@ -67,6 +67,7 @@ pub(super) struct BaseKey {
     pub(super) pictures: [Option<AssetId<Image>>; 3],
     pub(super) size: UVec2,
     pub(super) layout: Option<Layout>,
+    pub(super) is_twofold: bool,
 }
 
 impl BasePictures {
