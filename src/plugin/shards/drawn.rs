@@ -63,8 +63,8 @@ fn rim_of(look: &Look) -> RimLook {
     match look {
         // The picture behind is seen through the walls of the cracks.
         Look { shift, opaque: true, .. } if *shift > 0.0 => RimLook::GLASS,
-        // Neither light nor shade.
-        Look { glint: 0.0, .. } => RimLook::PLAIN,
+        // Drawn, or as thin as ink.
+        Look { opaque: true, .. } | Look { relief: 0.0, .. } => RimLook::PLAIN,
         _ => RimLook::STONE,
     }
 }
