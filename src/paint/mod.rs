@@ -1,6 +1,7 @@
 //! A base picture and a depth field to diffuse, normal and depth texels.
 //!
-//! Every painted texel is a function of the base picture and of the depth field in the 3 x 3 texels around it, so a
+//! Every painted texel is a function of the base picture, of the depth field in the 3 x 3 texels around it, and of what the
+//! field holds beside depths at the texel itself (the closed cell it lies in, what a hit has crushed, veils), so a
 //! dirty rectangle painted alone equals the whole painted anew, bit for bit. Where the field is untouched, the
 //! painted texel is the base texel.
 

@@ -2,6 +2,8 @@
 //!
 //! Depth is 16 bits a texel: 0 = untouched, 65535 = the deepest. Because stamps combine by max, painting is order-free
 //! and a segment can be stamped again, wider, without its neighbours.
+//!
+//! Beside depths a field may hold what some looks show ([`LayerPlan`]): plates, crushed zones and veils.
 
 mod dirty;
 mod distance;
