@@ -86,15 +86,8 @@ impl CrackPreset {
             variety: 0.15,
             ..GrowthParams::DEFAULT
         },
-        profile: Profile {
-            depth: 1.0,
-            full_width: 0.014,
-            wall: 0.35,
-            rim_width: 0.005,
-            rim_depth: 0.14,
-            faintest: 0.4,
-        },
-        look: Look::GROOVE,
+        profile: Profile { depth: 1.0, full_width: 0.02, wall: 0.55, rim_width: 0.005, rim_depth: 0.10, faintest: 0.0 },
+        look: Look::CONCRETE,
         steps_per_second: 60.0,
         follows_lines: false,
     };
@@ -126,8 +119,8 @@ impl CrackPreset {
             variety: 0.15,
             ..GrowthParams::DEFAULT
         },
-        profile: Profile { depth: 1.0, full_width: 0.008, wall: 0.3, rim_width: 0.008, rim_depth: 0.2, faintest: 0.4 },
-        look: Look::GROOVE,
+        profile: Profile { depth: 1.0, full_width: 0.012, wall: 0.4, rim_width: 0.0, rim_depth: 0.0, faintest: 0.0 },
+        look: Look::PLASTER,
         steps_per_second: 60.0,
         follows_lines: false,
     };
@@ -158,8 +151,8 @@ impl CrackPreset {
             courses: 0.0625,
             ..GrowthParams::DEFAULT
         },
-        profile: Profile { depth: 1.0, full_width: 0.01, wall: 0.3, rim_width: 0.006, rim_depth: 0.16, faintest: 0.4 },
-        look: Look::GROOVE,
+        profile: Profile { depth: 1.0, full_width: 0.014, wall: 0.4, rim_width: 0.003, rim_depth: 0.12, faintest: 0.0 },
+        look: Look::BRICK,
         steps_per_second: 60.0,
         follows_lines: true,
     };
@@ -195,8 +188,8 @@ impl CrackPreset {
             fork_angle: 0.45,
             ..GrowthParams::DEFAULT
         },
-        profile: Profile { depth: 1.0, full_width: 0.003, wall: 0.3, rim_width: 0.004, rim_depth: 0.3, faintest: 0.4 },
-        look: Look { relief: 0.004, glint: 0.5, ..Look::FROSTED },
+        profile: Profile { depth: 1.0, full_width: 0.003, wall: 0.5, rim_width: 0.0, rim_depth: 0.0, faintest: 0.0 },
+        look: Look::GLASS,
         steps_per_second: 120.0,
         follows_lines: false,
     };
@@ -228,8 +221,8 @@ impl CrackPreset {
             max_nodes: 40_000,
             ..GrowthParams::DEFAULT
         },
-        profile: Profile { depth: 1.0, full_width: 0.0035, wall: 0.3, rim_width: 0.003, rim_depth: 0.3, faintest: 0.4 },
-        look: Look { relief: 0.004, glint: 0.5, ..Look::FROSTED },
+        profile: Profile { depth: 1.0, full_width: 0.003, wall: 0.5, rim_width: 0.0, rim_depth: 0.0, faintest: 0.0 },
+        look: Look::TEMPERED_GLASS,
         steps_per_second: 240.0,
         follows_lines: false,
     };
@@ -261,8 +254,8 @@ impl CrackPreset {
             tip_taper: 6.0,
             ..GrowthParams::DEFAULT
         },
-        profile: Profile { depth: 1.0, full_width: 0.004, wall: 0.3, rim_width: 0.006, rim_depth: 0.3, faintest: 0.4 },
-        look: Look { relief: 0.004, glint: 0.5, ..Look::FROSTED },
+        profile: Profile { depth: 1.0, full_width: 0.003, wall: 0.5, rim_width: 0.0, rim_depth: 0.0, faintest: 0.0 },
+        look: Look::LAMINATED_GLASS,
         steps_per_second: 120.0,
         follows_lines: false,
     };
@@ -297,8 +290,8 @@ impl CrackPreset {
             tip_taper: 8.0,
             ..GrowthParams::DEFAULT
         },
-        profile: Profile { depth: 1.0, full_width: 0.004, wall: 0.5, rim_width: 0.012, rim_depth: 0.12, faintest: 0.4 },
-        look: Look::GROOVE,
+        profile: Profile { depth: 1.0, full_width: 0.02, wall: 0.7, rim_width: 0.012, rim_depth: 0.12, faintest: 0.0 },
+        look: Look::CLAY,
         steps_per_second: 40.0,
         follows_lines: false,
     };
@@ -330,8 +323,15 @@ impl CrackPreset {
             tip_taper: 8.0,
             ..GrowthParams::DEFAULT
         },
-        profile: Profile { depth: 1.0, full_width: 0.005, wall: 0.6, rim_width: 0.014, rim_depth: 0.12, faintest: 0.4 },
-        look: Look::GROOVE,
+        profile: Profile {
+            depth: 1.0,
+            full_width: 0.022,
+            wall: 0.75,
+            rim_width: 0.014,
+            rim_depth: 0.12,
+            faintest: 0.0,
+        },
+        look: Look::MUD,
         steps_per_second: 40.0,
         follows_lines: false,
     };
@@ -361,8 +361,8 @@ impl CrackPreset {
             num_iterations: 400,
             ..GrowthParams::DEFAULT
         },
-        profile: Profile { depth: 0.8, full_width: 0.0012, wall: 0.4, rim_width: 0.0, rim_depth: 0.0, faintest: 0.4 },
-        look: Look { relief: 0.003, ..Look::GROOVE },
+        profile: Profile { depth: 1.0, full_width: 0.006, wall: 0.4, rim_width: 0.0, rim_depth: 0.0, faintest: 0.0 },
+        look: Look::STAIN,
         steps_per_second: 60.0,
         follows_lines: false,
     };
@@ -392,15 +392,8 @@ impl CrackPreset {
             fork_angle: 1.0,
             ..GrowthParams::DEFAULT
         },
-        profile: Profile {
-            depth: 0.64,
-            full_width: 0.0055,
-            wall: 0.6,
-            rim_width: 0.008,
-            rim_depth: 0.22,
-            faintest: 0.4,
-        },
-        look: Look { relief: 0.004, ..Look::FROSTED },
+        profile: Profile { depth: 1.0, full_width: 0.006, wall: 0.6, rim_width: 0.0, rim_depth: 0.0, faintest: 0.0 },
+        look: Look::ICE,
         steps_per_second: 90.0,
         follows_lines: false,
     };
@@ -432,7 +425,14 @@ impl CrackPreset {
             variety: 0.2,
             ..GrowthParams::DEFAULT
         },
-        profile: Profile { depth: 1.0, full_width: 0.012, wall: 0.2, rim_width: 0.0, rim_depth: 0.0, faintest: 0.0 },
+        profile: Profile {
+            depth: 1.0,
+            full_width: 0.0005,
+            wall: 1.0,
+            rim_width: 0.0055,
+            rim_depth: 0.5,
+            faintest: 0.0,
+        },
         look: Look::TOON,
         steps_per_second: 30.0,
         follows_lines: false,
@@ -457,7 +457,10 @@ impl CrackPreset {
         let by = growth.step_length / self.growth.step_length;
         let Profile { full_width, rim_width, .. } = self.profile;
         let profile = Profile { full_width: full_width * by, rim_width: rim_width * by, ..self.profile };
-        Self { growth, profile, ..self.clone() }
+        let crushed = self.look.crushed.map(|crushed| crushed.scaled(by));
+        let veil = self.look.veil.map(|veil| veil.scaled(by));
+        let look = Look { crushed, veil, ..self.look.clone() };
+        Self { growth, profile, look, ..self.clone() }
     }
 
     /// The preset of this name (lower case), see [`NAMES`](Self::NAMES).

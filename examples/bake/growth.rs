@@ -9,9 +9,9 @@ use crate::{
 use bevy_crack::{
     CrackPreset,
     growth::{CrackGrowth, HitOutcome},
-    paint::{Look, LookTable},
-    pattern::{CrackMask, LinkKind, NO_PARENT, Network, SurfaceFrame},
-    raster::{DepthField, stamp_dot, stamp_path},
+    paint::{Look, LookTable, paint_glow},
+    pattern::{CrackMask, LinkKind, Moment, NO_PARENT, Network, SurfaceFrame},
+    raster::{DepthField, TexelRect, stamp_dot, stamp_path},
 };
 use clap::Args;
 use glam::{UVec2, Vec2};
@@ -24,6 +24,10 @@ pub(crate) struct Options {
     /// One of the presets: glass, concrete, clay and others
     #[arg(long, default_value = "concrete")]
     preset: String,
+    /// A preset file (`*.crack.ron`) in its place
+    #[cfg(feature = "serde")]
+    #[arg(long)]
+    file: Option<PathBuf>,
     /// Width and height in texels; by default those of the base picture, or 512x512
     #[arg(long, value_parser = size)]
     size: Option<UVec2>,
@@ -88,6 +92,10 @@ pub(crate) fn setting(text: &str) -> Result<(String, String), String> {
 pub(crate) fn bake(options: &Options) -> Result<(Network, RgbaImage), Box<dyn Error>> {
     let mut preset = CrackPreset::named(&options.preset)
         .ok_or_else(|| format!("no preset `{}`; there are {}", options.preset, CrackPreset::NAMES.join(", ")))?;
+    #[cfg(feature = "serde")]
+    if let Some(file) = &options.file {
+        preset = CrackPreset::from_ron(&fs::read_to_string(file)?)?;
+    }
     for (name, value) in &options.set {
         preset.growth.set(name, value)?;
     }
@@ -134,6 +142,7 @@ pub(crate) fn bake(options: &Options) -> Result<(Network, RgbaImage), Box<dyn Er
     let clock = Instant::now();
     let mut field = DepthField::new(frame);
     field.forbid(&layers);
+    field.lay(preset.look.layer(options.seed));
     let mut changed = Vec::new();
     growth.take_changed(&mut changed);
     for segment in changed {
@@ -146,6 +155,8 @@ pub(crate) fn bake(options: &Options) -> Result<(Network, RgbaImage), Box<dyn Er
     for marker in markers {
         stamp_dot(&mut field, marker, 2.0 / frame.texels_per_unit(), 0.6);
     }
+    let (timeline, mut rects) = (growth.timeline(), Vec::new());
+    field.show_layer(growth.network(), timeline, Moment::after(timeline.end()), &mut rects);
     let stamped = clock.elapsed();
 
     let clock = Instant::now();
@@ -154,6 +165,11 @@ pub(crate) fn bake(options: &Options) -> Result<(Network, RgbaImage), Box<dyn Er
     let painted = clock.elapsed();
 
     write_maps(&options.out, &maps, &field)?;
+    if !preset.look.glow.is_empty() {
+        let mut light = RgbaImage::new(size.x, size.y);
+        paint_glow(None, size, &field, &table, &[TexelRect::whole(size)], UVec2::ZERO, &mut light);
+        light.save(options.out.join("emissive.png"))?;
+    }
     let network = growth.network();
     fs::write(options.out.join("network.json"), serde_json::to_string(&describe(network, options))?)?;
 

@@ -19,7 +19,6 @@ mod ocr;
 mod own;
 mod painting;
 mod pictures;
-mod realism;
 mod shatter;
 mod sheet;
 mod text;
@@ -49,8 +48,6 @@ enum Method {
     FiguresMould(figures::Options),
     /// Words drawn by cracks and read back, to see how legible they are.
     Legible(legible::Options),
-    /// Masks of every preset with random hits, to be measured against photographs.
-    Realism(realism::Options),
     /// Shards: the pieces into which the cracks cut the picture.
     Shatter(Box<shatter::Options>),
 }
@@ -62,7 +59,6 @@ fn main() -> ExitCode {
         Method::Guided(options) => guided::bake(&options),
         Method::FiguresMould(options) => figures::bake(&options),
         Method::Legible(options) => legible::bake(&options),
-        Method::Realism(options) => realism::bake(&options),
         Method::Shatter(options) => shatter::bake(&options),
     };
     match done {

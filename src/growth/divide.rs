@@ -564,7 +564,7 @@ impl CrackGrowth {
                 }
             });
             near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-            near.into_iter().any(|(_, node)| self.join(node, tip));
+            near.into_iter().any(|(_, node)| self.join(node, tip, LinkKind::Junction));
         }
     }
 

@@ -2,16 +2,20 @@
 
 use super::{
     LookTable,
+    extras::Extras,
     patch::{BLOCK, Patch},
     rows::{Rgba, channel, round},
 };
-use crate::raster::TexelRect;
+use crate::raster::{TexelRect, noise as smooth_noise};
 use glam::{Mat4, UVec2};
 
-/// How much brighter a wall gets that faces the light squarely, for a glint of 1: a highlight of the crack's own, sRGB
+/// How much brighter a wall gets at the most that faces the light squarely: a highlight of the crack's own for a gloss of 1, sRGB
 /// levels, and a share of what is there. Found by eye on glass (the first) and concrete (the second).
-const HIGHLIGHT: f32 = 40.0;
-const SHADING: f32 = 0.5;
+const HIGHLIGHT: f32 = 110.0;
+const SHADING: f32 = 0.75;
+
+/// How much of the picture is seen in a hole.
+const HOLE: f32 = 0.10;
 
 /// The part of the base picture that belongs to the field.
 pub(super) struct Frame<'a> {
@@ -31,6 +35,13 @@ impl Frame<'_> {
     #[inline(always)]
     fn texel(&self, x: u32, y: u32) -> Rgba {
         self.base[self.index(x, y)]
+    }
+
+    /// The texel so many columns and rows away, or the nearest one.
+    #[inline(always)]
+    fn moved(&self, at: UVec2, [x, y]: [i32; 2]) -> Rgba {
+        let place = |at: u32, by: i32, size: u32| at.saturating_add_signed(by).min(size - 1);
+        self.texel(place(at.x, x, self.size.x), place(at.y, y, self.size.y))
     }
 
     /// The colour at texel `at` + `offset`, bilinear, weighted by alpha so that the hidden colour of transparent
@@ -89,16 +100,17 @@ fn noise(x: u32, y: u32) -> [f32; BLOCK] {
 /// First all are those of the picture, and blocks that are touched go on a list; then those are painted. To find and paint them
 /// one by one takes longer: a processor that guesses wrong which one is touched cannot begin it while it is at the one before.
 #[inline(always)]
-pub(super) fn diffuse_patch<const ROOM: usize>(
+pub(super) fn diffuse_patch<const ROOM: usize, const RICH: bool>(
     out: &mut [Rgba],
     frame: &Frame<'_>,
     patch: &mut Patch<ROOM>,
+    extras: Option<&Extras<'_, ROOM>>,
     look: &LookTable,
     rect: TexelRect,
 ) {
     let width = rect.size().x as usize;
     if width < BLOCK {
-        narrow_patch(out, frame, patch, look, rect);
+        narrow_patch::<ROOM, RICH>(out, frame, patch, extras, look, rect);
         return;
     }
     let mut count = 0;
@@ -122,17 +134,18 @@ pub(super) fn diffuse_patch<const ROOM: usize>(
         if let (Some(block), Some(out)) =
             (Block::load(&frame.base[first..], patch, place.into()), out[first..].first_chunk_mut())
         {
-            *out = block.colors(frame, look, at);
+            *out = block.colors::<ROOM, RICH>(frame, look, extras, place.into(), at);
         }
     }
 }
 
 /// The same of one that is narrower than a block.
 #[inline(always)]
-fn narrow_patch<const ROOM: usize>(
+fn narrow_patch<const ROOM: usize, const RICH: bool>(
     out: &mut [Rgba],
     frame: &Frame<'_>,
     patch: &Patch<ROOM>,
+    extras: Option<&Extras<'_, ROOM>>,
     look: &LookTable,
     rect: TexelRect,
 ) {
@@ -145,7 +158,8 @@ fn narrow_patch<const ROOM: usize>(
         if patch.is_touched(place)
             && let Some(block) = Block::load(base, patch, place)
         {
-            out.copy_from_slice(&block.colors(frame, look, UVec2::new(rect.min.x, y))[..width]);
+            let at = UVec2::new(rect.min.x, y);
+            out.copy_from_slice(&block.colors::<ROOM, RICH>(frame, look, extras, place, at)[..width]);
         }
     }
 }
@@ -180,17 +194,45 @@ impl<'a> Block<'a> {
 
 impl Block<'_> {
     #[inline(always)]
-    fn colors(&self, frame: &Frame<'_>, look: &LookTable, at: UVec2) -> [Rgba; BLOCK] {
-        let painted =
-            if look.opaque { self.paint::<true>(frame, look, at) } else { self.paint::<false>(frame, look, at) };
+    fn colors<const ROOM: usize, const RICH: bool>(
+        &self,
+        frame: &Frame<'_>,
+        look: &LookTable,
+        extras: Option<&Extras<'_, ROOM>>,
+        place: usize,
+        at: UVec2,
+    ) -> [Rgba; BLOCK] {
+        let extras = if RICH { extras.map(|extras| (extras, place)) } else { None };
+        let painted = if look.opaque {
+            self.paint::<ROOM, true, RICH>(frame, look, extras, at)
+        } else {
+            self.paint::<ROOM, false, RICH>(frame, look, extras, at)
+        };
         painted.map(u32::to_le_bytes)
     }
 
     #[inline(always)]
-    fn paint<const OPAQUE: bool>(&self, frame: &Frame<'_>, look: &LookTable, at: UVec2) -> [u32; BLOCK] {
+    fn paint<const ROOM: usize, const OPAQUE: bool, const RICH: bool>(
+        &self,
+        frame: &Frame<'_>,
+        look: &LookTable,
+        extras: Option<(&Extras<'_, ROOM>, usize)>,
+        at: UVec2,
+    ) -> [u32; BLOCK] {
         // Channel by channel, so that each loop works on many texels at once.
-        let over = self.over(look, at);
-        let under = self.picture(frame, look, at);
+        let mut over = self.over::<RICH>(look, at);
+        let mut under = self.picture(frame, look, at);
+        let facets = if RICH { self.plates(frame, extras, at, &mut under) } else { [0.0; BLOCK] };
+        if look.tint > 0.0 {
+            for c in 0..3 {
+                for i in 0..BLOCK {
+                    over[c][i] *= (1.0 - look.tint) + look.tint * (1.0 / 255.0) * under[c][i];
+                }
+            }
+        }
+        if RICH && let Some((extras, place)) = extras {
+            compose(extras, place, look, &facets, &under, &mut over);
+        }
         let mut painted = [0; BLOCK];
         let (mut under_share, mut over_share, mut facing) = ([0.0; BLOCK], [1.0; BLOCK], [0.0; BLOCK]);
         for i in 0..BLOCK {
@@ -207,20 +249,24 @@ impl Block<'_> {
                 under_share[i] = 1.0 - cover;
                 painted[i] = self.base[i] & 0xFF00_0000;
             }
-            // Light from the upper left, on a normal whose y runs down.
-            facing[i] = (self.x[i] + self.y[i]) * self.inv_len[i] * (-std::f32::consts::FRAC_1_SQRT_2 * look.glint);
+            // Light from the upper left, on a normal whose y runs down. Steep walls are not much brighter than others.
+            let light = (self.x[i] + self.y[i]) * self.inv_len[i] * (-std::f32::consts::FRAC_1_SQRT_2 * look.glint);
+            facing[i] = light / (1.0 + light.abs());
         }
         for c in 0..3 {
             let (under, over) = (&under[c], &over[c]);
             for i in 0..BLOCK {
                 let mixed = under[i] * under_share[i] + over[i] * over_share[i];
-                let lit = mixed + facing[i] * (HIGHLIGHT + SHADING * mixed);
+                let lit = mixed + facing[i] * (look.gloss * HIGHLIGHT + SHADING * mixed);
                 let lit = if lit > 0.0 { lit } else { 0.0 };
                 painted[i] |= round(if lit < 255.0 { lit } else { 255.0 }).wrapping_shl(8 * c as u32);
             }
         }
         for (i, painted) in painted.iter_mut().enumerate() {
-            let untouched = (self.depth[i] == 0) & (self.x[i] == 0.0) & (self.y[i] == 0.0);
+            let mut untouched = (self.depth[i] == 0) & (self.x[i] == 0.0) & (self.y[i] == 0.0);
+            if RICH && let Some((extras, place)) = extras {
+                untouched &= extras.is_untouched(place + i);
+            }
             if untouched | (self.base[i] >> 24 == 0) {
                 *painted = self.base[i];
             }
@@ -230,13 +276,22 @@ impl Block<'_> {
 
     /// What lies over the picture: three colours times cover, and cover. Texel by texel, the four of each at once, then turned.
     #[inline(always)]
-    fn over(&self, look: &LookTable, at: UVec2) -> [[f32; BLOCK]; 4] {
+    fn over<const RICH: bool>(&self, look: &LookTable, at: UVec2) -> [[f32; BLOCK]; 4] {
         let mut share = [1.0; BLOCK];
         if look.grain > 0.0 {
             let noise = noise(at.x, at.y);
             for i in 0..BLOCK {
                 share[i] = 1.0 - look.grain * noise[i];
             }
+        }
+        if look.sparkle > 0.0 && *self.depth != [0; BLOCK] {
+            for (i, share) in share.iter_mut().enumerate() {
+                let (x, y) = ((at.x + i as u32) as f32 * look.sparkle_scale, at.y as f32 * look.sparkle_scale);
+                *share *= 1.0 - look.sparkle * (0.5 + 0.5 * smooth_noise(0x5EED, x, y));
+            }
+        }
+        if RICH && *self.depth == [0; BLOCK] {
+            return [[0.0; BLOCK]; 4];
         }
         let mut between = [0.0; BLOCK];
         for (between, &depth) in between.iter_mut().zip(self.depth) {
@@ -276,5 +331,64 @@ impl Block<'_> {
             }
         }
         under
+    }
+
+    /// Shows each plate's own part of the picture in its own tone; returns the cover of its sheen.
+    #[inline(always)]
+    fn plates<const ROOM: usize>(
+        &self,
+        frame: &Frame<'_>,
+        extras: Option<(&Extras<'_, ROOM>, usize)>,
+        at: UVec2,
+        under: &mut [[f32; BLOCK]; 3],
+    ) -> [f32; BLOCK] {
+        let mut sheen = [0.0; BLOCK];
+        let Some((extras, place)) = extras else { return sheen };
+        for (i, sheen) in sheen.iter_mut().enumerate() {
+            let id = extras.plate(place + i);
+            if id == 0 {
+                continue;
+            }
+            let facet = extras.facet(id);
+            let x = at.x + i as u32;
+            // Where cracks bend the picture as well, they have the last word.
+            if facet.shift != [0; 2] && self.x[i] == 0.0 && self.y[i] == 0.0 {
+                let moved = frame.moved(UVec2::new(x, at.y), facet.shift);
+                if moved[3] == (self.base[i] >> 24) as u8 {
+                    under.iter_mut().zip(moved).for_each(|(under, value)| under[i] = f32::from(value));
+                }
+            }
+            under.iter_mut().for_each(|under| under[i] *= facet.tone);
+            *sheen = facet.sheen(x, at.y);
+        }
+        sheen
+    }
+}
+
+/// Lays the sheen of plates and what is crushed under the cracks, and holes over them.
+#[inline(always)]
+fn compose<const ROOM: usize>(
+    extras: &Extras<'_, ROOM>,
+    place: usize,
+    look: &LookTable,
+    sheen: &[f32; BLOCK],
+    under: &[[f32; BLOCK]; 3],
+    over: &mut [[f32; BLOCK]; 4],
+) {
+    for i in 0..BLOCK {
+        let spot = extras.spot(place + i);
+        let pale = f32::from(spot.pale) * (1.0 / 255.0);
+        let dark = f32::from(spot.dark) * (1.0 / 255.0);
+        let tone = 1.0 + f32::from(spot.shade) * (1.0 / 128.0);
+        let veil = f32::from(extras.veil(place + i)) * look.veil_cover;
+        let (left, sheen) = (1.0 - over[3][i], sheen[i]);
+        for c in 0..3 {
+            let veiled = look.sheen[c] * sheen * (1.0 - veil) + look.veil[c] * veil;
+            let below = veiled * (1.0 - pale) + extras.color[c] * tone * pale;
+            let crack = over[c][i] + below * left;
+            over[c][i] = crack * (1.0 - dark) + HOLE * under[c][i] * dark;
+        }
+        let cover = over[3][i] + left * (1.0 - (1.0 - sheen) * (1.0 - veil) * (1.0 - pale));
+        over[3][i] = cover * (1.0 - dark) + dark;
     }
 }

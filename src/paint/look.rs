@@ -1,6 +1,10 @@
 //! [`Look`]: what a crack does to the picture, as data.
 
-use crate::pattern::MAX_SIDE;
+use super::patch::Curve;
+use crate::{
+    pattern::MAX_SIDE,
+    raster::{Crushed, LayerPlan, Veil},
+};
 use glam::Vec4;
 use std::{
     borrow::Cow,
@@ -21,6 +25,39 @@ pub struct ColorStop {
     pub cover: f32,
 }
 
+/// Closed cells as plates of their own: each a little darker or brighter, tilted, and reflecting in its own way.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
+pub struct Facets {
+    /// How much darker or brighter plates are, at the most, as a share of the picture. 0..=1; default 0.1.
+    pub tone: f32,
+    /// Slope of the most tilted plates, in the normal map. 0..=1; default 0.1.
+    pub tilt: f32,
+    /// How far the picture behind a plate is moved, texels at the most. 0..=16; default 0.
+    pub shift: f32,
+    /// How much the brightest plates reflect: cover of [`sheen`](Self::sheen), which falls off across each. 0..=1; default 0.
+    pub gleam: f32,
+    /// Share of plates that flash; the others reflect a quarter of it at the most. 0..=1; default 0.1.
+    pub flash: f32,
+    /// Colour of what plates reflect, sRGB 0..=1; default that of a bright sky.
+    pub sheen: [f32; 3],
+    /// How much all of that is for plates near the hit: 0 = everywhere the same, 1 = next to nothing far away. Default 0.
+    pub near: f32,
+}
+
+impl Facets {
+    /// The default: plates of slightly different tone, without reflections.
+    pub const DEFAULT: Self =
+        Self { tone: 0.1, tilt: 0.1, shift: 0.0, gleam: 0.0, flash: 0.1, sheen: [0.88, 0.94, 1.0], near: 0.0 };
+}
+
+impl Default for Facets {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
+}
+
 /// What a crack does to the picture.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]
@@ -30,8 +67,15 @@ pub struct Look {
     ///
     /// Below the first stop its cover falls to zero; beyond the last one nothing changes.
     pub ramp: Cow<'static, [ColorStop]>,
+    /// How far colours of the ramp are shares of the picture's own: 0 = they are what they say, 1 = each is multiplied by the picture.
+    /// Default 1: a crack in brown clay is brown.
+    pub tint: f32,
     /// How much walls that face the light (from the upper left) brighten and the others darken, by their slope. 0..=4.
     pub glint: f32,
+    /// How much of that is a highlight of the crack's own, not a share of the colour that is there (glass). 0..=4; default 0.
+    pub gloss: f32,
+    /// How much the cover swells and fades along the way (glass, ice): up to this share of it is taken away. 0..=1; default 0.
+    pub sparkle: f32,
     /// How uneven the cover is from texel to texel (frosted glass): up to this share of it is taken away. 0..=1.
     pub grain: f32,
     /// Shift of the picture where the surface is tilted by the crack (refraction), texels at the steepest. 0..=16.
@@ -40,13 +84,42 @@ pub struct Look {
     ///
     /// Makes the slopes of the normal map, and those that [`glint`](Self::glint) and [`shift`](Self::shift) go by.
     pub relief: f32,
+    /// How far the rims of cracks curl up, as a share of [`relief`](Self::relief): the surface is highest at depth
+    /// [`curl_depth`](Self::curl_depth), and level with its surroundings at depth 0 and at twice that depth. 0..=1; default 0.
+    pub curl: f32,
+    /// See [`curl`](Self::curl); the profile's [`rim_depth`](crate::raster::Profile::rim_depth) as a rule. 0.001..=0.5; default 0.12.
+    pub curl_depth: f32,
+    /// Closed cells as plates of their own; default none.
+    pub facets: Option<Facets>,
+    /// What a hit crushes around it; default nothing.
+    pub crushed: Option<Crushed>,
+    /// Translucent sheets along cracks, to one side; default none.
+    pub veil: Option<Veil>,
+    /// Light that cracks give off, over depth, as [`ramp`](Self::ramp): what is written to the emissive map. Default nothing.
+    pub glow: Cow<'static, [ColorStop]>,
     /// Whether cracks make a translucent picture opaque by their cover (glass panes). Fully transparent texels stay so.
     pub opaque: bool,
 }
 
 impl Look {
     /// The names that [`named`](Self::named) knows.
-    pub const NAMES: [&'static str; 3] = ["groove", "frosted", "toon"];
+    pub const NAMES: [&'static str; 15] = [
+        "groove",
+        "frosted",
+        "toon",
+        "glass",
+        "tempered_glass",
+        "laminated_glass",
+        "ice",
+        "concrete",
+        "plaster",
+        "brick",
+        "clay",
+        "mud",
+        "stain",
+        "mirror",
+        "glowing",
+    ];
 
     /// The look of this name (lower case), see [`NAMES`](Self::NAMES).
     #[must_use]
@@ -55,59 +128,117 @@ impl Look {
             "groove" => Some(Self::GROOVE),
             "frosted" => Some(Self::FROSTED),
             "toon" => Some(Self::TOON),
+            "glass" => Some(Self::GLASS),
+            "tempered_glass" => Some(Self::TEMPERED_GLASS),
+            "laminated_glass" => Some(Self::LAMINATED_GLASS),
+            "ice" => Some(Self::ICE),
+            "concrete" => Some(Self::CONCRETE),
+            "plaster" => Some(Self::PLASTER),
+            "brick" => Some(Self::BRICK),
+            "clay" => Some(Self::CLAY),
+            "mud" => Some(Self::MUD),
+            "stain" => Some(Self::STAIN),
+            "mirror" => Some(Self::MIRROR),
+            "glowing" => Some(Self::GLOWING),
             _ => None,
         }
     }
 
-    /// A dark groove: concrete, clay, plaster.
+    /// A groove whose walls are lit, filled with the dark of the surface's own colour: concrete, clay, plaster.
     pub const GROOVE: Self = Self {
         ramp: Cow::Borrowed(&[
-            stop(0.12, [0.30, 0.27, 0.24], 0.15),
-            stop(0.45, [0.13, 0.115, 0.10], 0.75),
-            stop(0.8, [0.05, 0.045, 0.04], 0.95),
-            stop(1.0, [0.025, 0.022, 0.02], 1.0),
+            stop(0.15, [0.62, 0.59, 0.56], 0.10),
+            stop(0.40, [0.45, 0.41, 0.37], 0.80),
+            stop(0.80, [0.31, 0.275, 0.24], 0.95),
+            stop(1.0, [0.17, 0.148, 0.128], 1.0),
         ]),
-        glint: 0.6,
-        grain: 0.15,
+        tint: 1.0,
+        glint: 0.9,
+        gloss: 0.0,
+        grain: 0.12,
+        sparkle: 0.0,
         shift: 0.0,
-        relief: 0.02,
+        relief: 0.012,
+        curl: 0.0,
+        curl_depth: 0.12,
+        facets: None,
+        crushed: None,
+        veil: None,
+        glow: Cow::Borrowed(&[]),
         opaque: false,
     };
 
-    /// Cracked glass, ice: a frosted rim, a bright edge, a thin darker core, and the picture behind shifted by the walls.
+    /// Cracked glass, ice: a bright hairline with a dark companion on the side that is turned away, and the picture behind shifted by the
+    /// walls.
     pub const FROSTED: Self = Self {
         ramp: Cow::Borrowed(&[
-            stop(0.1, [0.82, 0.86, 0.87], 0.12),
-            stop(0.35, [0.9, 0.94, 0.94], 0.5),
-            stop(0.6, [0.97, 0.99, 0.98], 0.9),
-            stop(0.82, [0.8, 0.88, 0.85], 0.85),
-            stop(1.0, [0.3, 0.42, 0.38], 0.8),
+            stop(0.10, [0.86, 0.91, 0.92], 0.06),
+            stop(0.40, [0.93, 0.97, 0.97], 0.55),
+            stop(0.75, [0.97, 0.99, 1.0], 0.85),
+            stop(1.0, [0.98, 1.0, 1.0], 0.95),
         ]),
-        glint: 1.0,
-        grain: 0.35,
-        shift: 2.0,
-        relief: 0.012,
+        tint: 0.0,
+        glint: 0.6,
+        gloss: 1.0,
+        grain: 0.10,
+        sparkle: 0.35,
+        shift: 1.5,
+        relief: 0.003,
         opaque: true,
+        ..Self::GROOVE
     };
 
-    /// A drawn crack: a hard black outline with one lighter colour inside.
+    /// A drawn crack: a hard black outline of even width, nearly black inside, with one lit wall.
     pub const TOON: Self = Self {
         ramp: Cow::Borrowed(&[
-            stop(0.05, [0.0; 3], 0.0),
-            stop(0.2, [0.0; 3], 1.0),
-            stop(0.6, [0.0; 3], 1.0),
-            stop(0.7, [0.45, 0.42, 0.4], 1.0),
+            stop(0.04, [0.0; 3], 0.0),
+            stop(0.12, [0.02, 0.02, 0.03], 1.0),
+            stop(0.50, [0.02, 0.02, 0.03], 1.0),
+            stop(0.58, [0.17, 0.14, 0.17], 1.0),
+            stop(1.0, [0.07, 0.06, 0.08], 1.0),
         ]),
-        glint: 0.0,
+        tint: 0.0,
+        glint: 1.5,
+        gloss: 0.7,
         grain: 0.0,
-        shift: 0.0,
         relief: 0.02,
+        // The outline is the rim of the profile, and level; the walls begin at its inner edge.
+        curl: 0.5,
+        curl_depth: 0.5,
         opaque: true,
+        ..Self::GROOVE
     };
+
+    /// What a field is to hold beside depths so that this look can show it. `seed` fixes what is random in it.
+    ///
+    /// ```
+    /// use bevy_crack::{
+    ///     CrackPreset,
+    ///     growth::CrackGrowth,
+    ///     pattern::{Moment, SurfaceFrame},
+    ///     raster::DepthField,
+    /// };
+    ///
+    /// let (preset, frame) = (CrackPreset::GLASS, SurfaceFrame::new([256, 256].into())?);
+    /// let mut growth = CrackGrowth::new(preset.growth.clone(), frame.extent(), 7)?;
+    /// growth.hit([0.5, 0.5].into(), 1.0);
+    /// while growth.step().grew() {}
+    ///
+    /// let mut field = DepthField::new(frame);
+    /// field.lay(preset.look.layer(7));
+    /// let (timeline, mut changed) = (growth.timeline(), Vec::new());
+    /// field.show_layer(growth.network(), timeline, Moment::after(timeline.end()), &mut changed);
+    /// assert!(!changed.is_empty());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub const fn layer(&self, seed: u64) -> LayerPlan {
+        LayerPlan { plates: self.facets.is_some(), crushed: self.crushed, veil: self.veil, seed }
+    }
 }
 
-/// Shortens the tables above.
-const fn stop(depth: f32, color: [f32; 3], cover: f32) -> ColorStop {
+/// Shortens tables.
+pub(super) const fn stop(depth: f32, color: [f32; 3], cover: f32) -> ColorStop {
     ColorStop { depth, color, cover }
 }
 
@@ -136,6 +267,9 @@ pub enum LookError {
 /// The most stops that a [`Look::ramp`] has.
 const MAX_STOPS: usize = 16;
 
+/// Bumps of what swells and fades along cracks, a pattern unit.
+const SPARKLES: f32 = 28.0;
+
 /// Steps of the baked ramp: one for each value of the high byte of a depth.
 const STEPS: usize = 256;
 
@@ -148,7 +282,7 @@ type Ramp = [[Layer; 2]; STEPS + 1];
 
 /// Ramps in use, with the stops that they are made from. Surfaces with the same stops share one: so the processor's caches hold one
 /// while many surfaces are painted, and not each surface's own.
-static RAMPS: Mutex<Vec<(Cow<'static, [ColorStop]>, Weak<Ramp>)>> = Mutex::new(Vec::new());
+static RAMPS: Mutex<Vec<(Vec<ColorStop>, Weak<Ramp>)>> = Mutex::new(Vec::new());
 
 /// No more than so many are shared.
 const MAX_SHARED: usize = 64;
@@ -157,7 +291,21 @@ const MAX_SHARED: usize = 64;
 #[derive(Clone, Debug, PartialEq)]
 pub struct LookTable {
     ramp: Arc<Ramp>,
+    glow: Option<Arc<Ramp>>,
+    pub(super) tint: f32,
     pub(super) glint: f32,
+    pub(super) gloss: f32,
+    pub(super) sparkle: f32,
+    /// Bumps of it a texel.
+    pub(super) sparkle_scale: f32,
+    /// Where rims curl up.
+    pub(super) curve: Option<Box<Curve>>,
+    pub(super) facets: Option<Facets>,
+    /// Colour that plates reflect, 0..=255.
+    pub(super) sheen: [f32; 3],
+    /// Colour of veils, 0..=255, and what a step of their density covers; nothing if there are none.
+    pub(super) veil: [f32; 3],
+    pub(super) veil_cover: f32,
     pub(super) grain: f32,
     pub(super) shift: f32,
     /// From the Sobel sum of `u16` depths to the slope of the surface.
@@ -172,38 +320,73 @@ impl Look {
     /// The first field that is out of its range or not finite.
     pub fn validate(&self) -> Result<(), LookError> {
         let unit = "0..=1";
-        within("ramp.len()", self.ramp.len() as f32, 0.0..=MAX_STOPS as f32, "0..=16")?;
-        let mut above = 0.0;
-        for stop in self.ramp.iter() {
-            within("ramp.depth", stop.depth, above..=1.0, "0..=1, not below the stop before")?;
-            above = stop.depth;
-            for channel in stop.color {
-                within("ramp.color", channel, 0.0..=1.0, unit)?;
+        let ramp = ["ramp.len()", "ramp.depth", "ramp.color", "ramp.cover"];
+        let glow = ["glow.len()", "glow.depth", "glow.color", "glow.cover"];
+        for ([len, depth, color, cover], stops) in [(ramp, &self.ramp), (glow, &self.glow)] {
+            within(len, stops.len() as f32, 0.0..=MAX_STOPS as f32, "0..=16")?;
+            let mut above = 0.0;
+            for stop in stops.iter() {
+                within(depth, stop.depth, above..=1.0, "0..=1, not below the stop before")?;
+                above = stop.depth;
+                for channel in stop.color {
+                    within(color, channel, 0.0..=1.0, unit)?;
+                }
+                within(cover, stop.cover, 0.0..=1.0, unit)?;
             }
-            within("ramp.cover", stop.cover, 0.0..=1.0, unit)?;
         }
+        within("tint", self.tint, 0.0..=1.0, unit)?;
         within("glint", self.glint, 0.0..=4.0, "0..=4")?;
+        within("gloss", self.gloss, 0.0..=4.0, "0..=4")?;
+        within("sparkle", self.sparkle, 0.0..=1.0, unit)?;
         within("grain", self.grain, 0.0..=1.0, unit)?;
         within("shift", self.shift, 0.0..=16.0, "0..=16")?;
-        within("relief", self.relief, 0.0..=1.0, unit)
+        within("relief", self.relief, 0.0..=1.0, unit)?;
+        within("curl", self.curl, 0.0..=1.0, unit)?;
+        within("curl_depth", self.curl_depth, 0.001..=0.5, "0.001..=0.5")?;
+        if let Some(facets) = &self.facets {
+            within("facets.tone", facets.tone, 0.0..=1.0, unit)?;
+            within("facets.tilt", facets.tilt, 0.0..=1.0, unit)?;
+            within("facets.shift", facets.shift, 0.0..=16.0, "0..=16")?;
+            within("facets.gleam", facets.gleam, 0.0..=1.0, unit)?;
+            within("facets.flash", facets.flash, 0.0..=1.0, unit)?;
+            for channel in facets.sheen {
+                within("facets.sheen", channel, 0.0..=1.0, unit)?;
+            }
+            within("facets.near", facets.near, 0.0..=1.0, unit)?;
+        }
+        match self.crushed.as_ref().and_then(Crushed::fault).or(self.veil.as_ref().and_then(Veil::fault)) {
+            Some((field, value, range)) => Err(LookError::OutOfRange { field, value, range }),
+            None => Ok(()),
+        }
     }
 
-    /// Colour and cover at `depth` (0..=1); before the first stop the cover rises from zero, after the last nothing changes.
-    fn at(&self, depth: f32) -> ([f32; 3], f32) {
-        let Some(first) = self.ramp.first() else { return ([0.0; 3], 0.0) };
-        let mut low =
-            ColorStop { depth: 0.0, color: first.color, cover: if first.depth > 0.0 { 0.0 } else { first.cover } };
-        for &high in self.ramp.iter() {
-            if depth < high.depth {
-                let t = (depth - low.depth) / (high.depth - low.depth);
-                let mix = |a: f32, b: f32| a + (b - a) * t;
-                let color = std::array::from_fn(|i| mix(low.color[i], high.color[i]));
-                return (color, mix(low.cover, high.cover));
-            }
-            low = high;
-        }
-        (low.color, low.cover)
+    /// How far down the surface is at each depth, 65536 = at the bottom.
+    fn curve(&self) -> Option<Box<Curve>> {
+        (self.curl > 0.0).then(|| {
+            Box::new(Curve(std::array::from_fn(|step| {
+                let depth = step as f32 / STEPS as f32;
+                let rim = (1.0 - (depth / self.curl_depth - 1.0).abs()).max(0.0);
+                ((depth - self.curl * rim) * 65535.0) as i32
+            })))
+        })
     }
+}
+
+/// Colour and cover at `depth` (0..=1); before the first stop the cover rises from zero, after the last nothing changes.
+fn at(stops: &[ColorStop], depth: f32) -> ([f32; 3], f32) {
+    let Some(first) = stops.first() else { return ([0.0; 3], 0.0) };
+    let mut low =
+        ColorStop { depth: 0.0, color: first.color, cover: if first.depth > 0.0 { 0.0 } else { first.cover } };
+    for &high in stops {
+        if depth < high.depth {
+            let t = (depth - low.depth) / (high.depth - low.depth);
+            let mix = |a: f32, b: f32| a + (b - a) * t;
+            let color = std::array::from_fn(|i| mix(low.color[i], high.color[i]));
+            return (color, mix(low.cover, high.cover));
+        }
+        low = high;
+    }
+    (low.color, low.cover)
 }
 
 pub(super) fn within(
@@ -215,32 +398,30 @@ pub(super) fn within(
     if allowed.contains(&value) { Ok(()) } else { Err(LookError::OutOfRange { field, value, range }) }
 }
 
-impl Look {
-    fn ramp(&self) -> Ramp {
-        let layer = |step: usize| {
-            let (color, cover) = self.at(step as f32 / STEPS as f32);
-            let [r, g, b] = color.map(|channel| 255.0 * channel * cover);
-            Layer::new(r, g, b, cover)
-        };
-        let mut ramp = [[Layer::ZERO; 2]; STEPS + 1];
-        for (step, place) in ramp[1..].iter_mut().enumerate() {
-            *place = [layer(step), layer(step + 1) - layer(step)];
+fn ramp(stops: &[ColorStop]) -> Ramp {
+    let layer = |step: usize| {
+        let (color, cover) = at(stops, step as f32 / STEPS as f32);
+        let [r, g, b] = color.map(|channel| 255.0 * channel * cover);
+        Layer::new(r, g, b, cover)
+    };
+    let mut ramp = [[Layer::ZERO; 2]; STEPS + 1];
+    for (step, place) in ramp[1..].iter_mut().enumerate() {
+        *place = [layer(step), layer(step + 1) - layer(step)];
+    }
+    ramp
+}
+
+fn shared_ramp(wanted: &[ColorStop]) -> Arc<Ramp> {
+    let mut ramps = RAMPS.lock().unwrap_or_else(PoisonError::into_inner);
+    let known = ramps.iter().find(|(stops, _)| **stops == *wanted).and_then(|(_, ramp)| ramp.upgrade());
+    known.unwrap_or_else(|| {
+        ramps.retain(|(_, ramp)| ramp.strong_count() > 0);
+        let ramp = Arc::new(ramp(wanted));
+        if ramps.len() < MAX_SHARED {
+            ramps.push((wanted.to_vec(), Arc::downgrade(&ramp)));
         }
         ramp
-    }
-
-    fn shared_ramp(&self) -> Arc<Ramp> {
-        let mut ramps = RAMPS.lock().unwrap_or_else(PoisonError::into_inner);
-        let known = ramps.iter().find(|(stops, _)| *stops == self.ramp).and_then(|(_, ramp)| ramp.upgrade());
-        known.unwrap_or_else(|| {
-            ramps.retain(|(_, ramp)| ramp.strong_count() > 0);
-            let ramp = Arc::new(self.ramp());
-            if ramps.len() < MAX_SHARED {
-                ramps.push((self.ramp.clone(), Arc::downgrade(&ramp)));
-            }
-            ramp
-        })
-    }
+    })
 }
 
 impl LookTable {
@@ -251,11 +432,42 @@ impl LookTable {
     pub fn new(look: &Look, texels_per_unit: f32) -> Result<Self, LookError> {
         look.validate()?;
         within("texels_per_unit", texels_per_unit, f32::MIN_POSITIVE..=MAX_SIDE as f32, "above 0, up to 16384")?;
-        let ramp = look.shared_ramp();
+        let ramp = shared_ramp(&look.ramp);
+        let glow = (!look.glow.is_empty()).then(|| shared_ramp(&look.glow));
         // Sobel's kernel weighs a slope of one depth step per texel with 8.
         let slope = look.relief * texels_per_unit / (8.0 * 65535.0);
-        let Look { glint, grain, shift, opaque, .. } = *look;
-        Ok(Self { ramp, glint, grain, shift, slope, opaque })
+        let Look { tint, glint, gloss, sparkle, grain, shift, opaque, facets, .. } = *look;
+        Ok(Self {
+            ramp,
+            glow,
+            tint,
+            glint,
+            gloss,
+            sparkle,
+            sparkle_scale: SPARKLES / texels_per_unit,
+            curve: look.curve(),
+            facets,
+            sheen: facets.map_or([0.0; 3], |facets| facets.sheen.map(|channel| 255.0 * channel)),
+            veil: look.veil.map_or([0.0; 3], |veil| veil.color.map(|channel| 255.0 * channel)),
+            veil_cover: look.veil.map_or(0.0, |veil| veil.cover * (1.0 / 255.0)),
+            grain,
+            shift,
+            slope,
+            opaque,
+        })
+    }
+
+    /// Whether cracks give off light.
+    pub(super) const fn glows(&self) -> bool {
+        self.glow.is_some()
+    }
+
+    /// The light at a depth: three colours, 0..=255.
+    pub(super) fn light(&self, depth: u16) -> [f32; 3] {
+        let Some(glow) = &self.glow else { return [0.0; 3] };
+        let [low, gain] = glow[usize::from(depth >> 8) + usize::from(depth != 0)];
+        let [r, g, b, _] = (low + gain * Self::between(depth)).to_array();
+        [r, g, b]
     }
 
     /// What the ramp puts over the picture at `depth`, which lies so far [between](Self::between) two steps.
@@ -290,9 +502,10 @@ mod tests {
 
     #[test]
     fn the_constants_are_valid() {
-        for look in [Look::GROOVE, Look::FROSTED, Look::TOON] {
-            assert_eq!(refused(&look), None);
+        for name in Look::NAMES {
+            assert_eq!(refused(&Look::named(name).unwrap()), None, "{name}");
         }
+        assert_eq!(Look::named("no such"), None);
         assert_eq!(refused(&Look { ramp: vec![].into(), ..Look::GROOVE }), None);
     }
 
@@ -303,6 +516,43 @@ mod tests {
             assert_eq!(refused(&Look { grain: bad, ..Look::GROOVE }), Some("grain"));
             assert_eq!(refused(&Look { shift: bad, ..Look::GROOVE }), Some("shift"));
             assert_eq!(refused(&Look { relief: bad, ..Look::GROOVE }), Some("relief"));
+            assert_eq!(refused(&Look { tint: bad, ..Look::GROOVE }), Some("tint"));
+            assert_eq!(refused(&Look { gloss: bad, ..Look::GROOVE }), Some("gloss"));
+            assert_eq!(refused(&Look { sparkle: bad, ..Look::GROOVE }), Some("sparkle"));
+            assert_eq!(refused(&Look { curl: bad, ..Look::GROOVE }), Some("curl"));
+            assert_eq!(refused(&Look { curl_depth: bad, ..Look::GROOVE }), Some("curl_depth"));
+            let facets = |facets| refused(&Look { facets: Some(facets), ..Look::GROOVE });
+            assert_eq!(facets(Facets { tone: bad, ..Facets::DEFAULT }), Some("facets.tone"));
+            assert_eq!(facets(Facets { tilt: bad, ..Facets::DEFAULT }), Some("facets.tilt"));
+            assert_eq!(facets(Facets { shift: bad, ..Facets::DEFAULT }), Some("facets.shift"));
+            assert_eq!(facets(Facets { gleam: bad, ..Facets::DEFAULT }), Some("facets.gleam"));
+            assert_eq!(facets(Facets { flash: bad, ..Facets::DEFAULT }), Some("facets.flash"));
+            assert_eq!(facets(Facets { sheen: [0.0, 0.0, bad], ..Facets::DEFAULT }), Some("facets.sheen"));
+            assert_eq!(facets(Facets { near: bad, ..Facets::DEFAULT }), Some("facets.near"));
+            let crushed = |crushed| refused(&Look { crushed: Some(crushed), ..Look::GROOVE });
+            assert_eq!(crushed(Crushed { radius: bad, ..Crushed::DEFAULT }), Some("crushed.radius"));
+            assert_eq!(crushed(Crushed { ragged: bad, ..Crushed::DEFAULT }), Some("crushed.ragged"));
+            assert_eq!(crushed(Crushed { soft: bad, ..Crushed::DEFAULT }), Some("crushed.soft"));
+            assert_eq!(crushed(Crushed { hole: bad, ..Crushed::DEFAULT }), Some("crushed.hole"));
+            assert_eq!(crushed(Crushed { depth: bad, ..Crushed::DEFAULT }), Some("crushed.depth"));
+            assert_eq!(crushed(Crushed { rough: bad, ..Crushed::DEFAULT }), Some("crushed.rough"));
+            assert_eq!(crushed(Crushed { grain: bad, ..Crushed::DEFAULT }), Some("crushed.grain"));
+            assert_eq!(crushed(Crushed { color: [0.0, bad, 0.0], ..Crushed::DEFAULT }), Some("crushed.color"));
+            assert_eq!(crushed(Crushed { pale: bad, ..Crushed::DEFAULT }), Some("crushed.pale"));
+            assert_eq!(crushed(Crushed { speckle: bad, ..Crushed::DEFAULT }), Some("crushed.speckle"));
+            assert_eq!(crushed(Crushed { flake: bad, ..Crushed::DEFAULT }), Some("crushed.flake"));
+            assert_eq!(crushed(Crushed { dust: bad, ..Crushed::DEFAULT }), Some("crushed.dust"));
+            assert_eq!(crushed(Crushed { chips: bad, ..Crushed::DEFAULT }), Some("crushed.chips"));
+            assert_eq!(crushed(Crushed { reach: bad, ..Crushed::DEFAULT }), Some("crushed.reach"));
+            let veil = |veil| refused(&Look { veil: Some(veil), ..Look::GROOVE });
+            assert_eq!(veil(Veil { reach: bad, ..Veil::DEFAULT }), Some("veil.reach"));
+            assert_eq!(veil(Veil { full_width: bad, ..Veil::DEFAULT }), Some("veil.full_width"));
+            assert_eq!(veil(Veil { cover: bad, ..Veil::DEFAULT }), Some("veil.cover"));
+            assert_eq!(veil(Veil { color: [bad, 0.0, 0.0], ..Veil::DEFAULT }), Some("veil.color"));
+            let glow = |stops: &[ColorStop]| refused(&Look { glow: stops.to_vec().into(), ..Look::GROOVE });
+            assert_eq!(glow(&[stop(bad, [0.0; 3], 0.0)]), Some("glow.depth"));
+            assert_eq!(glow(&[stop(0.5, [bad, 0.0, 0.0], 0.0)]), Some("glow.color"));
+            assert_eq!(glow(&[stop(0.5, [0.0; 3], bad)]), Some("glow.cover"));
             let ramp = |stops: &[ColorStop]| refused(&Look { ramp: stops.to_vec().into(), ..Look::GROOVE });
             assert_eq!(ramp(&[stop(bad, [0.0; 3], 0.0)]), Some("ramp.depth"));
             assert_eq!(ramp(&[stop(0.5, [0.0, bad, 0.0], 0.0)]), Some("ramp.color"));
@@ -345,9 +595,10 @@ mod tests {
     fn the_ramp_is_linear_between_its_stops() {
         let ramp = vec![stop(0.25, [1.0, 0.0, 0.0], 0.5), stop(0.75, [0.0, 0.0, 1.0], 1.0)];
         let look = Look { ramp: ramp.into(), ..Look::GROOVE };
-        assert_eq!(look.at(0.125), ([1.0, 0.0, 0.0], 0.25));
-        assert_eq!(look.at(0.5), ([0.5, 0.0, 0.5], 0.75));
-        assert_eq!(look.at(1.0), ([0.0, 0.0, 1.0], 1.0));
+        let look_at = |depth| at(&look.ramp, depth);
+        assert_eq!(look_at(0.125), ([1.0, 0.0, 0.0], 0.25));
+        assert_eq!(look_at(0.5), ([0.5, 0.0, 0.5], 0.75));
+        assert_eq!(look_at(1.0), ([0.0, 0.0, 1.0], 1.0));
         let table = LookTable::new(&look, 512.0).unwrap();
         assert_eq!(layer(&table, 0), [0.0; 4]);
         assert_eq!(layer(&table, 0x8000), [0.5 * 0.75 * 255.0, 0.0, 0.5 * 0.75 * 255.0, 0.75]);

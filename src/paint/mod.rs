@@ -1,11 +1,15 @@
 //! A base picture and a depth field to diffuse, normal and depth texels.
 //!
-//! Every painted texel is a function of the base picture and of the depth field in the 3 x 3 texels around it, so a
+//! Every painted texel is a function of the base picture, of the depth field in the 3 x 3 texels around it, and of what the
+//! field holds beside depths at the texel itself (the closed cell it lies in, what a hit has crushed, veils), so a
 //! dirty rectangle painted alone equals the whole painted anew, bit for bit. Where the field is untouched, the
 //! painted texel is the base texel.
 
 mod diffuse;
+mod extras;
+mod glow;
 mod look;
+mod looks;
 mod modulate;
 mod patch;
 mod rows;
@@ -13,6 +17,7 @@ mod rows;
 mod tests;
 mod texel;
 
-pub use look::{ColorStop, Look, LookError, LookTable};
+pub use glow::paint_glow;
+pub use look::{ColorStop, Facets, Look, LookError, LookTable};
 pub use modulate::{Modulation, modulate};
 pub use texel::{BaseTexels, PaintTargets, paint_into, paint_rects};

@@ -7,6 +7,43 @@ use std::ops::Range;
 /// Texels whose colours are computed at once, or copied if all are untouched.
 pub(super) const BLOCK: usize = 8;
 
+/// What depths stand for where rims curl up: how far down the surface is, at depths 0, 256, .. 65536, linear between.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Curve(pub(super) [i32; 257]);
+
+impl Curve {
+    #[inline(always)]
+    fn at(&self, depth: u16) -> i32 {
+        let (step, rest) = (usize::from(depth >> 8), i32::from(depth & 255));
+        let (low, high) = (self.0[step], self.0[step + 1]);
+        low.wrapping_add(high.wrapping_sub(low).wrapping_mul(rest) >> 8)
+    }
+}
+
+/// Slopes by Sobel's operator from the nine values around each place.
+#[inline(always)]
+fn slopes<T: Copy>(
+    [[a, b, c], [d, _, f], [g, h, i]]: [[&[T]; 3]; 3],
+    value: impl Fn(T) -> i32,
+    scale: f32,
+    x: &mut [f32],
+    y: &mut [f32],
+    inv_len: &mut [f32],
+) {
+    let n = x.len();
+    let [a, b, c, d, f, g, h, i] = [a, b, c, d, f, g, h, i].map(|values| &values[..n]);
+    let (y, inv_len) = (&mut y[..n], &mut inv_len[..n]);
+    let gain = |low: T, high: T| value(high).wrapping_sub(value(low));
+    for k in 0..n {
+        let right = gain(a[k], c[k]).wrapping_add(gain(d[k], f[k]) << 1).wrapping_add(gain(g[k], i[k]));
+        let down = gain(a[k], g[k]).wrapping_add(gain(b[k], h[k]) << 1).wrapping_add(gain(c[k], i[k]));
+        let (right, down) = (right as f32 * scale, down as f32 * scale);
+        x[k] = right;
+        y[k] = down;
+        inv_len[k] = 1.0 / (right * right + down * down + 1.0).sqrt();
+    }
+}
+
 /// The depths of a patch and of the texels around it, and what is made of them.
 ///
 /// All texels lie in one line, row after row, so that the loops over them are long whatever the shape: the texel in column
@@ -66,23 +103,45 @@ impl<const ROOM: usize> Patch<ROOM> {
 
     /// Finds what is touched, and the slopes by Sobel's operator; a wall that goes down to the right leans to the right.
     #[inline(always)]
-    pub(super) fn measure(&mut self, scale: f32) {
+    pub(super) fn measure(&mut self, scale: f32, curve: Option<&Curve>) {
         let n = self.len;
         let place = |row: usize, column: usize| &self.depth[row * self.stride + column..][..n];
         let [[a, b, c], [d, e, f], [g, h, i]] = [0, 1, 2].map(|row| [0, 1, 2].map(|column| place(row, column)));
-        let (touch, x, y, inv_len) = (&mut self.touch[..n], &mut self.x[..n], &mut self.y[..n], &mut self.inv_len[..n]);
+        let touch = &mut self.touch[..n];
         for k in 0..n {
             touch[k] = a[k] | b[k] | c[k] | d[k] | e[k] | f[k] | g[k] | h[k] | i[k];
         }
-        let gain = |low: u16, high: u16| i32::from(high).wrapping_sub(i32::from(low));
-        for k in 0..n {
-            let right = gain(a[k], c[k]).wrapping_add(gain(d[k], f[k]) << 1).wrapping_add(gain(g[k], i[k]));
-            let down = gain(a[k], g[k]).wrapping_add(gain(b[k], h[k]) << 1).wrapping_add(gain(c[k], i[k]));
-            let (right, down) = (right as f32 * scale, down as f32 * scale);
-            x[k] = right;
-            y[k] = down;
-            inv_len[k] = 1.0 / (right * right + down * down + 1.0).sqrt();
+        if let Some(curve) = curve {
+            let mut heights = [0; ROOM];
+            for (height, &depth) in heights.iter_mut().zip(&self.depth).take(n + 2 * self.stride + 2) {
+                *height = curve.at(depth);
+            }
+            let place = |row: usize, column: usize| &heights[row * self.stride + column..][..n];
+            let around = [0, 1, 2].map(|row| [0, 1, 2].map(|column| place(row, column)));
+            let (x, y, inv_len) = (&mut self.x[..n], &mut self.y[..n], &mut self.inv_len[..n]);
+            slopes(around, |height| height, scale, x, y, inv_len);
+        } else {
+            let (x, y, inv_len) = (&mut self.x[..n], &mut self.y[..n], &mut self.inv_len[..n]);
+            slopes([[a, b, c], [d, e, f], [g, h, i]], i32::from, scale, x, y, inv_len);
         }
+    }
+
+    /// Adds other slopes to those of the cracks.
+    #[inline(always)]
+    pub(super) fn tilt(&mut self, mut slope: impl FnMut(usize) -> [f32; 2]) {
+        let n = self.len;
+        let (x, y, inv_len) = (&mut self.x[..n], &mut self.y[..n], &mut self.inv_len[..n]);
+        for k in 0..n {
+            let [right, down] = slope(k);
+            x[k] += right;
+            y[k] += down;
+            inv_len[k] = 1.0 / (x[k] * x[k] + y[k] * y[k] + 1.0).sqrt();
+        }
+    }
+
+    /// Places in all rows.
+    pub(super) const fn len(&self) -> usize {
+        self.len
     }
 
     /// Whether a texel of the block at a place is touched, or one beside it.

@@ -2,9 +2,11 @@
 
 use super::{BaseTexels, ColorStop, Look, LookTable, PaintTargets, paint_into, paint_rects, texel::FLAT};
 use crate::{
+    CrackPreset,
+    growth::CrackGrowth,
     math::Rng,
-    pattern::{PathPoint, SegmentPath, SurfaceFrame},
-    raster::{DepthField, DirtyTiles, Profile, TexelRect, stamp_dot, stamp_path_with},
+    pattern::{Moment, PathPoint, SegmentPath, SurfaceFrame},
+    raster::{DepthField, DirtyTiles, Profile, Redrawn, Replay, TexelRect, stamp_dot, stamp_path, stamp_path_with},
 };
 use glam::{UVec2, Vec2};
 
@@ -21,7 +23,17 @@ fn noise_bytes(rng: &mut Rng, n: usize) -> Vec<u8> {
 }
 
 fn looks() -> [Look; 4] {
-    let wild = Look { glint: 4.0, grain: 1.0, shift: 16.0, relief: 1.0, opaque: true, ..Look::GROOVE };
+    let wild = Look {
+        glint: 4.0,
+        gloss: 4.0,
+        grain: 1.0,
+        sparkle: 1.0,
+        shift: 16.0,
+        relief: 1.0,
+        curl: 1.0,
+        opaque: true,
+        ..Look::GROOVE
+    };
     [Look::GROOVE, Look::FROSTED, Look::TOON, wild]
 }
 
@@ -198,7 +210,7 @@ fn an_opaque_crack_covers_glass() {
     let mut field = field(UVec2::splat(8));
     field.depth.as_mut_slice().fill(65535);
     let black = [ColorStop { depth: 1.0, color: [0.0; 3], cover: 1.0 }];
-    let look = Look { ramp: black.to_vec().into(), grain: 0.0, ..Look::FROSTED };
+    let look = Look { ramp: black.to_vec().into(), grain: 0.0, sparkle: 0.0, ..Look::FROSTED };
     let canvas = Canvas {
         size: UVec2::splat(8),
         base: [[200, 100, 50, 60].repeat(64), vec![], vec![]],
@@ -253,7 +265,7 @@ fn green_is_up_and_light_comes_from_the_upper_left() {
     field.depth.row_mut(4).fill(65535);
     let grey = [128, 128, 128, 255].repeat(81);
     let (mut diffuse, mut normal) = (grey.clone(), grey.clone());
-    let look = Look { ramp: vec![].into(), ..Look::GROOVE };
+    let look = Look { ramp: vec![].into(), relief: 0.02, ..Look::GROOVE };
     let mut targets = PaintTargets { diffuse: Some(&mut diffuse), normal: Some(&mut normal), depth: None };
     let base = BaseTexels { size: UVec2::splat(9), diffuse: &grey, normal: None, depth: None };
     paint_into(base, &field, &table(&look, &field), TexelRect::whole(base.size), UVec2::ZERO, &mut targets);
@@ -272,7 +284,7 @@ fn a_slow_ramp_has_no_steps() {
     }
     let ramp =
         [ColorStop { depth: 0.0, color: [0.0; 3], cover: 1.0 }, ColorStop { depth: 1.0, color: [1.0; 3], cover: 1.0 }];
-    let look = Look { ramp: ramp.to_vec().into(), glint: 0.0, grain: 0.0, ..Look::GROOVE };
+    let look = Look { ramp: ramp.to_vec().into(), tint: 0.0, glint: 0.0, grain: 0.0, ..Look::GROOVE };
     let base = [7, 7, 7, 255].repeat(4096);
     let mut out = base.clone();
     let mut targets = PaintTargets { diffuse: Some(&mut out), normal: None, depth: None };
@@ -317,4 +329,118 @@ fn wrong_slices_and_places_are_left_alone() {
     );
     let from_corner = TexelRect { min: UVec2::ZERO, max: UVec2::MAX };
     assert!(try_it(size, &full, &full, from_corner, UVec2::splat(19), 1600)[0], "one texel lies inside");
+}
+
+/// A preset whose growth has ended after some hits, the last ones on the first.
+fn grown(preset: &CrackPreset, frame: SurfaceFrame, rng: &mut Rng) -> CrackGrowth {
+    let mut growth = CrackGrowth::new(preset.growth.clone(), frame.extent(), u64::from(rng.next_u32())).unwrap();
+    for round in 0..4 {
+        let pos = if round == 2 { Vec2::splat(0.4) } else { Vec2::new(rng.unit(), rng.unit()) } * frame.extent();
+        growth.hit(pos, 0.5 + 3.0 * rng.unit());
+        growth.hit(pos, 1.0);
+        for _ in 0..10 + below(rng, 30) {
+            growth.step();
+        }
+    }
+    while growth.step().grew() {}
+    growth
+}
+
+/// The field of a moment, drawn from nothing.
+fn drawn(preset: &CrackPreset, growth: &CrackGrowth, frame: SurfaceFrame, moment: Moment) -> DepthField {
+    let mut field = DepthField::new(frame);
+    field.lay(preset.look.layer(5));
+    let (network, timeline) = (growth.network(), growth.timeline());
+    for path in network.segments().filter_map(|segment| timeline.path_at(network, segment, moment)) {
+        stamp_path(&mut field, &preset.profile, &path);
+    }
+    field.show_layer(network, timeline, moment, &mut Vec::new());
+    field
+}
+
+#[test]
+fn presets_painted_where_they_change_equal_the_whole_at_any_time() {
+    let mut rng = Rng::new(21);
+    let (mut plates, mut spots, mut veils) = (0, 0, 0);
+    for name in CrackPreset::NAMES {
+        let preset = CrackPreset::named(name).unwrap();
+        let size = UVec2::new(150, 110);
+        let frame = SurfaceFrame::new(size).unwrap();
+        let growth = grown(&preset, frame, &mut rng);
+        let (network, timeline) = (growth.network(), growth.timeline());
+        let canvas = Canvas::new(&mut rng, size);
+        let mut field = DepthField::new(frame);
+        field.lay(preset.look.layer(5));
+        let (mut replay, mut redrawn) = (Replay::new(size, preset.profile), Redrawn::default());
+        let (mut dirty, mut rects, mut painted) = (DirtyTiles::new(size), Vec::new(), canvas.untouched());
+        let end = f64::from(timeline.end());
+        let mut moment = Moment::START;
+        for step in 0..40 {
+            // Onwards in small steps, jumps to and fro, and all the way back.
+            moment = match step {
+                39 => Moment::START,
+                38 => Moment::after(timeline.end()),
+                _ if step % 5 == 4 => Moment::nearest(end * f64::from(rng.unit())),
+                _ => Moment::nearest(moment.steps() + end * 0.04 * f64::from(rng.unit())),
+            };
+            replay.show(&mut field, network, timeline, moment, &mut redrawn);
+            redrawn.changed.iter().for_each(|rect| dirty.mark(rect.grow(1, size)));
+            rects.clear();
+            dirty.take_rects(&mut rects);
+            let look = table(&preset.look, &field);
+            canvas.paint_all(&field, &look, &rects, UVec2::ZERO, &mut painted);
+            if step % 3 == 0 || step > 36 {
+                let anew = drawn(&preset, &growth, frame, moment);
+                assert!(field == anew, "{name}: the field at {moment:?}, step {step}");
+                let mut whole = canvas.untouched();
+                canvas.paint(&anew, &look, TexelRect::whole(size), UVec2::ZERO, &mut whole);
+                assert!(painted == whole, "{name}: the picture at {moment:?}, step {step}");
+            }
+            plates += usize::from(field.layer().plates().is_some());
+            spots += usize::from(field.layer().crushed().is_some());
+            veils += usize::from(field.layer().veil().is_some_and(|veil| veil.as_slice().iter().any(|&v| v > 0)));
+        }
+        assert!(painted == canvas.untouched(), "{name}: something is left at the start");
+    }
+    assert!(plates > 100 && spots > 200 && veils > 20, "too little is shown: {plates} {spots} {veils}");
+}
+
+#[test]
+fn presets_that_grow_painted_where_they_change_equal_the_whole() {
+    let mut rng = Rng::new(22);
+    for name in CrackPreset::NAMES {
+        let preset = CrackPreset::named(name).unwrap();
+        let size = UVec2::new(131, 170);
+        let frame = SurfaceFrame::new(size).unwrap();
+        let mut growth = CrackGrowth::new(preset.growth.clone(), frame.extent(), 3).unwrap();
+        let canvas = Canvas::new(&mut rng, size);
+        let mut field = DepthField::new(frame);
+        field.lay(preset.look.layer(5));
+        let look = table(&preset.look, &field);
+        let (mut dirty, mut rects, mut painted) = (DirtyTiles::new(size), Vec::new(), canvas.untouched());
+        let mut segments = Vec::new();
+        for step in 0..60 {
+            if step % 15 == 0 {
+                growth.hit(Vec2::new(rng.unit(), rng.unit()) * frame.extent(), 0.5 + rng.unit());
+            }
+            growth.step();
+            growth.take_changed(&mut segments);
+            for path in segments.drain(..).filter_map(|segment| growth.network().path(segment)) {
+                stamp_path_with(&mut field, &preset.profile, &path, &mut |rect| rects.push(rect));
+            }
+            let timeline = growth.timeline();
+            field.show_layer(growth.network(), timeline, Moment::after(timeline.end()), &mut rects);
+            rects.drain(..).for_each(|rect| dirty.mark(rect.grow(1, size)));
+            dirty.take_rects(&mut rects);
+            canvas.paint_all(&field, &look, &rects, UVec2::ZERO, &mut painted);
+            rects.clear();
+            if step % 6 == 5 {
+                let mut whole = canvas.untouched();
+                canvas.paint(&field, &look, TexelRect::whole(size), UVec2::ZERO, &mut whole);
+                assert!(painted == whole, "{name}, step {step}");
+            }
+        }
+        let anew = drawn(&preset, &growth, frame, Moment::after(growth.timeline().end()));
+        assert!(field.layer() == anew.layer(), "{name}: what has come step by step is not what comes at once");
+    }
 }

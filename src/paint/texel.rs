@@ -9,6 +9,7 @@
 use super::{
     LookTable,
     diffuse::{Frame, diffuse_patch},
+    extras::Extras,
     patch::{BLOCK, Patch},
     rows::{Rgba, depth_row, flat_row, tilted_row},
 };
@@ -140,10 +141,16 @@ struct Job<'a> {
 impl Job<'_> {
     fn paint<const ROOM: usize>(&mut self, rects: impl Iterator<Item = TexelRect>) {
         let mut patch = Patch::EMPTY;
-        rects.for_each(|rect| self.paint_rect::<ROOM>(rect, &mut patch));
+        let mut extras = Extras::of(self.field, self.look);
+        rects.for_each(|rect| self.paint_rect::<ROOM>(rect, &mut patch, &mut extras));
     }
 
-    fn paint_rect<const ROOM: usize>(&mut self, rect: TexelRect, patch: &mut Patch<ROOM>) {
+    fn paint_rect<const ROOM: usize>(
+        &mut self,
+        rect: TexelRect,
+        patch: &mut Patch<ROOM>,
+        extras: &mut Option<Extras<'_, ROOM>>,
+    ) {
         let size = rect.size();
         let width = size.x.min(WIDE as u32);
         // A patch has two rows and columns more than are painted; the room suffices for one row at least.
@@ -152,8 +159,10 @@ impl Job<'_> {
             for x in (rect.min.x..rect.max.x).step_by(WIDE) {
                 let min = UVec2::new(x, y);
                 let part = TexelRect { min, max: (min + UVec2::new(width, height)).min(rect.max) };
-                if patch.load(&self.field.depth, part) {
-                    self.paint_patch(patch, part);
+                let is_touched = patch.load(&self.field.depth, part);
+                let extras = extras.as_mut().filter(|extras| extras.touches(part));
+                if is_touched || extras.is_some() {
+                    self.paint_patch(patch, extras, part);
                 } else {
                     self.restore(part);
                 }
@@ -213,20 +222,50 @@ impl Job<'_> {
         std::hint::black_box(sum);
     }
 
-    fn paint_patch<const ROOM: usize>(&mut self, patch: &mut Patch<ROOM>, rect: TexelRect) {
-        widest(
-            #[inline(always)]
-            || self.paint_texels(patch, rect),
-        );
+    fn paint_patch<const ROOM: usize>(
+        &mut self,
+        patch: &mut Patch<ROOM>,
+        extras: Option<&mut Extras<'_, ROOM>>,
+        rect: TexelRect,
+    ) {
+        match extras {
+            None => widest(
+                #[inline(always)]
+                || self.paint_texels(patch, None, rect),
+            ),
+            Some(extras) => widest(
+                #[inline(always)]
+                || {
+                    extras.load(rect);
+                    self.paint_texels(patch, Some(extras), rect);
+                },
+            ),
+        }
     }
 
     #[inline(always)]
-    fn paint_texels<const ROOM: usize>(&mut self, patch: &mut Patch<ROOM>, rect: TexelRect) {
+    fn paint_texels<const ROOM: usize>(
+        &mut self,
+        patch: &mut Patch<ROOM>,
+        mut extras: Option<&mut Extras<'_, ROOM>>,
+        rect: TexelRect,
+    ) {
         if self.diffuse_out.is_some() || self.normal_out.is_some() {
-            patch.measure(self.look.slope);
+            patch.measure(self.look.slope, self.look.curve.as_deref());
+            if let Some(extras) = &mut extras {
+                extras.mark(patch);
+            }
         }
         if let Some(out) = &mut self.diffuse_out {
-            diffuse_patch(out, &self.frame, patch, self.look, rect);
+            match &extras {
+                None => diffuse_patch::<ROOM, false>(out, &self.frame, patch, None, self.look, rect),
+                Some(extras) => diffuse_patch::<ROOM, true>(out, &self.frame, patch, Some(extras), self.look, rect),
+            }
+        }
+        if self.normal_out.is_some()
+            && let Some(extras) = &extras
+        {
+            extras.tilt(patch);
         }
         for (row, y) in (rect.min.y..rect.max.y).enumerate() {
             let range = self.range(rect, y);

@@ -8,7 +8,7 @@
 //!
 //! Directions are compared by exact cross products of whole numbers, never by angles.
 
-use super::{NO_PARENT, Network};
+use super::{NO_PARENT, Network, SegmentId, Timeline};
 use glam::Vec2;
 use std::{
     collections::{BTreeMap, HashMap},
@@ -164,6 +164,50 @@ pub struct CellTracker {
     cells: Vec<Cell>,
     /// Cells whose area has to be computed again.
     touched: Vec<u32>,
+    /// Each cell as it was when it closed, if that is wanted.
+    closings: Option<Closings>,
+}
+
+/// The cells of a network, each as it was at the moment it closed: later ones have been cut off it since.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Closings {
+    list: Vec<Closing>,
+    /// All outlines, one after the other.
+    points: Vec<Vec2>,
+}
+
+/// A cell at the moment it closed. The first in the list is cell 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Closing {
+    /// Step of the timeline in which the segment comes that closes it.
+    pub(crate) birth: u32,
+    /// The impact of that segment.
+    pub(crate) impact: u32,
+    /// The cell that it was a part of before.
+    pub(crate) host: u32,
+    /// Area inside the outline, pattern units squared, and its centre.
+    pub(crate) area: f32,
+    pub(crate) centroid: Vec2,
+    first: usize,
+    end: usize,
+}
+
+impl Closings {
+    pub(crate) fn all(&self) -> &[Closing] {
+        &self.list
+    }
+
+    /// The straight outline, pattern units.
+    pub(crate) fn outline(&self, closing: &Closing) -> &[Vec2] {
+        self.points.get(closing.first..closing.end).unwrap_or_default()
+    }
+
+    fn push(&mut self, cause: Cause, host: u32, (area, centroid): (f32, Vec2), outline: impl Iterator<Item = Vec2>) {
+        let first = self.points.len();
+        self.points.extend(outline);
+        let Cause { birth, impact } = cause;
+        self.list.push(Closing { birth, impact, host, area, centroid, first, end: self.points.len() });
+    }
 }
 
 impl CellTracker {
@@ -189,12 +233,23 @@ impl CellTracker {
             loops: Vec::new(),
             cells: Vec::new(),
             touched: Vec::new(),
+            closings: None,
         };
         tracker.corner = tracker.whole(extent);
         if valid && tracker.corner[0] > 0 && tracker.corner[1] > 0 {
             tracker.lay_border();
         }
         tracker
+    }
+
+    /// The same, which keeps of each cell what it was when it closed.
+    pub(crate) fn recording(extent: Vec2) -> Self {
+        Self { closings: Some(Closings::default()), ..Self::new(extent) }
+    }
+
+    /// What was kept by a tracker that is [`recording`](Self::recording).
+    pub(crate) const fn closings(&self) -> Option<&Closings> {
+        self.closings.as_ref()
     }
 
     fn lay_border(&mut self) {
@@ -232,21 +287,9 @@ impl CellTracker {
             if let Some(link) = links.get(self.links)
                 && nodes.get(i).is_none_or(|node| link.birth < node.birth && (link.a.max(link.b) as usize) < i)
             {
-                self.links += 1;
-                if let (Some(a), Some(b)) = (nodes.get(link.a as usize), nodes.get(link.b as usize)) {
-                    let cause = Cause { birth: link.birth, impact: a.impact.max(b.impact) };
-                    self.join(self.vertex_of[link.a as usize], self.vertex_of[link.b as usize], cause);
-                }
+                self.add_link(network, link.birth);
             } else {
-                let node = nodes[i];
-                let vertex = self.add_vertex(i as u32, node.pos);
-                self.vertex_of.push(vertex);
-                if node.parent != NO_PARENT
-                    && let Some(&parent) = self.vertex_of.get(node.parent as usize)
-                {
-                    let impact = node.impact.max(nodes[node.parent as usize].impact);
-                    self.join(parent, vertex, Cause { birth: node.birth, impact });
-                }
+                self.add_node(network, nodes[i].birth);
             }
         }
         self.touched.sort_unstable();
@@ -255,6 +298,51 @@ impl CellTracker {
         touched.drain(..).for_each(|cell| self.measure(cell));
         self.touched = touched;
         first..self.cells.len() as u32
+    }
+
+    /// As [`update`](Self::update), in the order of a timeline, whose steps count as births: hits in the middle of growth do not change it
+    /// either.
+    pub(crate) fn follow(&mut self, network: &Network, timeline: &Timeline) {
+        let (nodes, links) = (network.nodes(), network.links());
+        while !self.cells.is_empty() && (self.vertex_of.len() < nodes.len() || self.links < links.len()) {
+            let (i, k) = (self.vertex_of.len() as u32, self.links as u32);
+            let is_next = links.get(self.links).is_some_and(|link| {
+                link.a.max(link.b) < i && timeline.nodes_before(k).is_none_or(|before| before <= i)
+            });
+            if is_next || i as usize >= nodes.len() {
+                self.add_link(network, timeline.step_of(SegmentId::Link(k)).unwrap_or(u32::MAX));
+            } else {
+                self.add_node(network, timeline.step_of(SegmentId::Branch(i)).unwrap_or(u32::MAX));
+            }
+        }
+        self.touched.clear();
+    }
+
+    /// Takes in the next link.
+    fn add_link(&mut self, network: &Network, birth: u32) {
+        let Some(link) = network.links().get(self.links) else { return };
+        self.links += 1;
+        let [a, b] = [link.a, link.b].map(|node| {
+            let vertex = self.vertex_of.get(node as usize)?;
+            Some((*vertex, network.nodes().get(node as usize)?.impact))
+        });
+        if let (Some((a, impact)), Some((b, other))) = (a, b) {
+            self.join(a, b, Cause { birth, impact: impact.max(other) });
+        }
+    }
+
+    /// Takes in the next node, with the branch that leads to it.
+    fn add_node(&mut self, network: &Network, birth: u32) {
+        let i = self.vertex_of.len();
+        let Some(node) = network.nodes().get(i) else { return };
+        let vertex = self.add_vertex(i as u32, node.pos);
+        self.vertex_of.push(vertex);
+        if node.parent != NO_PARENT
+            && let Some(&parent) = self.vertex_of.get(node.parent as usize)
+        {
+            let impact = network.nodes().get(node.parent as usize).map_or(node.impact, |parent| parent.impact);
+            self.join(parent, vertex, Cause { birth, impact: impact.max(node.impact) });
+        }
     }
 
     /// All cells by their number; the first is what no crack has cut off yet.
@@ -376,6 +464,11 @@ impl CellTracker {
 
     /// Names along a loop, without the ways to dead ends and back.
     fn trace(&self, start: u32) -> Vec<u32> {
+        self.corners(start).into_iter().map(|vertex| self.vertices[vertex as usize].name).collect()
+    }
+
+    /// Vertices along a loop, as in [`trace`](Self::trace).
+    fn corners(&self, start: u32) -> Vec<u32> {
         let mut line: Vec<u32> = Vec::new();
         for half_edge in self.walk(start) {
             if line.last() == Some(&(half_edge ^ 1)) {
@@ -389,7 +482,7 @@ impl CellTracker {
         while ends.len() > 1 && line[ends.start] == line[ends.end - 1] ^ 1 {
             ends = ends.start + 1..ends.end - 1;
         }
-        line[ends].iter().map(|&h| self.vertices[self.origin[h as usize] as usize].name).collect()
+        line[ends].iter().map(|&h| self.origin[h as usize]).collect()
     }
 
     fn sums_from(&self, start: u32) -> Sums {
@@ -600,6 +693,13 @@ impl CellTracker {
             _ => self.cell_around(self.at(self.origin[new as usize]), Some(id)),
         };
         self.hand_over_holes(host, id);
+        if let Some(mut closings) = self.closings.take() {
+            let sums = self.loops[new_loop as usize].sums;
+            let corners = self.corners(new);
+            let outline = corners.into_iter().map(|vertex| self.vertices[vertex as usize].pos);
+            closings.push(Cause { birth, impact }, host, self.area_and_centre(sums, new), outline);
+            self.closings = Some(closings);
+        }
         if !matches!(side, Side::Cell(_)) {
             self.loops[old_loop as usize].side = Side::Around { host };
             self.cells[host as usize].holes.push(old);
@@ -662,6 +762,13 @@ impl CellTracker {
         for &hole in holes {
             sums.add(self.loops[self.loop_root(hole) as usize].sums);
         }
+        let (area, centroid) = self.area_and_centre(sums, start);
+        let cell = &mut self.cells[cell as usize];
+        (cell.area, cell.centroid) = (area, centroid);
+    }
+
+    /// Area and centre of what has these sums; that of nothing is where the half-edge `start` begins.
+    fn area_and_centre(&self, sums: Sums, start: u32) -> (f32, Vec2) {
         let area = sums.area as f64;
         let centroid = if sums.area == 0 {
             self.vertices[self.origin[start as usize] as usize].pos
@@ -669,9 +776,7 @@ impl CellTracker {
             let [x, y] = sums.moment.map(|moment| moment as f64 / (3.0 * area) / self.scale);
             Vec2::new(x as f32, y as f32)
         };
-        let cell = &mut self.cells[cell as usize];
-        cell.area = (0.5 * area / (self.scale * self.scale)) as f32;
-        cell.centroid = centroid;
+        ((0.5 * area / (self.scale * self.scale)) as f32, centroid)
     }
 }
 

@@ -14,10 +14,11 @@ mod path;
 pub(crate) mod random;
 mod timeline;
 
+pub(crate) use cells::Closing;
 pub use cells::{CORNERS, Cell, CellTracker};
 pub use frame::{FrameError, MAX_ASPECT, MAX_SIDE, SurfaceFrame};
 pub use mask::{CrackMask, MaskError};
 pub use network::{Link, LinkKind, NO_IMPACT, NO_PARENT, Network, Node, SegmentId};
 pub use path::{MAX_PATH_POINTS, PathPoint, SegmentPath};
-pub(crate) use timeline::Entries;
 pub use timeline::{Dot, Moment, Timeline};
+pub(crate) use timeline::{Entries, Strike};

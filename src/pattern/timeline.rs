@@ -102,9 +102,21 @@ pub struct Timeline {
     links: Vec<LinkBirth>,
     widenings: Vec<Widening>,
     dots: Vec<(u32, Dot)>,
+    strikes: Vec<Strike>,
     /// The longest opening, and the step after which all that open are open.
     longest: u32,
     open: u32,
+}
+
+/// A hit that began an impact or added to one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Strike {
+    step: u32,
+    /// The impact, where it is in pattern units, and its energy before and after.
+    pub(crate) impact: u32,
+    pub(crate) pos: Vec2,
+    pub(crate) before: f32,
+    pub(crate) energy: f32,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -122,6 +134,8 @@ struct LinkBirth {
     step: u32,
     /// As of a node.
     opening: u32,
+    /// Nodes that came before it.
+    after: u32,
 }
 
 /// Width at `moment` of what comes in a step and opens to `width` in so many further ones, evenly from nothing at the start of the
@@ -151,6 +165,7 @@ pub(crate) struct Entries {
     pub(crate) links: usize,
     pub(crate) widenings: usize,
     pub(crate) dots: usize,
+    pub(crate) strikes: usize,
 }
 
 impl Timeline {
@@ -182,7 +197,7 @@ impl Timeline {
 
     /// The next link comes, and opens to its width in so many further steps.
     pub(crate) fn add_opening_link(&mut self, opening: u32) {
-        self.links.push(LinkBirth { step: self.now, opening });
+        self.links.push(LinkBirth { step: self.now, opening, after: self.nodes.len() as u32 });
         self.opens(opening);
     }
 
@@ -204,10 +219,21 @@ impl Timeline {
         self.dots.push((self.now, dot));
     }
 
+    /// An impact at `pos` comes, or has more energy than `before`.
+    pub(crate) fn strike(&mut self, impact: u32, pos: Vec2, before: f32, energy: f32) {
+        self.strikes.push(Strike { step: self.now, impact, pos, before, energy });
+    }
+
+    /// All hits, in order; those in [`entries`](Self::entries) have come.
+    pub(crate) fn strikes(&self) -> &[Strike] {
+        &self.strikes
+    }
+
     /// Forgets the first nodes, and all links but those with the numbers `left`.
     pub(crate) fn forget(&mut self, first: u32, left: &[u32]) {
         self.nodes.drain(..first as usize);
         self.links = left.iter().filter_map(|&link| self.links.get(link as usize).copied()).collect();
+        self.links.iter_mut().for_each(|link| link.after = link.after.saturating_sub(first));
         self.nodes.iter_mut().for_each(|birth| birth.latest = NONE);
         let since = self.nodes.first().map_or(u32::MAX, |birth| birth.step);
         self.dots.retain(|dot| dot.0 >= since);
@@ -230,6 +256,7 @@ impl Timeline {
             self.links.last().map(|birth| birth.step),
             self.widenings.last().map(|widening| widening.step),
             self.dots.last().map(|dot| dot.0),
+            self.strikes.last().map(|strike| strike.step),
         ];
         let is_empty = self.nodes.is_empty() && self.links.is_empty();
         last.into_iter().flatten().max().unwrap_or(0).max(if is_empty { 0 } else { self.open })
@@ -248,7 +275,7 @@ impl Timeline {
         let widths = match segment {
             SegmentId::Branch(_) => (self.width_at(a, moment)?, self.width_at(b, moment)?),
             SegmentId::Link(i) => {
-                let LinkBirth { step, opening } = *self.links.get(i as usize)?;
+                let LinkBirth { step, opening, .. } = *self.links.get(i as usize)?;
                 let width = opened(network.links().get(i as usize)?.width, step, opening, moment);
                 (width, width)
             }
@@ -303,6 +330,11 @@ impl Timeline {
         }
     }
 
+    /// How many nodes came before a link.
+    pub(crate) fn nodes_before(&self, link: u32) -> Option<u32> {
+        self.links.get(link as usize).map(|link| link.after)
+    }
+
     /// The nodes and the links that have come by the end of step `step` and open on after it.
     pub(crate) fn opening(&self, step: u32) -> (impl Iterator<Item = usize>, impl Iterator<Item = usize>) {
         // Those before have opened for as long as any do.
@@ -332,6 +364,7 @@ impl Timeline {
             links: self.links.partition_point(|birth| birth.step <= step),
             widenings: self.widenings.partition_point(|widening| widening.step <= step),
             dots: self.dots.partition_point(|dot| dot.0 <= step),
+            strikes: self.strikes.partition_point(|strike| strike.step <= step),
         }
     }
 }

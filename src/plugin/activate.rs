@@ -134,7 +134,9 @@ fn apply(world: &mut World, entity: Entity, hit: QueuedHit) -> Result<HitOutcome
     const GONE: &str = "the surface is gone";
     let active = world.resource::<Surfaces>().active.get(&entity);
     let kind = active.map(|active| active.carrier.kind).or_else(|| carrier::inspect(world, entity).0).ok_or(GONE)?;
-    let uv = locate(world, entity, kind, hit.at)?;
+    let is_blank = active.is_some_and(|active| active.growth.network().nodes().is_empty());
+    let at = (kind.aim)(world, entity, &hit, is_blank);
+    let uv = locate(world, entity, kind, at)?;
     let mut surfaces = world.resource_mut::<Surfaces>();
     let active = surfaces.active.get_mut(&entity).ok_or(GONE)?;
     let texel = active.field.frame.to_texel(active.field.frame.uv_to_pos(uv)).max(Vec2::ZERO).as_uvec2();
@@ -274,5 +276,6 @@ pub(super) fn make_textures(
         diffuse: add(&textures::DIFFUSE, reuse.map(|t| &t.diffuse))?,
         normal: add(&textures::NORMAL, reuse.map(|t| &t.normal))?,
         depth: add(&textures::DEPTH, reuse.map(|t| &t.depth))?,
+        emissive: add(&textures::EMISSIVE, reuse.map(|t| &t.emissive))?,
     })
 }

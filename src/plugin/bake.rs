@@ -9,11 +9,13 @@ use super::{
     BakeProgress, CrackBaked, CrackBudget, CrackError, CrackFailed,
     budget::FrameClock,
     error::Called,
+    later::hold,
     plan::Plan,
     read::{self, Read, Reading},
 };
 use begin::begin;
 use bevy::{
+    ecs::entity::EntityHashSet,
     prelude::*,
     tasks::{AsyncComputeTaskPool, Task, futures::check_ready},
 };
@@ -36,8 +38,8 @@ const SHARE: f32 = 0.9;
 #[derive(Resource, Default)]
 pub(super) struct Bakes {
     list: Vec<(Entity, Bake)>,
-    /// Bakes were cancelled while the list was worked on.
-    cancelled: Vec<Entity>,
+    /// While the list is worked on: the bakes that were cancelled meanwhile.
+    cancelled: Option<EntityHashSet>,
     /// Whether tasks turned out to run in place.
     pub(super) no_threads: bool,
 }
@@ -74,14 +76,18 @@ impl Bakes {
     /// Begins a bake anew.
     pub(super) fn want(&mut self, entity: Entity) {
         self.cancel(entity);
-        self.cancelled.retain(|cancelled| *cancelled != entity);
+        if let Some(cancelled) = &mut self.cancelled {
+            cancelled.remove(&entity);
+        }
         self.list.push((entity, Bake { work: Work::Wanted, plan: None, rounds: 0 }));
     }
 
     /// Ends a bake without a word.
     pub(super) fn cancel(&mut self, entity: Entity) {
         self.list.retain(|(baked, _)| *baked != entity);
-        self.cancelled.push(entity);
+        if let Some(cancelled) = &mut self.cancelled {
+            cancelled.insert(entity);
+        }
     }
 
     /// What was read of the picture before this frame is another one now.
@@ -232,16 +238,30 @@ impl Job {
 
 /// Works on all bakes: starts those that can start, asks those on tasks, and makes slices of those that have none.
 pub(super) fn bake_guided(world: &mut World) {
+    for (entity, result) in hold(world, work_on_bakes) {
+        end(world, entity, result);
+    }
+}
+
+/// Returns those that have ended.
+fn work_on_bakes(world: &mut World) -> Vec<(Entity, Result<Option<f32>, CrackError>)> {
     let timer = world.resource::<FrameClock>().start(world.resource::<CrackBudget>(), SHARE);
     let mut bakes = world.resource_mut::<Bakes>();
-    bakes.cancelled.clear();
+    bakes.cancelled = Some(EntityHashSet::default());
     let mut list = core::mem::take(&mut bakes.list);
     let pool = bakes.pool();
     let mut room = pool.map_or(1, |pool| pool.thread_num().max(1));
     room = room.saturating_sub(list.iter().filter(|(_, bake)| bake.work.is_running()).count());
     let mut left = read::MAX_BYTES;
     let mut ended = Vec::new();
+    let is_cancelled = |world: &World, entity| {
+        let cancelled = &world.resource::<Bakes>().cancelled;
+        cancelled.as_ref().is_some_and(|cancelled| cancelled.contains(&entity))
+    };
     list.retain_mut(|(entity, bake)| {
+        if is_cancelled(world, *entity) {
+            return false;
+        }
         let result = loop {
             match core::mem::replace(&mut bake.work, Work::Wanted) {
                 Work::Wanted => match begin(world, *entity, bake) {
@@ -329,14 +349,13 @@ pub(super) fn bake_guided(world: &mut World) {
     // What was begun or cancelled meanwhile has the last word.
     let mut bakes = world.resource_mut::<Bakes>();
     let newer = core::mem::take(&mut bakes.list);
-    let cancelled = core::mem::take(&mut bakes.cancelled);
+    let cancelled = bakes.cancelled.take().unwrap_or_default();
     list.retain(|(entity, _)| !cancelled.contains(entity) && newer.iter().all(|(other, _)| other != entity));
     list.extend(newer);
     bakes.list = list;
+    ended.retain(|(entity, _)| !cancelled.contains(entity));
     world.resource_mut::<FrameClock>().stop(&timer);
-    for (entity, result) in ended {
-        end(world, entity, result);
-    }
+    ended
 }
 
 fn tell(world: &mut World, entity: Entity, progress: f32) {
@@ -387,6 +406,31 @@ mod tests {
         let outcome = guarded(|| -> Result<(), CrackError> { panic!("no {}", "luck") });
         assert_eq!(outcome, Err(CrackError::Bake { reason: "it panicked: no luck".into() }));
         assert_eq!(guarded(|| Ok(7)), Ok(7));
+    }
+
+    /// Whatever is healed, closed or despawned in the frames is not remembered.
+    #[cfg(feature = "2d")]
+    #[test]
+    fn s3_nothing_is_kept_of_what_was_cancelled() {
+        use crate::plugin::prelude::*;
+        let mut app = app(CrackBudget::default());
+        let image = app.world_mut().resource_mut::<Assets<Image>>().add(blank(UVec2::splat(16)));
+        for _ in 0..20 {
+            let surface = || (Sprite::from_image(image.clone()), CrackSurface::default());
+            let all: Vec<Entity> = (0..100).map(|_| app.world_mut().spawn(surface()).id()).collect();
+            for (i, entity) in all.iter().enumerate() {
+                let mut commands = app.world_mut().commands();
+                match i % 3 {
+                    0 => _ = commands.entity(*entity).heal_cracks(),
+                    1 => _ = commands.entity(*entity).close_cracks(1.0),
+                    _ => _ = commands.entity(*entity).remove::<CrackSurface>(),
+                }
+            }
+            app.update();
+            all.into_iter().for_each(|entity| _ = app.world_mut().despawn(entity));
+            let bakes = app.world().resource::<Bakes>();
+            assert!(bakes.list.is_empty() && bakes.cancelled.is_none());
+        }
     }
 
     /// Frames until the bake has ended, and the progress after each.

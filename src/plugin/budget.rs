@@ -26,7 +26,13 @@ pub struct CrackBudget {
     pub max_texture_bytes: u64,
     /// Longest side of a texture, texels; default 8192. The device's own limit holds as well.
     pub max_side: u32,
-    /// Shards that are shown at once, of all surfaces together; default 4096. The oldest make room for new ones.
+    /// Shards that there are at once, of all surfaces together, shown or kept to serve again; default 4096. Each is an entity, in 3D with
+    /// one more for its sides.
+    ///
+    /// A surface that would break into more than this breaks into fewer and larger ones. Where several have broken, the oldest
+    /// shards make room for new ones, and pieces that would [break again](super::ShatterCracks::again) stay whole when their time has come
+    /// if there is no room for all their fragments, in the order in which the surfaces broke. While none is shown, up to 256 are kept to
+    /// serve again.
     pub max_shards: usize,
 }
 

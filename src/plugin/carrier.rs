@@ -1,9 +1,10 @@
 //! [`Carrier`]: what shows a surface's pictures, a sprite or a material.
 
 use super::{
-    CrackError, CrackMaps, CrackSurface, CrackTextures, Shard, layout::Layout, preset, shards::Plane, surfaces::Active,
+    CrackError, CrackMaps, CrackSurface, CrackTextures, HitPoint, Shard, layout::Layout, preset, queue::QueuedHit,
+    shards::Plane, surfaces::Active,
 };
-use crate::CrackPreset;
+use crate::{CrackPreset, raster::TexelRect};
 #[cfg(feature = "2d")]
 use bevy::sprite::SpriteImageMode;
 use bevy::{
@@ -64,22 +65,26 @@ pub(super) struct Kind {
     /// Width of the whole picture over its height, as it is shown in the world, the picture having this size and the crate having given
     /// that to a sprite; `None` where there is no telling.
     pub(super) aspect: fn(&World, Entity, picture: Option<Vec2>, given: Option<Vec2>) -> Option<f32>,
+    /// Whether its textures are to hold the picture twice, see [`Faces`](super::faces::Faces).
+    pub(super) is_twofold: fn(&World, Entity) -> bool,
+    /// Says where a hit lands, having chosen what of it cracks if it has no cracks yet.
+    pub(super) aim: fn(&mut World, Entity, &QueuedHit, is_blank: bool) -> HitPoint,
     /// Texture coordinates in the shown part of a point in the entity's own space.
     pub(super) locate: fn(&World, Entity, Vec3) -> Result<Vec2, &'static str>,
     /// Whether its shards have thickness.
     pub(super) is_solid: bool,
     /// Where its picture lies in the entity's own space, if that is flat.
     pub(super) plane: fn(&World, Entity, &Active) -> Result<Plane, &'static str>,
-    /// Makes what it shows transparent where its texture is.
-    pub(super) open: fn(&mut World, &Carrier),
+    /// Makes what it shows transparent where its texture is, or has no holes any more.
+    pub(super) open: fn(&mut World, Entity, &Carrier, has_holes: bool),
     /// The material of its shards, with the picture given, so much of it being there (0..=1).
     pub(super) shard_material: fn(&mut World, Entity, &Carrier, &Handle<Image>, f32) -> Option<UntypedHandle>,
     /// The material of their sides, if they have any, of a picture of this mean colour (sRGB).
     pub(super) inside: fn(&mut World, &Carrier, [f32; 3], f32) -> Option<UntypedHandle>,
-    /// Makes entities of shards, all at a stroke.
-    pub(super) spawn: fn(&mut World, Vec<(Shard, Clothes)>) -> Vec<Entity>,
+    /// Makes entities of shards; `None` where their surface has gone meanwhile.
+    pub(super) spawn: fn(&mut World, Vec<(Shard, Clothes)>) -> Vec<Option<Entity>>,
     /// The same for their sides.
-    pub(super) spawn_sides: fn(&mut World, Vec<Clothes>) -> Vec<Entity>,
+    pub(super) spawn_sides: fn(&mut World, Vec<Clothes>) -> Vec<Option<Entity>>,
     /// Makes a shard, or the sides of one, of an entity that was one.
     pub(super) dress: fn(&mut EntityWorldMut, Option<Shard>, Clothes),
     /// Gives a shard another material.
@@ -120,6 +125,8 @@ pub(super) struct Carrier {
     pub(super) mesh: Option<(Handle<Mesh>, Handle<Mesh>)>,
     /// The size that was given to the sprite.
     pub(super) size: Option<Vec2>,
+    /// Whether its textures hold the picture twice, one above the other: the upper one cracks.
+    pub(super) is_twofold: bool,
     /// How the sprite laid out its picture, if its texture has it laid out.
     #[cfg(feature = "2d")]
     pub(super) mode: Option<SpriteImageMode>,
@@ -134,9 +141,15 @@ impl Carrier {
             own: None,
             mesh: None,
             size: None,
+            is_twofold: false,
             #[cfg(feature = "2d")]
             mode: None,
         }
+    }
+
+    /// What of textures of this size cracks where all of a picture is shown.
+    pub(super) fn whole(&self, texels: UVec2) -> TexelRect {
+        TexelRect::whole(if self.is_twofold { UVec2::new(texels.x, texels.y / 2) } else { texels })
     }
 
     /// Ids of the pictures it was made from.

@@ -9,6 +9,7 @@ use super::{
     budget::{FrameClock, Timer},
     paint::tell_painted,
     surfaces::{Active, Surfaces, Touched},
+    textures::MAPS,
     upload::{Stager, Uploads},
 };
 use crate::{
@@ -97,7 +98,7 @@ impl Out {
 
 impl Film {
     /// Of a growth all of whose times are to be shown, and of the texels that are shown first: beside the frames, as both are copied.
-    pub(super) fn new(growth: &CrackGrowth, texels: &[Option<Vec<u8>>; 3]) -> Self {
+    pub(super) fn new(growth: &CrackGrowth, texels: &[Option<Vec<u8>>; MAPS]) -> Self {
         let back = Back { texels: texels.clone(), behind: Vec::new() };
         Self { score: Some(Score::of(growth)), back: Some(back), ..Self::default() }
     }
@@ -128,7 +129,7 @@ impl Film {
             redrawn: Redrawn::default(),
             stage: Stage::Begin,
             changed: Vec::new(),
-            staged: [const { None }; 3],
+            staged: [const { None }; MAPS],
         });
         (active.is_dirty, active.is_late) = (true, false);
         self.shot = Some(Out::start(shot, has_threads));
@@ -202,6 +203,7 @@ impl Active {
         let frame = self.field.frame;
         self.field = DepthField::new(frame);
         self.field.forbid(self.growth.mask());
+        self.field.lay(self.preset.look.layer(self.surface.seed));
         self.touched = Touched::new(frame.size());
         let (profile, whole) = (self.profile, TexelRect::whole(frame.size()));
         if let Some(playback) = &mut self.playback {

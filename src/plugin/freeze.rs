@@ -40,6 +40,7 @@ impl Active {
         stamp(self, &mut Scratch::default());
         self.cells.update(self.growth.network());
         let gone = self.growth.forget_oldest(most / 2);
+        self.field.freeze_layer(self.growth.network(), self.growth.timeline());
         let before = self.frozen.take();
         let (nodes, cells) = before.map_or((0, 0), |before| (before.nodes, before.cells));
         let closed = cells + self.cells.closed();

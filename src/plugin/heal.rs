@@ -3,6 +3,7 @@
 use super::{
     CrackState, CrackStats, CrackTextures, ShatterRequest, bake,
     carrier::{self, Found},
+    later::when_free,
     prepare::{self, Preparations},
     queue::HitQueue,
     shards::{Request, drop_shards},
@@ -75,16 +76,18 @@ impl CrackCommandsExt for EntityCommands<'_> {
 
     fn close_cracks(&mut self, seconds: f32) -> &mut Self {
         let entity = self.id();
-        self.commands().queue(move |world: &mut World| close(world, entity, seconds));
+        self.commands().queue(move |world: &mut World| when_free(world, move |world| close(world, entity, seconds)));
         self
     }
 
     fn shatter_cracks(&mut self, request: ShatterRequest) -> &mut Self {
         let entity = self.id();
         self.commands().queue(move |world: &mut World| {
-            if let Some(mut surfaces) = world.get_resource_mut::<Surfaces>() {
-                surfaces.requests.push(Request::new(entity, request));
-            }
+            when_free(world, move |world| {
+                if let Some(mut surfaces) = world.get_resource_mut::<Surfaces>() {
+                    surfaces.requests.push(Request::new(entity, request));
+                }
+            });
         });
         self
     }
@@ -100,11 +103,17 @@ fn close(world: &mut World, entity: Entity, seconds: f32) {
         is_closing
     });
     if !is_closing {
-        heal(world, entity);
+        heal_now(world, entity);
     }
 }
 
 fn heal(world: &mut World, entity: Entity) {
+    // At once, wherever the list of bakes is.
+    bake::cancel(world, entity);
+    when_free(world, move |world| heal_now(world, entity));
+}
+
+fn heal_now(world: &mut World, entity: Entity) {
     purge(world, entity);
     forget(world, entity);
     if let Some(mut state) = world.get_mut::<CrackState>(entity) {
@@ -144,13 +153,17 @@ pub(super) fn heal_later(world: &mut DeferredWorld, entity: Entity) {
 /// From the hook of a new component: if the entity is a clone and shows private textures of another, it gets the
 /// original pictures.
 pub(super) fn disown_clone(world: &mut DeferredWorld, entity: Entity) {
-    if world.get_resource::<Surfaces>().is_some_and(|surfaces| !surfaces.owners.is_empty()) {
-        world.commands().queue(move |world: &mut World| disown(world, entity));
+    // Without it, a system has the surfaces in its hands.
+    if world.get_resource::<Surfaces>().is_none_or(|surfaces| !surfaces.owners.is_empty()) {
+        world.commands().queue(move |world: &mut World| when_free(world, move |world| disown(world, entity)));
     }
 }
 
 fn disown(world: &mut World, entity: Entity) {
     let (_, Found::Shown(shown)) = carrier::inspect(world, entity) else { return };
+    if !world.contains_resource::<Surfaces>() {
+        return;
+    }
     world.resource_scope(|world, surfaces: Mut<Surfaces>| {
         let owner = surfaces.owners.get(&shown.asset.id()).filter(|owner| **owner != entity);
         if let Some(active) = owner.and_then(|owner| surfaces.active.get(owner)) {

@@ -131,7 +131,7 @@ pub(super) fn collect_hits(
             }
             Ok(_) if hit.energy == 0.0 => stats.ignored += 1,
             Ok(at) => {
-                let waiting = QueuedHit { at, energy: hit.energy, direction: hit.direction };
+                let waiting = QueuedHit { at, point: None, energy: hit.energy, direction: hit.direction };
                 queue.push(hit.entity, waiting, budget.max_queued_per_surface, &mut stats);
             }
         }

@@ -82,7 +82,7 @@ impl Material2d for CrackLitMaterial {
 }
 
 impl CrackMaterial for CrackLitMaterial {
-    const MAPS: CrackMaps = CrackMaps { diffuse: true, normal: true, depth: false };
+    const MAPS: CrackMaps = CrackMaps { diffuse: true, normal: true, depth: false, emissive: false };
 
     fn pictures(&self) -> [Option<Handle<Image>>; 3] {
         [self.diffuse.clone(), self.normal.clone(), None]

@@ -1,9 +1,13 @@
 //! Meshes with a material as carriers.
 
+#[cfg(feature = "3d")]
+mod split;
+
 use super::{
-    CrackError, CrackMaps, CrackTextures, Shard,
+    CrackError, CrackMaps, CrackTextures, HitPoint, Shard,
     carrier::{Carrier, Clothes, Found, Kind, Shown},
-    mesh::{aspect_of, closest_uv, place_of, wrap},
+    mesh::{aspect_of, closest, is_flat, place_of, wrap},
+    queue::QueuedHit,
     shards::Plane,
     surfaces::Active,
 };
@@ -26,6 +30,8 @@ pub(super) trait CrackMaterial: Asset + Clone {
     fn uv_transform(&self) -> Affine2 {
         Affine2::IDENTITY
     }
+    /// Shows the upper half of its textures as if that were all of them.
+    fn show_upper_half(&mut self) {}
     /// Becomes transparent where its picture is.
     fn open(&mut self);
     /// The same for shards: with this picture, the mesh's texture coordinates being the picture's, and so much of it there (0..=1).
@@ -51,6 +57,8 @@ pub(super) const fn kind<S: MaterialSlot>() -> Kind {
         attach: attach::<S>,
         detach: detach::<S>,
         aspect: aspect::<S>,
+        is_twofold: is_twofold::<S>,
+        aim,
         locate: locate::<S>,
         is_solid: S::Material::MAPS.depth,
         plane: plane::<S>,
@@ -109,6 +117,9 @@ fn attach<S: MaterialSlot>(
     let Some(mut materials) = world.get_resource_mut::<Assets<S::Material>>() else { return };
     let Some(mut material) = materials.get(&before).cloned() else { return };
     material.show(textures, relief);
+    if carrier.is_twofold {
+        material.show_upper_half();
+    }
     let own = match &carrier.own {
         Some(own) => own.clone().typed::<S::Material>(),
         None => materials.reserve_handle(),
@@ -125,6 +136,8 @@ fn attach<S: MaterialSlot>(
     if S::Material::MAPS.depth && carrier.mesh.is_none() {
         carrier.mesh = give_tangents(world, entity);
     }
+    #[cfg(feature = "3d")]
+    split::give_faces::<S>(world, entity, carrier);
 }
 
 /// Normal and depth maps show nothing on a mesh without tangents: such a mesh is replaced by one that has them.
@@ -162,22 +175,56 @@ fn detach<S: MaterialSlot>(world: &mut World, entity: Entity, carrier: &Carrier)
     {
         mesh.0 = before.clone();
     }
+    #[cfg(feature = "3d")]
+    split::forget(world, entity);
+}
+
+/// From a mesh's texture coordinates to those of the picture.
+fn to_picture<S: MaterialSlot>(world: &World, entity: Entity) -> Result<Affine2, &'static str> {
+    let material = world.get::<S>(entity).ok_or("the material is gone")?.material();
+    let materials = world.get_resource::<Assets<S::Material>>().ok_or("there are no materials")?;
+    let transform = materials.get(material).map_or(Affine2::IDENTITY, CrackMaterial::uv_transform);
+    #[cfg(feature = "3d")]
+    if split::is_upper_half(world, entity, material.id().untyped()) {
+        return Ok(Affine2::from_scale(Vec2::new(1.0, 2.0)) * transform);
+    }
+    Ok(transform)
+}
+
+fn is_twofold<S: MaterialSlot>(world: &World, entity: Entity) -> bool {
+    #[cfg(feature = "3d")]
+    if S::Material::MAPS.depth {
+        return split::shares_its_picture::<S>(world, entity);
+    }
+    let _ = (world, entity);
+    false
+}
+
+fn aim(world: &mut World, entity: Entity, hit: &QueuedHit, is_blank: bool) -> HitPoint {
+    #[cfg(feature = "3d")]
+    if let Some(at) = split::aim(world, entity, hit, is_blank) {
+        return at;
+    }
+    let _ = (world, entity, is_blank);
+    hit.at
 }
 
 fn aspect<S: MaterialSlot>(world: &World, entity: Entity, _: Option<Vec2>, _: Option<Vec2>) -> Option<f32> {
     let mesh = world.get_resource::<Assets<Mesh>>()?.get(mesh_of(world, entity)?)?;
-    let material = world.get_resource::<Assets<S::Material>>()?.get(world.get::<S>(entity)?.material())?;
+    world.get_resource::<Assets<S::Material>>()?.get(world.get::<S>(entity)?.material())?;
     let place = world.get::<GlobalTransform>(entity).map_or(Mat3A::IDENTITY, |place| place.affine().matrix3);
-    aspect_of(mesh, place, material.uv_transform())
+    aspect_of(mesh, place, to_picture::<S>(world, entity).ok()?)
 }
 
 fn locate<S: MaterialSlot>(world: &World, entity: Entity, local: Vec3) -> Result<Vec2, &'static str> {
     let mesh = mesh_of(world, entity).ok_or("there is no mesh")?;
     let meshes = world.get_resource::<Assets<Mesh>>().ok_or("there are no mesh assets")?;
-    let uv = closest_uv(meshes.get(mesh).ok_or("the mesh is not loaded")?, local)?;
-    let material = world.get::<S>(entity).ok_or("the material is gone")?;
-    let materials = world.get_resource::<Assets<S::Material>>().ok_or("there are no materials")?;
-    let transform = materials.get(material.material()).map_or(Affine2::IDENTITY, CrackMaterial::uv_transform);
+    let transform = to_picture::<S>(world, entity)?;
+    #[cfg(feature = "3d")]
+    if let Some(uv) = split::locate(world, entity, meshes, local)? {
+        return Ok(transform.transform_point2(uv).clamp(Vec2::ZERO, Vec2::ONE));
+    }
+    let (_, uv) = closest(meshes.get(mesh).ok_or("the mesh is not loaded")?, local)?;
     Ok(wrap(transform.transform_point2(uv)))
 }
 
@@ -185,19 +232,33 @@ fn plane<S: MaterialSlot>(world: &World, entity: Entity, _: &Active) -> Result<P
     let mesh = mesh_of(world, entity).ok_or("there is no mesh")?;
     let mesh =
         world.get_resource::<Assets<Mesh>>().and_then(|meshes| meshes.get(mesh)).ok_or("its mesh is not loaded")?;
-    let material = world.get::<S>(entity).ok_or("the material is gone")?;
-    let materials = world.get_resource::<Assets<S::Material>>().ok_or("there are no materials")?;
-    let transform = materials.get(material.material()).map_or(Affine2::IDENTITY, CrackMaterial::uv_transform);
+    let transform = to_picture::<S>(world, entity)?;
     if transform.matrix2.determinant() == 0.0 {
         return Err("its material shows one line of the picture only");
     }
     let to_mesh = transform.inverse();
     let corner = |u, v| place_of(mesh, to_mesh.transform_point2(Vec2::new(u, v))).ok_or("its mesh lacks a corner");
     let (first, normal) = corner(0.0, 0.0)?;
-    Plane::through([first, corner(1.0, 0.0)?.0, corner(0.0, 1.0)?.0, corner(1.0, 1.0)?.0], normal)
+    let plane = Plane::through([first, corner(1.0, 0.0)?.0, corner(0.0, 1.0)?.0, corner(1.0, 1.0)?.0], normal)?;
+    #[cfg(feature = "3d")]
+    if let Some(thickness) = split::thickness(world, entity) {
+        return Ok(Plane { thickness: Some(thickness), ..plane });
+    }
+    if !is_flat(mesh, first, normal) {
+        return Err(
+            "its mesh is neither flat nor a slab, which is a box at least four times as wide and high as thick",
+        );
+    }
+    Ok(plane)
 }
 
-fn open<S: MaterialSlot>(world: &mut World, carrier: &Carrier) {
+#[cfg_attr(not(feature = "3d"), expect(unused_variables, reason = "only 3D meshes have sides"))]
+fn open<S: MaterialSlot>(world: &mut World, entity: Entity, carrier: &Carrier, has_holes: bool) {
+    #[cfg(feature = "3d")]
+    split::open(world, entity, has_holes);
+    if !has_holes {
+        return;
+    }
     let (Some(own), Some(mut materials)) = (&carrier.own, world.get_resource_mut::<Assets<S::Material>>()) else {
         return;
     };
@@ -226,14 +287,28 @@ fn inside<S: MaterialSlot>(world: &mut World, carrier: &Carrier, mean: [f32; 3],
     Some(materials.add(inside).untyped())
 }
 
-/// Makes entities of shards.
-pub(super) fn spawn<S: MaterialSlot>(world: &mut World, shards: Vec<(Shard, Clothes)>) -> Vec<Entity> {
-    world.spawn_batch(shards.into_iter().map(|(shard, clothes)| (shard, worn::<S>(clothes)))).collect()
+/// Makes entities of shards; `None` once their surface is gone.
+///
+/// One after the other, and each a child of its surface before it is a shard: observers of shards may despawn the surface, and the engine
+/// panics where that comes between a child and its parent.
+pub(super) fn spawn<S: MaterialSlot>(world: &mut World, shards: Vec<(Shard, Clothes)>) -> Vec<Option<Entity>> {
+    let spawn = |(shard, clothes)| {
+        let entity = spawn_one::<S>(world, clothes)?;
+        if let Ok(mut entity) = world.get_entity_mut(entity) {
+            entity.insert(shard);
+        }
+        Some(entity)
+    };
+    shards.into_iter().map(spawn).collect()
 }
 
-/// Makes entities of the sides of shards.
-pub(super) fn spawn_sides<S: MaterialSlot>(world: &mut World, sides: Vec<Clothes>) -> Vec<Entity> {
-    world.spawn_batch(sides.into_iter().map(worn::<S>)).collect()
+/// Makes entities of the sides of shards; `None` where the shard is gone.
+pub(super) fn spawn_sides<S: MaterialSlot>(world: &mut World, sides: Vec<Clothes>) -> Vec<Option<Entity>> {
+    sides.into_iter().map(|clothes| spawn_one::<S>(world, clothes)).collect()
+}
+
+fn spawn_one<S: MaterialSlot>(world: &mut World, clothes: Clothes) -> Option<Entity> {
+    world.get_entity(clothes.parent).is_ok().then(|| world.spawn(worn::<S>(clothes)).id())
 }
 
 /// All that is seen of a shard.
@@ -246,13 +321,17 @@ fn worn<S: MaterialSlot>(clothes: Clothes) -> (ChildOf, Transform, Visibility, S
 pub(super) fn dress<S: MaterialSlot>(entity: &mut EntityWorldMut, shard: Option<Shard>, clothes: Clothes) {
     let is_child = entity.get::<ChildOf>().is_some_and(|child| child.parent() == clothes.parent);
     let (parent, place, visibility, mesh, material) = worn::<S>(clothes);
-    let seen = (place, visibility, mesh, material);
-    match (shard, is_child) {
-        (Some(shard), true) => entity.insert((shard, seen)),
-        (Some(shard), false) => entity.insert((shard, parent, seen)),
-        (None, true) => entity.insert(seen),
-        (None, false) => entity.insert((parent, seen)),
-    };
+    let has_parent = is_child || entity.world().get_entity(parent.parent()).is_ok();
+    if !is_child && has_parent {
+        entity.insert(parent);
+    }
+    if !entity.is_despawned() {
+        entity.insert((place, visibility, mesh, material));
+    }
+    // Last, as in `spawn`.
+    if let Some(shard) = shard.filter(|_| has_parent && !entity.is_despawned()) {
+        entity.insert(shard);
+    }
 }
 
 /// Gives a shard another material.
@@ -274,7 +353,7 @@ mod flat {
     };
 
     impl CrackMaterial for ColorMaterial {
-        const MAPS: CrackMaps = CrackMaps { diffuse: true, normal: true, depth: false };
+        const MAPS: CrackMaps = CrackMaps { diffuse: true, normal: true, depth: false, emissive: false };
 
         fn pictures(&self) -> [Option<Handle<Image>>; 3] {
             [self.texture.clone(), None, None]
@@ -327,11 +406,11 @@ mod standard {
     use super::{Affine2, CrackMaps, CrackMaterial, CrackTextures, Handle, Image, MaterialSlot};
     use bevy::{
         pbr::ParallaxMappingMethod,
-        prelude::{AlphaMode, Color, Mesh3d, MeshMaterial3d, StandardMaterial},
+        prelude::{AlphaMode, Color, LinearRgba, Mesh3d, MeshMaterial3d, StandardMaterial, Vec2},
     };
 
     impl CrackMaterial for StandardMaterial {
-        const MAPS: CrackMaps = CrackMaps { diffuse: true, normal: true, depth: true };
+        const MAPS: CrackMaps = CrackMaps { diffuse: true, normal: true, depth: true, emissive: true };
 
         fn pictures(&self) -> [Option<Handle<Image>>; 3] {
             [self.base_color_texture.clone(), self.normal_map_texture.clone(), self.depth_map.clone()]
@@ -343,6 +422,10 @@ mod standard {
             }
             if let Some(normal) = &textures.normal {
                 self.normal_map_texture = Some(normal.clone());
+            }
+            if let Some(emissive) = textures.emissive.as_ref().filter(|_| self.emissive_texture.is_none()) {
+                self.emissive_texture = Some(emissive.clone());
+                self.emissive = LinearRgba::WHITE;
             }
             let Some(depth) = &textures.depth else { return };
             if self.depth_map.is_none() {
@@ -356,6 +439,12 @@ mod standard {
 
         fn uv_transform(&self) -> Affine2 {
             self.uv_transform
+        }
+
+        fn show_upper_half(&mut self) {
+            self.uv_transform = Affine2::from_scale(Vec2::new(1.0, 0.5)) * self.uv_transform;
+            // Depth is in units of the texture, which is twice as high.
+            self.parallax_depth_scale *= 0.5;
         }
 
         fn open(&mut self) {
@@ -381,6 +470,7 @@ mod standard {
                 emissive: color.to_linear() * (GLOW * share),
                 base_color_texture: None,
                 normal_map_texture: None,
+                emissive_texture: None,
                 depth_map: None,
                 ..self.clone()
             })

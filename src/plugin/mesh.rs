@@ -11,14 +11,14 @@ use bevy::{
 const MAX_DISTANCE: f32 = 0.25;
 
 /// The triangles of a mesh.
-struct Triangles<'a> {
+pub(super) struct Triangles<'a> {
     positions: &'a [[f32; 3]],
     uvs: &'a [[f32; 2]],
     indices: Option<&'a Indices>,
 }
 
 impl<'a> Triangles<'a> {
-    fn of(mesh: &'a Mesh) -> Result<Self, &'static str> {
+    pub(super) fn of(mesh: &'a Mesh) -> Result<Self, &'static str> {
         const NO_DATA: &str = "the mesh has no data on the CPU: load it with `RenderAssetUsages::MAIN_WORLD`";
         let positions = match mesh.try_attribute_option(Mesh::ATTRIBUTE_POSITION) {
             Ok(Some(VertexAttributeValues::Float32x3(positions))) => positions,
@@ -36,28 +36,39 @@ impl<'a> Triangles<'a> {
         Ok(Self { positions, uvs, indices: mesh.try_indices_option().map_err(|_| NO_DATA)? })
     }
 
-    fn len(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         self.indices.map_or(self.positions.len(), Indices::len) / 3
     }
 
-    /// Corners and their texture coordinates; `None` for a triangle with a vertex that is not there.
-    fn get(&self, i: usize) -> Option<([Vec3; 3], [Vec2; 3])> {
+    /// Number of vertices.
+    pub(super) fn vertices(&self) -> usize {
+        self.positions.len()
+    }
+
+    /// The vertices of a triangle.
+    pub(super) fn corners(&self, i: usize) -> Option<[usize; 3]> {
         let vertex = |i: usize| match self.indices {
-            None => i,
-            Some(Indices::U16(indices)) => usize::from(indices[i]),
-            Some(Indices::U32(indices)) => indices[i] as usize,
+            None => Some(i),
+            Some(Indices::U16(indices)) => indices.get(i).map(|index| usize::from(*index)),
+            Some(Indices::U32(indices)) => indices.get(i).map(|index| *index as usize),
         };
-        let corners = [vertex(3 * i), vertex(3 * i + 1), vertex(3 * i + 2)];
+        Some([vertex(3 * i)?, vertex(3 * i + 1)?, vertex(3 * i + 2)?])
+    }
+
+    /// Corners and their texture coordinates; `None` for a triangle with a vertex that is not there.
+    pub(super) fn get(&self, i: usize) -> Option<([Vec3; 3], [Vec2; 3])> {
+        let corners = self.corners(i)?;
         Some((read(self.positions, corners)?.map(Vec3::from_array), read(self.uvs, corners)?.map(Vec2::from_array)))
     }
 }
 
-/// Texture coordinates at the point of `mesh` that is closest to `point`, both in the mesh's space.
-pub(super) fn closest_uv(mesh: &Mesh, point: Vec3) -> Result<Vec2, &'static str> {
+/// The triangle of `mesh` that is closest to `point`, and the texture coordinates at the point of it that is, all in the mesh's space.
+pub(super) fn closest(mesh: &Mesh, point: Vec3) -> Result<(usize, Vec2), &'static str> {
     let triangles = Triangles::of(mesh)?;
-    let mut best: Option<(f32, Vec2)> = None;
+    let mut best: Option<(f32, (usize, Vec2))> = None;
     let (mut min, mut max) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-    for ([a, b, c], [uv_a, uv_b, uv_c]) in (0..triangles.len()).filter_map(|i| triangles.get(i)) {
+    for i in 0..triangles.len() {
+        let Some(([a, b, c], [uv_a, uv_b, uv_c])) = triangles.get(i) else { continue };
         min = min.min(a).min(b).min(c);
         max = max.max(a).max(b).max(c);
         let weights = closest_weights(point, a, b, c);
@@ -65,14 +76,28 @@ pub(super) fn closest_uv(mesh: &Mesh, point: Vec3) -> Result<Vec2, &'static str>
         let distance = closest.distance_squared(point);
         // The first of equals wins; NaN never does.
         if distance.is_finite() && best.is_none_or(|(least, _)| distance < least) {
-            best = Some((distance, uv_a * weights.x + uv_b * weights.y + uv_c * weights.z));
+            best = Some((distance, (i, uv_a * weights.x + uv_b * weights.y + uv_c * weights.z)));
         }
     }
-    let (distance, uv) = best.ok_or("the mesh has no triangles")?;
+    let (distance, found) = best.ok_or("the mesh has no triangles")?;
     if distance.sqrt() > MAX_DISTANCE * min.distance(max) {
         return Err("the point lies off the mesh");
     }
-    Ok(uv)
+    Ok(found)
+}
+
+/// Whether all of a mesh lies in the plane through `point` across `normal`.
+pub(super) fn is_flat(mesh: &Mesh, point: Vec3, normal: Vec3) -> bool {
+    const SLACK: f32 = 1e-3;
+    let Ok(triangles) = Triangles::of(mesh) else { return false };
+    let (mut min, mut max, mut off) = (Vec3::INFINITY, Vec3::NEG_INFINITY, 0.0f32);
+    for (corners, _) in (0..triangles.len()).filter_map(|i| triangles.get(i)) {
+        for corner in corners {
+            (min, max) = (min.min(corner), max.max(corner));
+            off = off.max((corner - point).dot(normal).abs());
+        }
+    }
+    off <= SLACK * min.distance(max)
 }
 
 /// The point that has these texture coordinates, and the way the mesh faces there, in the mesh's space. Of the triangles that hold
@@ -181,7 +206,7 @@ mod tests {
     #[test]
     fn quad_and_its_surroundings() {
         let mesh = Mesh::from(Rectangle::new(2.0, 1.0));
-        let uv = |x, y, z| closest_uv(&mesh, Vec3::new(x, y, z));
+        let uv = |x, y, z| closest(&mesh, Vec3::new(x, y, z)).map(|(_, uv)| uv);
         assert_eq!(uv(-1.0, 0.5, 0.0), Ok(Vec2::ZERO), "top left");
         assert_eq!(uv(0.5, 0.0, 0.1), Ok(Vec2::new(0.75, 0.5)), "above the face");
         assert_eq!(uv(1.2, -0.6, 0.0), Ok(Vec2::ONE), "just off a corner");
@@ -232,9 +257,9 @@ mod tests {
     fn broken_meshes_are_refused() {
         let mut mesh = Mesh::from(Rectangle::new(1.0, 1.0));
         mesh.insert_indices(Indices::U32(vec![0, 1, 99, 0]));
-        assert!(closest_uv(&mesh, Vec3::ZERO).is_err(), "no whole triangle is left");
+        assert!(closest(&mesh, Vec3::ZERO).is_err(), "no whole triangle is left");
         mesh.remove_attribute(Mesh::ATTRIBUTE_UV_0);
-        assert!(closest_uv(&mesh, Vec3::ZERO).is_err(), "no texture coordinates");
+        assert!(closest(&mesh, Vec3::ZERO).is_err(), "no texture coordinates");
     }
 
     #[test]

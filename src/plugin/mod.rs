@@ -23,6 +23,8 @@ mod budget;
 mod carrier;
 mod clock;
 mod error;
+#[cfg(feature = "3d")]
+mod faces;
 mod film;
 mod freeze;
 mod grow;
@@ -31,6 +33,7 @@ mod guided;
 mod headless;
 mod heal;
 mod hit;
+mod later;
 mod layout;
 #[cfg(feature = "2d")]
 mod lit;
@@ -72,7 +75,8 @@ pub use mask::CrackMaskSource;
 pub use place::{CrackPlace, CrackPlaces};
 pub use preset::PresetSource;
 pub use shards::{
-    CrackShards, Reassembled, Shard, ShardsError, ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen, Shattered,
+    CrackShards, GravitySpace, Reassembled, Shard, ShardsError, ShatterCracks, ShatterFailed, ShatterRequest,
+    ShatterWhen, Shattered,
 };
 pub use state::{CellClosed, CrackFailed, CrackFinished, CrackState, CrackStatus, CrackTip};
 pub use surface::{CrackMaps, CrackResolution, CrackSurface};
@@ -92,8 +96,8 @@ pub mod prelude {
         BakeProgress, CellClosed, CrackBaked, CrackBudget, CrackClock, CrackCommandsExt, CrackDrive, CrackError,
         CrackFailed, CrackFinished, CrackGuide, CrackHit, CrackMaps, CrackMaskSource, CrackPlugin, CrackPlugins,
         CrackResolution, CrackShards, CrackState, CrackStats, CrackStatus, CrackSurface, CrackSystems, CrackTextures,
-        CrackTip, GuideSource, GuidedAppearance, GuidedCracks, HitPoint, PresetSource, Reassembled, Shard,
-        ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen, Shattered,
+        CrackTip, GravitySpace, GuideSource, GuidedAppearance, GuidedCracks, HitPoint, PresetSource, Reassembled,
+        Shard, ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen, Shattered,
     };
     #[cfg(feature = "2d")]
     pub use super::{CrackLight2d, CrackLitMaterial};
@@ -155,6 +159,7 @@ impl Plugin for CrackPlugin {
             .init_resource::<CrackStats>()
             .init_resource::<CrackUploadStats>()
             .init_resource::<upload::Uploads>()
+            .init_resource::<later::Later>()
             .init_resource::<shards::Spares>()
             .init_resource::<budget::FrameClock>()
             .init_resource::<queue::HitQueue>()

@@ -4,11 +4,11 @@ use super::{
     CellClosed, CrackBudget, CrackFinished, CrackState, CrackStatus, CrackTextures, CrackTip,
     budget::{FrameClock, share_out},
     surfaces::{Active, Surfaces, Touched, batch},
+    textures::{self, MAPS},
     upload::{Packer, Uploads},
 };
 use crate::{
     growth::CrackGrowth,
-    paint::{PaintTargets, paint_rects},
     pattern::{Moment, NO_PARENT, SegmentId},
     raster::{DOT_DEPTH, DepthField, Profile, Redrawn, TexelRect, stamp_dot, stamp_path, stamp_path_with},
 };
@@ -142,6 +142,8 @@ pub(super) fn stamp(active: &mut Active, scratch: &mut Scratch) {
             active.touched.mark(rect);
         }
     }
+    let timeline = active.growth.timeline();
+    active.field.show_layer(active.growth.network(), timeline, moment, &mut scratch.rects);
     scratch.rects.drain(..).for_each(|rect| active.mark(rect));
     active.growth.take_markers(&mut scratch.markers);
     let radius = active.growth.params().line_width;
@@ -180,6 +182,7 @@ pub(super) fn stamp_all(growth: &CrackGrowth, profile: &Profile, field: &mut Dep
             touched.mark(stamp_path(field, profile, &path));
         }
     }
+    field.show_layer(network, timeline, end, &mut Vec::new());
 }
 
 /// Paints in the middle of a frame what is dirty.
@@ -194,7 +197,7 @@ pub(super) fn paint_now(world: &mut World, active: &mut Active) {
 }
 
 /// The data of a surface's textures, out of their images: many cannot be borrowed at once.
-struct Canvas([Option<Vec<u8>>; 3]);
+struct Canvas([Option<Vec<u8>>; MAPS]);
 
 impl Canvas {
     /// Texels are changed without an asset event, which would upload the whole image.
@@ -221,15 +224,14 @@ impl Canvas {
         let origin = view.rect.min;
         let shown = TexelRect::whole(view.rect.size());
         rects.iter_mut().for_each(|rect| *rect = rect.intersect(shown));
-        let [diffuse, normal, depth] = self.0.each_mut().map(Option::as_deref_mut);
-        let mut targets = PaintTargets { diffuse, normal, depth };
-        paint_rects(active.base.texels(), &active.field, &active.look, rects, origin, &mut targets);
+        let texels = self.0.each_mut().map(Option::as_deref_mut);
+        textures::paint(&active.base, &active.field, &active.look, rects, origin, texels);
         for rect in rects.drain(..) {
-            if let (Some(broken), Some(diffuse)) = (&active.broken, targets.diffuse.as_deref_mut()) {
+            if let (Some(broken), [Some(diffuse), ..]) = (&active.broken, &mut self.0) {
                 broken.holes.cut_out(diffuse, size, origin, rect);
             }
             let rect = TexelRect { min: rect.min + origin, max: rect.max + origin }.intersect(TexelRect::whole(size));
-            let data = [targets.diffuse.as_deref(), targets.normal.as_deref(), targets.depth.as_deref()];
+            let data = self.0.each_ref().map(Option::as_deref);
             let pictures = active.textures.all().into_iter().zip(data);
             packer.push(pictures.map(|(texture, data)| Some((texture?.id(), data?))), size, rect);
         }

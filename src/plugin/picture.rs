@@ -67,6 +67,7 @@ pub(super) struct BaseKey {
     pub(super) pictures: [Option<AssetId<Image>>; 3],
     pub(super) size: UVec2,
     pub(super) layout: Option<Layout>,
+    pub(super) is_twofold: bool,
 }
 
 impl BasePictures {
@@ -387,7 +388,12 @@ mod tests {
     fn a_base_picture_in_use_is_read_once() {
         let mut bases = BasePictures::default();
         let id = AssetId::from(bevy::asset::uuid::Uuid::from_u128(7));
-        let key = |side| BaseKey { pictures: [None, Some(id), None], size: UVec2::splat(side), layout: None };
+        let key = |side| BaseKey {
+            pictures: [None, Some(id), None],
+            size: UVec2::splat(side),
+            layout: None,
+            is_twofold: false,
+        };
         let white = |side: u32| BasePicture::new(UVec2::splat(side), vec![255; 4 * (side * side) as usize], None, None);
         let unread = || -> Result<BasePicture, CrackError> { panic!("it is in use") };
         assert_eq!(bases.get(key(1), || Err(CrackError::NoCpuData)), Err(CrackError::NoCpuData));

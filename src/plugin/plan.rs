@@ -58,7 +58,10 @@ impl Plan {
             return Ok(None);
         };
         let aspect = |picture| (kind.aspect)(world, entity, picture, None);
-        let pictures = plan_pictures(world, &surface, &shown, &Stretch { aspect: &aspect, kept: None }, 0)?;
+        let is_twofold = (kind.is_twofold)(world, entity);
+        let stretch = Stretch { aspect: &aspect, kept: None, is_twofold };
+        let layer = preset.look.layer(0).bytes_per_texel();
+        let pictures = plan_pictures(world, &surface, &shown, &stretch, layer, 0)?;
         let read_at = world.resource::<Surfaces>().frame;
         Ok(pictures.map(|pictures| Self {
             surface,
@@ -114,8 +117,9 @@ impl Plan {
             let image = kind.empty(*size, sampler).ok_or(CrackError::Size { width, height })?;
             Ok(Some(images.add(image)))
         };
-        let [diffuse, normal, depth] = textures::KINDS.each_ref().map(&mut add);
-        self.textures = Some(CrackTextures { diffuse: diffuse?, normal: normal?, depth: depth? });
+        let [diffuse, normal, depth, emissive] = textures::KINDS.each_ref().map(&mut add);
+        let (diffuse, normal, depth, emissive) = (diffuse?, normal?, depth?, emissive?);
+        self.textures = Some(CrackTextures { diffuse, normal, depth, emissive });
         Ok(())
     }
 
@@ -156,8 +160,8 @@ impl Plan {
                 world.resource_mut::<PictureMasks>().remember(Key::new(picture, &pictures, part), &mask);
             }
         }
-        let PicturePlan { bytes, rect, unstretched, .. } = pictures;
-        let carrier = Carrier::new(kind, shown);
+        let PicturePlan { bytes, rect, unstretched, is_twofold, .. } = pictures;
+        let carrier = Carrier { is_twofold, ..Carrier::new(kind, shown) };
         Ground { surface, preset, look, base, textures, carrier, bytes, rect, unstretched, read_at }
     }
 }
@@ -245,6 +249,7 @@ impl Blank {
         growth.set_mask(mask.clone());
         let mut field = DepthField::new(frame);
         field.forbid(mask);
+        field.lay(preset.look.layer(surface.seed));
         Ok(Self { growth, field, look })
     }
 }
@@ -271,6 +276,8 @@ pub(super) struct PicturePlan {
     pub(super) layout: Option<Arc<Layout>>,
     /// Whether its texels are shown as squares.
     is_nearest: bool,
+    /// Whether the textures hold the picture twice, one above the other.
+    pub(super) is_twofold: bool,
 }
 
 impl PicturePlan {
@@ -282,7 +289,8 @@ impl PicturePlan {
 
     fn key(&self, shown: &Shown) -> BaseKey {
         let pictures = self.needed(shown).map(|map| map.map(Handle::id));
-        BaseKey { pictures, size: self.size, layout: self.layout.as_deref().copied() }
+        let layout = self.layout.as_deref().copied();
+        BaseKey { pictures, size: self.size, layout, is_twofold: self.is_twofold }
     }
 
     /// Reads the pictures, unless somebody else has.
@@ -297,16 +305,17 @@ impl PicturePlan {
 
     /// The pictures, read.
     fn read(&self, [diffuse, normal, depth]: [Option<&Image>; 3]) -> Result<BasePicture, CrackError> {
-        let n = self.size.x as usize * self.size.y as usize;
-        let read =
-            |image: Option<&Image>| image.map(|image| picture::read(image, Space::Linear, self.size)).transpose();
+        let size = if self.is_twofold { self.size / UVec2::new(1, 2) } else { self.size };
+        let n = size.x as usize * size.y as usize;
+        let read = |image: Option<&Image>| image.map(|image| picture::read(image, Space::Linear, size)).transpose();
         let diffuse = match diffuse {
-            Some(image) => picture::read_shown(image, self.size, self.layout.as_deref(), self.is_nearest)?,
+            Some(image) => picture::read_shown(image, size, self.layout.as_deref(), self.is_nearest)?,
             None => vec![255; n * 4],
         };
         let normal = if self.maps.normal { read(normal)? } else { None };
         let depth = if self.maps.depth { read(depth)?.map(|rgba| picture::red(&rgba)) } else { None };
-        Ok(BasePicture::new(self.size, diffuse, normal, depth))
+        let all = |texels: Vec<u8>| if self.is_twofold { texels.repeat(2) } else { texels };
+        Ok(BasePicture::new(self.size, all(diffuse), normal.map(all), depth.map(all)))
     }
 }
 
@@ -317,14 +326,17 @@ pub(super) struct Stretch<'a> {
     /// The size that the surface's textures would have had without it, and what they have: as long as the former is the same, so is the
     /// latter, however it is shown now.
     pub(super) kept: Option<(UVec2, UVec2)>,
+    /// Whether the textures hold it twice, one above the other.
+    pub(super) is_twofold: bool,
 }
 
-/// Plans the pictures of a surface; `None` if they are not there yet. `owned` bytes of the budget are its own already.
+/// Plans the pictures of a surface; `None` if they are not there yet. Beside depths, a field takes `layer` bytes a texel; `owned` bytes of the budget are its own already.
 fn plan_pictures(
     world: &World,
     surface: &CrackSurface,
     shown: &Shown,
     stretch: &Stretch<'_>,
+    layer: u64,
     owned: u64,
 ) -> Result<Option<PicturePlan>, CrackError> {
     let images = world.get_resource::<Assets<Image>>().ok_or(CrackError::NoImages)?;
@@ -337,15 +349,18 @@ fn plan_pictures(
         diffuse: surface.write.diffuse && shown.maps.diffuse,
         normal: surface.write.normal && shown.maps.normal,
         depth: surface.write.depth && shown.maps.depth,
+        emissive: surface.write.emissive && shown.maps.emissive,
     };
     let image = shown.diffuse.as_ref().and_then(|picture| images.get(picture));
     let is_nearest = image.is_some_and(|image| picture::is_nearest(world, image));
-    let (size, unstretched) = size(world, surface, shown, image, stretch, is_nearest, maps, owned)?;
+    let (size, unstretched) = size(world, surface, shown, image, stretch, is_nearest, (maps, layer), owned)?;
+    let is_twofold = stretch.is_twofold && shown.rect.is_none();
     let whole = TexelRect::whole(size);
+    let size = if is_twofold { size * UVec2::new(1, 2) } else { size };
     let rect = shown.rect.map_or(whole, |rect| TexelRect { min: rect.min, max: rect.max }.intersect(whole));
     let sampler = image.map_or(ImageSampler::Default, |image| image.sampler.clone());
-    let (bytes, layout) = (bytes(size, maps), shown.layout.clone());
-    Ok(Some(PicturePlan { size, rect, bytes, sampler, maps, unstretched, layout, is_nearest }))
+    let (bytes, layout) = (bytes(size, (maps, layer)), shown.layout.clone());
+    Ok(Some(PicturePlan { size, rect, bytes, sampler, maps, unstretched, layout, is_nearest, is_twofold }))
 }
 
 /// Reads the pictures of a cracked surface anew; `None` if they are not there yet. `owned` as in [`plan_pictures`].
@@ -356,15 +371,18 @@ pub(super) fn draft(
     shown: &Shown,
 ) -> Result<Option<Draft>, CrackError> {
     let aspect = |picture| (active.carrier.kind.aspect)(world, entity, picture, active.carrier.size);
-    let kept = active.unstretched.map(|unstretched| (unstretched, active.base.size));
-    let stretch = Stretch { aspect: &aspect, kept };
-    let plan = plan_pictures(world, &active.surface, shown, &stretch, active.bytes)?;
+    let kept = active.unstretched.map(|unstretched| (unstretched, active.carrier.whole(active.base.size).size()));
+    let stretch = Stretch { aspect: &aspect, kept, is_twofold: (active.carrier.kind.is_twofold)(world, entity) };
+    let layer = active.preset.look.layer(0).bytes_per_texel();
+    let plan = plan_pictures(world, &active.surface, shown, &stretch, layer, active.bytes)?;
     plan.map(|plan| plan.draft(world, shown)).transpose()
 }
 
-/// Bytes of the textures on the CPU and the GPU, the base picture, as if no other surface had the same, and the depth field.
-fn bytes(size: UVec2, maps: CrackMaps) -> u64 {
-    let texel = 4 + 2 + 8 * u64::from(maps.diffuse) + 8 * u64::from(maps.normal) + 2 * u64::from(maps.depth);
+/// Bytes of the textures on the CPU and the GPU, the base picture, as if no other surface had the same, and the depth field with what it
+/// may hold beside depths.
+fn bytes(size: UVec2, (maps, layer): (CrackMaps, u64)) -> u64 {
+    let whole = [maps.diffuse, maps.normal, maps.emissive].map(u64::from).iter().sum::<u64>();
+    let texel = 4 + 2 + layer + 8 * whole + 2 * u64::from(maps.depth);
     u64::from(size.x) * u64::from(size.y) * texel
 }
 
@@ -377,7 +395,7 @@ fn size(
     image: Option<&Image>,
     stretch: &Stretch<'_>,
     is_nearest: bool,
-    maps: CrackMaps,
+    maps: (CrackMaps, u64),
     owned: u64,
 ) -> Result<(UVec2, Option<UVec2>), CrackError> {
     let aspect = |picture| (stretch.aspect)(picture).filter(|aspect| aspect.is_normal());
@@ -397,6 +415,10 @@ fn size(
     let budget = world.resource::<CrackBudget>();
     let device = world.get_resource::<RenderDevice>().map_or(u32::MAX, |d| d.limits().max_texture_dimension_2d);
     let max_side = budget.max_side.clamp(1, device.clamp(1, crate::pattern::MAX_SIDE));
+    // Twice as high as the picture, and as large.
+    let times = if stretch.is_twofold && shown.rect.is_none() { 2 } else { 1 };
+    let max_side = (max_side / times).max(1);
+    let bytes = |size, maps| u64::from(times) * bytes(size, maps);
     let left = budget.max_texture_bytes.saturating_sub(world.resource::<Surfaces>().bytes.saturating_sub(owned));
     let mut size = match surface.resolution {
         CrackResolution::Fixed(size) if shown.rect.is_none() => size,

@@ -154,7 +154,7 @@ struct Made {
     read: Readings,
     blank: Blank,
     /// The texels of each texture.
-    pictures: [Option<Picture>; 3],
+    pictures: [Option<Picture>; textures::MAPS],
 }
 
 impl Work {

@@ -17,6 +17,8 @@ const MAX_WARNED: usize = 1024;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct QueuedHit {
     pub(super) at: HitPoint,
+    /// The point in the entity's own space, where `at` has been found from one.
+    pub(super) point: Option<Vec3>,
     pub(super) energy: f32,
     /// In the world.
     pub(super) direction: Vec3,
@@ -91,6 +93,9 @@ impl HitQueue {
     /// Says where that hit is.
     pub(super) fn place_first(&mut self, entity: Entity, uv: Vec2) {
         if let Some(hit) = self.hits.get_mut(&entity).and_then(VecDeque::front_mut) {
+            if let HitPoint::Local(point) = hit.at {
+                hit.point = Some(point);
+            }
             hit.at = HitPoint::Uv(uv);
         }
     }
@@ -153,7 +158,8 @@ mod tests {
         let (mut queue, mut stats) = (HitQueue::default(), CrackStats::default());
         let surfaces = [Entity::from_bits(1), Entity::from_bits(2)];
         for i in 0..10 {
-            let hit = QueuedHit { at: HitPoint::Uv(Vec2::splat(i as f32)), energy: 1.0, direction: Vec3::ZERO };
+            let hit =
+                QueuedHit { at: HitPoint::Uv(Vec2::splat(i as f32)), point: None, energy: 1.0, direction: Vec3::ZERO };
             queue.push(surfaces[usize::from(i > 6)], hit, 5, &mut stats);
         }
         assert_eq!((stats.queued, stats.merged), (8, 2), "two of seven hits do not fit");

@@ -68,6 +68,8 @@ pub struct ShatterCracks {
     pub anchor: Anchor,
     /// How shards fly.
     pub burst: BurstParams,
+    /// Whose down they fall. Default: the world's.
+    pub gravity: GravitySpace,
     /// Whether the crate moves the shards, lets them fade and takes them away; default true. Else they stay where they are, for a
     /// physics engine: see [`Shard`]. Counts when a surface shatters.
     pub fly: bool,
@@ -78,9 +80,11 @@ pub struct ShatterCracks {
     /// = 0.
     pub seek: Option<f32>,
     /// How pieces break again on their way, where the crate moves them; `None` (default) = they stay whole. Fragments are shards as all
-    /// others; time that runs backwards puts them together again.
+    /// others; time that runs backwards puts them together again. No more than [`CrackBudget::max_shards`](super::CrackBudget::max_shards)
+    /// lets there be: a piece without room for its fragments stays whole.
     pub again: Option<BreakAgain>,
-    /// How thick shards of 3D surfaces are, pattern units, 0..=10; default 0.03.
+    /// How thick shards of flat 3D surfaces are, pattern units, 0..=10; default 0.03. Those of a slab, a box at least four times as wide and
+    /// high as thick, are as thick as it is.
     pub thickness: f32,
     /// How their rims look; `None` (default) = as befits the preset: [`RimLook::GLASS`] where cracks are frosted,
     /// [`RimLook::PLAIN`] where they are drawn as in a cartoon, else [`RimLook::STONE`].
@@ -99,6 +103,7 @@ impl Default for ShatterCracks {
             cut: ShatterParams::DEFAULT,
             anchor: Anchor::Border,
             burst: BurstParams::DEFAULT,
+            gravity: GravitySpace::World,
             fly: true,
             speed: 1.0,
             seek: None,
@@ -109,6 +114,21 @@ impl Default for ShatterCracks {
             inside: None,
         }
     }
+}
+
+/// In which axes [`BurstParams::gravity`] is meant.
+#[derive(Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[reflect(Default)]
+pub enum GravitySpace {
+    /// Those of the world: y is up, whichever way the surface is turned, mirrored or scaled, in 2D and in 3D. Pieces of a floor fall
+    /// through it, those of a turned sprite straight down.
+    ///
+    /// How the surface lies is taken when it is shattered. Shards are children of their surface: what moves or turns it afterwards moves
+    /// and turns them, and the way they fall, as one. One pattern unit of the acceleration is as long as the surface shows it then.
+    #[default]
+    World,
+    /// Those of the surface: x along its picture, y up it. For scenes that are seen from above, say, and pieces that are to slide.
+    Surface,
 }
 
 /// When shards fall by themselves.
@@ -136,11 +156,17 @@ pub struct ShatterRequest {
     pub energy: Option<f32>,
     /// Direction of the blow in the world; zero = straight on; `None` = as the last hit.
     pub direction: Option<Vec3>,
+    /// Whether what is held goes as well, and cracks that end inside a piece are carried on to the next crack or the border, so that the
+    /// parts without cracks go in pieces. Else [`ShatterCracks::anchor`] and [`ShatterParams::carry_on`] hold. Default: `false`.
+    pub everything: bool,
 }
 
 impl ShatterRequest {
-    /// Everything that is not held, as a burst from the last hit.
-    pub const ALL: Self = Self { uv: None, reach: 64.0, energy: None, direction: None };
+    /// All pieces that the cracks have cut out and nothing holds, as a burst from the last hit.
+    pub const ALL: Self = Self { uv: None, reach: 64.0, energy: None, direction: None, everything: false };
+
+    /// The whole surface, as a burst from the last hit: nothing of it stays, whatever holds it and however few cracks it has.
+    pub const EVERYTHING: Self = Self { everything: true, ..Self::ALL };
 
     /// What lies within `reach` (pattern units) of `uv` (0..=1, v down), and what nothing holds then.
     #[must_use]
@@ -165,7 +191,8 @@ impl Default for ShatterRequest {
 /// A piece of a surface that has left it. Its entity is a child of the surface, its origin the shard's centre.
 ///
 /// Where the crate moves shards, their entities serve for others when they are gone, without this component meanwhile: take off again
-/// what you put on (observe `Remove` of `Shard`).
+/// what you put on (observe `Remove` of `Shard`). One that has a [`CrackSurface`](super::CrackSurface) then is despawned instead, with all that
+/// was made for it.
 ///
 /// With [`ShatterCracks::fly`] off, this is what a physics engine needs: colliders, mass and the velocity of the blow.
 #[derive(Component, Clone, Debug)]
@@ -220,6 +247,9 @@ pub struct CrackShards {
 }
 
 /// Shards have left a surface.
+///
+/// No more than 256 leave in one frame, those first that move first, unless [`CrackBudget::milliseconds`](super::CrackBudget::milliseconds)
+/// is a second or more: of a larger burst the event comes for each of its frames.
 #[derive(EntityEvent, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Event)]
 pub struct Shattered {
@@ -227,6 +257,8 @@ pub struct Shattered {
     pub entity: Entity,
     /// The shards that have just left.
     pub shards: Vec<Entity>,
+    /// How many more leave it in the next frames; 0 = these were all, or the last.
+    pub rest: u32,
 }
 
 /// All shards of a surface have returned to their places, time having run backwards.
@@ -253,8 +285,9 @@ pub enum ShardsError {
     /// A parameter of [`ShatterCracks`] or [`ShatterRequest`] is out of its range.
     #[error(transparent)]
     Parameter(#[from] ShatterError),
-    /// Only sprites and flat meshes that show their picture once can shatter.
-    #[error("only sprites and flat meshes that show the whole picture can shatter: {reason}")]
+    /// Only sprites, flat meshes that show their picture once, and slabs can shatter: boxes at least four times as wide and high as thick,
+    /// each of whose broad faces shows all of the picture, as those of a `Cuboid` do.
+    #[error("only sprites, and flat meshes and slabs that show the whole picture can shatter: {reason}")]
     NotFlat {
         /// What is wrong with it.
         reason: &'static str,

@@ -21,10 +21,12 @@ pub(super) const KIND: Kind = Kind {
     attach,
     detach,
     aspect,
+    is_twofold: |_, _| false,
+    aim: |_, _, hit, _| hit.at,
     locate,
     is_solid: false,
     plane,
-    open: |_, _| {},
+    open: |_, _, _, _| {},
     shard_material,
     inside: |_, _, _, _| None,
     spawn: material::spawn::<MeshMaterial2d<ColorMaterial>>,
@@ -69,7 +71,7 @@ fn inspect(world: &World, entity: Entity) -> Found {
         rect: rect.map(|rect| URect { min: rect.min.floor().as_uvec2(), max: rect.max.ceil().as_uvec2() }),
         layout: layout(&sprite.image_mode, sprite.custom_size).map(Arc::new),
         size: sprite.custom_size,
-        maps: CrackMaps { diffuse: true, normal: true, depth: false },
+        maps: CrackMaps { diffuse: true, normal: true, depth: false, emissive: false },
     }))
 }
 
@@ -181,7 +183,7 @@ fn plane(world: &World, entity: Entity, active: &Active) -> Result<Plane, &'stat
     let anchor = world.get::<Anchor>(entity).copied().unwrap_or_default();
     let flip = BVec2::new(sprite.flip_x, sprite.flip_y);
     let middle = (-anchor.as_vec() * size).extend(0.0);
-    Ok(Plane { middle, rotation: Quat::IDENTITY, size: Vec2::select(flip, -size, size) })
+    Ok(Plane { middle, rotation: Quat::IDENTITY, size: Vec2::select(flip, -size, size), thickness: None })
 }
 
 /// Shards of sprites are meshes: a material that looks as the sprite does.

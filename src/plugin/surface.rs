@@ -16,6 +16,13 @@ use bevy::{
 /// copy of a material is changed through the handle that the entity has then, not through the one it was spawned with, and is dropped
 /// by healing; another image or material put in its place is cracked as the first one was. A sprite that repeats or slices its picture shows
 /// it laid out in its texture while it is cracked, at the size that it had when that was made, and its `image_mode` is `Tiled` without tiles.
+///
+/// On a 3D mesh some of whose faces show the same part of the picture, as those of a `Cuboid` or a `Cylinder`, only that face cracks which is hit
+/// first; hits on others are refused until it is healed. Its textures hold the picture twice, and `Mesh3d` is a copy with other texture
+/// coordinates while it is cracked. A face is what hangs together in the texture coordinates, or a side of a box. A box no thicker than a
+/// quarter of its width and height, as it is scaled in the world, is a slab: it cracks through, so that its back shows what its front shows,
+/// and is hit from all sides. Where a face shows a part of the picture twice itself, where the picture repeats, faces share vertices, or there
+/// are more than 65,536 triangles, the mesh stays as it is, and cracks show wherever their place of the picture does.
 #[derive(Component, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Component, Default)]
 #[require(CrackState)]
@@ -46,7 +53,7 @@ impl CrackSurface {
             preset: preset.into(),
             seed: 0,
             resolution: CrackResolution::Picture,
-            write: CrackMaps { diffuse: true, normal: true, depth: true },
+            write: CrackMaps { diffuse: true, normal: true, depth: true, emissive: false },
             alpha_mask: true,
             mask: CrackMaskSource::Auto,
         }
@@ -113,11 +120,14 @@ pub struct CrackMaps {
     pub normal: bool,
     /// Depth for parallax mapping: 3D meshes only.
     pub depth: bool,
+    /// Light that cracks give off, for looks that [glow](crate::paint::Look::glow): 3D meshes whose material has no emissive picture of its
+    /// own. Default no.
+    pub emissive: bool,
 }
 
 impl Default for CrackMaps {
     fn default() -> Self {
-        Self { diffuse: true, normal: true, depth: true }
+        Self { diffuse: true, normal: true, depth: true, emissive: false }
     }
 }
 

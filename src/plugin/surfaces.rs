@@ -292,6 +292,8 @@ pub(super) struct Surfaces {
     /// All shards that are shown, the oldest first: entity, surface, and which of its pieces for which time; and some that are not
     /// any more.
     pub(super) shards: VecDeque<(Entity, Entity, [u32; 2])>,
+    /// How many more may become entities in this frame.
+    pub(super) new_shards: usize,
     /// Who owns a private image, material or mesh.
     pub(super) owners: HashMap<UntypedAssetId, Entity>,
     /// Which surfaces were made from a picture.

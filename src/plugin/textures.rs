@@ -5,7 +5,10 @@ use super::{
     picture::BasePicture,
     upload::{Staged, Stager, Uploads},
 };
-use crate::raster::TexelRect;
+use crate::{
+    paint::{LookTable, PaintTargets, paint_glow, paint_rects},
+    raster::{DepthField, TexelRect},
+};
 use bevy::{
     asset::RenderAssetUsages,
     image::ImageSampler,
@@ -24,6 +27,8 @@ pub struct CrackTextures {
     pub normal: Option<Handle<Image>>,
     /// Depth, `R8Unorm`, white = deep.
     pub depth: Option<Handle<Image>>,
+    /// The light that cracks give off, `Rgba8UnormSrgb`, black where there is none.
+    pub emissive: Option<Handle<Image>>,
 }
 
 impl CrackTextures {
@@ -33,8 +38,8 @@ impl CrackTextures {
     }
 
     /// In the order of [`KINDS`].
-    pub(super) fn all(&self) -> [Option<&Handle<Image>>; 3] {
-        [self.diffuse.as_ref(), self.normal.as_ref(), self.depth.as_ref()]
+    pub(super) fn all(&self) -> [Option<&Handle<Image>>; MAPS] {
+        [self.diffuse.as_ref(), self.normal.as_ref(), self.depth.as_ref(), self.emissive.as_ref()]
     }
 }
 
@@ -64,8 +69,33 @@ pub(super) const DEPTH: TextureKind = TextureKind {
     format: TextureFormat::R8Unorm,
 };
 
+pub(super) const EMISSIVE: TextureKind = TextureKind {
+    is_wanted: |maps| maps.emissive,
+    texels: |base| [0, 0, 0, 255].repeat(base.area()),
+    format: TextureFormat::Rgba8UnormSrgb,
+};
+
+/// Kinds of textures.
+pub(super) const MAPS: usize = 4;
+
 /// In the order of [`CrackTextures`].
-pub(super) const KINDS: [TextureKind; 3] = [DIFFUSE, NORMAL, DEPTH];
+pub(super) const KINDS: [TextureKind; MAPS] = [DIFFUSE, NORMAL, DEPTH, EMISSIVE];
+
+/// Paints some rectangles of the field, whose top left is at `origin`, in all textures there are; texels in the order of [`KINDS`].
+pub(super) fn paint(
+    base: &BasePicture,
+    field: &DepthField,
+    look: &LookTable,
+    rects: &[TexelRect],
+    origin: UVec2,
+    texels: [Option<&mut [u8]>; MAPS],
+) {
+    let [diffuse, normal, depth, emissive] = texels;
+    paint_rects(base.texels(), field, look, rects, origin, &mut PaintTargets { diffuse, normal, depth });
+    if let Some(emissive) = emissive {
+        paint_glow(None, base.size, field, look, rects, origin, emissive);
+    }
+}
 
 impl TextureKind {
     /// Bytes of a texel.
@@ -92,7 +122,7 @@ impl TextureKind {
 }
 
 /// The texels of the uncracked textures that are wanted, in the order of [`KINDS`].
-pub(super) fn texels(maps: CrackMaps, base: &BasePicture) -> [Option<Vec<u8>>; 3] {
+pub(super) fn texels(maps: CrackMaps, base: &BasePicture) -> [Option<Vec<u8>>; MAPS] {
     KINDS.each_ref().map(|kind| (kind.is_wanted)(maps).then(|| (kind.texels)(base)))
 }
 
@@ -103,7 +133,7 @@ pub(super) struct Picture {
 }
 
 /// Texels of textures of this size, in the order of [`KINDS`], brought to the renderer if there is one.
-pub(super) fn stage(texels: [Option<Vec<u8>>; 3], size: UVec2, stager: Option<&Stager>) -> [Option<Picture>; 3] {
+pub(super) fn stage(texels: [Option<Vec<u8>>; MAPS], size: UVec2, stager: Option<&Stager>) -> [Option<Picture>; MAPS] {
     let mut kinds = KINDS.iter();
     texels.map(|texels| {
         let texel = kinds.next().map_or(0, TextureKind::texel);
@@ -115,7 +145,7 @@ pub(super) fn stage(texels: [Option<Vec<u8>>; 3], size: UVec2, stager: Option<&S
 
 impl CrackTextures {
     /// Gives them their texels, and the renderer; `pictures` have what they had before then.
-    pub(super) fn fill(&self, world: &mut World, pictures: &mut [Option<Picture>; 3]) {
+    pub(super) fn fill(&self, world: &mut World, pictures: &mut [Option<Picture>; MAPS]) {
         world.resource_scope(|world, mut uploads: Mut<Uploads>| {
             let Some(mut images) = world.get_resource_mut::<Assets<Image>>() else { return };
             for (texture, picture) in self.all().into_iter().zip(pictures) {

@@ -6,6 +6,7 @@ use super::{
     bake::Bakes,
     carrier::{self, Carrier, Found, Shown},
     error::Called,
+    later::hold,
     mask::{self, PictureMasks},
     paint::stamp_anew,
     picture::BasePictures,
@@ -87,6 +88,10 @@ pub(super) fn any_changed(surfaces: Res<Surfaces>) -> bool {
 
 /// Takes up what has changed. What is not loaded yet is looked at again in the next frame.
 pub(super) fn update_changed(world: &mut World) {
+    hold(world, take_up_changed);
+}
+
+fn take_up_changed(world: &mut World) {
     let mut changed = core::mem::take(&mut world.resource_mut::<Surfaces>().changed);
     changed.sort_unstable();
     changed.dedup();
@@ -168,7 +173,7 @@ fn update(world: &mut World, entity: Entity, active: &mut Active) -> Result<bool
             let original = Shown { rect: shown.rect, layout, ..active.carrier.shown.clone() };
             return update_picture(world, entity, active, original);
         }
-        let whole = TexelRect::whole(active.base.size);
+        let whole = active.carrier.whole(active.base.size);
         let rect = shown.rect.map_or(whole, |rect| TexelRect { min: rect.min, max: rect.max }.intersect(whole));
         if !rect.is_empty() {
             active.show(rect);
@@ -216,8 +221,10 @@ fn update_preset(active: &mut Active, preset: CrackPreset) -> Result<(), CrackEr
         outcome.map_err(|error| CrackError::Preset { reason: error.to_string() })?;
     }
     active.look = look;
-    if active.profile != preset.profile {
+    let plan = preset.look.layer(active.surface.seed);
+    if active.profile != preset.profile || *active.field.plan() != plan {
         active.profile = preset.profile;
+        active.field.lay(plan);
         stamp_anew(active);
     }
     active.rate = preset.steps_per_second;
@@ -320,11 +327,13 @@ fn update_picture(world: &mut World, entity: Entity, active: &mut Active, shown:
         active.look = look;
         active.field = DepthField::new(frame);
         active.field.forbid(&mask);
+        active.field.lay(active.preset.look.layer(active.surface.seed));
         stamp_anew(active);
     }
     active.views.clear();
     active.show(draft.plan.rect);
     active.carrier.shown = shown;
+    active.carrier.is_twofold = draft.plan.is_twofold;
     // The material is made anew: one that exists keeps showing a texture of the old size.
     attach(world, entity, active);
     Ok(true)

@@ -2,9 +2,12 @@
 //!
 //! Depth is 16 bits a texel: 0 = untouched, 65535 = the deepest. Because stamps combine by max, painting is order-free
 //! and a segment can be stamped again, wider, without its neighbours.
+//!
+//! Beside depths a field may hold what some looks show ([`LayerPlan`]): plates, crushed zones and veils.
 
 mod dirty;
 mod distance;
+mod layer;
 mod rect;
 mod replay;
 mod section;
@@ -12,13 +15,15 @@ mod stamp;
 
 pub use dirty::DirtyTiles;
 pub use distance::{MAX_DISTANCE, crack_distance};
+pub use layer::{Crushed, LayerPlan, Veil};
+pub(crate) use layer::{CrushedField, Layer, Plate, SLOPE_UNIT, Spot, noise};
 pub use rect::TexelRect;
 pub use replay::{DOT_DEPTH, Redrawn, Replay};
 pub use stamp::{stamp_dot, stamp_path, stamp_path_with};
 
 use crate::{
     Grid,
-    pattern::{CrackMask, SurfaceFrame},
+    pattern::{CrackMask, Moment, Network, SurfaceFrame, Timeline},
 };
 use glam::UVec2;
 
@@ -31,6 +36,7 @@ pub struct DepthField {
     pub depth: Grid<u16>,
     /// Texels that stay untouched.
     forbidden: Option<Grid<bool>>,
+    layer: Layer,
 }
 
 impl DepthField {
@@ -40,19 +46,51 @@ impl DepthField {
         // Written twice: new memory is dear at the first write of each page, which else comes when cracks grow.
         let mut depth = Grid::new(frame.size(), u16::MAX);
         std::hint::black_box(&mut depth).as_mut_slice().fill(0);
-        Self { frame, depth, forbidden: None }
+        Self { frame, depth, forbidden: None, layer: Layer::default() }
     }
 
     /// Takes the depths out, and leaves a field without texels in the same place, on which nothing is drawn.
     #[cfg(feature = "bevy")]
     pub(crate) fn take(&mut self) -> Self {
-        let empty = Self { frame: self.frame, depth: Grid::new(UVec2::ZERO, 0), forbidden: None };
+        let empty =
+            Self { frame: self.frame, depth: Grid::new(UVec2::ZERO, 0), forbidden: None, layer: Layer::default() };
         std::mem::replace(self, empty)
     }
 
     /// Makes all of it untouched. What is forbidden stays so.
     pub fn clear(&mut self) {
         self.depth.as_mut_slice().fill(0);
+        self.layer.clear(self.frame);
+    }
+
+    /// Lets it hold what `plan` says beside depths, of which nothing is there at first.
+    pub fn lay(&mut self, plan: LayerPlan) {
+        self.layer = Layer::new(plan, self.frame);
+    }
+
+    /// What it holds beside depths.
+    #[must_use]
+    pub const fn plan(&self) -> &LayerPlan {
+        self.layer.plan()
+    }
+
+    /// Makes what it holds beside depths that of `network` at `moment`; appends the rectangles of the texels that may be others now.
+    ///
+    /// Network and timeline must be those of one growth, which may have grown since the last time. What it holds depends on the moment
+    /// alone. A cell that closes costs its own area once, a hit its crushed zone. [`Replay::show`] does it by itself.
+    pub fn show_layer(&mut self, network: &Network, timeline: &Timeline, moment: Moment, changed: &mut Vec<TexelRect>) {
+        self.layer.show(network, timeline, moment, self.forbidden.as_ref(), changed);
+        changed.retain(|rect| !rect.is_empty());
+    }
+
+    /// Goes on with a network whose oldest part was forgotten: what is shown stays.
+    #[cfg_attr(not(feature = "bevy"), expect(dead_code, reason = "surfaces of the plugin forget"))]
+    pub(crate) fn freeze_layer(&mut self, network: &Network, timeline: &Timeline) {
+        self.layer.freeze(network, timeline);
+    }
+
+    pub(crate) const fn layer(&self) -> &Layer {
+        &self.layer
     }
 
     /// Keeps every texel whose centre `mask` forbids untouched from now on, and gives back those that are not.
@@ -79,9 +117,17 @@ impl DepthField {
         for y in rect.min.y..rect.max.y {
             let texels = rect.min.x as usize..rect.max.x as usize;
             let depth = &mut self.depth.row_mut(y as usize)[texels.clone()];
-            for (depth, forbidden) in depth.iter_mut().zip(&forbidden.row(y as usize)[texels]) {
+            for (depth, forbidden) in depth.iter_mut().zip(&forbidden.row(y as usize)[texels.clone()]) {
                 if *forbidden {
                     *depth = 0;
+                }
+            }
+            if let Some(veil) = &mut self.layer.veil {
+                let veil = &mut veil.density_mut().row_mut(y as usize)[texels.clone()];
+                for (veil, forbidden) in veil.iter_mut().zip(&forbidden.row(y as usize)[texels]) {
+                    if *forbidden {
+                        *veil = 0;
+                    }
                 }
             }
         }

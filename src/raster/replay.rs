@@ -1,7 +1,10 @@
 //! [`Replay`]: a depth field that shows a network at any time.
 
 use super::{DepthField, Profile, TexelRect, stamp_dot, stamp_path};
-use crate::pattern::{Entries, Moment, NO_PARENT, Network, SegmentId, Timeline};
+use crate::{
+    Grid,
+    pattern::{Entries, Moment, NO_PARENT, Network, SegmentId, Timeline},
+};
 use glam::{UVec2, Vec2};
 
 /// Depth of the discs that stand for markers.
@@ -74,6 +77,8 @@ pub struct Replay {
     marked: Vec<u32>,
     drawn: usize,
     before: Vec<[u16; (TILE * TILE) as usize]>,
+    /// The same of veils, if there are any.
+    veils_before: Vec<[u8; (TILE * TILE) as usize]>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -107,7 +112,8 @@ pub struct Redrawn {
     pub cleared: Vec<TexelRect>,
     /// The texels of each segment that was stamped.
     pub stamped: Vec<TexelRect>,
-    /// What is not as before, disjoint, each within a tile.
+    /// What is not as before: of depths, disjoint rectangles that each lie within a tile, then those of cells that have closed or opened and
+    /// of hits.
     pub changed: Vec<TexelRect>,
 }
 
@@ -144,6 +150,7 @@ impl Replay {
             marked: Vec::new(),
             drawn: 0,
             before: Vec::new(),
+            veils_before: Vec::new(),
         }
     }
 
@@ -179,7 +186,7 @@ impl Replay {
     ) {
         self.begin(field, network, timeline, to, redrawn);
         while !self.draw(field, network, timeline, usize::MAX, redrawn) {}
-        self.end(field, redrawn);
+        self.end(field, network, timeline, redrawn);
     }
 
     /// The first part of [`show`](Self::show): clears what will be drawn anew.
@@ -292,6 +299,18 @@ impl Replay {
             self.before.push(before);
             redrawn.cleared.push(rect);
         }
+        self.veils_before.clear();
+        let Some(veil) = &mut field.layer.veil else { return };
+        for &tile in &self.marked {
+            let rect = self.tile(tile);
+            let mut before = [0; (TILE * TILE) as usize];
+            for (y, kept) in (rect.min.y..rect.max.y).zip(before.chunks_exact_mut(TILE as usize)) {
+                let row = &mut veil.density_mut().row_mut(y as usize)[rect.min.x as usize..rect.max.x as usize];
+                kept[..row.len()].copy_from_slice(row);
+                row.fill(0);
+            }
+            self.veils_before.push(before);
+        }
     }
 
     /// The second part: stamps what touches a marked tile, all of it: beside the marked tiles it changes nothing, for it is there
@@ -340,24 +359,31 @@ impl Replay {
         self.drawn == self.marked.len()
     }
 
-    /// The last part: notes the texels of the marked tiles that differ from before.
-    pub(crate) fn end(&mut self, field: &DepthField, redrawn: &mut Redrawn) {
+    /// The last part: notes the texels of the marked tiles that differ from before, and makes all else that the field holds follow.
+    pub(crate) fn end(
+        &mut self,
+        field: &mut DepthField,
+        network: &Network,
+        timeline: &Timeline,
+        redrawn: &mut Redrawn,
+    ) {
         for (&tile, before) in self.marked.iter().zip(&self.before) {
             let rect = self.tile(tile);
-            let mut changed = TexelRect::default();
-            for (y, kept) in (rect.min.y..rect.max.y).zip(before.chunks_exact(TILE as usize)) {
-                let row = &field.depth.row(y as usize)[rect.min.x as usize..rect.max.x as usize];
-                let mut differing = (rect.min.x..).zip(row.iter().zip(kept)).filter(|(_, (a, b))| a != b);
-                if let Some((first, _)) = differing.next() {
-                    let last = differing.last().map_or(first, |(x, _)| x);
-                    changed = changed.union(TexelRect { min: UVec2::new(first, y), max: UVec2::new(last + 1, y + 1) });
-                }
-            }
+            let changed = differing(&field.depth, before, rect);
             if !changed.is_empty() {
                 redrawn.changed.push(changed);
             }
         }
+        if let Some(veils) = field.layer.veil() {
+            for (&tile, before) in self.marked.iter().zip(&self.veils_before) {
+                let changed = differing(veils, before, self.tile(tile));
+                if !changed.is_empty() {
+                    redrawn.changed.push(changed);
+                }
+            }
+        }
         self.marked.clear();
+        field.show_layer(network, timeline, self.at, &mut redrawn.changed);
     }
 
     /// Puts into the index what was written since the last time; returns how much was in it before.
@@ -423,9 +449,14 @@ impl Replay {
         };
         // The edge of a stamp is a texel soft; one more for rounding.
         let reach = (radius + self.profile.rim_width.max(0.0)) * field.frame.texels_per_unit() + 2.5;
+        let hang = match (part.what, &field.layer.veil) {
+            (What::Segment(_), Some(veil)) => veil.hang(),
+            _ => Vec2::ZERO,
+        };
+        let (low, high) = (field.frame.to_texel(low), field.frame.to_texel(high));
         let rect = TexelRect {
-            min: (field.frame.to_texel(low) - reach).max(Vec2::ZERO).as_uvec2(),
-            max: (field.frame.to_texel(high) + reach).ceil().max(Vec2::ZERO).as_uvec2().min(self.size),
+            min: (low + hang.min(Vec2::ZERO) - reach).max(Vec2::ZERO).as_uvec2(),
+            max: (high + hang.max(Vec2::ZERO) + reach).ceil().max(Vec2::ZERO).as_uvec2().min(self.size),
         };
         let before = part.rect;
         part.rect = before.union(rect);
@@ -443,6 +474,20 @@ impl Replay {
             }
         }
     }
+}
+
+/// The texels of a tile at `rect` that are not as before.
+fn differing<T: Copy + PartialEq>(now: &Grid<T>, before: &[T; (TILE * TILE) as usize], rect: TexelRect) -> TexelRect {
+    let mut changed = TexelRect::default();
+    for (y, kept) in (rect.min.y..rect.max.y).zip(before.chunks_exact(TILE as usize)) {
+        let row = &now.row(y as usize)[rect.min.x as usize..rect.max.x as usize];
+        let mut differing = (rect.min.x..).zip(row.iter().zip(kept)).filter(|(_, (a, b))| a != b);
+        if let Some((first, _)) = differing.next() {
+            let last = differing.last().map_or(first, |(x, _)| x);
+            changed = changed.union(TexelRect { min: UVec2::new(first, y), max: UVec2::new(last + 1, y + 1) });
+        }
+    }
+    changed
 }
 
 /// Columns and rows of the tiles of `side` that `rect` touches.

@@ -81,6 +81,13 @@ fn stamp_pieces<const TELL: bool>(
             bounds = bounds.union(capsule.stamp::<TELL>(field, &section, changed));
         }
     }
+    if let Some(veil) = &mut field.layer.veil {
+        let rect = veil.stamp(path);
+        if TELL && !rect.is_empty() {
+            changed(rect);
+        }
+        bounds = bounds.union(rect);
+    }
     field.spare(bounds);
     bounds
 }

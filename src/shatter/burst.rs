@@ -25,7 +25,8 @@ pub struct BurstParams {
     pub spin: f32,
     /// Whether pieces turn about any axis; else about the one through the picture. Default: `true`.
     pub tumble: bool,
-    /// Acceleration, y up; each component -100..=100. Default: 2.2 down.
+    /// Acceleration, x right, y up; each component -100..=100. Default: 2.2 down. In the surface's own axes here; the plugin turns it
+    /// so that y is up in the world, unless its `GravitySpace` says otherwise.
     pub gravity: Vec2,
     /// Share of the speed that air takes a second, 0..=100. Default: 0.4.
     pub drag: f32,
@@ -95,6 +96,7 @@ impl Default for BurstParams {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Burst {
     params: BurstParams,
+    gravity: Vec3,
     from: Vec2,
     direction: Vec3,
     energy: f32,
@@ -152,7 +154,15 @@ impl Burst {
             return Err(ShatterError::NotFinite { index: 0 });
         }
         let direction = direction.try_normalize().unwrap_or(Vec3::NEG_Z);
-        Ok(Self { params, from, direction, energy, seed })
+        Ok(Self { gravity: params.gravity.extend(0.0), params, from, direction, energy, seed })
+    }
+
+    /// The same with another acceleration (pattern units a second squared; x right, y up, z towards the viewer): pieces of a surface
+    /// that is turned in the world do not fall along its own y. What is not finite counts as none.
+    #[must_use]
+    pub fn with_gravity(mut self, gravity: Vec3) -> Self {
+        self.gravity = if gravity.is_finite() { gravity } else { Vec3::ZERO };
+        self
     }
 
     /// The flight of a piece that the burst knocks out; `number` tells pieces apart.
@@ -183,7 +193,7 @@ impl Burst {
     }
 
     fn released(&self, shard: &Shard, velocity: Vec3, distance: f32, mut rng: Rng) -> Flight {
-        let BurstParams { hold, front, spin, tumble, gravity, drag, fade_after, fade, .. } = self.params;
+        let BurstParams { hold, front, spin, tumble, drag, fade_after, fade, .. } = self.params;
         let any = Vec3::new(rng.signed(), rng.signed(), 0.5 * rng.signed());
         let turn = rng.signed();
         let (axis, spin) =
@@ -193,7 +203,7 @@ impl Burst {
             velocity,
             axis,
             spin: spin * lightness(shard.area),
-            gravity: gravity.extend(0.0),
+            gravity: self.gravity,
             drag,
             fade_after: fade_after * (0.8 + 0.4 * rng.unit()),
             fade,

@@ -21,6 +21,8 @@ mod hits;
 mod images;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod lifecycle;
+#[cfg(all(feature = "2d", feature = "3d"))]
+mod looks;
 mod masks;
 mod pictures;
 #[cfg(all(feature = "2d", feature = "3d"))]
@@ -29,13 +31,19 @@ mod plugin;
 mod prepare;
 #[cfg(feature = "serde")]
 mod presets;
+#[cfg(all(feature = "2d", feature = "3d"))]
+mod random;
 mod replay;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod shards;
 #[cfg(all(feature = "2d", feature = "3d"))]
+mod shards_bounds;
+#[cfg(all(feature = "2d", feature = "3d"))]
 mod shards_life;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod shards_order;
+#[cfg(all(feature = "2d", feature = "3d"))]
+mod solids;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod support;
 mod voronoi;

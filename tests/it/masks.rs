@@ -294,7 +294,7 @@ mod in_apps {
     use bevy_crack::{
         growth::CrackGrowth,
         paint::{BaseTexels, LookTable, PaintTargets, paint_into},
-        pattern::{CrackMask, SurfaceFrame},
+        pattern::{CrackMask, Moment, SurfaceFrame},
         prelude::*,
         raster::{DepthField, TexelRect, stamp_path},
     };
@@ -375,9 +375,12 @@ mod in_apps {
             growth.hit(frame.uv_to_pos(at), 1.0);
             while growth.step().grew() {}
             let mut field = DepthField::new(frame);
+            field.lay(preset.look.layer(0));
             for segment in growth.network().segments() {
                 stamp_path(&mut field, &preset.profile, &growth.network().path(segment).unwrap());
             }
+            let timeline = growth.timeline();
+            field.show_layer(growth.network(), timeline, Moment::after(timeline.end()), &mut Vec::new());
             let mut diffuse = picture.as_raw().clone();
             paint_into(
                 BaseTexels { size, diffuse: picture.as_raw(), normal: None, depth: None },

@@ -6,7 +6,7 @@ use bevy_crack::{
     CrackPreset,
     growth::CrackGrowth,
     paint::{BaseTexels, LookTable, PaintTargets, paint_into},
-    pattern::SurfaceFrame,
+    pattern::{Moment, SurfaceFrame},
     raster::{DepthField, TexelRect, stamp_path},
 };
 use glam::{UVec2, Vec2};
@@ -23,9 +23,12 @@ fn paint(preset: &CrackPreset) -> (RgbaImage, RgbaImage) {
     growth.hit(Vec2::new(1.1, 0.7), 0.4);
     while growth.step().grew() {}
     let mut field = DepthField::new(frame);
+    field.lay(preset.look.layer(1));
     for segment in growth.network().segments() {
         stamp_path(&mut field, &preset.profile, &growth.network().path(segment).unwrap());
     }
+    let timeline = growth.timeline();
+    field.show_layer(growth.network(), timeline, Moment::after(timeline.end()), &mut Vec::new());
     let base = RgbaImage::from_fn(SIZE.x, SIZE.y, |x, y| {
         let shade = 110 + ((x / 8 + y / 8) % 2) as u8 * 30;
         image::Rgba([shade, shade, shade - 10, if x < 4 { 0 } else { 255 }])

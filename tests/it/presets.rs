@@ -126,7 +126,7 @@ fn every_number_is_checked() {
                 section = if value == "(" { field } else { "" };
             }
             if depth == 2 {
-                group = if value.ends_with('(') { field } else { "" };
+                group = if value.ends_with(['(', '[']) { field } else { "" };
             }
             let value = value.trim_end_matches(',');
             // Whole numbers cannot be NaN in a file.
@@ -136,7 +136,6 @@ fn every_number_is_checked() {
             let full = match (section, depth) {
                 ("", _) => field.to_owned(),
                 (_, 2) => format!("{section}.{field}"),
-                ("look", _) => format!("look.ramp.{field}"),
                 _ => format!("{section}.{group}.{field}"),
             };
             let broken = text.replacen(line, &line.replace(value, "NaN"), 1);

@@ -200,7 +200,7 @@ fn every_edge_lies_on_a_drawn_crack() {
 }
 
 /// Memory of this process that is in use, bytes; 0 where the system does not tell.
-fn resident() -> u64 {
+pub(crate) fn resident() -> u64 {
     let pages = std::fs::read_to_string("/proc/self/statm").unwrap_or_default();
     4096 * pages.split(' ').nth(1).and_then(|pages| pages.parse::<u64>().ok()).unwrap_or(0)
 }

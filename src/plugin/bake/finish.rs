@@ -10,7 +10,7 @@ use super::{
         paint::stamp_all,
         picture::BasePicture,
         surfaces::{Active, Added, Touched},
-        textures::{self, Picture},
+        textures::{self, MAPS, Picture},
         upload::Stager,
         watch::{Past, grown_anew},
     },
@@ -19,7 +19,7 @@ use super::{
 use crate::{
     CrackPreset,
     growth::CrackGrowth,
-    paint::{LookTable, PaintTargets, paint_rects},
+    paint::LookTable,
     pattern::{CellTracker, CrackMask, Moment},
     raster::{DepthField, Redrawn, Replay, TexelRect},
 };
@@ -48,15 +48,14 @@ impl Order {
     pub(super) fn of(active: &Active, seconds: Option<f32>, stager: Option<Stager>) -> Option<Self> {
         let past = Past::of(active);
         let seconds = seconds.filter(|_| past.hits.is_empty());
-        let [diffuse, normal, depth] =
-            [&active.textures.diffuse, &active.textures.normal, &active.textures.depth].map(Option::is_some);
+        let [diffuse, normal, depth, emissive] = active.textures.all().map(|texture| texture.is_some());
         Some(Self {
             surface: active.surface.clone(),
             preset: active.preset.clone(),
             base: active.base.clone(),
             mask: active.growth.mask().clone(),
             rect: active.views.get(active.view)?.rect,
-            maps: CrackMaps { diffuse, normal, depth },
+            maps: CrackMaps { diffuse, normal, depth, emissive },
             past,
             hits: active.hits,
             first: active.first(seconds),
@@ -96,7 +95,7 @@ enum Stage {
         growth: CrackGrowth,
         cells: CellTracker,
         drawn: Box<Drawn>,
-        texels: [Option<Vec<u8>>; 3],
+        texels: [Option<Vec<u8>>; MAPS],
         /// The first row that is not painted yet.
         row: u32,
     },
@@ -123,7 +122,7 @@ pub(super) struct Finished {
     /// If it is to show other times.
     pub(super) film: Option<Box<Film>>,
     /// The texels of each texture, and the same where the renderer can read them.
-    pub(super) pictures: [Option<Picture>; 3],
+    pub(super) pictures: [Option<Picture>; MAPS],
 }
 
 /// A slice further.
@@ -189,6 +188,7 @@ impl Order {
         let frame = frame(self.rect)?;
         let (mut field, mut touched) = (DepthField::new(frame), Touched::new(frame.size()));
         field.forbid(&self.mask);
+        field.lay(self.preset.look.layer(self.surface.seed));
         let profile = self.preset.profile;
         let replay = match self.first.moment(growth.timeline().end()) {
             None => {
@@ -207,13 +207,12 @@ impl Order {
     }
 
     /// Paints some rows from `row` on; returns the next one.
-    fn paint(&self, drawn: &Drawn, texels: &mut [Option<Vec<u8>>; 3], row: u32) -> u32 {
+    fn paint(&self, drawn: &Drawn, texels: &mut [Option<Vec<u8>>; MAPS], row: u32) -> u32 {
         let size = self.rect.size();
         let end = size.y.min(row + (SLICE / size.x).max(1));
         let band = TexelRect { min: UVec2::new(0, row), max: UVec2::new(size.x, end) };
-        let [diffuse, normal, depth] = texels.each_mut().map(Option::as_deref_mut);
-        let mut targets = PaintTargets { diffuse, normal, depth };
-        paint_rects(self.base.texels(), &drawn.field, &drawn.look, &[band], self.rect.min, &mut targets);
+        let texels = texels.each_mut().map(Option::as_deref_mut);
+        textures::paint(&self.base, &drawn.field, &drawn.look, &[band], self.rect.min, texels);
         end
     }
 }

@@ -3,12 +3,12 @@
 use super::super::{
     picture::BasePicture,
     surfaces::Touched,
-    textures::{self, TextureKind},
+    textures::{self, MAPS, TextureKind},
     upload::{Staged, Stager},
 };
 use crate::{
     growth::CrackGrowth,
-    paint::{LookTable, PaintTargets, paint_rects},
+    paint::LookTable,
     pattern::{Moment, Network, Timeline},
     raster::{DepthField, DirtyTiles, Redrawn, Replay, TexelRect},
 };
@@ -41,7 +41,7 @@ impl Score {
 
 /// The texels that were shown before those that are.
 pub(super) struct Back {
-    pub(super) texels: [Option<Vec<u8>>; 3],
+    pub(super) texels: [Option<Vec<u8>>; MAPS],
     /// Texels of the field that have changed since.
     pub(super) behind: Vec<TexelRect>,
 }
@@ -53,7 +53,7 @@ pub(super) struct Shot {
     pub(super) base: Arc<BasePicture>,
     pub(super) look: LookTable,
     /// Which textures there are, and the part of them that is shown.
-    pub(super) maps: [bool; 3],
+    pub(super) maps: [bool; MAPS],
     pub(super) rect: TexelRect,
     pub(super) stager: Option<Stager>,
     pub(super) field: DepthField,
@@ -66,7 +66,7 @@ pub(super) struct Shot {
     pub(super) stage: Stage,
     /// The same when it is made: texels of the field.
     pub(super) changed: Vec<TexelRect>,
-    pub(super) staged: [Option<Staged>; 3],
+    pub(super) staged: [Option<Staged>; MAPS],
 }
 
 pub(super) enum Stage {
@@ -94,7 +94,7 @@ impl Shot {
             }
             Stage::Draw => {
                 if self.replay.draw(&mut self.field, network, timeline, SEGMENTS, &mut self.redrawn) {
-                    self.replay.end(&self.field, &mut self.redrawn);
+                    self.replay.end(&mut self.field, network, timeline, &mut self.redrawn);
                     self.stage = Stage::Paint(self.plan());
                 }
             }
@@ -132,7 +132,7 @@ impl Shot {
             }
             None => {
                 let mut kinds = textures::KINDS.iter().zip(self.maps);
-                let texels = [(); 3].map(|()| {
+                let texels = [(); MAPS].map(|()| {
                     let (kind, _) = kinds.next().filter(|(_, is_wanted)| *is_wanted)?;
                     Some((kind.texels)(&self.base))
                 });
@@ -146,9 +146,8 @@ impl Shot {
 
     fn paint(&mut self, rects: &[TexelRect]) {
         let Some(back) = &mut self.back else { return };
-        let [diffuse, normal, depth] = back.texels.each_mut().map(Option::as_deref_mut);
-        let mut targets = PaintTargets { diffuse, normal, depth };
-        paint_rects(self.base.texels(), &self.field, &self.look, rects, self.rect.min, &mut targets);
+        let texels = back.texels.each_mut().map(Option::as_deref_mut);
+        textures::paint(&self.base, &self.field, &self.look, rects, self.rect.min, texels);
     }
 
     /// Brings what has changed to where the renderer can read it.

@@ -7,6 +7,7 @@ use super::{
 };
 use crate::{
     plugin::{
+        CrackSurface,
         beside::throw_away,
         carrier::{Carrier, Clothes},
     },
@@ -31,8 +32,14 @@ pub(super) struct Body {
     origin: Origin,
 }
 
-/// Bodies of shards that are not shown any more, hidden, numbered as they came. They are kept as long as any surface is broken, and
-/// as they are: a piece that is shown once more has its own again if no other has taken it.
+/// So many bodies are kept for others while no shard is shown; else as many as are shown.
+const KEPT: usize = 256;
+
+/// No more go in a frame.
+const GOING: usize = 256;
+
+/// Bodies of shards that are not shown any more, hidden, numbered as they came. They are kept as long as any surface is broken, up to
+/// [`KEPT`] or as many as are shown, and as they are: a piece that is shown once more has its own again if no other has taken it.
 #[derive(Resource, Default)]
 pub(in crate::plugin) struct Spares {
     flat: BTreeMap<u64, Body>,
@@ -41,15 +48,37 @@ pub(in crate::plugin) struct Spares {
 }
 
 impl Spares {
-    /// Lets all go.
-    pub(super) fn clear(world: &mut World) {
-        let is_any = |spares: &Self| !(spares.flat.is_empty() && spares.solid.is_empty());
-        if world.get_resource().is_some_and(is_any) {
-            let mut spares = world.resource_mut::<Self>();
-            let (flat, solid) = (core::mem::take(&mut spares.flat), core::mem::take(&mut spares.solid));
-            for body in flat.into_values().chain(solid.into_values()) {
-                world.try_despawn(body.entity).ok();
-            }
+    fn len(&self) -> usize {
+        self.flat.len() + self.solid.len()
+    }
+
+    /// Takes out the oldest of all.
+    fn pop(&mut self) -> Option<Body> {
+        let first = |bodies: &BTreeMap<u64, Body>| bodies.first_key_value().map(|(number, _)| *number);
+        let is_flat = match (first(&self.flat), first(&self.solid)) {
+            (Some(flat), Some(solid)) => flat < solid,
+            (flat, _) => flat.is_some(),
+        };
+        self.of(!is_flat).pop_first().map(|(_, body)| body)
+    }
+
+    /// Lets the oldest go until there are no more than `most`.
+    pub(super) fn shrink_to(world: &mut World, most: usize) {
+        while let Some(mut spares) = world.get_resource_mut::<Self>()
+            && spares.len() > most
+            && let Some(body) = spares.pop()
+        {
+            world.try_despawn(body.entity).ok();
+        }
+    }
+
+    /// Lets those go, some in each frame, that will hardly be of use, so many shards being shown; without a broken surface all.
+    pub(super) fn trim(world: &mut World, is_any_broken: bool, shown: usize, is_boundless: bool) {
+        let len = world.get_resource().map_or(0, Self::len);
+        let most = if is_any_broken { shown.max(KEPT) } else { 0 };
+        if len > most {
+            let least = if is_boundless { 0 } else { len.saturating_sub(GOING) };
+            Self::shrink_to(world, most.max(least));
         }
     }
 
@@ -87,9 +116,14 @@ impl Body {
         is_there(self.entity) && self.sides.as_ref().is_none_or(|(sides, _)| is_there(*sides))
     }
 
-    /// Hides a body and keeps it for another shard. Returns its number among the spare ones.
+    /// Hides a body and keeps it for another shard. Returns its number among the spare ones. One that has been made a surface goes, with
+    /// all that was made for that.
     fn park(self, world: &mut World, carrier: &Carrier) -> Option<u64> {
         let mut entity = world.get_entity_mut(self.entity).ok()?;
+        if entity.contains::<CrackSurface>() {
+            entity.despawn();
+            return None;
+        }
         // Materials and their pictures are the surface's.
         (carrier.kind.undress)(&mut entity);
         if let Some(mut visibility) = entity.get_mut::<Visibility>() {
@@ -143,7 +177,7 @@ impl Broken {
         self.wear[level].clone()
     }
 
-    /// Makes the entities of pieces: of bodies that are there, then all others at a stroke. Returns them, and which pieces they are,
+    /// Makes the entities of pieces: of bodies that are there, then all others. Returns them, and which pieces they are,
     /// in order; not those for which something is missing.
     pub(super) fn spawn(
         &mut self,
@@ -176,6 +210,10 @@ impl Broken {
         let mut all = Vec::with_capacity(shown.len());
         for (Shown { index, pose, form }, own) in shown.into_iter().zip(own) {
             let form = if own.is_none() { form.map(|form| *form).or_else(|| forms.next()) } else { None };
+            // Who was told of the shards before has taken it away: this one comes in the next frame.
+            if own.as_ref().is_some_and(|body| !body.is_there(world)) {
+                continue;
+            }
             let level = self.level(carrier, pose);
             let Some(material) = self.material(world, surface, carrier, level) else { continue };
             let Some(place) = self.place(carrier, index, pose) else { continue };
@@ -200,11 +238,15 @@ impl Broken {
             let origin = origin(piece);
             match body {
                 Some(mut body) => {
-                    (carrier.kind.dress)(&mut world.entity_mut(body.entity), Some(shard), worn);
+                    if let Ok(mut entity) = world.get_entity_mut(body.entity) {
+                        (carrier.kind.dress)(&mut entity, Some(shard), worn);
+                    }
                     if let (Some((entity, kept)), Some((mesh, material))) = (&mut body.sides, side) {
                         let worn = Clothes { parent: body.entity, place: Transform::default(), mesh, material };
                         *kept = worn.mesh.clone();
-                        (carrier.kind.dress)(&mut world.entity_mut(*entity), None, worn);
+                        if let Ok(mut entity) = world.get_entity_mut(*entity) {
+                            (carrier.kind.dress)(&mut entity, None, worn);
+                        }
                     }
                     piece.body = Some(Body { mesh, origin, ..body });
                 }
@@ -218,6 +260,7 @@ impl Broken {
         let entities = (carrier.kind.spawn)(world, clothes);
         let mut with_sides = Vec::new();
         for (((index, mesh, origin), side), entity) in new.into_iter().zip(sides).zip(entities) {
+            let Some(entity) = entity else { continue };
             self.pieces[index].body = Some(Body { entity, mesh, sides: None, origin });
             with_sides.extend(side.map(|(mesh, material)| {
                 let clothes = Clothes { parent: entity, place: Transform::default(), mesh, material };
@@ -230,6 +273,7 @@ impl Broken {
             let clothes = with_sides.into_iter().map(|(_, clothes)| clothes).collect();
             let entities = (carrier.kind.spawn_sides)(world, clothes);
             for ((index, mesh), entity) in kept.into_iter().zip(entities) {
+                let Some(entity) = entity else { continue };
                 if let Some(body) = &mut self.pieces[index].body {
                     body.sides = Some((entity, mesh));
                 }
@@ -269,7 +313,7 @@ impl Broken {
 
     /// Thickness of shards in the entity's units.
     fn thickness(&self) -> f32 {
-        self.settings.thickness * self.plane.size.y.abs() / self.cut.extent().y
+        self.plane.thickness(self.settings.thickness, self.cut.extent())
     }
 
     /// How much of [`LEVELS`] is there.

@@ -4,14 +4,15 @@ use super::{
     CrackShards, Plane, ShatterCracks,
     body::{Body, LEVELS},
     holes::Holes,
+    order::Batch,
 };
 use crate::{
-    plugin::{paint::stamp_anew, surfaces::Active},
+    plugin::{carrier::Carrier, paint::stamp_anew, surfaces::Active},
     raster::TexelRect,
     shatter::{BreakAgain, Flight, RimLook, Shards, Support},
 };
 use bevy::{asset::UntypedHandle, prelude::*};
-use std::sync::Arc;
+use std::{collections::VecDeque, sync::Arc};
 
 /// The last hit of a surface.
 #[derive(Clone, Copy)]
@@ -42,6 +43,18 @@ pub(in crate::plugin) struct Broken {
     pub(in crate::plugin) carried: Vec<Arc<[Vec<Vec2>]>>,
     /// Pieces that are out of their places and fragments of them, by id: fragments come after what they were part of.
     pub(super) pieces: Vec<Piece>,
+    /// What is to leave in the next frames.
+    pub(super) waiting: VecDeque<Batch>,
+    /// Whether its copy of the picture has just been made.
+    pub(super) is_fresh: bool,
+    /// Whether pieces wait to be shown or to break: a frame had no room for them.
+    pub(super) is_behind: bool,
+    /// Whether pieces that had broken have faded away.
+    pub(super) has_faded: bool,
+    /// When what waits was released, seconds since it broke: with the first that leave.
+    pub(super) since: f64,
+    /// Whether any of it has left.
+    pub(super) has_begun: bool,
     /// Id for the next piece.
     pub(super) next: u32,
     /// How many pieces were released so far.
@@ -76,6 +89,8 @@ pub(super) struct Piece {
     pub(super) again: Option<(BreakAgain, f32)>,
     /// Whether its fragments have taken its place.
     pub(super) is_broken: bool,
+    /// Whether there was no room for its fragments when it was to break.
+    pub(super) stays_whole: bool,
     /// A fragment: the id of the piece that it was part of.
     pub(super) part_of: Option<u32>,
     /// The part of the texture that the surface showed then.
@@ -110,6 +125,12 @@ impl Broken {
             holes: Holes::new(active.field.frame.size()),
             carried: Vec::new(),
             pieces: Vec::new(),
+            waiting: VecDeque::new(),
+            is_fresh: true,
+            is_behind: false,
+            has_faded: false,
+            since: 0.0,
+            has_begun: false,
             next: 0,
             released: 0,
             time: 0.0,
@@ -143,6 +164,36 @@ impl Broken {
         self.pieces.binary_search_by_key(&id, |piece| piece.id).ok()
     }
 
+    /// What has waited to leave stays after all.
+    pub(super) fn keep_waiting(&mut self) {
+        for leaving in self.waiting.drain(..).flat_map(|batch| batch.leaving) {
+            self.support.put_back(leaving.number);
+        }
+    }
+
+    /// Puts fragments of pieces that have faded away together again: they are the same whenever the piece breaks.
+    pub(super) fn join_faded(&mut self, world: &mut World, carrier: &Carrier) {
+        let now = self.time;
+        let is_faded = |piece: &Piece| piece.flight.pose((now - piece.start) as f32).opacity <= 0.0;
+        // Fragments come after what they were part of, so ids are in order.
+        let mut gone: Vec<u32> = Vec::new();
+        let mut bodies = Vec::new();
+        self.pieces.retain_mut(|piece| {
+            let goes = piece.part_of.is_some_and(|whole| gone.binary_search(&whole).is_ok());
+            if piece.is_broken && (goes || is_faded(piece)) {
+                gone.push(piece.id);
+                piece.is_broken = false;
+            }
+            if goes {
+                bodies.extend(piece.body.take());
+            }
+            !goes
+        });
+        for body in bodies {
+            self.put_away(world, carrier, body);
+        }
+    }
+
     /// A piece is in its place again.
     pub(super) fn put_back(&mut self, piece: &Piece) {
         if Arc::ptr_eq(&piece.cut, &self.cut) {
@@ -166,6 +217,7 @@ pub(in crate::plugin) fn drop_shards(world: &mut World, entity: Entity, active: 
     for index in 0..broken.pieces.len() {
         broken.hide(world, &active.carrier, index);
     }
+    (active.carrier.kind.open)(world, entity, &active.carrier, false);
     if !broken.carried.is_empty() {
         stamp_anew(active);
     }

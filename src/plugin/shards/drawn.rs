@@ -2,13 +2,13 @@
 
 use super::ShatterCracks;
 use crate::{
-    paint::{Look, LookTable, PaintTargets, paint_rects},
+    paint::{Look, LookTable},
     pattern::{PathPoint, SegmentPath},
     plugin::{
         beside::throw_away,
         picture::BasePicture,
         surfaces::Active,
-        textures::{self, TextureKind},
+        textures::{self, MAPS, TextureKind},
         upload::Uploads,
     },
     raster::{DepthField, DirtyTiles, Profile, TexelRect, stamp_path},
@@ -63,8 +63,8 @@ fn rim_of(look: &Look) -> RimLook {
     match look {
         // The picture behind is seen through the walls of the cracks.
         Look { shift, opaque: true, .. } if *shift > 0.0 => RimLook::GLASS,
-        // Neither light nor shade.
-        Look { glint: 0.0, .. } => RimLook::PLAIN,
+        // Drawn, or as thin as ink.
+        Look { opaque: true, .. } | Look { relief: 0.0, .. } => RimLook::PLAIN,
         _ => RimLook::STONE,
     }
 }
@@ -76,7 +76,7 @@ pub(super) struct Sketch {
     look: LookTable,
     width: f32,
     /// Which textures there are.
-    maps: [bool; 3],
+    maps: [bool; MAPS],
     view: TexelRect,
     painted: u64,
 }
@@ -90,7 +90,7 @@ impl Sketch {
             profile: active.profile,
             look: active.look.clone(),
             width: active.hair(),
-            maps: [&textures.diffuse, &textures.normal, &textures.depth].map(Option::is_some),
+            maps: textures.all().map(|texture| texture.is_some()),
             view: active.views.get(active.view)?.rect,
             painted: active.painted,
         })
@@ -107,14 +107,10 @@ impl Sketch {
         rects.retain(|rect| !rect.is_empty());
         let mut kinds = textures::KINDS.iter().zip(self.maps);
         let mut room = || kinds.next().filter(|(_, is)| *is).map(|(kind, _)| vec![0; base.area() * kind.texel()]);
-        let [mut diffuse, mut normal, mut depth] = [room(), room(), room()];
-        let mut targets = PaintTargets {
-            diffuse: diffuse.as_deref_mut(),
-            normal: normal.as_deref_mut(),
-            depth: depth.as_deref_mut(),
-        };
-        paint_rects(base.texels(), &self.field, &self.look, &rects, self.view.min, &mut targets);
-        Drawn { sketch: self, rects, maps: [diffuse, normal, depth] }
+        let mut maps = [(); MAPS].map(|()| room());
+        let texels = maps.each_mut().map(Option::as_deref_mut);
+        textures::paint(base, &self.field, &self.look, &rects, self.view.min, texels);
+        Drawn { sketch: self, rects, maps }
     }
 }
 
@@ -124,7 +120,7 @@ pub(super) struct Drawn {
     /// Texels of the field that have changed.
     rects: Vec<TexelRect>,
     /// The whole textures, with texels in these rectangles only.
-    maps: [Option<Vec<u8>>; 3],
+    maps: [Option<Vec<u8>>; MAPS],
 }
 
 impl Drawn {
@@ -143,8 +139,7 @@ impl Drawn {
         }
         world.resource_scope(|world, mut images: Mut<Assets<Image>>| {
             let mut uploads = world.resource_mut::<Uploads>();
-            let textures = [&active.textures.diffuse, &active.textures.normal, &active.textures.depth];
-            for ((texture, map), kind) in textures.into_iter().zip(&maps).zip(&textures::KINDS) {
+            for ((texture, map), kind) in active.textures.all().into_iter().zip(&maps).zip(&textures::KINDS) {
                 // Without an asset event, which would upload the whole image.
                 if let (Some(texture), Some(map)) = (texture, map)
                     && let Some(data) = images.get_mut_untracked(texture).and_then(|image| image.data.as_mut())

@@ -6,12 +6,15 @@ use super::{
     broken::Piece,
     drop_shards,
     holes::{bounds, spans_of},
-    release::make_room,
+    order::MOST_NEW,
+    release::{count_shown, make_room},
 };
 use crate::{
     math::mix,
     plugin::{
+        CrackBudget,
         carrier::Carrier,
+        later::hold,
         surfaces::{Active, Surfaces},
     },
     shatter::Pose,
@@ -34,47 +37,82 @@ enum Fate {
     Whole,
 }
 
-/// Shards that are shown from this frame on: entity, surface, and which of its pieces for which time.
-type News = Vec<(Entity, Entity, [u32; 2])>;
+/// A piece breaks into no more than about twice so many at a time; those break again.
+const MOST_PARTS: f32 = 64.0;
+
+/// How many more shards there may be.
+struct Room {
+    /// That are made in this frame.
+    new: usize,
+    /// In all.
+    all: usize,
+}
+
+impl Room {
+    fn take(&mut self, new: usize, all: usize) {
+        // Frames that may take any time have no end of it.
+        if self.new != usize::MAX {
+            self.new = self.new.saturating_sub(new);
+        }
+        self.all = self.all.saturating_sub(all);
+    }
+}
 
 /// Lets time pass for all shards and puts them where they are then.
 pub(in crate::plugin) fn fly_shards(world: &mut World) {
     let seconds = world.get_resource::<Time>().map_or(DEFAULT_FRAME, |time| time.delta_secs());
-    let (mut whole, mut shown) = (Vec::new(), Vec::new());
-    world.resource_scope(|world, mut surfaces: Mut<Surfaces>| {
-        let mut broken = core::mem::take(&mut surfaces.broken);
-        broken.retain(|&entity| {
-            let Some(active) = surfaces.active.get_mut(&entity) else { return false };
-            let Some(pieces) = active.broken.take() else { return false };
-            match fly(world, entity, active, pieces, seconds, &mut shown) {
-                Fate::Broken => {}
-                Fate::Mended => {
-                    active.renew();
-                    active.mind_holes();
-                    surfaces.soil(entity);
-                }
-                Fate::Whole => {
-                    let bytes = drop_shards(world, entity, active);
-                    surfaces.bytes -= bytes;
-                    surfaces.soil(entity);
-                    whole.push(entity);
-                    return false;
-                }
-            }
-            true
-        });
-        if broken.is_empty() {
-            Spares::clear(world);
-        }
-        surfaces.broken = broken;
-        if !shown.is_empty() {
-            surfaces.shards.extend(shown);
-            make_room(world, &mut surfaces);
-        }
+    let mut whole = Vec::new();
+    hold(world, |world| {
+        world.resource_scope(|world, mut surfaces: Mut<Surfaces>| fly_all(world, &mut surfaces, seconds, &mut whole));
     });
     for entity in whole {
         world.trigger(Reassembled { entity });
     }
+}
+
+fn fly_all(world: &mut World, surfaces: &mut Surfaces, seconds: f32, whole: &mut Vec<Entity>) {
+    let budget = world.resource::<CrackBudget>();
+    let (most, is_boundless) = (budget.max_shards, budget.is_boundless());
+    let mut broken = core::mem::take(&mut surfaces.broken);
+    let shown = if broken.is_empty() { 0 } else { count_shown(world, surfaces) };
+    let mut room = Room { new: if is_boundless { usize::MAX } else { MOST_NEW }, all: most.saturating_sub(shown) };
+    let mut fresh = Vec::new();
+    broken.retain(|&entity| {
+        let Some(active) = surfaces.active.get_mut(&entity) else { return false };
+        let Some(pieces) = active.broken.take() else { return false };
+        match fly(world, entity, active, pieces, seconds, &mut room) {
+            (Fate::Broken, pieces) => fresh.push((entity, pieces)),
+            (Fate::Mended, pieces) => {
+                active.renew();
+                active.mind_holes();
+                surfaces.soil(entity);
+                fresh.push((entity, pieces));
+            }
+            (Fate::Whole, _) => {
+                let bytes = drop_shards(world, entity, active);
+                surfaces.bytes -= bytes;
+                surfaces.soil(entity);
+                whole.push(entity);
+                return false;
+            }
+        }
+        true
+    });
+    surfaces.broken = broken;
+    surfaces.new_shards = room.new;
+    // The oldest make room only for what is shown anew.
+    for (entity, mut pieces) in fresh.into_iter().filter(|(_, pieces)| !pieces.is_empty()) {
+        pieces.truncate(most);
+        make_room(world, surfaces, pieces.len());
+        let Some(active) = surfaces.active.get_mut(&entity) else { continue };
+        let Some(mut broken) = active.broken.take() else { continue };
+        let shards = broken.spawn(world, entity, &active.carrier, pieces);
+        broken.tell(world, entity);
+        active.broken = Some(broken);
+        surfaces.shards.extend(shards.into_iter().map(|(shard, piece)| (shard, entity, piece)));
+        Spares::shrink_to(world, most.saturating_sub(surfaces.shards.len()));
+    }
+    Spares::trim(world, !surfaces.broken.is_empty(), surfaces.shards.len(), is_boundless);
 }
 
 fn fly(
@@ -83,8 +121,8 @@ fn fly(
     active: &mut Active,
     mut broken: Box<Broken>,
     seconds: f32,
-    shown: &mut News,
-) -> Fate {
+    room: &mut Room,
+) -> (Fate, Vec<Shown>) {
     let (speed, seek, is_flying) = match world.get_mut::<ShatterCracks>(surface) {
         Some(mut settings) => (settings.speed, settings.bypass_change_detection().seek.take(), settings.fly),
         None => (1.0, None, true),
@@ -96,14 +134,22 @@ fn fly(
     broken.time = if time.is_nan() { 0.0 } else { time.clamp(0.0, MAX_TIME) };
     if run < 0.0 && time <= 0.0 {
         active.broken = Some(broken);
-        return Fate::Whole;
+        return (Fate::Whole, Vec::new());
     }
     let now = broken.time;
-    if now == before {
+    // Some may have had to wait for their turn.
+    if now == before && !broken.is_behind && !broken.has_faded {
         active.broken = Some(broken);
-        return Fate::Broken;
+        return (Fate::Broken, Vec::new());
     }
     let mut fate = Fate::Broken;
+    if now < broken.since && !broken.waiting.is_empty() {
+        broken.keep_waiting();
+        fate = Fate::Mended;
+    }
+    if core::mem::take(&mut broken.has_faded) {
+        broken.join_faded(world, &active.carrier);
+    }
     // What was released later than now is in its place, and what parted later is one.
     let early: Vec<Piece> =
         if now < before { broken.pieces.extract_if(.., |piece| piece.born > now).collect() } else { Vec::new() };
@@ -123,21 +169,29 @@ fn fly(
         fate = Fate::Mended;
     }
     let is_over = before > broken.end && now > broken.end;
+    let mut fresh = Vec::new();
+    broken.is_behind = false;
     if is_flying && !is_over {
-        let mut fresh = Vec::new();
+        let first = broken.next;
         let mut index = 0;
         while index < broken.pieces.len() {
-            broken.break_if_due(index);
-            let pose = broken.show(world, surface, &active.carrier, index);
-            fresh.extend(pose.map(|pose| Shown { index, pose, form: None }));
+            // Parts that have come off in this frame were counted then.
+            let is_counted = broken.pieces[index].id >= first;
+            broken.break_if_due(index, is_counted, room);
+            if let Some(pose) = broken.show(world, surface, &active.carrier, index) {
+                if is_counted || room.new > 0 {
+                    fresh.push(Shown { index, pose, form: None });
+                    room.take(usize::from(!is_counted), usize::from(!is_counted));
+                } else {
+                    broken.is_behind = true;
+                }
+            }
             index += 1;
         }
-        let fresh = broken.spawn(world, surface, &active.carrier, fresh);
-        shown.extend(fresh.into_iter().map(|(entity, piece)| (entity, surface, piece)));
     }
     broken.tell(world, surface);
     active.broken = Some(broken);
-    fate
+    (fate, fresh)
 }
 
 impl Broken {
@@ -145,6 +199,7 @@ impl Broken {
     fn show(&mut self, world: &mut World, surface: Entity, carrier: &Carrier, index: usize) -> Option<Pose> {
         let piece = &self.pieces[index];
         let pose = piece.flight.pose((self.time - piece.start) as f32);
+        self.has_faded |= pose.opacity <= 0.0 && piece.is_broken;
         if pose.opacity <= 0.0 || piece.is_broken {
             self.hide(world, carrier, index);
             return None;
@@ -156,16 +211,35 @@ impl Broken {
         None
     }
 
-    /// Lets fragments take the place of a piece if its time has come. They are always the same.
-    fn break_if_due(&mut self, index: usize) {
-        let piece = &self.pieces[index];
-        let Some((again, due)) = piece.again.filter(|_| !piece.is_broken) else { return };
+    /// Lets fragments take the place of a piece if its time has come. They are always the same. It stays whole if there is no room for
+    /// them when it has come, and waits for a frame that has.
+    fn break_if_due(&mut self, index: usize, is_counted: bool, room: &mut Room) {
+        let piece = &mut self.pieces[index];
+        let Some((again, due)) = piece.again.filter(|_| !piece.is_broken && !piece.is_spent) else { return };
         let born = piece.start + f64::from(due);
         let end = piece.start + f64::from(piece.flight.end());
         let is_due = born <= self.time && born < end && self.time < end;
-        let Some(whole) = piece.cut.get(piece.number).filter(|_| is_due) else { return };
+        piece.stays_whole &= is_due;
+        let Some(whole) = piece.cut.get(piece.number).filter(|_| is_due && !piece.stays_whole) else { return };
         let Some(largest) = again.classes.next(whole.area) else { return };
+        let largest = largest.max(whole.area / MOST_PARTS);
+        // Its own place becomes free.
+        let own = usize::from(is_counted || piece.body.is_some());
+        let least = (whole.area / largest).ceil() as usize;
+        if least > room.all + own {
+            piece.stays_whole = true;
+            return;
+        }
+        if least > room.new && room.new < MOST_NEW {
+            self.is_behind = true;
+            return;
+        }
         let Ok(fragments) = piece.cut.break_again(piece.number, largest, piece.seed) else { return };
+        if fragments.len() > room.all + own {
+            piece.stays_whole = true;
+            return;
+        }
+        room.take(fragments.len() - usize::from(is_counted).min(fragments.len()), fragments.len().saturating_sub(own));
         let fragments = Arc::new(fragments);
         let mut parts = Vec::with_capacity(fragments.len());
         for (number, fragment) in (0u32..).zip(fragments.iter()) {
@@ -180,6 +254,7 @@ impl Broken {
                 flight: piece.flight.fragment(due, whole, fragment, again.apart, seed),
                 again: again.due(fragment.area, seed).map(|more| (again, due + more)),
                 is_broken: false,
+                stays_whole: false,
                 part_of: Some(piece.id),
                 uv: piece.uv,
                 is_spent: piece.is_spent,

@@ -1,7 +1,7 @@
 //! From a surface to its shards, beside the frames: nothing here touches the world but [`Order::of`], which looks at it.
 
 use super::{
-    Broken, Plane, ShardsError, ShatterCracks, ShatterRequest,
+    Broken, GravitySpace, Plane, ShardsError, ShatterCracks, ShatterRequest,
     drawn::{Drawn, Sketch},
     form::{Form, Style},
     holes::{Holes, Scan, Span, join_spans},
@@ -10,12 +10,16 @@ use crate::{
     Grid,
     math::mix,
     pattern::{Network, SurfaceFrame},
-    plugin::{picture::BasePicture, space, surfaces::Active},
+    plugin::{CrackBudget, picture::BasePicture, space, surfaces::Active},
     raster::{DirtyTiles, TexelRect},
-    shatter::{BreakAgain, Burst, Cuts, Flight, RimLook, Shards, ShatterError, Support, shatter},
+    shatter::{Anchor, BreakAgain, Burst, Cuts, Flight, RimLook, Shards, ShatterError, Support, shatter},
 };
 use bevy::prelude::*;
-use std::sync::Arc;
+use std::{collections::VecDeque, sync::Arc};
+
+/// The most shards that become entities in one frame, of all surfaces together, unless frames may take any time. Fewer would be seen to
+/// come late: a burst stands for 0.15 s before its pieces move.
+pub(super) const MOST_NEW: usize = 256;
 
 /// What a surface is to lose, and all that was to be known of it when that was asked for.
 pub(super) struct Order {
@@ -38,6 +42,8 @@ pub(super) struct Order {
     sketch: Option<Sketch>,
     /// Pieces that were released before.
     released: u32,
+    /// The most that leave in one frame.
+    batch: usize,
     holes: Option<Holes>,
     base: Arc<BasePicture>,
     frame: SurfaceFrame,
@@ -64,22 +70,25 @@ pub(super) struct Made {
     /// Whether it was cut anew.
     pub(super) is_new: bool,
     pub(super) support: Support,
-    /// In the order of their release.
-    pub(super) leaving: Vec<Leaving>,
-    /// The texels of `leaving`, row by row.
-    pub(super) spans: Vec<Span>,
-    /// Rectangles that cover them, texels of the field.
-    pub(super) rects: Vec<TexelRect>,
-    /// All that has left the surface then.
-    pub(super) holes: Holes,
-    /// The part of the texture that the surface showed.
-    pub(super) uv: [Vec2; 2],
+    /// What leaves, frame by frame.
+    pub(super) batches: VecDeque<Batch>,
     /// The cracks that were carried on.
     pub(super) drawn: Option<Drawn>,
-    /// Where cracks may go then.
+    /// Where cracks may go when all have left.
     pub(super) density: Option<Grid<f32>>,
     /// Memory for a copy of the picture, written once: the first write is the dear one.
     pub(super) room: Vec<u8>,
+}
+
+/// Pieces that leave in one frame.
+pub(super) struct Batch {
+    pub(super) leaving: Vec<Leaving>,
+    /// Their texels, row by row.
+    pub(super) spans: Vec<Span>,
+    /// Rectangles that cover them, texels of the field.
+    pub(super) rects: Vec<TexelRect>,
+    /// The part of the texture that the surface showed.
+    pub(super) uv: [Vec2; 2],
 }
 
 /// A piece that leaves its place.
@@ -91,6 +100,7 @@ pub(super) struct Leaving {
     pub(super) again: Option<(BreakAgain, f32)>,
     /// Its meshes, unless nothing of it can be seen.
     pub(super) form: Option<Box<Form>>,
+    spans: Vec<Span>,
 }
 
 impl Made {
@@ -108,7 +118,15 @@ impl Order {
         active: &Active,
         request: &ShatterRequest,
     ) -> Result<Self, ShardsError> {
-        let settings = world.get::<ShatterCracks>(entity).cloned().unwrap_or_default();
+        let mut settings = world.get::<ShatterCracks>(entity).cloned().unwrap_or_default();
+        let budget = world.resource::<CrackBudget>();
+        if request.everything {
+            settings.cut.carry_on = true;
+            settings.anchor = Anchor::Nothing;
+        }
+        // Fewer and larger ones, rather than some that nobody sees.
+        settings.cut.max_shards =
+            settings.cut.max_shards.min(u32::try_from(budget.max_shards).unwrap_or(u32::MAX).max(1));
         if !(0.0..=10.0).contains(&settings.thickness) {
             let value = f64::from(settings.thickness);
             let name = "thickness";
@@ -133,7 +151,13 @@ impl Order {
         let released = broken.map_or(0, |broken| broken.released);
         let seed = active.surface.seed;
         let energy = request.energy.unwrap_or(energy);
-        let burst = Burst::new(settings.burst, from, direction, energy, seed ^ u64::from(released))?;
+        let mut burst = Burst::new(settings.burst, from, direction, energy, seed ^ u64::from(released))?;
+        if settings.gravity == GravitySpace::World
+            && let Some(gravity) =
+                world.get::<GlobalTransform>(entity).and_then(|place| plane.down(extent, place, settings.burst.gravity))
+        {
+            burst = burst.with_gravity(gravity);
+        }
         let grown = (network.nodes().len(), network.links().len());
         let same = |broken: &Broken| {
             let before = &broken.settings;
@@ -161,6 +185,7 @@ impl Order {
             is_first: broken.is_none(),
             sketch: if is_sketched { Sketch::new(active) } else { None },
             released,
+            batch: if budget.is_boundless() { usize::MAX } else { MOST_NEW },
             holes: broken.map(|broken| broken.holes.clone()),
             base: active.base.clone(),
             frame: active.field.frame,
@@ -192,10 +217,10 @@ impl Order {
         let (frame, settings) = (self.frame, self.settings);
         let size = self.base.size.as_vec2();
         let uv = [self.view.min.as_vec2() / size, self.view.max.as_vec2() / size];
-        let thickness = settings.thickness * self.plane.size.y.abs() / cut.extent().y;
+        let thickness = self.plane.thickness(settings.thickness, cut.extent());
         let style = Style { plane: self.plane, rim: self.rim, thickness: self.is_solid.then_some(thickness) };
         let mut holes = self.holes.unwrap_or_else(|| Holes::new(frame.size()));
-        let (mut scan, mut spans) = (Scan::new(frame), Vec::new());
+        let mut scan = Scan::new(frame);
         let is_seen = |&[y, from, to]: &Span| (from..to).any(|x| !self.base.is_hole(self.view.min + UVec2::new(x, y)));
         let falls = fallen.hit.iter().map(|_| false).chain(fallen.loose.iter().map(|_| true));
         let mut leaving = Vec::with_capacity(fallen.hit.len() + fallen.loose.len());
@@ -204,23 +229,36 @@ impl Order {
             let flight = if is_falling { self.burst.fall(nth, shard) } else { self.burst.flight(nth, shard) };
             let seed = mix(self.seed ^ mix(u64::from(nth)));
             let again = settings.again.and_then(|again| Some((again, flight.delay + again.due(shard.area, seed)?)));
-            let first = spans.len();
+            let mut spans = Vec::new();
             scan.find(&cut, number, &mut spans);
-            let is_shown = spans.len() == first || spans[first..].iter().any(is_seen);
+            let is_shown = spans.is_empty() || spans.iter().any(is_seen);
             let form = is_shown.then(|| Box::new(style.form(&cut, number, uv, seed)));
-            leaving.push(Leaving { number, flight, seed, again, form });
+            leaving.push(Leaving { number, flight, seed, again, form, spans });
         }
-        join_spans(&mut spans);
-        holes.set(&spans, true);
-        let (mut dirty, mut rects) = (DirtyTiles::new(frame.size()), Vec::new());
-        for &[y, from, to] in &spans {
-            dirty.mark(TexelRect { min: UVec2::new(from, y), max: UVec2::new(to, y + 1) });
+        if leaving.len() > self.batch {
+            // Those that move first leave first.
+            leaving.sort_by(|a, b| a.flight.delay.total_cmp(&b.flight.delay));
         }
-        dirty.take_rects(&mut rects);
+        let mut dirty = DirtyTiles::new(frame.size());
+        let mut batches = VecDeque::with_capacity(leaving.len().div_ceil(self.batch));
+        let mut rest = leaving.into_iter().peekable();
+        while rest.peek().is_some() {
+            let mut leaving: Vec<Leaving> = rest.by_ref().take(self.batch).collect();
+            let mut spans: Vec<Span> =
+                leaving.iter_mut().flat_map(|leaving| core::mem::take(&mut leaving.spans)).collect();
+            join_spans(&mut spans);
+            holes.set(&spans, true);
+            for &[y, from, to] in &spans {
+                dirty.mark(TexelRect { min: UVec2::new(from, y), max: UVec2::new(to, y + 1) });
+            }
+            let mut rects = Vec::new();
+            dirty.take_rects(&mut rects);
+            batches.push_back(Batch { leaving, spans, rects, uv });
+        }
         let density = holes.density(self.view, self.alpha_mask.then_some(&*self.base));
-        let room = if self.is_first && !leaving.is_empty() { vec![1; self.base.diffuse.len()] } else { Vec::new() };
+        let room = if self.is_first && !batches.is_empty() { vec![1; self.base.diffuse.len()] } else { Vec::new() };
         let drawn = match self.sketch {
-            Some(sketch) if !leaving.is_empty() && !cut.carried().is_empty() => {
+            Some(sketch) if !batches.is_empty() && !cut.carried().is_empty() => {
                 Some(sketch.draw(cut.carried(), &self.base))
             }
             _ => None,
@@ -234,11 +272,7 @@ impl Order {
             cut,
             is_new,
             support,
-            leaving,
-            spans,
-            rects,
-            holes,
-            uv,
+            batches,
             drawn,
             density,
             room,

@@ -1,6 +1,6 @@
 //! [`Plane`]: where a flat surface lies in its own space.
 
-use crate::shatter::Pose;
+use crate::{plugin::space, shatter::Pose};
 use bevy::prelude::*;
 
 /// Where a flat surface lies in the entity's own space.
@@ -12,6 +12,8 @@ pub(in crate::plugin) struct Plane {
     pub(in crate::plugin) rotation: Quat,
     /// Size of the picture, in the entity's units; below zero where it is mirrored.
     pub(in crate::plugin) size: Vec2,
+    /// How thick it is, in the entity's units, if it has a thickness.
+    pub(in crate::plugin) thickness: Option<f32>,
 }
 
 /// How much corners may stand out of the plane, as a share of the diagonal.
@@ -31,7 +33,13 @@ impl Plane {
         let mirror = if side.cross(up).dot(normal) < 0.0 { -1.0 } else { 1.0 };
         let side = side * mirror;
         let rotation = Quat::from_mat3(&Mat3::from_cols(side, up, side.cross(up)));
-        Ok(Self { middle: 0.5 * (origin + last), rotation, size: Vec2::new(mirror * x.length(), y.length()) })
+        let size = Vec2::new(mirror * x.length(), y.length());
+        Ok(Self { middle: 0.5 * (origin + last), rotation, size, thickness: None })
+    }
+
+    /// How thick shards are, in the entity's units: as a slab is, else `thickness` (pattern units).
+    pub(super) fn thickness(&self, thickness: f32, extent: Vec2) -> f32 {
+        self.thickness.unwrap_or(thickness * self.size.y.abs() / extent.y)
     }
 
     /// Where a shard is, whose centroid lies at `centroid` of a surface of `extent` (pattern units); its mesh reaches to `forward`
@@ -42,6 +50,19 @@ impl Plane {
         let out = pose.offset * scale.extend(scale.y.abs());
         let translation = self.middle + self.rotation * (Vec3::new(at.x, -at.y, -forward) + out);
         Transform::from_translation(translation).with_rotation(self.rotation * pose.rotation)
+    }
+
+    /// The acceleration `gravity`, given along the world's x and y, in the axes of the flights on a surface of `extent`, all in pattern
+    /// units. `None` if there is no telling: the surface has no size in the world.
+    pub(super) fn down(&self, extent: Vec2, place: &GlobalTransform, gravity: Vec2) -> Option<Vec3> {
+        let scale = self.size / extent;
+        let scale = scale.extend(scale.y.abs());
+        let shown = |axis: Vec3| place.affine().transform_vector3(self.rotation * (axis * scale)).length();
+        // A pattern unit is as long as this in the world.
+        let unit = (shown(Vec3::X) * shown(Vec3::Y)).sqrt();
+        let own = space::to_local(place)?.transform_vector3(gravity.extend(0.0) * unit);
+        let down = self.rotation.inverse() * own / scale;
+        down.is_finite().then_some(down)
     }
 
     /// Whether the picture is mirrored.
@@ -69,6 +90,38 @@ mod tests {
             let risen = plane.place(Vec2::new(0.5, 0.25), extent, risen, 0.0).translation - at.translation;
             assert!(risen.distance(Vec3::new(mirror * 0.5, 1.0, 2.0)) < 1e-5, "{risen}");
         }
+    }
+
+    /// However a surface is turned, mirrored and scaled, what falls by the formula falls along the world's y.
+    #[test]
+    fn down_is_the_worlds() {
+        let mut rng = crate::math::Rng::new(3);
+        for round in 0..200 {
+            let mut number = |from, to| rng.range(from, to);
+            let rotation = Quat::from_euler(EulerRot::XYZ, number(-3.0, 3.0), number(-1.5, 1.5), number(-3.0, 3.0));
+            let mut scale = || number(0.3, 4.0) * if number(0.0, 1.0) < 0.5 { -1.0 } else { 1.0 };
+            let scale = Vec3::new(scale(), scale(), scale());
+            let place = Transform { translation: Vec3::new(1.0, 2.0, 3.0), rotation, scale };
+            // Under a parent that shears it.
+            let parent = Transform::from_scale(Vec3::new(1.0, 2.0, 0.5)).with_rotation(Quat::from_rotation_z(0.4));
+            let place = GlobalTransform::from(parent) * GlobalTransform::from(place);
+            let (extent, size) = (Vec2::new(1.5, 1.0), Vec2::new(if round % 2 == 0 { 3.0 } else { -3.0 }, 2.0));
+            let plane = Plane { middle: Vec3::X, rotation: Quat::from_rotation_x(0.7), size, thickness: None };
+            let down = plane.down(extent, &place, Vec2::new(0.0, -2.0)).unwrap();
+            let at = |offset| {
+                let pose = Pose { offset, ..Pose::AT_REST };
+                place.transform_point(plane.place(Vec2::ZERO, extent, pose, 0.0).translation)
+            };
+            let fallen = at(down) - at(Vec3::ZERO);
+            let unit = (at(Vec3::X).distance(at(Vec3::ZERO)) * at(Vec3::Y).distance(at(Vec3::ZERO))).sqrt();
+            assert!(fallen.distance(Vec3::NEG_Y * 2.0 * unit) < 1e-3 * unit.max(1.0), "{fallen} {unit}");
+        }
+        let plane =
+            Plane { middle: Vec3::ZERO, rotation: Quat::IDENTITY, size: Vec2::new(30.0, 20.0), thickness: None };
+        let down = |place: Transform| plane.down(Vec2::new(1.5, 1.0), &place.into(), Vec2::new(0.5, -2.0));
+        assert_eq!(down(Transform::default()), Some(Vec3::new(0.5, -2.0, 0.0)), "as in its own axes");
+        assert_eq!(down(Transform::from_scale(Vec3::new(3.0, 3.0, 0.0))), Some(Vec3::new(0.5, -2.0, 0.0)));
+        assert_eq!(down(Transform::from_scale(Vec3::ZERO)), None);
     }
 
     #[test]

@@ -1,24 +1,24 @@
 //! From requests to shards: they are made beside the frames, and a frame takes them up.
 
 use super::{
-    Broken, Shard, ShardsError, ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen, Shattered,
+    Broken, Shard, ShardsError, ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen, Shattered, Spares,
     body::Shown,
     broken::Piece,
     holes::{Span, cut_span},
-    order::{Leaving, Made, Order},
+    order::{Batch, Leaving, MOST_NEW, Made, Order},
 };
 use crate::{
     plugin::{
         CrackBudget, CrackState, CrackStatus,
         beside::Beside,
         error::Called,
+        later::hold,
         paint::paint_now,
         surfaces::{Active, Surfaces},
         textures,
         upload::Uploads,
     },
     raster::TexelRect,
-    shatter::Pose,
 };
 use bevy::{asset::UntypedHandle, prelude::*};
 
@@ -66,54 +66,62 @@ pub(in crate::plugin) fn shatter_when_due(
     }
 }
 
-/// Whether any surface is to shatter.
+/// Whether any surface is to shatter, or has begun to.
 pub(in crate::plugin) fn any_requests(surfaces: Res<Surfaces>) -> bool {
-    !surfaces.requests.is_empty()
+    let is_waiting = |entity| surfaces.active.get(entity).is_some_and(Active::is_shattering);
+    !surfaces.requests.is_empty() || surfaces.broken.iter().any(is_waiting)
+}
+
+impl Active {
+    /// Whether some of what was released is still to leave.
+    fn is_shattering(&self) -> bool {
+        self.broken.as_ref().is_some_and(|broken| !broken.waiting.is_empty())
+    }
 }
 
 /// Shatters the surfaces that are to, one request after the other.
 pub(in crate::plugin) fn shatter_surfaces(world: &mut World) {
-    let mut told = Vec::new();
-    let mut failed = Vec::new();
-    world.resource_scope(|world, mut surfaces: Mut<Surfaces>| {
-        let requests = core::mem::take(&mut surfaces.requests);
-        for request in requests {
-            let entity = request.entity;
-            let is_first = surfaces.requests.iter().all(|other| other.entity != entity);
-            let left = world.resource::<CrackBudget>().max_texture_bytes.saturating_sub(surfaces.bytes);
-            let Some(active) = surfaces.active.get_mut(&entity) else { continue };
-            // The shards are to show what the surface will.
-            if active.is_dirty || !is_first {
-                surfaces.requests.push(request);
-                continue;
+    let (mut told, mut failed) = (Vec::new(), Vec::new());
+    hold(world, |world| {
+        world.resource_scope(|world, mut surfaces: Mut<Surfaces>| {
+            let requests = core::mem::take(&mut surfaces.requests);
+            // Those that have begun first.
+            for entity in surfaces.broken.clone() {
+                told.extend(let_go(world, entity, &mut surfaces));
             }
-            let outcome = match proceed(world, active, request) {
-                Ok(Progress::Wait(request)) => {
+            for request in requests {
+                let entity = request.entity;
+                let is_first = surfaces.requests.iter().all(|other| other.entity != entity);
+                let left = world.resource::<CrackBudget>().max_texture_bytes.saturating_sub(surfaces.bytes);
+                let Some(active) = surfaces.active.get_mut(&entity) else { continue };
+                // The shards are to show what the surface will.
+                if active.is_dirty || active.is_shattering() || !is_first {
                     surfaces.requests.push(request);
                     continue;
                 }
-                Ok(Progress::Made(made)) => {
-                    let (bytes, was_broken) = (active.bytes, active.broken.is_some());
-                    let outcome = release(world, entity, active, *made, left);
-                    let (more, is_broken) = (active.bytes - bytes, active.broken.is_some());
-                    surfaces.bytes += more;
-                    if is_broken && !was_broken {
-                        surfaces.broken.push(entity);
+                let outcome = match proceed(world, active, request) {
+                    Ok(Progress::Wait(request)) => {
+                        surfaces.requests.push(request);
+                        continue;
                     }
-                    outcome
+                    Ok(Progress::Made(made)) => {
+                        let (bytes, was_broken) = (active.bytes, active.broken.is_some());
+                        let outcome = release(world, entity, active, *made, left);
+                        let (more, is_broken) = (active.bytes - bytes, active.broken.is_some());
+                        surfaces.bytes += more;
+                        if is_broken && !was_broken {
+                            surfaces.broken.push(entity);
+                        }
+                        outcome
+                    }
+                    Err(error) => Err(error),
+                };
+                match outcome {
+                    Ok(()) => told.extend(let_go(world, entity, &mut surfaces)),
+                    Err(error) => failed.push(ShatterFailed { entity, error }),
                 }
-                Err(error) => Err(error),
-            };
-            match outcome {
-                Ok(shards) if shards.is_empty() => {}
-                Ok(shards) => {
-                    surfaces.shards.extend(shards.iter().map(|(shard, piece)| (*shard, entity, *piece)));
-                    told.push(Shattered { entity, shards: shards.into_iter().map(|(shard, _)| shard).collect() });
-                }
-                Err(error) => failed.push(ShatterFailed { entity, error }),
             }
-        }
-        make_room(world, &mut surfaces);
+        });
     });
     for mut event in told {
         event.shards.retain(|shard| world.get::<Shard>(*shard).is_some());
@@ -153,13 +161,19 @@ fn proceed(world: &World, active: &Active, mut request: Request) -> Result<Progr
     Ok(Progress::Made(Box::new(made)))
 }
 
-/// The oldest shards go if there are too many.
-pub(super) fn make_room(world: &mut World, surfaces: &mut Surfaces) {
+/// Counts the shards that are shown.
+pub(super) fn count_shown(world: &World, surfaces: &mut Surfaces) -> usize {
     // Entities are used again: only those count that still are the same piece.
     surfaces.shards.retain(|&(entity, of, piece)| {
         world.get::<Shard>(entity).is_some_and(|shard| shard.surface == of && shard.piece == piece)
     });
-    let excess = surfaces.shards.len().saturating_sub(world.resource::<CrackBudget>().max_shards);
+    surfaces.shards.len()
+}
+
+/// The oldest shards go if there are too many with so many more.
+pub(super) fn make_room(world: &mut World, surfaces: &mut Surfaces, more: usize) {
+    let shown = count_shown(world, surfaces);
+    let excess = (shown + more).saturating_sub(world.resource::<CrackBudget>().max_shards).min(shown);
     let mut shortened = Vec::new();
     for (_, surface, [piece, _]) in surfaces.shards.drain(..excess) {
         let Some(active) = surfaces.active.get_mut(&surface) else { continue };
@@ -179,20 +193,13 @@ pub(super) fn make_room(world: &mut World, surfaces: &mut Surfaces) {
     }
 }
 
-/// Takes up what leaves a surface.
-fn release(
-    world: &mut World,
-    entity: Entity,
-    active: &mut Active,
-    made: Made,
-    left: u64,
-) -> Result<Vec<(Entity, [u32; 2])>, ShardsError> {
-    if made.leaving.is_empty() {
-        return Ok(Vec::new());
+/// Takes up what is to leave a surface.
+fn release(world: &mut World, entity: Entity, active: &mut Active, made: Made, left: u64) -> Result<(), ShardsError> {
+    if made.batches.is_empty() {
+        return Ok(());
     }
     let is_first = active.broken.is_none();
-    let Made { settings, rim, plane, grown, cut, is_new, support, leaving, .. } = made;
-    let Made { spans, rects, holes, uv, drawn, density, room, .. } = made;
+    let Made { settings, rim, plane, grown, cut, is_new, support, batches, drawn, density, room, .. } = made;
     if is_first {
         can_copy_picture(world, active, left)?;
     }
@@ -209,7 +216,7 @@ fn release(
         Some(broken) => broken,
         None => {
             let picture = copy_picture(world, active, room)?;
-            (active.carrier.kind.open)(world, &active.carrier);
+            (active.carrier.kind.open)(world, entity, &active.carrier, true);
             Box::new(Broken::new((cut.clone(), support.clone()), grown, settings.clone(), picture, plane, active))
         }
     };
@@ -219,29 +226,82 @@ fn release(
     broken.inside = inside(world, active, &settings, rim.bright, broken.inside.take());
     (broken.cut, broken.support, broken.grown) = (cut, support, grown);
     (broken.settings, broken.plane, broken.rim) = (settings, plane, rim);
-    if !is_first {
-        refresh(world, active, &broken, &rects);
+    broken.is_fresh = is_first;
+    (broken.waiting, broken.since, broken.has_begun) = (batches, broken.time, false);
+    if is_first {
+        active.bytes += broken.bytes;
     }
-    broken.holes = holes;
+    broken.tell(world, entity);
+    active.broken = Some(broken);
+    active.growth.set_density(density);
+    Ok(())
+}
+
+/// Lets the pieces go that leave a surface in this frame, if there is room for any.
+fn let_go(world: &mut World, entity: Entity, surfaces: &mut Surfaces) -> Option<Shattered> {
+    let budget = world.resource::<CrackBudget>();
+    let (most, is_boundless) = (budget.max_shards, budget.is_boundless());
+    let batch = surfaces.active.get(&entity)?.broken.as_ref()?.waiting.front()?;
+    let new = batch.leaving.iter().filter(|leaving| leaving.form.is_some()).count();
+    if new > surfaces.new_shards && surfaces.new_shards < MOST_NEW && !is_boundless {
+        // Others have made some in this frame.
+        return None;
+    }
+    surfaces.new_shards = surfaces.new_shards.saturating_sub(new);
+    make_room(world, surfaces, new);
+    let active = surfaces.active.get_mut(&entity)?;
+    let mut broken = active.broken.take()?;
+    if !core::mem::replace(&mut broken.has_begun, true) {
+        broken.since = broken.time;
+    }
+    let shards = match broken.waiting.pop_front() {
+        Some(batch) => depart(world, entity, active, &mut broken, batch, most),
+        None => Vec::new(),
+    };
+    broken.tell(world, entity);
+    let rest = broken.waiting.iter().map(|batch| batch.leaving.len() as u32).sum();
+    active.broken = Some(broken);
+    active.renew();
+    surfaces.shards.extend(shards.iter().map(|(shard, piece)| (*shard, entity, *piece)));
+    Spares::shrink_to(world, most.saturating_sub(surfaces.shards.len()));
+    let shards: Vec<Entity> = shards.into_iter().map(|(shard, _)| shard).collect();
+    (!shards.is_empty()).then_some(Shattered { entity, shards, rest })
+}
+
+/// Makes shards and a hole of pieces. Returns the shards, no more than `most`, and which pieces they are.
+fn depart(
+    world: &mut World,
+    entity: Entity,
+    active: &mut Active,
+    broken: &mut Broken,
+    Batch { leaving, spans, rects, uv }: Batch,
+    most: usize,
+) -> Vec<(Entity, [u32; 2])> {
+    if !core::mem::take(&mut broken.is_fresh) {
+        refresh(world, active, broken, &rects);
+    }
+    broken.holes.set(&spans, true);
     punch(world, active, &spans, &rects);
     broken.pieces.reserve(leaving.len());
     let mut shown = Vec::with_capacity(leaving.len());
-    for Leaving { number, flight, seed, again, form } in leaving {
-        broken.end = broken.end.max(broken.time + f64::from(flight.end()));
-        let is_spent = form.is_none();
-        if form.is_some() {
-            shown.push(Shown { index: broken.pieces.len(), pose: Pose::AT_REST, form });
+    for Leaving { number, flight, seed, again, form, .. } in leaving {
+        broken.end = broken.end.max(broken.since + f64::from(flight.end()));
+        let is_spent = form.is_none() || shown.len() >= most;
+        let pose = flight.pose((broken.time - broken.since) as f32);
+        if !is_spent && pose.opacity > 0.0 {
+            shown.push(Shown { index: broken.pieces.len(), pose, form });
         }
         broken.pieces.push(Piece {
             cut: broken.cut.clone(),
             number,
             id: broken.next,
             seed,
-            start: broken.time,
-            born: broken.time,
+            start: broken.since,
+            born: broken.since,
             flight,
             again,
             is_broken: false,
+            stays_whole: false,
             part_of: None,
             uv,
             is_spent,
@@ -252,15 +312,7 @@ fn release(
         });
         (broken.next, broken.released) = (broken.next + 1, broken.released + 1);
     }
-    let shards = broken.spawn(world, entity, &active.carrier, shown);
-    if is_first {
-        active.bytes += broken.bytes;
-    }
-    broken.tell(world, entity);
-    active.broken = Some(broken);
-    active.renew();
-    active.growth.set_density(density);
-    Ok(shards)
+    broken.spawn(world, entity, &active.carrier, shown)
 }
 
 /// Bytes of a copy of the surface's picture on the CPU and the GPU.

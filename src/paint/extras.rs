@@ -1,0 +1,208 @@
+//! What a field holds beside depths, in a patch.
+
+use super::{Facets, LookTable, patch::Patch};
+use crate::{
+    Grid,
+    raster::{CrushedField, DepthField, Plate, SLOPE_UNIT, Spot, TexelRect},
+};
+use glam::Vec2;
+use std::cell::Cell;
+
+/// Plates and crushed zones of a patch; places as in [`Patch`].
+pub(super) struct Extras<'a, const ROOM: usize> {
+    facets: Option<&'a Facets>,
+    ids: Option<&'a Grid<u16>>,
+    plates: &'a [Plate],
+    crushed: Option<&'a CrushedField>,
+    /// Colour of what is crushed, 0..=255.
+    pub(super) color: [f32; 3],
+    veils: Option<&'a Grid<u8>>,
+    room: Box<Room<ROOM>>,
+    /// The plate that was looked at last: most texels beside it are its own.
+    last: Cell<(u16, Facet)>,
+    /// Width of a row of the patch with the texels around.
+    stride: usize,
+    height: usize,
+}
+
+struct Room<const ROOM: usize> {
+    plate: [u16; ROOM],
+    spot: [Spot; ROOM],
+    veil: [u8; ROOM],
+}
+
+impl<'a, const ROOM: usize> Extras<'a, ROOM> {
+    /// `None` if there is nothing that the look shows.
+    pub(super) fn of(field: &'a DepthField, look: &'a LookTable) -> Option<Self> {
+        let layer = field.layer();
+        let plates = layer.plates().filter(|_| look.facets.is_some());
+        let (crushed, veils) = (layer.crushed(), layer.veil().filter(|_| look.veil_cover > 0.0));
+        (plates.is_some() || crushed.is_some() || veils.is_some()).then(|| Self {
+            facets: look.facets.as_ref().filter(|_| plates.is_some()),
+            ids: plates.map(|plates| plates.ids()),
+            plates: plates.map_or(&[], |plates| plates.plates()),
+            crushed,
+            color: crushed.map_or([0.0; 3], |crushed| crushed.settings().color.map(|channel| 255.0 * channel)),
+            veils,
+            room: Box::new(Room { plate: [0; ROOM], spot: [Spot::default(); ROOM], veil: [0; ROOM] }),
+            last: Cell::new((0, Facet::NONE)),
+            stride: 0,
+            height: 0,
+        })
+    }
+
+    /// Whether anything is in a rectangle.
+    pub(super) fn touches(&self, rect: TexelRect) -> bool {
+        let columns = rect.min.x as usize..rect.max.x as usize;
+        let rows = || rect.min.y as usize..rect.max.y as usize;
+        self.crushed.is_some_and(|crushed| crushed.touches(rect))
+            || self.ids.is_some_and(|ids| rows().any(|y| ids.row(y)[columns.clone()].iter().any(|&id| id != 0)))
+            || self.veils.is_some_and(|veils| rows().any(|y| veils.row(y)[columns.clone()].iter().any(|&v| v != 0)))
+    }
+
+    /// Reads what is there.
+    #[inline(always)]
+    pub(super) fn load(&mut self, rect: TexelRect) {
+        let size = rect.size().as_usizevec2();
+        (self.stride, self.height) = (size.x + 2, size.y);
+        let Room { plate, spot, veil } = &mut *self.room;
+        let rows = plate.chunks_exact_mut(self.stride).zip(spot.chunks_exact_mut(self.stride));
+        for (((plate, spot), veil), y) in rows.zip(veil.chunks_exact_mut(self.stride)).zip(rect.min.y..rect.max.y) {
+            if let Some(veils) = self.veils {
+                veil[..size.x].copy_from_slice(&veils.row(y as usize)[rect.min.x as usize..rect.max.x as usize]);
+            }
+            veil[size.x..].fill(0);
+            if let Some(ids) = self.ids {
+                plate[..size.x].copy_from_slice(&ids.row(y as usize)[rect.min.x as usize..rect.max.x as usize]);
+            }
+            if let Some(crushed) = self.crushed {
+                crushed.read(rect.min.x, y, &mut spot[..size.x]);
+            }
+            plate[size.x..].fill(0);
+            spot[size.x..].fill(Spot::default());
+        }
+    }
+
+    /// Marks in the patch what is touched, and adds the slopes of what is crushed.
+    #[inline(always)]
+    pub(super) fn mark(&self, patch: &mut Patch<ROOM>) {
+        let n = patch.len();
+        if self.ids.is_some() {
+            for (touch, id) in patch.touch[..n].iter_mut().zip(&self.room.plate) {
+                *touch |= id;
+            }
+        }
+        if self.veils.is_some() {
+            for (touch, &veil) in patch.touch[..n].iter_mut().zip(&self.room.veil) {
+                *touch |= u16::from(veil);
+            }
+        }
+        if self.crushed.is_some() {
+            for (touch, spot) in patch.touch[..n].iter_mut().zip(&self.room.spot) {
+                *touch |= u16::from(*spot != Spot::default());
+            }
+            patch.tilt(|k| self.room.spot[k].slope.map(|slope| f32::from(slope) * (1.0 / SLOPE_UNIT)));
+        }
+    }
+
+    /// Adds the slopes of plates.
+    #[inline(always)]
+    pub(super) fn tilt(&self, patch: &mut Patch<ROOM>) {
+        if self.facets.is_some_and(|facets| facets.tilt > 0.0) {
+            patch.tilt(|k| self.facet(self.room.plate[k]).tilt);
+        }
+    }
+
+    /// How a plate looks.
+    #[inline(always)]
+    pub(super) fn facet(&self, id: u16) -> Facet {
+        let (last, facet) = self.last.get();
+        if id == last {
+            return facet;
+        }
+        let facet = match (self.facets, self.plates.get(usize::from(id))) {
+            (Some(facets), Some(plate)) if id != 0 => facets.of(plate),
+            _ => Facet::NONE,
+        };
+        self.last.set((id, facet));
+        facet
+    }
+
+    #[inline(always)]
+    pub(super) fn plate(&self, place: usize) -> u16 {
+        self.room.plate[place]
+    }
+
+    #[inline(always)]
+    pub(super) fn is_untouched(&self, place: usize) -> bool {
+        self.room.plate[place] == 0 && self.room.veil[place] == 0 && self.room.spot[place] == Spot::default()
+    }
+
+    #[inline(always)]
+    pub(super) fn veil(&self, place: usize) -> u8 {
+        self.room.veil[place]
+    }
+
+    #[inline(always)]
+    pub(super) fn spot(&self, place: usize) -> Spot {
+        self.room.spot[place]
+    }
+}
+
+/// A plate as it looks.
+#[derive(Clone, Copy)]
+pub(super) struct Facet {
+    /// What the picture is multiplied by.
+    pub(super) tone: f32,
+    /// Where it is taken from, texels away.
+    pub(super) shift: [i32; 2],
+    pub(super) tilt: [f32; 2],
+    /// Cover of the sheen at the centre of the field, and what it gains a texel to the right and down, before it is cut to `low..=high`.
+    sheen: f32,
+    gain: Vec2,
+    low: f32,
+    high: f32,
+}
+
+impl Facet {
+    pub(super) const NONE: Self =
+        Self { tone: 1.0, shift: [0; 2], tilt: [0.0; 2], sheen: 0.0, gain: Vec2::ZERO, low: 0.0, high: 0.0 };
+
+    /// Cover of the sheen at a texel.
+    #[inline(always)]
+    pub(super) fn sheen(&self, x: u32, y: u32) -> f32 {
+        let sheen = self.sheen + x as f32 * self.gain.x + y as f32 * self.gain.y;
+        if sheen < self.low {
+            self.low
+        } else if sheen > self.high {
+            self.high
+        } else {
+            sheen
+        }
+    }
+}
+
+impl Facets {
+    /// How a plate looks.
+    pub(super) fn of(&self, plate: &Plate) -> Facet {
+        let [a, b, c, d, e, f] = plate.draws;
+        let weight = 1.0 - self.near + self.near * plate.near;
+        let lean = Vec2::new(b, c);
+        let shift = (self.shift * weight * lean).round().as_ivec2().to_array();
+        // A few flash; of the others those that lean to the light shine a little.
+        let strength = if d > 1.0 - 2.0 * self.flash { 0.45 + 0.55 * e.abs() } else { 0.25 * f.max(0.0) };
+        let high = self.gleam * strength * weight.sqrt();
+        let low = 0.25 * high;
+        let gain = lean.normalize_or(Vec2::Y) * (high - low) * plate.inv_side;
+        let sheen = 0.5 * (low + high) - gain.dot(plate.centre);
+        Facet {
+            tone: 1.0 + self.tone * weight * a,
+            shift,
+            tilt: (self.tilt * weight * lean).to_array(),
+            sheen,
+            gain,
+            low,
+            high,
+        }
+    }
+}

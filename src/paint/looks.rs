@@ -1,0 +1,287 @@
+//! The looks of the presets.
+
+use super::{Facets, Look, look::stop};
+use crate::raster::{Crushed, Veil};
+use std::borrow::Cow;
+
+impl Look {
+    /// Window glass: bright hairlines, plates that reflect and shift what is behind them, a white crushed ring around a hole.
+    pub const GLASS: Self = Self {
+        facets: Some(Facets {
+            tone: 0.13,
+            tilt: 0.10,
+            shift: 3.0,
+            gleam: 0.55,
+            flash: 0.16,
+            near: 0.55,
+            ..Facets::DEFAULT
+        }),
+        crushed: Some(Crushed {
+            radius: 0.026,
+            ragged: 0.75,
+            soft: 0.75,
+            hole: 0.30,
+            depth: 0.003,
+            rough: 0.0006,
+            grain: 0.0035,
+            color: [0.95, 0.98, 1.0],
+            pale: 0.95,
+            speckle: 0.55,
+            flake: 2.2,
+            dust: 0.10,
+            chips: 0.10,
+            reach: 2.2,
+        }),
+        ..Self::FROSTED
+    };
+
+    /// Tempered glass: dice, each with its own tone and glitter.
+    pub const TEMPERED_GLASS: Self = Self {
+        ramp: Cow::Borrowed(&[
+            stop(0.10, [0.84, 0.90, 0.90], 0.06),
+            stop(0.45, [0.88, 0.94, 0.93], 0.28),
+            stop(1.0, [0.93, 0.98, 0.97], 0.62),
+        ]),
+        glint: 0.5,
+        relief: 0.002,
+        facets: Some(Facets {
+            tone: 0.30,
+            tilt: 0.22,
+            shift: 3.0,
+            gleam: 0.75,
+            flash: 0.14,
+            near: 0.25,
+            ..Facets::DEFAULT
+        }),
+        crushed: Some(Crushed {
+            radius: 0.02,
+            ragged: 0.6,
+            soft: 0.8,
+            hole: 0.45,
+            depth: 0.001,
+            rough: 0.0003,
+            grain: 0.005,
+            color: [0.95, 0.98, 1.0],
+            pale: 0.75,
+            speckle: 0.5,
+            flake: 0.0,
+            dust: 0.12,
+            chips: 0.0,
+            reach: 3.0,
+        }),
+        ..Self::FROSTED
+    };
+
+    /// Laminated glass: a milky disc, lines that fade and shine along their way, plates that hold together.
+    pub const LAMINATED_GLASS: Self = Self {
+        sparkle: 0.7,
+        facets: Some(Facets {
+            tone: 0.06,
+            tilt: 0.05,
+            shift: 1.0,
+            gleam: 0.28,
+            flash: 0.12,
+            near: 0.8,
+            ..Facets::DEFAULT
+        }),
+        crushed: Some(Crushed {
+            radius: 0.055,
+            ragged: 0.35,
+            soft: 1.0,
+            hole: 0.0,
+            depth: 0.0008,
+            rough: 0.0002,
+            grain: 0.004,
+            color: [0.93, 0.96, 0.97],
+            pale: 0.85,
+            speckle: 0.45,
+            flake: 0.0,
+            dust: 0.14,
+            chips: 0.0,
+            reach: 2.6,
+        }),
+        ..Self::FROSTED
+    };
+
+    /// Ice: bright lines, a white bruise with bubbles.
+    pub const ICE: Self = Self {
+        ramp: Cow::Borrowed(&[
+            stop(0.08, [0.86, 0.94, 0.98], 0.05),
+            stop(0.40, [0.92, 0.97, 1.0], 0.55),
+            stop(1.0, [0.98, 1.0, 1.0], 0.92),
+        ]),
+        gloss: 0.6,
+        glint: 0.5,
+        sparkle: 0.5,
+        veil: Some(Veil { cover: 0.6, full_width: 0.012, ..Veil::DEFAULT }),
+        facets: Some(Facets {
+            tone: 0.07,
+            tilt: 0.05,
+            shift: 2.0,
+            gleam: 0.22,
+            flash: 0.12,
+            sheen: [0.85, 0.95, 1.0],
+            near: 0.2,
+        }),
+        crushed: Some(Crushed {
+            radius: 0.055,
+            ragged: 0.7,
+            soft: 1.0,
+            hole: 0.0,
+            depth: 0.0008,
+            rough: 0.0004,
+            grain: 0.0045,
+            color: [0.94, 0.98, 1.0],
+            pale: 0.9,
+            speckle: 0.6,
+            flake: 0.0,
+            dust: 0.10,
+            chips: 0.22,
+            reach: 2.6,
+        }),
+        ..Self::FROSTED
+    };
+
+    /// Concrete: grey-brown cracks, a spalled crater with paler aggregate, crumbs and dust.
+    pub const CONCRETE: Self = Self {
+        crushed: Some(Crushed {
+            radius: 0.04,
+            ragged: 0.5,
+            depth: 0.022,
+            rough: 0.005,
+            grain: 0.007,
+            color: [0.70, 0.67, 0.62],
+            pale: 0.55,
+            speckle: 0.6,
+            dust: 0.20,
+            chips: 0.30,
+            reach: 2.4,
+            ..Crushed::DEFAULT
+        }),
+        ..Self::GROOVE
+    };
+
+    /// Plaster: thin cracks, and flakes that have come off where it was hit.
+    pub const PLASTER: Self = Self {
+        ramp: Cow::Borrowed(&[
+            stop(0.15, [0.72, 0.70, 0.67], 0.12),
+            stop(0.45, [0.50, 0.47, 0.43], 0.75),
+            stop(1.0, [0.22, 0.19, 0.16], 0.95),
+        ]),
+        relief: 0.006,
+        crushed: Some(Crushed {
+            radius: 0.032,
+            ragged: 0.6,
+            depth: 0.004,
+            rough: 0.0008,
+            grain: 0.005,
+            color: [0.66, 0.62, 0.56],
+            pale: 0.65,
+            speckle: 0.25,
+            dust: 0.12,
+            chips: 0.12,
+            reach: 2.0,
+            ..Crushed::DEFAULT
+        }),
+        ..Self::GROOVE
+    };
+
+    /// Brick: mortar that is gone, and a corner chipped off where it was hit.
+    pub const BRICK: Self = Self {
+        ramp: Cow::Borrowed(&[
+            stop(0.15, [0.66, 0.62, 0.58], 0.12),
+            stop(0.40, [0.48, 0.44, 0.40], 0.80),
+            stop(0.80, [0.32, 0.285, 0.255], 0.95),
+            stop(1.0, [0.19, 0.165, 0.145], 1.0),
+        ]),
+        crushed: Some(Crushed {
+            radius: 0.028,
+            ragged: 0.6,
+            depth: 0.008,
+            rough: 0.0025,
+            grain: 0.006,
+            color: [0.74, 0.50, 0.40],
+            pale: 0.45,
+            speckle: 0.5,
+            dust: 0.14,
+            chips: 0.25,
+            reach: 2.2,
+            ..Crushed::DEFAULT
+        }),
+        ..Self::GROOVE
+    };
+
+    /// Clay: plates of slightly different tone with lit rims, brown depth.
+    pub const CLAY: Self = Self {
+        ramp: Cow::Borrowed(&[
+            stop(0.16, [0.80, 0.74, 0.68], 0.05),
+            stop(0.35, [0.46, 0.37, 0.29], 0.85),
+            stop(0.75, [0.26, 0.19, 0.14], 0.97),
+            stop(1.0, [0.12, 0.085, 0.06], 1.0),
+        ]),
+        glint: 1.0,
+        relief: 0.014,
+        curl: 0.10,
+        curl_depth: 0.12,
+        facets: Some(Facets { tone: 0.08, tilt: 0.03, ..Facets::DEFAULT }),
+        ..Self::GROOVE
+    };
+
+    /// Mud: plates of different tone with curled rims, brown depth.
+    pub const MUD: Self = Self {
+        curl: 0.16,
+        relief: 0.02,
+        glint: 1.2,
+        facets: Some(Facets { tone: 0.11, tilt: 0.04, ..Facets::DEFAULT }),
+        ..Self::CLAY
+    };
+
+    /// The glaze of pottery: ink that has gone into hairlines, darker the wider they are, without relief.
+    pub const STAIN: Self = Self {
+        ramp: Cow::Borrowed(&[
+            stop(0.35, [0.45, 0.38, 0.33], 0.32),
+            stop(0.60, [0.36, 0.29, 0.25], 0.48),
+            stop(1.0, [0.20, 0.155, 0.125], 0.75),
+        ]),
+        glint: 0.0,
+        grain: 0.08,
+        sparkle: 0.3,
+        relief: 0.0,
+        ..Self::GROOVE
+    };
+
+    /// A mirror: each piece reflects something else.
+    pub const MIRROR: Self = Self {
+        facets: Some(Facets {
+            tone: 0.20,
+            tilt: 0.16,
+            shift: 9.0,
+            gleam: 0.40,
+            flash: 0.22,
+            near: 0.25,
+            ..Facets::DEFAULT
+        }),
+        sparkle: 0.2,
+        ..Self::GLASS
+    };
+
+    /// Light through the cracks: lava, magic. The emissive map has it too.
+    pub const GLOWING: Self = Self {
+        ramp: Cow::Borrowed(&[
+            stop(0.10, [0.30, 0.10, 0.05], 0.20),
+            stop(0.35, [0.55, 0.10, 0.02], 0.85),
+            stop(0.60, [1.0, 0.42, 0.08], 1.0),
+            stop(1.0, [1.0, 0.92, 0.55], 1.0),
+        ]),
+        tint: 0.0,
+        glint: 0.25,
+        grain: 0.05,
+        sparkle: 0.25,
+        glow: Cow::Borrowed(&[
+            stop(0.10, [0.45, 0.06, 0.0], 0.25),
+            stop(0.40, [0.90, 0.22, 0.02], 0.85),
+            stop(1.0, [1.0, 0.75, 0.30], 1.0),
+        ]),
+        ..Self::GROOVE
+    };
+}

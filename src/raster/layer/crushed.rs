@@ -1,0 +1,486 @@
+//! Crushed zones: what a hit leaves around itself.
+
+use super::{hash, noise};
+use crate::{
+    Grid,
+    math::mix,
+    pattern::{Strike, SurfaceFrame},
+    raster::TexelRect,
+};
+use glam::{UVec2, Vec2};
+
+/// What a hit crushes: a spot around it, by its energy. All of it is made from the seed and the place, at any resolution.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
+pub struct Crushed {
+    /// Radius at energy 1; it grows with the square root of the energy. Pattern units, 0..=0.5; default 0.03.
+    pub radius: f32,
+    /// How far the outline strays from a circle, as a share of the radius. 0..=1; default 0.4.
+    pub ragged: f32,
+    /// How softly it ends: 0 = with a broken edge, 1 = it fades from the middle on. Default 0.
+    pub soft: f32,
+    /// Radius of the dark hole in the middle, as a share of the radius. 0..=1; default 0.
+    pub hole: f32,
+    /// Depth of the crater, pattern units, 0..=0.2; default 0.008.
+    pub depth: f32,
+    /// Height of the bumps on its floor, pattern units, 0..=0.05; default 0.002.
+    pub rough: f32,
+    /// Size of grains and crumbs, pattern units, 0.0005..=0.1; default 0.006.
+    pub grain: f32,
+    /// Colour of what is crushed, of dust and of crumbs, sRGB 0..=1; default a light grey.
+    pub color: [f32; 3],
+    /// How much that colour covers the picture. 0..=1; default 0.5.
+    pub pale: f32,
+    /// How uneven that is from grain to grain. 0..=1; default 0.4.
+    pub speckle: f32,
+    /// How far a flat flake with arcs reaches to one side (conchoidal fracture), radii. 0..=8; default 0 = none.
+    pub flake: f32,
+    /// How much dust covers the surface around it, falling to nothing at [`reach`](Self::reach). 0..=1; default 0.2.
+    pub dust: f32,
+    /// How many crumbs lie around it, up to [`reach`](Self::reach); 0..=1; default 0.3.
+    pub chips: f32,
+    /// How far dust and crumbs reach, radii. 1..=8; default 2.5.
+    pub reach: f32,
+}
+
+impl Crushed {
+    /// The default: a crater in stone.
+    pub const DEFAULT: Self = Self {
+        radius: 0.03,
+        ragged: 0.4,
+        soft: 0.0,
+        hole: 0.0,
+        depth: 0.008,
+        rough: 0.002,
+        grain: 0.006,
+        color: [0.72, 0.70, 0.66],
+        pale: 0.5,
+        speckle: 0.4,
+        flake: 0.0,
+        dust: 0.2,
+        chips: 0.3,
+        reach: 2.5,
+    };
+
+    /// The first field that is out of its range or not finite: its name, value and range.
+    pub(crate) fn fault(&self) -> Option<(&'static str, f32, &'static str)> {
+        let fields = [
+            ("crushed.radius", self.radius, 0.0..=0.5, "0..=0.5"),
+            ("crushed.ragged", self.ragged, 0.0..=1.0, "0..=1"),
+            ("crushed.soft", self.soft, 0.0..=1.0, "0..=1"),
+            ("crushed.hole", self.hole, 0.0..=1.0, "0..=1"),
+            ("crushed.depth", self.depth, 0.0..=0.2, "0..=0.2"),
+            ("crushed.rough", self.rough, 0.0..=0.05, "0..=0.05"),
+            ("crushed.grain", self.grain, 0.0005..=0.1, "0.0005..=0.1"),
+            ("crushed.color", self.color[0], 0.0..=1.0, "0..=1"),
+            ("crushed.color", self.color[1], 0.0..=1.0, "0..=1"),
+            ("crushed.color", self.color[2], 0.0..=1.0, "0..=1"),
+            ("crushed.pale", self.pale, 0.0..=1.0, "0..=1"),
+            ("crushed.speckle", self.speckle, 0.0..=1.0, "0..=1"),
+            ("crushed.flake", self.flake, 0.0..=8.0, "0..=8"),
+            ("crushed.dust", self.dust, 0.0..=1.0, "0..=1"),
+            ("crushed.chips", self.chips, 0.0..=1.0, "0..=1"),
+            ("crushed.reach", self.reach, 1.0..=8.0, "1..=8"),
+        ];
+        let is_bad = |(_, value, range, _): &(_, f32, std::ops::RangeInclusive<f32>, _)| !range.contains(value);
+        fields.into_iter().find(is_bad).map(|(name, value, _, range)| (name, value, range))
+    }
+
+    /// The same seen from nearer or further away.
+    pub(crate) fn scaled(&self, by: f32) -> Self {
+        let scaled = |length: f32, low: f32, high: f32| (length * by).clamp(low, high);
+        Self {
+            radius: scaled(self.radius, 0.0, 0.5),
+            depth: scaled(self.depth, 0.0, 0.2),
+            rough: scaled(self.rough, 0.0, 0.05),
+            grain: scaled(self.grain, 0.0005, 0.1),
+            ..*self
+        }
+    }
+}
+
+impl Default for Crushed {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
+}
+
+/// Steps of a slope of 1.
+pub(crate) const SLOPE_UNIT: f32 = 2048.0;
+
+/// What is crushed at a texel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Spot {
+    /// Slope of the surface to the right and down, as of a height that goes down into it.
+    pub(crate) slope: [i16; 2],
+    /// How much the crushed colour covers, 0..=255, and how much darker or brighter it is, 1/128.
+    pub(crate) pale: u8,
+    pub(crate) shade: i8,
+    /// How much of the hole there is.
+    pub(crate) dark: u8,
+}
+
+impl Spot {
+    const NONE: Self = Self { slope: [0; 2], pale: 0, shade: 0, dark: 0 };
+
+    /// Both, in any order: what is deeper in the hole or paler shows, and the steeper slope.
+    fn with(self, other: Self) -> Self {
+        let strength = |spot: Self| (spot.dark, spot.pale, spot.shade);
+        let steep = |[x, y]: [i16; 2]| (i32::from(x).pow(2) + i32::from(y).pow(2), x, y);
+        let slope = if steep(self.slope) >= steep(other.slope) { self.slope } else { other.slope };
+        Self { slope, ..if strength(self) >= strength(other) { self } else { other } }
+    }
+}
+
+/// Side of a tile, texels.
+const TILE: u32 = 32;
+
+type Tile = [Spot; (TILE * TILE) as usize];
+
+/// One impact that has crushed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Zone {
+    /// Texels.
+    pos: Vec2,
+    energy: f32,
+    bounds: TexelRect,
+}
+
+/// Columns and rows of the tiles that a rectangle touches.
+fn tiles_of(rect: &TexelRect) -> impl Iterator<Item = UVec2> + use<> {
+    let (min, max) = (rect.min / TILE, rect.max.map(|end| end.div_ceil(TILE)));
+    let columns = if rect.is_empty() { 0..0 } else { min.x..max.x };
+    (min.y..max.y).flat_map(move |y| columns.clone().map(move |x| UVec2::new(x, y)))
+}
+
+/// Crushed zones of all impacts, in tiles that are only there where they are.
+#[derive(Clone, Debug)]
+pub(crate) struct CrushedField {
+    crushed: Crushed,
+    frame: SurfaceFrame,
+    seed: u32,
+    /// By impact.
+    zones: Vec<Option<Zone>>,
+    /// Hits that are taken up.
+    shown: usize,
+    columns: u32,
+    tiles: Vec<Option<Box<Tile>>>,
+    used: usize,
+}
+
+/// What is shown, not the way there.
+impl PartialEq for CrushedField {
+    fn eq(&self, other: &Self) -> bool {
+        self.crushed == other.crushed && self.frame == other.frame && self.tiles == other.tiles
+    }
+}
+
+impl CrushedField {
+    pub(super) fn new(crushed: &Crushed, frame: SurfaceFrame, seed: u64) -> Self {
+        let count = frame.size().map(|side| side.div_ceil(TILE));
+        Self {
+            crushed: *crushed,
+            frame,
+            seed: mix(seed ^ 0xC4) as u32,
+            zones: Vec::new(),
+            shown: 0,
+            columns: count.x,
+            tiles: vec![None; count.element_product() as usize],
+            used: 0,
+        }
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.used == 0
+    }
+
+    pub(crate) const fn settings(&self) -> &Crushed {
+        &self.crushed
+    }
+
+    /// Shows the first hits of `all`, those in `strikes`.
+    pub(super) fn show(
+        &mut self,
+        strikes: &[Strike],
+        all: &[Strike],
+        forbidden: Option<&Grid<bool>>,
+        changed: &mut Vec<TexelRect>,
+    ) {
+        if self.shown == strikes.len() || self.crushed.radius <= 0.0 {
+            return;
+        }
+        // Tiles of impacts that are others now are made anew; what is new is laid over them.
+        let (mut anew, mut new) = (Vec::new(), Vec::new());
+        while self.shown > strikes.len() {
+            self.shown -= 1;
+            let Some(strike) = all.get(self.shown) else { continue };
+            anew.push(self.set(strike, strike.before));
+        }
+        for strike in &strikes[self.shown..] {
+            self.shown += 1;
+            let bounds = self.set(strike, strike.energy);
+            if strike.before > 0.0 {
+                anew.push(bounds);
+            } else {
+                new.push(strike.impact);
+            }
+        }
+        let mut tiles: Vec<UVec2> = anew.iter().flat_map(tiles_of).collect();
+        tiles.sort_unstable_by_key(|tile| (tile.y, tile.x));
+        tiles.dedup();
+        for &tile in &tiles {
+            let slot = (tile.y * self.columns + tile.x) as usize;
+            self.used -= usize::from(self.tiles[slot].take().is_some());
+            for index in 0..self.zones.len() as u32 {
+                self.draw(index, tile, forbidden);
+            }
+        }
+        for index in new {
+            let Some(Some(zone)) = self.zones.get(index as usize).copied() else { continue };
+            for tile in tiles_of(&zone.bounds) {
+                if tiles.binary_search_by_key(&(tile.y, tile.x), |tile| (tile.y, tile.x)).is_err() {
+                    self.draw(index, tile, forbidden);
+                }
+            }
+            changed.push(zone.bounds);
+        }
+        changed.extend(anew);
+    }
+
+    /// Gives the impact of a hit this energy; returns the texels that may be others now.
+    fn set(&mut self, strike: &Strike, energy: f32) -> TexelRect {
+        let index = strike.impact as usize;
+        if self.zones.len() <= index {
+            self.zones.resize(index + 1, None);
+        }
+        let zone = (energy > 0.0).then(|| {
+            let pos = self.frame.to_texel(strike.pos);
+            let Crushed { reach, flake, ragged, .. } = self.crushed;
+            let radius = self.radius(energy) * reach.max(flake).max(1.0 + WIDEST * ragged);
+            let limit = self.frame.size().as_vec2();
+            let min = (pos - radius - 2.0).floor().clamp(Vec2::ZERO, limit).as_uvec2();
+            let max = (pos + radius + 2.0).ceil().clamp(Vec2::ZERO, limit).as_uvec2();
+            Zone { pos, energy, bounds: TexelRect { min, max } }
+        });
+        let before = std::mem::replace(&mut self.zones[index], zone);
+        let bounds = |zone: Option<Zone>| zone.map_or(TexelRect::default(), |zone| zone.bounds);
+        bounds(before).union(bounds(zone))
+    }
+
+    fn radius(&self, energy: f32) -> f32 {
+        self.crushed.radius * self.frame.texels_per_unit() * energy.sqrt()
+    }
+
+    /// Lays what an impact has crushed over a tile, if it touches it.
+    fn draw(&mut self, index: u32, tile: UVec2, forbidden: Option<&Grid<bool>>) {
+        let Some(Some(zone)) = self.zones.get(index as usize).copied() else { return };
+        let corner = tile * TILE;
+        let rect = TexelRect { min: corner, max: (corner + TILE).min(self.frame.size()) }.intersect(zone.bounds);
+        if rect.is_empty() {
+            return;
+        }
+        let radius = self.radius(zone.energy);
+        let slot = &mut self.tiles[(tile.y * self.columns + tile.x) as usize];
+        self.used += usize::from(slot.is_none());
+        let texels = slot.get_or_insert_with(|| Box::new([Spot::NONE; (TILE * TILE) as usize]));
+        let shape = Shape::new(&self.crushed, self.frame.texels_per_unit(), radius);
+        shape.draw(texels, zone.pos, self.seed ^ index.wrapping_mul(0x9E37_79B1), rect, corner);
+        let Some(forbidden) = forbidden else { return };
+        for y in rect.min.y..rect.max.y {
+            for x in rect.min.x..rect.max.x {
+                if forbidden.get(x, y) == Some(true) {
+                    texels[((y - corner.y) * TILE + x - corner.x) as usize] = Spot::NONE;
+                }
+            }
+        }
+    }
+
+    /// Whether anything may be crushed in a rectangle.
+    pub(crate) fn touches(&self, rect: TexelRect) -> bool {
+        let (min, max) = (rect.min / TILE, rect.max.map(|end| end.div_ceil(TILE)));
+        (min.y..max.y).any(|y| (min.x..max.x).any(|x| self.tiles[(y * self.columns + x) as usize].is_some()))
+    }
+
+    /// The texels of row `y` from column `x` on.
+    pub(crate) fn read(&self, x: u32, y: u32, to: &mut [Spot]) {
+        let mut rest = to;
+        let mut x = x;
+        while !rest.is_empty() {
+            let within = x % TILE;
+            let (now, later) = rest.split_at_mut(rest.len().min((TILE - within) as usize));
+            match self.tiles.get((y / TILE * self.columns + x / TILE) as usize) {
+                Some(Some(tile)) => {
+                    let first = (y % TILE * TILE + within) as usize;
+                    now.copy_from_slice(&tile[first..first + now.len()]);
+                }
+                _ => now.fill(Spot::NONE),
+            }
+            x += now.len() as u32;
+            rest = later;
+        }
+    }
+}
+
+/// How far an outline strays at the most, for a raggedness of 1.
+const WIDEST: f32 = 1.1;
+
+/// A crushed zone in texels.
+struct Shape<'a> {
+    crushed: &'a Crushed,
+    radius: f32,
+    depth: f32,
+    rough: f32,
+    grain: f32,
+}
+
+/// What there is at a place.
+#[derive(Clone, Copy)]
+struct Place {
+    height: f32,
+    pale: f32,
+    shade: f32,
+    dark: f32,
+}
+
+impl<'a> Shape<'a> {
+    fn new(crushed: &'a Crushed, unit: f32, radius: f32) -> Self {
+        Self {
+            crushed,
+            radius,
+            depth: crushed.depth * unit,
+            rough: crushed.rough * unit,
+            grain: (crushed.grain * unit).max(1.0),
+        }
+    }
+
+    /// Lays it over the texels `rect` of a tile whose first texel is at `corner`.
+    fn draw(&self, texels: &mut Tile, centre: Vec2, seed: u32, rect: TexelRect, corner: UVec2) {
+        const WIDE: usize = TILE as usize + 2;
+        // Heights around each texel are needed for its slope.
+        let mut places = [Place { height: 0.0, pale: 0.0, shade: 0.0, dark: 0.0 }; WIDE * WIDE];
+        let (size, first) = (rect.size().as_usizevec2(), rect.min.as_vec2() - 0.5);
+        for y in 0..size.y + 2 {
+            for x in 0..size.x + 2 {
+                let at = first + Vec2::new(x as f32, y as f32);
+                places[y * WIDE + x] = self.place(at - centre, at, seed);
+            }
+        }
+        let corner = (rect.min - corner).as_usizevec2();
+        for y in 0..size.y {
+            for x in 0..size.x {
+                let at = (y + 1) * WIDE + x + 1;
+                let slope = |step: usize| {
+                    let slope = 0.5 * (places[at - step].height - places[at + step].height);
+                    (slope * SLOPE_UNIT).clamp(-32_000.0, 32_000.0) as i16
+                };
+                let Place { pale, shade, dark, .. } = places[at];
+                let spot = Spot {
+                    // Nothing is lit in a hole.
+                    slope: if dark > 0.5 { [0; 2] } else { [slope(1), slope(WIDE)] },
+                    pale: (pale.clamp(0.0, 1.0) * 255.0 + 0.5) as u8,
+                    shade: (shade * 128.0).clamp(-127.0, 127.0) as i8,
+                    dark: (dark.clamp(0.0, 1.0) * 255.0 + 0.5) as u8,
+                };
+                let texel = &mut texels[(y + corner.y) * TILE as usize + x + corner.x];
+                *texel = texel.with(spot);
+            }
+        }
+    }
+
+    /// `off` is the way from the centre, `at` the place in the field.
+    fn place(&self, off: Vec2, at: Vec2, seed: u32) -> Place {
+        let Crushed { ragged, soft, hole, pale, speckle, flake, dust, chips, reach, .. } = *self.crushed;
+        let mut place = Place { height: 0.0, pale: 0.0, shade: 0.0, dark: 0.0 };
+        let distance = off.length();
+        let radii = distance / self.radius.max(0.5);
+        // No outline strays further than that.
+        let widest = 1.0 + WIDEST * ragged;
+        if radii > reach.max(flake).max(widest) + 0.1 {
+            return place;
+        }
+        let way = off / distance.max(1.0e-3);
+        let grain = |k: u32, size: f32| noise(seed ^ k, at.x / size, at.y / size);
+        let round = |k: u32, times: f32| noise(seed ^ k, way.x * times + 17.0, way.y * times + 31.0);
+        let mut inside = 0.0;
+        if radii <= widest {
+            let fine = grain(1, self.grain);
+            let edge = 1.0 + ragged * (0.55 * round(2, 1.3) + 0.35 * round(3, 3.7) + 0.2 * fine);
+            let outline = (self.radius * edge).max(0.5);
+            // One texel of soft edge.
+            inside = (outline - distance + 0.5).clamp(0.0, 1.0);
+            if inside > 0.0 {
+                let coarse = grain(4, 2.3 * self.grain);
+                let rest = (1.0 - distance / outline).clamp(0.0, 1.0);
+                let fade = inside + soft * ((1.5 * rest).min(1.0) - inside);
+                // A broken edge is steep, a soft one has none.
+                let bowl = rest.sqrt() + soft * (rest * rest - rest.sqrt());
+                place.height = -self.depth * bowl + fade * self.rough * (0.6 * coarse + 0.4 * fine);
+                let grains = 1.0 - speckle * (0.5 + 0.5 * grain(5, 0.6 * self.grain)).clamp(0.0, 1.0);
+                place.pale = pale * fade * grains;
+                place.shade = speckle * (0.6 * coarse + 0.3 * fine) * inside;
+            }
+        }
+        if flake > 1.0 {
+            self.add_flake(&mut place, way, radii, seed);
+        }
+        if inside < 1.0 && radii < reach {
+            let left = 1.0 - ((radii - 0.8) / (reach - 0.8)).clamp(0.0, 1.0);
+            if dust > 0.0 {
+                let cloud = 0.65 + 0.35 * grain(6, 5.0 * self.grain);
+                place.pale = place.pale.max(dust * left * left * cloud * (1.0 - inside));
+            }
+            self.add_crumb(&mut place, at, chips * left * left, seed);
+        }
+        if hole > 0.0 && radii <= hole * (1.0 + WIDEST * ragged) + 1.0 {
+            let radius = self.radius * hole * (1.0 + 0.6 * ragged * (round(7, 1.9) + 0.5 * round(8, 4.3)));
+            place.dark = (radius - distance + 0.5).clamp(0.0, 1.0);
+        }
+        place
+    }
+
+    /// A flat flake to one side of the hit, with arcs around it.
+    fn add_flake(&self, place: &mut Place, way: Vec2, q: f32, seed: u32) {
+        let side = Vec2::new(super::lattice(seed, 1, 7), super::lattice(seed, 5, 3)).normalize_or(Vec2::Y);
+        let facing = way.dot(side);
+        let reach = 1.0 + (self.crushed.flake - 1.0) * (0.45 + 0.55 * facing).max(0.0);
+        let inside = ((reach - q) * self.radius + 0.5).clamp(0.0, 1.0);
+        if inside <= 0.0 || q <= 0.9 {
+            return;
+        }
+        let share = ((q - 1.0) / (reach - 1.0).max(0.05)).clamp(0.0, 1.0);
+        // Arcs, wider apart outward; each a steep step and a gentle way back.
+        let arcs = 5.0 * share.sqrt() + 0.4 * noise(seed ^ 9, way.x * 2.0, way.y * 2.0);
+        let saw = arcs - arcs.floor();
+        let strength = inside * (1.0 - 0.6 * share);
+        place.height -= 0.35 * self.depth * (1.0 - share) * inside + 0.25 * self.depth * saw * strength;
+        place.pale = place.pale.max(self.crushed.pale * strength * (0.04 + 0.30 * saw * saw * saw));
+        // Its rim catches the light.
+        let rim = (1.0 - ((reach - q) * self.radius - 1.0).abs() / 1.2).clamp(0.0, 1.0);
+        place.pale = place.pale.max(0.5 * self.crushed.pale * rim);
+    }
+
+    /// A crumb in some of the squares of a lattice.
+    fn add_crumb(&self, place: &mut Place, at: Vec2, chance: f32, seed: u32) {
+        let side = 2.6 * self.grain;
+        let cell = (at / side).floor();
+        let (x, y) = (cell.x as i32, cell.y as i32);
+        let draw = |k: u32| (hash(seed ^ k, x, y) >> 8) as i32 as f32 * (1.0 / 16_777_216.0);
+        if draw(20) >= chance {
+            return;
+        }
+        let radius = self.grain * (0.35 + 0.85 * draw(21) * draw(22));
+        let middle = (cell + 0.5) * side + (Vec2::new(draw(23), draw(24)) - 0.5) * (side - 2.0 * radius).max(0.0);
+        let off = at - middle;
+        // An angular one: a square on its corner, turned.
+        let turn = Vec2::new(draw(25) - 0.5, draw(26) - 0.5).normalize_or(Vec2::X);
+        let (u, v) = (off.dot(turn).abs(), off.perp_dot(turn).abs());
+        let far = (0.75 * u + 0.75 * v).max(u.max(v)) / radius;
+        let inside = ((1.0 - far) * radius + 0.5).clamp(0.0, 1.0);
+        if inside > 0.0 {
+            place.height += 0.9 * radius * (1.0 - far).clamp(0.0, 0.6);
+            place.pale = place.pale.max(self.crushed.pale.max(0.4) * inside);
+            place.shade += (0.5 * draw(27) - 0.25) * inside;
+        }
+    }
+}

@@ -1,0 +1,135 @@
+//! [`Layer`]: what a field holds beside depths, for looks that show it: plates, crushed zones and veils.
+
+mod crushed;
+mod plates;
+mod veil;
+
+pub use crushed::Crushed;
+pub(crate) use crushed::{CrushedField, SLOPE_UNIT, Spot};
+pub(crate) use plates::Plate;
+pub use veil::Veil;
+pub(super) use veil::VeilField;
+
+use super::TexelRect;
+use crate::{
+    Grid,
+    pattern::{CellTracker, Moment, Network, SurfaceFrame, Timeline},
+};
+use plates::PlateField;
+
+/// What a [`DepthField`](super::DepthField) is to hold beside depths. A look [says](crate::paint::Look::layer) what it shows.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LayerPlan {
+    /// Whether it is to know which closed cell each texel lies in; default no.
+    pub plates: bool,
+    /// Crushed zones at the hits; default none.
+    pub crushed: Option<Crushed>,
+    /// Sheets along cracks; default none.
+    pub veil: Option<Veil>,
+    /// Fixes all that is random in it; default 0.
+    pub seed: u64,
+}
+
+impl LayerPlan {
+    /// Bytes that it takes for each texel of the field, about; crushed zones take theirs where they are.
+    #[must_use]
+    pub const fn bytes_per_texel(&self) -> u64 {
+        (if self.plates { 2 } else { 0 }) + (if self.veil.is_some() { 1 } else { 0 })
+    }
+}
+
+/// See [`LayerPlan`]. It follows a network and its timeline: what it holds depends on the moment alone, bit for bit.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Layer {
+    plan: LayerPlan,
+    plates: Option<Box<PlateField>>,
+    crushed: Option<Box<CrushedField>>,
+    pub(super) veil: Option<Box<VeilField>>,
+}
+
+impl Layer {
+    pub(super) fn new(plan: LayerPlan, frame: SurfaceFrame) -> Self {
+        let plates = plan.plates.then(|| Box::new(PlateField::new(frame, plan.seed)));
+        let crushed = plan.crushed.as_ref().map(|crushed| Box::new(CrushedField::new(crushed, frame, plan.seed)));
+        let veil = plan.veil.as_ref().map(|veil| Box::new(VeilField::new(veil, frame, plan.seed)));
+        Self { plan, plates, crushed, veil }
+    }
+
+    /// As it was made.
+    pub(super) fn clear(&mut self, frame: SurfaceFrame) {
+        *self = Self::new(std::mem::take(&mut self.plan), frame);
+    }
+
+    pub(super) fn show(
+        &mut self,
+        network: &Network,
+        timeline: &Timeline,
+        moment: Moment,
+        forbidden: Option<&Grid<bool>>,
+        changed: &mut Vec<TexelRect>,
+    ) {
+        if let Some(plates) = &mut self.plates {
+            plates.show(network, timeline, moment, forbidden, changed);
+        }
+        if let Some(crushed) = &mut self.crushed {
+            let count = timeline.entries(moment.begun()).strikes;
+            crushed.show(&timeline.strikes()[..count], timeline.strikes(), forbidden, changed);
+        }
+    }
+
+    /// Goes on with a network whose oldest part was forgotten.
+    pub(super) fn freeze(&mut self, network: &Network, timeline: &Timeline) {
+        if let Some(plates) = &mut self.plates {
+            plates.freeze(network, timeline);
+        }
+    }
+
+    pub(super) const fn plan(&self) -> &LayerPlan {
+        &self.plan
+    }
+
+    pub(crate) fn veil(&self) -> Option<&Grid<u8>> {
+        self.veil.as_deref().map(VeilField::density)
+    }
+
+    pub(crate) fn plates(&self) -> Option<&PlateField> {
+        self.plates.as_deref().filter(|plates| !plates.is_empty())
+    }
+
+    pub(crate) fn crushed(&self) -> Option<&CrushedField> {
+        self.crushed.as_deref().filter(|crushed| !crushed.is_empty())
+    }
+}
+
+/// A tracker of the cells of a network.
+fn tracker(frame: SurfaceFrame) -> CellTracker {
+    CellTracker::recording(frame.extent())
+}
+
+/// A number in `-1..=1` at a lattice point.
+#[inline(always)]
+fn lattice(seed: u32, x: i32, y: i32) -> f32 {
+    let hash = hash(seed, x, y);
+    (hash >> 8) as i32 as f32 * (2.0 / 16_777_215.0) - 1.0
+}
+
+#[inline(always)]
+fn hash(seed: u32, x: i32, y: i32) -> u32 {
+    let mut h = seed ^ (x as u32).wrapping_mul(0x9E37_79B1) ^ (y as u32).wrapping_mul(0x85EB_CA77);
+    h = (h ^ (h >> 15)).wrapping_mul(0x2C1B_3C6D);
+    h = (h ^ (h >> 12)).wrapping_mul(0x297A_2D39);
+    h ^ (h >> 15)
+}
+
+/// Smooth noise in `-1..=1`, whose bumps are about one unit wide.
+#[inline(always)]
+pub(crate) fn noise(seed: u32, x: f32, y: f32) -> f32 {
+    let (fx, fy) = (x.floor(), y.floor());
+    let (ix, iy) = (fx as i32, fy as i32);
+    let ease = |t: f32| t * t * (3.0 - 2.0 * t);
+    let (tx, ty) = (ease(x - fx), ease(y - fy));
+    let at = |dx: i32, dy: i32| lattice(seed, ix.wrapping_add(dx), iy.wrapping_add(dy));
+    let top = at(0, 0) + (at(1, 0) - at(0, 0)) * tx;
+    let low = at(0, 1) + (at(1, 1) - at(0, 1)) * tx;
+    top + (low - top) * ty
+}
