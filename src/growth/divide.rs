@@ -14,7 +14,7 @@ use super::{
 };
 use crate::{
     math::{hash_unit, ops},
-    pattern::{NO_PARENT, Node},
+    pattern::{LinkKind, NO_PARENT, Node},
 };
 use glam::Vec2;
 use std::{f32::consts::PI, ops::Range};
