@@ -330,7 +330,7 @@ impl CrackGrowth {
 
     /// Begins new cracks where markers are out of reach of all others.
     fn nucleate(&mut self) {
-        let due = self.params.nucleation * (self.steps + 1) as f32;
+        let due = self.params.nucleation * self.steps.saturating_add(1) as f32;
         // What springs from a blow breaks ahead of its cracks, what dries breaks anywhere.
         let center = self.impacts.last().map_or(Vec2::ZERO, |impact| impact.pos);
         let is_blow = matches!(self.params.starts, StartLayout::Crushed { .. });
