@@ -29,6 +29,9 @@ const MAX_LOOKS: usize = 64;
 /// The largest depth of parallax that still looks like depth, in units of the texture.
 const MAX_PARALLAX: f32 = 0.1;
 
+/// Shards fly no further after harder hits: the most that [`ShatterRequest::energy`](super::ShatterRequest::energy) may be.
+const HARDEST: f32 = 1000.0;
+
 /// Applies the hits that wait, in turns, as many as the budget allows.
 pub(super) fn apply_hits(world: &mut World) {
     let timer = world.resource::<FrameClock>().start(world.resource::<CrackBudget>(), SHARE);
@@ -139,13 +142,14 @@ fn apply(world: &mut World, entity: Entity, hit: QueuedHit) -> Result<HitOutcome
     let uv = locate(world, entity, kind, at)?;
     let mut surfaces = world.resource_mut::<Surfaces>();
     let active = surfaces.active.get_mut(&entity).ok_or(GONE)?;
-    let texel = active.field.frame.to_texel(active.field.frame.uv_to_pos(uv)).max(Vec2::ZERO).as_uvec2();
+    let frame = active.field.frame;
+    let texel = frame.to_texel(frame.uv_to_pos(uv)).max(Vec2::ZERO).as_uvec2();
     if active.broken.as_ref().is_some_and(|broken| broken.holes.contains(texel)) {
         return Err("a shard has left the surface there");
     }
     if active.surface.alpha_mask
         && let Some(view) = active.views.get(active.view)
-        && active.base.is_hole(view.rect.min + (uv * view.rect.size().as_vec2()).as_uvec2().min(view.rect.size() - 1))
+        && active.base.is_hole(view.rect.min + (uv * frame.size().as_vec2()).as_uvec2().min(view.rect.size() - 1))
     {
         return Err("the surface is transparent there");
     }
@@ -153,7 +157,8 @@ fn apply(world: &mut World, entity: Entity, hit: QueuedHit) -> Result<HitOutcome
     active.freeze_if_full();
     let outcome = active.growth.hit(pos, hit.energy);
     if matches!(outcome, HitOutcome::Started(_) | HitOutcome::Merged(_)) {
-        active.struck = Some(Struck { pos, energy: hit.energy, direction: hit.direction });
+        let energy = hit.energy.min(HARDEST);
+        active.struck = Some(Struck { pos, energy, direction: hit.direction });
         active.hits += 1;
         surfaces.start_growing(entity);
         // The nodes it starts with show at once.
@@ -200,6 +205,7 @@ pub(super) fn make_ready_now(world: &mut World, entity: Entity) -> Result<bool, 
 
 /// Makes growth and textures in this frame; `false` if its mask is not there yet.
 pub(super) fn make_now(world: &mut World, entity: Entity, plan: Plan) -> Result<bool, CrackError> {
+    plan.check_mesh(world, entity)?;
     let draft = plan.pictures.clone().draft(world, &plan.shown)?;
     let Some(mask) = mask::resolve(world, plan.mask(), &plan.shown, &draft)? else { return Ok(false) };
     let read = Readings { base: draft.base.clone(), mask };

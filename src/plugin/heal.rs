@@ -45,7 +45,7 @@ pub trait CrackCommandsExt {
 
     /// Closes all cracks within so many seconds: they run back the way they came, whatever a [`CrackClock`](super::CrackClock)
     /// says, and are healed as by [`heal_cracks`](Self::heal_cracks) then. Hits that wait on the surface are refused; one that comes
-    /// while they close makes them grow on from where they are. Not a number, zero or below: at once.
+    /// while they close makes them grow on from where they are. Not a number, zero or below: at once; infinite: they stand still.
     fn close_cracks(&mut self, seconds: f32) -> &mut Self;
 
     /// Knocks shards out of a cracked surface, along the cracks it has. Nothing happens to an entity without cracks; one

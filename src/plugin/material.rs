@@ -5,8 +5,8 @@ mod split;
 
 use super::{
     CrackError, CrackMaps, CrackTextures, HitPoint, Shard,
-    carrier::{Carrier, Clothes, Found, Kind, Shown},
-    mesh::{aspect_of, closest, is_flat, place_of, wrap},
+    carrier::{Carrier, Clothes, Found, Kind, Shown, typed},
+    mesh::{aspect_of, check_for_tangents, closest, is_flat, place_of, wrap},
     queue::QueuedHit,
     shards::Plane,
     surfaces::Active,
@@ -60,6 +60,7 @@ pub(super) const fn kind<S: MaterialSlot>() -> Kind {
         is_twofold: is_twofold::<S>,
         aim,
         locate: locate::<S>,
+        check_mesh: check_mesh::<S>,
         is_solid: S::Material::MAPS.depth,
         plane: plane::<S>,
         open: open::<S>,
@@ -113,17 +114,14 @@ fn attach<S: MaterialSlot>(
     textures: &CrackTextures,
     relief: f32,
 ) {
-    let before = carrier.shown.asset.clone().typed::<S::Material>();
+    let Some(before) = typed::<S::Material>(&carrier.shown.asset) else { return };
     let Some(mut materials) = world.get_resource_mut::<Assets<S::Material>>() else { return };
     let Some(mut material) = materials.get(&before).cloned() else { return };
     material.show(textures, relief);
     if carrier.is_twofold {
         material.show_upper_half();
     }
-    let own = match &carrier.own {
-        Some(own) => own.clone().typed::<S::Material>(),
-        None => materials.reserve_handle(),
-    };
+    let own = carrier.own.as_ref().and_then(typed::<S::Material>).unwrap_or_else(|| materials.reserve_handle());
     // A handle that we hold is never refused.
     if materials.insert(&own, material).is_err() {
         return;
@@ -133,11 +131,26 @@ fn attach<S: MaterialSlot>(
         slot.set_material(own);
     }
     #[cfg(feature = "3d")]
-    if S::Material::MAPS.depth && carrier.mesh.is_none() {
+    if S::Material::MAPS.depth && carrier.mesh.is_none() && (textures.normal.is_some() || textures.depth.is_some()) {
         carrier.mesh = give_tangents(world, entity);
     }
     #[cfg(feature = "3d")]
     split::give_faces::<S>(world, entity, carrier);
+}
+
+/// Whether tangents can be made for a mesh that has none.
+fn check_mesh<S: MaterialSlot>(world: &World, entity: Entity) -> Result<(), CrackError> {
+    let meshes = world.get_resource::<Assets<Mesh>>();
+    match meshes.and_then(|meshes| meshes.get(mesh_of(world, entity)?)) {
+        Some(mesh) if S::Material::MAPS.depth && lacks_tangents(mesh) => {
+            check_for_tangents(mesh).map_err(|reason| CrackError::Mesh { reason })
+        }
+        _ => Ok(()),
+    }
+}
+
+fn lacks_tangents(mesh: &Mesh) -> bool {
+    matches!(mesh.try_attribute_option(Mesh::ATTRIBUTE_TANGENT), Ok(None))
 }
 
 /// Normal and depth maps show nothing on a mesh without tangents: such a mesh is replaced by one that has them.
@@ -146,10 +159,13 @@ fn give_tangents(world: &mut World, entity: Entity) -> Option<(Handle<Mesh>, Han
     let before = world.get::<Mesh3d>(entity)?.0.clone();
     let mut meshes = world.get_resource_mut::<Assets<Mesh>>()?;
     let mesh = meshes.get(&before)?;
-    if !matches!(mesh.try_attribute_option(Mesh::ATTRIBUTE_TANGENT), Ok(None)) {
+    if !lacks_tangents(mesh) {
         return None;
     }
-    match mesh.clone().with_generated_tangents() {
+    // It may be another one than when the surface was planned.
+    let made = check_for_tangents(mesh)
+        .and_then(|()| mesh.clone().with_generated_tangents().map_err(|error| error.to_string()));
+    match made {
         Ok(mesh) => {
             let own = meshes.add(mesh);
             world.get_mut::<Mesh3d>(entity)?.0 = own.clone();
@@ -166,8 +182,9 @@ fn give_tangents(world: &mut World, entity: Entity) -> Option<(Handle<Mesh>, Han
 fn detach<S: MaterialSlot>(world: &mut World, entity: Entity, carrier: &Carrier) {
     if let Some(mut slot) = world.get_mut::<S>(entity)
         && carrier.is_showing(&slot.material().clone().untyped())
+        && let Some(before) = typed(&carrier.shown.asset)
     {
-        slot.set_material(carrier.shown.asset.clone().typed());
+        slot.set_material(before);
     }
     if let Some((before, own)) = &carrier.mesh
         && let Some(mut mesh) = world.get_mut::<Mesh3d>(entity)
@@ -262,7 +279,7 @@ fn open<S: MaterialSlot>(world: &mut World, entity: Entity, carrier: &Carrier, h
     let (Some(own), Some(mut materials)) = (&carrier.own, world.get_resource_mut::<Assets<S::Material>>()) else {
         return;
     };
-    if let Some(mut material) = materials.get_mut(&own.clone().typed()) {
+    if let Some(mut material) = typed(own).and_then(|own| materials.get_mut(&own)) {
         material.open();
     }
 }
@@ -275,7 +292,7 @@ fn shard_material<S: MaterialSlot>(
     opacity: f32,
 ) -> Option<UntypedHandle> {
     let mut materials = world.get_resource_mut::<Assets<S::Material>>()?;
-    let own = carrier.own.as_ref().unwrap_or(&carrier.shown.asset).clone().typed();
+    let own = typed(carrier.own.as_ref().unwrap_or(&carrier.shown.asset))?;
     let mut material = materials.get(&own)?.clone();
     material.for_shards(picture, opacity);
     Some(materials.add(material).untyped())
@@ -283,7 +300,7 @@ fn shard_material<S: MaterialSlot>(
 
 fn inside<S: MaterialSlot>(world: &mut World, carrier: &Carrier, mean: [f32; 3], bright: f32) -> Option<UntypedHandle> {
     let mut materials = world.get_resource_mut::<Assets<S::Material>>()?;
-    let inside = materials.get(&carrier.shown.asset.clone().typed())?.for_sides(mean, bright)?;
+    let inside = materials.get(&typed(&carrier.shown.asset)?)?.for_sides(mean, bright)?;
     Some(materials.add(inside).untyped())
 }
 
@@ -311,10 +328,11 @@ fn spawn_one<S: MaterialSlot>(world: &mut World, clothes: Clothes) -> Option<Ent
     world.get_entity(clothes.parent).is_ok().then(|| world.spawn(worn::<S>(clothes)).id())
 }
 
-/// All that is seen of a shard.
+/// All that is seen of a shard; nothing of one whose material is of another kind.
 fn worn<S: MaterialSlot>(clothes: Clothes) -> (ChildOf, Transform, Visibility, S::Mesh, S) {
     let Clothes { parent, place, mesh, material } = clothes;
-    (ChildOf(parent), place, Visibility::Inherited, mesh.into(), material.typed().into())
+    let material: Handle<S::Material> = typed(&material).unwrap_or_default();
+    (ChildOf(parent), place, Visibility::Inherited, mesh.into(), material.into())
 }
 
 /// Makes a shard of an entity that was one.
@@ -336,7 +354,9 @@ pub(super) fn dress<S: MaterialSlot>(entity: &mut EntityWorldMut, shard: Option<
 
 /// Gives a shard another material.
 pub(super) fn change<S: MaterialSlot>(entity: &mut EntityWorldMut, material: &UntypedHandle) {
-    entity.insert(S::from(material.clone().typed()));
+    if let Some(material) = typed::<S::Material>(material) {
+        entity.insert(S::from(material));
+    }
 }
 
 /// Takes what makes it a shard from an entity, and the material.

@@ -51,6 +51,7 @@ mod prepare;
 mod preset;
 mod queue;
 mod read;
+mod reflect;
 mod shards;
 mod space;
 #[cfg(feature = "2d")]
@@ -142,6 +143,7 @@ impl Plugin for CrackPlugin {
             .register_type::<CrackClock>()
             .register_type::<CrackState>()
             .register_type::<GuidedCracks>()
+            .register_type::<GuidedAppearance>()
             .register_type::<BakeProgress>()
             .register_type::<CrackBaked>()
             .register_type::<CrackTextures>()
@@ -150,6 +152,8 @@ impl Plugin for CrackPlugin {
             .register_type::<CrackFailed>()
             .register_type::<CellClosed>()
             .register_type::<ShatterCracks>()
+            .register_type::<Shard>()
+            .register_type::<CrackShards>()
             .register_type::<Shattered>()
             .register_type::<Reassembled>()
             .register_type::<CrackBudget>()

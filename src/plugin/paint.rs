@@ -221,6 +221,7 @@ impl Canvas {
         let origin = view.rect.min;
         let shown = TexelRect::whole(view.rect.size());
         rects.iter_mut().for_each(|rect| *rect = rect.intersect(shown));
+        rects.retain(|rect| !rect.is_empty());
         let [diffuse, normal, depth] = self.0.each_mut().map(Option::as_deref_mut);
         let mut targets = PaintTargets { diffuse, normal, depth };
         paint_rects(active.base.texels(), &active.field, &active.look, rects, origin, &mut targets);

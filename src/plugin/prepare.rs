@@ -246,6 +246,7 @@ fn begin(world: &mut World, entity: Entity, mut plan: Plan, is_wanted: bool, thr
     }
     let mut copies = Copies::default();
     let Some(raw) = plan.raw(world, &mut copies)? else { return Ok(false) };
+    plan.check_mesh(world, entity)?;
     let images = world.get_resource::<Assets<Image>>().ok_or(CrackError::NoImages)?;
     let Some(reading) = Reading::new(copies.0, images, true) else { return Ok(false) };
     plan.make_room(world)?;

@@ -19,10 +19,13 @@ use bevy::{
 #[component(clone_behavior = Ignore)]
 pub struct CrackTextures {
     /// The picture with its cracks, `Rgba8UnormSrgb`.
+    #[reflect(skip_serializing)]
     pub diffuse: Option<Handle<Image>>,
     /// Tangent-space normals, +Y up, `Rgba8Unorm`.
+    #[reflect(skip_serializing)]
     pub normal: Option<Handle<Image>>,
     /// Depth, `R8Unorm`, white = deep.
+    #[reflect(skip_serializing)]
     pub depth: Option<Handle<Image>>,
 }
 

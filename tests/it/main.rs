@@ -33,6 +33,8 @@ mod presets;
 mod random;
 mod replay;
 #[cfg(all(feature = "2d", feature = "3d"))]
+mod saved;
+#[cfg(all(feature = "2d", feature = "3d"))]
 mod shards;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod shards_bounds;
@@ -44,4 +46,6 @@ mod shards_order;
 mod solids;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod support;
+#[cfg(all(feature = "2d", feature = "3d"))]
+mod values;
 mod voronoi;

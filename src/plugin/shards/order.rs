@@ -127,6 +127,7 @@ impl Order {
         // Fewer and larger ones, rather than some that nobody sees.
         settings.cut.max_shards =
             settings.cut.max_shards.min(u32::try_from(budget.max_shards).unwrap_or(u32::MAX).max(1));
+        request.validate()?;
         if !(0.0..=10.0).contains(&settings.thickness) {
             let value = f64::from(settings.thickness);
             let name = "thickness";
@@ -146,7 +147,8 @@ impl Order {
         let plane =
             (active.carrier.kind.plane)(world, entity, active).map_err(|reason| ShardsError::NotFlat { reason })?;
         let back = world.get::<GlobalTransform>(entity).and_then(space::to_local).unwrap_or_default();
-        let direction = plane.rotation.inverse() * back.transform_vector3(request.direction.unwrap_or(direction));
+        let direction = back.transform_vector3(space::direction(request.direction.unwrap_or(direction)));
+        let direction = plane.rotation.inverse() * space::direction(direction);
         let broken = active.broken.as_deref();
         let released = broken.map_or(0, |broken| broken.released);
         let seed = active.surface.seed;
