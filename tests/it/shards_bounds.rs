@@ -426,16 +426,22 @@ fn s7_what_turns_later_takes_its_shards_along() {
 fn s9_everything_goes() {
     let mut app = app();
     // Held on all sides; a few cracks cut nothing out, or pieces in the middle, unless they are carried on.
-    for (preset, carry_on) in [(CrackPreset::GLASS, true), (CrackPreset::GLASS, false), (CrackPreset::BRICK, true)] {
+    let cases = [
+        (CrackPreset::GLASS, true, 1.0),
+        (CrackPreset::GLASS, false, 1.0),
+        (CrackPreset::GLASS, false, 4.0),
+        (CrackPreset::BRICK, true, 1.0),
+    ];
+    for (preset, carry_on, energy) in cases {
         let cut = ShatterParams { carry_on, ..ShatterParams::DEFAULT };
         let settings = ShatterCracks { cut, anchor: Anchor::Border, ..loose() };
         let image = add(&mut app, picture(UVec2::new(96, 64)));
         let surface = CrackSurface::new(preset).with_seed(4);
         let entity = app.world_mut().spawn((Sprite::from_image(image), surface, settings)).id();
-        hit(&mut app, CrackHit::uv(entity, Vec2::new(0.3, 0.4)));
+        hit(&mut app, CrackHit::uv(entity, Vec2::new(0.3, 0.4)).with_energy(energy));
         settle(&mut app, entity);
         let left = |app: &App| shown(app, entity).as_chunks::<4>().0.iter().filter(|texel| texel[3] != 0).count();
-        if carry_on {
+        if carry_on || energy > 1.0 {
             shatter(&mut app, entity, ShatterRequest::ALL);
             assert!(left(&app) > 0, "something is held");
         }

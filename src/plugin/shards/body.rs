@@ -126,9 +126,9 @@ impl Body {
         }
         // Materials and their pictures are the surface's.
         (carrier.kind.undress)(&mut entity);
-        if let Some(mut visibility) = entity.get_mut::<Visibility>() {
-            *visibility = Visibility::Hidden;
-        }
+        // Who is told of that may take it away.
+        let mut visibility = world.get_mut::<Visibility>(self.entity)?;
+        *visibility = Visibility::Hidden;
         if let Some((sides, _)) = &self.sides
             && let Ok(mut sides) = world.get_entity_mut(*sides)
         {
