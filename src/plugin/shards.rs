@@ -60,7 +60,7 @@ pub struct ShatterCracks {
     /// When shards fall by themselves.
     pub when: ShatterWhen,
     /// How far around the hit shards are knocked out when they fall by themselves, pattern units, 0..=64 (the surface's shorter side is
-    /// 1). Default: 64, everywhere.
+    /// 1); infinite as in [`ShatterRequest::EVERYTHING`]. Default: 64, everywhere.
     pub reach: f32,
     /// How lines become shards.
     pub cut: ShatterParams,
@@ -151,23 +151,21 @@ pub struct ShatterRequest {
     /// Where the blow lands, texture coordinates of the surface's picture or sprite frame, 0..=1, v down; from beside it no further than
     /// -64..=64. `None` = where it was hit last.
     pub uv: Option<Vec2>,
-    /// How far around it shards are knocked out, pattern units, 0..=64.
+    /// How far around it shards are knocked out, pattern units, 0..=64; infinite as in [`EVERYTHING`](Self::EVERYTHING).
     pub reach: f32,
     /// How hard, 0..=1000; `None` = as the last hit.
     pub energy: Option<f32>,
     /// Direction of the blow in the world, of any length; zero = straight on; `None` = as the last hit.
     pub direction: Option<Vec3>,
-    /// Whether what is held goes as well, and cracks that end inside a piece are carried on to the next crack or the border, so that the
-    /// parts without cracks go in pieces. Else [`ShatterCracks::anchor`] and [`ShatterParams::carry_on`] hold. Default: `false`.
-    pub everything: bool,
 }
 
 impl ShatterRequest {
     /// All pieces that the cracks have cut out and nothing holds, as a burst from the last hit.
-    pub const ALL: Self = Self { uv: None, reach: 64.0, energy: None, direction: None, everything: false };
+    pub const ALL: Self = Self { uv: None, reach: 64.0, energy: None, direction: None };
 
-    /// The whole surface, as a burst from the last hit: nothing of it stays, whatever holds it and however few cracks it has.
-    pub const EVERYTHING: Self = Self { everything: true, ..Self::ALL };
+    /// The whole surface, as a burst from the last hit: nothing of it stays, whatever [`ShatterCracks::anchor`] says, and cracks that
+    /// end inside a piece are carried on to the next crack or the border, so that the parts without cracks go in pieces.
+    pub const EVERYTHING: Self = Self { reach: f32::INFINITY, ..Self::ALL };
 
     /// What lies within `reach` (pattern units) of `uv` (0..=1, v down), and what nothing holds then.
     #[must_use]
