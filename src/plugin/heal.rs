@@ -51,7 +51,8 @@ pub trait CrackCommandsExt {
     /// Knocks shards out of a cracked surface, along the cracks it has. Nothing happens to an entity without cracks; one
     /// that cannot shatter says so with [`ShatterFailed`](super::ShatterFailed). See [`ShatterCracks`](super::ShatterCracks).
     ///
-    /// The shards are those of this frame, and are there two frames later, on every machine: they are made on the
+    /// The shards are those of this frame, and are there two frames later, on every machine (later only where the renderer has not made its
+    /// pipelines for shards yet; with [`ShatterCracks`](super::ShatterCracks) on the surface, it is asked to beforehand): they are made on the
     /// [`AsyncComputeTaskPool`](bevy::tasks::AsyncComputeTaskPool) meanwhile. Only if they are not ready then, or the surface has been
     /// shattered or mended in between, they are made in that frame. Healing takes the request back.
     fn shatter_cracks(&mut self, request: ShatterRequest) -> &mut Self;

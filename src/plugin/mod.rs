@@ -60,6 +60,8 @@ mod surface;
 mod surfaces;
 mod textures;
 mod upload;
+#[cfg_attr(not(any(feature = "2d", feature = "3d")), expect(dead_code, reason = "there are no kinds then"))]
+mod warm;
 mod watch;
 
 pub use budget::{CrackBudget, CrackStats};
@@ -168,6 +170,7 @@ impl Plugin for CrackPlugin {
             .init_resource::<surfaces::Surfaces>()
             .init_resource::<bake::Bakes>()
             .init_resource::<prepare::Preparations>()
+            .init_resource::<warm::Warmth>()
             .add_message::<CrackHit>()
             .add_observer(hit::receive_hit)
             .configure_sets(
@@ -178,6 +181,11 @@ impl Plugin for CrackPlugin {
             .add_systems(
                 PostUpdate,
                 (
+                    (warm::note_fresh, warm::watch_views, warm::warm_up)
+                        .chain()
+                        .run_if(warm::is_connected)
+                        .in_set(Shatter)
+                        .before(shards::fly_shards),
                     (
                         shards::fly_shards,
                         shards::shatter_when_due,
@@ -196,7 +204,7 @@ impl Plugin for CrackPlugin {
                         watch::update_changed.run_if(watch::any_changed),
                         hit::collect_hits,
                         prepare::prepare_surfaces.run_if(prepare::any_preparing),
-                        activate::apply_hits.run_if(queue::any_queued),
+                        activate::apply_hits.run_if(activate::any_hits),
                     )
                         .chain()
                         .in_set(Hit),
@@ -232,6 +240,7 @@ impl Plugin for CrackPlugin {
         app.insert_resource(picture::NearestByDefault::of(app));
         preset::add_assets(app);
         upload::connect(app);
+        warm::connect(app);
         #[cfg(feature = "2d")]
         lit::add_material(app);
     }
