@@ -181,6 +181,36 @@ fn e13_no_frame_without_a_surface_that_comes_with_its_hit() {
     }
 }
 
+/// That such films show what they are to show: without the crate's help a surface is gone when it comes to look otherwise.
+#[test]
+fn e13_what_is_exchanged_by_hand_is_gone_for_a_frame() {
+    for stage in [Stage::Sprite, Stage::Standard] {
+        let Some((_one, mut app)) = app() else { return };
+        let (target, entity) = set_up(&mut app, stage);
+        wait_until_seen(&mut app, &target);
+        let picture = add(&mut app, solid(UVec2::splat(64), [230, 220, 210, 255]));
+        if stage == Stage::Sprite {
+            let quad = add(&mut app, Mesh::from(Rectangle::from_size(Vec2::splat(200.0))));
+            let material = add(&mut app, ColorMaterial::from(picture));
+            app.world_mut().entity_mut(entity).remove::<Sprite>().insert((Mesh2d(quad), MeshMaterial2d(material)));
+        } else {
+            let mesh =
+                Mesh::from(Rectangle::new(4.0, 4.0)).with_generated_tangents().expect("it has all that it takes");
+            let (mesh, flat) = (add(&mut app, mesh), add(&mut app, solid(UVec2::ONE, [128, 128, 255, 255])));
+            let material = StandardMaterial {
+                base_color_texture: Some(picture),
+                normal_map_texture: Some(flat),
+                unlit: true,
+                ..default()
+            };
+            let material = add(&mut app, material);
+            app.world_mut().entity_mut(entity).insert((Mesh3d(mesh), MeshMaterial3d(material)));
+        }
+        let film = shares(&mut app, &target, 3, |_| true);
+        assert!(film.iter().any(|share| *share < 0.01), "{stage:?}: {film:?}");
+    }
+}
+
 /// What is drawn so that pipelines are made goes again, and nothing of it is left.
 #[test]
 fn e13_nothing_is_left_of_what_was_asked_for() {
