@@ -419,8 +419,8 @@ impl MarkerField {
         Some((Vec2::new(self.x[i], self.y[i]), self.loyal[i]))
     }
 
-    /// Markers in the cells, dead ones included.
-    fn made_settled(&self) -> usize {
+    /// Markers in the cells, with those that died since the last [`settle`](Self::settle).
+    pub(super) fn made_settled(&self) -> usize {
         self.x.len().saturating_sub(LANES)
     }
 
@@ -444,14 +444,6 @@ impl MarkerField {
     /// Markers alive, counting those that died since the last [`settle`](Self::settle).
     pub(super) fn living_at_most(&self) -> usize {
         self.x.len() + self.newborn.len()
-    }
-
-    /// Whether a marker, alive or dead since the last [`settle`](Self::settle), lies within `distance` of `pos`.
-    pub(super) fn any_within(&self, pos: Vec2, distance: f32) -> bool {
-        self.rows(pos, distance).any(|(from, to)| {
-            let (from, to) = (self.first[from] as usize, self.first[to] as usize);
-            (from..to).any(|i| distance_sq(self.x[i], self.y[i], pos) < distance * distance)
-        })
     }
 }
 

@@ -38,6 +38,7 @@ mod field;
 mod foreign;
 mod forget;
 mod impact;
+mod layout;
 mod links;
 mod markers;
 mod nodes;

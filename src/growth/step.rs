@@ -5,6 +5,7 @@ use super::{
     arrest::{Advance, Arrest},
     changes::Changes,
     field::{ANY_IMPACT, MarkerField},
+    layout::Layout,
     links::{self, Linker},
     nodes::NodeGrid,
     pull::{NO_PULL, Pull},
@@ -70,6 +71,8 @@ pub struct CrackGrowth {
     pub(super) widths: Widths,
     pub(super) linker: Linker,
     pub(super) impacts: Vec<Impact>,
+    /// What the last hit has still to lay out.
+    pub(super) layout: Option<Box<Layout>>,
     pub(super) density: Option<Grid<f32>>,
     pub(super) mask: Arc<CrackMask>,
     pub(super) steps: u32,
@@ -122,6 +125,7 @@ impl CrackGrowth {
             widths: Widths::new(&params),
             linker: Linker::default(),
             impacts: Vec::new(),
+            layout: None,
             density: None,
             mask: Arc::default(),
             steps: 0,
@@ -148,6 +152,7 @@ impl CrackGrowth {
     /// Where markers of later hits may be: a probability 0..=1 over the whole surface, at any resolution, sampled at the
     /// nearest cell; `None` = everywhere. Values that are not finite count as 0.
     pub fn set_density(&mut self, density: Option<Grid<f32>>) {
+        self.finish_layout();
         self.density = density.filter(|grid| grid.size().min_element() > 0);
     }
 
@@ -156,6 +161,7 @@ impl CrackGrowth {
     /// Markers move to the weakest place near them, cracks steer along what is weak and around what is strong, and no line
     /// enters a forbidden texel. A hit on one is [rejected](super::Rejected::Forbidden). What is grown stays.
     pub fn set_mask(&mut self, mask: impl Into<Arc<CrackMask>>) {
+        self.finish_layout();
         self.mask = mask.into();
         self.mind_others();
     }
@@ -228,6 +234,7 @@ impl CrackGrowth {
     /// the closest marker, on it if that is nearer than `D`. So every birth serves a marker, and growth ends within
     /// [`GrowthParams::most_nodes`]. A node beyond the border, or closer to it than the kill distance on its way, lies on it.
     pub fn step(&mut self) -> StepReport {
+        self.finish_layout();
         self.newborn = 0..0;
         // A tip that has just set out to meet a crack may be all that moves, and has no node to show for it yet.
         while self.steps_left > 0 && self.newborn.is_empty() {
@@ -462,6 +469,7 @@ impl CrackGrowth {
     /// If a parameter is out of its range; nothing changes then.
     pub fn set_params(&mut self, params: GrowthParams) -> Result<(), ParamError> {
         params.validate()?;
+        self.finish_layout();
         let params = params.varied(self.seed);
         self.field.set_params(&params);
         self.widths.set_params(&params);

@@ -2,7 +2,7 @@
 
 use super::{
     CrackError, CrackMaps, CrackSurface, CrackTextures, HitPoint, Shard, layout::Layout, preset, queue::QueuedHit,
-    shards::Plane, surfaces::Active,
+    shards::Plane, surfaces::Active, warm::Asked,
 };
 use crate::{CrackPreset, raster::TexelRect};
 use bevy::{
@@ -69,6 +69,8 @@ pub(super) struct Kind {
     pub(super) inspect: fn(&World, Entity) -> Found,
     /// Makes the entity show `textures`; called again when they have changed.
     pub(super) attach: fn(&mut World, Entity, &mut Carrier, &CrackTextures, relief: f32),
+    /// Whether the renderer can draw what is asked. If not, it is asked to.
+    pub(super) looks: fn(&mut World, Entity, &Asked<'_>) -> bool,
     /// Gives back what the entity showed before.
     pub(super) detach: fn(&mut World, Entity, &Carrier),
     /// Width of the whole picture over its height, as it is shown in the world, the picture having this size and the crate having given

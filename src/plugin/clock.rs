@@ -208,7 +208,7 @@ impl Active {
             (Ruler::Closing(_), _) => false,
             _ => self.due >= 1.0,
         };
-        is_due && self.growth.is_growing()
+        is_due && self.growth.is_growing() && !self.growth.is_laying_out()
     }
 
     /// Makes a step of growth if one is due.

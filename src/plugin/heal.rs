@@ -52,8 +52,9 @@ pub trait CrackCommandsExt {
     /// that cannot shatter says so with [`ShatterFailed`](super::ShatterFailed). See [`ShatterCracks`](super::ShatterCracks).
     ///
     /// The shards are those of this frame, and are there two frames later, and one more for each 500 nodes of cracks, up to 20, on every
-    /// machine: they are made on the [`AsyncComputeTaskPool`](bevy::tasks::AsyncComputeTaskPool) meanwhile. (Two in any case where
-    /// [`CrackBudget::milliseconds`](super::CrackBudget::milliseconds) is a second or more.) Only if they are not ready then, or the surface has been
+    /// machine (later only where the renderer has not made its pipelines for shards yet; with [`ShatterCracks`](super::ShatterCracks) on the
+    /// surface, it is asked to beforehand): they are made on the [`AsyncComputeTaskPool`](bevy::tasks::AsyncComputeTaskPool) meanwhile. (Two in
+    /// any case where [`CrackBudget::milliseconds`](super::CrackBudget::milliseconds) is a second or more.) Only if they are not ready then, or the surface has been
     /// shattered or mended in between, they are made in that frame. Healing takes the request back.
     fn shatter_cracks(&mut self, request: ShatterRequest) -> &mut Self;
 }

@@ -108,6 +108,11 @@ impl CrackMaterial for CrackLitMaterial {
     fn for_sides(&self, _mean: [f32; 3], _bright: f32) -> Option<Self> {
         None
     }
+
+    /// One for all.
+    fn pipeline_key(&self) -> u64 {
+        0
+    }
 }
 
 impl MaterialSlot for MeshMaterial2d<CrackLitMaterial> {

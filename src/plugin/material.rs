@@ -10,6 +10,7 @@ use super::{
     queue::QueuedHit,
     shards::Plane,
     surfaces::Active,
+    warm::{self, Asked, Shape},
 };
 use bevy::{
     asset::{LoadState, UntypedHandle},
@@ -39,6 +40,8 @@ pub(super) trait CrackMaterial: Asset + Clone {
     /// The same for the sides of shards of a picture of this mean colour (sRGB), if they have any; see
     /// [`RimLook::bright`](crate::shatter::RimLook::bright).
     fn for_sides(&self, mean: [f32; 3], bright: f32) -> Option<Self>;
+    /// What the renderer's pipelines for it depend on.
+    fn pipeline_key(&self) -> u64;
 }
 
 /// The component that holds a material.
@@ -55,6 +58,7 @@ pub(super) const fn kind<S: MaterialSlot>() -> Kind {
     Kind {
         inspect: inspect::<S>,
         attach: attach::<S>,
+        looks: looks::<S>,
         detach: detach::<S>,
         aspect: aspect::<S>,
         is_twofold: is_twofold::<S>,
@@ -102,7 +106,7 @@ fn is_mesh_loading(world: &World, entity: Entity) -> bool {
     matches!(state, Some(LoadState::NotLoaded | LoadState::Loading))
 }
 
-fn mesh_of(world: &World, entity: Entity) -> Option<&Handle<Mesh>> {
+pub(super) fn mesh_of(world: &World, entity: Entity) -> Option<&Handle<Mesh>> {
     let mesh_2d = world.get::<Mesh2d>(entity).map(|mesh| &mesh.0);
     mesh_2d.or_else(|| world.get::<Mesh3d>(entity).map(|mesh| &mesh.0))
 }
@@ -175,6 +179,45 @@ fn give_tangents(world: &mut World, entity: Entity) -> Option<(Handle<Mesh>, Han
             let surface = super::error::Called::of(world, entity);
             warn!("the normals of the cracks on {surface} will not show, its mesh has no tangents: {error}");
             None
+        }
+    }
+}
+
+fn looks<S: MaterialSlot>(world: &mut World, entity: Entity, asked: &Asked<'_>) -> bool {
+    let Some(materials) = world.get_resource::<Assets<S::Material>>() else { return true };
+    let Some(now) = world.get::<S>(entity).and_then(|slot| materials.get(slot.material())) else { return true };
+    // Any picture will do, and the engine's white one is there.
+    let (white, is_solid) = (Handle::<Image>::default(), S::Material::MAPS.depth);
+    let textures = |maps: &CrackMaps| CrackTextures {
+        diffuse: (maps.diffuse && S::Material::MAPS.diffuse).then(|| white.clone()),
+        normal: (maps.normal && S::Material::MAPS.normal).then(|| white.clone()),
+        depth: (maps.depth && S::Material::MAPS.depth).then(|| white.clone()),
+    };
+    let own = Shape::Own { has_tangents: is_solid };
+    let mut cracked = now.clone();
+    match asked {
+        Asked::Cracked(maps) => {
+            cracked.show(&textures(maps), 0.0);
+            let is_as_before = !is_solid && cracked.pipeline_key() == now.pipeline_key();
+            is_as_before || warm::can_draw::<S>(world, entity, cracked, &own)
+        }
+        Asked::Broken { maps, original, has_rims, inside } => {
+            cracked.show(&textures(maps), 0.0);
+            let read = |material: &UntypedHandle| materials.get(&material.clone().try_typed().ok()?);
+            let sides = match inside {
+                Some(inside) => read(inside).cloned(),
+                None => read(original).and_then(|before| before.for_sides([0.0; 3], 0.0)),
+            };
+            cracked.open();
+            let mut shard = cracked.clone();
+            shard.for_shards(&white, 1.0);
+            let shape = Shape::Shard { has_colors: *has_rims, has_tangents: is_solid };
+            let bare = Shape::Shard { has_colors: false, has_tangents: true };
+            // All of them, that they come at once.
+            let has_surface = warm::can_draw::<S>(world, entity, cracked, &own);
+            let has_shards = warm::can_draw::<S>(world, entity, shard, &shape);
+            let has_sides = !is_solid || sides.is_none_or(|sides| warm::can_draw::<S>(world, entity, sides, &bare));
+            has_surface && has_shards && has_sides
         }
     }
 }
@@ -405,6 +448,14 @@ mod flat {
         fn for_sides(&self, _mean: [f32; 3], _bright: f32) -> Option<Self> {
             None
         }
+
+        fn pipeline_key(&self) -> u64 {
+            match self.alpha_mode {
+                AlphaMode2d::Opaque => 0,
+                AlphaMode2d::Mask(_) => 1,
+                AlphaMode2d::Blend => 2,
+            }
+        }
     }
 
     impl MaterialSlot for MeshMaterial2d<ColorMaterial> {
@@ -425,9 +476,11 @@ mod flat {
 mod standard {
     use super::{Affine2, CrackMaps, CrackMaterial, CrackTextures, Handle, Image, MaterialSlot};
     use bevy::{
-        pbr::ParallaxMappingMethod,
+        pbr::{ParallaxMappingMethod, StandardMaterialKey},
         prelude::{AlphaMode, Color, Mesh3d, MeshMaterial3d, StandardMaterial, Vec2},
     };
+    use core::hash::{Hash, Hasher};
+    use std::collections::hash_map::DefaultHasher;
 
     impl CrackMaterial for StandardMaterial {
         const MAPS: CrackMaps = CrackMaps { diffuse: true, normal: true, depth: true };
@@ -489,6 +542,14 @@ mod standard {
                 depth_map: None,
                 ..self.clone()
             })
+        }
+
+        fn pipeline_key(&self) -> u64 {
+            let mut hasher = DefaultHasher::new();
+            StandardMaterialKey::from(self).hash(&mut hasher);
+            core::mem::discriminant(&self.alpha_mode).hash(&mut hasher);
+            core::mem::discriminant(&self.opaque_render_method).hash(&mut hasher);
+            hasher.finish()
         }
     }
 

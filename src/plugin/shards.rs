@@ -19,6 +19,7 @@ mod release;
 
 pub(super) use body::Spares;
 pub(super) use broken::{Broken, Struck, drop_shards};
+pub(super) use drawn::rim_for;
 pub(super) use fly::fly_shards;
 pub(super) use plane::Plane;
 pub(super) use release::{Request, any_requests, shatter_surfaces, shatter_when_due};

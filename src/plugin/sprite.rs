@@ -7,6 +7,7 @@ use super::{
     material,
     shards::Plane,
     surfaces::{Active, Surfaces},
+    warm::{self, Asked, Shape},
 };
 use bevy::{
     asset::UntypedHandle,
@@ -19,6 +20,7 @@ use std::sync::Arc;
 pub(super) const KIND: Kind = Kind {
     inspect,
     attach,
+    looks,
     detach,
     aspect,
     is_twofold: |_, _| false,
@@ -143,6 +145,14 @@ fn attach(world: &mut World, entity: Entity, carrier: &mut Carrier, textures: &C
         sprite.custom_size = before;
         carrier.size = before;
     }
+}
+
+/// With cracks it is a sprite as before.
+fn looks(world: &mut World, entity: Entity, asked: &Asked<'_>) -> bool {
+    let Asked::Broken { has_rims, .. } = asked else { return true };
+    let material = ColorMaterial { texture: Some(Handle::default()), ..ColorMaterial::default() };
+    let shape = Shape::Shard { has_colors: *has_rims, has_tangents: false };
+    warm::can_draw::<MeshMaterial2d<ColorMaterial>>(world, entity, material, &shape)
 }
 
 fn detach(world: &mut World, entity: Entity, carrier: &Carrier) {

@@ -282,6 +282,8 @@ pub(super) struct Surfaces {
     pub(super) growing: VecDeque<Entity>,
     /// Surfaces that will grow when others have ended.
     pub(super) held: VecDeque<Entity>,
+    /// Surfaces whose last hit has markers to lay out, in order; and some that are done.
+    pub(super) laying_out: VecDeque<Entity>,
     /// Surfaces to paint, each once, in turns.
     pub(super) dirty: VecDeque<Entity>,
     /// Surfaces whose times are made beside the frames.

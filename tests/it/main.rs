@@ -4,6 +4,8 @@
 #![cfg(test)]
 
 #[cfg(all(feature = "2d", feature = "3d"))]
+mod blink;
+#[cfg(all(feature = "2d", feature = "3d"))]
 mod cells;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod clock;

@@ -3,6 +3,7 @@
 mod arrest;
 mod reference;
 mod side;
+mod slices;
 
 use super::{CrackGrowth, GrowthParams, HitOutcome, MAX_ENERGY, MarkerLayout, Rejected, StartLayout, Venation};
 use crate::{
