@@ -1,6 +1,10 @@
 //! [`Grid`]: the one two-dimensional buffer of the crate.
 
+#[cfg(feature = "bevy")]
+use bevy::reflect::{ReflectDeserialize, ReflectSerialize};
 use glam::UVec2;
+#[cfg(feature = "bevy")]
+use serde::{Serialize, de::DeserializeOwned};
 
 /// A row-major buffer of `size.x * size.y` values: (0, 0) is the top left, x runs right, y runs down.
 ///
@@ -14,9 +18,30 @@ use glam::UVec2;
 /// assert_eq!(grid.get(3, 1), None);
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect), reflect(opaque))]
+#[cfg_attr(feature = "bevy", reflect(Clone, Debug, PartialEq, Serialize, Deserialize))]
+#[cfg_attr(feature = "bevy", reflect(where T: Copy + core::fmt::Debug + PartialEq + Serialize + DeserializeOwned))]
 pub struct Grid<T> {
     size: UVec2,
     data: Vec<T>,
+}
+
+/// Size and values have to fit.
+#[cfg(feature = "serde")]
+impl<'de, T: Copy + serde::Deserialize<'de>> serde::Deserialize<'de> for Grid<T> {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        #[derive(serde::Deserialize)]
+        #[serde(rename = "Grid")]
+        struct Parts<T> {
+            size: UVec2,
+            data: Vec<T>,
+        }
+        let Parts { size, data } = Parts::deserialize(deserializer)?;
+        let length = data.len();
+        let misfit = || serde::de::Error::custom(format_args!("{length} values for a grid of {size}"));
+        Self::from_vec(size, data).ok_or_else(misfit)
+    }
 }
 
 impl<T: Copy> Grid<T> {

@@ -479,8 +479,8 @@ impl MarkerField {
         self.killed += 1;
     }
 
-    /// Markers in the cells, dead ones included.
-    fn made_settled(&self) -> usize {
+    /// Markers in the cells, with those that died since the last [`settle`](Self::settle).
+    pub(super) fn made_settled(&self) -> usize {
         self.x.len().saturating_sub(LANES)
     }
 

@@ -1,16 +1,13 @@
 //! Hits: where cracks begin, and what a hit on older cracks does.
 
 use super::{
-    CrackGrowth, MarkerLayout, StartLayout,
-    divide::rim_towards,
+    CrackGrowth, StartLayout,
     field::ANY_IMPACT,
     markers::{self, Region},
-    nodes::NodeGrid,
-    params::MAX_MARKERS,
 };
 use crate::{
     math::mix,
-    pattern::{Dot, Link, LinkKind, NO_PARENT, Node},
+    pattern::{Link, LinkKind, NO_PARENT, Node},
 };
 use glam::Vec2;
 
@@ -19,9 +16,6 @@ pub const MAX_ENERGY: f32 = 16.0;
 
 /// Half the width of the widest crack in which a hit is looked for, pattern units.
 const WIDE: f32 = 0.1;
-
-/// Room is made for so many nodes at least.
-const FEW_NODES: usize = 64;
 
 /// How much further a hit reaches, as a share, where it has next to no room.
 const MORE_REACH: f32 = 1.8;
@@ -84,6 +78,29 @@ impl CrackGrowth {
     /// Lays out starts and markers; growth happens in [`step`](Self::step). A hit as good as on top of an earlier one adds
     /// its energy to that one, so hammering on one spot costs no more than one hard hit.
     pub fn hit(&mut self, pos: Vec2, energy: f32) -> HitOutcome {
+        let outcome = self.begin_hit(pos, energy);
+        self.finish_layout();
+        outcome
+    }
+
+    /// As [`hit`](Self::hit), but its markers are left to [`lay_out`](Self::lay_out), so that a hit that makes many of them can take several
+    /// frames. The cracks are the same.
+    ///
+    /// ```
+    /// use bevy_crack::{CrackPreset, growth::CrackGrowth};
+    ///
+    /// let fine = CrackPreset::TEMPERED_GLASS.scaled(0.1).growth;
+    /// let mut growth = CrackGrowth::new(fine, [1.0, 1.0].into(), 7)?;
+    /// growth.begin_hit([0.5, 0.5].into(), 1.0);
+    /// let mut slices = 1;
+    /// while growth.lay_out(4096) {
+    ///     slices += 1;
+    /// }
+    /// assert!(slices > 100);
+    /// # Ok::<(), bevy_crack::growth::ParamError>(())
+    /// ```
+    pub fn begin_hit(&mut self, pos: Vec2, energy: f32) -> HitOutcome {
+        self.finish_layout();
         if !pos.is_finite() || !energy.is_finite() {
             return HitOutcome::Rejected(Rejected::NotFinite);
         }
@@ -238,67 +255,9 @@ impl CrackGrowth {
         let center = self.masonry.as_ref().and_then(|masonry| masonry.nearest(center)).unwrap_or(center);
         let region = Region { center, inner, outer, extent };
         let seed = mix(self.seed ^ mix(u64::from(impact) | 1 << 40));
-        // Darts keep their distance from each other, and from the markers of hits that no step has taken up yet.
-        let mut darts = None;
-        let divides = self.division.is_some();
-        // Where the markers of an earlier hit still wait they serve this one as well.
-        let apart = if divides { 0.5 * markers::spacing(&self.params, extent) } else { 0.0 };
-        if divides {
-            self.field.settle(&self.network.nodes, &self.nodes);
-        }
-        if let MarkerLayout::DartThrowing { spacing } = self.params.markers {
-            self.field.settle(&self.network.nodes, &self.nodes);
-            darts = Some(NodeGrid::new(extent, spacing));
-        }
-        let (field, nodes, shown) = (&mut self.field, &self.nodes, &mut self.shown_markers);
-        let (timeline, radius) = (&mut self.timeline, self.params.line_width);
-        let show = self.params.draw_markers;
         // The rays of a hit are its own: older cracks do not sprout towards them.
-        let is_loyal = self.params.keeps_apart();
-        let loyal = if is_loyal { impact } else { ANY_IMPACT };
-        let wishes = (self.density.as_ref(), &*self.mask);
-        markers::lay_out(&self.params, region, wishes, seed, |pos, spacing| {
-            if field.living_at_most() >= MAX_MARKERS {
-                return;
-            }
-            if let (Some(spacing), Some(darts)) = (spacing, &mut darts) {
-                if darts.any_within(pos, spacing) || field.any_within(pos, spacing) || nodes.any_within(pos, spacing) {
-                    return;
-                }
-                darts.push(pos);
-            }
-            if divides && field.any_within(pos, apart) {
-                return;
-            }
-            // The border is a crack too, and beyond the rim there is no stress.
-            let relieved = if divides {
-                pos.min(extent - pos)
-                    .min_element()
-                    .min(rim_towards(pos - center, outer, self.seed ^ u64::from(impact)) - pos.distance(center))
-            } else {
-                f32::INFINITY
-            };
-            field.add(pos, loyal, relieved);
-            if show {
-                shown.push(pos);
-                timeline.add_dot(Dot { pos, radius });
-            }
-        });
-        // A large growth makes about two nodes a marker: room for them now, so that no step pauses to move them all.
-        let expected = (2 * self.field.living_at_most()).max(FEW_NODES).min(self.room());
-        if expected > 4096 {
-            self.field.reserve();
-        }
-        self.network.nodes.reserve(expected);
-        self.nodes.reserve(expected);
-        self.widths.reserve(expected);
-        self.pull_of.reserve(expected);
-        self.courses.reserve(expected);
-        self.changes.reserve(expected);
-        self.timeline.reserve(expected);
-        if let Some(arrest) = &mut self.arrest {
-            arrest.reserve(expected);
-        }
+        let loyal = if self.params.keeps_apart() { impact } else { ANY_IMPACT };
+        self.begin_layout(region, (impact, loyal), seed);
     }
 
     /// A hit from which nothing could grow, so narrow is its place, leaves a short crack all the same.

@@ -1,6 +1,9 @@
 //! Where markers and starts come to lie.
 
-use super::params::{GrowthParams, MarkerLayout, StartLayout};
+use super::{
+    layout::{Cursor, Keeper},
+    params::{GrowthParams, MarkerLayout, StartLayout},
+};
 use crate::{
     Grid,
     math::{Rng, hash_unit, mix, ops},
@@ -37,69 +40,88 @@ pub(super) fn density_at(density: Option<&Grid<f32>>, pos: Vec2, extent: Vec2) -
     value.filter(|p| p.is_finite()).unwrap_or(0.0)
 }
 
-/// Calls `keep` with every marker that `params` lay out in `region`, in a fixed order.
+/// Gives `keeper` the next markers that `params` lay out in `region`, in a fixed order, as far as the slice goes. Returns whether those were the
+/// last ones.
 ///
-/// For dart throwing it also gets the distance that the marker must keep from others. Each draw depends on the place alone, so that a hit that grows by energy only adds a ring.
+/// Each draw depends on the place alone, so that a hit that grows by energy only adds a ring, and slices may be of any size.
 pub(super) fn lay_out(
     params: &GrowthParams,
     region: Region,
     (density, mask): (Option<&Grid<f32>>, &CrackMask),
     seed: u64,
-    mut keep: impl FnMut(Vec2, Option<f32>),
-) {
-    let mut kept = 0;
+    cursor: &mut Cursor,
+    keeper: &mut Keeper<'_>,
+) -> bool {
+    let mut kept = cursor.kept;
     let apart = spacing(params, region.extent);
-    let mut offer = |pos: Vec2, chance: f32, probability: f32, spacing: Option<f32>| {
-        let Some(share) = region.share(pos) else { return };
+    // Where a marker comes to lie that is offered a place, if it does.
+    let settle = |pos: Vec2, chance: f32, probability: f32| {
+        let share = region.share(pos)?;
         let mut thinned = if params.focus > 0.0 { ops::powf(1.0 - share, params.focus) } else { 1.0 };
         let mut pos = pos;
         if !mask.is_empty() {
             let (place, liking) = to_weak_place(pos, apart, mask, region.extent, seed);
             (pos, thinned) = (place, thinned * liking);
         }
-        if chance < probability * thinned * density_at(density, pos, region.extent) {
-            keep(pos, spacing);
-            // A closer one dies at once.
-            kept += u32::from(pos.distance(region.center) > 1.5 * params.kill_distance);
+        (chance < probability * thinned * density_at(density, pos, region.extent)).then_some(pos)
+    };
+    // A closer one dies at once.
+    let counts = |pos: Vec2| u32::from(pos.distance(region.center) > 1.5 * params.kill_distance);
+    let mut offer = |pos: Vec2, chance: f32, probability: f32| {
+        if let Some(pos) = settle(pos, chance, probability) {
+            keeper.keep(pos);
+            kept += counts(pos);
         }
     };
-    match params.markers {
+    // Places that may move are looked for.
+    let cost = if mask.is_empty() { 1 } else { TRIES };
+    let is_over = match params.markers {
         // They come with their plan.
-        MarkerLayout::Rays { .. } => {}
+        MarkerLayout::Rays { .. } => true,
         MarkerLayout::PseudoGrid { occupancy, jitter } => {
             let [columns, lines] = grid(params, region.extent).to_array();
             let cell = region.extent / Vec2::new(columns as f32, lines as f32);
-            let (x0, x1) = span(region.center.x, region.outer, cell.x, columns);
-            let (y0, y1) = span(region.center.y, region.outer, cell.y, lines);
-            for y in y0..y1 {
-                for x in x0..x1 {
+            let cells = Cells {
+                x: span(region.center.x, region.outer, cell.x, columns),
+                y: span(region.center.y, region.outer, cell.y, lines),
+            };
+            for y in cursor.slice(cells.rows(), cost * cells.columns()) {
+                let y = cells.y.0 + y as u32;
+                for x in cells.x.0..cells.x.1 {
                     let vertex = mix(seed ^ (u64::from(y) << 32 | u64::from(x)));
                     let stray = Vec2::new(hash_unit(vertex, 1), hash_unit(vertex, 2)) - 0.5;
                     let pos = (Vec2::new(x as f32, y as f32) + 0.5 + stray * jitter) * cell;
-                    offer(pos, hash_unit(vertex, 0), occupancy, None);
+                    offer(pos, hash_unit(vertex, 0), occupancy);
                 }
             }
+            cursor.is_at(cells.rows())
         }
         MarkerLayout::DartThrowing { spacing } => {
             // One dart per cell and round; the cells are small enough that each holds at most one marker.
-            let cell = spacing * std::f32::consts::FRAC_1_SQRT_2;
-            let cells = (region.extent / cell).ceil().as_uvec2();
-            let (x0, x1) = span(region.center.x, region.outer, cell, cells.x);
-            let (y0, y1) = span(region.center.y, region.outer, cell, cells.y);
-            for round in 0..6u64 {
-                for y in y0..y1 {
-                    for x in x0..x1 {
-                        let dart = mix(seed ^ (u64::from(y) << 32 | u64::from(x))).wrapping_add(round);
-                        let stray = Vec2::new(hash_unit(dart, 1), hash_unit(dart, 2));
-                        let pos = (Vec2::new(x as f32, y as f32) + stray) * cell;
-                        offer(pos, hash_unit(dart, 0), 1.0, Some(spacing));
+            let (cell, cells) = dart_cells(&region, spacing);
+            let rows = DART_ROUNDS * cells.rows();
+            for row in cursor.slice(rows, cost * cells.columns()) {
+                let (round, row) = (row / cells.rows(), row % cells.rows());
+                let (y, first) = (cells.y.0 + row as u32, row * u64::from(cells.columns()));
+                for (x, index) in (cells.x.0..cells.x.1).zip(first..) {
+                    if keeper.is_covered(index) {
+                        continue;
+                    }
+                    let dart = mix(seed ^ (u64::from(y) << 32 | u64::from(x))).wrapping_add(round);
+                    let stray = Vec2::new(hash_unit(dart, 1), hash_unit(dart, 2));
+                    let pos = (Vec2::new(x as f32, y as f32) + stray) * cell;
+                    if let Some(pos) = settle(pos, hash_unit(dart, 0), 1.0) {
+                        keeper.throw(pos, spacing);
+                        kept += counts(pos);
                     }
                 }
             }
+            cursor.is_at(rows)
         }
-    }
+    };
+    cursor.kept = kept;
     let has_rays = matches!(params.markers, MarkerLayout::Rays { .. });
-    if region.inner == 0.0 && kept < FEWEST && !has_rays {
+    if is_over && region.inner == 0.0 && kept < FEWEST && !has_rays {
         let mut rng = Rng::new(seed).stream("fewest");
         let turn = rng.unit();
         for i in 0..FEWEST {
@@ -110,9 +132,38 @@ pub(super) fn lay_out(
             let inside = pos.cmpge(Vec2::ZERO).all() && pos.cmple(region.extent).all();
             let pos = if inside { pos } else { towards_room(region, arm) };
             if density_at(density, pos, region.extent) > 0.0 && !mask.is_forbidden(pos / region.extent) {
-                keep(pos, None);
+                keeper.keep(pos);
             }
         }
+    }
+    is_over
+}
+
+/// Rounds of darts, one for each cell.
+const DART_ROUNDS: u64 = 6;
+
+/// Side of the cells for darts, and the cells that a region may touch.
+pub(super) fn dart_cells(region: &Region, spacing: f32) -> (f32, Cells) {
+    let cell = spacing * std::f32::consts::FRAC_1_SQRT_2;
+    let all = (region.extent / cell).ceil().as_uvec2();
+    let x = span(region.center.x, region.outer, cell, all.x);
+    (cell, Cells { x, y: span(region.center.y, region.outer, cell, all.y) })
+}
+
+/// Cells from one column and row to others, row by row.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cells {
+    pub(super) x: (u32, u32),
+    pub(super) y: (u32, u32),
+}
+
+impl Cells {
+    pub(super) const fn columns(&self) -> u32 {
+        self.x.1 - self.x.0
+    }
+
+    pub(super) fn rows(&self) -> u64 {
+        u64::from(self.y.1 - self.y.0)
     }
 }
 
@@ -134,10 +185,12 @@ pub(super) fn spacing(params: &GrowthParams, extent: Vec2) -> f32 {
     }
 }
 
+/// Places that are looked at for the weakest one.
+const TRIES: u32 = 24;
+
 /// The weakest place near a marker, and how much of its chance it keeps there: none where cracks are forbidden, little where
 /// all around is strong or, if some places of the surface are weak, nothing here is.
 fn to_weak_place(pos: Vec2, apart: f32, mask: &CrackMask, extent: Vec2, seed: u64) -> (Vec2, f32) {
-    const TRIES: u32 = 24;
     let place = mix(seed ^ u64::from(pos.x.to_bits()) << 32 ^ u64::from(pos.y.to_bits()));
     let mut best = (pos, f32::NEG_INFINITY);
     for i in 0..TRIES {

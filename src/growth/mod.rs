@@ -39,6 +39,7 @@ mod field;
 mod foreign;
 mod forget;
 mod impact;
+mod layout;
 mod links;
 mod markers;
 mod masonry;

@@ -6,6 +6,7 @@ use super::{
     changes::Changes,
     divide::Division,
     field::{ANY_IMPACT, MarkerField},
+    layout::Layout,
     links::{self, Linker},
     masonry::Masonry,
     nodes::NodeGrid,
@@ -76,6 +77,8 @@ pub struct CrackGrowth {
     pub(super) linker: Linker,
     pub(super) rays: Rays,
     pub(super) impacts: Vec<Impact>,
+    /// What the last hit has still to lay out.
+    pub(super) layout: Option<Box<Layout>>,
     pub(super) density: Option<Grid<f32>>,
     pub(super) mask: Arc<CrackMask>,
     /// The joints in which cracks run.
@@ -134,6 +137,7 @@ impl CrackGrowth {
             linker: Linker::default(),
             rays: Rays::default(),
             impacts: Vec::new(),
+            layout: None,
             density: None,
             mask: Arc::default(),
             masonry: None,
@@ -164,6 +168,7 @@ impl CrackGrowth {
     /// Where markers of later hits may be: a probability 0..=1 over the whole surface, at any resolution, sampled at the
     /// nearest cell; `None` = everywhere. Values that are not finite count as 0.
     pub fn set_density(&mut self, density: Option<Grid<f32>>) {
+        self.finish_layout();
         self.density = density.filter(|grid| grid.size().min_element() > 0);
     }
 
@@ -172,6 +177,7 @@ impl CrackGrowth {
     /// Markers move to the weakest place near them, cracks steer along what is weak and around what is strong, and no line
     /// enters a forbidden texel. A hit on one is [rejected](super::Rejected::Forbidden). What is grown stays.
     pub fn set_mask(&mut self, mask: impl Into<Arc<CrackMask>>) {
+        self.finish_layout();
         self.mask = mask.into();
         self.mind_others();
         self.lay_bricks();
@@ -262,6 +268,7 @@ impl CrackGrowth {
     /// the closest marker, on it if that is nearer than `D`. So every birth serves a marker, and growth ends within
     /// [`GrowthParams::most_nodes`]. A node beyond the border, or closer to it than the kill distance on its way, lies on it.
     pub fn step(&mut self) -> StepReport {
+        self.finish_layout();
         self.newborn = 0..0;
         // A tip that has just set out to meet a crack may be all that moves, and has no node to show for it yet.
         while self.steps_left > 0 && self.newborn.is_empty() {
@@ -393,7 +400,7 @@ impl CrackGrowth {
 
     /// Begins new cracks where markers are out of reach of all others.
     fn nucleate(&mut self) {
-        let due = self.params.nucleation * (self.steps + 1) as f32;
+        let due = self.params.nucleation * self.steps.saturating_add(1) as f32;
         // What springs from a blow breaks ahead of its cracks, what dries breaks anywhere.
         let center = self.impacts.last().map_or(Vec2::ZERO, |impact| impact.pos);
         let is_blow = matches!(self.params.starts, StartLayout::Crushed { .. });
@@ -532,6 +539,7 @@ impl CrackGrowth {
     /// If a parameter is out of its range; nothing changes then.
     pub fn set_params(&mut self, params: GrowthParams) -> Result<(), ParamError> {
         params.validate()?;
+        self.finish_layout();
         let params = params.varied(self.seed);
         self.field.set_params(&params);
         self.widths.set_params(&params);

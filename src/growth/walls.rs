@@ -8,6 +8,9 @@ const NONE: u32 = u32::MAX;
 /// Lines closer than this (pattern units) count as touching.
 const CLEARANCE: f64 = 2e-4;
 
+/// Lines whose bounds lie further apart touch nowhere, whatever rounding does to them.
+const APART: f32 = 2.0 * CLEARANCE as f32;
+
 /// Cosine of the least angle between two lines at a node, 20 degrees: closer ones would be one line drawn twice.
 const LEAST_ANGLE: f64 = 0.94;
 
@@ -17,6 +20,8 @@ struct Wall {
     ends: (u32, u32),
     first: u32,
     len: u32,
+    low: Vec2,
+    high: Vec2,
 }
 
 /// An index of lines by place; lines are only ever added.
@@ -35,7 +40,7 @@ pub(super) struct Walls {
 impl Walls {
     /// An index over `extent` for lines of about `length`.
     pub(super) fn new(extent: Vec2, length: f32) -> Self {
-        let side = length.max(extent.max_element() / 128.0);
+        let side = length.max(extent.max_element() / 512.0);
         let cells = (extent / side).ceil().as_uvec2().max(UVec2::ONE);
         Self {
             cells,
@@ -72,7 +77,7 @@ impl Walls {
             self.entries.push((wall, self.head[slot]));
             self.head[slot] = self.entries.len() as u32 - 1;
         }
-        self.walls.push(Wall { ends, first: self.points.len() as u32, len: path.points().len() as u32 });
+        self.walls.push(Wall { ends, first: self.points.len() as u32, len: path.points().len() as u32, low, high });
         self.points.extend(path.points().iter().map(|point| point.pos));
     }
 
@@ -80,12 +85,14 @@ impl Walls {
     /// it; a node that is not born yet is `u32::MAX`.
     pub(super) fn touches_any(&self, ends: (u32, u32), path: &SegmentPath) -> bool {
         let (low, high) = bounds(path.points());
-        let margin = CLEARANCE as f32;
-        self.slots(low - margin, high + margin).any(|slot| {
+        let (low, high) = (low - APART, high + APART);
+        self.slots(low, high).any(|slot| {
             let mut entry = self.head[slot];
             while entry != NONE {
                 let (wall, next) = self.entries[entry as usize];
-                if self.touches(self.walls[wall as usize], ends, path.points()) {
+                let wall = self.walls[wall as usize];
+                let is_near = wall.low.cmple(high).all() && wall.high.cmpge(low).all();
+                if is_near && self.touches(wall, ends, path.points()) {
                     return true;
                 }
                 entry = next;
@@ -144,13 +151,17 @@ impl Walls {
     /// Whether a line passes within `distance` of `pos`.
     pub(super) fn any_within(&self, pos: Vec2, distance: f32) -> bool {
         let limit = f64::from(distance).powi(2);
-        self.slots(pos - distance, pos + distance).any(|slot| {
+        let (low, high) = (pos - distance - APART, pos + distance + APART);
+        self.slots(low, high).any(|slot| {
             let mut entry = self.head[slot];
             while entry != NONE {
                 let (wall, next) = self.entries[entry as usize];
-                let Wall { first, len, .. } = self.walls[wall as usize];
+                let Wall { first, len, low: from, high: to, .. } = self.walls[wall as usize];
                 let line = &self.points[first as usize..(first + len) as usize];
-                if line.windows(2).any(|p| point_gap_sq(pos.as_dvec2(), (p[0].as_dvec2(), p[1].as_dvec2())) < limit) {
+                if from.cmple(high).all()
+                    && to.cmpge(low).all()
+                    && line.windows(2).any(|p| point_gap_sq(pos.as_dvec2(), (p[0].as_dvec2(), p[1].as_dvec2())) < limit)
+                {
                     return true;
                 }
                 entry = next;

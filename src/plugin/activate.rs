@@ -2,7 +2,7 @@
 
 use super::{
     CrackBudget, CrackClock, CrackError, CrackFailed, CrackState, CrackStats, CrackStatus, CrackTextures, HitPoint,
-    budget::FrameClock,
+    budget::{FrameClock, Timer},
     carrier::{self, Found, Kind},
     error::Called,
     mask, picture,
@@ -26,22 +26,43 @@ const MAX_OTHERS: usize = 16;
 /// So many surfaces that are not ready are looked at when there is no time.
 const MAX_LOOKS: usize = 64;
 
+/// Places for markers that a hit looks at between two looks at the clock.
+const SLICE: u32 = 4096;
+
 /// The largest depth of parallax that still looks like depth, in units of the texture.
 const MAX_PARALLAX: f32 = 0.1;
+
+/// Shards fly no further after harder hits: the most that [`ShatterRequest::energy`](super::ShatterRequest::energy) may be.
+const HARDEST: f32 = 1000.0;
+
+/// Whether any hit waits, or has markers to lay out.
+pub(super) fn any_hits(queue: Res<HitQueue>, surfaces: Res<Surfaces>) -> bool {
+    queue.has_any() || !surfaces.laying_out.is_empty()
+}
 
 /// Applies the hits that wait, in turns, as many as the budget allows.
 pub(super) fn apply_hits(world: &mut World) {
     let timer = world.resource::<FrameClock>().start(world.resource::<CrackBudget>(), SHARE);
+    let (mut looks, mut has_worked) = (0, lay_out(&mut world.resource_mut::<Surfaces>(), &timer));
     world.resource_mut::<HitQueue>().unpark();
-    let (mut looks, mut has_worked) = (0, false);
     while let Some(entity) = world.resource::<HitQueue>().next() {
+        if has_worked && timer.is_over() {
+            make_others(world);
+            break;
+        }
+        // A hit comes after the markers of the one before it.
+        let active = world.resource::<Surfaces>().active.get(&entity);
+        if active.is_some_and(|active| active.growth.is_laying_out()) {
+            world.resource_mut::<HitQueue>().park();
+            continue;
+        }
         // A hit beside a surface makes nothing for it.
         let ready = if is_missed(world, entity) { Ok(true) } else { prepare::make_ready(world, entity) };
         let is_ready = !matches!(ready, Ok(false));
         match ready {
             // Observers may have healed it.
             _ if world.resource::<HitQueue>().next() != Some(entity) => {}
-            Ok(true) => apply_next(world, entity),
+            Ok(true) => apply_next(world, entity, &timer),
             Ok(false) => {
                 set_status(world, entity, CrackStatus::Waiting);
                 world.resource_mut::<HitQueue>().park();
@@ -51,12 +72,28 @@ pub(super) fn apply_hits(world: &mut World) {
         }
         has_worked |= is_ready;
         // Those that wait are not to keep others from the one hit that every frame has time for.
-        if timer.is_over() && (has_worked || looks >= MAX_LOOKS) {
+        if timer.is_over() && looks >= MAX_LOOKS {
             make_others(world);
             break;
         }
     }
     world.resource_mut::<FrameClock>().stop(&timer);
+}
+
+/// Goes on with the markers of hits, the oldest first, one slice at least. Returns whether there was any.
+fn lay_out(surfaces: &mut Surfaces, timer: &Timer) -> bool {
+    let Surfaces { active, laying_out, .. } = surfaces;
+    let mut has_worked = false;
+    while let Some(entity) = laying_out.front().filter(|_| !has_worked || !timer.is_over()) {
+        let is_left = active.get_mut(entity).is_some_and(|active| {
+            has_worked |= active.growth.is_laying_out();
+            active.growth.lay_out(SLICE)
+        });
+        if !is_left {
+            laying_out.pop_front();
+        }
+    }
+    has_worked
 }
 
 /// Has surfaces made beside the frames for whose hits this one has no time.
@@ -77,11 +114,11 @@ fn make_others(world: &mut World) {
 }
 
 /// Applies the first hit of the surface in turn, which is ready.
-fn apply_next(world: &mut World, entity: Entity) {
+fn apply_next(world: &mut World, entity: Entity, timer: &Timer) {
     world.resource_scope(|world, mut queue: Mut<HitQueue>| {
         let mut stats = *world.resource::<CrackStats>();
         if let Some(hit) = queue.take(&mut stats) {
-            match apply(world, entity, hit) {
+            match apply(world, entity, hit, timer) {
                 Ok(HitOutcome::Started(_)) => stats.applied += 1,
                 Ok(HitOutcome::Merged(_)) => stats.merged += 1,
                 Ok(HitOutcome::Nothing) => stats.ignored += 1,
@@ -130,7 +167,7 @@ fn locate(world: &World, entity: Entity, kind: &Kind, at: HitPoint) -> Result<Ve
     is_within.then_some(uv).ok_or("it lies off the surface")
 }
 
-fn apply(world: &mut World, entity: Entity, hit: QueuedHit) -> Result<HitOutcome, &'static str> {
+fn apply(world: &mut World, entity: Entity, hit: QueuedHit, timer: &Timer) -> Result<HitOutcome, &'static str> {
     const GONE: &str = "the surface is gone";
     let active = world.resource::<Surfaces>().active.get(&entity);
     let kind = active.map(|active| active.carrier.kind).or_else(|| carrier::inspect(world, entity).0).ok_or(GONE)?;
@@ -139,22 +176,31 @@ fn apply(world: &mut World, entity: Entity, hit: QueuedHit) -> Result<HitOutcome
     let uv = locate(world, entity, kind, at)?;
     let mut surfaces = world.resource_mut::<Surfaces>();
     let active = surfaces.active.get_mut(&entity).ok_or(GONE)?;
-    let texel = active.field.frame.to_texel(active.field.frame.uv_to_pos(uv)).max(Vec2::ZERO).as_uvec2();
+    let frame = active.field.frame;
+    let texel = frame.to_texel(frame.uv_to_pos(uv)).max(Vec2::ZERO).as_uvec2();
     if active.broken.as_ref().is_some_and(|broken| broken.holes.contains(texel)) {
         return Err("a shard has left the surface there");
     }
     if active.surface.alpha_mask
         && let Some(view) = active.views.get(active.view)
-        && active.base.is_hole(view.rect.min + (uv * view.rect.size().as_vec2()).as_uvec2().min(view.rect.size() - 1))
+        && active.base.is_hole(view.rect.min + (uv * frame.size().as_vec2()).as_uvec2().min(view.rect.size() - 1))
     {
         return Err("the surface is transparent there");
     }
     let pos = uv * active.growth.network().extent();
     active.freeze_if_full();
-    let outcome = active.growth.hit(pos, hit.energy);
+    let outcome = active.growth.begin_hit(pos, hit.energy);
+    let mut is_left = active.growth.lay_out(SLICE);
+    while is_left && !timer.is_over() {
+        is_left = active.growth.lay_out(SLICE);
+    }
     if matches!(outcome, HitOutcome::Started(_) | HitOutcome::Merged(_)) {
-        active.struck = Some(Struck { pos, energy: hit.energy, direction: hit.direction });
+        let energy = hit.energy.min(HARDEST);
+        active.struck = Some(Struck { pos, energy, direction: hit.direction });
         active.hits += 1;
+        if is_left && !surfaces.laying_out.contains(&entity) {
+            surfaces.laying_out.push_back(entity);
+        }
         surfaces.start_growing(entity);
         // The nodes it starts with show at once.
         surfaces.soil(entity);
@@ -200,6 +246,7 @@ pub(super) fn make_ready_now(world: &mut World, entity: Entity) -> Result<bool, 
 
 /// Makes growth and textures in this frame; `false` if its mask is not there yet.
 pub(super) fn make_now(world: &mut World, entity: Entity, plan: Plan) -> Result<bool, CrackError> {
+    plan.check_mesh(world, entity)?;
     let draft = plan.pictures.clone().draft(world, &plan.shown)?;
     let Some(mask) = mask::resolve(world, plan.mask(), &plan.shown, &draft)? else { return Ok(false) };
     let read = Readings { base: draft.base.clone(), mask };
@@ -278,4 +325,71 @@ pub(super) fn make_textures(
         depth: add(&textures::DEPTH, reuse.map(|t| &t.depth))?,
         emissive: add(&textures::EMISSIVE, reuse.map(|t| &t.emissive))?,
     })
+}
+
+#[cfg(all(test, feature = "2d"))]
+mod tests {
+    use super::*;
+    use crate::{
+        growth::CrackGrowth,
+        plugin::{
+            CrackHit, CrackSurface,
+            headless::{app, blank},
+        },
+    };
+
+    /// Fault B5: a frame without time looks at one slice of places, however many markers hits make and however many hits there are, and
+    /// the cracks are those of hits that take effect at once.
+    #[test]
+    fn b5_the_markers_of_hits_are_laid_out_within_the_budget() {
+        let preset = CrackPreset::TEMPERED_GLASS.scaled(0.2);
+        let mut app = app(CrackBudget { milliseconds: 0.0, ..default() });
+        let places = [Vec2::splat(0.5), Vec2::new(0.2, 0.7)];
+        let entities: Vec<Entity> = (0..3)
+            .map(|seed| {
+                let image = app.world_mut().resource_mut::<Assets<Image>>().add(blank(UVec2::splat(64)));
+                let surface = CrackSurface::new(preset.clone()).with_seed(seed);
+                app.world_mut().spawn((Sprite::from_image(image), surface)).id()
+            })
+            .collect();
+        app.update();
+        for (entity, at) in entities.iter().flat_map(|entity| places.map(|at| (*entity, at))) {
+            app.world_mut().trigger(CrackHit::uv(entity, at));
+        }
+        let made = |app: &App| -> u32 {
+            let active = &app.world().resource::<Surfaces>().active;
+            entities.iter().filter_map(|entity| active.get(entity)).map(|active| active.growth.census().total).sum()
+        };
+        let (mut before, mut frames, mut has_waited) = (0, 0, false);
+        loop {
+            app.update();
+            frames += 1;
+            let now = made(&app);
+            assert!(now - before <= SLICE, "{} markers in a frame", now - before);
+            before = now;
+            let surfaces = app.world().resource::<Surfaces>();
+            has_waited |=
+                surfaces.active.values().any(|active| active.growth.is_laying_out() && active.growth.steps() == 0);
+            let is_done = |entity: &Entity| surfaces.active.get(entity).is_some_and(|active| active.hits == 2);
+            if entities.iter().all(is_done) && surfaces.laying_out.is_empty() {
+                break;
+            }
+            assert!(frames < 20_000, "they never come");
+        }
+        assert!(has_waited && frames > 100, "{frames} frames");
+        let stats = app.world().resource::<CrackStats>();
+        assert_eq!((stats.sent, stats.applied, stats.queued), (6, 6, 0));
+        for (seed, entity) in (0..).zip(&entities) {
+            let growth = &app.world().resource::<Surfaces>().active[entity].growth;
+            let mut at_once = CrackGrowth::new(preset.growth.clone(), Vec2::ONE, seed).expect("it is valid");
+            at_once.hit(places[0], 1.0);
+            // The other hit came after as many steps as there were by then.
+            let first_of_second = growth.network().nodes().iter().position(|node| node.impact == 1);
+            let born = first_of_second.map_or(0, |node| growth.network().nodes()[node].birth);
+            while at_once.steps() < born && at_once.step().grew() {}
+            at_once.hit(places[1], 1.0);
+            while at_once.steps() < growth.steps() && at_once.step().grew() {}
+            assert_eq!(at_once.network().nodes(), growth.network().nodes(), "surface {seed}");
+        }
+    }
 }

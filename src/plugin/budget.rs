@@ -12,7 +12,7 @@ use std::sync::{Mutex, PoisonError};
 pub struct CrackBudget {
     /// Time for hits, growth and painting in one frame, milliseconds, however many threads grow and paint; default 2. Up to a quarter of it
     /// counts as spent on what runs between them. What is left over waits for the next frame; at least one hit, one step and one surface
-    /// are done in each. Where more cracks grow than there is time for, all of them grow more slowly. NaN and values below zero count
+    /// are done in each, of a hit that makes many markers a part of them. Where more cracks grow than there is time for, all of them grow more slowly. NaN and values below zero count
     /// as 0.
     ///
     /// With a second or more nothing that a frame shows is put off: for recordings, whose frames may take any time.

@@ -2,15 +2,15 @@
 
 use super::{
     CrackError, CrackMaps, CrackSurface, CrackTextures, HitPoint, Shard, layout::Layout, preset, queue::QueuedHit,
-    shards::Plane, surfaces::Active,
+    shards::Plane, surfaces::Active, warm::Asked,
 };
 use crate::{CrackPreset, raster::TexelRect};
-#[cfg(feature = "2d")]
-use bevy::sprite::SpriteImageMode;
 use bevy::{
     asset::{UntypedAssetId, UntypedHandle},
     prelude::*,
 };
+#[cfg(feature = "2d")]
+use bevy::{sprite::SpriteImageMode, sprite_render::TilemapChunk};
 use std::sync::Arc;
 
 /// What an entity shows.
@@ -32,6 +32,14 @@ pub(super) struct Shown {
 }
 
 impl Shown {
+    /// The texels that it shows of a picture of this size; `None` if there are none. All that is to be known of a part of a picture goes
+    /// through here: a `rect` may lie anywhere, and a frame of an atlas may be cut off by the sheet's edge.
+    pub(super) fn texels(&self, size: UVec2) -> Option<TexelRect> {
+        let whole = TexelRect::whole(size);
+        let seen = self.rect.map_or(whole, |URect { min, max }| TexelRect { min, max }.intersect(whole));
+        (!seen.is_empty()).then_some(seen)
+    }
+
     pub(super) fn pictures(&self) -> impl Iterator<Item = &Handle<Image>> {
         [&self.diffuse, &self.normal, &self.depth].into_iter().flatten()
     }
@@ -39,7 +47,8 @@ impl Shown {
     /// Whether the same pictures are shown, as large a part of them, wherever that lies: another frame of an animation.
     pub(super) fn is_like(&self, other: &Self) -> bool {
         let moved = Self { rect: other.rect, size: other.size, ..self.clone() };
-        let is_as_large = self.rect.map(|rect| rect.size()) == other.rect.map(|rect| rect.size());
+        let size = |shown: &Self| shown.rect.map(|URect { min, max }| max.saturating_sub(min));
+        let is_as_large = size(self) == size(other);
         moved == *other && is_as_large && (self.diffuse.is_some() || self.size == other.size)
     }
 }
@@ -60,6 +69,8 @@ pub(super) struct Kind {
     pub(super) inspect: fn(&World, Entity) -> Found,
     /// Makes the entity show `textures`; called again when they have changed.
     pub(super) attach: fn(&mut World, Entity, &mut Carrier, &CrackTextures, relief: f32),
+    /// Whether the renderer can draw what is asked. If not, it is asked to.
+    pub(super) looks: fn(&mut World, Entity, &Asked<'_>) -> bool,
     /// Gives back what the entity showed before.
     pub(super) detach: fn(&mut World, Entity, &Carrier),
     /// Width of the whole picture over its height, as it is shown in the world, the picture having this size and the crate having given
@@ -71,6 +82,8 @@ pub(super) struct Kind {
     pub(super) aim: fn(&mut World, Entity, &QueuedHit, is_blank: bool) -> HitPoint,
     /// Texture coordinates in the shown part of a point in the entity's own space.
     pub(super) locate: fn(&World, Entity, Vec3) -> Result<Vec2, &'static str>,
+    /// Looks whether the mesh can show normals.
+    pub(super) check_mesh: fn(&World, Entity) -> Result<(), CrackError>,
     /// Whether its shards have thickness.
     pub(super) is_solid: bool,
     /// Where its picture lies in the entity's own space, if that is flat.
@@ -168,6 +181,12 @@ impl Carrier {
     }
 }
 
+/// A handle as one of assets of this type, if it is one.
+#[cfg_attr(not(any(feature = "2d", feature = "3d")), expect(dead_code, reason = "there are no kinds then"))]
+pub(super) fn typed<A: Asset>(handle: &UntypedHandle) -> Option<Handle<A>> {
+    handle.clone().try_typed().ok()
+}
+
 /// What the entity shows, and how to deal with it.
 pub(super) fn inspect(world: &World, entity: Entity) -> (Option<&'static Kind>, Found) {
     for kind in KINDS {
@@ -175,6 +194,10 @@ pub(super) fn inspect(world: &World, entity: Entity) -> (Option<&'static Kind>, 
             Found::Other => {}
             found => return (Some(kind), found),
         }
+    }
+    #[cfg(feature = "2d")]
+    if world.get::<TilemapChunk>(entity).is_some() {
+        return (None, Found::Unusable(CrackError::Tilemap));
     }
     (None, Found::Unusable(CrackError::NothingToCrack))
 }

@@ -56,7 +56,7 @@ pub struct CrackClock {
 pub enum CrackDrive {
     /// Seconds of the app's [`Time`], at this many times the preset's
     /// [`steps_per_second`](crate::CrackPreset::steps_per_second): 1 = as without a clock, 0 = it stands still, below zero it runs
-    /// backwards and stops at the start. Steps are grown when their time comes. Not a number = 0.
+    /// backwards and stops at the start. Steps are grown when their time comes. Not a number = 0; infinite = as fast as the budget allows.
     Speed(f32),
     /// A value from outside, say health, music or a slider: this share of all steps made so far is shown, 0..=1. Hits go on
     /// growing at the preset's pace, shown or not. Not a number = as before.
@@ -208,7 +208,7 @@ impl Active {
             (Ruler::Closing(_), _) => false,
             _ => self.due >= 1.0,
         };
-        is_due && self.growth.is_growing()
+        is_due && self.growth.is_growing() && !self.growth.is_laying_out()
     }
 
     /// Makes a step of growth if one is due.

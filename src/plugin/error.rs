@@ -13,6 +13,12 @@ pub enum CrackError {
          `MeshMaterial3d<StandardMaterial>` (or the feature `2d` or `3d` is off)"
     )]
     NothingToCrack,
+    /// It is a chunk of a tilemap, whose tiles share the texels of their tileset.
+    #[error(
+        "it is a `TilemapChunk`, whose tiles share the texels of their tileset: take the tile out of its `TilemapChunkTileData` \
+         and put a `Sprite` (or a `Mesh2d`) of it in its place, at `TilemapChunk::calculate_tile_transform`, with the `CrackSurface`"
+    )]
+    Tilemap,
     /// There is no place for images.
     #[error("there are no image assets: add `AssetPlugin` and `ImagePlugin`")]
     NoImages,
@@ -56,6 +62,18 @@ pub enum CrackError {
         /// Height, texels.
         height: u32,
     },
+    /// The sprite shows a part of its picture (`Sprite::rect`, an atlas) that has no texels, or lies beyond it.
+    #[error(
+        "it shows the texels from {min} to {max} of a picture of {size}: there are none (see `Sprite::rect` and its atlas)"
+    )]
+    Part {
+        /// First column and row.
+        min: UVec2,
+        /// One past the last column and row.
+        max: UVec2,
+        /// Size of the picture, texels.
+        size: UVec2,
+    },
     /// The sprite is scaled into its size, or it is sliced or tiled and shows a part of its picture.
     #[error(
         "`SpriteImageMode` {mode} is not supported here: use `Auto`, or `Sliced` or `Tiled` without `rect` and atlas"
@@ -72,6 +90,24 @@ pub enum CrackError {
         /// Bytes left.
         left: u64,
     },
+    /// The mesh is broken, so that the engine could not make tangents for it.
+    #[error("its mesh has no tangents, and none can be made: {reason}")]
+    Mesh {
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// A number of [`GuidedCracks`](super::GuidedCracks) is out of its range, or not finite.
+    #[error("`{field}` is {value}, must lie in {min}..={max}")]
+    OutOfRange {
+        /// Name of the field, as in `appearance.seconds`.
+        field: String,
+        /// Its value.
+        value: f32,
+        /// Least value allowed.
+        min: f32,
+        /// Greatest value allowed.
+        max: f32,
+    },
     /// A guide of [`GuidedCracks`](super::GuidedCracks) cannot be read.
     #[error("guide number {index} cannot be used: {reason}")]
     Guide {
@@ -80,7 +116,7 @@ pub enum CrackError {
         /// Why.
         reason: String,
     },
-    /// The bake of [`GuidedCracks`](super::GuidedCracks) failed, most likely by a parameter out of its range.
+    /// The bake of [`GuidedCracks`](super::GuidedCracks) failed.
     #[error("the bake failed: {reason}")]
     Bake {
         /// Which one and why.

@@ -1,16 +1,17 @@
 //! [`GuidedCracks`]: cracks that draw a picture, baked beside the frames.
 
 use super::{
-    CrackSurface,
+    CrackError, CrackSurface,
     bake::{self, Bakes},
 };
 use crate::{
     Grid,
-    voronoi::{SiteLayout, VoronoiParams},
+    voronoi::{SiteLayout, VoronoiError, VoronoiParams},
 };
 use bevy::{
     ecs::{lifecycle::HookContext, world::DeferredWorld},
     prelude::*,
+    reflect::serde::ReflectSerializeWithRegistry,
 };
 use std::sync::Arc;
 
@@ -43,12 +44,11 @@ use std::sync::Arc;
 /// }
 /// ```
 #[derive(Component, Reflect, Clone, Debug, PartialEq)]
-#[reflect(opaque)]
-#[reflect(Component, Clone, Debug, PartialEq)]
+#[reflect(Component, Default, Clone, Debug, PartialEq)]
 #[require(BakeProgress)]
 #[component(on_remove = removed)]
 pub struct GuidedCracks {
-    /// The pictures that the cracks follow; none = cracks of plain mud or pavement.
+    /// The pictures that the cracks follow, at most 64; none = cracks of plain mud or pavement.
     pub guides: Vec<CrackGuide>,
     /// Sites, their layout, levels, noise and widths.
     pub params: VoronoiParams,
@@ -56,7 +56,7 @@ pub struct GuidedCracks {
     pub seed: u64,
     /// How the cracks come when the bake is done.
     pub appearance: GuidedAppearance,
-    /// Longer side of the map, texels, at least 1; default 1024. The map has the surface's own size if that is smaller; its
+    /// Longer side of the map, texels; 0 counts as 1; default 1024. The map has the surface's own size if that is smaller; its
     /// cracks are lines, as sharp as the surface's textures in any case. A map takes some 12 bytes a texel.
     pub max_side: u32,
 }
@@ -84,6 +84,50 @@ impl GuidedCracks {
     }
 }
 
+/// The most guides of a surface: a map takes 2 bytes a texel for each.
+const MAX_GUIDES: usize = 64;
+
+/// A front begins no further from a surface, texture coordinates.
+const FURTHEST: f32 = 64.0;
+
+/// Cracks take no longer to appear, seconds.
+const LONGEST: f32 = 1e6;
+
+impl GuidedCracks {
+    /// Checks every number that is not read from a picture.
+    ///
+    /// # Errors
+    /// [`CrackError::OutOfRange`] for the first that is out of its range or not finite.
+    pub fn validate(&self) -> Result<(), CrackError> {
+        let (from, seconds) = match self.appearance {
+            GuidedAppearance::AtOnce => (Vec2::ZERO, 0.0),
+            GuidedAppearance::Front { from, seconds } => (from, seconds),
+            GuidedAppearance::Widen { seconds } => (Vec2::ZERO, seconds),
+        };
+        for (field, value, min, max) in [
+            ("guides", self.guides.len() as f32, 0.0, MAX_GUIDES as f32),
+            ("appearance.from", from.x, -FURTHEST, FURTHEST),
+            ("appearance.from", from.y, -FURTHEST, FURTHEST),
+            // Not a number and what is below zero mean at once.
+            ("appearance.seconds", seconds.max(0.0), 0.0, LONGEST),
+        ] {
+            if !(min..=max).contains(&value) {
+                return Err(CrackError::OutOfRange { field: field.to_owned(), value, min, max });
+            }
+        }
+        let outcome = self.params.validate_with(self.guides.iter().map(|guide| guide.gamma));
+        outcome.map_err(|error| match error {
+            VoronoiError::OutOfRange { field: "gamma", value, min, max } => {
+                CrackError::OutOfRange { field: "guides.gamma".to_owned(), value, min, max }
+            }
+            VoronoiError::OutOfRange { field, value, min, max } => {
+                CrackError::OutOfRange { field: format!("params.{field}"), value, min, max }
+            }
+            error => CrackError::Bake { reason: error.to_string() },
+        })
+    }
+}
+
 impl Default for GuidedCracks {
     fn default() -> Self {
         Self {
@@ -97,7 +141,8 @@ impl Default for GuidedCracks {
 }
 
 /// One picture that cracks follow.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Reflect, Clone, Debug, PartialEq)]
+#[reflect(Clone, Debug, PartialEq)]
 pub struct CrackGuide {
     /// Where it comes from. It is stretched over the shown part of the surface's picture.
     pub source: GuideSource,
@@ -127,7 +172,8 @@ impl CrackGuide {
 }
 
 /// Where a guide comes from.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Reflect, Clone, Debug, PartialEq)]
+#[reflect(Clone, Debug, PartialEq, SerializeWithRegistry)]
 pub enum GuideSource {
     /// The drawing in an image, see [`ink`](crate::voronoi::ink): at most 8192 texels a side, readable on the CPU. The bake
     /// waits until it is loaded; later changes of it have no effect.
@@ -169,27 +215,30 @@ impl From<Arc<[u8]>> for GuideSource {
 /// is what it shows, and when time stands still, or has come to its end, that is exactly the picture of that time. While cracks move, this
 /// takes some 8 bytes a texel more. Where there are no threads it is done in slices inside the [`CrackBudget`](super::CrackBudget);
 /// with a budget of a second or more, in the frame itself.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Reflect, Clone, Copy, Debug, Default, PartialEq)]
+#[reflect(Clone, Debug, Default, PartialEq)]
 pub enum GuidedAppearance {
     /// All at once.
     #[default]
     AtOnce,
     /// They run outward along their seams.
     Front {
-        /// The point from which, texture coordinates in the surface's picture or sprite frame, 0..=1, v down.
+        /// The point from which, texture coordinates in the surface's picture or sprite frame, 0..=1, v down; from beside it no further
+        /// than -64..=64.
         from: Vec2,
-        /// Until all are there. Not a number, zero or below: at once.
+        /// Until all are there, up to 1e6. Not a number, zero or below: at once.
         seconds: f32,
     },
     /// They open from hair cracks to their widths.
     Widen {
-        /// Until all are open. Not a number, zero or below: at once.
+        /// Until all are open, up to 1e6. Not a number, zero or below: at once.
         seconds: f32,
     },
 }
 
-/// How far the bake of a [`GuidedCracks`] is: 0 while its pictures load, 1 when its cracks are on the surface. Falls only when a new bake
-/// begins, or to 0 when one is cancelled. Written by the crate.
+/// How far the bake of a [`GuidedCracks`] is: 0 while its pictures load, 1 when its cracks are on the surface, and as long as they are,
+/// without the component as well. Falls only when a new bake begins, or to 0 when one is cancelled or the surface is healed. Written by the
+/// crate.
 #[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq)]
 #[reflect(Component, Default)]
 #[component(clone_behavior = Ignore)]
@@ -220,7 +269,8 @@ fn removed(mut world: DeferredWorld, context: HookContext) {
     if let Some(mut bakes) = world.get_resource_mut::<Bakes>() {
         bakes.cancel(context.entity);
     }
-    if let Some(mut progress) = world.get_mut::<BakeProgress>(context.entity) {
+    // The cracks of a bake that is done stay.
+    if let Some(mut progress) = world.get_mut::<BakeProgress>(context.entity).filter(|progress| progress.0 < 1.0) {
         bake::reset(&mut progress);
     }
 }

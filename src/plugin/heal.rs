@@ -45,14 +45,16 @@ pub trait CrackCommandsExt {
 
     /// Closes all cracks within so many seconds: they run back the way they came, whatever a [`CrackClock`](super::CrackClock)
     /// says, and are healed as by [`heal_cracks`](Self::heal_cracks) then. Hits that wait on the surface are refused; one that comes
-    /// while they close makes them grow on from where they are. Not a number, zero or below: at once.
+    /// while they close makes them grow on from where they are. Not a number, zero or below: at once; infinite: they stand still.
     fn close_cracks(&mut self, seconds: f32) -> &mut Self;
 
     /// Knocks shards out of a cracked surface, along the cracks it has. Nothing happens to an entity without cracks; one
     /// that cannot shatter says so with [`ShatterFailed`](super::ShatterFailed). See [`ShatterCracks`](super::ShatterCracks).
     ///
-    /// The shards are those of this frame, and are there two frames later, on every machine: they are made on the
-    /// [`AsyncComputeTaskPool`](bevy::tasks::AsyncComputeTaskPool) meanwhile. Only if they are not ready then, or the surface has been
+    /// The shards are those of this frame, and are there two frames later, and one more for each 500 nodes of cracks, up to 20, on every
+    /// machine (later only where the renderer has not made its pipelines for shards yet; with [`ShatterCracks`](super::ShatterCracks) on the
+    /// surface, it is asked to beforehand): they are made on the [`AsyncComputeTaskPool`](bevy::tasks::AsyncComputeTaskPool) meanwhile. (Two in
+    /// any case where [`CrackBudget::milliseconds`](super::CrackBudget::milliseconds) is a second or more.) Only if they are not ready then, or the surface has been
     /// shattered or mended in between, they are made in that frame. Healing takes the request back.
     fn shatter_cracks(&mut self, request: ShatterRequest) -> &mut Self;
 }

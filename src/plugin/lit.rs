@@ -108,6 +108,11 @@ impl CrackMaterial for CrackLitMaterial {
     fn for_sides(&self, _mean: [f32; 3], _bright: f32) -> Option<Self> {
         None
     }
+
+    /// One for all.
+    fn pipeline_key(&self) -> u64 {
+        0
+    }
 }
 
 impl MaterialSlot for MeshMaterial2d<CrackLitMaterial> {
@@ -123,7 +128,7 @@ impl MaterialSlot for MeshMaterial2d<CrackLitMaterial> {
     }
 }
 
-/// A light that shines on all [`CrackLitMaterial`]s, from where its entity is.
+/// A light that shines on all [`CrackLitMaterial`]s, from where its entity is. One of whose numbers is not finite is dark.
 #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
 #[reflect(Component, Default)]
 #[require(Transform)]
@@ -162,20 +167,30 @@ pub(super) fn add_material(app: &mut App) {
 
 /// Writes the lights into the materials, when a light has changed or a material is new.
 fn shine(
-    lights: Query<(&CrackLight2d, &GlobalTransform)>,
+    lights: Query<(&CrackLight2d, &GlobalTransform, Option<&Name>)>,
     changed: Query<(), (With<CrackLight2d>, Or<(Changed<CrackLight2d>, Changed<GlobalTransform>)>)>,
     mut removed: RemovedComponents<CrackLight2d>,
     mut added: MessageReader<AssetEvent<CrackLitMaterial>>,
     mut materials: ResMut<Assets<CrackLitMaterial>>,
+    mut has_warned: Local<bool>,
 ) {
     let is_new = added.read().filter(|event| matches!(event, AssetEvent::Added { .. })).count() > 0;
     if changed.is_empty() && removed.read().count() == 0 && !is_new {
         return;
     }
     let (mut position, mut color) = ([Vec4::ZERO; MAX_LIGHTS], [Vec4::ZERO; MAX_LIGHTS]);
-    for (i, (light, transform)) in lights.iter().take(MAX_LIGHTS).enumerate() {
-        position[i] = (transform.translation() + Vec3::Z * light.height).extend(light.range.max(0.0));
-        color[i] = light.color.to_linear().to_vec4() * light.intensity;
+    for (i, (light, transform, called)) in lights.iter().take(MAX_LIGHTS).enumerate() {
+        let at = (transform.translation() + Vec3::Z * light.height).extend(light.range.max(0.0));
+        let shine = light.color.to_linear().to_vec4() * light.intensity;
+        if at.is_finite() && shine.is_finite() && light.range.is_finite() {
+            (position[i], color[i]) = (at, shine);
+        } else if !core::mem::replace(&mut *has_warned, true) {
+            let light =
+                called.map_or_else(|| "a `CrackLight2d`".to_owned(), |name| format!("the `CrackLight2d` of {name}"));
+            warn!(
+                "{light} is dark: its colour, intensity, range, height or place is not finite (others will not be told)"
+            );
+        }
     }
     let is_stale = |material: &CrackLitMaterial| material.lit.position != position || material.lit.color != color;
     let stale: Vec<_> = materials.iter().filter(|(_, material)| is_stale(material)).map(|(id, _)| id).collect();

@@ -14,7 +14,9 @@ use crate::{
     pattern::{CrackMask, MaskError},
     raster::TexelRect,
 };
-use bevy::{platform::time::Instant, prelude::*, tasks::AsyncComputeTaskPool};
+use bevy::{
+    platform::time::Instant, prelude::*, reflect::serde::ReflectSerializeWithRegistry, tasks::AsyncComputeTaskPool,
+};
 use std::{
     sync::{Arc, Weak},
     time::Duration,
@@ -22,6 +24,7 @@ use std::{
 
 /// Where cracks like to run, where they do not, and where they never go. See [`CrackMask`].
 #[derive(Reflect, Clone, Debug, Default, PartialEq)]
+#[reflect(Default, SerializeWithRegistry)]
 pub enum CrackMaskSource {
     /// As the preset has it: cracks of brick, and of every preset that [follows lines](CrackPreset::follows_lines), follow the lines of the
     /// surface's own picture, which are read as those of [`FromPicture`](Self::FromPicture); else [`None`](Self::None).
@@ -191,14 +194,15 @@ impl PictureMasks {
     }
 }
 
-/// The texels in `rect` of RGBA rows.
+/// The texels in `rect` of RGBA rows, as far as they are there.
 pub(super) fn part(rgba: &[u8], size: UVec2, rect: TexelRect) -> Vec<u8> {
     if rect == TexelRect::whole(size) {
         return rgba.to_vec();
     }
+    let rect = rect.intersect(TexelRect::whole(size));
     let row = |y: u32| {
         let start = 4 * (y as usize * size.x as usize + rect.min.x as usize);
-        &rgba[start..start + 4 * rect.size().x as usize]
+        rgba.get(start..start + 4 * rect.size().x as usize).unwrap_or_default()
     };
     (rect.min.y..rect.max.y).flat_map(row).copied().collect()
 }

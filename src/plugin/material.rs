@@ -5,11 +5,12 @@ mod split;
 
 use super::{
     CrackError, CrackMaps, CrackTextures, HitPoint, Shard,
-    carrier::{Carrier, Clothes, Found, Kind, Shown},
-    mesh::{aspect_of, closest, is_flat, place_of, wrap},
+    carrier::{Carrier, Clothes, Found, Kind, Shown, typed},
+    mesh::{aspect_of, check_for_tangents, closest, is_flat, place_of, wrap},
     queue::QueuedHit,
     shards::Plane,
     surfaces::Active,
+    warm::{self, Asked, Shape},
 };
 use bevy::{
     asset::{LoadState, UntypedHandle},
@@ -39,6 +40,8 @@ pub(super) trait CrackMaterial: Asset + Clone {
     /// The same for the sides of shards of a picture of this mean colour (sRGB), if they have any; see
     /// [`RimLook::bright`](crate::shatter::RimLook::bright).
     fn for_sides(&self, mean: [f32; 3], bright: f32) -> Option<Self>;
+    /// What the renderer's pipelines for it depend on.
+    fn pipeline_key(&self) -> u64;
 }
 
 /// The component that holds a material.
@@ -55,11 +58,13 @@ pub(super) const fn kind<S: MaterialSlot>() -> Kind {
     Kind {
         inspect: inspect::<S>,
         attach: attach::<S>,
+        looks: looks::<S>,
         detach: detach::<S>,
         aspect: aspect::<S>,
         is_twofold: is_twofold::<S>,
         aim,
         locate: locate::<S>,
+        check_mesh: check_mesh::<S>,
         is_solid: S::Material::MAPS.depth,
         plane: plane::<S>,
         open: open::<S>,
@@ -101,7 +106,7 @@ fn is_mesh_loading(world: &World, entity: Entity) -> bool {
     matches!(state, Some(LoadState::NotLoaded | LoadState::Loading))
 }
 
-fn mesh_of(world: &World, entity: Entity) -> Option<&Handle<Mesh>> {
+pub(super) fn mesh_of(world: &World, entity: Entity) -> Option<&Handle<Mesh>> {
     let mesh_2d = world.get::<Mesh2d>(entity).map(|mesh| &mesh.0);
     mesh_2d.or_else(|| world.get::<Mesh3d>(entity).map(|mesh| &mesh.0))
 }
@@ -113,17 +118,14 @@ fn attach<S: MaterialSlot>(
     textures: &CrackTextures,
     relief: f32,
 ) {
-    let before = carrier.shown.asset.clone().typed::<S::Material>();
+    let Some(before) = typed::<S::Material>(&carrier.shown.asset) else { return };
     let Some(mut materials) = world.get_resource_mut::<Assets<S::Material>>() else { return };
     let Some(mut material) = materials.get(&before).cloned() else { return };
     material.show(textures, relief);
     if carrier.is_twofold {
         material.show_upper_half();
     }
-    let own = match &carrier.own {
-        Some(own) => own.clone().typed::<S::Material>(),
-        None => materials.reserve_handle(),
-    };
+    let own = carrier.own.as_ref().and_then(typed::<S::Material>).unwrap_or_else(|| materials.reserve_handle());
     // A handle that we hold is never refused.
     if materials.insert(&own, material).is_err() {
         return;
@@ -133,11 +135,26 @@ fn attach<S: MaterialSlot>(
         slot.set_material(own);
     }
     #[cfg(feature = "3d")]
-    if S::Material::MAPS.depth && carrier.mesh.is_none() {
+    if S::Material::MAPS.depth && carrier.mesh.is_none() && (textures.normal.is_some() || textures.depth.is_some()) {
         carrier.mesh = give_tangents(world, entity);
     }
     #[cfg(feature = "3d")]
     split::give_faces::<S>(world, entity, carrier);
+}
+
+/// Whether tangents can be made for a mesh that has none.
+fn check_mesh<S: MaterialSlot>(world: &World, entity: Entity) -> Result<(), CrackError> {
+    let meshes = world.get_resource::<Assets<Mesh>>();
+    match meshes.and_then(|meshes| meshes.get(mesh_of(world, entity)?)) {
+        Some(mesh) if S::Material::MAPS.depth && lacks_tangents(mesh) => {
+            check_for_tangents(mesh).map_err(|reason| CrackError::Mesh { reason })
+        }
+        _ => Ok(()),
+    }
+}
+
+fn lacks_tangents(mesh: &Mesh) -> bool {
+    matches!(mesh.try_attribute_option(Mesh::ATTRIBUTE_TANGENT), Ok(None))
 }
 
 /// Normal and depth maps show nothing on a mesh without tangents: such a mesh is replaced by one that has them.
@@ -146,10 +163,13 @@ fn give_tangents(world: &mut World, entity: Entity) -> Option<(Handle<Mesh>, Han
     let before = world.get::<Mesh3d>(entity)?.0.clone();
     let mut meshes = world.get_resource_mut::<Assets<Mesh>>()?;
     let mesh = meshes.get(&before)?;
-    if !matches!(mesh.try_attribute_option(Mesh::ATTRIBUTE_TANGENT), Ok(None)) {
+    if !lacks_tangents(mesh) {
         return None;
     }
-    match mesh.clone().with_generated_tangents() {
+    // It may be another one than when the surface was planned.
+    let made = check_for_tangents(mesh)
+        .and_then(|()| mesh.clone().with_generated_tangents().map_err(|error| error.to_string()));
+    match made {
         Ok(mesh) => {
             let own = meshes.add(mesh);
             world.get_mut::<Mesh3d>(entity)?.0 = own.clone();
@@ -163,11 +183,51 @@ fn give_tangents(world: &mut World, entity: Entity) -> Option<(Handle<Mesh>, Han
     }
 }
 
+fn looks<S: MaterialSlot>(world: &mut World, entity: Entity, asked: &Asked<'_>) -> bool {
+    let Some(materials) = world.get_resource::<Assets<S::Material>>() else { return true };
+    let Some(now) = world.get::<S>(entity).and_then(|slot| materials.get(slot.material())) else { return true };
+    // Any picture will do, and the engine's white one is there.
+    let (white, is_solid) = (Handle::<Image>::default(), S::Material::MAPS.depth);
+    let textures = |maps: &CrackMaps| CrackTextures {
+        diffuse: (maps.diffuse && S::Material::MAPS.diffuse).then(|| white.clone()),
+        normal: (maps.normal && S::Material::MAPS.normal).then(|| white.clone()),
+        depth: (maps.depth && S::Material::MAPS.depth).then(|| white.clone()),
+    };
+    let own = Shape::Own { has_tangents: is_solid };
+    let mut cracked = now.clone();
+    match asked {
+        Asked::Cracked(maps) => {
+            cracked.show(&textures(maps), 0.0);
+            let is_as_before = !is_solid && cracked.pipeline_key() == now.pipeline_key();
+            is_as_before || warm::can_draw::<S>(world, entity, cracked, &own)
+        }
+        Asked::Broken { maps, original, has_rims, inside } => {
+            cracked.show(&textures(maps), 0.0);
+            let read = |material: &UntypedHandle| materials.get(&material.clone().try_typed().ok()?);
+            let sides = match inside {
+                Some(inside) => read(inside).cloned(),
+                None => read(original).and_then(|before| before.for_sides([0.0; 3], 0.0)),
+            };
+            cracked.open();
+            let mut shard = cracked.clone();
+            shard.for_shards(&white, 1.0);
+            let shape = Shape::Shard { has_colors: *has_rims, has_tangents: is_solid };
+            let bare = Shape::Shard { has_colors: false, has_tangents: true };
+            // All of them, that they come at once.
+            let has_surface = warm::can_draw::<S>(world, entity, cracked, &own);
+            let has_shards = warm::can_draw::<S>(world, entity, shard, &shape);
+            let has_sides = !is_solid || sides.is_none_or(|sides| warm::can_draw::<S>(world, entity, sides, &bare));
+            has_surface && has_shards && has_sides
+        }
+    }
+}
+
 fn detach<S: MaterialSlot>(world: &mut World, entity: Entity, carrier: &Carrier) {
     if let Some(mut slot) = world.get_mut::<S>(entity)
         && carrier.is_showing(&slot.material().clone().untyped())
+        && let Some(before) = typed(&carrier.shown.asset)
     {
-        slot.set_material(carrier.shown.asset.clone().typed());
+        slot.set_material(before);
     }
     if let Some((before, own)) = &carrier.mesh
         && let Some(mut mesh) = world.get_mut::<Mesh3d>(entity)
@@ -262,7 +322,7 @@ fn open<S: MaterialSlot>(world: &mut World, entity: Entity, carrier: &Carrier, h
     let (Some(own), Some(mut materials)) = (&carrier.own, world.get_resource_mut::<Assets<S::Material>>()) else {
         return;
     };
-    if let Some(mut material) = materials.get_mut(&own.clone().typed()) {
+    if let Some(mut material) = typed(own).and_then(|own| materials.get_mut(&own)) {
         material.open();
     }
 }
@@ -275,7 +335,7 @@ fn shard_material<S: MaterialSlot>(
     opacity: f32,
 ) -> Option<UntypedHandle> {
     let mut materials = world.get_resource_mut::<Assets<S::Material>>()?;
-    let own = carrier.own.as_ref().unwrap_or(&carrier.shown.asset).clone().typed();
+    let own = typed(carrier.own.as_ref().unwrap_or(&carrier.shown.asset))?;
     let mut material = materials.get(&own)?.clone();
     material.for_shards(picture, opacity);
     Some(materials.add(material).untyped())
@@ -283,7 +343,7 @@ fn shard_material<S: MaterialSlot>(
 
 fn inside<S: MaterialSlot>(world: &mut World, carrier: &Carrier, mean: [f32; 3], bright: f32) -> Option<UntypedHandle> {
     let mut materials = world.get_resource_mut::<Assets<S::Material>>()?;
-    let inside = materials.get(&carrier.shown.asset.clone().typed())?.for_sides(mean, bright)?;
+    let inside = materials.get(&typed(&carrier.shown.asset)?)?.for_sides(mean, bright)?;
     Some(materials.add(inside).untyped())
 }
 
@@ -311,10 +371,11 @@ fn spawn_one<S: MaterialSlot>(world: &mut World, clothes: Clothes) -> Option<Ent
     world.get_entity(clothes.parent).is_ok().then(|| world.spawn(worn::<S>(clothes)).id())
 }
 
-/// All that is seen of a shard.
+/// All that is seen of a shard; nothing of one whose material is of another kind.
 fn worn<S: MaterialSlot>(clothes: Clothes) -> (ChildOf, Transform, Visibility, S::Mesh, S) {
     let Clothes { parent, place, mesh, material } = clothes;
-    (ChildOf(parent), place, Visibility::Inherited, mesh.into(), material.typed().into())
+    let material: Handle<S::Material> = typed(&material).unwrap_or_default();
+    (ChildOf(parent), place, Visibility::Inherited, mesh.into(), material.into())
 }
 
 /// Makes a shard of an entity that was one.
@@ -336,7 +397,9 @@ pub(super) fn dress<S: MaterialSlot>(entity: &mut EntityWorldMut, shard: Option<
 
 /// Gives a shard another material.
 pub(super) fn change<S: MaterialSlot>(entity: &mut EntityWorldMut, material: &UntypedHandle) {
-    entity.insert(S::from(material.clone().typed()));
+    if let Some(material) = typed::<S::Material>(material) {
+        entity.insert(S::from(material));
+    }
 }
 
 /// Takes what makes it a shard from an entity, and the material.
@@ -385,6 +448,14 @@ mod flat {
         fn for_sides(&self, _mean: [f32; 3], _bright: f32) -> Option<Self> {
             None
         }
+
+        fn pipeline_key(&self) -> u64 {
+            match self.alpha_mode {
+                AlphaMode2d::Opaque => 0,
+                AlphaMode2d::Mask(_) => 1,
+                AlphaMode2d::Blend => 2,
+            }
+        }
     }
 
     impl MaterialSlot for MeshMaterial2d<ColorMaterial> {
@@ -405,9 +476,11 @@ mod flat {
 mod standard {
     use super::{Affine2, CrackMaps, CrackMaterial, CrackTextures, Handle, Image, MaterialSlot};
     use bevy::{
-        pbr::ParallaxMappingMethod,
+        pbr::{ParallaxMappingMethod, StandardMaterialKey},
         prelude::{AlphaMode, Color, LinearRgba, Mesh3d, MeshMaterial3d, StandardMaterial, Vec2},
     };
+    use core::hash::{Hash, Hasher};
+    use std::collections::hash_map::DefaultHasher;
 
     impl CrackMaterial for StandardMaterial {
         const MAPS: CrackMaps = CrackMaps { diffuse: true, normal: true, depth: true, emissive: true };
@@ -474,6 +547,14 @@ mod standard {
                 depth_map: None,
                 ..self.clone()
             })
+        }
+
+        fn pipeline_key(&self) -> u64 {
+            let mut hasher = DefaultHasher::new();
+            StandardMaterialKey::from(self).hash(&mut hasher);
+            core::mem::discriminant(&self.alpha_mode).hash(&mut hasher);
+            core::mem::discriminant(&self.opaque_render_method).hash(&mut hasher);
+            hasher.finish()
         }
     }
 

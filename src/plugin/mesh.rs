@@ -3,6 +3,7 @@
 use bevy::{
     math::{Affine2, Mat3A},
     mesh::{Indices, PrimitiveTopology, VertexAttributeValues},
+    platform::collections::HashMap,
     prelude::*,
 };
 
@@ -118,6 +119,64 @@ pub(super) fn place_of(mesh: &Mesh, uv: Vec2) -> Option<(Vec3, Vec3)> {
         }
     }
     best.map(|(_, place)| place)
+}
+
+/// The most triangles that may meet in one vertex of a mesh that tangents are made for: making them takes as long as their square.
+const MOST_AT_VERTEX: u32 = 4096;
+
+/// The most pairs of a triangle with two corners in one place and one without.
+const MOST_PAIRS: usize = 1 << 27;
+
+/// Looks whether the engine can make tangents for a mesh: over what is refused here it would end the app, or take minutes.
+pub(super) fn check_for_tangents(mesh: &Mesh) -> Result<(), String> {
+    let (Ok(triangles), Ok(Some(VertexAttributeValues::Float32x3(normals)))) =
+        (Triangles::of(mesh), mesh.try_attribute_option(Mesh::ATTRIBUTE_NORMAL))
+    else {
+        // The engine says so itself.
+        return Ok(());
+    };
+    let Triangles { positions, uvs, indices } = triangles;
+    let n = positions.len();
+    if normals.len() != n || uvs.len() != n {
+        let (normals, uvs) = (normals.len(), uvs.len());
+        return Err(format!("it has {n} positions, {normals} normals and {uvs} texture coordinates"));
+    }
+    let beyond = match indices {
+        Some(Indices::U16(indices)) => indices.iter().copied().map(usize::from).find(|index| *index >= n),
+        Some(Indices::U32(indices)) => indices.iter().map(|index| *index as usize).find(|index| *index >= n),
+        None => None,
+    };
+    if let Some(index) = beyond {
+        return Err(format!("an index names vertex {index} of {n}"));
+    }
+    let is_finite = |i: &usize| {
+        let numbers = positions[*i].iter().chain(&normals[*i]).chain(&uvs[*i]);
+        numbers.copied().all(f32::is_finite)
+    };
+    if let Some(vertex) = (0..n).find(|i| !is_finite(i)) {
+        return Err(format!("position, normal or texture coordinates of vertex {vertex} are not finite"));
+    }
+    let corners = || (0..triangles.len()).filter_map(|i| triangles.corners(i));
+    let is_flat = |[a, b, c]: [usize; 3]| {
+        positions[a] == positions[b] || positions[b] == positions[c] || positions[c] == positions[a]
+    };
+    let flat = corners().filter(|corners| is_flat(*corners)).count();
+    if flat.saturating_mul(triangles.len() - flat) > MOST_PAIRS {
+        return Err(format!("{flat} of its {} triangles have no area", triangles.len()));
+    }
+    if triangles.len() > MOST_AT_VERTEX as usize {
+        // Vertices that are the same in all that counts are one.
+        let mut met = HashMap::<[u32; 8], u32>::default();
+        for i in corners().flatten() {
+            let ([x, y, z], [a, b, c], [u, v]) = (positions[i], normals[i], uvs[i]);
+            *met.entry([x, y, z, a, b, c, u, v].map(f32::to_bits)).or_default() += 1;
+        }
+        let most = met.into_values().max().unwrap_or(0);
+        if most > MOST_AT_VERTEX {
+            return Err(format!("{most} of its triangles meet in one vertex, more than {MOST_AT_VERTEX}"));
+        }
+    }
+    Ok(())
 }
 
 /// Triangles that are looked at for the proportions of a mesh.

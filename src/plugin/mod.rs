@@ -51,6 +51,7 @@ mod prepare;
 mod preset;
 mod queue;
 mod read;
+mod reflect;
 mod shards;
 mod space;
 #[cfg(feature = "2d")]
@@ -60,6 +61,8 @@ mod surface;
 mod surfaces;
 mod textures;
 mod upload;
+#[cfg_attr(not(any(feature = "2d", feature = "3d")), expect(dead_code, reason = "there are no kinds then"))]
+mod warm;
 mod watch;
 
 pub use budget::{CrackBudget, CrackStats};
@@ -142,6 +145,7 @@ impl Plugin for CrackPlugin {
             .register_type::<CrackClock>()
             .register_type::<CrackState>()
             .register_type::<GuidedCracks>()
+            .register_type::<GuidedAppearance>()
             .register_type::<BakeProgress>()
             .register_type::<CrackBaked>()
             .register_type::<CrackTextures>()
@@ -150,6 +154,8 @@ impl Plugin for CrackPlugin {
             .register_type::<CrackFailed>()
             .register_type::<CellClosed>()
             .register_type::<ShatterCracks>()
+            .register_type::<Shard>()
+            .register_type::<CrackShards>()
             .register_type::<Shattered>()
             .register_type::<Reassembled>()
             .register_type::<CrackBudget>()
@@ -168,6 +174,7 @@ impl Plugin for CrackPlugin {
             .init_resource::<surfaces::Surfaces>()
             .init_resource::<bake::Bakes>()
             .init_resource::<prepare::Preparations>()
+            .init_resource::<warm::Warmth>()
             .add_message::<CrackHit>()
             .add_observer(hit::receive_hit)
             .configure_sets(
@@ -178,6 +185,11 @@ impl Plugin for CrackPlugin {
             .add_systems(
                 PostUpdate,
                 (
+                    (warm::note_fresh, warm::watch_views, warm::warm_up)
+                        .chain()
+                        .run_if(warm::is_connected)
+                        .in_set(Shatter)
+                        .before(shards::fly_shards),
                     (
                         shards::fly_shards,
                         shards::shatter_when_due,
@@ -196,7 +208,7 @@ impl Plugin for CrackPlugin {
                         watch::update_changed.run_if(watch::any_changed),
                         hit::collect_hits,
                         prepare::prepare_surfaces.run_if(prepare::any_preparing),
-                        activate::apply_hits.run_if(queue::any_queued),
+                        activate::apply_hits.run_if(activate::any_hits),
                     )
                         .chain()
                         .in_set(Hit),
@@ -232,6 +244,7 @@ impl Plugin for CrackPlugin {
         app.insert_resource(picture::NearestByDefault::of(app));
         preset::add_assets(app);
         upload::connect(app);
+        warm::connect(app);
         #[cfg(feature = "2d")]
         lit::add_material(app);
     }

@@ -224,6 +224,7 @@ impl Canvas {
         let origin = view.rect.min;
         let shown = TexelRect::whole(view.rect.size());
         rects.iter_mut().for_each(|rect| *rect = rect.intersect(shown));
+        rects.retain(|rect| !rect.is_empty());
         let texels = self.0.each_mut().map(Option::as_deref_mut);
         textures::paint(&active.base, &active.field, &active.look, rects, origin, texels);
         for rect in rects.drain(..) {

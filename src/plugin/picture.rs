@@ -201,7 +201,7 @@ pub(super) fn readable_size(image: &Image) -> Result<UVec2, CrackError> {
     }
     let data = image.data.as_ref().ok_or(CrackError::NoCpuData)?;
     let texel = u64::from(format.block_copy_size(None).ok_or_else(unsupported)?);
-    let expected = u64::from(size.x) * u64::from(size.y) * texel;
+    let expected = (u64::from(size.x) * u64::from(size.y)).saturating_mul(texel);
     let actual = data.len() as u64;
     let has_mips = image.texture_descriptor.mip_level_count > 1;
     if actual < expected || (actual > expected && !has_mips) {
@@ -388,12 +388,8 @@ mod tests {
     fn a_base_picture_in_use_is_read_once() {
         let mut bases = BasePictures::default();
         let id = AssetId::from(bevy::asset::uuid::Uuid::from_u128(7));
-        let key = |side| BaseKey {
-            pictures: [None, Some(id), None],
-            size: UVec2::splat(side),
-            layout: None,
-            is_twofold: false,
-        };
+        let pictures = [None, Some(id), None];
+        let key = |side| BaseKey { pictures, size: UVec2::splat(side), layout: None, is_twofold: false };
         let white = |side: u32| BasePicture::new(UVec2::splat(side), vec![255; 4 * (side * side) as usize], None, None);
         let unread = || -> Result<BasePicture, CrackError> { panic!("it is in use") };
         assert_eq!(bases.get(key(1), || Err(CrackError::NoCpuData)), Err(CrackError::NoCpuData));

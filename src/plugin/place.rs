@@ -1,5 +1,7 @@
 //! [`CrackPlaces`]: from points of a crack to points of the world.
 
+#[cfg(feature = "2d")]
+use super::sprite;
 use super::{mesh::place_of, space};
 #[cfg(feature = "2d")]
 use bevy::sprite::Anchor;
@@ -66,7 +68,7 @@ impl CrackPlaces<'_, '_> {
     fn local(&self, entity: Entity, uv: Vec2) -> Option<(Vec3, Vec3)> {
         #[cfg(feature = "2d")]
         if let Ok((sprite, anchor)) = self.sprites.get(entity) {
-            let size = self.size(sprite)?;
+            let (size, uv) = (self.size(sprite)?, self.uv_in_sprite(sprite, uv));
             let flip = Vec2::new(if sprite.flip_x { -1.0 } else { 1.0 }, if sprite.flip_y { 1.0 } else { -1.0 });
             let anchor = anchor.map_or(Vec2::ZERO, Anchor::as_vec);
             return Some(((((uv - 0.5) * flip - anchor) * size).extend(0.0), Vec3::Z));
@@ -77,6 +79,17 @@ impl CrackPlaces<'_, '_> {
         #[cfg(feature = "3d")]
         let mesh = mesh.or_else(|| self.solid.get(entity).ok().map(|mesh| &mesh.0));
         place_of(self.meshes.as_ref()?.get(mesh?)?, uv)
+    }
+
+    /// From the texels that a sprite shows of its picture to all that it is to show: what the picture's edge cuts off is missing.
+    #[cfg(feature = "2d")]
+    fn uv_in_sprite(&self, sprite: &Sprite, uv: Vec2) -> Vec2 {
+        let part = sprite::part(sprite, self.layouts.as_deref());
+        let image = self.images.as_ref().and_then(|images| images.get(&sprite.image));
+        let (Some(part), Some(image)) = (part, image) else { return uv };
+        let URect { min, max } = sprite::texels(part).intersect(URect { min: UVec2::ZERO, max: image.size() });
+        let seen = Rect { min: min.as_vec2(), max: max.as_vec2() };
+        if seen == part { uv } else { (seen.min + uv * seen.size() - part.min) / part.size() }
     }
 
     /// Size of a sprite in its own space.

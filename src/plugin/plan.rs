@@ -75,6 +75,12 @@ impl Plan {
         }))
     }
 
+    /// Looks whether the mesh can show its textures.
+    pub(super) fn check_mesh(&self, world: &World, entity: Entity) -> Result<(), CrackError> {
+        let has_normals = self.pictures.maps.normal || self.pictures.maps.depth;
+        if has_normals { (self.kind.check_mesh)(world, entity) } else { Ok(()) }
+    }
+
     /// Where its mask comes from.
     pub(super) fn mask(&self) -> MaskFrom<'_> {
         self.surface.mask.with(&self.preset)
@@ -355,24 +361,30 @@ fn plan_pictures(
     let is_nearest = image.is_some_and(|image| picture::is_nearest(world, image));
     let (size, unstretched) = size(world, surface, shown, image, stretch, is_nearest, (maps, layer), owned)?;
     let is_twofold = stretch.is_twofold && shown.rect.is_none();
-    let whole = TexelRect::whole(size);
+    let rect = shown.texels(size).ok_or_else(|| {
+        let URect { min, max } = shown.rect.unwrap_or_default();
+        CrackError::Part { min, max, size }
+    })?;
     let size = if is_twofold { size * UVec2::new(1, 2) } else { size };
-    let rect = shown.rect.map_or(whole, |rect| TexelRect { min: rect.min, max: rect.max }.intersect(whole));
     let sampler = image.map_or(ImageSampler::Default, |image| image.sampler.clone());
     let (bytes, layout) = (bytes(size, (maps, layer)), shown.layout.clone());
     Ok(Some(PicturePlan { size, rect, bytes, sampler, maps, unstretched, layout, is_nearest, is_twofold }))
 }
 
-/// Reads the pictures of a cracked surface anew; `None` if they are not there yet. `owned` as in [`plan_pictures`].
+/// Reads the pictures of a cracked surface anew; `None` if they are not there yet. `other` is how to deal with them if they are not those
+/// that it was made from.
 pub(super) fn draft(
     world: &mut World,
     entity: Entity,
     active: &Active,
+    other: Option<&Kind>,
     shown: &Shown,
 ) -> Result<Option<Draft>, CrackError> {
-    let aspect = |picture| (active.carrier.kind.aspect)(world, entity, picture, active.carrier.size);
-    let kept = active.unstretched.map(|unstretched| (unstretched, active.carrier.whole(active.base.size).size()));
-    let stretch = Stretch { aspect: &aspect, kept, is_twofold: (active.carrier.kind.is_twofold)(world, entity) };
+    let kind = other.unwrap_or(active.carrier.kind);
+    let aspect = |picture| (kind.aspect)(world, entity, picture, active.carrier.size);
+    let same = active.unstretched.filter(|_| other.is_none());
+    let kept = same.map(|unstretched| (unstretched, active.carrier.whole(active.base.size).size()));
+    let stretch = Stretch { aspect: &aspect, kept, is_twofold: (kind.is_twofold)(world, entity) };
     let layer = active.preset.look.layer(0).bytes_per_texel();
     let plan = plan_pictures(world, &active.surface, shown, &stretch, layer, active.bytes)?;
     plan.map(|plan| plan.draft(world, shown)).transpose()

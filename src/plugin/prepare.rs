@@ -12,6 +12,7 @@ use super::{
     surfaces::{Active, Surfaces},
     textures::{self, Picture},
     upload::{Stager, Uploads},
+    warm,
 };
 use crate::{CrackPreset, raster::TexelRect};
 use bevy::{ecs::entity::EntityHashMap, platform::time::Instant, prelude::*, render::renderer::RenderDevice};
@@ -186,6 +187,10 @@ fn ready(world: &mut World, entity: Entity, is_wanted: bool) -> Result<bool, Cra
     if preparations.is_making(entity) {
         return Ok(false);
     }
+    if !warm::can_crack(world, entity) {
+        return Ok(false);
+    }
+    let preparations = world.resource::<Preparations>();
     // One of many comes when it is its turn: the others take some time of the frames already.
     let (is_late, is_one_of_many) = (preparations.has_changed_often(entity), preparations.has_small());
     let Some(plan) = Plan::new(world, entity)? else { return Ok(false) };
@@ -205,7 +210,7 @@ pub(super) fn make_beside(world: &mut World, entity: Entity) -> Result<bool, Cra
     let preparations = world.resource::<Preparations>();
     let is_known = preparations.is_making(entity) || preparations.has_changed_often(entity);
     let Some(threads) = threads(world).filter(|_| !is_known) else { return Ok(false) };
-    if world.resource::<Surfaces>().active.contains_key(&entity) {
+    if world.resource::<Surfaces>().active.contains_key(&entity) || !warm::can_crack(world, entity) {
         return Ok(false);
     }
     match Plan::new(world, entity)? {
@@ -246,6 +251,7 @@ fn begin(world: &mut World, entity: Entity, mut plan: Plan, is_wanted: bool, thr
     }
     let mut copies = Copies::default();
     let Some(raw) = plan.raw(world, &mut copies)? else { return Ok(false) };
+    plan.check_mesh(world, entity)?;
     let images = world.get_resource::<Assets<Image>>().ok_or(CrackError::NoImages)?;
     let Some(reading) = Reading::new(copies.0, images, true) else { return Ok(false) };
     plan.make_room(world)?;

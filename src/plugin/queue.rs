@@ -85,6 +85,11 @@ impl HitQueue {
         }
     }
 
+    /// Whether any hit waits.
+    pub(super) fn has_any(&self) -> bool {
+        !self.hits.is_empty()
+    }
+
     /// The hit of a surface that waits the longest.
     pub(super) fn first(&self, entity: Entity) -> Option<&QueuedHit> {
         self.hits.get(&entity)?.front()
@@ -133,11 +138,6 @@ impl HitQueue {
     pub(super) fn unpark(&mut self) {
         self.turns.extend(self.parked.drain(..));
     }
-}
-
-/// Whether any hit waits.
-pub(super) fn any_queued(queue: Res<HitQueue>) -> bool {
-    !queue.hits.is_empty()
 }
 
 /// Distance in whatever space both points are; infinite between different ones.

@@ -19,12 +19,13 @@ mod release;
 
 pub(super) use body::Spares;
 pub(super) use broken::{Broken, Struck, drop_shards};
+pub(super) use drawn::rim_for;
 pub(super) use fly::fly_shards;
 pub(super) use plane::Plane;
 pub(super) use release::{Request, any_requests, shatter_surfaces, shatter_when_due};
 
 use crate::shatter::{Anchor, BreakAgain, BurstParams, ConvexPiece, RimLook, Shards, ShatterError, ShatterParams};
-use bevy::prelude::*;
+use bevy::{prelude::*, reflect::serde::ReflectSerializeWithRegistry};
 use std::sync::Arc;
 
 /// How a surface shatters, and when by itself. Without it, [`shatter_cracks`](super::CrackCommandsExt::shatter_cracks) goes by the
@@ -55,12 +56,12 @@ use std::sync::Arc;
 /// }
 /// ```
 #[derive(Component, Reflect, Clone, Debug, PartialEq)]
-#[reflect(Component, Default)]
+#[reflect(Component, Default, SerializeWithRegistry)]
 pub struct ShatterCracks {
     /// When shards fall by themselves.
     pub when: ShatterWhen,
     /// How far around the hit shards are knocked out when they fall by themselves, pattern units, 0..=64 (the surface's shorter side is
-    /// 1). Default: 64, everywhere.
+    /// 1); infinite as in [`ShatterRequest::EVERYTHING`]. Default: 64, everywhere.
     pub reach: f32,
     /// How lines become shards.
     pub cut: ShatterParams,
@@ -74,7 +75,7 @@ pub struct ShatterCracks {
     /// physics engine: see [`Shard`]. Counts when a surface shatters.
     pub fly: bool,
     /// Seconds of the shards for each second of the app's [`Time`]; default 1. 0 = they stand still; below zero time runs backwards,
-    /// each shard returns to its place and is part of the surface again. Not a number = 0.
+    /// each shard returns to its place and is part of the surface again. Not finite = 0.
     pub speed: f32,
     /// Where the shards' time is to jump to, seconds since the surface broke; `None` again when it has. Below zero and not a number
     /// = 0.
@@ -138,7 +139,8 @@ pub enum ShatterWhen {
     /// Only on [`shatter_cracks`](super::CrackCommandsExt::shatter_cracks).
     #[default]
     Never,
-    /// When the cracks of a hit have come to their end and [`CrackState::damage`](super::CrackState::damage) is at least this.
+    /// When the cracks of a hit have come to their end and [`CrackState::damage`](super::CrackState::damage) is at least this. Not a
+    /// number = never.
     AtDamage(f32),
     /// Each cell when cracks have closed it, unless it touches what is anchored.
     CellsAsTheyClose,
@@ -147,26 +149,24 @@ pub enum ShatterWhen {
 /// What [`shatter_cracks`](super::CrackCommandsExt::shatter_cracks) is to knock out of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShatterRequest {
-    /// Where the blow lands, texture coordinates of the surface's picture or sprite frame, 0..=1, v down; `None` = where it was hit
-    /// last.
+    /// Where the blow lands, texture coordinates of the surface's picture or sprite frame, 0..=1, v down; from beside it no further than
+    /// -64..=64. `None` = where it was hit last.
     pub uv: Option<Vec2>,
-    /// How far around it shards are knocked out, pattern units, 0..=64.
+    /// How far around it shards are knocked out, pattern units, 0..=64; infinite as in [`EVERYTHING`](Self::EVERYTHING).
     pub reach: f32,
     /// How hard, 0..=1000; `None` = as the last hit.
     pub energy: Option<f32>,
-    /// Direction of the blow in the world; zero = straight on; `None` = as the last hit.
+    /// Direction of the blow in the world, of any length; zero = straight on; `None` = as the last hit.
     pub direction: Option<Vec3>,
-    /// Whether what is held goes as well, and cracks that end inside a piece are carried on to the next crack or the border, so that the
-    /// parts without cracks go in pieces. Else [`ShatterCracks::anchor`] and [`ShatterParams::carry_on`] hold. Default: `false`.
-    pub everything: bool,
 }
 
 impl ShatterRequest {
     /// All pieces that the cracks have cut out and nothing holds, as a burst from the last hit.
-    pub const ALL: Self = Self { uv: None, reach: 64.0, energy: None, direction: None, everything: false };
+    pub const ALL: Self = Self { uv: None, reach: 64.0, energy: None, direction: None };
 
-    /// The whole surface, as a burst from the last hit: nothing of it stays, whatever holds it and however few cracks it has.
-    pub const EVERYTHING: Self = Self { everything: true, ..Self::ALL };
+    /// The whole surface, as a burst from the last hit: nothing of it stays, whatever [`ShatterCracks::anchor`] says, and cracks that
+    /// end inside a piece are carried on to the next crack or the border, so that the parts without cracks go in pieces.
+    pub const EVERYTHING: Self = Self { reach: f32::INFINITY, ..Self::ALL };
 
     /// What lies within `reach` (pattern units) of `uv` (0..=1, v down), and what nothing holds then.
     #[must_use]
@@ -179,6 +179,31 @@ impl ShatterRequest {
     pub const fn with_energy(mut self, energy: f32) -> Self {
         self.energy = Some(energy);
         self
+    }
+
+    /// `Ok` if every field lies in its range.
+    ///
+    /// # Errors
+    /// [`ShatterError::OutOfRange`] for the first that does not.
+    pub fn validate(&self) -> Result<(), ShatterError> {
+        let uv = self.uv.unwrap_or_default();
+        // Infinitely far means everything.
+        let reach = if self.reach == f32::INFINITY { 64.0 } else { self.reach };
+        let most = f64::from(f32::MAX);
+        let direction = self.direction.unwrap_or_default().to_array().map(|value| ("direction", value, -most, most));
+        let others = [
+            ("uv", uv.x, -64.0, 64.0),
+            ("uv", uv.y, -64.0, 64.0),
+            ("reach", reach, 0.0, 64.0),
+            ("energy", self.energy.unwrap_or_default(), 0.0, 1000.0),
+        ];
+        for (name, value, min, max) in others.into_iter().chain(direction) {
+            let value = f64::from(value);
+            if !(min..=max).contains(&value) {
+                return Err(ShatterError::OutOfRange { name, value, min, max });
+            }
+        }
+        Ok(())
     }
 }
 
@@ -195,12 +220,14 @@ impl Default for ShatterRequest {
 /// was made for it.
 ///
 /// With [`ShatterCracks::fly`] off, this is what a physics engine needs: colliders, mass and the velocity of the blow.
-#[derive(Component, Clone, Debug)]
+#[derive(Component, Reflect, Clone, Debug)]
+#[reflect(Component, Clone, Debug)]
 #[component(clone_behavior = Ignore)]
 pub struct Shard {
     /// The surface that it is a piece of.
     pub surface: Entity,
     /// The pieces that it was cut with.
+    #[reflect(ignore)]
     pub pieces: Arc<Shards>,
     /// Its number among them.
     pub number: u32,
@@ -211,6 +238,7 @@ pub struct Shard {
     /// Units of the surface's own space to a pattern unit, along x and y of the shard; below zero where the picture is mirrored.
     pub scale: Vec2,
     /// Which of the released pieces of its surface it is, and for how many times that is shown.
+    #[reflect(ignore)]
     pub(super) piece: [u32; 2],
 }
 
@@ -233,10 +261,12 @@ impl Shard {
 }
 
 /// What has become of a surface that has shattered. Written by the crate, gone when it is whole again.
-#[derive(Component, Clone, Debug)]
+#[derive(Component, Reflect, Clone, Debug)]
+#[reflect(Component, Clone, Debug)]
 #[component(clone_behavior = Ignore)]
 pub struct CrackShards {
     /// The pieces into which the surface was cut last.
+    #[reflect(ignore)]
     pub pieces: Arc<Shards>,
     /// Number of pieces that are out of their places, shown or not.
     pub gone: u32,

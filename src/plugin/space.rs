@@ -16,9 +16,28 @@ pub(super) fn to_local(transform: &GlobalTransform) -> Option<Affine3A> {
     (!is_flat && inverse.is_finite()).then_some(inverse)
 }
 
+/// A vector of the same direction whose length can be reckoned with; zero if it has none.
+pub(super) fn direction(of: Vec3) -> Vec3 {
+    let length_sq = of.length_squared();
+    if length_sq.is_normal() { of } else { (of / of.abs().max_element()).try_normalize().unwrap_or(Vec3::ZERO) }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn directions_may_be_of_any_length() {
+        let way = Vec3::new(1.0, -2.0, 2.0) / 3.0;
+        for length in [1e-40, 1e-30, 1e-3, 1.0, 1e10, 1e30, 1e38] {
+            let found = direction(way * length).normalize();
+            assert!(found.distance(way) < 1e-3, "{length}: {found}");
+        }
+        assert_eq!(direction(way), way, "as it is");
+        for bad in [0.0, f32::NAN, f32::INFINITY] {
+            assert_eq!(direction(Vec3::new(bad, 0.0, bad)), Vec3::ZERO, "{bad}");
+        }
+    }
 
     #[test]
     fn what_is_flat_along_z_alone_can_be_hit() {

@@ -2,11 +2,12 @@
 
 use super::{
     CrackError, CrackMaps, CrackTextures,
-    carrier::{Carrier, Found, Kind, Shown},
+    carrier::{Carrier, Found, Kind, Shown, typed},
     layout::Layout,
     material,
     shards::Plane,
-    surfaces::Active,
+    surfaces::{Active, Surfaces},
+    warm::{self, Asked, Shape},
 };
 use bevy::{
     asset::UntypedHandle,
@@ -19,11 +20,13 @@ use std::sync::Arc;
 pub(super) const KIND: Kind = Kind {
     inspect,
     attach,
+    looks,
     detach,
     aspect,
     is_twofold: |_, _| false,
     aim: |_, _, hit, _| hit.at,
     locate,
+    check_mesh: |_, _| Ok(()),
     is_solid: false,
     plane,
     open: |_, _, _, _| {},
@@ -49,17 +52,12 @@ fn inspect(world: &World, entity: Entity) -> Found {
         return Found::Unusable(CrackError::SpriteMode { mode: mode.to_owned() });
     }
     let layouts = world.get_resource::<Assets<TextureAtlasLayout>>();
-    let frame = match &sprite.texture_atlas {
-        Some(atlas) => {
-            let Some(layout) = layouts.and_then(|layouts| layouts.get(&atlas.layout)) else { return Found::Waiting };
-            layout.textures.get(atlas.index).map(|rect| rect.as_rect())
-        }
-        None => None,
-    };
-    let rect = match (frame, sprite.rect) {
-        (Some(frame), Some(rect)) => Some(Rect { min: rect.min + frame.min, max: rect.max + frame.min }),
-        (frame, rect) => frame.or(rect),
-    };
+    if let Some(atlas) = &sprite.texture_atlas
+        && !layouts.is_some_and(|layouts| layouts.contains(&atlas.layout))
+    {
+        return Found::Waiting;
+    }
+    let rect = part(sprite, layouts);
     // A sprite of one colour shows Bevy's white picture of one texel.
     let is_blank = sprite.image == Handle::default() && rect.is_none();
     Found::Shown(Box::new(Shown {
@@ -67,12 +65,30 @@ fn inspect(world: &World, entity: Entity) -> Found {
         diffuse: (!is_blank).then(|| sprite.image.clone()),
         normal: None,
         depth: None,
-        // Texels that a border between two pixels cuts belong to the frame.
-        rect: rect.map(|rect| URect { min: rect.min.floor().as_uvec2(), max: rect.max.ceil().as_uvec2() }),
+        rect: rect.map(texels),
         layout: layout(&sprite.image_mode, sprite.custom_size).map(Arc::new),
         size: sprite.custom_size,
         maps: CrackMaps { diffuse: true, normal: true, depth: false, emissive: false },
     }))
+}
+
+/// The part of its picture that a sprite is to show, as somebody has written it; `None` = all of it.
+pub(super) fn part(sprite: &Sprite, layouts: Option<&Assets<TextureAtlasLayout>>) -> Option<Rect> {
+    let frame = sprite.texture_atlas.as_ref().and_then(|atlas| {
+        let layout = layouts?.get(&atlas.layout)?;
+        layout.textures.get(atlas.index).map(URect::as_rect)
+    });
+    match (frame, sprite.rect) {
+        (Some(frame), Some(rect)) => Some(Rect { min: rect.min + frame.min, max: rect.max + frame.min }),
+        (frame, rect) => frame.or(rect),
+    }
+}
+
+/// The texels of a part of a picture; one that ends before it begins, or is not a number, has none. Texels that a border between two
+/// pixels cuts belong to it.
+pub(super) fn texels(part: Rect) -> URect {
+    let (min, max) = (part.min.floor().as_uvec2(), part.max.ceil().as_uvec2());
+    URect { min, max: max.max(min) }
 }
 
 /// The whole picture, stretched: as [`SpriteImageMode::Auto`], and the engine forgets the parts that it has drawn before.
@@ -113,7 +129,7 @@ fn attach(world: &mut World, entity: Entity, carrier: &mut Carrier, textures: &C
     carrier.own = Some(own.clone().untyped());
     let images = world.get_resource::<Assets<Image>>();
     let size = |handle: &Handle<Image>| images.and_then(|images| images.get(handle)).map(Image::size_f32);
-    let (before, now) = (size(&carrier.shown.asset.clone().typed()), size(own));
+    let (before, now) = (typed(&carrier.shown.asset).and_then(|before| size(&before)), size(own));
     let Some(mut sprite) = world.get_mut::<Sprite>(entity) else { return };
     sprite.image = own.clone();
     if carrier.shown.layout.is_some() {
@@ -131,10 +147,20 @@ fn attach(world: &mut World, entity: Entity, carrier: &mut Carrier, textures: &C
     }
 }
 
+/// With cracks it is a sprite as before.
+fn looks(world: &mut World, entity: Entity, asked: &Asked<'_>) -> bool {
+    let Asked::Broken { has_rims, .. } = asked else { return true };
+    let material = ColorMaterial { texture: Some(Handle::default()), ..ColorMaterial::default() };
+    let shape = Shape::Shard { has_colors: *has_rims, has_tangents: false };
+    warm::can_draw::<MeshMaterial2d<ColorMaterial>>(world, entity, material, &shape)
+}
+
 fn detach(world: &mut World, entity: Entity, carrier: &Carrier) {
     let Some(mut sprite) = world.get_mut::<Sprite>(entity) else { return };
-    if carrier.is_showing(&sprite.image.clone().untyped()) {
-        sprite.image = carrier.shown.asset.clone().typed();
+    if carrier.is_showing(&sprite.image.clone().untyped())
+        && let Some(before) = typed(&carrier.shown.asset)
+    {
+        sprite.image = before;
     }
     if let Some(mode) = carrier.mode.as_ref().filter(|_| sprite.image_mode == WHOLE) {
         sprite.image_mode = mode.clone();
@@ -142,8 +168,8 @@ fn detach(world: &mut World, entity: Entity, carrier: &Carrier) {
     give_size_back(&mut sprite, carrier.size);
 }
 
-/// Takes the size that was given to a sprite from it, unless somebody has changed it since.
-fn give_size_back(sprite: &mut Sprite, given: Option<Vec2>) {
+/// Takes the size that was given to a sprite from it, unless somebody has changed it since. If so it does not count as changed.
+fn give_size_back(sprite: &mut Mut<Sprite>, given: Option<Vec2>) {
     if given.is_some() && sprite.custom_size == given {
         sprite.custom_size = None;
     }
@@ -166,23 +192,30 @@ fn locate(world: &World, entity: Entity, local: Vec3) -> Result<Vec2, &'static s
         .compute_pixel_space_point(local.truncate(), anchor, images, layouts)
         .map_err(|_| "the point lies off the sprite")?;
     let Found::Shown(shown) = inspect(world, entity) else { return Err("the sprite cannot be read") };
-    let rect = match shown.rect {
-        Some(rect) => rect.as_rect(),
-        None => Rect { min: Vec2::ZERO, max: images.get(&sprite.image).ok_or("the picture is gone")?.size_f32() },
-    };
-    Ok((texel - rect.min) / rect.size())
+    let size = images.get(&sprite.image).ok_or("the picture is gone")?.size();
+    let seen = shown.texels(size).ok_or("the sprite shows nothing of its picture")?;
+    // Of frames that are not all of one size, the first one that was hit says how large the surface is.
+    let active = world.get_resource::<Surfaces>().and_then(|surfaces| surfaces.active.get(&entity));
+    let size = active.filter(|_| shown.rect.is_some()).map_or(seen.size(), |active| active.field.frame.size());
+    Ok((texel - seen.min.as_vec2()) / size.as_vec2())
 }
 
 fn plane(world: &World, entity: Entity, active: &Active) -> Result<Plane, &'static str> {
     let sprite = world.get::<Sprite>(entity).ok_or("the sprite is gone")?;
-    let texels = active.views.get(active.view).ok_or("it shows nothing")?.rect.size();
-    let size = sprite.custom_size.unwrap_or(texels.as_vec2());
-    if !(size.is_finite() && size.min_element() > 0.0) {
+    let seen = active.views.get(active.view).ok_or("it shows nothing")?.rect;
+    let seen = Rect { min: seen.min.as_vec2(), max: seen.max.as_vec2() };
+    let part = part(sprite, world.get_resource::<Assets<TextureAtlasLayout>>()).unwrap_or(seen);
+    let size = sprite.custom_size.unwrap_or(part.size());
+    let has_area = |size: Vec2| size.is_finite() && size.min_element() > 0.0;
+    if !(has_area(size) && has_area(part.size())) {
         return Err("the sprite has no size");
     }
     let anchor = world.get::<Anchor>(entity).copied().unwrap_or_default();
     let flip = BVec2::new(sprite.flip_x, sprite.flip_y);
-    let middle = (-anchor.as_vec() * size).extend(0.0);
+    // What the picture's edge cuts off is no part of the surface.
+    let (shift, share) = ((seen.center() - part.center()) / part.size(), seen.size() / part.size());
+    let aside = Vec2::select(flip, -shift, shift) * Vec2::new(1.0, -1.0);
+    let (middle, size) = (((aside - anchor.as_vec()) * size).extend(0.0), size * share);
     Ok(Plane { middle, rotation: Quat::IDENTITY, size: Vec2::select(flip, -size, size), thickness: None })
 }
 

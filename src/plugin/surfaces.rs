@@ -53,6 +53,8 @@ pub(super) struct Active {
     pub(super) base: Arc<BasePicture>,
     pub(super) textures: CrackTextures,
     pub(super) carrier: Carrier,
+    /// Pictures that somebody gave it, until they are accepted.
+    pub(super) offered: Vec<AssetId<Image>>,
     /// Bytes counted against the budget.
     pub(super) bytes: u64,
     pub(super) views: Vec<View>,
@@ -137,6 +139,7 @@ impl Active {
             textures,
             base,
             carrier,
+            offered: Vec::new(),
             bytes,
             views: Vec::new(),
             view: 0,
@@ -279,6 +282,8 @@ pub(super) struct Surfaces {
     pub(super) growing: VecDeque<Entity>,
     /// Surfaces that will grow when others have ended.
     pub(super) held: VecDeque<Entity>,
+    /// Surfaces whose last hit has markers to lay out, in order; and some that are done.
+    pub(super) laying_out: VecDeque<Entity>,
     /// Surfaces to paint, each once, in turns.
     pub(super) dirty: VecDeque<Entity>,
     /// Surfaces whose times are made beside the frames.
@@ -369,7 +374,7 @@ impl Surfaces {
     /// Notes which assets the surface owns and which it was made from.
     pub(super) fn own(&mut self, entity: Entity, active: &Active) {
         self.owners.extend(active.owned().map(|id| (id, entity)));
-        for source in active.carrier.sources() {
+        for source in active.sources() {
             let users = self.sources.entry(source).or_default();
             if !users.contains(&entity) {
                 users.push(entity);
@@ -382,7 +387,7 @@ impl Surfaces {
         for id in active.owned() {
             self.owners.remove(&id);
         }
-        for source in active.carrier.sources() {
+        for source in active.sources() {
             if let Some(users) = self.sources.get_mut(&source) {
                 users.retain(|e| *e != entity);
                 if users.is_empty() {
@@ -394,6 +399,11 @@ impl Surfaces {
 }
 
 impl Active {
+    /// Ids of the pictures it was made from, and of those that it is to be made from.
+    fn sources(&self) -> impl Iterator<Item = AssetId<Image>> + '_ {
+        self.carrier.sources().chain(self.offered.iter().copied())
+    }
+
     fn owned(&self) -> impl Iterator<Item = UntypedAssetId> + '_ {
         self.textures.handles().map(|handle| handle.id().untyped()).chain(self.carrier.owned())
     }

@@ -22,10 +22,13 @@ use bevy::{
 #[component(clone_behavior = Ignore)]
 pub struct CrackTextures {
     /// The picture with its cracks, `Rgba8UnormSrgb`.
+    #[reflect(skip_serializing)]
     pub diffuse: Option<Handle<Image>>,
     /// Tangent-space normals, +Y up, `Rgba8Unorm`.
+    #[reflect(skip_serializing)]
     pub normal: Option<Handle<Image>>,
     /// Depth, `R8Unorm`, white = deep.
+    #[reflect(skip_serializing)]
     pub depth: Option<Handle<Image>>,
     /// The light that cracks give off, `Rgba8UnormSrgb`, black where there is none.
     pub emissive: Option<Handle<Image>>,

@@ -4,7 +4,7 @@ use super::{
     CrackError, CrackState, CrackStatus, CrackSurface, CrackTextures,
     activate::{attach, fail, frame, look, make_textures, set_status, tell_textures},
     bake::Bakes,
-    carrier::{self, Carrier, Found, Shown},
+    carrier::{self, Carrier, Found, Kind, Shown},
     error::Called,
     later::hold,
     mask::{self, PictureMasks},
@@ -171,22 +171,16 @@ fn update(world: &mut World, entity: Entity, active: &mut Active) -> Result<bool
             let is_new = is_laid_out || active.carrier.own.is_none();
             let layout = if is_new { shown.layout } else { active.carrier.shown.layout.clone() };
             let original = Shown { rect: shown.rect, layout, ..active.carrier.shown.clone() };
-            return update_picture(world, entity, active, original);
+            return update_picture(world, entity, active, None, original);
         }
-        let whole = active.carrier.whole(active.base.size);
-        let rect = shown.rect.map_or(whole, |rect| TexelRect { min: rect.min, max: rect.max }.intersect(whole));
-        if !rect.is_empty() {
+        if let Some(rect) = shown.texels(active.carrier.whole(active.base.size).size()) {
             active.show(rect);
         }
         return Ok(true);
     }
     // Somebody gave it another picture.
     let Some(kind) = kind else { return Ok(true) };
-    let size = active.carrier.size;
-    let mesh = active.carrier.mesh.take();
-    active.carrier = Carrier { mesh, size, ..Carrier::new(kind, shown.clone()) };
-    active.unstretched = None;
-    update_picture(world, entity, active, shown)
+    update_picture(world, entity, active, Some(kind), shown)
 }
 
 /// Takes up other settings; a preset that is invalid is refused and the old one stays. `false` if it is not there yet.
@@ -214,6 +208,9 @@ fn update_settings(world: &World, entity: Entity, active: &mut Active) -> bool {
 }
 
 fn update_preset(active: &mut Active, preset: CrackPreset) -> Result<(), CrackError> {
+    if preset == active.preset {
+        return Ok(());
+    }
     let look = look(&preset, active.field.frame)?;
     active.recall();
     if preset.growth != active.preset.growth {
@@ -289,10 +286,31 @@ pub(super) fn grown_anew(
     Ok(growth)
 }
 
-/// Reads the pictures anew and paints the cracks over them; `false` if they are not there yet.
-fn update_picture(world: &mut World, entity: Entity, active: &mut Active, shown: Shown) -> Result<bool, CrackError> {
+/// It is shown by something else from now on.
+fn change_carrier(world: &mut World, entity: Entity, active: &mut Active, kind: &'static Kind, shown: &Shown) {
+    active.offered.clear();
+    let carrier = Carrier::new(kind, shown.clone());
+    if shown.asset.type_id() == active.carrier.shown.asset.type_id() {
+        let (mesh, size) = (active.carrier.mesh.take(), active.carrier.size);
+        active.carrier = Carrier { mesh, size, ..carrier };
+    } else {
+        (active.carrier.kind.detach)(world, entity, &active.carrier);
+        active.carrier = carrier;
+    }
+}
+
+/// Reads the pictures anew and paints the cracks over them; `false` if they are not there yet. `other` is how to deal with them if somebody
+/// gave them to it. Until they are accepted it is dealt with as before: its shards are of the kind that it was.
+fn update_picture(
+    world: &mut World,
+    entity: Entity,
+    active: &mut Active,
+    other: Option<&'static Kind>,
+    shown: Shown,
+) -> Result<bool, CrackError> {
     active.is_outdated = true;
-    let Some(draft) = draft(world, entity, active, &shown)? else { return Ok(false) };
+    active.offered = if other.is_some() { shown.pictures().map(Handle::id).collect() } else { Vec::new() };
+    let Some(draft) = draft(world, entity, active, other, &shown)? else { return Ok(false) };
     let from = active.surface.mask.with(&active.preset);
     let Some(mask) = mask::resolve(world, from, &shown, &draft)? else { return Ok(false) };
     let frame = frame(draft.plan.rect)?;
@@ -303,6 +321,9 @@ fn update_picture(world: &mut World, entity: Entity, active: &mut Active, shown:
     // Shards show the picture that was.
     let bytes = drop_shards(world, entity, active);
     world.resource_mut::<Surfaces>().bytes -= bytes;
+    if let Some(kind) = other {
+        change_carrier(world, entity, active, kind, &shown);
+    }
     active.is_outdated = false;
     active.read_at = world.resource::<Surfaces>().frame;
     if let Some(growth) = regrown {

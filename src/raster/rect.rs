@@ -47,10 +47,11 @@ impl TexelRect {
         }
     }
 
-    /// The texels in both.
+    /// The texels in both; the default if there are none, so that no rectangle ends before it begins.
     #[must_use]
     pub fn intersect(self, other: Self) -> Self {
-        Self { min: self.min.max(other.min), max: self.max.min(other.max) }
+        let both = Self { min: self.min.max(other.min), max: self.max.min(other.max) };
+        if both.is_empty() { Self::default() } else { both }
     }
 
     /// Grown by `by` texels on every side, within a surface of `size`.
@@ -59,6 +60,34 @@ impl TexelRect {
         if self.is_empty() {
             return self;
         }
-        Self { min: self.min.saturating_sub(UVec2::splat(by)), max: (self.max + UVec2::splat(by)).min(size) }
+        let by = UVec2::splat(by);
+        Self { min: self.min.saturating_sub(by), max: self.max.saturating_add(by) }.intersect(Self::whole(size))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Against the texels themselves, for rectangles of every kind: empty, and such as end before they begin.
+    #[test]
+    fn what_is_in_both_is_in_both() {
+        let rect = |bits: u32| {
+            let number = |shift: u32| bits >> shift & 3;
+            TexelRect { min: UVec2::new(number(0), number(2)), max: UVec2::new(number(4), number(6)) }
+        };
+        let holds = |rect: TexelRect, texel: UVec2| texel.cmpge(rect.min).all() && texel.cmplt(rect.max).all();
+        for (a, b) in (0..256).flat_map(|a| (0..256).map(move |b| (rect(a), rect(b)))) {
+            let both = a.intersect(b);
+            assert!(both.min.cmple(both.max).all(), "{a:?} {b:?}: {both:?}");
+            for texel in (0..4).flat_map(|y| (0..4).map(move |x| UVec2::new(x, y))) {
+                assert_eq!(holds(both, texel), holds(a, texel) && holds(b, texel), "{texel} of {a:?} {b:?}");
+            }
+            let size = UVec2::splat(3);
+            let grown = a.grow(1, size);
+            assert!(a.is_empty() || grown == grown.intersect(TexelRect::whole(size)), "{a:?}: {grown:?}");
+        }
+        let huge = TexelRect { min: UVec2::ONE, max: UVec2::MAX };
+        assert_eq!(huge.grow(7, UVec2::MAX), TexelRect::whole(UVec2::MAX));
     }
 }

@@ -23,6 +23,9 @@ pub(super) struct Lattice {
 }
 
 impl Lattice {
+    /// Of a surface of 1 x 1.
+    pub(super) const ONE: Self = Self { extent: Vec2::ONE, scale: RANGE, corner: [1 << 24; 2] };
+
     pub(super) fn new(extent: Vec2) -> Option<Self> {
         if !extent.is_finite() || extent.min_element() <= 0.0 {
             return None;

@@ -54,6 +54,23 @@ pub struct Shards {
     carried: Arc<[Vec<Vec2>]>,
 }
 
+/// No pieces of a surface of 1 x 1.
+impl Default for Shards {
+    fn default() -> Self {
+        Self {
+            lattice: Lattice::ONE,
+            places: Vec::new(),
+            positions: Vec::new(),
+            outlines: Vec::new(),
+            rings: vec![0],
+            triangles: Vec::new(),
+            neighbours: Vec::new(),
+            shards: Vec::new(),
+            carried: Arc::default(),
+        }
+    }
+}
+
 impl Shards {
     pub(super) fn new(drawing: &Drawing, faces: &Faces, carried: Vec<Vec<Vec2>>) -> Self {
         let lattice = drawing.lattice;

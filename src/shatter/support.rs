@@ -72,6 +72,12 @@ impl Support {
         Self { anchored: anchored.collect(), gone: vec![false; shards.len()] }
     }
 
+    /// The same shards in their places, held by something else.
+    #[must_use]
+    pub fn held_by(&self, shards: &Shards, anchor: Anchor) -> Self {
+        Self { gone: self.gone.clone(), ..Self::new(shards, anchor) }
+    }
+
     /// The support of a surface that has been cracked further: what lies where a shard had gone is gone.
     #[must_use]
     pub fn renewed(&self, old: &Shards, new: &Shards, anchor: Anchor) -> Self {

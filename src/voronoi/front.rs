@@ -14,6 +14,9 @@ const OPENING: f32 = 0.18;
 /// Length of crack between one step of birth and the next in [`Seams::network`], pattern units.
 pub const FRONT_STEP: f32 = 0.01;
 
+/// No birth is later, however far away the front begins.
+const LAST_BIRTH: f32 = 1_000_000.0;
+
 /// Thinner cracks are drawn so wide in a network, whose widths are above zero; pattern units.
 const LEAST_WIDTH: f32 = 1.0e-5;
 
@@ -110,7 +113,7 @@ impl Seams {
         (0u32..).zip(&order).for_each(|(i, &id)| index[id as usize] = i);
 
         let mut network = Network::new(self.extent, 0.0, 0);
-        let birth = |id: u32| (arrivals[id as usize].distance / FRONT_STEP) as u32;
+        let birth = |id: u32| (arrivals[id as usize].distance / FRONT_STEP).min(LAST_BIRTH) as u32;
         for &id in &order {
             let parent = arrivals[id as usize].parent.map(|parent| index[parent as usize]);
             network.nodes.push(Node {

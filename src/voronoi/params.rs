@@ -12,6 +12,7 @@ pub const MAX_LEVELS: u32 = 5;
 
 /// How sites are laid out.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]
 #[non_exhaustive]
 pub enum SiteLayout {
     /// Anywhere, as in the paper: pavement.
@@ -61,6 +62,7 @@ impl Guide {
 
 /// Everything that a map of cracks is told, besides size, seed and guides.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]
 pub struct VoronoiParams {
     /// Weight `α` of the noise in the cost of an edge (Mould 2005, eq. 1). 0..=100 times [`beta`](Self::beta); default 6.
     ///
@@ -113,6 +115,11 @@ impl VoronoiParams {
     /// # Errors
     /// Names the first field that is out of its range or not finite.
     pub fn validate(&self, guides: &[Guide]) -> Result<(), VoronoiError> {
+        self.validate_with(guides.iter().map(|guide| guide.gamma))
+    }
+
+    /// The same with the weights of guides that are not read yet.
+    pub(crate) fn validate_with(&self, gammas: impl Iterator<Item = f32>) -> Result<(), VoronoiError> {
         let focus = match self.layout {
             SiteLayout::Impact { focus, .. } => focus,
             _ => 1.0,
@@ -139,11 +146,11 @@ impl VoronoiParams {
             }
         }
         let mut room = (MAX_WEIGHT - 1.0) * self.beta - self.alpha;
-        for guide in guides {
-            if !(0.0..=room).contains(&guide.gamma) {
-                return Err(VoronoiError::OutOfRange { field: "gamma", value: guide.gamma, min: 0.0, max: room });
+        for gamma in gammas {
+            if !(0.0..=room).contains(&gamma) {
+                return Err(VoronoiError::OutOfRange { field: "gamma", value: gamma, min: 0.0, max: room });
             }
-            room -= guide.gamma;
+            room -= gamma;
         }
         Ok(())
     }

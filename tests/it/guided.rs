@@ -316,6 +316,38 @@ fn f1_f2_hostile_files_fail_once_and_hits_still_crack() {
     assert_cracks(&mut app, entities[0]);
 }
 
+/// Cracks that are baked are there with the component or without it.
+#[test]
+fn e2_the_component_goes() {
+    let mut app = guided_app();
+    let entity = spawn(&mut app, guided());
+    bake(&mut app, entity);
+    settle(&mut app, entity);
+    let baked = shown(&app, entity);
+    let remove = |app: &mut App| {
+        app.world_mut().entity_mut(entity).remove::<GuidedCracks>();
+        step(app);
+        progress(app, entity)
+    };
+    assert_eq!(remove(&mut app), 1.0, "it is done");
+    steps(&mut app, 3);
+    assert!(progress(&app, entity) == 1.0 && shown(&app, entity) == baked);
+    // One that goes on is cancelled.
+    app.world_mut().entity_mut(entity).insert(guided().with_seed(2));
+    step(&mut app);
+    assert!(progress(&app, entity) < 1.0);
+    assert_eq!(remove(&mut app), 0.0, "it is cancelled");
+    steps(&mut app, 20);
+    assert_eq!((progress(&app, entity), told(&app).baked.len()), (0.0, 1));
+    // Healing takes them away.
+    app.world_mut().entity_mut(entity).insert(guided());
+    bake(&mut app, entity);
+    app.world_mut().entity_mut(entity).remove::<GuidedCracks>();
+    app.world_mut().commands().entity(entity).heal_cracks();
+    step(&mut app);
+    assert_eq!(progress(&app, entity), 0.0, "it is healed");
+}
+
 /// What cannot be baked is told once, by name, and the surface can be hit.
 #[test]
 fn what_cannot_be_baked_fails_once() {

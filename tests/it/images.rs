@@ -285,7 +285,7 @@ fn t4_what_sprites_cannot_do_is_named() {
         let sprite = Sprite { rect: Some(rect), ..Sprite::from_image(image.clone()) };
         let entity = app.world_mut().spawn((sprite, CrackSurface::default())).id();
         let error = assert_fails(&mut app, entity);
-        assert!(matches!(error, CrackError::Size { .. }), "{rect:?}: {error:?}");
+        assert!(matches!(error, CrackError::Part { size, .. } if size == UVec2::splat(48)), "{rect:?}: {error:?}");
     }
     // One that is partly there cracks there.
     let rect = Some(Rect::new(24.0, 24.0, 100.0, 100.0));
@@ -1321,4 +1321,460 @@ fn t4_a_size_that_a_game_gives_a_cracked_sprite_is_kept() {
     assert_eq!(get::<Sprite>(&app, entity).custom_size, size);
     heal(&mut app);
     assert_eq!(get::<Sprite>(&app, entity).custom_size, size);
+}
+
+/// Rectangles that have no texel of a picture of 48 x 48.
+fn beyond() -> Vec<Rect> {
+    let bad = f32::NAN;
+    let at = |min: Vec2, max: Vec2| Rect { min, max };
+    vec![
+        at(Vec2::new(48.0, 0.0), Vec2::new(64.0, 16.0)),
+        at(Vec2::new(0.0, 48.0), Vec2::new(48.0, 49.0)),
+        at(Vec2::splat(1e30), Vec2::splat(f32::MAX)),
+        at(Vec2::splat(f32::NEG_INFINITY), Vec2::splat(-1.0)),
+        at(Vec2::splat(30.0), Vec2::splat(10.0)),
+        at(Vec2::new(10.0, 30.0), Vec2::new(30.0, 10.0)),
+        at(Vec2::splat(5.0), Vec2::splat(5.0)),
+        at(Vec2::splat(bad), Vec2::splat(bad)),
+        at(Vec2::new(bad, 0.0), Vec2::new(bad, 48.0)),
+    ]
+}
+
+#[test]
+fn t15_a_part_of_the_picture_that_is_not_there() {
+    let image = picture(UVec2::splat(48));
+    // In the frame of the hit, beside the frames, by a bake that reads the picture, and made ready without a hit.
+    for (case, preset) in
+        [CrackPreset::BRICK, CrackPreset::CONCRETE, CrackPreset::BRICK, CrackPreset::BRICK].iter().enumerate()
+    {
+        let mut app = app();
+        app.init_resource::<crate::guided::Told>();
+        let mut app = crate::guided::listening(app);
+        if case > 0 {
+            app.world_mut().resource_mut::<CrackBudget>().milliseconds = 2.0;
+        }
+        let image = add(&mut app, image.clone());
+        for (i, rect) in beyond().into_iter().enumerate() {
+            let sprite = Sprite { rect: Some(rect), ..Sprite::from_image(image.clone()) };
+            let surface = CrackSurface::new(preset.clone()).with_mask(CrackMaskSource::FromPicture);
+            let entity = app.world_mut().spawn((sprite, surface)).id();
+            match case {
+                0 | 1 => hit(&mut app, center(entity)),
+                2 => _ = app.world_mut().entity_mut(entity).insert(GuidedCracks::new(CrackGuide::own_edges())),
+                _ => _ = app.world_mut().commands().entity(entity).prepare_cracks(),
+            }
+            wait_for(&mut app, "the failure", |app| crate::guided::told(app).failed.len() > i);
+            steps(&mut app, 3);
+            let failed = &crate::guided::told(&app).failed;
+            assert_eq!((failed.len(), failed[i].0), (i + 1, entity), "once");
+            let error = &failed[i].1;
+            assert!(matches!(error, CrackError::Part { size, .. } if *size == UVec2::splat(48)), "{rect:?}: {error:?}");
+            assert!(error.to_string().contains("Sprite::rect"), "{error}");
+        }
+    }
+}
+
+/// What there is of a frame that the sheet's edge cuts off cracks where it is hit, and its shards are where it is seen.
+#[test]
+fn t15_frames_that_are_cut_off_by_the_edge_of_the_sheet() {
+    let mut app = app();
+    let image = add(&mut app, picture(UVec2::new(40, 32)));
+    let grid = add(&mut app, TextureAtlasLayout::from_grid(UVec2::splat(32), 2, 1, None, None));
+    let rects = [
+        (Sprite { texture_atlas: Some(TextureAtlas { layout: grid, index: 1 }), ..default() }, [32, 0, 40, 32]),
+        (Sprite { rect: Some(Rect::new(-8.0, -16.0, 24.0, 16.0)), ..default() }, [0, 0, 24, 16]),
+        (Sprite { rect: Some(Rect::new(30.0, 20.0, 60.0, 50.0)), flip_x: true, ..default() }, [30, 20, 40, 32]),
+        (Sprite { rect: Some(Rect::new(8.0, 4.0, 40.0, 32.0)), flip_y: true, ..default() }, [8, 4, 40, 32]),
+        (
+            Sprite {
+                rect: Some(Rect::new(20.0, 0.0, 60.0, 40.0)),
+                custom_size: Some(Vec2::new(80.0, 20.0)),
+                ..default()
+            },
+            [20, 0, 40, 32],
+        ),
+    ];
+    let mut rng = Rng::new(2);
+    for (sprite, [left, top, right, bottom]) in rects {
+        let what = format!("{:?} {:?} {:?}", sprite.rect, sprite.custom_size, sprite.texture_atlas);
+        let (min, max) = (Vec2::new(left as f32, top as f32), Vec2::new(right as f32, bottom as f32));
+        let sprite = Sprite { image: image.clone(), ..sprite };
+        let (flip, whole) =
+            (BVec2::new(sprite.flip_x, sprite.flip_y), sprite.rect.unwrap_or(Rect::new(32.0, 0.0, 64.0, 32.0)));
+        let size = sprite.custom_size.unwrap_or(whole.size());
+        let shatter = ShatterCracks {
+            cut: bevy_crack::shatter::ShatterParams { carry_on: true, ..default() },
+            anchor: bevy_crack::shatter::Anchor::Nothing,
+            rim: Some(bevy_crack::shatter::RimLook::PLAIN),
+            speed: 0.0,
+            ..default()
+        };
+        let place = Transform::from_xyz(7.0, -3.0, 0.0);
+        let entity = app.world_mut().spawn((sprite, place, CrackSurface::new(CrackPreset::GLASS), shatter)).id();
+        // Where the engine draws a texel of the picture.
+        let drawn = |texel: Vec2| {
+            let share = (texel - whole.center()) / whole.size();
+            (Vec2::select(flip, -share, share) * Vec2::new(1.0, -1.0) * size + Vec2::new(7.0, -3.0)).extend(0.0)
+        };
+        step(&mut app);
+        let before = counts(&app);
+        for _ in 0..20 {
+            let texel = min - 6.0 + Vec2::new(rng.unit(), rng.unit()) * (max - min + 12.0);
+            let (is_seen, is_shown) = (texel.cmpge(min).all() && texel.cmple(max).all(), whole.contains(texel));
+            let near = (texel - min).abs().min_element().min((texel - max).abs().min_element()) < 0.01;
+            if near || (!is_seen && !is_shown) {
+                continue;
+            }
+            let rejected = counts(&app).rejected;
+            hit(&mut app, CrackHit::world(entity, drawn(texel)));
+            step(&mut app);
+            assert_eq!(counts(&app).rejected - rejected, u64::from(!is_seen), "{what}: {texel}");
+            if is_seen {
+                let mut places = bevy::ecs::system::SystemState::<CrackPlaces>::new(app.world_mut());
+                let uv = (texel - min) / (max - min);
+                let place = places.get(app.world()).expect("the places").at(entity, uv).expect("a place").position;
+                assert!(place.distance(drawn(texel)) < 1e-3, "{what}: {place} of {texel}");
+            }
+        }
+        assert!(counts(&app).applied + counts(&app).merged > before.applied + before.merged, "{what}");
+        settle(&mut app, entity);
+        app.world_mut().commands().entity(entity).shatter_cracks(ShatterRequest::ALL);
+        steps(&mut app, 4);
+        let mut query = app.world_mut().query::<(&Shard, &GlobalTransform, &Mesh2d)>();
+        let meshes = app.world().resource::<Assets<Mesh>>();
+        let mut corners = 0;
+        for (_, place, mesh) in query.iter(app.world()) {
+            let mesh = meshes.get(&mesh.0).expect("its mesh");
+            let Some(bevy::mesh::VertexAttributeValues::Float32x3(at)) = mesh.attribute(Mesh::ATTRIBUTE_POSITION)
+            else {
+                panic!()
+            };
+            let Some(bevy::mesh::VertexAttributeValues::Float32x2(uvs)) = mesh.attribute(Mesh::ATTRIBUTE_UV_0) else {
+                panic!()
+            };
+            for (at, uv) in at.iter().zip(uvs) {
+                let found = place.transform_point(Vec3::from(*at)).truncate();
+                let expected = drawn(Vec2::from(*uv) * Vec2::new(40.0, 32.0)).truncate();
+                assert!(found.distance(expected) < 2e-3, "{what}: {found}, not {expected}");
+                corners += 1;
+            }
+        }
+        assert!(corners > 10, "{what}: {corners}");
+        app.world_mut().despawn(entity);
+        step(&mut app);
+    }
+}
+
+/// A surface that has shattered shows other parts of its sheet, as they come: of other sizes, cut off, beyond it.
+#[test]
+fn t15_a_broken_sprite_shows_other_parts_of_its_sheet() {
+    let mut app = app();
+    let image = add(&mut app, picture(UVec2::new(40, 32)));
+    let grid = add(&mut app, TextureAtlasLayout::from_grid(UVec2::splat(32), 3, 1, None, None));
+    let mut frames = TextureAtlasLayout::new_empty(UVec2::splat(64));
+    let mut rng = Rng::new(8);
+    for _ in 0..12 {
+        let min = UVec2::new(rng.next_u32() % 44, rng.next_u32() % 36);
+        frames.add_texture(URect { min, max: min + UVec2::new(rng.next_u32() % 30, rng.next_u32() % 30) });
+    }
+    let frames = add(&mut app, frames);
+    for (layout, count) in [(grid, 4), (frames, 13)] {
+        let sprite =
+            Sprite { texture_atlas: Some(TextureAtlas { layout, index: 0 }), ..Sprite::from_image(image.clone()) };
+        let shatter = ShatterCracks { anchor: bevy_crack::shatter::Anchor::Nothing, ..default() };
+        let entity = app.world_mut().spawn((sprite, CrackSurface::new(CrackPreset::MUD), shatter)).id();
+        let mut gone = 0;
+        for frame in 0..400 {
+            if frame % 7 == 0 {
+                hit(&mut app, CrackHit::uv(entity, Vec2::new(rng.unit(), rng.unit())).with_energy(4.0));
+            }
+            if frame > 60 && frame % 20 == 0 {
+                let around = ShatterRequest::around(Vec2::new(rng.unit(), rng.unit()), 0.2);
+                app.world_mut().commands().entity(entity).shatter_cracks(around);
+            }
+            if frame > 60 && frame % 5 == 0 {
+                let mut sprite = app.world_mut().get_mut::<Sprite>(entity).unwrap();
+                sprite.texture_atlas.as_mut().unwrap().index = rng.next_u32() as usize % count;
+            }
+            if frame % 130 == 129 {
+                app.world_mut().get_mut::<ShatterCracks>(entity).unwrap().speed = -1.0;
+            } else if frame % 130 == 30 {
+                app.world_mut().get_mut::<ShatterCracks>(entity).unwrap().speed = 1.0;
+            }
+            step(&mut app);
+            gone += app.world().get::<CrackShards>(entity).map_or(0, |shards| shards.gone);
+        }
+        assert!(gone > 0, "it has shattered");
+        assert_sound(&app, entity);
+        app.world_mut().commands().entity(entity).heal_cracks();
+        step(&mut app);
+        assert_eq!(image_of(&app, entity), image);
+        app.world_mut().despawn(entity);
+    }
+}
+
+/// A mesh that has shattered is given a material of another kind, or a sprite, whose picture cannot be read, and shatters again.
+#[test]
+fn t11_what_has_shattered_is_shown_by_something_of_another_kind() {
+    let mut app = app();
+    let image = add(&mut app, picture(UVec2::splat(64)));
+    let mesh = add(&mut app, Mesh::from(Rectangle::new(64.0, 64.0)));
+    let lit = add(&mut app, CrackLitMaterial::new(image.clone()));
+    let plain = add(&mut app, ColorMaterial::from(image.clone()));
+    for case in 0..4 {
+        let unreadable = add(&mut app, Image { data: None, ..picture(UVec2::splat(48)) });
+        let plain_after = add(&mut app, ColorMaterial::from(unreadable.clone()));
+        let lit_after = add(&mut app, CrackLitMaterial::new(unreadable.clone()));
+        let shatter = ShatterCracks { anchor: bevy_crack::shatter::Anchor::Nothing, ..default() };
+        let mut entity = app.world_mut().spawn((CrackSurface::new(CrackPreset::MUD), shatter));
+        match case {
+            0 | 2 => entity.insert((Mesh2d(mesh.clone()), MeshMaterial2d(lit.clone()))),
+            1 => entity.insert((Mesh2d(mesh.clone()), MeshMaterial2d(plain.clone()))),
+            _ => entity.insert(Sprite::from_image(image.clone())),
+        };
+        let entity = entity.id();
+        hit(&mut app, center(entity));
+        settle_any(&mut app, entity);
+        let shatter = |app: &mut App, at: f32| {
+            app.world_mut().commands().entity(entity).shatter_cracks(ShatterRequest::around(Vec2::splat(at), 0.1));
+            steps(app, 4);
+            app.world().get::<CrackShards>(entity).map_or(0, |shards| shards.gone)
+        };
+        let gone = shatter(&mut app, 0.3);
+        assert!(gone > 0);
+        // It stays what it is until what it was given is accepted.
+        let mut it = app.world_mut().entity_mut(entity);
+        match case {
+            0 => it.remove::<MeshMaterial2d<CrackLitMaterial>>().insert(MeshMaterial2d(plain_after.clone())),
+            1 => it.remove::<MeshMaterial2d<ColorMaterial>>().insert(MeshMaterial2d(lit_after.clone())),
+            2 => it.insert(Sprite::from_image(unreadable.clone())),
+            _ => it.remove::<Sprite>().insert((Mesh2d(mesh.clone()), MeshMaterial2d(plain_after.clone()))),
+        };
+        steps(&mut app, 3);
+        assert_eq!(state(&app, entity).status, CrackStatus::Failed(CrackError::NoCpuData), "case {case}");
+        assert_eq!(app.world().get::<CrackShards>(entity).map(|shards| shards.gone), Some(gone));
+        shatter(&mut app, 0.7);
+        // What its shards wear is there.
+        let shards: Vec<Entity> = app.world_mut().query_filtered::<Entity, With<Shard>>().iter(app.world()).collect();
+        assert!(!shards.is_empty());
+        for shard in shards {
+            let [plain, lit] = [
+                app.world()
+                    .get::<MeshMaterial2d<ColorMaterial>>(shard)
+                    .is_some_and(|material| app.world().resource::<Assets<ColorMaterial>>().contains(&material.0)),
+                app.world()
+                    .get::<MeshMaterial2d<CrackLitMaterial>>(shard)
+                    .is_some_and(|material| app.world().resource::<Assets<CrackLitMaterial>>().contains(&material.0)),
+            ];
+            assert!(plain != lit, "case {case}: one material that is there");
+            assert_eq!(lit, case == 0 || case == 2, "case {case}: of the kind that it was");
+        }
+        // Its picture comes after all: it is whole, on that one.
+        replace(&mut app, &unreadable, picture(UVec2::splat(48)));
+        steps(&mut app, 5);
+        assert!(
+            !matches!(state(&app, entity).status, CrackStatus::Failed(_)),
+            "case {case}: {:?}",
+            state(&app, entity)
+        );
+        assert!(app.world().get::<CrackShards>(entity).is_none());
+        assert_eq!(app.world_mut().query::<&Shard>().iter(app.world()).count(), 0);
+        let textures: CrackTextures = get(&app, entity);
+        assert_eq!(size_of(&app, textures.diffuse.as_ref().expect("a diffuse texture")), UVec2::splat(48));
+        assert_eq!(shows(&app, entity).as_ref(), textures.diffuse.as_ref(), "case {case}");
+        assert!(shatter(&mut app, 0.5) > 0);
+        // And given back.
+        app.world_mut().commands().entity(entity).heal_cracks();
+        step(&mut app);
+        assert_eq!(shows(&app, entity), Some(unreadable), "case {case}");
+        if case == 2 {
+            assert_eq!(get::<MeshMaterial2d<CrackLitMaterial>>(&app, entity).0, lit, "what it showed before");
+        }
+        app.world_mut().despawn(entity);
+        steps(&mut app, 2);
+    }
+}
+
+/// Frames until its cracks have ended, whatever shows them.
+fn settle_any(app: &mut App, entity: Entity) {
+    step(app);
+    wait_for(app, "the end of the cracks", |app| state(app, entity).status == CrackStatus::Done);
+}
+
+/// The picture that an entity shows.
+fn shows(app: &App, entity: Entity) -> Option<Handle<Image>> {
+    let world = app.world();
+    if let Some(sprite) = world.get::<Sprite>(entity) {
+        return Some(sprite.image.clone());
+    }
+    if let Some(material) = world.get::<MeshMaterial2d<ColorMaterial>>(entity) {
+        return world.resource::<Assets<ColorMaterial>>().get(&material.0)?.texture.clone();
+    }
+    let material = world.get::<MeshMaterial2d<CrackLitMaterial>>(entity)?;
+    world.resource::<Assets<CrackLitMaterial>>().get(&material.0)?.diffuse.clone()
+}
+
+/// Meshes that tangents cannot be made for, and what is said of them.
+fn broken_meshes() -> Vec<(Mesh, &'static str)> {
+    use bevy::mesh::Indices;
+    let quad = || Mesh::from(Rectangle::new(2.0, 1.0));
+    let mut meshes = Vec::new();
+    for index in [4, 900, u32::MAX] {
+        meshes.push((quad().with_inserted_indices(Indices::U32(vec![0, 1, 2, 0, 2, index])), "names vertex"));
+    }
+    meshes.push((quad().with_inserted_indices(Indices::U16(vec![0, 1, u16::MAX])), "names vertex 65535 of 4"));
+    meshes.push((quad().with_inserted_attribute(Mesh::ATTRIBUTE_NORMAL, vec![[0.0, 0.0, 1.0]; 3]), "3 normals"));
+    meshes.push((quad().with_inserted_attribute(Mesh::ATTRIBUTE_UV_0, vec![[0.0, 0.5]; 2]), "2 texture coordinates"));
+    for bad in [f32::NAN, f32::INFINITY] {
+        let positions = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [bad, 1.0, 0.0], [0.0, 1.0, 0.0]];
+        meshes.push((quad().with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, positions), "vertex 2 are not finite"));
+        let uvs = vec![[0.0, 0.0], [1.0, bad], [1.0, 1.0], [0.0, 1.0]];
+        meshes.push((quad().with_inserted_attribute(Mesh::ATTRIBUTE_UV_0, uvs), "vertex 1 are not finite"));
+    }
+    let fan = (0..5000u32).flat_map(|i| [0, 1 + i % 3, 1 + (i + 1) % 3]).collect();
+    meshes.push((quad().with_inserted_indices(Indices::U32(fan)), "5000 of its triangles meet in one vertex"));
+    let flat = (0..40_000u32).flat_map(|i| if i % 2 == 0 { [0, 1, 2] } else { [0, 0, 1] }).collect();
+    meshes.push((quad().with_inserted_indices(Indices::U32(flat)), "20000 of its 40000 triangles have no area"));
+    meshes
+}
+
+#[test]
+fn t16_broken_3d_meshes_are_refused_by_name() {
+    let mut app = app();
+    single_threaded(&mut app);
+    let image = add(&mut app, picture(UVec2::splat(48)));
+    let material = add(&mut app, StandardMaterial { base_color_texture: Some(image), ..default() });
+    let spawn = |app: &mut App, mesh: Mesh, surface: CrackSurface| {
+        let mesh = add(app, mesh);
+        app.world_mut().spawn((Mesh3d(mesh), MeshMaterial3d(material.clone()), surface)).id()
+    };
+    for (mesh, said) in broken_meshes() {
+        let entity = spawn(&mut app, mesh.clone(), CrackSurface::default());
+        let heard = warnings(|| {
+            for _ in 0..3 {
+                hit(&mut app, center(entity));
+                steps(&mut app, 2);
+            }
+        });
+        let CrackStatus::Failed(CrackError::Mesh { reason }) = state(&app, entity).status else {
+            panic!("{said}: {:?}", state(&app, entity))
+        };
+        assert!(reason.contains(said), "{reason}, not {said}");
+        assert_eq!(heard.len(), 1, "one warning: {heard:?}");
+        assert!(app.world().get::<CrackTextures>(entity).is_none());
+        // The other ways to a surface.
+        let prepared = spawn(&mut app, mesh.clone(), CrackSurface::default());
+        app.world_mut().commands().entity(prepared).prepare_cracks();
+        let baked = spawn(&mut app, mesh.clone(), CrackSurface::default());
+        app.world_mut().entity_mut(baked).insert(GuidedCracks::default());
+        steps(&mut app, 5);
+        assert!(matches!(state(&app, prepared).status, CrackStatus::Failed(CrackError::Mesh { .. })), "{said}");
+        assert!(app.world().get::<CrackTextures>(baked).is_none(), "{said}");
+        // Without maps that need tangents it cracks.
+        let flat = CrackSurface::default().with_maps(CrackMaps { diffuse: true, normal: false, depth: false });
+        let flat = spawn(&mut app, mesh, flat);
+        hit(&mut app, center(flat));
+        settle_any(&mut app, flat);
+        for entity in [entity, prepared, baked, flat] {
+            app.world_mut().despawn(entity);
+        }
+    }
+    // One that breaks when its surface is there already is left as it is.
+    let whole = spawn(&mut app, Mesh::from(Rectangle::new(2.0, 1.0)), CrackSurface::default());
+    hit(&mut app, center(whole));
+    settle_any(&mut app, whole);
+    let own: Mesh3d = get(&app, whole);
+    let tangents = |app: &App, mesh: &Handle<Mesh>| {
+        let mesh = app.world().resource::<Assets<Mesh>>().get(mesh).expect("the mesh");
+        mesh.attribute(Mesh::ATTRIBUTE_TANGENT).is_some()
+    };
+    assert!(tangents(&app, &own.0), "its own mesh has tangents");
+}
+
+/// What is let through the engine makes tangents for, whatever it is: thousands of meshes of random numbers, of which many are broken.
+#[test]
+fn t16_what_is_let_through_gets_tangents() {
+    use bevy::mesh::{Indices, PrimitiveTopology};
+    let mut app = app();
+    let image = add(&mut app, picture(UVec2::splat(8)));
+    let material = add(&mut app, StandardMaterial { base_color_texture: Some(image), ..default() });
+    let mut rng = Rng::new(16);
+    let (mut made, mut refused) = (0, 0);
+    for _ in 0..600 {
+        let n = 1 + rng.next_u32() % 9;
+        let is_odd = rng.unit() < 0.3;
+        let mut number = |rng: &mut Rng| match rng.next_u32() % 40 {
+            0 if is_odd => f32::NAN,
+            1 if is_odd => f32::INFINITY,
+            2 => 1e38,
+            3 => 1e-40,
+            4 => -0.0,
+            5 | 6 => 0.0,
+            _ => rng.signed(),
+        };
+        let vertex = |rng: &mut Rng, number: &mut dyn FnMut(&mut Rng) -> f32| [number(rng), number(rng), number(rng)];
+        let short = |rng: &mut Rng| if is_odd && rng.unit() < 0.3 { n - 1 } else { n };
+        let mut mesh = Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::default());
+        let count = short(&mut rng);
+        let positions: Vec<[f32; 3]> = (0..count).map(|_| vertex(&mut rng, &mut number)).collect();
+        let normals: Vec<[f32; 3]> = (0..short(&mut rng)).map(|_| vertex(&mut rng, &mut number)).collect();
+        let uvs: Vec<[f32; 2]> = (0..short(&mut rng)).map(|_| [number(&mut rng), number(&mut rng)]).collect();
+        mesh.insert_attribute(Mesh::ATTRIBUTE_POSITION, positions);
+        mesh.insert_attribute(Mesh::ATTRIBUTE_NORMAL, normals);
+        mesh.insert_attribute(Mesh::ATTRIBUTE_UV_0, uvs);
+        let beyond = u32::from(is_odd && rng.unit() < 0.3);
+        let indices = (0..rng.next_u32() % 40).map(|_| rng.next_u32() % (n + beyond)).collect();
+        if rng.unit() < 0.8 {
+            mesh.insert_indices(Indices::U32(indices));
+        }
+        let mesh = add(&mut app, mesh);
+        let surface = CrackSurface::new(small_preset());
+        let entity = app.world_mut().spawn((Mesh3d(mesh), MeshMaterial3d(material.clone()), surface)).id();
+        hit(&mut app, center(entity));
+        steps(&mut app, 2);
+        match state(&app, entity).status {
+            CrackStatus::Failed(CrackError::Mesh { .. }) => refused += 1,
+            CrackStatus::Failed(error) => panic!("{error}"),
+            _ => {
+                let own: Mesh3d = get(&app, entity);
+                let mesh = app.world().resource::<Assets<Mesh>>().get(&own.0).expect("the mesh");
+                made += usize::from(mesh.attribute(Mesh::ATTRIBUTE_TANGENT).is_some());
+            }
+        }
+        app.world_mut().despawn(entity);
+    }
+    assert!(made > 200 && refused > 50, "{made} made, {refused} refused");
+}
+
+/// A picture of more texels than numbers can say.
+#[test]
+fn t6_a_picture_that_says_it_is_huge() {
+    let mut app = app();
+    let mut huge = picture(UVec2::splat(4));
+    huge.texture_descriptor.size = Extent3d { width: u32::MAX, height: u32::MAX, depth_or_array_layers: 1 };
+    let huge = add(&mut app, huge);
+    let entity = spawn_sprite(&mut app, &huge);
+    let error = assert_fails(&mut app, entity);
+    assert!(matches!(error, CrackError::DataLength { expected: u64::MAX, actual: 64 }), "{error:?}");
+}
+
+#[test]
+fn t4_a_chunk_of_a_tilemap_says_what_to_do() {
+    use bevy::sprite_render::{
+        TileData, TilemapChunk, TilemapChunkMaterial, TilemapChunkMeshCache, TilemapChunkTileData,
+    };
+    let mut app = app();
+    app.init_resource::<TilemapChunkMeshCache>().init_asset::<TilemapChunkMaterial>();
+    let tileset = add(&mut app, picture(UVec2::splat(16)));
+    let chunk = TilemapChunk { chunk_size: UVec2::splat(2), tile_display_size: UVec2::splat(8), tileset, ..default() };
+    let tiles = TilemapChunkTileData(vec![Some(TileData::from_tileset_index(0)); 4]);
+    let entity = app.world_mut().spawn((chunk, tiles, CrackSurface::default())).id();
+    step(&mut app);
+    hit(&mut app, center(entity));
+    step(&mut app);
+    assert_eq!(state(&app, entity).status, CrackStatus::Failed(CrackError::Tilemap));
+    let said = CrackError::Tilemap.to_string();
+    for word in ["TilemapChunkTileData", "`Sprite`", "`Mesh2d`", "calculate_tile_transform"] {
+        assert!(said.contains(word), "{said}");
+    }
 }

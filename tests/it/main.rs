@@ -4,6 +4,8 @@
 #![cfg(test)]
 
 #[cfg(all(feature = "2d", feature = "3d"))]
+mod blink;
+#[cfg(all(feature = "2d", feature = "3d"))]
 mod cells;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod clock;
@@ -35,6 +37,8 @@ mod presets;
 mod random;
 mod replay;
 #[cfg(all(feature = "2d", feature = "3d"))]
+mod saved;
+#[cfg(all(feature = "2d", feature = "3d"))]
 mod shards;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod shards_bounds;
@@ -46,4 +50,6 @@ mod shards_order;
 mod solids;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod support;
+#[cfg(all(feature = "2d", feature = "3d"))]
+mod values;
 mod voronoi;

@@ -318,6 +318,66 @@ mod in_apps {
         settle(&mut folder.app, entities[0]);
     }
 
+    /// One save, one error: the engine tries twice to load anew what it could not.
+    #[test]
+    fn f3_one_save_of_a_broken_file_is_one_error() {
+        let mut folder = Folder::new("preset_one_error");
+        let mut told =
+            folder.app.world().resource::<Messages<AssetLoadFailedEvent<CrackPreset>>>().get_cursor_current();
+        // The engine's log says each of these.
+        let mut save = |folder: &mut Folder, text: &str, errors: usize| {
+            folder.write(text);
+            folder.app.world().resource::<AssetServer>().reload(FILE);
+            let mut failed = Vec::new();
+            for _ in 0..40 {
+                std::thread::sleep(std::time::Duration::from_millis(5));
+                step(&mut folder.app);
+                let events = folder.app.world().resource::<Messages<AssetLoadFailedEvent<CrackPreset>>>();
+                failed.extend(told.read(events).map(|event| event.error.to_string()));
+            }
+            assert_eq!(failed.len(), errors, "{failed:#?}");
+            failed.pop().unwrap_or_default()
+        };
+        let status = |folder: &mut Folder, entity: Entity| {
+            hit(&mut folder.app, center(entity));
+            steps(&mut folder.app, 3);
+            state(&folder.app, entity).status
+        };
+        // Broken from the start, and saved as broken, in the same way and in another.
+        folder.write("((((");
+        let handle = folder.load();
+        let early = folder.spawn(handle.clone());
+        wait_for(&mut folder.app, "the failure", |app| {
+            matches!(
+                app.world().resource::<AssetServer>().get_load_state(&handle),
+                Some(bevy::asset::LoadState::Failed(_))
+            )
+        });
+        steps(&mut folder.app, 5);
+        assert!(matches!(status(&mut folder, early), CrackStatus::Failed(CrackError::Preset { .. })));
+        save(&mut folder, "(growth: (reach: NaN))", 1);
+        assert!(matches!(status(&mut folder, early), CrackStatus::Failed(CrackError::Preset { .. })));
+        for _ in 0..3 {
+            let error = save(&mut folder, "(growth: (reach: -1.0))", 1);
+            assert!(error.contains("`growth.reach` is -1"), "{error}");
+            assert!(matches!(status(&mut folder, early), CrackStatus::Failed(CrackError::Preset { .. })));
+        }
+        // Whole, and broken again: what was there before stays.
+        let good = small_preset();
+        save(&mut folder, &good.to_ron().unwrap(), 0);
+        assert!(!matches!(status(&mut folder, early), CrackStatus::Failed(_)));
+        settle(&mut folder.app, early);
+        let before = shown(&folder.app, early);
+        for broken in ["((((", "(gorwth: ())", "(gorwth: ())"] {
+            let heard = warnings(|| _ = save(&mut folder, broken, 1));
+            assert_eq!(heard, [""; 0], "the asset server has said it");
+            assert_eq!(folder.app.world().resource::<Assets<CrackPreset>>().get(&handle), Some(&good));
+            assert!(shown(&folder.app, early) == before, "it changes nothing");
+            let late = folder.spawn(handle.clone());
+            assert!(!matches!(status(&mut folder, late), CrackStatus::Failed(_)), "it can still be used");
+        }
+    }
+
     /// E8 for files: new steps take up what has changed, what is drawn stays, and a broken file changes nothing.
     #[test]
     fn a_changed_file_is_taken_up_while_cracks_grow() {

@@ -173,8 +173,8 @@ fn s4_few_are_kept_while_none_is_shown() {
     app.world_mut().despawn(broken);
     app.world_mut().despawn(entity);
     step(&mut app);
-    assert!(stock(&app)[0] + 300 >= after[0]);
-    steps(&mut app, 10);
+    assert!(stock(&app)[0] + 80 >= after[0]);
+    steps(&mut app, 20);
     assert!(stock(&app)[1] == 0, "all meshes are gone");
 }
 
@@ -272,17 +272,24 @@ fn s6_no_frame_makes_thousands() {
     set(&mut app, entity, |settings| settings.speed = 1.0);
     let ask = |app: &mut App| {
         app.world_mut().commands().entity(entity).shatter_cracks(ShatterRequest::EVERYTHING);
-        steps(app, 3);
+        // So many cracks take more than two frames, always as many.
+        let mut frames = 0;
+        while shards(app).is_empty() {
+            step(app);
+            frames += 1;
+        }
+        assert!((4..=21).contains(&frames), "{frames}");
+        frames
     };
     // Time runs back before all have left.
-    ask(&mut app);
+    let frames = ask(&mut app);
     assert_eq!(count(&mut app), 256);
     set(&mut app, entity, |settings| settings.speed = -1.0);
     steps(&mut app, 30);
     assert!(shards(&mut app).is_empty() && app.world().get::<CrackShards>(entity).is_none());
     assert!(shown(&app, entity) == whole, "whole, bit for bit");
     // It is healed before.
-    ask(&mut app);
+    assert_eq!(ask(&mut app), frames);
     assert_eq!(count(&mut app), 256);
     app.world_mut().commands().entity(entity).heal_cracks();
     steps(&mut app, 3);
@@ -305,7 +312,7 @@ fn s6_no_frame_makes_thousands() {
         let area: f32 = shards(&mut app).iter().map(|shard| get::<Shard>(&app, *shard).area()).sum();
         assert!((gone - area).abs() < 0.02 * area.max(50.0), "{gone} {area}");
         (before, frames) = (now, frames + 1);
-        assert!(frames < 20, "it never ends");
+        assert!(frames < 40, "it never ends");
     }
     assert!(before == at_once && shown(&app, entity) == picture, "the same in the end");
     let told = core::mem::take(&mut app.world_mut().resource_mut::<Told>().0);
@@ -426,16 +433,22 @@ fn s7_what_turns_later_takes_its_shards_along() {
 fn s9_everything_goes() {
     let mut app = app();
     // Held on all sides; a few cracks cut nothing out, or pieces in the middle, unless they are carried on.
-    for (preset, carry_on) in [(CrackPreset::GLASS, true), (CrackPreset::GLASS, false), (CrackPreset::BRICK, true)] {
+    let cases = [
+        (CrackPreset::GLASS, true, 1.0),
+        (CrackPreset::GLASS, false, 1.0),
+        (CrackPreset::GLASS, false, 4.0),
+        (CrackPreset::BRICK, true, 1.0),
+    ];
+    for (preset, carry_on, energy) in cases {
         let cut = ShatterParams { carry_on, ..ShatterParams::DEFAULT };
         let settings = ShatterCracks { cut, anchor: Anchor::Border, ..loose() };
         let image = add(&mut app, picture(UVec2::new(96, 64)));
         let surface = CrackSurface::new(preset).with_seed(4);
         let entity = app.world_mut().spawn((Sprite::from_image(image), surface, settings)).id();
-        hit(&mut app, CrackHit::uv(entity, Vec2::new(0.3, 0.4)));
+        hit(&mut app, CrackHit::uv(entity, Vec2::new(0.3, 0.4)).with_energy(energy));
         settle(&mut app, entity);
         let left = |app: &App| shown(app, entity).as_chunks::<4>().0.iter().filter(|texel| texel[3] != 0).count();
-        if carry_on {
+        if carry_on || energy > 1.0 {
             shatter(&mut app, entity, ShatterRequest::ALL);
             assert!(left(&app) > 0, "something is held");
         }

@@ -7,6 +7,7 @@ mod masonry;
 mod rays;
 mod rays_reference;
 mod reference;
+mod slices;
 mod widths;
 
 use super::{CrackGrowth, GrowthParams, HitOutcome, MAX_ENERGY, MarkerLayout, Rejected, StartLayout, Venation};

@@ -15,6 +15,7 @@ use bevy::prelude::*;
 /// All that a bake needs; `None` if its pictures are not there yet.
 pub(super) fn begin(world: &mut World, entity: Entity, bake: &mut Bake) -> Result<Option<Work>, CrackError> {
     let Some(guided) = world.get::<GuidedCracks>(entity).cloned() else { return Ok(None) };
+    guided.validate()?;
     let mut copies = Copies::default();
     let known = world.resource::<Surfaces>().active.get(&entity).and_then(|active| {
         let rect = active.views.get(active.view)?.rect;
@@ -25,6 +26,7 @@ pub(super) fn begin(world: &mut World, entity: Entity, bake: &mut Bake) -> Resul
         None => {
             let Some(plan) = Plan::new(world, entity)? else { return Ok(None) };
             let Some(raw) = plan.raw(world, &mut copies)? else { return Ok(None) };
+            plan.check_mesh(world, entity)?;
             bake.plan = Some(Box::new(plan));
             Surface::Raw(Box::new(raw))
         }

@@ -1,7 +1,13 @@
 //! The copy of a mesh whose faces share the picture: only one of them shows the half of the textures that cracks.
 
 use super::{MaterialSlot, QueuedHit, to_picture};
-use crate::plugin::{HitPoint, carrier::Carrier, faces::Faces, material::CrackMaterial, mesh::closest};
+use crate::plugin::{
+    HitPoint,
+    carrier::{Carrier, typed},
+    faces::Faces,
+    material::CrackMaterial,
+    mesh::closest,
+};
 use bevy::{asset::UntypedAssetId, math::Affine2, prelude::*};
 use std::sync::Arc;
 
@@ -72,7 +78,7 @@ fn new_split<S: MaterialSlot>(world: &mut World, entity: Entity, carrier: &mut C
     let own = carrier.mesh.as_ref().filter(|(_, own)| *own == shown);
     let before = own.map_or_else(|| shown.clone(), |(before, _)| before.clone());
     let materials = world.get_resource::<Assets<S::Material>>()?;
-    let to_picture = materials.get(&carrier.shown.asset.clone().typed())?.uv_transform();
+    let to_picture = materials.get(&typed(&carrier.shown.asset)?)?.uv_transform();
     let mesh = world.get_resource::<Assets<Mesh>>()?.get(&before)?;
     let faces = Arc::new(Faces::of(mesh, to_picture, scale(world, entity))?);
     let (face, is_open) = known

@@ -36,7 +36,7 @@ pub(super) struct Body {
 const KEPT: usize = 256;
 
 /// No more go in a frame.
-const GOING: usize = 256;
+const GOING: usize = 64;
 
 /// Bodies of shards that are not shown any more, hidden, numbered as they came. They are kept as long as any surface is broken, up to
 /// [`KEPT`] or as many as are shown, and as they are: a piece that is shown once more has its own again if no other has taken it.
@@ -126,9 +126,9 @@ impl Body {
         }
         // Materials and their pictures are the surface's.
         (carrier.kind.undress)(&mut entity);
-        if let Some(mut visibility) = entity.get_mut::<Visibility>() {
-            *visibility = Visibility::Hidden;
-        }
+        // Who is told of that may take it away.
+        let mut visibility = world.get_mut::<Visibility>(self.entity)?;
+        *visibility = Visibility::Hidden;
         if let Some((sides, _)) = &self.sides
             && let Ok(mut sides) = world.get_entity_mut(*sides)
         {

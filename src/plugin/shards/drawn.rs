@@ -42,8 +42,13 @@ impl Active {
 
     /// How the rims of its shards look.
     pub(super) fn rim(&self, settings: &ShatterCracks) -> RimLook {
-        settings.rim.unwrap_or_else(|| rim_of(&self.preset.look))
+        rim_for(settings, &self.preset.look)
     }
+}
+
+/// How the rims of shards look.
+pub(in crate::plugin) fn rim_for(settings: &ShatterCracks, look: &Look) -> RimLook {
+    settings.rim.unwrap_or_else(|| rim_of(look))
 }
 
 fn stamp(

@@ -37,6 +37,7 @@ impl Holes {
 
     /// What lies in a rectangle, row by row: runs of texels that are all gone, or all there.
     fn for_each_run(&self, rect: TexelRect, is_gone: bool, mut run: impl FnMut(Span)) {
+        let rect = rect.intersect(TexelRect::whole(self.gone.size()));
         for y in rect.min.y..rect.max.y {
             let mut x = rect.min.x;
             for texels in self.gone.row(y as usize)[rect.min.x as usize..rect.max.x as usize].chunk_by(|a, b| a == b) {
@@ -52,7 +53,6 @@ impl Holes {
     /// Makes the holes in `rect` of the field transparent in the RGBA texels of an image of `size`, where the field lies at `origin`.
     pub(in crate::plugin) fn cut_out(&self, rgba: &mut [u8], size: UVec2, origin: UVec2, rect: TexelRect) {
         if self.is_any() {
-            let rect = rect.intersect(TexelRect::whole(self.gone.size()));
             self.for_each_run(rect, true, |span| cut_span(rgba, size, origin, span));
         }
     }

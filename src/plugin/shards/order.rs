@@ -21,6 +21,9 @@ use std::{collections::VecDeque, sync::Arc};
 /// come late: a burst stands for 0.15 s before its pieces move.
 pub(super) const MOST_NEW: usize = 256;
 
+/// The largest reach of a blow, pattern units: no surface is larger.
+const MOST_REACH: f32 = 64.0;
+
 /// What a surface is to lose, and all that was to be known of it when that was asked for.
 pub(super) struct Order {
     /// What the surface was then, see [`Active::version`].
@@ -53,8 +56,10 @@ pub(super) struct Order {
 
 /// Where the pieces come from.
 enum Pieces {
-    /// What has been cut stays cut.
+    /// What has been cut stays cut, and what held it holds it.
     Cut(Arc<Shards>, Support),
+    /// The same, but something else holds it.
+    Held(Arc<Shards>, Support),
     /// There is more to cut along: a network, and what was carried on. What it was cut into before, and what held.
     Lines(Network, Vec<Arc<[Vec<Vec2>]>>, Option<(Arc<Shards>, Support)>),
 }
@@ -120,13 +125,15 @@ impl Order {
     ) -> Result<Self, ShardsError> {
         let mut settings = world.get::<ShatterCracks>(entity).cloned().unwrap_or_default();
         let budget = world.resource::<CrackBudget>();
-        if request.everything {
+        let is_everything = request.reach == f32::INFINITY;
+        if is_everything {
             settings.cut.carry_on = true;
             settings.anchor = Anchor::Nothing;
         }
         // Fewer and larger ones, rather than some that nobody sees.
         settings.cut.max_shards =
             settings.cut.max_shards.min(u32::try_from(budget.max_shards).unwrap_or(u32::MAX).max(1));
+        request.validate()?;
         if !(0.0..=10.0).contains(&settings.thickness) {
             let value = f64::from(settings.thickness);
             let name = "thickness";
@@ -146,7 +153,8 @@ impl Order {
         let plane =
             (active.carrier.kind.plane)(world, entity, active).map_err(|reason| ShardsError::NotFlat { reason })?;
         let back = world.get::<GlobalTransform>(entity).and_then(space::to_local).unwrap_or_default();
-        let direction = plane.rotation.inverse() * back.transform_vector3(request.direction.unwrap_or(direction));
+        let direction = back.transform_vector3(space::direction(request.direction.unwrap_or(direction)));
+        let direction = plane.rotation.inverse() * space::direction(direction);
         let broken = active.broken.as_deref();
         let released = broken.map_or(0, |broken| broken.released);
         let seed = active.surface.seed;
@@ -159,12 +167,12 @@ impl Order {
             burst = burst.with_gravity(gravity);
         }
         let grown = (network.nodes().len(), network.links().len());
-        let same = |broken: &Broken| {
-            let before = &broken.settings;
-            broken.grown == grown && before.cut == settings.cut && before.anchor == settings.anchor
-        };
+        let same = |broken: &Broken| broken.grown == grown && broken.settings.cut == settings.cut;
         let pieces = match broken {
-            Some(broken) if same(broken) => Pieces::Cut(broken.cut.clone(), broken.support.clone()),
+            Some(broken) if same(broken) && broken.settings.anchor == settings.anchor => {
+                Pieces::Cut(broken.cut.clone(), broken.support.clone())
+            }
+            Some(broken) if same(broken) => Pieces::Held(broken.cut.clone(), broken.support.clone()),
             Some(Broken { cut, support, carried, .. }) => {
                 Pieces::Lines(network.clone(), carried.clone(), Some((cut.clone(), support.clone())))
             }
@@ -177,7 +185,7 @@ impl Order {
             plane,
             is_solid: active.carrier.kind.is_solid,
             from,
-            reach: request.reach,
+            reach: if is_everything { MOST_REACH } else { request.reach },
             burst,
             seed,
             grown,
@@ -200,6 +208,10 @@ impl Order {
         let is_new = matches!(self.pieces, Pieces::Lines(..));
         let (cut, mut support) = match self.pieces {
             Pieces::Cut(cut, support) => (cut, support),
+            Pieces::Held(cut, support) => {
+                let support = support.held_by(&cut, self.settings.anchor);
+                (cut, support)
+            }
             Pieces::Lines(network, carried, before) => {
                 let mut cuts = Cuts::from_network(&network)?;
                 for line in carried.iter().flat_map(|lines| lines.iter()) {

@@ -17,13 +17,30 @@ use crate::{
         surfaces::{Active, Surfaces},
         textures,
         upload::Uploads,
+        warm,
     },
     raster::TexelRect,
 };
 use bevy::{asset::UntypedHandle, prelude::*};
 
-/// Frames from a request to its shards: the same on every machine, however long they take to make.
+/// Frames from a request to its shards, at the least, where the renderer is ready to draw them: the same on every machine, however long
+/// they take to make.
 const FRAMES: u32 = 2;
+
+/// One more for so many nodes of cracks, unless frames may take any time: a frame is not to wait for the making of thousands of shards.
+const NODES: usize = 500;
+
+/// And the most.
+const MOST_FRAMES: u32 = 20;
+
+/// Frames from a request to its shards.
+fn frames(world: &World, active: &Active) -> u32 {
+    if world.resource::<CrackBudget>().is_boundless() {
+        return FRAMES;
+    }
+    let more = active.growth.network().nodes().len() / NODES;
+    (FRAMES + u32::try_from(more).unwrap_or(MOST_FRAMES)).min(MOST_FRAMES)
+}
 
 /// A surface that is to shatter.
 pub(in crate::plugin) struct Request {
@@ -31,11 +48,13 @@ pub(in crate::plugin) struct Request {
     request: ShatterRequest,
     /// Once its shards are being made, and how many frames ago that was begun.
     work: Option<(Beside<Order, Result<Made, ShardsError>>, u32)>,
+    /// How many of them it takes.
+    frames: u32,
 }
 
 impl Request {
     pub(in crate::plugin) const fn new(entity: Entity, request: ShatterRequest) -> Self {
-        Self { entity, request, work: None }
+        Self { entity, request, work: None, frames: FRAMES }
     }
 }
 
@@ -99,7 +118,8 @@ pub(in crate::plugin) fn shatter_surfaces(world: &mut World) {
                     surfaces.requests.push(request);
                     continue;
                 }
-                let outcome = match proceed(world, active, request) {
+                let is_warm = warm::can_break(world, entity, active);
+                let outcome = match proceed(world, active, request, is_warm) {
                     Ok(Progress::Wait(request)) => {
                         surfaces.requests.push(request);
                         continue;
@@ -138,16 +158,18 @@ enum Progress {
     Made(Box<Made>),
 }
 
-/// Begins to make what was asked for, waits for it, or has it.
-fn proceed(world: &World, active: &Active, mut request: Request) -> Result<Progress, ShardsError> {
+/// Begins to make what was asked for, waits for it, or has it. It is not to be had before `is_warm`.
+fn proceed(world: &World, active: &Active, mut request: Request, is_warm: bool) -> Result<Progress, ShardsError> {
     let order = |request: &Request| Order::of(world, request.entity, active, &request.request);
     let made = match request.work.take() {
         None => {
             request.work = Some((Beside::start(order(&request)?, Order::make), 1));
+            request.frames = frames(world, active);
             return Ok(Progress::Wait(request));
         }
-        Some((work, frames)) if frames < FRAMES => {
-            request.work = Some((work, frames + 1));
+        // Before the renderer can draw shards, there would be nothing to see.
+        Some((work, frames)) if frames < request.frames || !is_warm => {
+            request.work = Some((work, frames.saturating_add(1)));
             return Ok(Progress::Wait(request));
         }
         Some((work, _)) => work.finish(),
