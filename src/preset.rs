@@ -151,7 +151,7 @@ impl CrackPreset {
             courses: 0.0625,
             ..GrowthParams::DEFAULT
         },
-        profile: Profile { depth: 1.0, full_width: 0.014, wall: 0.4, rim_width: 0.003, rim_depth: 0.12, faintest: 0.0 },
+        profile: Profile { depth: 1.0, full_width: 0.006, wall: 0.4, rim_width: 0.003, rim_depth: 0.12, faintest: 0.0 },
         look: Look::BRICK,
         steps_per_second: 60.0,
         follows_lines: true,
@@ -361,7 +361,7 @@ impl CrackPreset {
             num_iterations: 400,
             ..GrowthParams::DEFAULT
         },
-        profile: Profile { depth: 1.0, full_width: 0.006, wall: 0.4, rim_width: 0.0, rim_depth: 0.0, faintest: 0.0 },
+        profile: Profile { depth: 1.0, full_width: 0.003, wall: 0.4, rim_width: 0.0, rim_depth: 0.0, faintest: 0.0 },
         look: Look::STAIN,
         steps_per_second: 60.0,
         follows_lines: false,

@@ -45,7 +45,7 @@ impl Look {
         glint: 0.5,
         relief: 0.002,
         facets: Some(Facets {
-            tone: 0.30,
+            tone: 0.24,
             tilt: 0.22,
             shift: 3.0,
             gleam: 0.75,
@@ -175,8 +175,8 @@ impl Look {
             depth: 0.004,
             rough: 0.0008,
             grain: 0.005,
-            color: [0.66, 0.62, 0.56],
-            pale: 0.65,
+            color: [0.62, 0.605, 0.58],
+            pale: 0.5,
             speckle: 0.25,
             dust: 0.12,
             chips: 0.12,
@@ -221,7 +221,7 @@ impl Look {
         ]),
         glint: 1.0,
         relief: 0.014,
-        curl: 0.10,
+        curl: 0.07,
         curl_depth: 0.12,
         facets: Some(Facets { tone: 0.08, tilt: 0.03, ..Facets::DEFAULT }),
         ..Self::GROOVE
@@ -229,10 +229,10 @@ impl Look {
 
     /// Mud: plates of different tone with curled rims, brown depth.
     pub const MUD: Self = Self {
-        curl: 0.16,
+        curl: 0.10,
         relief: 0.02,
         glint: 1.2,
-        facets: Some(Facets { tone: 0.11, tilt: 0.04, ..Facets::DEFAULT }),
+        facets: Some(Facets { tone: 0.075, tilt: 0.04, ..Facets::DEFAULT }),
         ..Self::CLAY
     };
 

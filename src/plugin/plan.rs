@@ -336,7 +336,8 @@ pub(super) struct Stretch<'a> {
     pub(super) is_twofold: bool,
 }
 
-/// Plans the pictures of a surface; `None` if they are not there yet. Beside depths, a field takes `layer` bytes a texel; `owned` bytes of the budget are its own already.
+/// Plans the pictures of a surface; `None` if they are not there yet. Beside depths, a field takes `layer` bytes a texel; `owned` bytes of the
+/// budget are its own already.
 fn plan_pictures(
     world: &World,
     surface: &CrackSurface,
