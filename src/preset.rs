@@ -134,7 +134,6 @@ impl CrackPreset {
             num_lines_grid: 28,
             num_columns_grid: 28,
             markers: MarkerLayout::PseudoGrid { occupancy: 1.0, jitter: 1.0 },
-            focus: 0.1,
             reach: 0.3,
             starts: StartLayout::Arms { count: 4 },
             line_width: 0.003,

@@ -18,7 +18,7 @@ pub const MAX_ENERGY: f32 = 16.0;
 const WIDE: f32 = 0.1;
 
 /// How much further a hit reaches, as a share, where it has next to no room.
-const MORE_REACH: f32 = 1.8;
+const MORE_REACH: f32 = 1.6;
 
 /// How many times wider the cracks of an impact are than those of one of energy 1.
 fn widening(energy: f32) -> f32 {

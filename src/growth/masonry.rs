@@ -13,7 +13,7 @@ const BRICK: f32 = 3.0;
 const THIN: f32 = 0.14;
 
 /// A hit at the border counts places there as further away by so many times what they lack of room.
-const OFF_BORDER: f32 = 2.0;
+const OFF_BORDER: f32 = 2.2;
 
 /// Places closer than this (pattern units) are one.
 const SAME: f32 = 1e-4;
