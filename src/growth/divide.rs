@@ -398,15 +398,16 @@ impl CrackGrowth {
             let (from, way) = (from - pos, to - from);
             let length_sq = way.length_squared();
             // For all axes alike, without a branch, so that they are taken at once.
-            for i in 0..AXES {
-                let (slope, across) = (axes[i].perp_dot(way), axes[i].perp_dot(from));
+            for (i, axis) in axes.iter().enumerate() {
+                let (slope, across) = (axis.perp_dot(way), axis.perp_dot(from));
                 let share = -across / slope;
-                let distance = axes[i].dot(from) + share * axes[i].dot(way);
+                let distance = axis.dot(from) + share * axis.dot(way);
                 let slant = 1.0 - slope * slope / length_sq;
+                let is_on = (0.0..=1.0).contains(&share);
                 for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
                     let sight = &mut sight[side];
                     let ahead = sign * distance;
-                    let is_nearer = (share >= 0.0) & (share <= 1.0) & (ahead >= 0.0) & (ahead < sight.distance[i]);
+                    let is_nearer = is_on & (ahead >= 0.0) & (ahead < sight.distance[i]);
                     sight.distance[i] = if is_nearer { ahead } else { sight.distance[i] };
                     sight.slant[i] = if is_nearer { slant } else { sight.slant[i] };
                 }
