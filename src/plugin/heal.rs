@@ -51,11 +51,12 @@ pub trait CrackCommandsExt {
     /// Knocks shards out of a cracked surface, along the cracks it has. Nothing happens to an entity without cracks; one
     /// that cannot shatter says so with [`ShatterFailed`](super::ShatterFailed). See [`ShatterCracks`](super::ShatterCracks).
     ///
-    /// The shards are those of this frame, and are there two frames later, and one more for each 500 nodes of cracks, up to 20, on every
-    /// machine (later only where the renderer has not made its pipelines for shards yet; with [`ShatterCracks`](super::ShatterCracks) on the
-    /// surface, it is asked to beforehand): they are made on the [`AsyncComputeTaskPool`](bevy::tasks::AsyncComputeTaskPool) meanwhile. (Two in
-    /// any case where [`CrackBudget::milliseconds`](super::CrackBudget::milliseconds) is a second or more.) Only if they are not ready then, or the surface has been
-    /// shattered or mended in between, they are made in that frame. Healing takes the request back.
+    /// The shards are those of this frame, and are there two frames later, on every machine (later only where the renderer has not made its
+    /// pipelines for shards yet; with [`ShatterCracks`](super::ShatterCracks) on the surface, it is asked to beforehand): they are made on the
+    /// [`AsyncComputeTaskPool`](bevy::tasks::AsyncComputeTaskPool) meanwhile. Only if they are not ready then, or the surface has been
+    /// shattered or mended in between, they are made in that frame. Where there are more than 500 nodes of cracks, they have one frame more
+    /// for each 500, up to 20, and no frame waits for them; with a [`CrackBudget::milliseconds`](super::CrackBudget::milliseconds) of a
+    /// second or more it is two frames there, too. Healing takes the request back.
     fn shatter_cracks(&mut self, request: ShatterRequest) -> &mut Self;
 }
 

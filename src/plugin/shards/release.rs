@@ -10,7 +10,7 @@ use super::{
 use crate::{
     plugin::{
         CrackBudget, CrackState, CrackStatus,
-        beside::Beside,
+        beside::{Beside, PATIENCE},
         error::Called,
         later::hold,
         paint::paint_now,
@@ -21,13 +21,13 @@ use crate::{
     },
     raster::TexelRect,
 };
-use bevy::{asset::UntypedHandle, prelude::*};
+use bevy::{asset::UntypedHandle, platform::time::Instant, prelude::*};
 
 /// Frames from a request to its shards, at the least, where the renderer is ready to draw them: the same on every machine, however long
 /// they take to make.
 const FRAMES: u32 = 2;
 
-/// One more for so many nodes of cracks, unless frames may take any time: a frame is not to wait for the making of thousands of shards.
+/// One more for so many nodes of cracks, unless frames may take any time; where these are more, no frame waits for them.
 const NODES: usize = 500;
 
 /// And the most.
@@ -50,11 +50,13 @@ pub(in crate::plugin) struct Request {
     work: Option<(Beside<Order, Result<Made, ShardsError>>, u32)>,
     /// How many of them it takes.
     frames: u32,
+    /// When it was begun.
+    since: Instant,
 }
 
 impl Request {
-    pub(in crate::plugin) const fn new(entity: Entity, request: ShatterRequest) -> Self {
-        Self { entity, request, work: None, frames: FRAMES }
+    pub(in crate::plugin) fn new(entity: Entity, request: ShatterRequest) -> Self {
+        Self { entity, request, work: None, frames: FRAMES, since: Instant::now() }
     }
 }
 
@@ -164,13 +166,24 @@ fn proceed(world: &World, active: &Active, mut request: Request, is_warm: bool) 
     let made = match request.work.take() {
         None => {
             request.work = Some((Beside::start(order(&request)?, Order::make), 1));
-            request.frames = frames(world, active);
+            (request.frames, request.since) = (frames(world, active), Instant::now());
             return Ok(Progress::Wait(request));
         }
         // Before the renderer can draw shards, there would be nothing to see.
         Some((work, frames)) if frames < request.frames || !is_warm => {
             request.work = Some((work, frames.saturating_add(1)));
             return Ok(Progress::Wait(request));
+        }
+        // It will take what it takes; one that no thread has begun is done here.
+        Some((work, frames)) if request.frames > FRAMES && !work.is_done() => {
+            let is_late = request.since.elapsed() >= PATIENCE;
+            match is_late.then(|| work.take_back()).flatten() {
+                Some(order) => Some(order.make()),
+                None => {
+                    request.work = Some((work, frames));
+                    return Ok(Progress::Wait(request));
+                }
+            }
         }
         Some((work, _)) => work.finish(),
     };
