@@ -192,6 +192,7 @@ fn looks<S: MaterialSlot>(world: &mut World, entity: Entity, asked: &Asked<'_>) 
         diffuse: (maps.diffuse && S::Material::MAPS.diffuse).then(|| white.clone()),
         normal: (maps.normal && S::Material::MAPS.normal).then(|| white.clone()),
         depth: (maps.depth && S::Material::MAPS.depth).then(|| white.clone()),
+        emissive: (maps.emissive && S::Material::MAPS.emissive).then(|| white.clone()),
     };
     let own = Shape::Own { has_tangents: is_solid };
     let mut cracked = now.clone();
