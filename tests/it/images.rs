@@ -1671,7 +1671,7 @@ fn t16_broken_3d_meshes_are_refused_by_name() {
         assert!(matches!(state(&app, prepared).status, CrackStatus::Failed(CrackError::Mesh { .. })), "{said}");
         assert!(app.world().get::<CrackTextures>(baked).is_none(), "{said}");
         // Without maps that need tangents it cracks.
-        let flat = CrackSurface::default().with_maps(CrackMaps { diffuse: true, normal: false, depth: false });
+        let flat = CrackSurface::default().with_maps(CrackMaps { normal: false, depth: false, ..default() });
         let flat = spawn(&mut app, mesh, flat);
         hit(&mut app, center(flat));
         settle_any(&mut app, flat);
