@@ -226,7 +226,7 @@ impl CrackGrowth {
         }
         for direction in directions {
             // Where another is too near, a little further on.
-            for turn in [0.0f32, 0.15, -0.15, 0.3, -0.3] {
+            for turn in [0.0f32, 0.15, -0.15, 0.3, -0.3, 0.5, -0.5, 0.8, -0.8] {
                 let direction = direction + direction.perp() * turn;
                 let to = pos + self.params.direct(direction).normalize_or(direction) * self.params.step_length;
                 let is_inside = to.cmpgt(Vec2::ZERO).all() && to.cmplt(self.network.extent()).all();

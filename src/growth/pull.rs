@@ -97,6 +97,15 @@ impl CrackGrowth {
             let cell = (pos / self.params.grain).as_uvec2();
             let draw = hash_unit(self.seed ^ 0x6A41, u64::from(cell.y) << 32 | u64::from(cell.x));
             stray = WITHIN_GRAIN * stray + 2.0 * draw - 1.0;
+            // What runs along the border kinks away from it.
+            let (extent, near) = (self.network.extent(), 2.0 * self.params.arrest);
+            let sides =
+                [(pos.x, Vec2::NEG_X), (extent.x - pos.x, Vec2::X), (pos.y, Vec2::NEG_Y), (extent.y - pos.y, Vec2::Y)];
+            for (distance, out) in sides {
+                if distance < near && course.dot(out).abs() < 0.5 && course.perp().dot(out) * stray > 0.0 {
+                    stray = -0.5 * stray;
+                }
+            }
         }
         (course + course.perp() * (self.params.wander * stray)).normalize_or_zero()
     }

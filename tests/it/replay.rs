@@ -268,8 +268,9 @@ fn widths_are_those_of_the_growth() {
         for step in 0..scene.growth.steps() {
             for node in timeline.born(step, step + 1) {
                 let Node { birth, parent, impact, .. } = network.nodes()[node as usize];
-                // What a hit makes at once: starts, and sprouts of the crack that it falls on.
-                let is_of_hit = network.nodes().get(parent as usize).is_none_or(|parent| parent.impact != impact);
+                // What a hit makes at once: starts with their arms, and sprouts of the crack that it falls on.
+                let parent = network.nodes().get(parent as usize);
+                let is_of_hit = parent.is_none_or(|parent| parent.impact != impact || parent.birth == birth);
                 assert!(birth == step + 1 || (birth == step && is_of_hit), "starts come a step later");
             }
         }
