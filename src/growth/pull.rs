@@ -103,7 +103,7 @@ impl CrackGrowth {
                 [(pos.x, Vec2::NEG_X), (extent.x - pos.x, Vec2::X), (pos.y, Vec2::NEG_Y), (extent.y - pos.y, Vec2::Y)];
             for (distance, out) in sides {
                 if distance < near && course.dot(out).abs() < 0.5 && course.perp().dot(out) * stray > 0.0 {
-                    stray = -0.5 * stray;
+                    stray *= -0.5;
                 }
             }
         }

@@ -11,7 +11,7 @@ use glam::Vec2;
 fn child_of(
     p: &GrowthParams,
     extent: Vec2,
-    from: Vec2,
+    (from, heading): (Vec2, Vec2),
     set: &[(f32, usize)],
     marker: impl Fn(usize) -> Vec2,
     stray: f32,
@@ -23,6 +23,14 @@ fn child_of(
         sum[1] += i64::from(towards.y as i32);
     }
     let mut direction = Vec2::new(sum[0] as f32, sum[1] as f32).normalize_or_zero();
+    if p.inertia > 0.0 && heading.dot(direction) > 0.0 {
+        direction = (direction + heading * p.inertia).normalize_or_zero();
+    }
+    if p.directed > 0.0 {
+        let axis = Vec2::new(crate::math::ops::cos(p.axis), crate::math::ops::sin(p.axis));
+        let along = axis * axis.dot(direction);
+        direction = (along + (direction - along) * (1.0 - p.directed)).normalize_or(direction);
+    }
     if p.wander > 0.0 {
         direction = (direction + direction.perp() * stray).normalize_or_zero();
     }
@@ -49,6 +57,12 @@ fn child_of(
     let (closest_sq, id) = set.iter().copied().min_by(|a, b| a.partial_cmp(b).unwrap()).unwrap();
     let distance = closest_sq.sqrt();
     if distance <= p.step_length { marker(id) } else { from + (marker(id) - from) * (p.step_length / distance) }
+}
+
+/// Where a node is, and the direction in which its crack has come there.
+fn on_its_way(nodes: &[(Vec2, u32)], node: usize) -> (Vec2, Vec2) {
+    let (pos, parent) = nodes[node];
+    (pos, nodes.get(parent as usize).map_or(Vec2::ZERO, |before| (pos - before.0).normalize_or_zero()))
 }
 
 /// All markers against all nodes, every step.
@@ -86,7 +100,7 @@ impl Reference {
         let before = self.nodes.len();
         for (node, set) in attracted.iter().enumerate().filter(|(_, set)| !set.is_empty()) {
             let stray = p.wander * (2.0 * hash_unit(self.seed ^ 0x57A6, self.nodes.len() as u64) - 1.0);
-            let to = child_of(p, self.extent, self.nodes[node].0, set, |id| self.markers[id].0, stray);
+            let to = child_of(p, self.extent, on_its_way(&self.nodes, node), set, |id| self.markers[id].0, stray);
             self.nodes.push((to, node as u32));
             self.impacts.push(self.impacts[node]);
         }
@@ -99,7 +113,11 @@ fn equals_brute_force_node_for_node() {
     let mut ended = 0;
     for case in 0..300u64 {
         let mut rng = Rng::new(case).stream("brute force");
-        let params = random_params(&mut rng, true);
+        let mut params = random_params(&mut rng, true);
+        if case % 2 == 0 {
+            params.inertia = rng.range(0.0, 6.0);
+            (params.axis, params.directed) = (3.0 * rng.signed(), if case % 4 == 0 { 0.0 } else { rng.unit() });
+        }
         let extent = random_extent(&mut rng);
         let mut growth = CrackGrowth::new(params.clone(), extent, case).unwrap();
         let mut reference =
@@ -228,7 +246,7 @@ impl ClosedReference {
         }
         let before = self.nodes.len();
         for (node, set) in attracted.iter().enumerate().filter(|(_, set)| !set.is_empty()) {
-            let to = child_of(&p, self.extent, self.nodes[node].0, set, |id| self.markers[id].pos, 0.0);
+            let to = child_of(&p, self.extent, on_its_way(&self.nodes, node), set, |id| self.markers[id].pos, 0.0);
             self.nodes.push((to, node as u32));
         }
         self.look();
@@ -251,6 +269,8 @@ fn closed_venation_equals_brute_force() {
             starts: if rng.unit() < 0.5 { StartLayout::Point } else { StartLayout::Points { count: 5 } },
             reach: 1.0,
             wander: 0.0,
+            inertia: if case % 2 == 0 { 0.0 } else { rng.range(0.0, 6.0) },
+            directed: if case % 3 == 0 { 0.0 } else { rng.unit() },
             num_iterations: 100_000,
             ..GrowthParams::DEFAULT
         };
