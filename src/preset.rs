@@ -205,7 +205,7 @@ impl CrackPreset {
             markers: MarkerLayout::PseudoGrid { occupancy: 1.0, jitter: 0.9 },
             venation: Venation::Dividing,
             focus: 0.55,
-            front: 0.012,
+            front: 0.008,
             reach: 64.0,
             line_width: 0.0026,
             tip_taper: 0.0,
@@ -216,7 +216,7 @@ impl CrackPreset {
             wander: 0.1,
             roughness: 0.02,
             arrest: 0.02,
-            nucleation: 64.0,
+            nucleation: 31.0,
             max_nodes: 40_000,
             ..GrowthParams::DEFAULT
         },
