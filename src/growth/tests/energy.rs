@@ -155,6 +155,7 @@ fn always_ends_with_the_rules_of_the_presets() {
         }
         params.wander = (params.wander * by()).min(1.0);
         params.inertia = params.inertia.min(8.0);
+        params.nucleation = params.nucleation.min(64.0);
         params.forks = (params.forks * by()).min(1.0);
         params.fork_angle = (params.fork_angle * by()).clamp(0.2, 1.6);
         params.crack_radius = params.crack_radius.max(params.kill_distance);

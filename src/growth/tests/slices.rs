@@ -116,6 +116,7 @@ fn darts_are_those_of_all_pairs() {
             }
             let seed = mix(case ^ mix(growth.impacts().len() as u64 | 1 << 40));
             growth.hit(pos, 1.0);
+            let reach = growth.reach_of(growth.impacts().len() as u32 - 1);
             others.extend(growth.network().nodes().iter().map(|node| (node.pos, false)));
             let side = spacing * std::f32::consts::FRAC_1_SQRT_2;
             let [columns, rows] = (extent / side).ceil().as_uvec2().to_array();
@@ -125,7 +126,7 @@ fn darts_are_those_of_all_pairs() {
             {
                 let dart = mix(seed ^ (u64::from(y) << 32 | u64::from(x))).wrapping_add(round);
                 let place = (Vec2::new(x as f32, y as f32) + Vec2::new(hash_unit(dart, 1), hash_unit(dart, 2))) * side;
-                let is_on = place.cmple(extent).all() && place.distance(pos) < params.reach;
+                let is_on = place.cmple(extent).all() && place.distance(pos) < reach;
                 let limit = spacing * spacing;
                 let is_near = |&(other, is_marker): &(Vec2, bool)| {
                     let distance_sq = other.distance_squared(place);
