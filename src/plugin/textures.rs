@@ -31,6 +31,7 @@ pub struct CrackTextures {
     #[reflect(skip_serializing)]
     pub depth: Option<Handle<Image>>,
     /// The light that cracks give off, `Rgba8UnormSrgb`, black where there is none.
+    #[reflect(skip_serializing)]
     pub emissive: Option<Handle<Image>>,
 }
 

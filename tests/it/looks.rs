@@ -102,7 +102,7 @@ fn cracks_that_glow_write_an_emissive_map_and_heal() {
     let preset = CrackPreset { look: Look::GLOWING, ..CrackPreset::CONCRETE };
     let wall = (Mesh3d(mesh), MeshMaterial3d(material.clone()));
     let entity = app.world_mut().spawn((wall, CrackSurface::new(preset).with_maps(maps))).id();
-    hit(&mut app, center(entity));
+    hit(&mut app, center(entity).with_energy(4.0));
     settle(&mut app, entity);
     let emissive = get::<CrackTextures>(&app, entity).emissive.expect("an emissive map");
     let light = texels(&app, &emissive);

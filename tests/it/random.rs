@@ -126,6 +126,8 @@ struct Known {
     carrier: Carrier,
     is_good: bool,
     is_surface: bool,
+    /// Whether a hit was sent in this frame: it lands at the end of it, whatever is healed before.
+    is_struck: bool,
     shown: Shown,
     expect: Expect,
 }
@@ -140,7 +142,7 @@ impl Known {
         self.expect = match self.expect {
             _ if !self.is_surface => self.expect,
             Expect::Whole | Expect::Failed if self.is_sound() => Expect::Cracked,
-            Expect::Whole if !self.is_good => Expect::Failed,
+            Expect::Whole if !self.is_good && self.carrier.is_sound() => Expect::Failed,
             Expect::Whole => Expect::Anything,
             other => other,
         };
@@ -248,6 +250,9 @@ impl Game {
     }
 
     fn spawn(&mut self, slot: u8, carrier: Carrier, shows: Show) -> Known {
+        // The engine itself ends over pictures that it cannot upload.
+        let is_drawn = !self.targets.is_empty();
+        let shows = if is_drawn && !matches!(shows, Show::Good(_)) { Show::NoData } else { shows };
         let image = add(&mut self.app, show(shows));
         let at = Transform::from_xyz(f32::from(slot) * 3.0 - 36.0, 0.0, 0.0);
         let sprite = Sprite::from_image(image.clone());
@@ -290,7 +295,7 @@ impl Game {
             }
         };
         let is_good = matches!(shows, Show::Good(_));
-        Known { entity, carrier, is_good, is_surface: false, shown, expect: Expect::Whole }
+        Known { entity, carrier, is_good, is_surface: false, is_struck: false, shown, expect: Expect::Whole }
     }
 
     fn send(&mut self, hit: CrackHit) {
@@ -345,6 +350,7 @@ impl Game {
         match op {
             Op::Hit { uv, energy, .. } => {
                 self.send(CrackHit::uv(entity, uv.into()).with_energy(energy));
+                known.is_struck = true;
                 let [u, v] = uv;
                 let is_inside = (0.02..=0.98).contains(&u) && (0.02..=0.98).contains(&v);
                 if is_inside && energy.is_finite() && energy > 0.0 {
@@ -357,6 +363,7 @@ impl Game {
             }
             Op::HitWorld { at, energy, .. } => {
                 self.send(CrackHit::world(entity, at.into()).with_energy(energy));
+                known.is_struck = true;
                 known.expect = if known.is_surface { Expect::Anything } else { known.expect };
                 return true;
             }
@@ -371,7 +378,8 @@ impl Game {
             }
             Op::RemoveSurface(_) => {
                 commands.remove::<CrackSurface>();
-                (known.is_surface, known.expect) = (false, Expect::Whole);
+                (known.is_surface, known.expect) =
+                    (false, if known.is_struck { Expect::Anything } else { Expect::Whole });
             }
             Op::InsertSurface { preset, seed, .. } => {
                 commands.insert(surface_of(preset, seed));
@@ -379,7 +387,7 @@ impl Game {
             }
             Op::Heal(_) => {
                 commands.heal_cracks();
-                known.expect = Expect::Whole;
+                known.expect = if known.is_struck { Expect::Anything } else { Expect::Whole };
             }
             Op::Close { seconds, .. } => {
                 commands.close_cracks(seconds);
@@ -457,7 +465,9 @@ impl Game {
                     sprite.image = image.clone();
                     // Where it was good before, it is good now: cracks stay.
                     known.shown = Shown::Image(image);
-                    if !known.is_good && known.carrier.is_sound() {
+                    if !known.is_good {
+                        // Good or not, by what was wrong with it.
+                        known.carrier = Carrier::Tiled;
                         known.expect = if known.expect == Expect::Whole { Expect::Whole } else { Expect::Anything };
                     }
                 }
@@ -505,7 +515,7 @@ impl Game {
                 if let Some(old) = self.model.slots.remove(&to) {
                     self.app.world_mut().despawn(old.entity);
                 }
-                let known = Known { entity, carrier, is_good, is_surface, shown, expect };
+                let known = Known { entity, carrier, is_good, is_surface, is_struck: false, shown, expect };
                 self.model.slots.insert(to, known);
             }
             Op::CrackShard(number) | Op::DespawnShard(number) => {
@@ -587,6 +597,7 @@ impl Game {
     fn frame(&mut self) {
         self.app.update();
         self.check();
+        self.model.slots.values_mut().for_each(|known| known.is_struck = false);
     }
 
     /// Waits until everything that is to crack has cracked.

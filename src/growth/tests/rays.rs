@@ -141,8 +141,12 @@ fn rays_start_all_around() {
             }
         }
         angles.sort_by(f32::total_cmp);
-        let around =
-            angles.iter().cycle().skip(1).zip(&angles).map(|(next, angle)| (next - angle).rem_euclid(6.283_185));
+        let around = angles
+            .iter()
+            .cycle()
+            .skip(1)
+            .zip(&angles)
+            .map(|(next, angle)| (next - angle).rem_euclid(std::f32::consts::TAU));
         let gaps: Vec<f32> = around.map(f32::to_degrees).collect();
         assert!((10..=16).contains(&gaps.len()), "{} rays start at the hit", gaps.len());
         let (least, most) =
