@@ -334,9 +334,14 @@ fn i7_a_hundred_surfaces_show_it_on_the_gpu() {
 fn i8_a_thousand_surfaces_grow_at_once_and_in_turns() {
     let mut app = app();
     let image = add(&mut app, picture(UVec2::splat(32)));
-    let surfaces: Vec<_> = (0..1000).map(|seed| spawn_small(&mut app, &image, seed)).collect();
+    let surfaces: Vec<_> = (0..1000)
+        .map(|seed| {
+            let surface = CrackSurface::default().with_seed(seed);
+            app.world_mut().spawn((Sprite::from_image(image.clone()), surface)).id()
+        })
+        .collect();
     for entity in &surfaces {
-        hit(&mut app, center(*entity).with_energy(4.0));
+        hit(&mut app, center(*entity));
     }
     step(&mut app);
     let all_grow = surfaces.iter().all(|entity| state(&app, *entity).status == CrackStatus::Growing);

@@ -406,7 +406,8 @@ impl Game {
                 let is_sane = scale.iter().all(|side| (0.2..=5.0).contains(&side.abs()));
                 if !is_sane && known.is_surface {
                     known.expect = Expect::Anything;
-                    known.is_good = false;
+                    // A hit by texture coordinates may crack it all the same.
+                    known.carrier = Carrier::Tiled;
                 }
             }
             Op::Parent { parent, .. } => {
