@@ -487,7 +487,7 @@ mod tests {
             while !is_made(&app) {
                 std::thread::yield_now();
             }
-            (0..2).for_each(|_| app.update());
+            (0..22).for_each(|_| app.update());
             assert!(app.world().get::<CrackShards>(entity).is_some_and(|told| told.shown > shown));
             let active = &app.world().resource::<Surfaces>().active[&entity];
             assert_eq!(painted(&app), before, "a whole frame's painting");
