@@ -77,7 +77,8 @@ impl Faces {
     /// picture repeats on them, or there are too many triangles.
     pub(super) fn of(mesh: &Mesh, to_picture: Affine2, scale: Vec3) -> Option<Self> {
         let triangles = Triangles::of(mesh).ok()?;
-        if triangles.len() > MOST_TRIANGLES || !(to_picture.matrix2.determinant().abs() > 1e-6) {
+        let area = to_picture.matrix2.determinant().abs();
+        if triangles.len() > MOST_TRIANGLES || area.is_nan() || area <= 1e-6 {
             return None;
         }
         let solid = BoxShape::of(&triangles);
@@ -201,7 +202,8 @@ impl BoxShape {
         let size = (self.max - self.min) * scale.abs();
         let axis = (0..3).min_by(|a, b| size[*a].total_cmp(&size[*b]))?;
         let [a, b] = across(axis);
-        if !(size[axis] <= SLAB * size[a].min(size[b])) {
+        let thickest = SLAB * size[a].min(size[b]);
+        if size[axis].is_nan() || thickest.is_nan() || size[axis] > thickest {
             return None;
         }
         let is_broad = |face: &u32| (*face / 2) as usize == axis;
