@@ -96,7 +96,7 @@ impl CrackGrowth {
     /// while growth.lay_out(4096) {
     ///     slices += 1;
     /// }
-    /// assert!(slices > 100);
+    /// assert!(slices > 4);
     /// # Ok::<(), bevy_crack::growth::ParamError>(())
     /// ```
     pub fn begin_hit(&mut self, pos: Vec2, energy: f32) -> HitOutcome {
