@@ -4,6 +4,9 @@
 //! markers lie still, sorted by the cells of a uniform grid, and remember their nearest node; a newborn node looks once at
 //! the markers within its reach and wins those that it is nearest to.
 
+mod settle;
+
+use self::settle::Settling;
 use super::{
     GrowthParams,
     closed::{Bond, Relations},
@@ -72,6 +75,8 @@ pub(super) struct MarkerField {
     pub(super) relations: Option<Relations>,
     /// Markers that lie in no cell yet.
     newborn: Vec<Newborn>,
+    /// Newborn markers that have not all found their places.
+    settling: Option<Box<Settling>>,
     cells: UVec2,
     /// Cells per pattern unit.
     per_unit: Vec2,
@@ -102,6 +107,7 @@ impl MarkerField {
             ray_of: Vec::new(),
             relations: (params.venation == Venation::Closed).then(|| Relations::new(params)),
             newborn: Vec::new(),
+            settling: None,
             cells: UVec2::ONE,
             per_unit: extent.recip(),
             first: vec![0, 0],
@@ -146,14 +152,24 @@ impl MarkerField {
     /// Empties the field of its settled markers and returns the living.
     fn take_living(&mut self) -> Vec<Newborn> {
         let living = (0..self.x.len()).filter(|&i| self.near_sq[i] > DEAD);
-        let marker = |i: usize| Newborn {
+        let living = living.map(|i| self.marker_at(i)).collect();
+        self.clear();
+        living
+    }
+
+    /// A settled marker as one that has not settled.
+    fn marker_at(&self, i: usize) -> Newborn {
+        Newborn {
             pos: Vec2::new(self.x[i], self.y[i]),
             id: self.id[i],
             loyal: self.loyal[i],
             given_up: self.given_up[i],
             near_sq: if self.divides { self.near_sq[i] } else { f32::INFINITY },
-        };
-        let living = living.map(marker).collect();
+        }
+    }
+
+    /// Empties the field of its settled markers.
+    fn clear(&mut self) {
         for plane in [&mut self.x, &mut self.y, &mut self.near_sq] {
             plane.clear();
         }
@@ -163,7 +179,6 @@ impl MarkerField {
         self.given_up.clear();
         self.active.clear();
         self.first.fill(0);
-        living
     }
 
     pub(super) fn add(&mut self, pos: Vec2, loyal: u32, relieved: f32) {
@@ -176,83 +191,11 @@ impl MarkerField {
         }
     }
 
-    /// Gets memory ready for the markers that were added, so that no step pauses to do it.
-    pub(super) fn reserve(&mut self) {
-        let n = self.x.len() + self.newborn.len() + LANES;
-        for plane in [&mut self.x, &mut self.y, &mut self.near_sq] {
-            get_ready(plane, n);
-        }
-        for plane in [&mut self.node, &mut self.id, &mut self.loyal] {
-            get_ready(plane, n);
-        }
-        get_ready(&mut self.given_up, n);
-    }
-
     #[inline]
     pub(super) fn marker(&self, index: u32) -> Marker {
         let i = index as usize;
         let pos = Vec2::new(self.x[i], self.y[i]);
         Marker { pos, id: self.id[i] }
-    }
-
-    /// Takes up the newborn markers: forgets the dead, sorts all into cells, and lets every node win what it is nearest to.
-    pub(super) fn settle(&mut self, nodes: &[Node], grid: &NodeGrid) {
-        if self.newborn.is_empty() {
-            return;
-        }
-        let mut all = self.take_living();
-        if all.is_empty() {
-            // Not copied: a first hit makes thousands.
-            all = std::mem::take(&mut self.newborn);
-        } else {
-            all.append(&mut self.newborn);
-        }
-        // Cells of half the radius, but with a few markers to each.
-        let per_cell = (self.extent.x * self.extent.y * 3.0 / all.len() as f32).sqrt();
-        let side = (0.5 * self.radius).max(per_cell).max(self.extent.max_element() / 1024.0);
-        self.cells = (self.extent / side).ceil().as_uvec2().max(UVec2::ONE);
-        self.per_unit = self.cells.as_vec2() / self.extent;
-        // Counting sort; stable, so the markers of a cell stay in order.
-        let n_cells = self.cells.x as usize * self.cells.y as usize;
-        self.first.clear();
-        self.first.resize(n_cells + 1, 0);
-        let homes: Vec<u32> = all.iter().map(|marker| self.cell_of(marker.pos) as u32).collect();
-        for &home in &homes {
-            self.first[home as usize + 1] += 1;
-        }
-        for cell in 0..n_cells {
-            self.first[cell + 1] += self.first[cell];
-        }
-        let mut next = self.first.clone();
-        let padded = all.len() + LANES;
-        self.x.resize(padded, 0.0);
-        self.y.resize(padded, 0.0);
-        self.id.resize(padded, 0);
-        self.loyal.resize(padded, ANY_IMPACT);
-        self.given_up.resize(padded, 0);
-        self.node.resize(padded, NO_NODE);
-        self.near_sq.resize(all.len(), self.radius * self.radius);
-        self.near_sq.resize(padded, DEAD);
-        for (Newborn { pos, id, loyal, given_up, near_sq }, home) in all.into_iter().zip(homes) {
-            let slot = &mut next[home as usize];
-            let i = *slot as usize;
-            *slot += 1;
-            (self.x[i], self.y[i], self.id[i], self.loyal[i]) = (pos.x, pos.y, id, loyal);
-            self.given_up[i] = given_up;
-            self.near_sq[i] = self.near_sq[i].min(near_sq);
-        }
-        if let Some(relations) = &self.relations {
-            // These have looked at all nodes already.
-            for i in 0..self.x.len() - LANES {
-                if let Some(&node) = relations.neighbours(self.id[i]).first() {
-                    self.node[i] = node;
-                    self.active.push(i as u32);
-                }
-            }
-        }
-        for index in 0..nodes.len() as u32 {
-            self.visit(index, nodes, grid);
-        }
     }
 
     fn cell_at(&self, pos: Vec2) -> UVec2 {
@@ -479,6 +422,11 @@ impl MarkerField {
         self.killed += 1;
     }
 
+    /// Whether newborn markers have begun to settle, and not all have found their places.
+    pub(super) const fn is_settling(&self) -> bool {
+        self.settling.is_some()
+    }
+
     /// Markers in the cells, with those that died since the last [`settle`](Self::settle).
     pub(super) fn made_settled(&self) -> usize {
         self.x.len().saturating_sub(LANES)
@@ -487,7 +435,8 @@ impl MarkerField {
     /// Markers that are alive, and how many of them attract a node.
     pub(super) fn living(&self) -> (u32, u32) {
         let alive = self.near_sq.iter().zip(&self.node).filter(|(near_sq, _)| **near_sq > DEAD);
-        let (mut living, mut attracting) = (self.newborn.len() as u32, 0);
+        let in_hand = self.settling.as_ref().map_or(0, |settling| settling.in_hand());
+        let (mut living, mut attracting) = ((self.newborn.len() + in_hand) as u32, 0);
         for (_, node) in alive {
             living += 1;
             attracting += u32::from(*node != NO_NODE);

@@ -21,6 +21,8 @@ pub(super) struct Layout {
     cursor: Cursor,
     darts: Option<Box<Darts>>,
     stress: Option<Stress>,
+    /// The next of what gets room for what will grow, once all markers are there.
+    room: Option<u32>,
 }
 
 /// How far from all that relieves it the surface is, around a hit whose cracks divide domains.
@@ -52,6 +54,26 @@ pub(super) struct Cursor {
 }
 
 impl Cursor {
+    /// A slice of so many places.
+    pub(super) fn of(places: u32) -> Self {
+        Self { left: places, ..Self::default() }
+    }
+
+    /// Goes on from where another slice has ended.
+    pub(super) const fn go_on(&mut self, from: &Self) {
+        self.next = from.next;
+    }
+
+    /// Back to the first.
+    pub(super) const fn rewind(&mut self) {
+        self.next = 0;
+    }
+
+    /// Whether the slice has no room for more.
+    pub(super) const fn is_spent(&self) -> bool {
+        self.left == 0
+    }
+
     /// The next of `all`, as many as the slice has room for at `cost` places each, one at least.
     pub(super) fn slice(&mut self, all: u64, cost: u32) -> Range<u64> {
         let first = self.next.min(all);
@@ -226,6 +248,12 @@ impl Keeper<'_> {
 /// The fewest nodes that a layout makes room for.
 const FEW_NODES: usize = 64;
 
+/// For more than so many markers are given room in good time.
+const MANY_NODES: usize = 4096;
+
+/// Room for so many nodes costs as much as a place.
+const ROOM: u32 = 16;
+
 impl CrackGrowth {
     /// Prepares the layout of an impact for `region`.
     pub(super) fn begin_layout(&mut self, region: Region, (impact, loyal): (u32, u32), seed: u64) {
@@ -241,7 +269,8 @@ impl CrackGrowth {
             let others = (self.field.made_settled(), self.network.nodes.len());
             darts = Some(Box::new(Darts::new(&region, spacing, self.mask.is_empty(), others)));
         }
-        self.layout = Some(Box::new(Layout { region, seed, loyal, cursor: Cursor::default(), darts, stress }));
+        self.layout =
+            Some(Box::new(Layout { region, seed, loyal, cursor: Cursor::default(), darts, stress, room: None }));
     }
 
     /// Goes on laying out the markers of a hit that was [begun](Self::begin_hit), at up to about `places` places. Returns whether some are left.
@@ -249,8 +278,18 @@ impl CrackGrowth {
     /// Where markers come to lie does not depend on the slices. Whatever else is asked of the growth does what is left first.
     pub fn lay_out(&mut self, places: u32) -> bool {
         let Some(mut layout) = self.layout.take() else { return false };
-        let Layout { region, seed, loyal, cursor, darts, stress } = &mut *layout;
-        cursor.left = places;
+        layout.cursor.left = places;
+        if layout.room.is_none() && self.lay_out_markers(&mut layout) {
+            layout.room = Some(0);
+        }
+        let is_left = !layout.room.as_mut().is_some_and(|room| self.make_room(room, &mut layout.cursor));
+        self.layout = is_left.then_some(layout);
+        is_left
+    }
+
+    /// Lays out markers as far as the slice goes. Returns whether those were the last ones.
+    fn lay_out_markers(&mut self, layout: &mut Layout) -> bool {
+        let Layout { region, seed, loyal, cursor, darts, stress, .. } = layout;
         if let Some(darts) = darts {
             let (count, markers) = (darts.others.len().min(cursor.left as usize), darts.index.markers);
             for _ in 0..count {
@@ -262,8 +301,7 @@ impl CrackGrowth {
             }
             cursor.left -= count as u32;
             if !darts.others.is_empty() {
-                self.layout = Some(layout);
-                return true;
+                return false;
             }
         }
         let GrowthParams { draw_markers, line_width, .. } = self.params;
@@ -277,26 +315,39 @@ impl CrackGrowth {
         let wishes = (self.density.as_ref(), &*self.mask);
         // A full field takes none of those that are left.
         let is_full = keeper.field.living_at_most() >= MAX_MARKERS;
-        if !is_full && !markers::lay_out(&self.params, *region, wishes, *seed, cursor, &mut keeper) {
-            self.layout = Some(layout);
-            return true;
-        }
-        // A large growth makes about two nodes a marker: room for them now, so that no step pauses to move them all.
-        let expected = (2 * self.field.living_at_most()).max(FEW_NODES).min(self.room());
-        if expected > 4096 {
-            self.field.reserve();
-        }
-        self.network.nodes.reserve(expected);
-        self.nodes.reserve(expected);
-        self.widths.reserve(expected);
-        self.pull_of.reserve(expected);
-        self.courses.reserve(expected);
-        self.changes.reserve(expected);
-        self.timeline.reserve(expected);
-        if let Some(arrest) = &mut self.arrest {
-            arrest.reserve(expected);
+        is_full || markers::lay_out(&self.params, *region, wishes, *seed, cursor, &mut keeper)
+    }
+
+    /// A large growth makes about two nodes a marker: room for them now, one kind after the other, so that no step pauses to move them
+    /// all. Returns whether there is room for all.
+    fn make_room(&mut self, next: &mut u32, cursor: &mut Cursor) -> bool {
+        let more = (2 * self.field.living_at_most()).max(FEW_NODES).min(self.room());
+        while cursor.left > 0 {
+            match *next {
+                0 if more > MANY_NODES => self.field.reserve(),
+                1 => self.network.nodes.reserve(more),
+                2 => self.nodes.reserve(more),
+                3 => self.widths.reserve(more),
+                4 => self.pull_of.reserve(more),
+                5 => self.courses.reserve(more),
+                6 => self.changes.reserve(more),
+                7 => self.timeline.reserve(more),
+                8 => self.arrest.iter_mut().for_each(|arrest| arrest.reserve(more)),
+                0 => {}
+                _ => return true,
+            }
+            *next += 1;
+            cursor.left = cursor.left.saturating_sub(more as u32 / ROOM);
         }
         false
+    }
+
+    /// Takes up the markers of hits, up to about so many of them, before the next [`step`](Self::step), which takes up all that are left. Returns
+    /// whether it has only to grow.
+    ///
+    /// What grows does not depend on the slices.
+    pub fn prepare_step(&mut self, markers: u32) -> bool {
+        !self.lay_out(markers) && self.field.settle_some(&self.network.nodes, &self.nodes, markers)
     }
 
     /// Whether markers of a hit are still to be laid out.
@@ -305,8 +356,11 @@ impl CrackGrowth {
         self.layout.is_some()
     }
 
-    /// Lays out what is left.
+    /// Lays out what is left, and has it settle if it has begun to.
     pub(super) fn finish_layout(&mut self) {
         while self.lay_out(1 << 16) {}
+        if self.field.is_settling() {
+            self.field.settle(&self.network.nodes, &self.nodes);
+        }
     }
 }

@@ -29,6 +29,10 @@ const WIDER: f32 = 2.5;
 /// A border nearer than this (pattern units) gets fewer rays.
 const NEAR: f32 = 0.3;
 
+/// And a hit has fewer of them where there is less room for them: by this power of it. As many fewer as there is less room would be hard to
+/// see in a corner.
+const FEWER: f32 = 0.35;
+
 /// Length of the first straight run of a ray, pattern units; the others are longer and longer.
 const FIRST_RUN: f32 = 0.03;
 const RUN_GROWTH: f32 = 1.5;
@@ -340,7 +344,7 @@ fn directions(blow: Blow, extent: Vec2, count: f32, jitter: f32, rng: &mut Rng) 
     if all <= 0.0 {
         return Vec::new();
     }
-    let count = (count * ops::powf(all / BINS as f32, 0.6)).round().clamp(2.0, 360.0) as usize;
+    let count = (count * ops::powf(all / BINS as f32, FEWER)).round().clamp(2.0, 360.0) as usize;
     let turn = rng.unit();
     let mut angles: Vec<f32> = (0..count)
         .map(|i| {

@@ -27,7 +27,7 @@ const MAX_OTHERS: usize = 16;
 const MAX_LOOKS: usize = 64;
 
 /// Places for markers that a hit looks at between two looks at the clock.
-const SLICE: u32 = 4096;
+const SLICE: u32 = 1024;
 
 /// The largest depth of parallax that still looks like depth, in units of the texture.
 const MAX_PARALLAX: f32 = 0.1;
@@ -115,24 +115,30 @@ fn make_others(world: &mut World) {
 
 /// Applies the first hit of the surface in turn, which is ready.
 fn apply_next(world: &mut World, entity: Entity, timer: &Timer) {
-    world.resource_scope(|world, mut queue: Mut<HitQueue>| {
-        let mut stats = *world.resource::<CrackStats>();
-        if let Some(hit) = queue.take(&mut stats) {
-            match apply(world, entity, hit, timer) {
-                Ok(HitOutcome::Started(_)) => stats.applied += 1,
-                Ok(HitOutcome::Merged(_)) => stats.merged += 1,
-                Ok(HitOutcome::Nothing) => stats.ignored += 1,
-                Ok(HitOutcome::Rejected(reason)) => {
-                    queue.reject(&Called::of(world, entity), &reason.to_string(), &mut stats);
-                }
-                Err(reason) => queue.reject(&Called::of(world, entity), reason, &mut stats),
-            }
-        }
-        *world.resource_mut::<CrackStats>() = stats;
-    });
+    let hit = with_queue(world, |_, queue, stats| queue.take(stats));
+    if let Some(hit) = hit {
+        let outcome = apply(world, entity, hit, timer);
+        with_queue(world, |world, queue, stats| match outcome {
+            Ok(HitOutcome::Started(_)) => stats.applied += 1,
+            Ok(HitOutcome::Merged(_)) => stats.merged += 1,
+            Ok(HitOutcome::Nothing) => stats.ignored += 1,
+            Ok(HitOutcome::Rejected(reason)) => queue.reject(&Called::of(world, entity), &reason.to_string(), stats),
+            Err(reason) => queue.reject(&Called::of(world, entity), reason, stats),
+        });
+    }
     if world.get::<CrackState>(entity).is_some_and(|state| state.status == CrackStatus::Waiting) {
         set_status(world, entity, CrackStatus::Untouched);
     }
+}
+
+/// Works on the queue and its counts. Nothing of a game runs meanwhile: whatever it does finds the queue in the world.
+fn with_queue<T>(world: &mut World, work: impl FnOnce(&World, &mut HitQueue, &mut CrackStats) -> T) -> T {
+    world.resource_scope(|world, mut queue: Mut<HitQueue>| {
+        let mut stats = *world.resource::<CrackStats>();
+        let result = work(world, &mut queue, &mut stats);
+        *world.resource_mut::<CrackStats>() = stats;
+        result
+    })
 }
 
 /// Whether the first hit of a surface without cracks is to be refused for where it lands. If not, the hit knows its place from then on: it
@@ -224,9 +230,7 @@ pub(super) fn set_status(world: &mut World, entity: Entity, status: CrackStatus)
 /// Gives up a surface: refuses its hits and says why, once for each cause.
 pub(super) fn fail(world: &mut World, entity: Entity, error: CrackError) {
     prepare::cancel(world, entity);
-    world.resource_scope(|world, mut queue: Mut<HitQueue>| {
-        queue.purge(entity, &mut world.resource_mut::<CrackStats>());
-    });
+    with_queue(world, |_, queue, stats| queue.purge(entity, stats));
     let status = CrackStatus::Failed(error.clone());
     let Some(mut state) = world.get_mut::<CrackState>(entity) else { return };
     if state.status != status {

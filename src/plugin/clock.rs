@@ -90,6 +90,9 @@ const MAX_DUE: f64 = 64.0;
 /// paint many steps at once costs half as much as to paint each, but is seen to jump.
 const MAX_LATE: f64 = 4.0;
 
+/// Markers that are taken up between two looks at the frame's clock.
+const SLICE: u32 = 8192;
+
 /// The most steps a second that baked cracks appear in.
 const MOST_STEPS: f64 = 1e6;
 
@@ -211,9 +214,9 @@ impl Active {
         is_due && self.growth.is_growing() && !self.growth.is_laying_out()
     }
 
-    /// Makes a step of growth if one is due.
+    /// Makes a step of growth if one is due and the markers of the last hits have been taken up, which may need more than one turn.
     pub(super) fn step_if_due(&mut self) -> bool {
-        if !self.is_due() {
+        if !self.is_due() || !self.growth.prepare_step(SLICE) {
             return false;
         }
         self.due = (self.due - 1.0).max(0.0);

@@ -39,8 +39,9 @@ pub trait CrackCommandsExt {
     fn prepare_cracks(&mut self) -> &mut Self;
 
     /// Takes all cracks away, those of [`GuidedCracks`](super::GuidedCracks) too, and all shards and holes: the surface shows its
-    /// own pictures again, its textures and its growth are dropped, hits
-    /// that wait on it are refused. Does nothing on entities without cracks.
+    /// own pictures again, its textures and its growth are dropped. Hits that wait on it are refused, and so are those that were triggered
+    /// before it in the same frame; those written as messages are read at the end of the frame, and crack it anew. Does nothing on entities
+    /// without cracks.
     fn heal_cracks(&mut self) -> &mut Self;
 
     /// Closes all cracks within so many seconds: they run back the way they came, whatever a [`CrackClock`](super::CrackClock)
@@ -79,7 +80,10 @@ impl CrackCommandsExt for EntityCommands<'_> {
 
     fn close_cracks(&mut self, seconds: f32) -> &mut Self {
         let entity = self.id();
-        self.commands().queue(move |world: &mut World| when_free(world, move |world| close(world, entity, seconds)));
+        self.commands().queue(move |world: &mut World| {
+            purge(world, entity);
+            when_free(world, move |world| close(world, entity, seconds));
+        });
         self
     }
 
@@ -97,7 +101,6 @@ impl CrackCommandsExt for EntityCommands<'_> {
 }
 
 fn close(world: &mut World, entity: Entity, seconds: f32) {
-    purge(world, entity);
     bake::cancel(world, entity);
     let is_closing = world.get_resource_mut::<Surfaces>().is_some_and(|mut surfaces| {
         let is_closing = surfaces.active.get_mut(&entity).is_some_and(|active| active.close(seconds));
@@ -111,13 +114,13 @@ fn close(world: &mut World, entity: Entity, seconds: f32) {
 }
 
 fn heal(world: &mut World, entity: Entity) {
-    // At once, wherever the list of bakes is.
+    // At once, wherever the list of bakes is; hits that come after this stay.
     bake::cancel(world, entity);
+    purge(world, entity);
     when_free(world, move |world| heal_now(world, entity));
 }
 
 fn heal_now(world: &mut World, entity: Entity) {
-    purge(world, entity);
     forget(world, entity);
     if let Some(mut state) = world.get_mut::<CrackState>(entity) {
         state.set_if_neq(CrackState::default());

@@ -42,6 +42,7 @@ impl<'a> Triangles<'a> {
     }
 
     /// Number of vertices.
+    #[cfg(feature = "3d")]
     pub(super) fn vertices(&self) -> usize {
         self.positions.len()
     }

@@ -75,8 +75,13 @@ impl HitQueue {
         }
     }
 
-    /// Drops all hits that wait on a surface; they count as refused.
+    /// Drops all hits that wait on a surface, those of this frame's events too; they count as refused.
     pub(super) fn purge(&mut self, entity: Entity, stats: &mut CrackStats) {
+        let before = self.inbox.len();
+        self.inbox.retain(|hit| hit.entity != entity);
+        let dropped = (before - self.inbox.len()) as u64;
+        stats.sent += dropped;
+        stats.rejected += dropped;
         if let Some(hits) = self.hits.remove(&entity) {
             stats.queued -= hits.len() as u64;
             stats.rejected += hits.len() as u64;

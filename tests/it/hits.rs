@@ -605,3 +605,30 @@ fn warnings_call_a_surface_by_its_name() {
         assert!(heard.iter().any(|warning| warning.contains(&expected)), "{expected}: {heard:?}");
     }
 }
+
+#[test]
+fn i12_healing_takes_back_the_hits_of_its_frame_that_came_before_it() {
+    let mut app = app();
+    let entity = spawn_picture(&mut app, UVec2::splat(48));
+    let before = shown(&app, entity);
+    for close in [false, true] {
+        for _ in 0..3 {
+            hit(&mut app, center(entity));
+        }
+        let mut commands = app.world_mut().commands();
+        let mut commands = commands.entity(entity);
+        if close {
+            commands.close_cracks(0.5)
+        } else {
+            commands.heal_cracks()
+        };
+        app.world_mut().flush();
+        let stats = step(&mut app);
+        assert_eq!((stats.sent, stats.rejected, stats.queued), if close { (6, 6, 0) } else { (3, 3, 0) });
+        assert_eq!((shown(&app, entity), state(&app, entity)), (before.clone(), CrackState::default()));
+    }
+    // A hit that comes after it lands.
+    app.world_mut().commands().entity(entity).heal_cracks();
+    app.world_mut().flush();
+    assert_cracks(&mut app, entity);
+}

@@ -126,8 +126,6 @@ struct Known {
     carrier: Carrier,
     is_good: bool,
     is_surface: bool,
-    /// Whether a hit was sent in this frame: it lands at the end of it, whatever is healed before.
-    is_struck: bool,
     shown: Shown,
     expect: Expect,
 }
@@ -295,7 +293,7 @@ impl Game {
             }
         };
         let is_good = matches!(shows, Show::Good(_));
-        Known { entity, carrier, is_good, is_surface: false, is_struck: false, shown, expect: Expect::Whole }
+        Known { entity, carrier, is_good, is_surface: false, shown, expect: Expect::Whole }
     }
 
     fn send(&mut self, hit: CrackHit) {
@@ -333,10 +331,10 @@ impl Game {
             _ => None,
         };
         if let Some(slot) = slot_of(op) {
-            if let Some(mut known) = self.model.slots.remove(&slot) {
-                if self.act(op, &mut known) {
-                    self.model.slots.insert(slot, known);
-                }
+            if let Some(mut known) = self.model.slots.remove(&slot)
+                && self.act(op, &mut known)
+            {
+                self.model.slots.insert(slot, known);
             }
         } else {
             self.act_on_all(op);
@@ -350,7 +348,6 @@ impl Game {
         match op {
             Op::Hit { uv, energy, .. } => {
                 self.send(CrackHit::uv(entity, uv.into()).with_energy(energy));
-                known.is_struck = true;
                 let [u, v] = uv;
                 let is_inside = (0.02..=0.98).contains(&u) && (0.02..=0.98).contains(&v);
                 if is_inside && energy.is_finite() && energy > 0.0 {
@@ -363,7 +360,6 @@ impl Game {
             }
             Op::HitWorld { at, energy, .. } => {
                 self.send(CrackHit::world(entity, at.into()).with_energy(energy));
-                known.is_struck = true;
                 known.expect = if known.is_surface { Expect::Anything } else { known.expect };
                 return true;
             }
@@ -378,8 +374,7 @@ impl Game {
             }
             Op::RemoveSurface(_) => {
                 commands.remove::<CrackSurface>();
-                (known.is_surface, known.expect) =
-                    (false, if known.is_struck { Expect::Anything } else { Expect::Whole });
+                (known.is_surface, known.expect) = (false, Expect::Whole);
             }
             Op::InsertSurface { preset, seed, .. } => {
                 commands.insert(surface_of(preset, seed));
@@ -387,7 +382,7 @@ impl Game {
             }
             Op::Heal(_) => {
                 commands.heal_cracks();
-                known.expect = if known.is_struck { Expect::Anything } else { Expect::Whole };
+                known.expect = Expect::Whole;
             }
             Op::Close { seconds, .. } => {
                 commands.close_cracks(seconds);
@@ -516,7 +511,7 @@ impl Game {
                 if let Some(old) = self.model.slots.remove(&to) {
                     self.app.world_mut().despawn(old.entity);
                 }
-                let known = Known { entity, carrier, is_good, is_surface, is_struck: false, shown, expect };
+                let known = Known { entity, carrier, is_good, is_surface, shown, expect };
                 self.model.slots.insert(to, known);
             }
             Op::CrackShard(number) | Op::DespawnShard(number) => {
@@ -598,7 +593,6 @@ impl Game {
     fn frame(&mut self) {
         self.app.update();
         self.check();
-        self.model.slots.values_mut().for_each(|known| known.is_struck = false);
     }
 
     /// Waits until everything that is to crack has cracked.
@@ -694,7 +688,7 @@ fn operation(rng: &mut Rng) -> Op {
                 3 => Show::Compressed,
                 _ => Show::Good(size),
             };
-            Op::Spawn { slot, carrier, show, preset: number, seed: number / 11, anchored: number % 3 == 0 }
+            Op::Spawn { slot, carrier, show, preset: number, seed: number / 11, anchored: number.is_multiple_of(3) }
         }
         5 => Op::Despawn(slot),
         6 => Op::RemoveSurface(slot),
@@ -705,11 +699,11 @@ fn operation(rng: &mut Rng) -> Op {
         18 | 19 => Op::Heal(slot),
         20 => Op::Close { slot, seconds: a },
         21 => Op::Prepare(slot),
-        22 => Op::Preset { slot, preset: number, scale: if number % 2 == 0 { 1.0 } else { c } },
+        22 => Op::Preset { slot, preset: number, scale: if number.is_multiple_of(2) { 1.0 } else { c } },
         23 => Op::Picture { slot, size },
         24 => Op::Change(slot),
         25 => Op::Transform { slot, scale: [c, -c, 1.0], turn: a },
-        26 => Op::Parent { slot, parent: (number % 4 > 0).then_some(number) },
+        26 => Op::Parent { slot, parent: (!number.is_multiple_of(4)).then_some(number) },
         27 => {
             let clock = match number % 4 {
                 0 => None,
@@ -721,15 +715,15 @@ fn operation(rng: &mut Rng) -> Op {
         }
         28 => Op::Guide { slot, side: 1 + number % 30, gamma: 20.0 * a, appearance: number, seconds: b },
         29 => Op::Unguide(slot),
-        30..33 => Op::Shatter { slot, uv: (number % 3 == 0).then_some([a, b]), reach: c },
+        30..33 => Op::Shatter { slot, uv: number.is_multiple_of(3).then_some([a, b]), reach: c },
         33 | 34 => {
-            let seek = (number % 5 == 0).then_some(c);
+            let seek = number.is_multiple_of(5).then_some(c);
             Op::Settings {
                 slot,
                 when: number,
                 speed: 2.0 * a - 0.6,
-                again: number % 2 == 0,
-                fly: number % 7 != 0,
+                again: number.is_multiple_of(2),
+                fly: !number.is_multiple_of(7),
                 seek,
             }
         }
@@ -740,7 +734,7 @@ fn operation(rng: &mut Rng) -> Op {
             Op::Budget { milliseconds, max_shards: usize::from(number) * 8 }
         }
         38 => Op::Speed([0.0, 0.5, 1.0, 1.0, 8.0][usize::from(number) % 5]),
-        _ if number % 2 == 0 => Op::Frame([0, 1, 16, 20, 1000][usize::from(number) % 5]),
+        _ if number.is_multiple_of(2) => Op::Frame([0, 1, 16, 20, 1000][usize::from(number) % 5]),
         _ => Op::Resize { target: number % 4, size: [u16::from(number), size[0]] },
     }
 }

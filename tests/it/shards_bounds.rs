@@ -108,7 +108,7 @@ fn s2_what_is_asked_for_meanwhile_is_done() {
             let hear = move |now: u32| {
                 move |world: &mut World| {
                     if now == moment {
-                        strike(world, what)
+                        strike(world, what);
                     }
                 }
             };

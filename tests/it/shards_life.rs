@@ -1,7 +1,7 @@
 //! How shards look, break again, serve again, and that nothing is left of them however often that is.
 
 use crate::{
-    shards::{crack, cracked, loose, shards, shatter, stock, surface, vertices},
+    shards::{crack, cracked, loose, shards, shatter, stock, vertices},
     support::*,
 };
 use bevy::{mesh::VertexAttributeValues, prelude::*};

@@ -85,13 +85,15 @@ fn more_energy_is_more_of_everything() {
     }
 }
 
-/// 400 hits, most of them near a border or in a corner: each leaves at least half of what is usual.
+/// 400 hits, most of them near a border or in a corner: each leaves at least half of what is usual. Fewer on tempered glass, all of which cracks
+/// wherever it is hit.
 #[test]
 fn no_hit_is_a_dud() {
-    for name in PRESETS {
+    for name in CrackPreset::NAMES {
+        let hits = if name == "tempered_glass" { 40 } else { 400 };
         let usual = median(of_seeds(name, 1.0).0);
         let mut duds = Vec::new();
-        for seed in 0..400u64 {
+        for seed in 0..hits {
             let mut rng = Rng::new(seed).stream("border");
             let near = |rng: &mut Rng| if rng.unit() < 0.5 { 0.06 * rng.unit() } else { 1.0 - 0.06 * rng.unit() };
             let pos = match seed % 4 {
@@ -106,7 +108,6 @@ fn no_hit_is_a_dud() {
                 duds.push((pos, length));
             }
         }
-        println!("{name}: {} duds of 400, usual {usual:.2}", duds.len());
         assert!(duds.is_empty(), "{name}: usual {usual}, but {duds:?}");
     }
 }

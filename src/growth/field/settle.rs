@@ -1,0 +1,179 @@
+//! Markers that were laid out take their places among the others, in slices if need be.
+
+use super::{ANY_IMPACT, DEAD, LANES, MarkerField, NO_NODE, Newborn, get_ready};
+use crate::{
+    growth::{layout::Cursor, nodes::NodeGrid},
+    pattern::Node,
+};
+use glam::UVec2;
+
+/// What a node that looks at the markers within its reach costs, in markers that are looked at.
+const VISIT: u32 = 8;
+
+/// How far a field has come with its newborn markers.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Settling {
+    phase: Phase,
+    cursor: Cursor,
+    all: Vec<Newborn>,
+    /// The cell of each of them.
+    homes: Vec<u32>,
+    /// The next place of each cell.
+    next: Vec<u32>,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Phase {
+    /// The living are taken out of their places.
+    #[default]
+    Gather,
+    /// Cells get to know how many they will have.
+    Count,
+    /// All get a place.
+    Place,
+    /// What they know of nodes already holds.
+    Recall,
+    /// Nodes look at them.
+    Visit,
+}
+
+impl Settling {
+    /// Markers that are nowhere else.
+    pub(super) fn in_hand(&self) -> usize {
+        if self.phase == Phase::Count { self.all.len() } else { 0 }
+    }
+}
+
+impl MarkerField {
+    /// Takes up the newborn markers: forgets the dead, sorts all into cells, and lets every node win what it is nearest to.
+    pub(in crate::growth) fn settle(&mut self, nodes: &[Node], grid: &NodeGrid) {
+        while !self.settle_some(nodes, grid, u32::MAX) {}
+    }
+
+    /// Goes on with that, by up to about so many markers. Returns whether it is done.
+    pub(in crate::growth) fn settle_some(&mut self, nodes: &[Node], grid: &NodeGrid, markers: u32) -> bool {
+        if self.newborn.is_empty() && self.settling.is_none() {
+            return true;
+        }
+        let mut settling = self.settling.take().unwrap_or_default();
+        let mut cursor = Cursor::of(markers);
+        cursor.go_on(&settling.cursor);
+        while self.pass(&mut settling, &mut cursor, nodes, grid) {
+            settling.phase = match settling.phase {
+                Phase::Gather => Phase::Count,
+                Phase::Count => Phase::Place,
+                Phase::Place => Phase::Recall,
+                Phase::Recall => Phase::Visit,
+                Phase::Visit => return true,
+            };
+            cursor.rewind();
+            if cursor.is_spent() {
+                break;
+            }
+        }
+        settling.cursor = cursor;
+        self.settling = Some(settling);
+        false
+    }
+
+    /// Works on a phase as far as the slice goes. Returns whether it is over.
+    fn pass(&mut self, settling: &mut Settling, cursor: &mut Cursor, nodes: &[Node], grid: &NodeGrid) -> bool {
+        let Settling { all, homes, next, .. } = settling;
+        let count = match settling.phase {
+            Phase::Gather => self.x.len(),
+            Phase::Count | Phase::Place => all.len(),
+            Phase::Recall => self.relations.as_ref().map_or(0, |_| self.x.len() - LANES),
+            Phase::Visit => nodes.len(),
+        } as u64;
+        let slice = cursor.slice(count, if settling.phase == Phase::Visit { VISIT } else { 1 });
+        let slice = slice.start as usize..slice.end as usize;
+        let is_over = cursor.is_at(count);
+        match settling.phase {
+            Phase::Gather => {
+                all.extend(slice.filter(|&i| self.near_sq[i] > DEAD).map(|i| self.marker_at(i)));
+                if is_over {
+                    self.clear();
+                    if all.is_empty() {
+                        // Not copied: a first hit makes thousands.
+                        *all = std::mem::take(&mut self.newborn);
+                    } else {
+                        all.append(&mut self.newborn);
+                    }
+                    self.choose_cells(all.len());
+                    homes.reserve(all.len());
+                }
+            }
+            Phase::Count => {
+                for marker in &all[slice] {
+                    let home = self.cell_of(marker.pos) as u32;
+                    self.first[home as usize + 1] += 1;
+                    homes.push(home);
+                }
+                if is_over {
+                    for cell in 1..self.first.len() {
+                        self.first[cell] += self.first[cell - 1];
+                    }
+                    next.clone_from(&self.first);
+                    self.make_places(all.len());
+                }
+            }
+            // The markers of a cell stay in order.
+            Phase::Place => {
+                for i in slice {
+                    let (Newborn { pos, id, loyal, given_up, near_sq }, slot) = (all[i], &mut next[homes[i] as usize]);
+                    let i = *slot as usize;
+                    *slot += 1;
+                    (self.x[i], self.y[i], self.id[i], self.loyal[i]) = (pos.x, pos.y, id, loyal);
+                    self.given_up[i] = given_up;
+                    self.near_sq[i] = self.near_sq[i].min(near_sq);
+                }
+            }
+            Phase::Recall => {
+                for i in slice {
+                    let known = self.relations.as_ref().and_then(|of| of.neighbours(self.id[i]).first().copied());
+                    if let Some(node) = known {
+                        self.node[i] = node;
+                        self.active.push(i as u32);
+                    }
+                }
+            }
+            Phase::Visit => slice.for_each(|index| self.visit(index as u32, nodes, grid)),
+        }
+        is_over
+    }
+
+    /// Cells of half the radius, but with a few markers to each.
+    fn choose_cells(&mut self, markers: usize) {
+        let per_cell = (self.extent.x * self.extent.y * 3.0 / markers as f32).sqrt();
+        let side = (0.5 * self.radius).max(per_cell).max(self.extent.max_element() / 1024.0);
+        self.cells = (self.extent / side).ceil().as_uvec2().max(UVec2::ONE);
+        self.per_unit = self.cells.as_vec2() / self.extent;
+        self.first.clear();
+        self.first.resize(self.cells.x as usize * self.cells.y as usize + 1, 0);
+    }
+
+    /// Places for so many markers, and as many dead ones as there are lanes.
+    fn make_places(&mut self, markers: usize) {
+        let padded = markers + LANES;
+        self.x.resize(padded, 0.0);
+        self.y.resize(padded, 0.0);
+        self.id.resize(padded, 0);
+        self.loyal.resize(padded, ANY_IMPACT);
+        self.given_up.resize(padded, 0);
+        self.node.resize(padded, NO_NODE);
+        self.near_sq.resize(markers, self.radius * self.radius);
+        self.near_sq.resize(padded, DEAD);
+    }
+
+    /// Gets memory ready for the markers that were added, so that no step pauses to do it.
+    pub(in crate::growth) fn reserve(&mut self) {
+        let n = self.x.len() + self.newborn.len() + LANES;
+        for plane in [&mut self.x, &mut self.y, &mut self.near_sq] {
+            get_ready(plane, n);
+        }
+        for plane in [&mut self.node, &mut self.id, &mut self.loyal] {
+            get_ready(plane, n);
+        }
+        get_ready(&mut self.given_up, n);
+    }
+}
