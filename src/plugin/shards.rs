@@ -71,6 +71,9 @@ pub struct ShatterCracks {
     pub burst: BurstParams,
     /// Whose down they fall. Default: the world's.
     pub gravity: GravitySpace,
+    /// Where shards come to rest, without a physics engine: the height of a level floor in the world. They bounce a little, skid, and lie flat in
+    /// 3D; in 2D they stand on it. Make [`BurstParams::fade_after`] long enough. `None` (default) or not finite = there is no floor.
+    pub floor: Option<f32>,
     /// Whether the crate moves the shards, lets them fade and takes them away; default true. Else they stay where they are, for a
     /// physics engine: see [`Shard`]. Counts when a surface shatters.
     pub fly: bool,
@@ -105,6 +108,7 @@ impl Default for ShatterCracks {
             anchor: Anchor::Border,
             burst: BurstParams::DEFAULT,
             gravity: GravitySpace::World,
+            floor: None,
             fly: true,
             speed: 1.0,
             seek: None,

@@ -1,6 +1,6 @@
 //! [`Burst`]: how pieces fly, as a function of time.
 
-use super::{Shard, ShatterError, cuts::in_range};
+use super::{Floor, Shard, ShatterError, cuts::in_range, floor::Landing};
 use crate::math::{Rng, ops};
 use glam::{Quat, Vec2, Vec3};
 
@@ -97,6 +97,7 @@ impl Default for BurstParams {
 pub struct Burst {
     params: BurstParams,
     gravity: Vec3,
+    floor: Option<Floor>,
     from: Vec2,
     direction: Vec3,
     energy: f32,
@@ -121,6 +122,9 @@ pub struct Flight {
     /// Where it begins: a fragment that has parted from its piece in the air does not begin in its place.
     offset: Vec3,
     rotation: Quat,
+    /// Where it may come to rest, and where it does.
+    floor: Option<Floor>,
+    landing: Option<Landing>,
 }
 
 /// Where a piece is.
@@ -132,6 +136,16 @@ pub struct Pose {
     pub rotation: Quat,
     /// 1 = there, 0 = faded and to be forgotten.
     pub opacity: f32,
+}
+
+/// A piece on its way.
+#[derive(Clone, Copy)]
+struct Moving {
+    offset: Vec3,
+    velocity: Vec3,
+    rotation: Quat,
+    /// Radians a second.
+    spin: f32,
 }
 
 impl Pose {
@@ -154,7 +168,7 @@ impl Burst {
             return Err(ShatterError::NotFinite { index: 0 });
         }
         let direction = direction.try_normalize().unwrap_or(Vec3::NEG_Z);
-        Ok(Self { gravity: params.gravity.extend(0.0), params, from, direction, energy, seed })
+        Ok(Self { gravity: params.gravity.extend(0.0), floor: None, params, from, direction, energy, seed })
     }
 
     /// The same with another acceleration (pattern units a second squared; x right, y up, z towards the viewer): pieces of a surface
@@ -163,6 +177,30 @@ impl Burst {
     pub fn with_gravity(mut self, gravity: Vec3) -> Self {
         self.gravity = if gravity.is_finite() { gravity } else { Vec3::ZERO };
         self
+    }
+
+    /// The same with a floor on which pieces come to rest.
+    ///
+    /// ```
+    /// use bevy_crack::shatter::{Burst, BurstParams, Cuts, Floor, ShatterParams, shatter};
+    /// use glam::Vec3;
+    ///
+    /// let shards = shatter(Cuts::new([1.0, 1.0].into())?, &ShatterParams::DEFAULT)?;
+    /// // Half a pattern unit below the lower edge of the picture.
+    /// let floor = Floor { up: Vec3::Y, height: -1.5, clearance: 0.0, lies_flat: true };
+    /// let burst = Burst::new(BurstParams::DEFAULT, [0.5, 0.5].into(), Vec3::ZERO, 1.0, 7)?.with_floor(floor)?;
+    /// let whole = shards.get(0).expect("one piece");
+    /// // The middle of the pane comes down by a whole unit, and stays there.
+    /// assert!((burst.flight(0, whole).pose(10.0).offset.y + 1.0).abs() < 1e-4);
+    /// # Ok::<(), bevy_crack::shatter::ShatterError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// If a number of the floor is not finite or outside its range, or its normal is zero.
+    pub fn with_floor(mut self, floor: Floor) -> Result<Self, ShatterError> {
+        floor.validate()?;
+        self.floor = Some(floor);
+        Ok(self)
     }
 
     /// The flight of a piece that the burst knocks out; `number` tells pieces apart.
@@ -198,7 +236,7 @@ impl Burst {
         let turn = rng.signed();
         let (axis, spin) =
             if tumble { (any.normalize_or(Vec3::X), spin * (0.4 + 0.6 * turn.abs())) } else { (Vec3::Z, spin * turn) };
-        Flight {
+        let mut flight = Flight {
             delay: hold + distance / front,
             velocity,
             axis,
@@ -209,7 +247,11 @@ impl Burst {
             fade,
             offset: Vec3::ZERO,
             rotation: Quat::IDENTITY,
-        }
+            floor: self.floor,
+            landing: None,
+        };
+        flight.land(shard, false);
+        flight
     }
 }
 
@@ -226,18 +268,46 @@ impl Flight {
         if time.is_nan() || time <= 0.0 {
             return Pose { offset: self.offset, rotation: self.rotation, opacity: 1.0 };
         }
-        let (run, fallen) = self.runs(time);
-        let half_turn = 0.5 * self.spin * run;
-        let rotation = (self.axis * ops::sin(half_turn)).extend(ops::cos(half_turn));
         let faded = if self.fade > 0.0 {
             ((time - self.fade_after) / self.fade).clamp(0.0, 1.0)
         } else {
             f32::from(u8::from(time > self.fade_after))
         };
-        Pose {
+        let Moving { offset, rotation, .. } = self.moving(time);
+        Pose { offset, rotation, opacity: 1.0 - faded }
+    }
+
+    /// Finds where the piece comes to rest, if there is a floor; it `must` if it is part of one that does.
+    fn land(&mut self, shard: &Shard, must: bool) {
+        let start = Vec3::new(shard.centroid.x, -shard.centroid.y, 0.0) + self.offset;
+        let size = shard.area.max(0.0).sqrt();
+        self.landing = self.floor.and_then(|floor| {
+            floor.landing(start, (size, must), self.gravity, |time| {
+                let Moving { offset, velocity, .. } = self.in_air(time);
+                (offset - self.offset, velocity)
+            })
+        });
+    }
+
+    /// How the piece moves, seconds after its release.
+    fn moving(&self, time: f32) -> Moving {
+        let Some(landing) = self.landing.filter(|landing| time > landing.time) else { return self.in_air(time) };
+        let (since, landed) = (time - landing.time, self.in_air(landing.time));
+        let (offset, velocity) = landing.motion(since);
+        let rotation = landing.rotation(landed.rotation, since);
+        Moving { offset: self.offset + offset, velocity, rotation, spin: 0.0 }
+    }
+
+    fn in_air(&self, time: f32) -> Moving {
+        let (run, fallen) = self.runs(time);
+        let decay = ops::exp(-self.drag * time);
+        let half_turn = 0.5 * self.spin * run;
+        let rotation = (self.axis * ops::sin(half_turn)).extend(ops::cos(half_turn));
+        Moving {
             offset: self.offset + self.velocity * run + self.gravity * fallen,
+            velocity: self.velocity * decay + self.gravity * run,
             rotation: Quat::from_vec4(rotation) * self.rotation,
-            opacity: 1.0 - faded,
+            spin: self.spin * decay,
         }
     }
 
@@ -259,27 +329,28 @@ impl Flight {
     #[must_use]
     pub fn fragment(&self, seconds: f32, piece: &Shard, fragment: &Shard, apart: f32, seed: u64) -> Self {
         let time = (seconds - self.delay).max(0.0);
-        let Pose { offset, rotation, .. } = self.pose(seconds);
-        let (run, _) = self.runs(time);
-        let decay = ops::exp(-self.drag * time);
-        let turning = self.axis * (self.spin * decay);
+        let Moving { offset, velocity, rotation, spin } = self.moving(time);
+        let turning = self.axis * spin;
         let way = fragment.centroid - piece.centroid;
         let at_rest = Vec3::new(way.x, -way.y, 0.0);
         let arm = rotation * at_rest;
         let mut rng = Rng::new(seed).stream("fragment");
         let mut noise = || Vec3::new(rng.signed(), rng.signed(), rng.signed());
-        let own = turning * 1.3 + noise() * (0.5 * self.spin * decay);
+        let own = turning * 1.3 + noise() * (0.5 * spin);
         let out = (arm.normalize_or_zero() + 0.4 * noise()) * apart;
-        Self {
+        let mut flight = Self {
             delay: seconds.max(self.delay),
-            velocity: self.velocity * decay + self.gravity * run + turning.cross(arm) + out,
+            velocity: velocity + turning.cross(arm) + out,
             axis: own.normalize_or(self.axis),
             spin: own.length(),
             fade_after: self.fade_after - time,
             offset: offset + arm - at_rest,
             rotation,
+            landing: None,
             ..*self
-        }
+        };
+        flight.land(fragment, self.landing.is_some());
+        flight
     }
 
     /// Seconds after the hit at which the piece has faded.

@@ -95,6 +95,7 @@ fn e2_removed_and_inserted_again() {
     // While it grows; before the next frame, and after some.
     for pause in [0, 5] {
         app.world_mut().commands().entity(entity).heal_cracks();
+        app.world_mut().flush();
         hit(&mut app, center(entity));
         steps(&mut app, 3);
         assert_eq!(state(&app, entity).status, CrackStatus::Growing);
@@ -108,6 +109,7 @@ fn e2_removed_and_inserted_again() {
     }
     // Healed and hit between two frames.
     app.world_mut().commands().entity(entity).heal_cracks();
+    app.world_mut().flush();
     hit(&mut app, center(entity));
     steps(&mut app, 3);
     app.world_mut().commands().entity(entity).heal_cracks();

@@ -166,6 +166,15 @@ impl Order {
         {
             burst = burst.with_gravity(gravity);
         }
+        if let (Some(height), Some(place)) =
+            (settings.floor.filter(|height| height.is_finite()), world.get::<GlobalTransform>(entity))
+        {
+            let is_solid = active.carrier.kind.is_solid;
+            let thickness = is_solid.then(|| plane.thickness(settings.thickness, extent));
+            if let Some(floor) = plane.floor(extent, place, height, thickness) {
+                burst = burst.with_floor(floor)?;
+            }
+        }
         let grown = (network.nodes().len(), network.links().len());
         let same = |broken: &Broken| broken.grown == grown && broken.settings.cut == settings.cut;
         let pieces = match broken {

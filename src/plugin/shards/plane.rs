@@ -1,6 +1,9 @@
 //! [`Plane`]: where a flat surface lies in its own space.
 
-use crate::{plugin::space, shatter::Pose};
+use crate::{
+    plugin::space,
+    shatter::{Floor, Pose},
+};
 use bevy::prelude::*;
 
 /// Where a flat surface lies in the entity's own space.
@@ -63,6 +66,32 @@ impl Plane {
         let own = space::to_local(place)?.transform_vector3(gravity.extend(0.0) * unit);
         let down = self.rotation.inverse() * own / scale;
         down.is_finite().then_some(down)
+    }
+
+    /// The world's plane y = `height`, for flights on a surface of `extent`; pieces are `thickness` (the entity's units) thick if they lie
+    /// flat. `None` if there is no telling: the surface has no size in the world.
+    pub(super) fn floor(
+        &self,
+        extent: Vec2,
+        place: &GlobalTransform,
+        height: f32,
+        thickness: Option<f32>,
+    ) -> Option<Floor> {
+        let scale = self.size / extent;
+        let scale = scale.extend(scale.y.abs());
+        let corner = 0.5 * extent * Vec2::new(-1.0, 1.0);
+        let at =
+            |point: Vec3| place.transform_point(self.middle + self.rotation * ((point + corner.extend(0.0)) * scale)).y;
+        let none = at(Vec3::ZERO);
+        let mut up = Vec3::new(at(Vec3::X), at(Vec3::Y), at(Vec3::Z)) - none;
+        if thickness.is_none() {
+            // In 2D pieces stay in the plane of the picture.
+            up.z = 0.0;
+        }
+        let (up, length) = (up.try_normalize()?, up.length());
+        let clearance = thickness.map_or(0.0, |thickness| 0.5 * thickness / scale.y.abs());
+        let floor = Floor { up, height: (height - none) / length, clearance, lies_flat: thickness.is_some() };
+        floor.height.is_finite().then_some(floor)
     }
 
     /// Whether the picture is mirrored.

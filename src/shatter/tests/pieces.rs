@@ -323,3 +323,75 @@ fn pictures_are_shifted_within_the_surface() {
     }
     assert!(2 * ways.len() > shards.len(), "{} ways in {}", ways.len(), shards.len());
 }
+
+/// The closed form against a piece that is moved in ten thousand small steps; then it rests, for good, and its fragments do.
+#[test]
+fn pieces_come_to_rest_on_the_floor() {
+    let shards = shatter(Cuts::from_network(&grown(&CrackPreset::GLASS, 2, 4)).unwrap(), &EVERYTHING).unwrap();
+    let (mut landed, mut never) = (0, 0);
+    for case in 0..40u64 {
+        let mut rng = Rng::new(case).stream("floor");
+        let up = Vec3::new(0.4 * rng.signed(), 1.0, 0.4 * rng.signed()) * rng.range(0.5, 2.0);
+        let lies_flat = rng.unit() < 0.5;
+        let floor = Floor { up, height: rng.range(-3.0, 0.3) * up.length(), clearance: 0.01, lies_flat };
+        let params = BurstParams { fade_after: 100.0, drag: rng.range(0.0, 2.0), ..BurstParams::DEFAULT };
+        let burst = Burst::new(params, Vec2::splat(0.5), Vec3::ZERO, 1.0, case).unwrap().with_floor(floor).unwrap();
+        let gravity = params.gravity.extend(0.0);
+        for (number, shard) in (0u32..).zip(shards.iter()).step_by(5) {
+            let flight = burst.flight(number, shard);
+            let start = Vec3::new(shard.centroid.x, -shard.centroid.y, 0.0);
+            let size = if lies_flat { floor.clearance } else { 0.5 * shard.area.sqrt() };
+            let above = |offset: Vec3| (up.dot(start + offset) - floor.height) / up.length() - size;
+            // A step after the other.
+            let (step, mut offset, mut velocity) = (1e-3, Vec3::ZERO, flight.velocity);
+            let mut time = 0.0;
+            while above(offset) > 0.0 && time < 10.0 {
+                velocity += step * 0.5 * (gravity - params.drag * velocity);
+                offset += step * velocity;
+                velocity += step * 0.5 * (gravity - params.drag * velocity);
+                time += step;
+            }
+            if above(Vec3::ZERO) < -size {
+                assert!(above(flight.pose(5.0).offset) < above(Vec3::ZERO), "what begins below the floor falls");
+                never += 1;
+                continue;
+            }
+            let at = flight.pose(flight.delay + time);
+            assert!(at.offset.distance(offset) < 0.02 * (1.0 + velocity.length()), "{case} {number}: {time}");
+            let poses = [20.0, 21.0].map(|seconds| flight.pose(seconds));
+            assert!(above(poses[0].offset).abs() < 1e-4, "{case} {number}: {}", above(poses[0].offset));
+            assert!(poses[0].offset.distance(poses[1].offset) < 1e-4);
+            for seconds in 0..200 {
+                let pose = flight.pose(0.05 * seconds as f32);
+                assert!(above(pose.offset) > (above(Vec3::ZERO)).min(0.0) - 1e-3, "never below it");
+            }
+            let face = poses[1].rotation * Vec3::Z;
+            let lie = if lies_flat { up.normalize() } else { Vec3::Z };
+            assert!(face.dot(lie).abs() > 0.9999, "{face}");
+            let fragment = flight.fragment(0.8, shard, shard, 0.3, 3).pose(30.0).offset;
+            assert!(above(fragment).abs() < 1e-3 || above(fragment) < -size, "{}", above(fragment));
+            landed += 1;
+        }
+    }
+    assert!(landed > 200 && never > 5, "{landed} landed, {never} began below");
+}
+
+#[test]
+fn floors_that_are_none_are_refused() {
+    let burst = Burst::new(BurstParams::DEFAULT, Vec2::ZERO, Vec3::ZERO, 1.0, 1).unwrap();
+    let good = Floor { up: Vec3::Y, height: -2.0, clearance: 0.0, lies_flat: true };
+    assert!(burst.clone().with_floor(good).is_ok());
+    for bad in [
+        Floor { up: Vec3::ZERO, ..good },
+        Floor { up: Vec3::NAN, ..good },
+        Floor { height: f32::INFINITY, ..good },
+        Floor { clearance: -1.0, ..good },
+    ] {
+        assert!(burst.clone().with_floor(bad).is_err(), "{bad:?}");
+    }
+    // Nothing pulls pieces down: they fly for ever.
+    let shards = shatter(Cuts::new(Vec2::ONE).unwrap(), &EVERYTHING).unwrap();
+    let floats = burst.with_gravity(Vec3::ZERO).with_floor(good).unwrap();
+    let flight = floats.flight(0, shards.get(0).unwrap());
+    assert!(flight.pose(100.0).offset.y > -2.0);
+}

@@ -1,0 +1,131 @@
+//! [`Floor`]: where flying pieces come to rest.
+
+use super::{ShatterError, cuts::in_range};
+use crate::math::ops;
+use glam::{Quat, Vec3};
+
+/// A plane on which pieces land, bounce a little, skid, and come to rest. Where and when a piece lands is known as it leaves, so that it is in the
+/// same place at the same time, forwards and backwards.
+///
+/// Coordinates are those of flights: pattern units, x right, y up, z towards the viewer, from the top left of the picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Floor {
+    /// Its normal, away from what it holds; of any length but zero.
+    pub up: Vec3,
+    /// What `up · point` is for its points.
+    pub height: f32,
+    /// How far above it the middle of a piece lies that rests there, pattern units, 0..=10: half its thickness. Pieces that stand upright are
+    /// as high as they are large.
+    pub clearance: f32,
+    /// Whether pieces come to lie flat on it; else they turn their faces to the viewer, as in a game that is seen from the side.
+    pub lies_flat: bool,
+}
+
+/// Share of the speed that a piece keeps where it bounces.
+const BOUNCE: f32 = 0.28;
+
+/// So often it bounces.
+const BOUNCES: u32 = 3;
+
+/// How fast it comes to a stop, and to lie: shares a second.
+const FRICTION: f32 = 4.5;
+const SETTLING: f32 = 5.0;
+
+/// No piece flies longer, seconds.
+const LONGEST: f32 = 600.0;
+
+impl Floor {
+    pub(super) fn validate(&self) -> Result<(), ShatterError> {
+        if !self.up.is_finite() || self.up.length_squared() < 1e-12 {
+            return Err(ShatterError::NotFinite { index: 0 });
+        }
+        in_range("floor.height", self.height, -1e6, 1e6)?;
+        in_range("floor.clearance", self.clearance, 0.0, 10.0)
+    }
+
+    /// Where a piece of this size lands that begins at `start`; `motion` is its offset and velocity so many seconds later. `None` if it never
+    /// comes there, or begins below the floor, unless it `must` land: parts of a piece that does land as well, however they reach into the floor.
+    pub(super) fn landing(
+        &self,
+        start: Vec3,
+        (size, must): (f32, bool),
+        gravity: Vec3,
+        motion: impl Fn(f32) -> (Vec3, Vec3),
+    ) -> Option<Landing> {
+        let length = self.up.length();
+        let up = self.up / length;
+        let clearance = if self.lies_flat { self.clearance } else { 0.5 * size };
+        let base = up.dot(start) - self.height / length - clearance;
+        let above = |time: f32| base + up.dot(motion(time).0);
+        let pull = -up.dot(gravity);
+        if (above(0.0) < -clearance - 1e-4 && !must) || !(pull > 1e-4) {
+            return None;
+        }
+        // It rises, if at all, before it falls: one crossing only.
+        let mut late = 0.05;
+        while above(late) > 0.0 {
+            late *= 2.0;
+            if late > LONGEST {
+                return None;
+            }
+        }
+        let mut early = 0.0;
+        for _ in 0..30 {
+            let middle = 0.5 * (early + late);
+            if above(middle) > 0.0 { early = middle } else { late = middle }
+        }
+        let (offset, velocity) = motion(late);
+        let fall = (-up.dot(velocity)).max(0.0);
+        let (sunk, skid) = ((-above(late)).max(0.0), velocity - up * up.dot(velocity));
+        Some(Landing { time: late, offset, up, sunk, fall, pull, skid, lies_flat: self.lies_flat })
+    }
+}
+
+/// How a piece comes to rest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Landing {
+    /// When, seconds after its release.
+    pub(super) time: f32,
+    /// Where.
+    offset: Vec3,
+    up: Vec3,
+    /// How far it reached into the floor when it left its place, and comes up.
+    sunk: f32,
+    /// How fast it came down.
+    fall: f32,
+    /// How fast it is drawn down.
+    pull: f32,
+    /// Its velocity along the floor.
+    skid: Vec3,
+    lies_flat: bool,
+}
+
+impl Landing {
+    /// Offset and velocity so many seconds after it has landed.
+    pub(super) fn motion(&self, seconds: f32) -> (Vec3, Vec3) {
+        let left = ops::exp(-FRICTION * seconds);
+        let (mut rise, mut speed) = (0.0, 0.0);
+        let (mut since, mut up) = (seconds, self.fall);
+        for _ in 0..BOUNCES {
+            up *= BOUNCE;
+            let length = 2.0 * up / self.pull;
+            if since < length {
+                rise = since * (up - 0.5 * self.pull * since);
+                speed = up - self.pull * since;
+                break;
+            }
+            since -= length;
+        }
+        let offset = self.offset + self.skid * ((1.0 - left) / FRICTION) + self.up * (rise + self.sunk * (1.0 - left));
+        (offset, self.skid * left + self.up * speed)
+    }
+
+    /// How it is turned so many seconds after it has landed, when it was turned by `landed`.
+    pub(super) fn rotation(&self, landed: Quat, seconds: f32) -> Quat {
+        let face = landed * Vec3::Z;
+        let lie = if self.lies_flat { self.up } else { Vec3::Z };
+        let lie = if face.dot(lie) < 0.0 { -lie } else { lie };
+        let rest = Quat::from_rotation_arc(face, lie) * landed;
+        landed.slerp(rest, 1.0 - ops::exp(-SETTLING * seconds))
+    }
+}
