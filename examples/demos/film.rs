@@ -1,6 +1,9 @@
 //! Pictures and a GIF of a run without a window.
 
-use crate::machine::{DemoArguments, Output};
+use crate::{
+    machine::{DemoArguments, Output},
+    moving,
+};
 use bevy::{
     camera::RenderTarget,
     prelude::*,
@@ -11,17 +14,19 @@ use bevy::{
 };
 use bevy_crack::prelude::CrackTextures;
 use image::{
-    Delay, Frame, RgbaImage,
-    codecs::gif::{GifEncoder, Repeat},
+    RgbaImage,
     imageops::{self, FilterType},
 };
-use std::{fs, fs::File, path::Path};
+use std::{error::Error, fs, path::Path};
 
 /// Size of the drawn pictures.
 const SIZE: UVec2 = UVec2::new(1280, 720);
 
-/// Width of the GIF.
-const GIF_WIDTH: u32 = 400;
+/// Frames a second of a scripted run.
+pub(crate) const RATE: u32 = 30;
+
+/// How long a picture of the GIF is shown at the most, hundredths of a second: a long run is shown faster than it was.
+const LONGEST: u32 = 10;
 
 /// Takes pictures where there is no window, writes them, and ends the app.
 pub(crate) struct FilmPlugin;
@@ -78,15 +83,22 @@ fn aim_camera(camera: On<Add, Camera>, film: Res<Film>, mut commands: Commands) 
     }
 }
 
-/// Whether a picture is taken of this frame: about 60 over the run, and the last frame for sure.
-fn is_due(frame: u32, frames: u32) -> bool {
-    frame <= frames && (frame.is_multiple_of((frames / 60).max(1)) || frame == frames)
+impl DemoArguments {
+    /// From picture to picture, frames.
+    fn step(&self) -> u32 {
+        (self.frames / self.pictures.max(1)).max(1)
+    }
+
+    /// Whether a picture is taken of this frame; of the last frame for sure.
+    fn is_due(&self, frame: u32) -> bool {
+        frame <= self.frames && (frame.is_multiple_of(self.step()) || frame == self.frames)
+    }
 }
 
 /// Drawing is slow without a GPU: cameras rest while no picture is due. One frame more, as the first of a camera is empty.
 fn draw_when_due(film: Res<Film>, output: Res<Output>, arguments: Res<DemoArguments>, mut cameras: Query<&mut Camera>) {
     if *output == Output::Offscreen {
-        let due = (film.frame + 1..=film.frame + 2).any(|frame| is_due(frame, arguments.frames));
+        let due = (film.frame + 1..=film.frame + 2).any(|frame| arguments.is_due(frame));
         for mut camera in &mut cameras {
             camera.is_active = due;
         }
@@ -102,7 +114,7 @@ fn take_picture(
     mut commands: Commands,
 ) {
     film.frame += 1;
-    if *output == Output::Window || !is_due(film.frame, arguments.frames) {
+    if *output == Output::Window || !arguments.is_due(film.frame) {
         return;
     }
     match film.target.clone() {
@@ -127,7 +139,7 @@ fn take_picture(
 impl Film {
     #[expect(clippy::print_stderr, reason = "a demo says what went wrong")]
     fn add(&mut self, picture: RgbaImage, arguments: &DemoArguments) {
-        let last = arguments.frames / (arguments.frames / 60).max(1);
+        let last = arguments.frames / arguments.step();
         // Six stills over the run; the last picture among them.
         let step = (last / 6).max(1) as usize;
         if self.strip.len() % step == step - 1 {
@@ -136,8 +148,9 @@ impl Film {
                 eprintln!("{}: {error}", arguments.out.display());
             }
         }
-        let height = GIF_WIDTH * picture.height() / picture.width().max(1);
-        self.strip.push(imageops::resize(&picture, GIF_WIDTH, height.max(1), FilterType::Triangle));
+        let width = arguments.width.clamp(1, SIZE.x);
+        let height = width * picture.height() / picture.width().max(1);
+        self.strip.push(imageops::resize(&picture, width, height.max(1), FilterType::Triangle));
     }
 }
 
@@ -146,13 +159,11 @@ fn write_still(picture: &RgbaImage, out: &Path, number: u32) -> image::ImageResu
     picture.save(out.join(format!("still_{number}.png")))
 }
 
-fn write_gif(strip: Vec<RgbaImage>, path: &Path) -> image::ImageResult<()> {
-    let mut encoder = GifEncoder::new_with_speed(File::create(path)?, 20);
-    encoder.set_repeat(Repeat::Infinite)?;
-    for picture in strip {
-        encoder.encode_frame(Frame::from_parts(picture, 0, 0, Delay::from_numer_denom_ms(100, 1)))?;
-    }
-    Ok(())
+/// Writes the GIF of a run.
+fn write_film(strip: &[RgbaImage], arguments: &DemoArguments, path: &Path) -> Result<(), Box<dyn Error>> {
+    fs::create_dir_all(&arguments.out)?;
+    let hundredths = (100 * arguments.step() / RATE).clamp(2, LONGEST);
+    Ok(moving::write_gif(strip, hundredths as u16, path)?)
 }
 
 #[expect(clippy::print_stdout, clippy::print_stderr, reason = "a demo says what it wrote")]
@@ -169,9 +180,7 @@ fn end(mut film: ResMut<Film>, output: Res<Output>, arguments: Res<DemoArguments
         return;
     }
     let path = arguments.out.join("film.gif");
-    let written = fs::create_dir_all(&arguments.out)
-        .map_err(image::ImageError::from)
-        .and_then(|()| write_gif(std::mem::take(&mut film.strip), &path));
+    let written = write_film(&std::mem::take(&mut film.strip), &arguments, &path);
     match written {
         Ok(()) => {
             println!("Wrote {} pictures and {}.", film.stills, path.display());

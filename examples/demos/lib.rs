@@ -4,6 +4,7 @@
 
 mod film;
 mod machine;
+mod moving;
 mod play;
 
 pub use film::OnCanvas;

@@ -1,6 +1,6 @@
 //! A window, an off-screen picture, or the CPU alone: what this machine can do, found out before the app starts.
 
-use crate::film::FilmPlugin;
+use crate::film::{FilmPlugin, RATE};
 use bevy::{
     app::ScheduleRunnerPlugin,
     asset::AssetPlugin,
@@ -28,6 +28,12 @@ pub struct DemoArguments {
     /// Frames of the scripted run without a window, at 30 a second
     #[arg(long, default_value_t = 1800)]
     pub frames: u32,
+    /// Pictures in the GIF of such a run
+    #[arg(long, default_value_t = 60)]
+    pub pictures: u32,
+    /// Width of the GIF
+    #[arg(long, default_value_t = 400)]
+    pub width: u32,
     /// Folder for the pictures of a run without a window
     #[arg(long, default_value = "out")]
     pub out: PathBuf,
@@ -98,7 +104,7 @@ pub fn demo_app(title: &str, arguments: &DemoArguments) -> App {
             .set(WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() })
             .add(ScheduleRunnerPlugin::run_loop(Duration::ZERO));
         // Nothing is put off: each frame is to be right.
-        app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs(1) / 30))
+        app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs(1) / RATE))
             .insert_resource(CrackBudget { milliseconds: 1e6, ..default() });
     }
     app.add_plugins(plugins).insert_resource(output).insert_resource(arguments.clone());

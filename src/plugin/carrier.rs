@@ -1,8 +1,8 @@
 //! [`Carrier`]: what shows a surface's pictures, a sprite or a material.
 
 use super::{
-    CrackError, CrackMaps, CrackSurface, CrackTextures, HitPoint, Shard, layout::Layout, preset, queue::QueuedHit,
-    shards::Plane, surfaces::Active, warm::Asked,
+    CrackError, CrackSurface, CrackTextures, HitPoint, Shard, layout::Layout, preset, queue::QueuedHit, shards::Plane,
+    surfaces::Active, textures::Maps, warm::Asked,
 };
 use crate::{CrackPreset, raster::TexelRect};
 use bevy::{
@@ -28,7 +28,7 @@ pub(super) struct Shown {
     /// The size that it was given, where there is no picture.
     pub(super) size: Option<Vec2>,
     /// Maps that it can make use of.
-    pub(super) maps: CrackMaps,
+    pub(super) maps: Maps,
 }
 
 impl Shown {

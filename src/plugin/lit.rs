@@ -1,8 +1,9 @@
 //! [`CrackLitMaterial`]: a 2D material that shows normals.
 
 use super::{
-    CrackMaps, CrackTextures,
+    CrackTextures,
     material::{CrackMaterial, MaterialSlot},
+    textures::Maps,
 };
 use bevy::{
     asset::{AssetServer, embedded_asset},
@@ -82,7 +83,7 @@ impl Material2d for CrackLitMaterial {
 }
 
 impl CrackMaterial for CrackLitMaterial {
-    const MAPS: CrackMaps = CrackMaps { diffuse: true, normal: true, depth: false, emissive: false };
+    const MAPS: Maps = Maps { diffuse: true, normal: true, depth: false, emissive: false };
 
     fn pictures(&self) -> [Option<Handle<Image>>; 3] {
         [self.diffuse.clone(), self.normal.clone(), None]

@@ -4,12 +4,13 @@
 mod split;
 
 use super::{
-    CrackError, CrackMaps, CrackTextures, HitPoint, Shard,
+    CrackError, CrackTextures, HitPoint, Shard,
     carrier::{Carrier, Clothes, Found, Kind, Shown, typed},
     mesh::{aspect_of, check_for_tangents, closest, is_flat, place_of, wrap},
     queue::QueuedHit,
     shards::Plane,
     surfaces::Active,
+    textures::Maps,
     warm::{self, Asked, Shape},
 };
 use bevy::{
@@ -22,7 +23,7 @@ use bevy::{
 /// A material that can show cracks.
 pub(super) trait CrackMaterial: Asset + Clone {
     /// The maps that it knows.
-    const MAPS: CrackMaps;
+    const MAPS: Maps;
     /// The pictures that it shows: diffuse, normal, depth.
     fn pictures(&self) -> [Option<Handle<Image>>; 3];
     /// Shows the textures that there are; `relief` is how deep a crack is, in units of the surface's shorter side.
@@ -188,7 +189,7 @@ fn looks<S: MaterialSlot>(world: &mut World, entity: Entity, asked: &Asked<'_>) 
     let Some(now) = world.get::<S>(entity).and_then(|slot| materials.get(slot.material())) else { return true };
     // Any picture will do, and the engine's white one is there.
     let (white, is_solid) = (Handle::<Image>::default(), S::Material::MAPS.depth);
-    let textures = |maps: &CrackMaps| CrackTextures {
+    let textures = |maps: &Maps| CrackTextures {
         diffuse: (maps.diffuse && S::Material::MAPS.diffuse).then(|| white.clone()),
         normal: (maps.normal && S::Material::MAPS.normal).then(|| white.clone()),
         depth: (maps.depth && S::Material::MAPS.depth).then(|| white.clone()),
@@ -410,14 +411,14 @@ pub(super) fn undress<S: MaterialSlot>(entity: &mut EntityWorldMut) {
 
 #[cfg(feature = "2d")]
 mod flat {
-    use super::{Affine2, CrackMaps, CrackMaterial, CrackTextures, Handle, Image, MaterialSlot};
+    use super::{Affine2, CrackMaterial, CrackTextures, Handle, Image, Maps, MaterialSlot};
     use bevy::{
         prelude::{Alpha, ColorMaterial, Mesh2d, MeshMaterial2d},
         sprite_render::AlphaMode2d,
     };
 
     impl CrackMaterial for ColorMaterial {
-        const MAPS: CrackMaps = CrackMaps { diffuse: true, normal: true, depth: false, emissive: false };
+        const MAPS: Maps = Maps { diffuse: true, normal: true, depth: false, emissive: false };
 
         fn pictures(&self) -> [Option<Handle<Image>>; 3] {
             [self.texture.clone(), None, None]
@@ -475,7 +476,7 @@ mod flat {
 
 #[cfg(feature = "3d")]
 mod standard {
-    use super::{Affine2, CrackMaps, CrackMaterial, CrackTextures, Handle, Image, MaterialSlot};
+    use super::{Affine2, CrackMaterial, CrackTextures, Handle, Image, Maps, MaterialSlot};
     use bevy::{
         pbr::{ParallaxMappingMethod, StandardMaterialKey},
         prelude::{AlphaMode, Color, LinearRgba, Mesh3d, MeshMaterial3d, StandardMaterial, Vec2},
@@ -484,7 +485,7 @@ mod standard {
     use std::collections::hash_map::DefaultHasher;
 
     impl CrackMaterial for StandardMaterial {
-        const MAPS: CrackMaps = CrackMaps { diffuse: true, normal: true, depth: true, emissive: true };
+        const MAPS: Maps = Maps { diffuse: true, normal: true, depth: true, emissive: true };
 
         fn pictures(&self) -> [Option<Handle<Image>>; 3] {
             [self.base_color_texture.clone(), self.normal_map_texture.clone(), self.depth_map.clone()]

@@ -1,7 +1,7 @@
 //! [`Plan`]: what a surface will be, before anything of it is made.
 
 use super::{
-    CrackBudget, CrackError, CrackMaps, CrackResolution, CrackSurface, CrackTextures,
+    CrackBudget, CrackError, CrackResolution, CrackSurface, CrackTextures,
     activate::{frame, look},
     carrier::{self, Carrier, Found, Kind, Shown, Untouched},
     layout::Layout,
@@ -9,7 +9,7 @@ use super::{
     picture::{self, BaseKey, BasePicture, BasePictures, Space},
     preset,
     surfaces::{Active, Ground, Surfaces},
-    textures::{self, TextureKind},
+    textures::{self, Maps, TextureKind},
 };
 use crate::{
     CrackPreset,
@@ -61,7 +61,8 @@ impl Plan {
         let is_twofold = (kind.is_twofold)(world, entity);
         let stretch = Stretch { aspect: &aspect, kept: None, is_twofold };
         let layer = preset.look.layer(0).bytes_per_texel();
-        let pictures = plan_pictures(world, &surface, &shown, &stretch, layer, 0)?;
+        let wanted = Maps::wanted(surface.write, &preset.look);
+        let pictures = plan_pictures(world, (&surface, wanted), &shown, &stretch, layer, 0)?;
         let read_at = world.resource::<Surfaces>().frame;
         Ok(pictures.map(|pictures| Self {
             surface,
@@ -275,7 +276,7 @@ pub(super) struct PicturePlan {
     /// Bytes of the textures and of what belongs to them.
     pub(super) bytes: u64,
     pub(super) sampler: ImageSampler,
-    pub(super) maps: CrackMaps,
+    pub(super) maps: Maps,
     /// The size that the textures would have if the picture were not shown stretched; `None` if they have a size that was asked for.
     pub(super) unstretched: Option<UVec2>,
     /// How the picture is laid out in its textures.
@@ -336,11 +337,11 @@ pub(super) struct Stretch<'a> {
     pub(super) is_twofold: bool,
 }
 
-/// Plans the pictures of a surface; `None` if they are not there yet. Beside depths, a field takes `layer` bytes a texel; `owned` bytes of the
+/// Plans the pictures of a surface of which these maps are wanted; `None` if they are not there yet. Beside depths, a field takes `layer` bytes a texel; `owned` bytes of the
 /// budget are its own already.
 fn plan_pictures(
     world: &World,
-    surface: &CrackSurface,
+    (surface, wanted): (&CrackSurface, Maps),
     shown: &Shown,
     stretch: &Stretch<'_>,
     layer: u64,
@@ -352,12 +353,7 @@ fn plan_pictures(
             return Ok(None);
         }
     }
-    let maps = CrackMaps {
-        diffuse: surface.write.diffuse && shown.maps.diffuse,
-        normal: surface.write.normal && shown.maps.normal,
-        depth: surface.write.depth && shown.maps.depth,
-        emissive: surface.write.emissive && shown.maps.emissive,
-    };
+    let maps = wanted.and(shown.maps);
     let image = shown.diffuse.as_ref().and_then(|picture| images.get(picture));
     let is_nearest = image.is_some_and(|image| picture::is_nearest(world, image));
     let (size, unstretched) = size(world, surface, shown, image, stretch, is_nearest, (maps, layer), owned)?;
@@ -387,13 +383,15 @@ pub(super) fn draft(
     let kept = same.map(|unstretched| (unstretched, active.carrier.whole(active.base.size).size()));
     let stretch = Stretch { aspect: &aspect, kept, is_twofold: (kind.is_twofold)(world, entity) };
     let layer = active.preset.look.layer(0).bytes_per_texel();
-    let plan = plan_pictures(world, &active.surface, shown, &stretch, layer, active.bytes)?;
+    let emissive = active.textures.emissive.is_some();
+    let wanted = Maps { emissive, ..Maps::wanted(active.surface.write, &active.preset.look) };
+    let plan = plan_pictures(world, (&active.surface, wanted), shown, &stretch, layer, active.bytes)?;
     plan.map(|plan| plan.draft(world, shown)).transpose()
 }
 
 /// Bytes of the textures on the CPU and the GPU, the base picture, as if no other surface had the same, and the depth field with what it
 /// may hold beside depths.
-fn bytes(size: UVec2, (maps, layer): (CrackMaps, u64)) -> u64 {
+fn bytes(size: UVec2, (maps, layer): (Maps, u64)) -> u64 {
     let whole = [maps.diffuse, maps.normal, maps.emissive].map(u64::from).iter().sum::<u64>();
     let texel = 4 + 2 + layer + 8 * whole + 2 * u64::from(maps.depth);
     u64::from(size.x) * u64::from(size.y) * texel
@@ -408,7 +406,7 @@ fn size(
     image: Option<&Image>,
     stretch: &Stretch<'_>,
     is_nearest: bool,
-    maps: (CrackMaps, u64),
+    maps: (Maps, u64),
     owned: u64,
 ) -> Result<(UVec2, Option<UVec2>), CrackError> {
     let aspect = |picture| (stretch.aspect)(picture).filter(|aspect| aspect.is_normal());

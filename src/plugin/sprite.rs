@@ -1,12 +1,13 @@
 //! Sprites as carriers.
 
 use super::{
-    CrackError, CrackMaps, CrackTextures,
+    CrackError, CrackTextures,
     carrier::{Carrier, Found, Kind, Shown, typed},
     layout::Layout,
     material,
     shards::Plane,
     surfaces::{Active, Surfaces},
+    textures::Maps,
     warm::{self, Asked, Shape},
 };
 use bevy::{
@@ -68,7 +69,7 @@ fn inspect(world: &World, entity: Entity) -> Found {
         rect: rect.map(texels),
         layout: layout(&sprite.image_mode, sprite.custom_size).map(Arc::new),
         size: sprite.custom_size,
-        maps: CrackMaps { diffuse: true, normal: true, depth: false, emissive: false },
+        maps: Maps { diffuse: true, normal: true, depth: false, emissive: false },
     }))
 }
 

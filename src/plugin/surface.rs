@@ -53,7 +53,7 @@ impl CrackSurface {
             preset: preset.into(),
             seed: 0,
             resolution: CrackResolution::Picture,
-            write: CrackMaps { diffuse: true, normal: true, depth: true, emissive: false },
+            write: CrackMaps { diffuse: true, normal: true, depth: true },
             alpha_mask: true,
             mask: CrackMaskSource::Auto,
         }
@@ -111,6 +111,9 @@ pub enum CrackResolution {
 }
 
 /// Which maps of a surface are written.
+///
+/// With a look that [glows](crate::paint::Look::glow) when a surface first cracks, 3D meshes whose material has no emissive picture of its own get an
+/// emissive map as well.
 #[derive(Reflect, Clone, Copy, Debug, PartialEq, Eq)]
 #[reflect(Default)]
 pub struct CrackMaps {
@@ -120,14 +123,11 @@ pub struct CrackMaps {
     pub normal: bool,
     /// Depth for parallax mapping: 3D meshes only.
     pub depth: bool,
-    /// Light that cracks give off, for looks that [glow](crate::paint::Look::glow): 3D meshes whose material has no emissive picture of its
-    /// own. Default no.
-    pub emissive: bool,
 }
 
 impl Default for CrackMaps {
     fn default() -> Self {
-        Self { diffuse: true, normal: true, depth: true, emissive: false }
+        Self { diffuse: true, normal: true, depth: true }
     }
 }
 

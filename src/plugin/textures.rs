@@ -6,7 +6,7 @@ use super::{
     upload::{Staged, Stager, Uploads},
 };
 use crate::{
-    paint::{LookTable, PaintTargets, paint_glow, paint_rects},
+    paint::{Look, LookTable, PaintTargets, paint_glow, paint_rects},
     raster::{DepthField, TexelRect},
 };
 use bevy::{
@@ -47,9 +47,35 @@ impl CrackTextures {
     }
 }
 
+/// Which textures a surface has, or could have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Maps {
+    pub(super) diffuse: bool,
+    pub(super) normal: bool,
+    pub(super) depth: bool,
+    pub(super) emissive: bool,
+}
+
+impl Maps {
+    /// Those that are to be written with a look.
+    pub(super) fn wanted(CrackMaps { diffuse, normal, depth }: CrackMaps, look: &Look) -> Self {
+        Self { diffuse, normal, depth, emissive: !look.glow.is_empty() }
+    }
+
+    /// Those that are in both.
+    pub(super) const fn and(self, other: Self) -> Self {
+        Self {
+            diffuse: self.diffuse && other.diffuse,
+            normal: self.normal && other.normal,
+            depth: self.depth && other.depth,
+            emissive: self.emissive && other.emissive,
+        }
+    }
+}
+
 /// One of the pictures of a surface.
 pub(super) struct TextureKind {
-    pub(super) is_wanted: fn(CrackMaps) -> bool,
+    pub(super) is_wanted: fn(Maps) -> bool,
     /// The texels of an uncracked surface.
     pub(super) texels: fn(&BasePicture) -> Vec<u8>,
     format: TextureFormat,
@@ -126,7 +152,7 @@ impl TextureKind {
 }
 
 /// The texels of the uncracked textures that are wanted, in the order of [`KINDS`].
-pub(super) fn texels(maps: CrackMaps, base: &BasePicture) -> [Option<Vec<u8>>; MAPS] {
+pub(super) fn texels(maps: Maps, base: &BasePicture) -> [Option<Vec<u8>>; MAPS] {
     KINDS.each_ref().map(|kind| (kind.is_wanted)(maps).then(|| (kind.texels)(base)))
 }
 

@@ -9,11 +9,12 @@
 #[cfg(any(feature = "2d", feature = "3d"))]
 use super::material::{CrackMaterial, MaterialSlot};
 use super::{
-    CrackBudget, CrackMaps, CrackSurface, ShatterCracks,
+    CrackBudget, CrackSurface, ShatterCracks,
     carrier::{self, Found},
     preset,
     shards::rim_for,
     surfaces::{Active, Surfaces},
+    textures::Maps,
 };
 #[cfg(any(feature = "2d", feature = "3d"))]
 use bevy::{
@@ -83,10 +84,10 @@ struct Look {
 /// What a surface is going to look like.
 pub(super) enum Asked<'a> {
     /// It shows these maps.
-    Cracked(CrackMaps),
+    Cracked(Maps),
     /// It has holes, and there are shards.
     Broken {
-        maps: CrackMaps,
+        maps: Maps,
         /// What it showed before it cracked.
         original: &'a UntypedHandle,
         has_rims: bool,
@@ -236,7 +237,13 @@ fn is_needed(world: &World) -> bool {
 /// Asks for what a surface may look like one day; `false` if it is not there yet.
 fn look_ahead(world: &mut World, entity: Entity) -> bool {
     let Some(surface) = world.get::<CrackSurface>(entity) else { return true };
-    let (maps, source) = (surface.write, surface.preset.clone());
+    let write = surface.write;
+    let preset = match preset::resolve(world, &surface.preset) {
+        Ok(Some(preset)) => preset,
+        Ok(None) => return false,
+        Err(_) => return true,
+    };
+    let maps = Maps::wanted(write, &preset.look);
     let (kind, shown) = match carrier::inspect(world, entity) {
         (Some(kind), Found::Shown(shown)) => (kind, shown),
         (_, Found::Waiting) => return false,
@@ -244,7 +251,6 @@ fn look_ahead(world: &mut World, entity: Entity) -> bool {
     };
     (kind.looks)(world, entity, &Asked::Cracked(maps));
     let Some(settings) = world.get::<ShatterCracks>(entity).cloned() else { return true };
-    let Ok(Some(preset)) = preset::resolve(world, &source) else { return true };
     let active = world.resource::<Surfaces>().active.get(&entity);
     let original = active.map_or(shown.asset, |active| active.carrier.shown.asset.clone());
     let has_rims = rim_for(&settings, &preset.look).width > 0.0;
@@ -266,7 +272,9 @@ pub(super) fn can_crack(world: &mut World, entity: Entity) -> bool {
     if !is_needed(world) {
         return true;
     }
-    let Some(maps) = world.get::<CrackSurface>(entity).map(|surface| surface.write) else { return true };
+    let Some(CrackSurface { write, preset, .. }) = world.get::<CrackSurface>(entity) else { return true };
+    let Ok(Some(preset)) = preset::resolve(world, preset) else { return true };
+    let maps = Maps::wanted(*write, &preset.look);
     let (Some(kind), Found::Shown(_)) = carrier::inspect(world, entity) else { return true };
     (kind.looks)(world, entity, &Asked::Cracked(maps))
 }
@@ -278,7 +286,9 @@ pub(super) fn can_break(world: &mut World, entity: Entity, active: &Active) -> b
     }
     let settings = world.get::<ShatterCracks>(entity).cloned().unwrap_or_default();
     let has_rims = rim_for(&settings, &active.preset.look).width > 0.0;
-    let (maps, original) = (active.surface.write, &active.carrier.shown.asset);
+    let emissive = active.textures.emissive.is_some();
+    let maps = Maps { emissive, ..Maps::wanted(active.surface.write, &active.preset.look) };
+    let original = &active.carrier.shown.asset;
     let asked = Asked::Broken { maps, original, has_rims, inside: inside(&settings) };
     (active.carrier.kind.looks)(world, entity, &asked)
 }

@@ -98,10 +98,9 @@ fn cracks_that_glow_write_an_emissive_map_and_heal() {
     let image = add(&mut app, picture(SIZE));
     let own = StandardMaterial { base_color_texture: Some(image), ..default() };
     let (mesh, material) = (add(&mut app, Mesh::from(Rectangle::default())), add(&mut app, own));
-    let maps = CrackMaps { emissive: true, ..default() };
     let preset = CrackPreset { look: Look::GLOWING, ..CrackPreset::CONCRETE };
     let wall = (Mesh3d(mesh), MeshMaterial3d(material.clone()));
-    let entity = app.world_mut().spawn((wall, CrackSurface::new(preset).with_maps(maps))).id();
+    let entity = app.world_mut().spawn((wall, CrackSurface::new(preset))).id();
     hit(&mut app, center(entity).with_energy(4.0));
     settle(&mut app, entity);
     let emissive = get::<CrackTextures>(&app, entity).emissive.expect("an emissive map");
