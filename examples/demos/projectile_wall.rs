@@ -1,4 +1,4 @@
-//! A turret shoots at a brick wall, a concrete slab and a pane of glass; every hit cracks what it hits.
+//! A cannon before a brick wall, a concrete slab and a pane of glass; every ball cracks what it hits, and dust flies.
 //!
 //! Aim with the mouse, click to fire, hold longer for a harder shot; H heals everything. A lamp wanders in front of the walls,
 //! so that the normals of the cracks show.
@@ -10,11 +10,17 @@ use bevy::{math::ops, prelude::*};
 use bevy_crack::prelude::*;
 use bevy_crack_demos::{Cursor, DemoArguments, OnCanvas, Script, caption, demo_app, heal_on_h, play, with_normals};
 
-/// Side of an exhibit in the world.
-const SIDE: f32 = 380.0;
+/// Side of an exhibit in the world, from the middle of one to the next, and the height of their middles.
+const SIDE: f32 = 412.0;
+const PITCH: f32 = 424.0;
+const HEIGHT: f32 = 104.0;
 
-/// Where shots come from.
-const MUZZLE: Vec2 = Vec2::new(0.0, -290.0);
+/// Where the ground begins.
+const GROUND: f32 = HEIGHT - 0.5 * SIDE - 14.0;
+
+/// What the barrel of the cannon turns about, and its length.
+const HINGE: Vec2 = Vec2::new(0.0, -266.0);
+const BARREL: f32 = 118.0;
 
 /// Seconds from the muzzle to the wall.
 const FLIGHT: f32 = 0.35;
@@ -23,18 +29,38 @@ const FLIGHT: f32 = 0.35;
 const SHOTS: u32 = 26;
 const HEAL_AT: f32 = 0.72;
 
-/// Something to shoot at.
-#[derive(Component)]
-struct Exhibit;
+/// Grains that fly at a hit of energy 1.
+const GRAINS: u32 = 22;
 
+/// Something to shoot at, and the colour of its dust.
 #[derive(Component)]
-struct Barrel;
+struct Exhibit {
+    dust: Color,
+}
+
+/// Jumps back at a shot.
+#[derive(Component)]
+struct Barrel {
+    aim: Vec2,
+    recoil: f32,
+}
+
+/// Flies off at a hit, falls and fades; dust hangs in the air.
+#[derive(Component)]
+struct Grain {
+    velocity: Vec2,
+    age: f32,
+    life: f32,
+    size: f32,
+    gravity: f32,
+}
 
 #[derive(Component)]
 struct Lamp;
 
 #[derive(Component)]
 struct Projectile {
+    from: Vec2,
     target: Vec2,
     energy: f32,
     age: f32,
@@ -43,11 +69,14 @@ struct Projectile {
 #[derive(Component)]
 struct Flash {
     age: f32,
+    size: f32,
 }
 
 #[derive(Resource)]
 struct Shapes {
     ball: Handle<Mesh>,
+    grain: Handle<Mesh>,
+    iron: Handle<ColorMaterial>,
     hot: Handle<ColorMaterial>,
 }
 
@@ -57,12 +86,12 @@ struct Charge(Option<f32>);
 fn main() -> AppExit {
     let mut app = demo_app(
         "bevy_crack: projectile wall",
-        &DemoArguments::given("A turret shoots at a brick wall, a concrete slab and a pane of glass"),
+        &DemoArguments::given("A cannon before a brick wall, a concrete slab and a pane of glass"),
     );
-    app.insert_resource(ClearColor(Color::srgb(0.11, 0.12, 0.14)))
+    app.insert_resource(ClearColor(Color::srgb(0.17, 0.17, 0.19)))
         .init_resource::<Charge>()
-        .add_systems(Startup, setup)
-        .add_systems(Update, (move_lamp, fly, fade).chain());
+        .add_systems(Startup, (setup, set_up_cannon))
+        .add_systems(Update, (move_lamp, fly, fade, scatter, turn_barrel).chain());
     play(app, (aim_and_fire, heal_on_h).before(move_lamp), play_script.before(move_lamp))
 }
 
@@ -79,18 +108,19 @@ fn setup(
     // Walls crack along their mortar, the light lines of the picture.
     let brick = CrackSurface::new(CrackPreset::BRICK).with_seed(1);
     let concrete = CrackSurface::new(CrackPreset::CONCRETE).with_seed(2);
-    for (x, name, surface) in [(-430.0, "brick_red", brick), (0.0, "concrete_fine", concrete)] {
+    let (red, grey) = (Color::srgb(0.72, 0.45, 0.36), Color::srgb(0.66, 0.64, 0.6));
+    for (x, name, surface, dust) in [(-PITCH, "brick_red", brick, red), (0.0, "concrete_fine", concrete, grey)] {
         let (picture, normal) = with_normals(&assets, name);
         commands.spawn((
-            Exhibit,
+            Exhibit { dust },
             Mesh2d(quad.clone()),
             MeshMaterial2d(
                 lit.add(
                     CrackLitMaterial { normal: Some(normal), ..CrackLitMaterial::new(picture.clone()) }
-                        .with_ambient(LinearRgba::gray(0.55)),
+                        .with_ambient(LinearRgba::gray(0.7)),
                 ),
             ),
-            Transform::from_xyz(x, 60.0, 0.0),
+            Transform::from_xyz(x, HEIGHT, 0.0),
             surface,
             OnCanvas { picture, size: Vec2::splat(SIDE) },
         ));
@@ -101,40 +131,105 @@ fn setup(
         Sprite {
             image: behind.clone(),
             custom_size: Some(Vec2::splat(SIDE)),
-            color: Color::srgb(0.5, 0.55, 0.6),
+            color: Color::srgb(0.62, 0.68, 0.74),
             ..default()
         },
-        Transform::from_xyz(430.0, 60.0, -1.0),
+        Transform::from_xyz(PITCH, HEIGHT, -1.0),
         OnCanvas { picture: behind, size: Vec2::splat(SIDE) },
     ));
     let pane = assets.load("textures/glass_pane.png");
     commands.spawn((
-        Exhibit,
+        Exhibit { dust: Color::srgb(0.9, 0.95, 1.0) },
         Sprite { image: pane.clone(), custom_size: Some(Vec2::splat(SIDE)), ..default() },
-        Transform::from_xyz(430.0, 60.0, 0.0),
+        Transform::from_xyz(PITCH, HEIGHT, 0.0),
         CrackSurface::new(CrackPreset::GLASS).with_seed(3),
         OnCanvas { picture: pane, size: Vec2::splat(SIDE) },
     ));
     commands.spawn((
         Lamp,
-        CrackLight2d { color: Color::srgb(1.0, 0.93, 0.8), intensity: 2.6, range: 1100.0, height: 170.0 },
+        CrackLight2d { color: Color::srgb(1.0, 0.94, 0.84), intensity: 2.4, range: 1300.0, height: 190.0 },
         Transform::default(),
     ));
-    let steel = colors.add(Color::srgb(0.35, 0.38, 0.42));
+    commands.spawn(caption("click: fire, hold for a harder shot      H: heal", Vec2::new(0.0, 338.0)));
+    commands.insert_resource(Shapes {
+        ball: meshes.add(Circle::new(11.0)),
+        grain: meshes.add(RegularPolygon::new(1.0, 5)),
+        iron: colors.add(Color::srgb(0.13, 0.13, 0.15)),
+        hot: colors.add(Color::srgb(1.0, 0.85, 0.5)),
+    });
+}
+
+/// The cannon on its carriage, and the ground that it stands on.
+fn set_up_cannon(
+    mut commands: Commands,
+    assets: Res<AssetServer>,
+    mut meshes: ResMut<Assets<Mesh>>,
+    mut colors: ResMut<Assets<ColorMaterial>>,
+) {
+    let mut part = |mesh: Mesh, color: Color, at: Vec3| {
+        (Mesh2d(meshes.add(mesh)), MeshMaterial2d(colors.add(color)), Transform::from_translation(at))
+    };
+    let (iron, bright) = (Color::srgb(0.24, 0.25, 0.28), Color::srgb(0.38, 0.4, 0.44));
+    let (oak, dark) = (Color::srgb(0.42, 0.28, 0.17), Color::srgb(0.29, 0.19, 0.11));
+    let depth = 360.0 + GROUND;
     commands.spawn((
-        Mesh2d(meshes.add(Circle::new(38.0))),
-        MeshMaterial2d(steel.clone()),
-        Transform::from_translation(MUZZLE.extend(2.0)),
+        Sprite {
+            image: assets.load("textures/paving.png"),
+            color: Color::srgb(0.5, 0.49, 0.48),
+            custom_size: Some(Vec2::new(1280.0, depth)),
+            image_mode: SpriteImageMode::Tiled { tile_x: true, tile_y: true, stretch_value: 0.5 },
+            ..default()
+        },
+        Transform::from_xyz(0.0, GROUND - 0.5 * depth, -2.0),
     ));
-    commands.spawn((
-        Barrel,
-        Mesh2d(meshes.add(Rectangle::new(16.0, 74.0))),
-        MeshMaterial2d(steel),
-        Transform::from_translation(MUZZLE.extend(3.0)),
+    commands.spawn(part(
+        Rectangle::new(1280.0, 10.0).into(),
+        Color::srgb(0.4, 0.38, 0.35),
+        Vec3::new(0.0, GROUND, -1.5),
     ));
-    commands.spawn(caption("click: fire, hold for a harder shot      H: heal", Vec2::new(0.0, 325.0)));
-    commands
-        .insert_resource(Shapes { ball: meshes.add(Circle::new(9.0)), hot: colors.add(Color::srgb(1.0, 0.75, 0.35)) });
+    // Its shadow.
+    commands.spawn(part(
+        Ellipse::new(118.0, 14.0).into(),
+        Color::srgba(0.0, 0.0, 0.0, 0.35),
+        HINGE.extend(1.0) - 62.0 * Vec3::Y,
+    ));
+    commands.spawn(part(Rectangle::new(132.0, 34.0).into(), oak, HINGE.extend(2.0) - 26.0 * Vec3::Y));
+    commands.spawn(part(Rectangle::new(132.0, 6.0).into(), dark, HINGE.extend(2.1) - 40.0 * Vec3::Y));
+    let barrel = commands
+        .spawn((
+            Barrel { aim: Vec2::Y, recoil: 0.0 },
+            Transform::from_translation(HINGE.extend(3.0)),
+            Visibility::default(),
+        ))
+        .id();
+    let up = |y: f32, z: f32| Vec3::new(0.0, y, z);
+    let tube = ConvexPolygon::new([[-27.0, -26.0], [27.0, -26.0], [18.0, BARREL], [-18.0, BARREL]].map(Vec2::from));
+    let shine = ConvexPolygon::new([[-15.0, -20.0], [-8.0, -20.0], [-5.0, BARREL], [-10.0, BARREL]].map(Vec2::from));
+    for part in [
+        part(Circle::new(27.0).into(), iron, up(-26.0, 0.0)),
+        part(Circle::new(9.0).into(), bright, up(-54.0, -0.1)),
+        part(Rectangle::new(50.0, 9.0).into(), bright, up(18.0, 0.2)),
+        part(Rectangle::new(46.0, 14.0).into(), iron, up(BARREL - 4.0, 0.3)),
+        part(Rectangle::new(46.0, 4.0).into(), bright, up(BARREL - 12.0, 0.4)),
+    ] {
+        commands.spawn((part, ChildOf(barrel)));
+    }
+    for (shape, color, z) in [(tube, iron, 0.0), (shine, bright, 0.1)] {
+        if let Ok(shape) = shape {
+            commands.spawn((part(shape.into(), color, up(0.0, z)), ChildOf(barrel)));
+        }
+    }
+    for x in [-70.0, 70.0] {
+        let at = HINGE.extend(5.0) + Vec3::new(x, -30.0, 0.0);
+        commands.spawn(part(Circle::new(36.0).into(), dark, at));
+        commands.spawn(part(Circle::new(29.0).into(), oak, at + 0.1 * Vec3::Z));
+        for k in 0..4 {
+            let (mesh, material, place) = part(Rectangle::new(58.0, 5.0).into(), dark, at + 0.2 * Vec3::Z);
+            let turned = place.with_rotation(Quat::from_rotation_z(std::f32::consts::FRAC_PI_4 * k as f32));
+            commands.spawn((mesh, material, turned));
+        }
+        commands.spawn(part(Circle::new(8.0).into(), bright, at + 0.3 * Vec3::Z));
+    }
 }
 
 /// The pointer aims; the button charges while it is down and fires when it is let go.
@@ -144,11 +239,11 @@ fn aim_and_fire(
     time: Res<Time>,
     buttons: Res<ButtonInput<MouseButton>>,
     cursor: Cursor,
-    mut barrel: Query<&mut Transform, With<Barrel>>,
+    mut barrel: Single<&mut Barrel>,
     shapes: Res<Shapes>,
 ) {
     let Some(target) = cursor.point() else { return };
-    turn_barrel(&mut barrel, target);
+    barrel.aim(target);
     if buttons.just_pressed(MouseButton::Left) {
         charge.0 = Some(0.0);
     }
@@ -157,26 +252,95 @@ fn aim_and_fire(
         if buttons.just_released(MouseButton::Left) {
             let energy = 0.5 + 3.5 * seconds.min(1.0);
             charge.0 = None;
-            fire(&mut commands, &shapes, target, energy);
+            fire(&mut commands, &shapes, &mut barrel, target, energy);
         }
     }
 }
 
-fn turn_barrel(barrel: &mut Query<&mut Transform, With<Barrel>>, target: Vec2) {
-    if let Ok(mut barrel) = barrel.single_mut() {
-        let aim = (target - MUZZLE).normalize_or(Vec2::Y);
-        barrel.rotation = Quat::from_rotation_arc_2d(Vec2::Y, aim);
-        barrel.translation = (MUZZLE + aim * 37.0).extend(3.0);
+impl Barrel {
+    fn aim(&mut self, target: Vec2) {
+        let aim = (target - HINGE).normalize_or(Vec2::Y);
+        // It does not shoot itself in the wheels.
+        self.aim = Vec2::new(aim.x, aim.y.max(0.25)).normalize_or(Vec2::Y);
     }
 }
 
-fn fire(commands: &mut Commands, shapes: &Shapes, target: Vec2, energy: f32) {
+fn turn_barrel(time: Res<Time>, barrel: Single<(&mut Barrel, &mut Transform)>) {
+    let (mut barrel, mut transform) = barrel.into_inner();
+    barrel.recoil *= ops::exp(-7.0 * time.delta_secs());
+    transform.rotation = Quat::from_rotation_arc_2d(Vec2::Y, barrel.aim);
+    transform.translation = (HINGE - barrel.recoil * barrel.aim).extend(3.0);
+}
+
+fn fire(commands: &mut Commands, shapes: &Shapes, barrel: &mut Barrel, target: Vec2, energy: f32) {
+    barrel.aim(target);
+    barrel.recoil = 26.0;
+    let from = HINGE + (BARREL + 6.0) * barrel.aim;
     commands.spawn((
-        Projectile { target, energy, age: 0.0 },
+        Projectile { from, target, energy, age: 0.0 },
+        Mesh2d(shapes.ball.clone()),
+        MeshMaterial2d(shapes.iron.clone()),
+        Transform::from_translation(from.extend(4.0)),
+    ));
+    commands.spawn(flash(shapes, from, 2.4));
+}
+
+/// Light for a moment.
+fn flash(shapes: &Shapes, at: Vec2, size: f32) -> impl Bundle {
+    (
+        Flash { age: 0.0, size },
         Mesh2d(shapes.ball.clone()),
         MeshMaterial2d(shapes.hot.clone()),
-        Transform::from_translation(MUZZLE.extend(4.0)),
-    ));
+        Transform::from_translation(at.extend(6.0)),
+    )
+}
+
+/// Grains and dust from a hit.
+fn burst(
+    commands: &mut Commands,
+    shapes: &Shapes,
+    colors: &mut Assets<ColorMaterial>,
+    at: Vec2,
+    energy: f32,
+    dust: Color,
+) {
+    for i in 0..(GRAINS as f32 * energy.sqrt()) as u32 {
+        let draw = |k: f32| (i as f32 * k + at.x * 0.013 + at.y * 0.037).rem_euclid(1.0);
+        let (sin, cos) = ops::sin_cos(std::f32::consts::TAU * draw(0.618_034));
+        let is_dust = i % 3 == 0;
+        let speed = if is_dust { 30.0 + 60.0 * draw(0.755) } else { 90.0 + 260.0 * draw(0.755) } * energy.sqrt();
+        let shade = 0.75 + 0.35 * draw(0.327);
+        let Srgba { red, green, blue, .. } = dust.to_srgba();
+        let color = Color::srgba(red * shade, green * shade, blue * shade, if is_dust { 0.25 } else { 1.0 });
+        commands.spawn((
+            Grain {
+                velocity: Vec2::new(cos, sin + 0.35) * speed,
+                age: 0.0,
+                life: if is_dust { 0.9 } else { 1.3 },
+                size: if is_dust { 16.0 + 14.0 * draw(0.913) } else { 1.6 + 3.4 * draw(0.913) },
+                gravity: if is_dust { -20.0 } else { 620.0 },
+            },
+            Mesh2d(shapes.grain.clone()),
+            MeshMaterial2d(colors.add(color)),
+            Transform::from_translation(at.extend(if is_dust { 4.5 } else { 5.0 })),
+        ));
+    }
+}
+
+fn scatter(mut commands: Commands, time: Res<Time>, mut grains: Query<(Entity, &mut Grain, &mut Transform)>) {
+    let seconds = time.delta_secs();
+    for (entity, mut grain, mut transform) in &mut grains {
+        grain.age += seconds;
+        grain.velocity *= ops::exp(-1.2 * seconds);
+        grain.velocity.y -= grain.gravity * seconds;
+        transform.translation += (grain.velocity * seconds).extend(0.0);
+        let left = 1.0 - grain.age / grain.life;
+        transform.scale = Vec3::splat(grain.size * left.max(0.0).sqrt());
+        transform.rotate_z(4.0 * seconds);
+        if left <= 0.0 {
+            commands.entity(entity).despawn();
+        }
+    }
 }
 
 /// Projectiles fly into the picture; those that arrive at an exhibit hit it.
@@ -184,30 +348,28 @@ fn fly(
     mut commands: Commands,
     time: Res<Time>,
     mut projectiles: Query<(Entity, &mut Projectile, &mut Transform)>,
-    exhibits: Query<(Entity, &GlobalTransform), With<Exhibit>>,
+    exhibits: Query<(Entity, &Exhibit, &GlobalTransform)>,
     shapes: Res<Shapes>,
+    mut colors: ResMut<Assets<ColorMaterial>>,
 ) {
     for (entity, mut projectile, mut transform) in &mut projectiles {
         projectile.age += time.delta_secs();
         let share = (projectile.age / FLIGHT).min(1.0);
         let size = (1.5 - share) * projectile.energy.sqrt().clamp(0.6, 2.0);
-        transform.translation = MUZZLE.lerp(projectile.target, share).extend(4.0);
+        transform.translation = projectile.from.lerp(projectile.target, share).extend(4.0);
         transform.scale = Vec3::splat(size);
         if share < 1.0 {
             continue;
         }
         commands.entity(entity).despawn();
-        for (exhibit, at) in &exhibits {
+        for (exhibit, Exhibit { dust }, at) in &exhibits {
             let offset = (projectile.target - at.translation().truncate()).abs();
             if offset.max_element() <= SIDE / 2.0 {
-                let point = projectile.target.extend(at.translation().z);
-                commands.trigger(CrackHit::world(exhibit, point).with_energy(projectile.energy));
-                commands.spawn((
-                    Flash { age: 0.0 },
-                    Mesh2d(shapes.ball.clone()),
-                    MeshMaterial2d(shapes.hot.clone()),
-                    Transform::from_translation(projectile.target.extend(5.0)),
-                ));
+                let Projectile { target, energy, .. } = *projectile;
+                let point = target.extend(at.translation().z);
+                commands.trigger(CrackHit::world(exhibit, point).with_energy(energy));
+                commands.spawn(flash(&shapes, target, 1.6));
+                burst(&mut commands, &shapes, &mut colors, target, energy, *dust);
             }
         }
     }
@@ -217,7 +379,7 @@ fn fade(mut commands: Commands, time: Res<Time>, mut flashes: Query<(Entity, &mu
     for (entity, mut flash, mut transform) in &mut flashes {
         flash.age += time.delta_secs();
         let share = flash.age / 0.15;
-        transform.scale = Vec3::splat(1.6 * (1.0 - share).max(0.0));
+        transform.scale = Vec3::splat(flash.size * (1.0 - share).max(0.0));
         if share >= 1.0 {
             commands.entity(entity).despawn();
         }
@@ -227,7 +389,7 @@ fn fade(mut commands: Commands, time: Res<Time>, mut flashes: Query<(Entity, &mu
 fn move_lamp(time: Res<Time>, mut lamp: Query<&mut Transform, With<Lamp>>) {
     let t = time.elapsed_secs();
     for mut transform in &mut lamp {
-        transform.translation = Vec3::new(560.0 * ops::sin(0.6 * t), 60.0 + 190.0 * ops::cos(0.83 * t), 0.0);
+        transform.translation = Vec3::new(560.0 * ops::sin(0.6 * t), HEIGHT + 190.0 * ops::cos(0.83 * t), 0.0);
     }
 }
 
@@ -235,7 +397,7 @@ fn move_lamp(time: Res<Time>, mut lamp: Query<&mut Transform, With<Lamp>>) {
 fn play_script(
     mut commands: Commands,
     script: Script,
-    mut barrel: Query<&mut Transform, With<Barrel>>,
+    mut barrel: Single<&mut Barrel>,
     exhibits: Query<Entity, With<Exhibit>>,
     shapes: Res<Shapes>,
 ) {
@@ -247,9 +409,8 @@ fn play_script(
     // The last shots have time to crack what they hit.
     for i in script.due(SHOTS, 0.0..0.9) {
         let golden = |k: f32| (i as f32 * k).fract() - 0.5;
-        let middle = Vec2::new([-430.0, 0.0, 430.0][i as usize % 3], 60.0);
+        let middle = Vec2::new([-PITCH, 0.0, PITCH][i as usize % 3], HEIGHT);
         let target = middle + Vec2::new(golden(0.618), golden(0.755)) * SIDE * 0.75;
-        turn_barrel(&mut barrel, target);
-        fire(&mut commands, &shapes, target, [0.6, 1.0, 1.5, 2.5][i as usize / 3 % 4]);
+        fire(&mut commands, &shapes, &mut barrel, target, [0.6, 1.0, 1.5, 2.5][i as usize / 3 % 4]);
     }
 }

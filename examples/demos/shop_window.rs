@@ -355,7 +355,8 @@ fn play_script(
     }
     if script.is_at(BURST_AT) {
         shatter.speed = SLOW;
-        commands.entity(entity).shatter_cracks(ShatterRequest::ALL);
+        // Out on the street, where it is seen.
+        commands.entity(entity).shatter_cracks(ShatterRequest::ALL.with_direction(Vec3::new(-0.25, 0.1, 1.0)));
     }
     if script.is_at(FAST_AT) {
         shatter.speed = 1.0;
