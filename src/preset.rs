@@ -454,8 +454,9 @@ impl CrackPreset {
     pub fn scaled(&self, by: f32) -> Self {
         let growth = self.growth.scaled(by);
         let by = growth.step_length / self.growth.step_length;
-        let Profile { full_width, rim_width, .. } = self.profile;
-        let profile = Profile { full_width: full_width * by, rim_width: rim_width * by, ..self.profile };
+        let full_width = (self.profile.full_width * by).clamp(0.0001, 1.0);
+        let rim_width = (self.profile.rim_width * by).clamp(0.0, 0.2);
+        let profile = Profile { full_width, rim_width, ..self.profile };
         let crushed = self.look.crushed.map(|crushed| crushed.scaled(by));
         let veil = self.look.veil.map(|veil| veil.scaled(by));
         let look = Look { crushed, veil, ..self.look.clone() };

@@ -19,8 +19,8 @@ use image::{
 };
 use std::{error::Error, fs, path::Path};
 
-/// Size of the drawn pictures.
-const SIZE: UVec2 = UVec2::new(1280, 720);
+/// Width of the drawn pictures.
+const WIDTH: u32 = 1280;
 
 /// Frames a second of a scripted run.
 pub(crate) const RATE: u32 = 30;
@@ -69,9 +69,14 @@ impl Plugin for FilmPlugin {
     }
 }
 
-fn open_film(mut film: ResMut<Film>, output: Res<Output>, mut images: ResMut<Assets<Image>>) {
+fn open_film(
+    mut film: ResMut<Film>,
+    output: Res<Output>,
+    arguments: Res<DemoArguments>,
+    mut images: ResMut<Assets<Image>>,
+) {
     if *output == Output::Offscreen {
-        let target = Image::new_target_texture(SIZE.x, SIZE.y, TextureFormat::Rgba8UnormSrgb, None);
+        let target = Image::new_target_texture(WIDTH, arguments.height(), TextureFormat::Rgba8UnormSrgb, None);
         film.target = Some(images.add(target));
     }
 }
@@ -87,6 +92,11 @@ impl DemoArguments {
     /// From picture to picture, frames.
     fn step(&self) -> u32 {
         (self.frames / self.pictures.max(1)).max(1)
+    }
+
+    /// Height of the drawn pictures.
+    fn height(&self) -> u32 {
+        self.height.clamp(16, 4096)
     }
 
     /// Whether a picture is taken of this frame; of the last frame for sure.
@@ -130,7 +140,7 @@ fn take_picture(
             );
         }
         None => {
-            let picture = composite(&images, shown.iter());
+            let picture = composite(&images, UVec2::new(WIDTH, arguments.height()), shown.iter());
             film.add(picture, &arguments);
         }
     }
@@ -148,7 +158,7 @@ impl Film {
                 eprintln!("{}: {error}", arguments.out.display());
             }
         }
-        let width = arguments.width.clamp(1, SIZE.x);
+        let width = arguments.width.clamp(1, WIDTH);
         let height = width * picture.height() / picture.width().max(1);
         self.strip.push(imageops::resize(&picture, width, height.max(1), FilterType::Triangle));
     }
@@ -196,9 +206,11 @@ fn end(mut film: ResMut<Film>, output: Res<Output>, arguments: Res<DemoArguments
 /// Lays the CPU copies of the surfaces' pictures out as they stand in the world, seen from the front.
 fn composite<'a>(
     images: &Assets<Image>,
+    canvas: UVec2,
     shown: impl Iterator<Item = (&'a GlobalTransform, &'a OnCanvas, Option<&'a CrackTextures>)>,
 ) -> RgbaImage {
-    let mut canvas = RgbaImage::from_pixel(SIZE.x, SIZE.y, image::Rgba([38, 42, 48, 255]));
+    let center = canvas.as_vec2() / 2.0;
+    let mut canvas = RgbaImage::from_pixel(canvas.x, canvas.y, image::Rgba([38, 42, 48, 255]));
     let mut layers: Vec<_> = shown.collect();
     layers.sort_by(|a, b| a.0.translation().z.total_cmp(&b.0.translation().z));
     for (transform, surface, cracked) in layers {
@@ -206,7 +218,7 @@ fn composite<'a>(
         let Some(Ok(picture)) = images.get(&handle).map(|image| image.clone().try_into_dynamic()) else { continue };
         let size = (surface.size * transform.scale().truncate()).abs().as_uvec2().max(UVec2::ONE);
         let picture = imageops::resize(&picture.to_rgba8(), size.x, size.y, FilterType::Triangle);
-        let middle = SIZE.as_vec2() / 2.0 + transform.translation().truncate() * Vec2::new(1.0, -1.0);
+        let middle = center + transform.translation().truncate() * Vec2::new(1.0, -1.0);
         let corner = (middle - size.as_vec2() / 2.0).as_ivec2();
         imageops::overlay(&mut canvas, &picture, i64::from(corner.x), i64::from(corner.y));
     }

@@ -34,6 +34,9 @@ pub struct DemoArguments {
     /// Width of the GIF
     #[arg(long, default_value_t = 400)]
     pub width: u32,
+    /// Height of the drawn pictures, which are 1280 wide
+    #[arg(long, default_value_t = 720)]
+    pub height: u32,
     /// Folder for the pictures of a run without a window
     #[arg(long, default_value = "out")]
     pub out: PathBuf,

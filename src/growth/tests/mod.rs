@@ -437,3 +437,19 @@ fn later_hits_on_a_spot_widen() {
         assert_eq!(growth.network(), &before);
     }
 }
+
+/// However far away a preset is seen from, it stays one.
+#[test]
+fn scaled_presets_are_in_order() {
+    let mut rng = Rng::new(12);
+    let wild = [0.0, -1.0, f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e30, -1e30, f32::MIN_POSITIVE, 1e-9, 0.1, 3.0];
+    for name in CrackPreset::NAMES {
+        let preset = CrackPreset::named(name).unwrap();
+        let some = (0..50).map(|_| (8.0 * rng.signed()).exp()).collect::<Vec<f32>>();
+        for by in wild.into_iter().chain(some) {
+            let scaled = preset.scaled(by);
+            assert_eq!(scaled.validate(), Ok(()), "{name} by {by}");
+            assert_eq!(scaled.scaled(1.0 / by).scaled(0.3).validate(), Ok(()), "{name} by {by} and back");
+        }
+    }
+}
