@@ -13,7 +13,7 @@ use bevy::{
 };
 use bevy_crack::{
     prelude::*,
-    shatter::{BreakAgain, BurstParams, ShatterParams, SizeClasses},
+    shatter::{BurstParams, ShatterParams},
 };
 use bevy_crack_demos::{DemoArguments, OnCanvas, Script, demo_app, heal_on_h, hit_on_press, play, with_normals};
 
@@ -123,11 +123,6 @@ fn setup(
                         fade_after: 600.0,
                         ..BurstParams::DEFAULT
                     },
-                    again: Some(BreakAgain {
-                        classes: SizeClasses { largest: [0.002, 0.006, 0.02] },
-                        after: 0.5,
-                        ..BreakAgain::DEFAULT
-                    }),
                     thickness: 0.05,
                     ..default()
                 },
@@ -162,7 +157,7 @@ fn play_script(mut commands: Commands, script: Script, walls: Query<(Entity, &Wa
             commands.trigger(hit);
         }
         if *number + 1 == HITS.len() && script.is_at(DOWN_AT) {
-            commands.entity(wall).shatter_cracks(ShatterRequest::EVERYTHING.with_energy(2.0));
+            commands.entity(wall).shatter_cracks(ShatterRequest::EVERYTHING.with_energy(1.5));
         }
     }
 }
