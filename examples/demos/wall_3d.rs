@@ -1,11 +1,18 @@
-//! A room of brick and concrete, with normal maps and relief parallax; every shot cracks the wall that it meets.
+//! A corridor of brick and concrete in raking light, with normal maps and relief parallax; every shot cracks what it meets, and dust hangs in the air.
 //!
 //! Click to shoot; H heals everything. The camera sways, so that the depth of the cracks shows.
 //!
 //! Without a display (or with `--headless`) a script plays, and pictures and a GIF are written to `--out`.
 //! Try `--frames 120 --out film`.
 
-use bevy::{camera::Hdr, core_pipeline::tonemapping::Tonemapping, math::ops, prelude::*};
+use bevy::{
+    asset::RenderAssetUsages,
+    camera::Hdr,
+    core_pipeline::tonemapping::Tonemapping,
+    math::ops,
+    prelude::*,
+    render::render_resource::{Extent3d, TextureDimension, TextureFormat},
+};
 use bevy_crack::prelude::*;
 use bevy_crack_demos::{DemoArguments, Script, demo_app, heal_on_h, hit_on_press, play, with_normals};
 
@@ -21,10 +28,28 @@ struct Wall;
 #[derive(Component)]
 struct Lamp;
 
+/// A cloud of dust.
+#[derive(Component)]
+struct Puff {
+    velocity: Vec3,
+    size: f32,
+    age: f32,
+}
+
+/// Seconds that dust hangs in the air, and clouds of a hit of energy 1.
+const DUSTY: f32 = 2.6;
+const PUFFS: u32 = 7;
+
+#[derive(Resource)]
+struct Dust {
+    quad: Handle<Mesh>,
+    cloud: Handle<Image>,
+}
+
 fn main() -> AppExit {
     let mut app =
         demo_app("bevy_crack: walls in 3D", &DemoArguments::given("A room of brick and concrete to shoot at"));
-    app.add_systems(Startup, setup).add_systems(Update, (sway, move_lamp));
+    app.add_systems(Startup, setup).add_systems(Update, (sway, move_lamp, drift)).add_observer(raise_dust);
     play(app, heal_on_h, play_script)
 }
 
@@ -34,13 +59,14 @@ fn setup(
 
     mut meshes: ResMut<Assets<Mesh>>,
     mut materials: ResMut<Assets<StandardMaterial>>,
+    mut images: ResMut<Assets<Image>>,
 ) {
     commands.spawn((
         Camera3d::default(),
         Hdr,
         // Needs no lookup table.
         Tonemapping::AcesFitted,
-        AmbientLight { brightness: 420.0, ..default() },
+        AmbientLight { brightness: 330.0, color: Color::srgb(0.82, 0.9, 1.0), ..default() },
         Transform::default(),
     ));
     let mut material = |name: &str| {
@@ -76,9 +102,82 @@ fn setup(
     }
     commands.spawn((
         Lamp,
-        PointLight { intensity: 420_000.0, range: 12.0, shadow_maps_enabled: false, ..default() },
+        PointLight {
+            color: Color::srgb(1.0, 0.9, 0.74),
+            intensity: 330_000.0,
+            range: 14.0,
+            shadow_maps_enabled: false,
+            ..default()
+        },
         Transform::default(),
     ));
+    commands.insert_resource(Dust { quad: meshes.add(Rectangle::new(1.0, 1.0)), cloud: images.add(cloud()) });
+}
+
+/// A soft white disc.
+fn cloud() -> Image {
+    const SIDE: u32 = 32;
+    let texel = |i: u32| {
+        let at = Vec2::new((i % SIDE) as f32, (i / SIDE) as f32) / (0.5 * (SIDE - 1) as f32) - 1.0;
+        let left = (1.0 - at.length()).max(0.0);
+        [255, 255, 255, (255.0 * left * left * (3.0 - 2.0 * left)) as u8]
+    };
+    let size = Extent3d { width: SIDE, height: SIDE, depth_or_array_layers: 1 };
+    let texels = (0..SIDE * SIDE).flat_map(texel).collect();
+    Image::new(size, TextureDimension::D2, texels, TextureFormat::Rgba8UnormSrgb, RenderAssetUsages::RENDER_WORLD)
+}
+
+/// Dust rises where something is hit.
+fn raise_dust(
+    hit: On<CrackHit>,
+    mut commands: Commands,
+    dust: Res<Dust>,
+    mut materials: ResMut<Assets<StandardMaterial>>,
+    walls: Query<&GlobalTransform>,
+) {
+    let (HitPoint::World(point), Ok(wall)) = (hit.at, walls.get(hit.entity)) else { return };
+    let out = wall.rotation() * Vec3::Z;
+    for i in 0..(PUFFS as f32 * hit.energy.sqrt()) as u32 {
+        let draw = |k: f32| (i as f32 * k + 3.7 * point.x + 5.1 * point.y + point.z).rem_euclid(1.0) - 0.5;
+        let away = Vec3::new(draw(0.618), draw(0.755) + 0.2, draw(0.327));
+        commands.spawn((
+            Puff { velocity: 0.7 * out + 0.9 * away, size: 0.35 + 0.3 * draw(0.913), age: 0.0 },
+            Mesh3d(dust.quad.clone()),
+            MeshMaterial3d(materials.add(StandardMaterial {
+                base_color: Color::srgba(0.78, 0.74, 0.68, 0.0),
+                base_color_texture: Some(dust.cloud.clone()),
+                alpha_mode: AlphaMode::Blend,
+                unlit: true,
+                ..default()
+            })),
+            Transform::from_translation(point + 0.1 * out + 0.12 * away),
+        ));
+    }
+}
+
+/// Dust slows down, spreads and fades, and faces the camera.
+fn drift(
+    mut commands: Commands,
+    time: Res<Time>,
+    mut puffs: Query<(Entity, &mut Puff, &mut Transform, &MeshMaterial3d<StandardMaterial>)>,
+    camera: Single<&Transform, (With<Camera3d>, Without<Puff>)>,
+    mut materials: ResMut<Assets<StandardMaterial>>,
+) {
+    let seconds = time.delta_secs();
+    for (entity, mut puff, mut transform, material) in &mut puffs {
+        puff.age += seconds;
+        puff.velocity *= ops::exp(-2.5 * seconds);
+        transform.translation += (puff.velocity - 0.05 * Vec3::Y) * seconds;
+        transform.rotation = camera.rotation;
+        let share = puff.age / DUSTY;
+        transform.scale = Vec3::splat(puff.size * (0.5 + 1.5 * share.sqrt()));
+        if let Some(mut material) = materials.get_mut(&material.0) {
+            material.base_color.set_alpha(0.34 * (1.0 - share).max(0.0));
+        }
+        if share >= 1.0 {
+            commands.entity(entity).despawn();
+        }
+    }
 }
 
 fn sway(time: Res<Time>, mut camera: Query<&mut Transform, With<Camera3d>>) {
@@ -92,7 +191,7 @@ fn sway(time: Res<Time>, mut camera: Query<&mut Transform, With<Camera3d>>) {
 fn move_lamp(time: Res<Time>, mut lamp: Query<&mut Transform, With<Lamp>>) {
     let t = time.elapsed_secs();
     for mut transform in &mut lamp {
-        transform.translation = Vec3::new(1.3 * ops::cos(0.7 * t), 1.2, 0.3 + 0.9 * ops::sin(0.7 * t));
+        transform.translation = Vec3::new(1.35 * ops::cos(0.5 * t), 1.45, -0.9 + 0.7 * ops::sin(0.5 * t));
     }
 }
 
