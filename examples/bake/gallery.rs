@@ -1,13 +1,12 @@
-//! `bake gallery`: every preset on its own picture, at three moments, on one sheet.
+//! `bake gallery`: every preset on its own picture, and one look more, at three moments, on one sheet.
 
-use crate::sheet;
-use bevy_crack::CrackPreset;
+use crate::{own, sheet};
 use clap::Args;
 use std::{error::Error, fs, path::PathBuf};
 
 #[derive(Args)]
 pub(crate) struct Options {
-    /// Only these presets; by default all
+    /// Only these presets, or looks on concrete; by default all presets
     #[arg(long)]
     preset: Vec<String>,
     #[arg(long, default_value_t = 1)]
@@ -22,7 +21,7 @@ pub(crate) struct Options {
 
 pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
     let names: Vec<&str> = match &options.preset[..] {
-        [] => CrackPreset::NAMES.to_vec(),
+        [] => own::exhibits().collect(),
         names => names.iter().map(String::as_str).collect(),
     };
     fs::create_dir_all(&options.out)?;

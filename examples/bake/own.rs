@@ -1,6 +1,17 @@
 //! Pictures that ship with the crate.
 
+use bevy_crack::{CrackPreset, paint::Look};
 use std::path::{Path, PathBuf};
+
+/// The presets, and a look that none of them has: as many as fill a sheet.
+pub(crate) fn exhibits() -> impl Iterator<Item = &'static str> {
+    CrackPreset::NAMES.into_iter().chain(["glowing"])
+}
+
+/// The preset of this name, or a look on concrete.
+pub(crate) fn exhibit(name: &str) -> Option<CrackPreset> {
+    CrackPreset::named(name).or_else(|| Some(CrackPreset { look: Look::named(name)?, ..CrackPreset::CONCRETE }))
+}
 
 /// The picture that suits a preset.
 pub(crate) fn own_picture(preset: &str) -> PathBuf {

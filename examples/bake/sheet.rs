@@ -1,7 +1,7 @@
 //! Every preset on its own picture, at three moments after a hit, on one sheet; made without an engine.
 
 use crate::{
-    own::own_picture,
+    own::{exhibit, own_picture},
     painting::{fitted, paint},
     pictures::read_picture,
     text::{FONT, draw_text},
@@ -29,8 +29,9 @@ const MOMENTS: [f32; 3] = [0.15, 0.4, 1.0];
 /// Presets side by side.
 const COLUMNS: u32 = 2;
 
-/// Where the one hit lands.
+/// Where the one hit lands, and how hard it is.
 const HIT: Vec2 = Vec2::new(0.46, 0.53);
+const HARD: f32 = 3.0;
 
 const PAPER: Rgba<u8> = Rgba([24, 26, 30, 255]);
 const INK: [f32; 3] = [214.0, 216.0, 220.0];
@@ -45,7 +46,7 @@ pub(crate) fn draw(names: &[&str], seed: u64, side: u32) -> Result<RgbaImage, Bo
     let rows = (names.len() as u32).div_ceil(COLUMNS);
     let mut sheet = RgbaImage::from_pixel(columns * block.x, rows * block.y, PAPER);
     for (i, name) in (0..).zip(names) {
-        let preset = CrackPreset::named(name).ok_or_else(|| format!("no preset `{name}`"))?;
+        let preset = exhibit(name).ok_or_else(|| format!("no preset `{name}`"))?;
         let corner = UVec2::new(i % COLUMNS, i / COLUMNS) * block + 2 * GAP;
         label(&mut sheet, name, corner, UVec2::new(block.x - 4 * GAP, LABEL));
         for (column, picture) in (0..).zip(moments(&preset, name, seed, side)?) {
@@ -67,7 +68,7 @@ fn moments(preset: &CrackPreset, name: &str, seed: u64, side: u32) -> Result<Vec
     let frame = SurfaceFrame::new(side)?;
     let mut growth = CrackGrowth::new(preset.growth.clone(), frame.extent(), seed)?;
     growth.set_mask(mask.clone());
-    growth.hit(frame.uv_to_pos(HIT), 1.0);
+    growth.hit(frame.uv_to_pos(HIT), HARD);
     while growth.step().grew() {}
     let table = LookTable::new(&preset.look, frame.texels_per_unit())?;
     let mut pictures = Vec::new();

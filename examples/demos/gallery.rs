@@ -49,16 +49,16 @@ fn main() -> AppExit {
 
 fn write_sheet(out: &Path) -> Result<(), Box<dyn Error>> {
     fs::create_dir_all(out)?;
-    Ok(sheet::draw(&CrackPreset::NAMES, 1, sheet::SIDE)?.save(out.join("gallery.png"))?)
+    Ok(sheet::draw(&own::exhibits().collect::<Vec<_>>(), 1, sheet::SIDE)?.save(out.join("gallery.png"))?)
 }
 
 fn setup(mut commands: Commands, assets: Res<AssetServer>) {
     commands.spawn(Camera2d);
     let size = Vec2::splat(SIDE);
-    let rows = CrackPreset::NAMES.len().div_ceil(COLUMNS);
+    let rows = own::exhibits().count().div_ceil(COLUMNS);
     let middle = Vec2::new(COLUMNS as f32 - 1.0, rows as f32 - 1.0) / 2.0;
-    for (i, name) in CrackPreset::NAMES.into_iter().enumerate() {
-        let Some(preset) = CrackPreset::named(name) else { continue };
+    for (i, name) in own::exhibits().enumerate() {
+        let Some(preset) = own::exhibit(name) else { continue };
         let cell = Vec2::new((i % COLUMNS) as f32, (i / COLUMNS) as f32);
         let at = (cell - middle) * PITCH * Vec2::new(1.0, -1.0);
         let file = |name: &str| own::own_picture(name).file_name().map(|file| Path::new("textures").join(file));

@@ -126,6 +126,9 @@ struct Known {
     carrier: Carrier,
     is_good: bool,
     is_surface: bool,
+    /// Whether it has cracks to be baked, and whether it was hit in this frame: both wait for it to be a surface.
+    has_guide: bool,
+    is_struck: bool,
     shown: Shown,
     expect: Expect,
 }
@@ -293,7 +296,16 @@ impl Game {
             }
         };
         let is_good = matches!(shows, Show::Good(_));
-        Known { entity, carrier, is_good, is_surface: false, shown, expect: Expect::Whole }
+        Known {
+            entity,
+            carrier,
+            is_good,
+            is_surface: false,
+            has_guide: false,
+            is_struck: false,
+            shown,
+            expect: Expect::Whole,
+        }
     }
 
     fn send(&mut self, hit: CrackHit) {
@@ -348,6 +360,7 @@ impl Game {
         match op {
             Op::Hit { uv, energy, .. } => {
                 self.send(CrackHit::uv(entity, uv.into()).with_energy(energy));
+                known.is_struck = true;
                 let [u, v] = uv;
                 let is_inside = (0.02..=0.98).contains(&u) && (0.02..=0.98).contains(&v);
                 if is_inside && energy.is_finite() && energy > 0.0 {
@@ -360,6 +373,7 @@ impl Game {
             }
             Op::HitWorld { at, energy, .. } => {
                 self.send(CrackHit::world(entity, at.into()).with_energy(energy));
+                known.is_struck = true;
                 known.expect = if known.is_surface { Expect::Anything } else { known.expect };
                 return true;
             }
@@ -379,6 +393,9 @@ impl Game {
             Op::InsertSurface { preset, seed, .. } => {
                 commands.insert(surface_of(preset, seed));
                 known.is_surface = true;
+                if known.has_guide || known.is_struck {
+                    known.expect = Expect::Anything;
+                }
             }
             Op::Heal(_) => {
                 commands.heal_cracks();
@@ -430,10 +447,12 @@ impl Game {
                 guided.params.sites = 20;
                 guided.max_side = 40;
                 commands.insert(guided);
+                known.has_guide = true;
                 known.expect = if known.is_surface { Expect::Anything } else { known.expect };
             }
             Op::Unguide(_) => {
                 commands.remove::<GuidedCracks>();
+                known.has_guide = false;
             }
             Op::Shatter { uv, reach, .. } => {
                 let request = uv.map_or(ShatterRequest::ALL, |uv| ShatterRequest::around(uv.into(), reach));
@@ -511,7 +530,8 @@ impl Game {
                 if let Some(old) = self.model.slots.remove(&to) {
                     self.app.world_mut().despawn(old.entity);
                 }
-                let known = Known { entity, carrier, is_good, is_surface, shown, expect };
+                let known =
+                    Known { entity, carrier, is_good, is_surface, has_guide: false, is_struck: false, shown, expect };
                 self.model.slots.insert(to, known);
             }
             Op::CrackShard(number) | Op::DespawnShard(number) => {
@@ -593,6 +613,7 @@ impl Game {
     fn frame(&mut self) {
         self.app.update();
         self.check();
+        self.model.slots.values_mut().for_each(|known| known.is_struck = false);
     }
 
     /// Waits until everything that is to crack has cracked.
