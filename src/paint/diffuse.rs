@@ -293,6 +293,14 @@ impl Block<'_> {
         if RICH && *self.depth == [0; BLOCK] {
             return [[0.0; BLOCK]; 4];
         }
+        if let Some(cel) = &look.cel {
+            let mut over = [[0.0; BLOCK]; 4];
+            for i in 0..BLOCK {
+                let layer = cel.layer(self.depth[i], [self.x[i], self.y[i]]);
+                over.iter_mut().zip(layer).for_each(|(over, part)| over[i] = part * share[i]);
+            }
+            return over;
+        }
         let mut between = [0.0; BLOCK];
         for (between, &depth) in between.iter_mut().zip(self.depth) {
             *between = LookTable::between(depth);
@@ -384,7 +392,8 @@ fn compose<const ROOM: usize>(
         let (left, sheen) = (1.0 - over[3][i], sheen[i]);
         for c in 0..3 {
             let veiled = look.sheen[c] * sheen * (1.0 - veil) + look.veil[c] * veil;
-            let below = veiled * (1.0 - pale) + extras.color[c] * tone * pale;
+            let crushed = extras.color[c] + under[c][i] * extras.tint;
+            let below = veiled * (1.0 - pale) + crushed * tone * pale;
             let crack = over[c][i] + below * left;
             over[c][i] = crack * (1.0 - dark) + HOLE * under[c][i] * dark;
         }

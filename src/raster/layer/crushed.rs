@@ -3,7 +3,7 @@
 use super::{hash, noise};
 use crate::{
     Grid,
-    math::mix,
+    math::{mix, ops},
     pattern::{Strike, SurfaceFrame},
     raster::TexelRect,
 };
@@ -42,6 +42,20 @@ pub struct Crushed {
     pub chips: f32,
     /// How far dust and crumbs reach, radii. 1..=8; default 2.5.
     pub reach: f32,
+    /// Whether it is broken along straight chords into plates, with angular chips that throw shadows; else its outline and floor are as of
+    /// something crushed to powder. [`soft`](Self::soft), [`hole`](Self::hole) and [`flake`](Self::flake) do not count then. Default false.
+    pub broken: bool,
+    /// Radius of the deeper hollow in the middle of what is broken, as a share of the radius; it has more than half of the depth. 0..=1; default
+    /// 0 = a flat floor.
+    pub basin: f32,
+    /// How many smaller flakes have come off further out, where it is [`broken`](Self::broken): at energy 1, more with its root. 0..=16; default 0.
+    pub flakes: u32,
+    /// Share that the picture's own colour has in [`color`](Self::color), so that what is crushed has the tone of what it was. 0..=1; default 0.
+    pub tint: f32,
+    /// How far chips and dust of what is [`broken`](Self::broken) lie below it (a wall): 0 = all around, 1 = nearly all below. 0..=1; default 0.
+    pub fall: f32,
+    /// Width of a dark line around chips of what is [`broken`](Self::broken) (a drawing), pattern units, 0..=0.05; default 0 = none.
+    pub outline: f32,
 }
 
 impl Crushed {
@@ -61,6 +75,12 @@ impl Crushed {
         dust: 0.2,
         chips: 0.3,
         reach: 2.5,
+        broken: false,
+        basin: 0.0,
+        flakes: 0,
+        tint: 0.0,
+        fall: 0.0,
+        outline: 0.0,
     };
 
     /// The first field that is out of its range or not finite: its name, value and range.
@@ -82,6 +102,11 @@ impl Crushed {
             ("crushed.dust", self.dust, 0.0..=1.0, "0..=1"),
             ("crushed.chips", self.chips, 0.0..=1.0, "0..=1"),
             ("crushed.reach", self.reach, 1.0..=8.0, "1..=8"),
+            ("crushed.basin", self.basin, 0.0..=1.0, "0..=1"),
+            ("crushed.flakes", self.flakes as f32, 0.0..=16.0, "0..=16"),
+            ("crushed.tint", self.tint, 0.0..=1.0, "0..=1"),
+            ("crushed.fall", self.fall, 0.0..=1.0, "0..=1"),
+            ("crushed.outline", self.outline, 0.0..=0.05, "0..=0.05"),
         ];
         let is_bad = |(_, value, range, _): &(_, f32, std::ops::RangeInclusive<f32>, _)| !range.contains(value);
         fields.into_iter().find(is_bad).map(|(name, value, _, range)| (name, value, range))
@@ -95,6 +120,7 @@ impl Crushed {
             depth: scaled(self.depth, 0.0, 0.2),
             rough: scaled(self.rough, 0.0, 0.05),
             grain: scaled(self.grain, 0.0005, 0.1),
+            outline: scaled(self.outline, 0.0, 0.05),
             ..*self
         }
     }
@@ -119,17 +145,20 @@ pub(crate) struct Spot {
     pub(crate) shade: i8,
     /// How much of the hole there is.
     pub(crate) dark: u8,
+    /// How deep it is, 255 = as deep as the crater gets.
+    pub(crate) deep: u8,
 }
 
 impl Spot {
-    const NONE: Self = Self { slope: [0; 2], pale: 0, shade: 0, dark: 0 };
+    const NONE: Self = Self { slope: [0; 2], pale: 0, shade: 0, dark: 0, deep: 0 };
 
     /// Both, in any order: what is deeper in the hole or paler shows, and the steeper slope.
     fn with(self, other: Self) -> Self {
         let strength = |spot: Self| (spot.dark, spot.pale, spot.shade);
         let steep = |[x, y]: [i16; 2]| (i32::from(x).pow(2) + i32::from(y).pow(2), x, y);
         let slope = if steep(self.slope) >= steep(other.slope) { self.slope } else { other.slope };
-        Self { slope, ..if strength(self) >= strength(other) { self } else { other } }
+        let deep = self.deep.max(other.deep);
+        Self { slope, deep, ..if strength(self) >= strength(other) { self } else { other } }
     }
 }
 
@@ -284,8 +313,9 @@ impl CrushedField {
         let slot = &mut self.tiles[(tile.y * self.columns + tile.x) as usize];
         self.used += usize::from(slot.is_none());
         let texels = slot.get_or_insert_with(|| Box::new([Spot::NONE; (TILE * TILE) as usize]));
-        let shape = Shape::new(&self.crushed, self.frame.texels_per_unit(), radius);
-        shape.draw(texels, zone.pos, self.seed ^ index.wrapping_mul(0x9E37_79B1), rect, corner);
+        let seed = self.seed ^ index.wrapping_mul(0x9E37_79B1);
+        let shape = Shape::new(&self.crushed, self.frame.texels_per_unit(), radius, seed);
+        shape.draw(texels, zone.pos, seed, rect, corner);
         let Some(forbidden) = forbidden else { return };
         for y in rect.min.y..rect.max.y {
             for x in rect.min.x..rect.max.x {
@@ -332,6 +362,7 @@ struct Shape<'a> {
     depth: f32,
     rough: f32,
     grain: f32,
+    broken: Option<Broken>,
 }
 
 /// What there is at a place.
@@ -344,13 +375,15 @@ struct Place {
 }
 
 impl<'a> Shape<'a> {
-    fn new(crushed: &'a Crushed, unit: f32, radius: f32) -> Self {
+    fn new(crushed: &'a Crushed, unit: f32, radius: f32, seed: u32) -> Self {
+        let grain = (crushed.grain * unit).max(1.0);
         Self {
             crushed,
             radius,
             depth: crushed.depth * unit,
             rough: crushed.rough * unit,
-            grain: (crushed.grain * unit).max(1.0),
+            grain,
+            broken: crushed.broken.then(|| Broken::new(crushed, unit, radius, grain, seed)),
         }
     }
 
@@ -374,13 +407,15 @@ impl<'a> Shape<'a> {
                     let slope = 0.5 * (places[at - step].height - places[at + step].height);
                     (slope * SLOPE_UNIT).clamp(-32_000.0, 32_000.0) as i16
                 };
-                let Place { pale, shade, dark, .. } = places[at];
+                let Place { height, pale, shade, dark } = places[at];
+                let deep = if self.depth > 0.0 { -height / self.depth } else { 0.0 };
                 let spot = Spot {
                     // Nothing is lit in a hole.
                     slope: if dark > 0.5 { [0; 2] } else { [slope(1), slope(WIDE)] },
                     pale: (pale.clamp(0.0, 1.0) * 255.0 + 0.5) as u8,
                     shade: (shade * 128.0).clamp(-127.0, 127.0) as i8,
                     dark: (dark.clamp(0.0, 1.0) * 255.0 + 0.5) as u8,
+                    deep: (deep.clamp(0.0, 1.0) * 255.0 + 0.5) as u8,
                 };
                 let texel = &mut texels[(y + corner.y) * TILE as usize + x + corner.x];
                 *texel = texel.with(spot);
@@ -397,6 +432,10 @@ impl<'a> Shape<'a> {
         // No outline strays further than that.
         let widest = 1.0 + WIDEST * ragged;
         if radii > reach.max(flake).max(widest) + 0.1 {
+            return place;
+        }
+        if let Some(broken) = &self.broken {
+            self.break_off(&mut place, broken, off, at, seed);
             return place;
         }
         let way = off / distance.max(1.0e-3);
@@ -483,4 +522,293 @@ impl<'a> Shape<'a> {
             place.shade += (0.5 * draw(27) - 0.25) * inside;
         }
     }
+    /// What is there of something that breaks along chords.
+    fn break_off(&self, place: &mut Place, broken: &Broken, off: Vec2, at: Vec2, seed: u32) {
+        let Crushed { pale, speckle, dust, chips, reach, fall, .. } = *self.crushed;
+        let within = broken.within(off);
+        let inside = (within + 0.5).clamp(0.0, 1.0);
+        if inside > 0.0 {
+            // A steep wall, and a floor of plates, each tilted in its own way.
+            let share = if broken.basin.is_some() { SHELF } else { 1.0 };
+            let mut down = share * (within / (WALL * share * self.depth).max(1.0)).clamp(0.0, 1.0);
+            let mut shadow = sink(broken.within(off + TO_LIGHT * (SHADOW * share * self.depth)));
+            if let Some(basin) = &broken.basin {
+                let within = basin.within(off);
+                down += (1.0 - SHELF) * (within / (WALL * self.depth).max(1.0)).clamp(0.0, 1.0);
+                if within > 0.0 {
+                    let length = SHADOW * (1.0 - SHELF) * self.depth;
+                    shadow = shadow.max(sink(basin.within(off + TO_LIGHT * length)));
+                }
+            }
+            let plate = Cell::find(seed ^ 0x51, at / (0.3 * self.radius).max(2.0 * self.grain));
+            let stone = Cell::find(seed ^ 0x52, at / self.grain);
+            let fade = (0.5 * within).clamp(0.0, 1.0);
+            let bumps = 0.7 * plate.height + 0.3 * stone.draw * (4.0 * stone.gap).min(1.0);
+            place.height = -self.depth * down + self.rough * bumps * fade;
+            place.pale = pale * inside;
+            // Stones are paler or darker than what they lie in, with dark gaps around them.
+            let gap = (1.0 - 6.0 * stone.gap).max(0.0);
+            let is_stone = stone.draw.abs() > 0.35;
+            let tone = if is_stone { 0.5 * stone.draw - 0.3 * gap } else { 0.12 * stone.draw };
+            place.shade = speckle * (tone + 0.25 * plate.draw) * inside;
+            place.dark = SHADE * shadow * inside * (SHADOW * self.depth).min(1.0);
+        }
+        if inside < 1.0 {
+            let sunk = 0.8 * fall;
+            let radii = (off - Vec2::new(0.0, sunk * self.radius)).length() / self.radius.max(0.5);
+            let left = 1.0 - ((radii - 0.7) / (reach - 0.7 - sunk).max(0.2)).clamp(0.0, 1.0);
+            if dust > 0.0 {
+                let cloud = 0.6 + 0.4 * noise(seed ^ 6, 0.7 * at.x, 0.7 * at.y);
+                place.pale = place.pale.max(dust * left * left * cloud * (1.0 - inside));
+            }
+            self.add_grit(place, at, (chips * left).min(0.5) * left, seed);
+        }
+        for chip in &broken.chips {
+            self.add_chip(place, chip, off);
+        }
+    }
+
+    /// A chip that lies there, or its shadow.
+    fn add_chip(&self, place: &mut Place, chip: &Chip, off: Vec2) {
+        let Chip { outline, tone, ink, .. } = chip;
+        let size = outline.reach;
+        if off.distance_squared(outline.centre) > (2.0 * size + 2.0) * (2.0 * size + 2.0) {
+            return;
+        }
+        let within = outline.within(off);
+        let inside = (within + 0.5).clamp(0.0, 1.0);
+        if inside < 1.0 && *ink <= 0.0 {
+            let shadow = (outline.within(off + TO_LIGHT * (0.45 * size)) + 0.5).clamp(0.0, 1.0);
+            place.dark = place.dark.max(SHADE * shadow * (1.0 - inside));
+        }
+        if inside > 0.0 {
+            place.dark *= 1.0 - inside;
+            place.shade += (tone - place.shade) * inside;
+            place.pale = place.pale.max(inside * self.crushed.pale.max(0.85));
+            if *ink > 0.0 {
+                // On the side that is turned away it is wider.
+                let turned = 0.5 - 0.5 * (off - outline.centre).normalize_or_zero().dot(TO_LIGHT);
+                let edge = (ink * (0.8 + 0.7 * turned) - within + 0.5).clamp(0.0, 1.0);
+                place.dark = place.dark.max(edge * inside);
+            } else {
+                place.height += (0.9 * within).clamp(0.0, 0.35 * size);
+            }
+        }
+    }
+
+    /// Grit in some of the squares of a lattice.
+    fn add_grit(&self, place: &mut Place, at: Vec2, chance: f32, seed: u32) {
+        let side = (1.3 * self.grain).max(3.0);
+        let cell = (at / side).floor();
+        let (x, y) = (cell.x as i32, cell.y as i32);
+        if chance <= 0.0 || draw(seed ^ 30, x, y) >= chance {
+            return;
+        }
+        let radius = 0.09 * side * (1.0 + 1.4 * draw(seed ^ 31, x, y));
+        let middle = Vec2::new(draw(seed ^ 32, x, y), draw(seed ^ 33, x, y)) - 0.5;
+        let off = at - ((cell + 0.5) * side + middle * (0.5 * side));
+        let inside = |off: Vec2| (radius.max(0.6) - off.length() + 0.5).clamp(0.0, 1.0) * (radius / 0.6).min(1.0);
+        let shadow = inside(off + TO_LIGHT * (0.8 * radius + 0.5));
+        let grit = inside(off);
+        place.dark = place.dark.max(0.8 * SHADE * shadow * (1.0 - grit));
+        place.pale = place.pale.max(self.crushed.pale.max(0.6) * grit);
+    }
+}
+
+/// Way to the light: from the upper left.
+const TO_LIGHT: Vec2 = Vec2::new(-std::f32::consts::FRAC_1_SQRT_2, -std::f32::consts::FRAC_1_SQRT_2);
+
+/// Share of the depth that is outside the basin.
+const SHELF: f32 = 0.4;
+
+/// Run of a wall, in its height.
+const WALL: f32 = 0.45;
+
+/// Length of shadows, in the height of what throws them, and how dark they are.
+const SHADOW: f32 = 0.75;
+const SHADE: f32 = 0.42;
+
+/// How much shadow there is where the edge that throws it is so far away.
+fn sink(within: f32) -> f32 {
+    (0.5 - 0.6 * within).clamp(0.0, 1.0)
+}
+
+/// A number in 0..1 for a pair of numbers.
+fn draw(seed: u32, x: i32, y: i32) -> f32 {
+    (hash(seed, x, y) >> 8) as i32 as f32 * (1.0 / 16_777_216.0)
+}
+
+/// The nearest of some scattered places, as of a plate or a stone.
+struct Cell {
+    /// A number of its own, -1..=1.
+    draw: f32,
+    /// Height of a tilted plate, about -1..=1.
+    height: f32,
+    /// How much further it is to the next one.
+    gap: f32,
+}
+
+impl Cell {
+    fn find(seed: u32, at: Vec2) -> Self {
+        let corner = at.floor();
+        let (mut nearest, mut next) = ((f32::MAX, 0, 0, Vec2::ZERO), f32::MAX);
+        for dy in -1..=1 {
+            for dx in -1..=1 {
+                let (x, y) = ((corner.x as i32).wrapping_add(dx), (corner.y as i32).wrapping_add(dy));
+                let site = Vec2::new(super::lattice(seed, x, y), super::lattice(seed ^ 0x77, x, y)) * 0.45;
+                let off = at - corner - Vec2::new(dx as f32 + 0.5, dy as f32 + 0.5) - site;
+                let distance = off.length();
+                if distance < nearest.0 {
+                    next = nearest.0;
+                    nearest = (distance, x, y, off);
+                } else if distance < next {
+                    next = distance;
+                }
+            }
+        }
+        let (distance, x, y, off) = nearest;
+        let lean = Vec2::new(super::lattice(seed ^ 0x78, x, y), super::lattice(seed ^ 0x79, x, y));
+        let draw = super::lattice(seed ^ 0x7A, x, y);
+        Self { draw, height: 0.5 * draw + 1.4 * lean.dot(off), gap: next - distance }
+    }
+}
+
+/// A polygon around a place, texels.
+struct Outline {
+    centre: Vec2,
+    /// How far its corners are away at the most.
+    reach: f32,
+    /// From the centre, in order of their [`turn`].
+    corners: Vec<(f32, Vec2)>,
+}
+
+/// A direction as a number in 0..4 that grows with its angle.
+fn turn(way: Vec2) -> f32 {
+    let share = way.y / (way.x.abs() + way.y.abs()).max(1.0e-6);
+    if way.x < 0.0 {
+        2.0 - share
+    } else if way.y < 0.0 {
+        4.0 + share
+    } else {
+        share
+    }
+}
+
+impl Outline {
+    /// About so many corners, between which sides are broken `levels` times.
+    fn new(centre: Vec2, radius: f32, count: u32, levels: u32, ragged: f32, seed: u32) -> Self {
+        let most = radius * (1.0 + WIDEST * ragged);
+        let phase = draw(seed, -1, 0);
+        let mut corners: Vec<Vec2> = (0..count as i32)
+            .map(|k| {
+                let turn = (k as f32 + phase + 0.7 * (draw(seed, k, 1) - 0.5)) / count as f32;
+                let far = radius * (1.0 + ragged * (1.4 * draw(seed, k, 2) - 0.7));
+                ops::unit(std::f32::consts::TAU * turn) * far
+            })
+            .collect();
+        for level in 0..levels as i32 {
+            let n = corners.len();
+            corners = (0..n)
+                .flat_map(|k| {
+                    let (a, b) = (corners[k], corners[(k + 1) % n]);
+                    let along = 0.3 + 0.4 * draw(seed, k as i32, 5 + 2 * level);
+                    let aside = 0.45 * ragged * (draw(seed, k as i32, 6 + 2 * level) - 0.5);
+                    [a, a + (b - a) * along + (b - a).perp() * aside]
+                })
+                .collect();
+        }
+        let mut corners: Vec<(f32, Vec2)> = corners
+            .into_iter()
+            .map(|corner| corner.clamp_length_max(most))
+            .map(|corner| (turn(corner), corner))
+            .collect();
+        corners.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let reach = corners.iter().map(|(_, corner)| corner.length()).fold(0.0, f32::max);
+        Self { centre, reach, corners }
+    }
+
+    /// How far inside its edge a place is, texels; below zero outside.
+    fn within(&self, at: Vec2) -> f32 {
+        let off = at - self.centre;
+        if off.length_squared() > (self.reach + 1.0) * (self.reach + 1.0) {
+            return -FAR_OUT;
+        }
+        let turn = turn(off);
+        let next = self.corners.partition_point(|corner| corner.0 <= turn);
+        let (Some(&(_, a)), Some(&(_, b))) = (
+            self.corners.get(next.checked_sub(1).unwrap_or(self.corners.len().saturating_sub(1))),
+            self.corners.get(if next < self.corners.len() { next } else { 0 }),
+        ) else {
+            return -FAR_OUT;
+        };
+        let side = b - a;
+        side.perp_dot(off - a) / side.length().max(0.1)
+    }
+}
+
+/// What is so many texels outside counts as far away.
+const FAR_OUT: f32 = 1.0e3;
+
+/// A chip that lies beside.
+struct Chip {
+    outline: Outline,
+    /// How much darker or brighter it is.
+    tone: f32,
+    /// Width of the line around it, texels.
+    ink: f32,
+}
+
+/// What has broken off, and where it lies; places from the hit, texels.
+struct Broken {
+    /// The crater and the flakes around it.
+    off: Vec<Outline>,
+    basin: Option<Outline>,
+    chips: Vec<Chip>,
+}
+
+impl Broken {
+    fn new(crushed: &Crushed, unit: f32, radius: f32, grain: f32, seed: u32) -> Self {
+        let Crushed { ragged, reach, fall, .. } = *crushed;
+        // The root of the energy.
+        let more = radius / (crushed.radius * unit).max(1.0e-3);
+        let pick = |k: u32, what: i32| draw(seed ^ 0x0B0E, k as i32, what);
+        let mut off = vec![Outline::new(Vec2::ZERO, radius, 7 + (3.0 * pick(0, 0)) as u32, 2, ragged, seed ^ 0x60)];
+        let flakes = (crushed.flakes as f32 * more).round().min(64.0) as u32;
+        for k in 0..flakes {
+            let size = radius / more.max(1.0) * (0.3 + 0.5 * pick(k, 1));
+            let far = radius * (1.0 + pick(k, 2) * (reach - 1.0)) - 1.8 * size;
+            let centre = ops::unit(std::f32::consts::TAU * pick(k, 3)) * far.max(0.0);
+            off.push(Outline::new(centre, size, 5, 1, 0.6, mix_in(seed, 0x100 + k)));
+        }
+        let basin = (crushed.basin > 0.0).then(|| {
+            let centre = Vec2::new(pick(0, 4) - 0.5, pick(0, 5) - 0.3) * (0.3 * radius);
+            Outline::new(centre, radius * crushed.basin, 7, 2, 0.8 * ragged, seed ^ 0x61)
+        });
+        let chips = (24.0 * crushed.chips * more).round().min(96.0) as u32;
+        let chips = (0..chips)
+            .map(|k| {
+                let size = (grain * (0.35 + 1.1 * pick(k, 6) * pick(k, 7))).min(0.4 * radius);
+                let mut way = ops::unit(std::f32::consts::TAU * pick(k, 8));
+                if way.y < 0.3 && pick(k, 9) < fall {
+                    way.y = 0.3 + way.y.abs();
+                }
+                let near = 0.95 + (0.85 * reach - 0.95) * pick(k, 10) * pick(k, 11).sqrt();
+                let centre = way.normalize_or(Vec2::Y) * (near * radius);
+                let outline =
+                    Outline::new(centre, size, 4 + (2.0 * pick(k, 12)) as u32, 0, 0.6, mix_in(seed, 0x200 + k));
+                Chip { outline, tone: 0.3 * pick(k, 13) - 0.18, ink: crushed.outline * unit }
+            })
+            .collect();
+        Self { off, basin, chips }
+    }
+
+    /// How far inside the edge of what has come off a place is.
+    fn within(&self, at: Vec2) -> f32 {
+        self.off.iter().map(|outline| outline.within(at)).fold(-FAR_OUT, f32::max)
+    }
+}
+
+/// Another seed for each.
+fn mix_in(seed: u32, k: u32) -> u32 {
+    mix(u64::from(seed) << 32 | u64::from(k)) as u32
 }
