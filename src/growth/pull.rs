@@ -60,11 +60,11 @@ const WITHIN_GRAIN: f32 = 0.3;
 /// A crack in masonry runs along a bed joint for so many bricks, and then takes the next head joint.
 const LONGEST_RUN: f32 = 0.9;
 
-/// What is near to a hit, as a share of its reach.
-const NEAR_HIT: f32 = 0.35;
+/// What is near to a hit, bricks.
+const NEAR_HIT: f32 = 0.7;
 
 /// Share of the nodes along a brick at which a hairline splits it.
-const SPLIT: f32 = 0.03;
+const SPLIT: f32 = 0.06;
 
 const FIXED: f32 = 16_777_216.0;
 pub(super) const NO_PULL: u32 = u32::MAX;
@@ -90,7 +90,7 @@ impl CrackGrowth {
     }
 
     /// The direction of a crack that is on its way in `course` at `pos`: straight within a grain, another one in the next.
-    fn strayed(&self, course: Vec2, pos: Vec2, child: u64) -> Vec2 {
+    fn strayed(&self, course: Vec2, pos: Vec2, child: u64, generation: u32) -> Vec2 {
         // A draw per child, frozen by its index.
         let mut stray = 2.0 * hash_unit(self.seed ^ 0x57A6, child) - 1.0;
         if self.params.grain > 0.0 {
@@ -106,6 +106,10 @@ impl CrackGrowth {
                     stray *= -0.5;
                 }
             }
+        }
+        if self.params.zigzag > 0.0 {
+            let side = if generation.is_multiple_of(2) { 1.0 } else { -1.0 };
+            stray += self.params.zigzag * (side * (0.45 + 0.55 * stray.abs()) - stray);
         }
         (course + course.perp() * (self.params.wander * stray)).normalize_or_zero()
     }
@@ -183,7 +187,8 @@ impl CrackGrowth {
             course = self.params.direct(course);
             let mut direction = course;
             if self.params.wander > 0.0 {
-                direction = self.strayed(course, from, child);
+                let generation = self.network.nodes[pull.node as usize].generation;
+                direction = self.strayed(course, from, child, generation);
             }
             let heading = self.heading_of(pull.node);
             if let Some(masonry) = &self.masonry {
@@ -297,8 +302,7 @@ impl CrackGrowth {
         }
         // Near the hit a crack takes both ways at the end of a head joint.
         let is_near_hit = self.impacts.get(impact as usize).is_some_and(|impact| {
-            let near = (NEAR_HIT * self.params.reach * impact.energy.sqrt()).max(0.7 * masonry.brick());
-            impact.pos.distance(pos) < near
+            masonry.nearest(impact.pos).unwrap_or(impact.pos).distance(pos) < NEAR_HIT * masonry.brick()
         });
         let is_level = best.0.x != 0.0 && heading.x != 0.0;
         let side = if ways.len() > 1 && ways[1].0 > -0.3 && (is_near_hit && heading.y != 0.0 || self.is_fork(node)) {

@@ -387,6 +387,8 @@ fn compose<const ROOM: usize>(
         let spot = extras.spot(place + i);
         let pale = f32::from(spot.pale) * (1.0 / 255.0);
         let dark = f32::from(spot.dark) * (1.0 / 255.0);
+        // Shadows lie under the cracks, a hole has none.
+        let (shade, hole) = if extras.shades { (dark, 0.0) } else { (0.0, dark) };
         let tone = 1.0 + f32::from(spot.shade) * (1.0 / 128.0);
         let veil = f32::from(extras.veil(place + i)) * look.veil_cover;
         let (left, sheen) = (1.0 - over[3][i], sheen[i]);
@@ -394,10 +396,11 @@ fn compose<const ROOM: usize>(
             let veiled = look.sheen[c] * sheen * (1.0 - veil) + look.veil[c] * veil;
             let crushed = extras.color[c] + under[c][i] * extras.tint;
             let below = veiled * (1.0 - pale) + crushed * tone * pale;
+            let below = below * (1.0 - shade) + HOLE * under[c][i] * shade;
             let crack = over[c][i] + below * left;
-            over[c][i] = crack * (1.0 - dark) + HOLE * under[c][i] * dark;
+            over[c][i] = crack * (1.0 - hole) + HOLE * under[c][i] * hole;
         }
-        let cover = over[3][i] + left * (1.0 - (1.0 - sheen) * (1.0 - veil) * (1.0 - pale));
-        over[3][i] = cover * (1.0 - dark) + dark;
+        let cover = over[3][i] + left * (1.0 - (1.0 - sheen) * (1.0 - veil) * (1.0 - pale) * (1.0 - shade));
+        over[3][i] = cover * (1.0 - hole) + hole;
     }
 }

@@ -18,6 +18,8 @@ pub(super) struct Extras<'a, const ROOM: usize> {
     pub(super) color: [f32; 3],
     /// Share that the picture's own has in it.
     pub(super) tint: f32,
+    /// Whether what is dark in it is a shadow, not a hole.
+    pub(super) shades: bool,
     /// What a step of its depth is in the depth map.
     deep: f32,
     veils: Option<&'a Grid<u8>>,
@@ -49,6 +51,7 @@ impl<'a, const ROOM: usize> Extras<'a, ROOM> {
             crushed,
             color: settings.map_or([0.0; 3], |all| all.color.map(|channel| 255.0 * channel * (1.0 - all.tint))),
             tint: settings.map_or(0.0, |all| all.tint),
+            shades: settings.is_some_and(|all| all.broken),
             deep: settings.map_or(0.0, |all| all.depth * look.deep),
             veils,
             room: Box::new(Room { plate: [0; ROOM], spot: [Spot::default(); ROOM], veil: [0; ROOM] }),

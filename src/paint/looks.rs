@@ -156,21 +156,23 @@ impl Look {
         ]),
         crushed: Some(Crushed {
             radius: 0.042,
-            ragged: 0.55,
-            depth: 0.014,
-            rough: 0.006,
+            ragged: 0.7,
+            depth: 0.016,
+            rough: 0.007,
             grain: 0.0075,
-            color: [0.72, 0.69, 0.64],
-            pale: 0.72,
+            color: [0.80, 0.76, 0.69],
+            pale: 0.8,
             speckle: 0.8,
             dust: 0.26,
             chips: 0.6,
             reach: 2.6,
             broken: true,
             basin: 0.6,
-            tint: 0.3,
+            tint: 0.6,
             ..Crushed::DEFAULT
         }),
+        glint: 0.6,
+        relief: 0.009,
         ..Self::GROOVE
     };
 
@@ -206,10 +208,10 @@ impl Look {
     /// Brick: mortar that is gone, and a corner chipped off where it was hit.
     pub const BRICK: Self = Self {
         ramp: Cow::Borrowed(&[
-            stop(0.15, [0.66, 0.62, 0.58], 0.12),
-            stop(0.40, [0.48, 0.44, 0.40], 0.80),
-            stop(0.80, [0.32, 0.285, 0.255], 0.95),
-            stop(1.0, [0.19, 0.165, 0.145], 1.0),
+            stop(0.10, [0.55, 0.50, 0.46], 0.0),
+            stop(0.35, [0.36, 0.32, 0.29], 0.85),
+            stop(0.70, [0.22, 0.19, 0.17], 0.97),
+            stop(1.0, [0.12, 0.10, 0.09], 1.0),
         ]),
         crushed: Some(Crushed {
             radius: 0.03,
@@ -242,11 +244,11 @@ impl Look {
         opaque: true,
         cel: Some(Cel::DEFAULT),
         crushed: Some(Crushed {
-            radius: 0.055,
+            radius: 0.06,
             ragged: 0.3,
             depth: 0.0,
             rough: 0.0,
-            grain: 0.016,
+            grain: 0.019,
             color: [1.0, 0.95, 0.88],
             pale: 0.0,
             speckle: 0.0,
@@ -255,7 +257,7 @@ impl Look {
             reach: 2.8,
             broken: true,
             tint: 0.8,
-            outline: 0.0028,
+            outline: 0.0020,
             ..Crushed::DEFAULT
         }),
         ..Self::GROOVE

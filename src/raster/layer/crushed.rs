@@ -540,17 +540,17 @@ impl<'a> Shape<'a> {
                     shadow = shadow.max(sink(basin.within(off + TO_LIGHT * length)));
                 }
             }
-            let plate = Cell::find(seed ^ 0x51, at / (0.3 * self.radius).max(2.0 * self.grain));
+            let plate = Cell::find(seed ^ 0x51, at / (0.36 * self.radius).max(2.0 * self.grain));
             let stone = Cell::find(seed ^ 0x52, at / self.grain);
             let fade = (0.5 * within).clamp(0.0, 1.0);
-            let bumps = 0.7 * plate.height + 0.3 * stone.draw * (4.0 * stone.gap).min(1.0);
+            let bumps = 0.85 * plate.height + 0.15 * stone.draw * (3.0 * stone.gap).min(1.0);
             place.height = -self.depth * down + self.rough * bumps * fade;
             place.pale = pale * inside;
-            // Stones are paler or darker than what they lie in, with dark gaps around them.
-            let gap = (1.0 - 6.0 * stone.gap).max(0.0);
-            let is_stone = stone.draw.abs() > 0.35;
-            let tone = if is_stone { 0.5 * stone.draw - 0.3 * gap } else { 0.12 * stone.draw };
-            place.shade = speckle * (tone + 0.25 * plate.draw) * inside;
+            // Few stones are paler or darker than what they lie in.
+            let is_stone = stone.draw.abs() > 0.7;
+            let tone = if is_stone { 0.45 * stone.draw * (5.0 * stone.gap).min(1.0) } else { 0.10 * stone.draw };
+            let dirt = noise(seed ^ 0x53, 0.9 * at.x, 0.9 * at.y);
+            place.shade = speckle * (tone + 0.22 * plate.draw + 0.14 * dirt) * inside;
             place.dark = SHADE * shadow * inside * (SHADOW * self.depth).min(1.0);
         }
         if inside < 1.0 {
@@ -561,7 +561,9 @@ impl<'a> Shape<'a> {
                 let cloud = 0.6 + 0.4 * noise(seed ^ 6, 0.7 * at.x, 0.7 * at.y);
                 place.pale = place.pale.max(dust * left * left * cloud * (1.0 - inside));
             }
-            self.add_grit(place, at, (chips * left).min(0.5) * left, seed);
+            if self.crushed.outline <= 0.0 {
+                self.add_grit(place, at, (chips * left).min(0.5) * left, seed);
+            }
         }
         for chip in &broken.chips {
             self.add_chip(place, chip, off);
@@ -772,7 +774,7 @@ impl Broken {
         // The root of the energy.
         let more = radius / (crushed.radius * unit).max(1.0e-3);
         let pick = |k: u32, what: i32| draw(seed ^ 0x0B0E, k as i32, what);
-        let mut off = vec![Outline::new(Vec2::ZERO, radius, 7 + (3.0 * pick(0, 0)) as u32, 2, ragged, seed ^ 0x60)];
+        let mut off = vec![Outline::new(Vec2::ZERO, radius, 5 + (3.0 * pick(0, 0)) as u32, 2, ragged, seed ^ 0x60)];
         let flakes = (crushed.flakes as f32 * more).round().min(64.0) as u32;
         for k in 0..flakes {
             let size = radius / more.max(1.0) * (0.3 + 0.5 * pick(k, 1));
@@ -787,7 +789,7 @@ impl Broken {
         let chips = (24.0 * crushed.chips * more).round().min(96.0) as u32;
         let chips = (0..chips)
             .map(|k| {
-                let size = (grain * (0.35 + 1.1 * pick(k, 6) * pick(k, 7))).min(0.4 * radius);
+                let size = (grain * (0.4 + pick(k, 6) * pick(k, 7))).min(0.4 * radius);
                 let mut way = ops::unit(std::f32::consts::TAU * pick(k, 8));
                 if way.y < 0.3 && pick(k, 9) < fall {
                     way.y = 0.3 + way.y.abs();
