@@ -465,8 +465,8 @@ impl CrackPreset {
     /// Cartoon: a ragged star at the hit, bold zigzag arms that end in needles.
     pub const TOON: Self = Self {
         growth: GrowthParams {
-            kill_distance: 0.04,
-            step_length: 0.042,
+            kill_distance: 0.05,
+            step_length: 0.048,
             crack_radius: 0.25,
             num_lines_grid: 16,
             num_columns_grid: 16,
@@ -475,17 +475,17 @@ impl CrackPreset {
             reach: 0.3,
             starts: StartLayout::Arms { count: 5 },
             line_width: 0.0012,
-            line_growth: 6.0,
+            line_growth: 8.0,
             murray: 1.4,
-            max_width: 0.034,
+            max_width: 0.036,
             tip_taper: 0.0,
             inertia: 1.6,
             wander: 0.6,
-            zigzag: 0.85,
+            zigzag: 0.75,
             forks: 0.14,
             fork_angle: 0.9,
             roughness: 0.0,
-            arrest: 0.105,
+            arrest: 0.12,
             variety: 0.2,
             ..GrowthParams::DEFAULT
         },

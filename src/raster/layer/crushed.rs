@@ -530,27 +530,35 @@ impl<'a> Shape<'a> {
         if inside > 0.0 {
             // A steep wall, and a floor of plates, each tilted in its own way.
             let share = if broken.basin.is_some() { SHELF } else { 1.0 };
-            let mut down = share * (within / (WALL * share * self.depth).max(1.0)).clamp(0.0, 1.0);
+            let wall = (within / (WALL * share * self.depth).max(1.0)).clamp(0.0, 1.0);
+            let bowl = (within / (0.8 * self.radius).max(1.0)).clamp(0.0, 1.0);
+            let mut down = share * (wall + BOWL * (bowl - wall));
             let mut shadow = sink(broken.within(off + TO_LIGHT * (SHADOW * share * self.depth)));
             if let Some(basin) = &broken.basin {
                 let within = basin.within(off);
-                down += (1.0 - SHELF) * (within / (WALL * self.depth).max(1.0)).clamp(0.0, 1.0);
+                down += (1.0 - SHELF) * (within / (1.5 * WALL * self.depth).max(1.0)).clamp(0.0, 1.0);
                 if within > 0.0 {
                     let length = SHADOW * (1.0 - SHELF) * self.depth;
                     shadow = shadow.max(sink(basin.within(off + TO_LIGHT * length)));
                 }
             }
-            let plate = Cell::find(seed ^ 0x51, at / (0.36 * self.radius).max(2.0 * self.grain));
+            let fold = |k: u32, size: f32| {
+                let warp =
+                    Vec2::new(noise(seed ^ k, at.x / size, at.y / size), noise(seed ^ k ^ 9, at.y / size, at.x / size));
+                facets(seed ^ k, at / size + 0.45 * warp)
+            };
+            let plate = fold(0x51, (0.42 * self.radius).max(2.0 * self.grain));
+            let small = fold(0x54, 1.7 * self.grain);
             let stone = Cell::find(seed ^ 0x52, at / self.grain);
             let fade = (0.5 * within).clamp(0.0, 1.0);
-            let bumps = 0.85 * plate.height + 0.15 * stone.draw * (3.0 * stone.gap).min(1.0);
+            let bumps = plate + 0.4 * small;
             place.height = -self.depth * down + self.rough * bumps * fade;
             place.pale = pale * inside;
             // Few stones are paler or darker than what they lie in.
             let is_stone = stone.draw.abs() > 0.7;
             let tone = if is_stone { 0.45 * stone.draw * (5.0 * stone.gap).min(1.0) } else { 0.10 * stone.draw };
             let dirt = noise(seed ^ 0x53, 0.9 * at.x, 0.9 * at.y);
-            place.shade = speckle * (tone + 0.22 * plate.draw + 0.14 * dirt) * inside;
+            place.shade = speckle * (tone + 0.1 * plate + 0.16 * dirt) * inside;
             place.dark = SHADE * shadow * inside * (SHADOW * self.depth).min(1.0);
         }
         if inside < 1.0 {
@@ -621,14 +629,17 @@ impl<'a> Shape<'a> {
 const TO_LIGHT: Vec2 = Vec2::new(-std::f32::consts::FRAC_1_SQRT_2, -std::f32::consts::FRAC_1_SQRT_2);
 
 /// Share of the depth that is outside the basin.
-const SHELF: f32 = 0.4;
+const SHELF: f32 = 0.5;
+
+/// Share of that which is gained on the way to the middle.
+const BOWL: f32 = 0.4;
 
 /// Run of a wall, in its height.
 const WALL: f32 = 0.45;
 
 /// Length of shadows, in the height of what throws them, and how dark they are.
 const SHADOW: f32 = 0.75;
-const SHADE: f32 = 0.42;
+const SHADE: f32 = 0.5;
 
 /// How much shadow there is where the edge that throws it is so far away.
 fn sink(within: f32) -> f32 {
@@ -640,12 +651,26 @@ fn draw(seed: u32, x: i32, y: i32) -> f32 {
     (hash(seed, x, y) >> 8) as i32 as f32 * (1.0 / 16_777_216.0)
 }
 
-/// The nearest of some scattered places, as of a plate or a stone.
+/// Flat facets in -1..=1, about one unit wide: heights at the corners of a lattice of triangles, linear between.
+fn facets(seed: u32, at: Vec2) -> f32 {
+    const SKEW: f32 = 0.366_025_4;
+    let skewed = at + SKEW * (at.x + at.y);
+    let corner = skewed.floor();
+    let (x, y) = (corner.x as i32, corner.y as i32);
+    let Vec2 { x: u, y: v } = skewed - corner;
+    let height = |dx: i32, dy: i32| super::lattice(seed, x.wrapping_add(dx), y.wrapping_add(dy));
+    let (first, last) = (height(0, 0), height(1, 1));
+    if u > v {
+        first * (1.0 - u) + height(1, 0) * (u - v) + last * v
+    } else {
+        first * (1.0 - v) + height(0, 1) * (v - u) + last * u
+    }
+}
+
+/// The nearest of some scattered places, as of a stone.
 struct Cell {
     /// A number of its own, -1..=1.
     draw: f32,
-    /// Height of a tilted plate, about -1..=1.
-    height: f32,
     /// How much further it is to the next one.
     gap: f32,
 }
@@ -653,7 +678,7 @@ struct Cell {
 impl Cell {
     fn find(seed: u32, at: Vec2) -> Self {
         let corner = at.floor();
-        let (mut nearest, mut next) = ((f32::MAX, 0, 0, Vec2::ZERO), f32::MAX);
+        let (mut nearest, mut next) = ((f32::MAX, 0, 0), f32::MAX);
         for dy in -1..=1 {
             for dx in -1..=1 {
                 let (x, y) = ((corner.x as i32).wrapping_add(dx), (corner.y as i32).wrapping_add(dy));
@@ -662,16 +687,14 @@ impl Cell {
                 let distance = off.length();
                 if distance < nearest.0 {
                     next = nearest.0;
-                    nearest = (distance, x, y, off);
+                    nearest = (distance, x, y);
                 } else if distance < next {
                     next = distance;
                 }
             }
         }
-        let (distance, x, y, off) = nearest;
-        let lean = Vec2::new(super::lattice(seed ^ 0x78, x, y), super::lattice(seed ^ 0x79, x, y));
-        let draw = super::lattice(seed ^ 0x7A, x, y);
-        Self { draw, height: 0.5 * draw + 1.4 * lean.dot(off), gap: next - distance }
+        let (distance, x, y) = nearest;
+        Self { draw: super::lattice(seed ^ 0x7A, x, y), gap: next - distance }
     }
 }
 
