@@ -179,21 +179,22 @@ impl Look {
     /// Plaster: thin cracks, and flakes that have come off where it was hit: the darker coat under it shows.
     pub const PLASTER: Self = Self {
         ramp: Cow::Borrowed(&[
-            stop(0.15, [0.66, 0.63, 0.60], 0.10),
+            stop(0.12, [0.60, 0.56, 0.52], 0.05),
             stop(0.45, [0.46, 0.42, 0.38], 0.80),
             stop(1.0, [0.22, 0.19, 0.16], 0.97),
         ]),
         relief: 0.006,
+        glint: 0.4,
         crushed: Some(Crushed {
             radius: 0.03,
             ragged: 0.7,
             depth: 0.004,
             rough: 0.0006,
             grain: 0.006,
-            color: [0.50, 0.44, 0.38],
+            color: [0.47, 0.40, 0.34],
             pale: 0.9,
-            speckle: 0.22,
-            dust: 0.10,
+            speckle: 0.3,
+            dust: 0.05,
             chips: 0.3,
             reach: 3.4,
             broken: true,

@@ -594,7 +594,9 @@ impl<'a> Shape<'a> {
         if inside > 0.0 {
             place.dark *= 1.0 - inside;
             place.shade += (tone - place.shade) * inside;
-            place.pale = place.pale.max(inside * self.crushed.pale.max(0.85));
+            // It shows the surface's own face.
+            let pale = if *ink > 0.0 { 0.85 } else { 0.3 * self.crushed.pale };
+            place.pale += (pale - place.pale) * inside;
             if *ink > 0.0 {
                 // On the side that is turned away it is wider.
                 let turned = 0.5 - 0.5 * (off - outline.centre).normalize_or_zero().dot(TO_LIGHT);
@@ -621,7 +623,8 @@ impl<'a> Shape<'a> {
         let shadow = inside(off + TO_LIGHT * (0.8 * radius + 0.5));
         let grit = inside(off);
         place.dark = place.dark.max(0.8 * SHADE * shadow * (1.0 - grit));
-        place.pale = place.pale.max(self.crushed.pale.max(0.6) * grit);
+        place.pale += (0.4 * self.crushed.pale - place.pale) * grit;
+        place.height += 0.6 * radius * grit;
     }
 }
 
