@@ -60,6 +60,9 @@ const WITHIN_GRAIN: f32 = 0.3;
 /// A crack in masonry runs along a bed joint for so many bricks, and then takes the next head joint.
 const LONGEST_RUN: f32 = 0.9;
 
+/// How much a crack in masonry likes to go on upwards or downwards, as it last did.
+const STAIRS: f32 = 0.7;
+
 /// What is near to a hit, bricks.
 const NEAR_HIT: f32 = 0.7;
 
@@ -270,10 +273,11 @@ impl CrackGrowth {
         }
         let draw = |what: u64| hash_unit(self.seed ^ what, u64::from(node));
         // How far it has run along a bed joint.
-        let (mut run, mut at) = (0.0, node);
+        let (mut run, mut at, mut rise) = (0.0, node, 0.0);
         while let Some(before) = self.network.nodes.get(self.network.nodes[at as usize].parent as usize) {
             let way = self.network.nodes[at as usize].pos - before.pos;
             if way.y.abs() > way.x.abs() || run > 2.0 * masonry.brick() {
+                rise = if way.y.abs() > way.x.abs() { way.y.signum() } else { 0.0 };
                 break;
             }
             run += way.x.abs();
@@ -291,7 +295,9 @@ impl CrackGrowth {
                 let is_level = way.x != 0.0;
                 let too_far = is_level && run > LONGEST_RUN * masonry.brick();
                 let liking = way.dot(course) + 0.3 * draw(if is_level { 0xB2 } else { 0xB3 });
-                (liking - if too_far { 4.0 } else { 0.0 }, (way, far))
+                // A staircase goes on up or down as before.
+                let stairs = STAIRS * rise * way.y;
+                (liking + stairs - if too_far { 4.0 } else { 0.0 }, (way, far))
             })
             .collect();
         ways.sort_by(|a, b| b.0.total_cmp(&a.0));

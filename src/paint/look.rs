@@ -347,7 +347,7 @@ pub(super) struct Strokes {
 }
 
 /// A wall is lit that faces the light by more than this (a cosine).
-const LIT: f32 = 0.25;
+const LIT: f32 = 0.2;
 
 impl Strokes {
     fn new(cel: &Cel, texels_per_unit: f32) -> Self {
@@ -380,7 +380,7 @@ impl Strokes {
         let open = share(inside - self.outline);
         let steep = (x * x + y * y).sqrt();
         let facing = if steep > 1.0e-6 { -std::f32::consts::FRAC_1_SQRT_2 * (x + y) / steep } else { 0.0 };
-        let lit = share(4.0 * (facing - LIT) + 0.5) * share(self.wall - inside + 0.5);
+        let lit = share(8.0 * (facing - LIT) + 0.5) * share(self.wall - inside + 0.5);
         let color = |c: usize| {
             let within = self.fill[c] + (self.lit[c] - self.fill[c]) * lit;
             (self.ink[c] + (within - self.ink[c]) * open) * cover

@@ -162,7 +162,7 @@ impl Look {
             grain: 0.0075,
             color: [0.76, 0.71, 0.63],
             pale: 0.85,
-            speckle: 0.8,
+            speckle: 0.55,
             dust: 0.26,
             chips: 0.6,
             reach: 2.6,
@@ -187,19 +187,19 @@ impl Look {
         glint: 0.4,
         crushed: Some(Crushed {
             radius: 0.03,
-            ragged: 0.7,
-            depth: 0.004,
+            ragged: 0.5,
+            depth: 0.0055,
             rough: 0.0006,
             grain: 0.006,
-            color: [0.47, 0.40, 0.34],
+            color: [0.50, 0.43, 0.37],
             pale: 0.9,
-            speckle: 0.3,
+            speckle: 0.2,
             dust: 0.05,
             chips: 0.3,
             reach: 3.4,
             broken: true,
             flakes: 4,
-            tint: 0.55,
+            tint: 0.6,
             fall: 0.5,
             ..Crushed::DEFAULT
         }),
@@ -233,6 +233,7 @@ impl Look {
             fall: 0.8,
             ..Crushed::DEFAULT
         }),
+        glint: 0.55,
         ..Self::GROOVE
     };
 
@@ -249,7 +250,7 @@ impl Look {
             ragged: 0.3,
             depth: 0.0,
             rough: 0.0,
-            grain: 0.019,
+            grain: 0.024,
             color: [1.0, 0.95, 0.88],
             pale: 0.0,
             speckle: 0.0,
@@ -257,7 +258,7 @@ impl Look {
             chips: 0.2,
             reach: 2.8,
             broken: true,
-            tint: 0.8,
+            tint: 0.65,
             outline: 0.0020,
             ..Crushed::DEFAULT
         }),

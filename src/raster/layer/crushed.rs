@@ -595,13 +595,16 @@ impl<'a> Shape<'a> {
             place.dark *= 1.0 - inside;
             place.shade += (tone - place.shade) * inside;
             // It shows the surface's own face.
-            let pale = if *ink > 0.0 { 0.85 } else { 0.3 * self.crushed.pale };
+            let pale = if *ink > 0.0 { 1.0 } else { 0.3 * self.crushed.pale };
             place.pale += (pale - place.pale) * inside;
             if *ink > 0.0 {
                 // On the side that is turned away it is wider.
                 let turned = 0.5 - 0.5 * (off - outline.centre).normalize_or_zero().dot(TO_LIGHT);
                 let edge = (ink * (0.8 + 0.7 * turned) - within + 0.5).clamp(0.0, 1.0);
                 place.dark = place.dark.max(edge * inside);
+                // Two flat faces.
+                let face = (off - outline.centre).dot(-TO_LIGHT) - 0.12 * size;
+                place.shade -= 0.3 * (face + 0.5).clamp(0.0, 1.0);
             } else {
                 place.height += (0.9 * within).clamp(0.0, 0.35 * size);
             }
