@@ -77,7 +77,7 @@ impl CrackPreset {
             tip_taper: 4.0,
             unevenness: 0.6,
             inertia: 1.5,
-            wander: 0.85,
+            wander: 0.7,
             grain: 0.02,
             forks: 0.11,
             fork_angle: 0.7,
@@ -486,6 +486,7 @@ impl CrackPreset {
             fork_angle: 0.9,
             roughness: 0.0,
             arrest: 0.12,
+            open_ends: 1.0,
             variety: 0.2,
             ..GrowthParams::DEFAULT
         },

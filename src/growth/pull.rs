@@ -61,10 +61,13 @@ const WITHIN_GRAIN: f32 = 0.3;
 const LONGEST_RUN: f32 = 0.9;
 
 /// How much a crack in masonry likes to go on upwards or downwards, as it last did.
-const STAIRS: f32 = 0.7;
+const STAIRS: f32 = 0.4;
 
 /// What is near to a hit, bricks.
 const NEAR_HIT: f32 = 0.7;
+
+/// How often a crack takes both ways there at the end of a head joint.
+const BOTH_WAYS: f32 = 0.5;
 
 /// Share of the nodes along a brick at which a hairline splits it.
 const SPLIT: f32 = 0.06;
@@ -294,7 +297,7 @@ impl CrackGrowth {
             .map(|(way, far)| {
                 let is_level = way.x != 0.0;
                 let too_far = is_level && run > LONGEST_RUN * masonry.brick();
-                let liking = way.dot(course) + 0.3 * draw(if is_level { 0xB2 } else { 0xB3 });
+                let liking = way.dot(course) + 0.55 * draw(if is_level { 0xB2 } else { 0xB3 });
                 // A staircase goes on up or down as before.
                 let stairs = STAIRS * rise * way.y;
                 (liking + stairs - if too_far { 4.0 } else { 0.0 }, (way, far))
@@ -306,12 +309,15 @@ impl CrackGrowth {
         if self.child_of(node) != NO_PARENT {
             return (pos, None);
         }
-        // Near the hit a crack takes both ways at the end of a head joint.
+        // Near the hit a crack may take both ways at the end of a head joint.
         let is_near_hit = self.impacts.get(impact as usize).is_some_and(|impact| {
             masonry.nearest(impact.pos).unwrap_or(impact.pos).distance(pos) < NEAR_HIT * masonry.brick()
         });
         let is_level = best.0.x != 0.0 && heading.x != 0.0;
-        let side = if ways.len() > 1 && ways[1].0 > -0.3 && (is_near_hit && heading.y != 0.0 || self.is_fork(node)) {
+        let side = if ways.len() > 1
+            && ways[1].0 > -0.3
+            && (is_near_hit && heading.y != 0.0 && draw(0xB6) < BOTH_WAYS || self.is_fork(node))
+        {
             Some(masonry.end(pos, ways[1].1, length))
         } else if ways.len() == 1 && is_level && self.child_of(parent) == node && draw(0xB4) < SPLIT {
             // Through the brick above or below.

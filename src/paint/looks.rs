@@ -188,7 +188,7 @@ impl Look {
         crushed: Some(Crushed {
             radius: 0.03,
             ragged: 0.5,
-            depth: 0.0055,
+            depth: 0.004,
             rough: 0.0006,
             grain: 0.006,
             color: [0.50, 0.43, 0.37],

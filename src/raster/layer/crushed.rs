@@ -803,7 +803,7 @@ impl Broken {
         // The root of the energy.
         let more = radius / (crushed.radius * unit).max(1.0e-3);
         let pick = |k: u32, what: i32| draw(seed ^ 0x0B0E, k as i32, what);
-        let mut off = vec![Outline::new(Vec2::ZERO, radius, 5 + (3.0 * pick(0, 0)) as u32, 2, ragged, seed ^ 0x60)];
+        let mut off = vec![Outline::new(Vec2::ZERO, radius, 6 + (3.0 * pick(0, 0)) as u32, 2, ragged, seed ^ 0x60)];
         let flakes = (crushed.flakes as f32 * more).round().min(64.0) as u32;
         for k in 0..flakes {
             let size = radius / more.max(1.0) * (0.3 + 0.5 * pick(k, 1));
