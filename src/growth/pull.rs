@@ -63,6 +63,9 @@ const LONGEST_RUN: f32 = 0.9;
 /// How much a crack in masonry likes to go on upwards or downwards, as it last did.
 const STAIRS: f32 = 0.4;
 
+/// How much it likes to leave at a side of the wall that is near.
+const OUT: f32 = 5.0;
+
 /// What is near to a hit, bricks.
 const NEAR_HIT: f32 = 0.7;
 
@@ -300,7 +303,10 @@ impl CrackGrowth {
                 let liking = way.dot(course) + 0.55 * draw(if is_level { 0xB2 } else { 0xB3 });
                 // A staircase goes on up or down as before.
                 let stairs = STAIRS * rise * way.y;
-                (liking + stairs - if too_far { 4.0 } else { 0.0 }, (way, far))
+                // Out to the side, rather than up and down beside the border.
+                let to = pos.x + way.x * far;
+                let out = if is_level && (to <= 0.0 || to >= self.network.extent().x) { OUT } else { 0.0 };
+                (liking + stairs + out - if too_far { 4.0 } else { 0.0 }, (way, far))
             })
             .collect();
         ways.sort_by(|a, b| b.0.total_cmp(&a.0));
