@@ -66,11 +66,8 @@ const STAIRS: f32 = 0.4;
 /// How much it likes to leave at a side of the wall that is near.
 const OUT: f32 = 5.0;
 
-/// What is near to a hit, bricks.
+/// What is near to a hit of energy 1, bricks; it goes with the root of the energy.
 const NEAR_HIT: f32 = 0.7;
-
-/// How often a crack takes both ways there at the end of a head joint.
-const BOTH_WAYS: f32 = 0.5;
 
 /// Share of the nodes along a brick at which a hairline splits it.
 const SPLIT: f32 = 0.06;
@@ -315,15 +312,13 @@ impl CrackGrowth {
         if self.child_of(node) != NO_PARENT {
             return (pos, None);
         }
-        // Near the hit a crack may take both ways at the end of a head joint.
+        // Near the hit a crack takes both ways at the end of a head joint.
         let is_near_hit = self.impacts.get(impact as usize).is_some_and(|impact| {
-            masonry.nearest(impact.pos).unwrap_or(impact.pos).distance(pos) < NEAR_HIT * masonry.brick()
+            let near = NEAR_HIT * masonry.brick() * impact.energy.sqrt();
+            masonry.nearest(impact.pos).unwrap_or(impact.pos).distance(pos) < near
         });
         let is_level = best.0.x != 0.0 && heading.x != 0.0;
-        let side = if ways.len() > 1
-            && ways[1].0 > -0.3
-            && (is_near_hit && heading.y != 0.0 && draw(0xB6) < BOTH_WAYS || self.is_fork(node))
-        {
+        let side = if ways.len() > 1 && ways[1].0 > -0.3 && (is_near_hit && heading.y != 0.0 || self.is_fork(node)) {
             Some(masonry.end(pos, ways[1].1, length))
         } else if ways.len() == 1 && is_level && self.child_of(parent) == node && draw(0xB4) < SPLIT {
             // Through the brick above or below.

@@ -690,6 +690,25 @@ mod tests {
     }
 
     #[test]
+    fn drawn_cracks_end_in_ink_and_one_wall_is_lit() {
+        let cel = Cel { wide: 0.1, outline: 0.004, wall: 0.02, ..Cel::DEFAULT };
+        // 50 texels of depth, an outline of 2, a lit wall up to 10.
+        let strokes = Strokes::new(&cel, 500.0);
+        let at = |texels: f32, slope: [f32; 2]| strokes.layer((texels / 50.0 * 65535.0) as u16, slope);
+        let close = |got: [f32; 4], color: [f32; 3], cover: f32| {
+            let want = [color[0], color[1], color[2]].map(|channel| 255.0 * channel * cover);
+            (0..3).all(|c| (got[c] - want[c]).abs() < 0.1) && (got[3] - cover).abs() < 1.0e-3
+        };
+        let (to_light, off_light) = ([-1.0, -1.0], [1.0, 1.0]);
+        assert_eq!(at(0.0, to_light), [0.0; 4]);
+        assert!(close(at(0.5, to_light), cel.ink, 0.5), "half a texel of edge is half covered");
+        assert!(close(at(1.9, to_light), cel.ink, 1.0), "a needle is all ink");
+        assert!(close(at(5.0, to_light), cel.lit, 1.0), "the wall that faces the light");
+        assert!(close(at(5.0, off_light), cel.fill, 1.0), "the other wall");
+        assert!(close(at(20.0, to_light), cel.fill, 1.0), "further inside");
+    }
+
+    #[test]
     fn equal_stops_share_a_ramp_and_others_do_not() {
         let stops = vec![stop(0.3, [0.1, 0.9, 0.2], 0.7), stop(0.9, [0.4, 0.2, 0.3], 1.0)];
         let look = Look { ramp: stops.clone().into(), ..Look::GROOVE };
