@@ -151,7 +151,7 @@ impl CrackPreset {
             unevenness: 0.6,
             inertia: 1.5,
             wander: 0.3,
-            forks: 0.03,
+            forks: 0.02,
             roughness: 0.09,
             arrest: 0.06,
             variety: 0.0,

@@ -66,7 +66,7 @@ const STAIRS: f32 = 0.4;
 /// How much it likes to leave at a side of the wall that is near.
 const OUT: f32 = 5.0;
 
-/// What is near to a hit of energy 1, bricks; it goes with the root of the energy.
+/// What is near to a hit of energy 1, bricks; it goes with the fourth root of the energy.
 const NEAR_HIT: f32 = 0.7;
 
 /// Share of the nodes along a brick at which a hairline splits it.
@@ -314,7 +314,7 @@ impl CrackGrowth {
         }
         // Near the hit a crack takes both ways at the end of a head joint.
         let is_near_hit = self.impacts.get(impact as usize).is_some_and(|impact| {
-            let near = NEAR_HIT * masonry.brick() * impact.energy.sqrt();
+            let near = NEAR_HIT * masonry.brick() * impact.energy.sqrt().sqrt();
             masonry.nearest(impact.pos).unwrap_or(impact.pos).distance(pos) < near
         });
         let is_level = best.0.x != 0.0 && heading.x != 0.0;
