@@ -365,15 +365,7 @@ impl Strokes {
     /// What lies over the picture at a depth where the surface leans this way: three colours times cover, and cover.
     #[inline(always)]
     pub(super) fn layer(&self, depth: u16, [x, y]: [f32; 2]) -> [f32; 4] {
-        let share = |value: f32| {
-            if value < 0.0 {
-                0.0
-            } else if value > 1.0 {
-                1.0
-            } else {
-                value
-            }
-        };
+        let share = |value: f32| value.clamp(0.0, 1.0);
         // All edges are one texel soft.
         let inside = f32::from(depth) * self.step;
         let cover = share(inside);
