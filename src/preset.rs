@@ -62,7 +62,7 @@ impl CrackPreset {
     pub const CONCRETE: Self = Self {
         growth: GrowthParams {
             kill_distance: 0.02,
-            step_length: 0.022,
+            step_length: 0.014,
             crack_radius: 0.15,
             num_lines_grid: 24,
             num_columns_grid: 24,
@@ -70,23 +70,23 @@ impl CrackPreset {
             focus: 0.4,
             reach: 0.3,
             starts: StartLayout::Arms { count: 5 },
-            line_width: 0.0042,
-            line_growth: 0.72,
-            murray: 2.8,
-            max_width: 0.03,
-            tip_taper: 6.0,
-            unevenness: 0.35,
+            line_width: 0.002,
+            line_growth: 0.26,
+            murray: 1.55,
+            max_width: 0.02,
+            tip_taper: 4.0,
+            unevenness: 0.6,
             inertia: 1.5,
-            wander: 0.5,
-            grain: 0.045,
-            forks: 0.12,
+            wander: 0.7,
+            grain: 0.02,
+            forks: 0.11,
             fork_angle: 0.7,
-            roughness: 0.16,
+            roughness: 0.12,
             arrest: 0.06,
             variety: 0.15,
             ..GrowthParams::DEFAULT
         },
-        profile: Profile { depth: 1.0, full_width: 0.02, wall: 0.55, rim_width: 0.005, rim_depth: 0.10, faintest: 0.0 },
+        profile: Profile { wall: 0.35, ..Profile::DEFAULT },
         look: Look::CONCRETE,
         steps_per_second: 60.0,
         follows_lines: false,
@@ -104,9 +104,9 @@ impl CrackPreset {
             focus: 0.9,
             reach: 0.4,
             starts: StartLayout::Arms { count: 4 },
-            line_width: 0.002,
-            line_growth: 0.22,
-            murray: 3.0,
+            line_width: 0.0017,
+            line_growth: 0.15,
+            murray: 1.8,
             max_width: 0.006,
             unevenness: 0.3,
             inertia: 2.0,
@@ -119,7 +119,15 @@ impl CrackPreset {
             variety: 0.15,
             ..GrowthParams::DEFAULT
         },
-        profile: Profile { depth: 1.0, full_width: 0.012, wall: 0.4, rim_width: 0.0, rim_depth: 0.0, faintest: 0.0 },
+        profile: Profile {
+            depth: 1.0,
+            full_width: 0.012,
+            wall: 0.4,
+            rim_width: 0.0,
+            rim_depth: 0.0,
+            faintest: 0.0,
+            ..Profile::DEFAULT
+        },
         look: Look::PLASTER,
         steps_per_second: 60.0,
         follows_lines: false,
@@ -136,21 +144,29 @@ impl CrackPreset {
             markers: MarkerLayout::PseudoGrid { occupancy: 1.0, jitter: 1.0 },
             reach: 0.3,
             starts: StartLayout::Arms { count: 4 },
-            line_width: 0.003,
-            line_growth: 0.35,
-            murray: 2.8,
+            line_width: 0.0025,
+            line_growth: 0.34,
+            murray: 1.8,
             max_width: 0.02,
-            unevenness: 0.3,
+            unevenness: 0.6,
             inertia: 1.5,
             wander: 0.3,
-            forks: 0.25,
-            roughness: 0.05,
+            forks: 0.02,
+            roughness: 0.09,
             arrest: 0.06,
             variety: 0.0,
             courses: 0.0625,
             ..GrowthParams::DEFAULT
         },
-        profile: Profile { depth: 1.0, full_width: 0.006, wall: 0.4, rim_width: 0.003, rim_depth: 0.12, faintest: 0.0 },
+        profile: Profile {
+            depth: 1.0,
+            full_width: 0.006,
+            wall: 0.4,
+            rim_width: 0.003,
+            rim_depth: 0.12,
+            faintest: 0.0,
+            ..Profile::DEFAULT
+        },
         look: Look::BRICK,
         steps_per_second: 60.0,
         follows_lines: true,
@@ -187,7 +203,15 @@ impl CrackPreset {
             fork_angle: 0.45,
             ..GrowthParams::DEFAULT
         },
-        profile: Profile { depth: 1.0, full_width: 0.003, wall: 0.5, rim_width: 0.0, rim_depth: 0.0, faintest: 0.0 },
+        profile: Profile {
+            depth: 1.0,
+            full_width: 0.003,
+            wall: 0.5,
+            rim_width: 0.0,
+            rim_depth: 0.0,
+            faintest: 0.0,
+            ..Profile::DEFAULT
+        },
         look: Look::GLASS,
         steps_per_second: 120.0,
         follows_lines: false,
@@ -220,7 +244,15 @@ impl CrackPreset {
             max_nodes: 40_000,
             ..GrowthParams::DEFAULT
         },
-        profile: Profile { depth: 1.0, full_width: 0.003, wall: 0.5, rim_width: 0.0, rim_depth: 0.0, faintest: 0.0 },
+        profile: Profile {
+            depth: 1.0,
+            full_width: 0.003,
+            wall: 0.5,
+            rim_width: 0.0,
+            rim_depth: 0.0,
+            faintest: 0.0,
+            ..Profile::DEFAULT
+        },
         look: Look::TEMPERED_GLASS,
         steps_per_second: 240.0,
         follows_lines: false,
@@ -253,7 +285,15 @@ impl CrackPreset {
             tip_taper: 6.0,
             ..GrowthParams::DEFAULT
         },
-        profile: Profile { depth: 1.0, full_width: 0.003, wall: 0.5, rim_width: 0.0, rim_depth: 0.0, faintest: 0.0 },
+        profile: Profile {
+            depth: 1.0,
+            full_width: 0.003,
+            wall: 0.5,
+            rim_width: 0.0,
+            rim_depth: 0.0,
+            faintest: 0.0,
+            ..Profile::DEFAULT
+        },
         look: Look::LAMINATED_GLASS,
         steps_per_second: 120.0,
         follows_lines: false,
@@ -289,7 +329,15 @@ impl CrackPreset {
             tip_taper: 8.0,
             ..GrowthParams::DEFAULT
         },
-        profile: Profile { depth: 1.0, full_width: 0.02, wall: 0.7, rim_width: 0.012, rim_depth: 0.12, faintest: 0.0 },
+        profile: Profile {
+            depth: 1.0,
+            full_width: 0.02,
+            wall: 0.7,
+            rim_width: 0.012,
+            rim_depth: 0.12,
+            faintest: 0.0,
+            ..Profile::DEFAULT
+        },
         look: Look::CLAY,
         steps_per_second: 40.0,
         follows_lines: false,
@@ -329,6 +377,7 @@ impl CrackPreset {
             rim_width: 0.014,
             rim_depth: 0.12,
             faintest: 0.0,
+            ..Profile::DEFAULT
         },
         look: Look::MUD,
         steps_per_second: 40.0,
@@ -360,7 +409,15 @@ impl CrackPreset {
             num_iterations: 400,
             ..GrowthParams::DEFAULT
         },
-        profile: Profile { depth: 1.0, full_width: 0.003, wall: 0.4, rim_width: 0.0, rim_depth: 0.0, faintest: 0.0 },
+        profile: Profile {
+            depth: 1.0,
+            full_width: 0.003,
+            wall: 0.4,
+            rim_width: 0.0,
+            rim_depth: 0.0,
+            faintest: 0.0,
+            ..Profile::DEFAULT
+        },
         look: Look::STAIN,
         steps_per_second: 60.0,
         follows_lines: false,
@@ -391,47 +448,49 @@ impl CrackPreset {
             fork_angle: 1.0,
             ..GrowthParams::DEFAULT
         },
-        profile: Profile { depth: 1.0, full_width: 0.006, wall: 0.6, rim_width: 0.0, rim_depth: 0.0, faintest: 0.0 },
+        profile: Profile {
+            depth: 1.0,
+            full_width: 0.006,
+            wall: 0.6,
+            rim_width: 0.0,
+            rim_depth: 0.0,
+            faintest: 0.0,
+            ..Profile::DEFAULT
+        },
         look: Look::ICE,
         steps_per_second: 90.0,
         follows_lines: false,
     };
 
-    /// Cartoon: few bold, smooth, tapering cracks with an outline.
+    /// Cartoon: a ragged star at the hit, bold zigzag arms that end in needles.
     pub const TOON: Self = Self {
         growth: GrowthParams {
-            kill_distance: 0.032,
-            step_length: 0.032,
-            crack_radius: 0.22,
+            kill_distance: 0.05,
+            step_length: 0.048,
+            crack_radius: 0.25,
             num_lines_grid: 16,
             num_columns_grid: 16,
             markers: MarkerLayout::PseudoGrid { occupancy: 1.0, jitter: 1.0 },
             focus: 0.5,
-            reach: 0.28,
+            reach: 0.3,
             starts: StartLayout::Arms { count: 5 },
-            line_width: 0.01,
-            line_growth: 0.85,
-            murray: 1.75,
-            max_width: 0.036,
-            tip_taper: 8.0,
-            inertia: 1.5,
+            line_width: 0.0016,
+            line_growth: 7.4,
+            murray: 1.4,
+            max_width: 0.042,
+            tip_taper: 0.0,
+            inertia: 1.6,
             wander: 0.6,
-            grain: 0.07,
-            forks: 0.09,
+            zigzag: 0.75,
+            forks: 0.14,
             fork_angle: 0.9,
             roughness: 0.0,
-            arrest: 0.08,
+            arrest: 0.12,
+            open_ends: 1.0,
             variety: 0.2,
             ..GrowthParams::DEFAULT
         },
-        profile: Profile {
-            depth: 1.0,
-            full_width: 0.0005,
-            wall: 1.0,
-            rim_width: 0.0055,
-            rim_depth: 0.5,
-            faintest: 0.0,
-        },
+        profile: Profile { full_width: 0.08, even_walls: true, ..Profile::DEFAULT },
         look: Look::TOON,
         steps_per_second: 30.0,
         follows_lines: false,
@@ -459,7 +518,8 @@ impl CrackPreset {
         let profile = Profile { full_width, rim_width, ..self.profile };
         let crushed = self.look.crushed.map(|crushed| crushed.scaled(by));
         let veil = self.look.veil.map(|veil| veil.scaled(by));
-        let look = Look { crushed, veil, ..self.look.clone() };
+        let cel = self.look.cel.map(|cel| cel.scaled(by));
+        let look = Look { cel, crushed, veil, ..self.look.clone() };
         Self { growth, profile, look, ..self.clone() }
     }
 

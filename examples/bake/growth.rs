@@ -3,7 +3,7 @@
 use crate::{
     maps::write_maps,
     own::own_picture,
-    painting::{fitted, paint},
+    painting::{depths, fitted, paint},
     pictures::read_picture,
 };
 use bevy_crack::{
@@ -164,7 +164,8 @@ pub(crate) fn bake(options: &Options) -> Result<(Network, RgbaImage), Box<dyn Er
     let maps = paint(&base, &field, &table);
     let painted = clock.elapsed();
 
-    write_maps(&options.out, &maps, &field)?;
+    let craters = if preset.look.crushed.is_some() { depths(&field, &table) } else { Vec::new() };
+    write_maps(&options.out, &maps, &field, &craters)?;
     if !preset.look.glow.is_empty() {
         let mut light = RgbaImage::new(size.x, size.y);
         paint_glow(None, size, &field, &table, &[TexelRect::whole(size)], UVec2::ZERO, &mut light);

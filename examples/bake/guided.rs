@@ -177,7 +177,7 @@ pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
     seams.stamp(&mut field, &PROFILE);
     let base = base_picture(options.base.as_deref(), options.size)?;
     let paint = Paint::new(&options.look, &frame)?;
-    write_maps(&options.out, &paint.paint(&base, &field)?, &field)?;
+    write_maps(&options.out, &paint.paint(&base, &field)?, &field, &[])?;
     // The cracks that draw alone, black on white.
     deep(&field).ok_or("mask size")?.save(options.out.join("deep.png"))?;
     regions(&map).save(options.out.join("regions.png"))?;

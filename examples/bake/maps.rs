@@ -64,16 +64,25 @@ pub(crate) fn mask(field: &DepthField) -> GrayImage {
     })
 }
 
-/// Writes `diffuse.png`, `normal.png`, `depth.png` (16 bit) and `mask.png` to a folder, which is made if it is not there.
+/// Writes `diffuse.png`, `normal.png`, `depth.png` (16 bit) and `mask.png` to a folder, which is made if it is not there. The depth is that of the
+/// cracks or of `craters` (8 bit), whichever is deeper.
 pub(crate) fn write_maps(
     folder: &Path,
     [diffuse, normal]: &[RgbaImage; 2],
     field: &DepthField,
+    craters: &[u8],
 ) -> Result<(), Box<dyn Error>> {
     fs::create_dir_all(folder)?;
     diffuse.save(folder.join("diffuse.png"))?;
     normal.save(folder.join("normal.png"))?;
-    let (size, texels) = (field.frame.size(), field.depth.as_slice().to_vec());
+    let (size, mut texels) = (field.frame.size(), field.depth.as_slice().to_vec());
+    for (texel, &crater) in texels.iter_mut().zip(craters) {
+        let crater = 257 * u16::from(crater);
+        // A crack alone is half a step off in eight bits.
+        if crater > texel.saturating_add(128) {
+            *texel = crater;
+        }
+    }
     let depth = ImageBuffer::<Luma<u16>, _>::from_raw(size.x, size.y, texels).ok_or("depth size")?;
     depth.save(folder.join("depth.png"))?;
     mask(field).save(folder.join("mask.png"))?;

@@ -134,7 +134,8 @@ impl CrackGrowth {
             impact.energy = (before + energy).min(MAX_ENERGY);
             let (center, after) = (impact.pos, impact.energy);
             if after > before {
-                self.timeline.strike(index, center, before, after);
+                let crushes = self.masonry.as_ref().and_then(|masonry| masonry.nearest(center)).unwrap_or(center);
+                self.timeline.strike(index, crushes, before, after);
                 self.widen(index);
                 let reach = self.reach(center, after);
                 self.populate(index, center, self.reach(center, before), reach);
@@ -147,8 +148,10 @@ impl CrackGrowth {
         }
         let index = self.impacts.len() as u32;
         let energy = energy.min(MAX_ENERGY);
+        // In masonry a hit crushes where its cracks begin.
+        let crushes = self.masonry.as_ref().and_then(|masonry| masonry.nearest(pos)).unwrap_or(pos);
         self.impacts.push(Impact { pos, energy, first_energy: energy, widening: widening(energy) });
-        self.timeline.strike(index, pos, 0.0, energy);
+        self.timeline.strike(index, crushes, 0.0, energy);
         let reach = self.reach(pos, energy);
         let first = self.network.nodes.len() as u32;
         let seed = mix(self.seed ^ mix(u64::from(index)));

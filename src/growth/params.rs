@@ -149,6 +149,9 @@ pub struct GrowthParams {
     /// Size of the grains that cracks go round: within each a crack runs straight, and at its border it kinks by up to twice
     /// [`wander`](Self::wander). Pattern units, 0..=1; 0 = none, cracks stray at every node.
     pub grain: f32,
+    /// How much cracks stray to the left and the right in turn, in place of at random (drawn cracks): 0 = not at all, 1 = at every node. They keep to
+    /// their course besides. 0..=1.
+    pub zigzag: f32,
     /// Share of nodes at which a tip forks, 0..=1: a side branch sets out ahead, if markers lie there; [`focus`](Self::focus) makes
     /// forks rarer away from the hit, as it does markers. Only with [`arrest`](Self::arrest). With
     /// [rays](MarkerLayout::Rays) it goes with the energy to the power of 0.6, forks fork again half as often, and the angle is 0.42 at least.
@@ -218,6 +221,7 @@ impl GrowthParams {
         directed: 0.0,
         wander: 0.1,
         grain: 0.0,
+        zigzag: 0.0,
         forks: 0.0,
         fork_angle: 0.7,
         roughness: 0.12,
@@ -323,6 +327,7 @@ impl GrowthParams {
         directed: f32 = 0.0, 1.0;
         wander: f32 = 0.0, 1.0;
         grain: f32 = 0.0, 1.0;
+        zigzag: f32 = 0.0, 1.0;
         forks: f32 = 0.0, 1.0;
         fork_angle: f32 = 0.2, 1.6;
         roughness: f32 = 0.0, 0.5;

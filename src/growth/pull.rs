@@ -60,11 +60,17 @@ const WITHIN_GRAIN: f32 = 0.3;
 /// A crack in masonry runs along a bed joint for so many bricks, and then takes the next head joint.
 const LONGEST_RUN: f32 = 0.9;
 
-/// What is near to a hit, as a share of its reach.
-const NEAR_HIT: f32 = 0.35;
+/// How much a crack in masonry likes to go on upwards or downwards, as it last did.
+const STAIRS: f32 = 0.4;
+
+/// How much it likes to leave at a side of the wall that is near.
+const OUT: f32 = 5.0;
+
+/// What is near to a hit of energy 1, bricks; it goes with the fourth root of the energy.
+const NEAR_HIT: f32 = 0.7;
 
 /// Share of the nodes along a brick at which a hairline splits it.
-const SPLIT: f32 = 0.03;
+const SPLIT: f32 = 0.06;
 
 const FIXED: f32 = 16_777_216.0;
 pub(super) const NO_PULL: u32 = u32::MAX;
@@ -90,7 +96,7 @@ impl CrackGrowth {
     }
 
     /// The direction of a crack that is on its way in `course` at `pos`: straight within a grain, another one in the next.
-    fn strayed(&self, course: Vec2, pos: Vec2, child: u64) -> Vec2 {
+    fn strayed(&self, course: Vec2, pos: Vec2, child: u64, generation: u32) -> Vec2 {
         // A draw per child, frozen by its index.
         let mut stray = 2.0 * hash_unit(self.seed ^ 0x57A6, child) - 1.0;
         if self.params.grain > 0.0 {
@@ -106,6 +112,10 @@ impl CrackGrowth {
                     stray *= -0.5;
                 }
             }
+        }
+        if self.params.zigzag > 0.0 {
+            let side = if generation.is_multiple_of(2) { 1.0 } else { -1.0 };
+            stray += self.params.zigzag * (side * (0.45 + 0.55 * stray.abs()) - stray);
         }
         (course + course.perp() * (self.params.wander * stray)).normalize_or_zero()
     }
@@ -183,7 +193,8 @@ impl CrackGrowth {
             course = self.params.direct(course);
             let mut direction = course;
             if self.params.wander > 0.0 {
-                direction = self.strayed(course, from, child);
+                let generation = self.network.nodes[pull.node as usize].generation;
+                direction = self.strayed(course, from, child, generation);
             }
             let heading = self.heading_of(pull.node);
             if let Some(masonry) = &self.masonry {
@@ -265,10 +276,11 @@ impl CrackGrowth {
         }
         let draw = |what: u64| hash_unit(self.seed ^ what, u64::from(node));
         // How far it has run along a bed joint.
-        let (mut run, mut at) = (0.0, node);
+        let (mut run, mut at, mut rise) = (0.0, node, 0.0);
         while let Some(before) = self.network.nodes.get(self.network.nodes[at as usize].parent as usize) {
             let way = self.network.nodes[at as usize].pos - before.pos;
             if way.y.abs() > way.x.abs() || run > 2.0 * masonry.brick() {
+                rise = if way.y.abs() > way.x.abs() { way.y.signum() } else { 0.0 };
                 break;
             }
             run += way.x.abs();
@@ -285,8 +297,13 @@ impl CrackGrowth {
             .map(|(way, far)| {
                 let is_level = way.x != 0.0;
                 let too_far = is_level && run > LONGEST_RUN * masonry.brick();
-                let liking = way.dot(course) + 0.3 * draw(if is_level { 0xB2 } else { 0xB3 });
-                (liking - if too_far { 4.0 } else { 0.0 }, (way, far))
+                let liking = way.dot(course) + 0.55 * draw(if is_level { 0xB2 } else { 0xB3 });
+                // A staircase goes on up or down as before.
+                let stairs = STAIRS * rise * way.y;
+                // Out to the side, rather than up and down beside the border.
+                let to = pos.x + way.x * far;
+                let out = if is_level && (to <= 0.0 || to >= self.network.extent().x) { OUT } else { 0.0 };
+                (liking + stairs + out - if too_far { 4.0 } else { 0.0 }, (way, far))
             })
             .collect();
         ways.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -297,8 +314,8 @@ impl CrackGrowth {
         }
         // Near the hit a crack takes both ways at the end of a head joint.
         let is_near_hit = self.impacts.get(impact as usize).is_some_and(|impact| {
-            let near = (NEAR_HIT * self.params.reach * impact.energy.sqrt()).max(0.7 * masonry.brick());
-            impact.pos.distance(pos) < near
+            let near = NEAR_HIT * masonry.brick() * impact.energy.sqrt().sqrt();
+            masonry.nearest(impact.pos).unwrap_or(impact.pos).distance(pos) < near
         });
         let is_level = best.0.x != 0.0 && heading.x != 0.0;
         let side = if ways.len() > 1 && ways[1].0 > -0.3 && (is_near_hit && heading.y != 0.0 || self.is_fork(node)) {

@@ -350,7 +350,7 @@ impl CrackGrowth {
                 let born = self.network.nodes.len();
                 let Pull { child, course, side, .. } = self.pulls[slot as usize];
                 let advanced = self.advance(node, child);
-                if (self.params.grain > 0.0 || self.masonry.is_some())
+                if (self.params.grain > 0.0 || self.params.zigzag > 0.0 || self.masonry.is_some())
                     && self.network.nodes.get(born).is_some_and(|born| born.pos == child)
                 {
                     self.courses[born] = course;

@@ -293,6 +293,14 @@ impl Block<'_> {
         if RICH && *self.depth == [0; BLOCK] {
             return [[0.0; BLOCK]; 4];
         }
+        if let Some(cel) = &look.cel {
+            let mut over = [[0.0; BLOCK]; 4];
+            for i in 0..BLOCK {
+                let layer = cel.layer(self.depth[i], [self.x[i], self.y[i]]);
+                over.iter_mut().zip(layer).for_each(|(over, part)| over[i] = part * share[i]);
+            }
+            return over;
+        }
         let mut between = [0.0; BLOCK];
         for (between, &depth) in between.iter_mut().zip(self.depth) {
             *between = LookTable::between(depth);
@@ -379,16 +387,20 @@ fn compose<const ROOM: usize>(
         let spot = extras.spot(place + i);
         let pale = f32::from(spot.pale) * (1.0 / 255.0);
         let dark = f32::from(spot.dark) * (1.0 / 255.0);
+        // Shadows lie under the cracks, a hole has none.
+        let (shade, hole) = if extras.shades { (dark, 0.0) } else { (0.0, dark) };
         let tone = 1.0 + f32::from(spot.shade) * (1.0 / 128.0);
         let veil = f32::from(extras.veil(place + i)) * look.veil_cover;
         let (left, sheen) = (1.0 - over[3][i], sheen[i]);
         for c in 0..3 {
             let veiled = look.sheen[c] * sheen * (1.0 - veil) + look.veil[c] * veil;
-            let below = veiled * (1.0 - pale) + extras.color[c] * tone * pale;
+            let crushed = extras.color[c] + under[c][i] * extras.tint;
+            let below = veiled * (1.0 - pale) + crushed * tone * pale;
+            let below = below * (1.0 - shade) + HOLE * under[c][i] * shade;
             let crack = over[c][i] + below * left;
-            over[c][i] = crack * (1.0 - dark) + HOLE * under[c][i] * dark;
+            over[c][i] = crack * (1.0 - hole) + HOLE * under[c][i] * hole;
         }
-        let cover = over[3][i] + left * (1.0 - (1.0 - sheen) * (1.0 - veil) * (1.0 - pale));
-        over[3][i] = cover * (1.0 - dark) + dark;
+        let cover = over[3][i] + left * (1.0 - (1.0 - sheen) * (1.0 - veil) * (1.0 - pale) * (1.0 - shade));
+        over[3][i] = cover * (1.0 - hole) + hole;
     }
 }

@@ -1,6 +1,6 @@
 //! What a field holds beside depths, in a patch.
 
-use super::{Facets, LookTable, patch::Patch};
+use super::{Facets, LookTable, patch::Patch, rows::round};
 use crate::{
     Grid,
     raster::{CrushedField, DepthField, Plate, SLOPE_UNIT, Spot, TexelRect},
@@ -14,8 +14,14 @@ pub(super) struct Extras<'a, const ROOM: usize> {
     ids: Option<&'a Grid<u16>>,
     plates: &'a [Plate],
     crushed: Option<&'a CrushedField>,
-    /// Colour of what is crushed, 0..=255.
+    /// Colour of what is crushed, 0..=255, by its share.
     pub(super) color: [f32; 3],
+    /// Share that the picture's own has in it.
+    pub(super) tint: f32,
+    /// Whether what is dark in it is a shadow, not a hole.
+    pub(super) shades: bool,
+    /// What a step of its depth is in the depth map.
+    deep: f32,
     veils: Option<&'a Grid<u8>>,
     room: Box<Room<ROOM>>,
     /// The plate that was looked at last: most texels beside it are its own.
@@ -37,12 +43,16 @@ impl<'a, const ROOM: usize> Extras<'a, ROOM> {
         let layer = field.layer();
         let plates = layer.plates().filter(|_| look.facets.is_some());
         let (crushed, veils) = (layer.crushed(), layer.veil().filter(|_| look.veil_cover > 0.0));
+        let settings = crushed.map(CrushedField::settings);
         (plates.is_some() || crushed.is_some() || veils.is_some()).then(|| Self {
             facets: look.facets.as_ref().filter(|_| plates.is_some()),
             ids: plates.map(|plates| plates.ids()),
             plates: plates.map_or(&[], |plates| plates.plates()),
             crushed,
-            color: crushed.map_or([0.0; 3], |crushed| crushed.settings().color.map(|channel| 255.0 * channel)),
+            color: settings.map_or([0.0; 3], |all| all.color.map(|channel| 255.0 * channel * (1.0 - all.tint))),
+            tint: settings.map_or(0.0, |all| all.tint),
+            shades: settings.is_some_and(|all| all.broken),
+            deep: settings.map_or(0.0, |all| all.depth * look.deep),
             veils,
             room: Box::new(Room { plate: [0; ROOM], spot: [Spot::default(); ROOM], veil: [0; ROOM] }),
             last: Cell::new((0, Facet::NONE)),
@@ -141,6 +151,18 @@ impl<'a, const ROOM: usize> Extras<'a, ROOM> {
     #[inline(always)]
     pub(super) fn veil(&self, place: usize) -> u8 {
         self.room.veil[place]
+    }
+
+    /// Lays the depth of what is crushed over a row of the depth map: the deeper of both.
+    #[inline(always)]
+    pub(super) fn deepen(&self, out: &mut [u8], row: usize) {
+        if self.crushed.is_none() || self.deep == 0.0 {
+            return;
+        }
+        for (out, spot) in out.iter_mut().zip(&self.room.spot[row * self.stride..]) {
+            let deep = f32::from(spot.deep) * self.deep;
+            *out = (*out).max(if deep < 255.0 { round(deep) as u8 } else { 255 });
+        }
     }
 
     #[inline(always)]

@@ -58,6 +58,71 @@ impl Default for Facets {
     }
 }
 
+/// Cracks as they are drawn in a cartoon: flat colours with hard edges, in place of the [`ramp`](Look::ramp).
+///
+/// Inside the edge runs a line of ink; where a crack is too narrow for more there is nothing else, so it ends in a needle of ink. Further inside is
+/// the fill, and on the wall that faces the light (from the upper left) a band of a lighter colour.
+/// Made for a profile with [even walls](crate::raster::Profile::even_walls).
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
+pub struct Cel {
+    /// How far inside the edge depth 1 is: half of the profile's [`full_width`](crate::raster::Profile::full_width).
+    /// Pattern units, 0.0001..=0.5; default 0.04.
+    pub wide: f32,
+    /// Width of the line of ink along the edge, pattern units, 0..=0.1; default 0.0035.
+    pub outline: f32,
+    /// How far inside the edge the lit wall ends, pattern units, 0..=0.5; default 0.012.
+    pub wall: f32,
+    /// Colour of the line, sRGB 0..=1; default a warm black.
+    pub ink: [f32; 3],
+    /// Colour inside, sRGB 0..=1; default a dark brown.
+    pub fill: [f32; 3],
+    /// Colour of the lit wall, sRGB 0..=1; default a lighter brown.
+    pub lit: [f32; 3],
+}
+
+impl Cel {
+    /// The default: warm black and browns.
+    pub const DEFAULT: Self = Self {
+        wide: 0.04,
+        outline: 0.0035,
+        wall: 0.012,
+        ink: [0.075, 0.05, 0.055],
+        fill: [0.16, 0.105, 0.10],
+        lit: [0.46, 0.31, 0.24],
+    };
+
+    /// The same seen from nearer or further away.
+    pub(crate) fn scaled(&self, by: f32) -> Self {
+        let scaled = |length: f32, low: f32, high: f32| (length * by).clamp(low, high);
+        Self {
+            wide: scaled(self.wide, 0.0001, 0.5),
+            outline: scaled(self.outline, 0.0, 0.1),
+            wall: scaled(self.wall, 0.0, 0.5),
+            ..*self
+        }
+    }
+
+    fn validate(&self) -> Result<(), LookError> {
+        within("cel.wide", self.wide, 0.0001..=0.5, "0.0001..=0.5")?;
+        within("cel.outline", self.outline, 0.0..=0.1, "0..=0.1")?;
+        within("cel.wall", self.wall, 0.0..=0.5, "0..=0.5")?;
+        for (field, color) in [("cel.ink", self.ink), ("cel.fill", self.fill), ("cel.lit", self.lit)] {
+            for channel in color {
+                within(field, channel, 0.0..=1.0, "0..=1")?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Default for Cel {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
+}
+
 /// What a crack does to the picture.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]
@@ -89,6 +154,8 @@ pub struct Look {
     pub curl: f32,
     /// See [`curl`](Self::curl); the profile's [`rim_depth`](crate::raster::Profile::rim_depth) as a rule. 0.001..=0.5; default 0.12.
     pub curl_depth: f32,
+    /// Cracks drawn with flat colours; default none, the ramp holds.
+    pub cel: Option<Cel>,
     /// Closed cells as plates of their own; default none.
     pub facets: Option<Facets>,
     /// What a hit crushes around it; default nothing.
@@ -161,6 +228,7 @@ impl Look {
         relief: 0.012,
         curl: 0.0,
         curl_depth: 0.12,
+        cel: None,
         facets: None,
         crushed: None,
         veil: None,
@@ -184,27 +252,6 @@ impl Look {
         sparkle: 0.35,
         shift: 1.5,
         relief: 0.003,
-        opaque: true,
-        ..Self::GROOVE
-    };
-
-    /// A drawn crack: a hard black outline of even width, nearly black inside, with one lit wall.
-    pub const TOON: Self = Self {
-        ramp: Cow::Borrowed(&[
-            stop(0.04, [0.0; 3], 0.0),
-            stop(0.12, [0.02, 0.02, 0.03], 1.0),
-            stop(0.50, [0.02, 0.02, 0.03], 1.0),
-            stop(0.58, [0.17, 0.14, 0.17], 1.0),
-            stop(1.0, [0.07, 0.06, 0.08], 1.0),
-        ]),
-        tint: 0.0,
-        glint: 1.5,
-        gloss: 0.7,
-        grain: 0.0,
-        relief: 0.02,
-        // The outline is the rim of the profile, and level; the walls begin at its inner edge.
-        curl: 0.5,
-        curl_depth: 0.5,
         opaque: true,
         ..Self::GROOVE
     };
@@ -287,6 +334,53 @@ static RAMPS: Mutex<Vec<(Vec<ColorStop>, Weak<Ramp>)>> = Mutex::new(Vec::new());
 /// No more than so many are shared.
 const MAX_SHARED: usize = 64;
 
+/// A [`Cel`] in texels, colours 0..=255.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Strokes {
+    /// Texels inside the edge, a step of depth.
+    step: f32,
+    outline: f32,
+    wall: f32,
+    ink: [f32; 3],
+    fill: [f32; 3],
+    lit: [f32; 3],
+}
+
+/// A wall is lit that faces the light by more than this (a cosine).
+const LIT: f32 = 0.2;
+
+impl Strokes {
+    fn new(cel: &Cel, texels_per_unit: f32) -> Self {
+        let [ink, fill, lit] = [cel.ink, cel.fill, cel.lit].map(|color| color.map(|channel| 255.0 * channel));
+        Self {
+            step: cel.wide * texels_per_unit * (1.0 / 65535.0),
+            outline: (cel.outline * texels_per_unit).max(1.0),
+            wall: cel.wall * texels_per_unit,
+            ink,
+            fill,
+            lit,
+        }
+    }
+
+    /// What lies over the picture at a depth where the surface leans this way: three colours times cover, and cover.
+    #[inline(always)]
+    pub(super) fn layer(&self, depth: u16, [x, y]: [f32; 2]) -> [f32; 4] {
+        let share = |value: f32| value.clamp(0.0, 1.0);
+        // All edges are one texel soft.
+        let inside = f32::from(depth) * self.step;
+        let cover = share(inside);
+        let open = share(inside - self.outline);
+        let steep = (x * x + y * y).sqrt();
+        let facing = if steep > 1.0e-6 { -std::f32::consts::FRAC_1_SQRT_2 * (x + y) / steep } else { 0.0 };
+        let lit = share(8.0 * (facing - LIT) + 0.5) * share(self.wall - inside + 0.5);
+        let color = |c: usize| {
+            let within = self.fill[c] + (self.lit[c] - self.fill[c]) * lit;
+            (self.ink[c] + (within - self.ink[c]) * open) * cover
+        };
+        [color(0), color(1), color(2), cover]
+    }
+}
+
 /// A [`Look`] made ready to paint with.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LookTable {
@@ -300,6 +394,7 @@ pub struct LookTable {
     pub(super) sparkle_scale: f32,
     /// Where rims curl up.
     pub(super) curve: Option<Box<Curve>>,
+    pub(super) cel: Option<Strokes>,
     pub(super) facets: Option<Facets>,
     /// Colour that plates reflect, 0..=255.
     pub(super) sheen: [f32; 3],
@@ -308,6 +403,8 @@ pub struct LookTable {
     pub(super) veil_cover: f32,
     pub(super) grain: f32,
     pub(super) shift: f32,
+    /// Share of a depth map's range that a pattern unit of depth is.
+    pub(super) deep: f32,
     /// From the Sobel sum of `u16` depths to the slope of the surface.
     pub(super) slope: f32,
     pub(super) opaque: bool,
@@ -343,6 +440,9 @@ impl Look {
         within("relief", self.relief, 0.0..=1.0, unit)?;
         within("curl", self.curl, 0.0..=1.0, unit)?;
         within("curl_depth", self.curl_depth, 0.001..=0.5, "0.001..=0.5")?;
+        if let Some(cel) = &self.cel {
+            cel.validate()?;
+        }
         if let Some(facets) = &self.facets {
             within("facets.tone", facets.tone, 0.0..=1.0, unit)?;
             within("facets.tilt", facets.tilt, 0.0..=1.0, unit)?;
@@ -446,12 +546,14 @@ impl LookTable {
             sparkle,
             sparkle_scale: SPARKLES / texels_per_unit,
             curve: look.curve(),
+            cel: look.cel.map(|cel| Strokes::new(&cel, texels_per_unit)),
             facets,
             sheen: facets.map_or([0.0; 3], |facets| facets.sheen.map(|channel| 255.0 * channel)),
             veil: look.veil.map_or([0.0; 3], |veil| veil.color.map(|channel| 255.0 * channel)),
             veil_cover: look.veil.map_or(0.0, |veil| veil.cover * (1.0 / 255.0)),
             grain,
             shift,
+            deep: if look.relief > 0.0 { 1.0 / look.relief } else { 0.0 },
             slope,
             opaque,
         })
@@ -521,6 +623,13 @@ mod tests {
             assert_eq!(refused(&Look { sparkle: bad, ..Look::GROOVE }), Some("sparkle"));
             assert_eq!(refused(&Look { curl: bad, ..Look::GROOVE }), Some("curl"));
             assert_eq!(refused(&Look { curl_depth: bad, ..Look::GROOVE }), Some("curl_depth"));
+            let cel = |cel| refused(&Look { cel: Some(cel), ..Look::GROOVE });
+            assert_eq!(cel(Cel { wide: bad, ..Cel::DEFAULT }), Some("cel.wide"));
+            assert_eq!(cel(Cel { outline: bad, ..Cel::DEFAULT }), Some("cel.outline"));
+            assert_eq!(cel(Cel { wall: bad, ..Cel::DEFAULT }), Some("cel.wall"));
+            assert_eq!(cel(Cel { ink: [bad, 0.0, 0.0], ..Cel::DEFAULT }), Some("cel.ink"));
+            assert_eq!(cel(Cel { fill: [0.0, bad, 0.0], ..Cel::DEFAULT }), Some("cel.fill"));
+            assert_eq!(cel(Cel { lit: [0.0, 0.0, bad], ..Cel::DEFAULT }), Some("cel.lit"));
             let facets = |facets| refused(&Look { facets: Some(facets), ..Look::GROOVE });
             assert_eq!(facets(Facets { tone: bad, ..Facets::DEFAULT }), Some("facets.tone"));
             assert_eq!(facets(Facets { tilt: bad, ..Facets::DEFAULT }), Some("facets.tilt"));
@@ -544,6 +653,11 @@ mod tests {
             assert_eq!(crushed(Crushed { dust: bad, ..Crushed::DEFAULT }), Some("crushed.dust"));
             assert_eq!(crushed(Crushed { chips: bad, ..Crushed::DEFAULT }), Some("crushed.chips"));
             assert_eq!(crushed(Crushed { reach: bad, ..Crushed::DEFAULT }), Some("crushed.reach"));
+            assert_eq!(crushed(Crushed { tint: bad, ..Crushed::DEFAULT }), Some("crushed.tint"));
+            assert_eq!(crushed(Crushed { basin: bad, ..Crushed::DEFAULT }), Some("crushed.basin"));
+            assert_eq!(crushed(Crushed { fall: bad, ..Crushed::DEFAULT }), Some("crushed.fall"));
+            assert_eq!(crushed(Crushed { outline: bad, ..Crushed::DEFAULT }), Some("crushed.outline"));
+            assert_eq!(crushed(Crushed { flakes: 17, ..Crushed::DEFAULT }), Some("crushed.flakes"));
             let veil = |veil| refused(&Look { veil: Some(veil), ..Look::GROOVE });
             assert_eq!(veil(Veil { reach: bad, ..Veil::DEFAULT }), Some("veil.reach"));
             assert_eq!(veil(Veil { full_width: bad, ..Veil::DEFAULT }), Some("veil.full_width"));
@@ -565,6 +679,25 @@ mod tests {
             refused(&Look { ramp: vec![stop(0.5, [0.0; 3], 0.0); 17].into(), ..Look::GROOVE }),
             Some("ramp.len()")
         );
+    }
+
+    #[test]
+    fn drawn_cracks_end_in_ink_and_one_wall_is_lit() {
+        let cel = Cel { wide: 0.1, outline: 0.004, wall: 0.02, ..Cel::DEFAULT };
+        // 50 texels of depth, an outline of 2, a lit wall up to 10.
+        let strokes = Strokes::new(&cel, 500.0);
+        let at = |texels: f32, slope: [f32; 2]| strokes.layer((texels / 50.0 * 65535.0) as u16, slope);
+        let close = |got: [f32; 4], color: [f32; 3], cover: f32| {
+            let want = [color[0], color[1], color[2]].map(|channel| 255.0 * channel * cover);
+            (0..3).all(|c| (got[c] - want[c]).abs() < 0.1) && (got[3] - cover).abs() < 1.0e-3
+        };
+        let (to_light, off_light) = ([-1.0, -1.0], [1.0, 1.0]);
+        assert_eq!(at(0.0, to_light), [0.0; 4]);
+        assert!(close(at(0.5, to_light), cel.ink, 0.5), "half a texel of edge is half covered");
+        assert!(close(at(1.9, to_light), cel.ink, 1.0), "a needle is all ink");
+        assert!(close(at(5.0, to_light), cel.lit, 1.0), "the wall that faces the light");
+        assert!(close(at(5.0, off_light), cel.fill, 1.0), "the other wall");
+        assert!(close(at(20.0, to_light), cel.fill, 1.0), "further inside");
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! The looks of the presets.
 
-use super::{Facets, Look, look::stop};
+use super::{Cel, Facets, Look, look::stop};
 use crate::raster::{Crushed, Veil};
 use std::borrow::Cow;
 
@@ -31,6 +31,7 @@ impl Look {
             dust: 0.10,
             chips: 0.10,
             reach: 2.2,
+            ..Crushed::DEFAULT
         }),
         ..Self::FROSTED
     };
@@ -68,6 +69,7 @@ impl Look {
             dust: 0.12,
             chips: 0.0,
             reach: 3.0,
+            ..Crushed::DEFAULT
         }),
         ..Self::FROSTED
     };
@@ -99,6 +101,7 @@ impl Look {
             dust: 0.14,
             chips: 0.0,
             reach: 2.6,
+            ..Crushed::DEFAULT
         }),
         ..Self::FROSTED
     };
@@ -138,49 +141,66 @@ impl Look {
             dust: 0.10,
             chips: 0.22,
             reach: 2.6,
+            ..Crushed::DEFAULT
         }),
         ..Self::FROSTED
     };
 
     /// Concrete: grey-brown cracks, a spalled crater with paler aggregate, crumbs and dust.
     pub const CONCRETE: Self = Self {
+        ramp: Cow::Borrowed(&[
+            stop(0.08, [0.60, 0.57, 0.54], 0.0),
+            stop(0.30, [0.42, 0.38, 0.345], 0.85),
+            stop(0.70, [0.27, 0.24, 0.21], 0.97),
+            stop(1.0, [0.15, 0.13, 0.112], 1.0),
+        ]),
         crushed: Some(Crushed {
-            radius: 0.04,
-            ragged: 0.5,
-            depth: 0.022,
-            rough: 0.005,
-            grain: 0.007,
-            color: [0.70, 0.67, 0.62],
-            pale: 0.55,
-            speckle: 0.6,
-            dust: 0.20,
-            chips: 0.30,
-            reach: 2.4,
+            radius: 0.042,
+            ragged: 0.7,
+            depth: 0.02,
+            rough: 0.009,
+            grain: 0.0075,
+            color: [0.76, 0.71, 0.63],
+            pale: 0.85,
+            speckle: 0.55,
+            dust: 0.26,
+            chips: 0.6,
+            reach: 2.6,
+            broken: true,
+            basin: 0.6,
+            tint: 0.6,
             ..Crushed::DEFAULT
         }),
+        glint: 0.6,
+        relief: 0.009,
         ..Self::GROOVE
     };
 
-    /// Plaster: thin cracks, and flakes that have come off where it was hit.
+    /// Plaster: thin cracks, and flakes that have come off where it was hit: the darker coat under it shows.
     pub const PLASTER: Self = Self {
         ramp: Cow::Borrowed(&[
-            stop(0.15, [0.72, 0.70, 0.67], 0.12),
-            stop(0.45, [0.50, 0.47, 0.43], 0.75),
-            stop(1.0, [0.22, 0.19, 0.16], 0.95),
+            stop(0.12, [0.60, 0.56, 0.52], 0.05),
+            stop(0.45, [0.46, 0.42, 0.38], 0.80),
+            stop(1.0, [0.22, 0.19, 0.16], 0.97),
         ]),
         relief: 0.006,
+        glint: 0.4,
         crushed: Some(Crushed {
-            radius: 0.032,
-            ragged: 0.6,
+            radius: 0.03,
+            ragged: 0.5,
             depth: 0.004,
-            rough: 0.0008,
-            grain: 0.005,
-            color: [0.62, 0.605, 0.58],
-            pale: 0.5,
-            speckle: 0.25,
-            dust: 0.12,
-            chips: 0.12,
-            reach: 2.0,
+            rough: 0.0006,
+            grain: 0.006,
+            color: [0.50, 0.43, 0.37],
+            pale: 0.9,
+            speckle: 0.2,
+            dust: 0.05,
+            chips: 0.3,
+            reach: 3.4,
+            broken: true,
+            flakes: 4,
+            tint: 0.6,
+            fall: 0.5,
             ..Crushed::DEFAULT
         }),
         ..Self::GROOVE
@@ -189,23 +209,57 @@ impl Look {
     /// Brick: mortar that is gone, and a corner chipped off where it was hit.
     pub const BRICK: Self = Self {
         ramp: Cow::Borrowed(&[
-            stop(0.15, [0.66, 0.62, 0.58], 0.12),
-            stop(0.40, [0.48, 0.44, 0.40], 0.80),
-            stop(0.80, [0.32, 0.285, 0.255], 0.95),
-            stop(1.0, [0.19, 0.165, 0.145], 1.0),
+            stop(0.10, [0.55, 0.50, 0.46], 0.0),
+            stop(0.35, [0.36, 0.32, 0.29], 0.85),
+            stop(0.70, [0.22, 0.19, 0.17], 0.97),
+            stop(1.0, [0.12, 0.10, 0.09], 1.0),
         ]),
         crushed: Some(Crushed {
-            radius: 0.028,
-            ragged: 0.6,
-            depth: 0.008,
-            rough: 0.0025,
+            radius: 0.03,
+            ragged: 0.75,
+            depth: 0.009,
+            rough: 0.006,
             grain: 0.006,
-            color: [0.74, 0.50, 0.40],
-            pale: 0.45,
+            color: [0.86, 0.76, 0.68],
+            pale: 0.9,
             speckle: 0.5,
-            dust: 0.14,
-            chips: 0.25,
-            reach: 2.2,
+            dust: 0.22,
+            chips: 0.5,
+            reach: 3.0,
+            broken: true,
+            basin: 0.55,
+            flakes: 2,
+            tint: 0.68,
+            fall: 0.8,
+            ..Crushed::DEFAULT
+        }),
+        glint: 0.55,
+        ..Self::GROOVE
+    };
+
+    /// A drawn crack: a line of ink that ends in needles, flat dark inside, one lit wall; loose chips around the hit.
+    pub const TOON: Self = Self {
+        tint: 0.0,
+        glint: 0.0,
+        grain: 0.0,
+        relief: 0.02,
+        opaque: true,
+        cel: Some(Cel::DEFAULT),
+        crushed: Some(Crushed {
+            radius: 0.06,
+            ragged: 0.3,
+            depth: 0.0,
+            rough: 0.0,
+            grain: 0.024,
+            color: [1.0, 0.95, 0.88],
+            pale: 0.0,
+            speckle: 0.0,
+            dust: 0.0,
+            chips: 0.2,
+            reach: 2.8,
+            broken: true,
+            tint: 0.65,
+            outline: 0.0020,
             ..Crushed::DEFAULT
         }),
         ..Self::GROOVE

@@ -18,6 +18,6 @@ mod tests;
 mod texel;
 
 pub use glow::paint_glow;
-pub use look::{ColorStop, Facets, Look, LookError, LookTable};
+pub use look::{Cel, ColorStop, Facets, Look, LookError, LookTable};
 pub use modulate::{Modulation, modulate};
 pub use texel::{BaseTexels, PaintTargets, paint_into, paint_rects};

@@ -359,6 +359,29 @@ fn drawn(preset: &CrackPreset, growth: &CrackGrowth, frame: SurfaceFrame, moment
 }
 
 #[test]
+fn the_depth_map_has_craters() {
+    let frame = SurfaceFrame::new(UVec2::splat(256)).unwrap();
+    let mut growth = CrackGrowth::new(CrackPreset::CONCRETE.growth, frame.extent(), 3).unwrap();
+    growth.hit(Vec2::splat(0.5), 1.0);
+    let moment = Moment::after(growth.timeline().end());
+    let field = drawn(&CrackPreset::CONCRETE, &growth, frame, moment);
+    let n = 256 * 256;
+    let paint = |look: &Look| {
+        let mut depth = vec![0; n];
+        let base = BaseTexels { size: frame.size(), diffuse: &[], normal: None, depth: None };
+        let mut targets = PaintTargets { diffuse: None, normal: None, depth: Some(&mut depth) };
+        paint_into(base, &field, &table(look, &field), TexelRect::whole(frame.size()), UVec2::ZERO, &mut targets);
+        depth
+    };
+    let depth = paint(&Look::CONCRETE);
+    let cracks: Vec<u8> = field.depth.as_slice().iter().map(|&depth| (u32::from(depth) * 255 / 65535) as u8).collect();
+    assert!(depth.iter().zip(&cracks).all(|(all, crack)| all >= crack), "the deeper of both");
+    let deeper = depth.iter().zip(&cracks).filter(|(all, crack)| **all > crack.saturating_add(20)).count();
+    // A circle of the radius has 363 texels.
+    assert!((100..900).contains(&deeper), "{deeper} texels of crater");
+}
+
+#[test]
 fn presets_painted_where_they_change_equal_the_whole_at_any_time() {
     let mut rng = Rng::new(21);
     let (mut plates, mut spots, mut veils) = (0, 0, 0);

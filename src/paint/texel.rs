@@ -277,7 +277,11 @@ impl Job<'_> {
                 }
             }
             if let Some(out) = &mut self.depth_out {
-                depth_row(&mut out[range.clone()], self.depth.map(|base| &base[range]), patch.depths(row));
+                let out = &mut out[range.clone()];
+                depth_row(out, self.depth.map(|base| &base[range]), patch.depths(row));
+                if let Some(extras) = &extras {
+                    extras.deepen(out, row);
+                }
             }
         }
     }

@@ -154,12 +154,22 @@ pub struct Profile {
     ///
     /// Keeps fine cracks visible on small pictures; the ends of needles fade all the same.
     pub faintest: f32,
+    /// Whether walls are equally steep whatever the width: depth then tells how far the edge is, and is 1 half a
+    /// [`full_width`](Self::full_width) away from it. [`wall`](Self::wall) does not count then. For [drawn](crate::paint::Cel) cracks; default false.
+    pub even_walls: bool,
 }
 
 impl Profile {
     /// The default: a groove with sloping walls and no rim.
-    pub const DEFAULT: Self =
-        Self { depth: 1.0, full_width: 0.02, wall: 0.6, rim_width: 0.0, rim_depth: 0.0, faintest: 0.0 };
+    pub const DEFAULT: Self = Self {
+        depth: 1.0,
+        full_width: 0.02,
+        wall: 0.6,
+        rim_width: 0.0,
+        rim_depth: 0.0,
+        faintest: 0.0,
+        even_walls: false,
+    };
 }
 
 impl Default for Profile {

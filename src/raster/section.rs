@@ -32,7 +32,9 @@ pub(super) fn at_door(x: f32, top: f32) -> f32 {
 #[derive(Clone, Copy)]
 pub(super) struct Section {
     depth: f32,
-    /// What a texel of half width adds to the 40 % of depth that the thinnest cracks have.
+    /// Share of depth that the thinnest cracks have.
+    least: f32,
+    /// What a texel of half width adds to it.
     gain: f32,
     wall: f32,
     rim: f32,
@@ -61,8 +63,9 @@ impl Section {
         let rim = at_door(profile.rim_width * texels_per_unit, MAX_RADIUS);
         Self {
             depth: at_door(profile.depth, 1.0),
-            gain: 1.2 / full_width,
-            wall: at_door(profile.wall, 1.0),
+            least: if profile.even_walls { 2.0 / full_width } else { 0.4 },
+            gain: if profile.even_walls { 2.0 } else { 1.2 } / full_width,
+            wall: if profile.even_walls { 1.0 } else { at_door(profile.wall, 1.0) },
             rim,
             rim_depth: if rim > 0.0 { at_door(profile.rim_depth, 1.0) } else { 0.0 },
             inv_rim: 1.0 / max(rim, 1.0),
@@ -73,6 +76,7 @@ impl Section {
     pub(super) fn upright(depth: f32) -> Self {
         Self {
             depth: at_door(depth, 1.0),
+            least: 0.4,
             gain: MAX_RADIUS,
             wall: 0.0,
             rim: 0.0,
@@ -87,7 +91,7 @@ impl Section {
     pub(super) fn cut(&self, r: f32) -> Cut {
         let core = max(r, 0.5);
         Cut {
-            peak: self.depth * min(0.4 + self.gain * r, 1.0),
+            peak: self.depth * min(self.least + self.gain * r, 1.0),
             reach: core + 0.5,
             inv_wall: 1.0 / (1.0 + self.wall * core),
             rim_reach: r + self.rim,

@@ -9,6 +9,9 @@
 //! depth = max(core, rim) * min(2 r / (1 - faintest), 1)
 //! ```
 //!
+//! `peak(r)` is 40 % of the depth and more with `r`, up to all of it at the full width; with even walls it is `(1 + r) / full` and `wall` 1, so that
+//! depth counts the texels to the edge.
+//!
 //! The core is a slot whose edge is one texel soft (`wall` 0) up to a V (`wall` 1). Lines thinner than a texel keep the
 //! cross-section of one texel (`r` = 1/2 in `core`) and only get fainter, by the last factor: a line 0.3 texels wide
 //! covers 0.3 texels of area (`faintest` 0) wherever it lies between the texel centres, and is never dotted. A needle fades out.
@@ -407,6 +410,7 @@ mod tests {
             rim_width: if below(rng, 2) == 0 { 0.0 } else { 0.05 * rng.unit() },
             rim_depth: rng.unit(),
             faintest: if below(rng, 2) == 0 { 0.0 } else { rng.unit() },
+            even_walls: below(rng, 4) == 0,
         }
     }
 
@@ -429,9 +433,15 @@ mod tests {
         let t = ((texel - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0);
         let width = f64::from(from.width) + t * (f64::from(to.width) - f64::from(from.width));
         let (d, r) = (texel.distance(a + (b - a) * t), 0.5 * width * unit);
-        let peak = f64::from(profile.depth) * (0.4 + 0.6 * width / f64::from(profile.full_width)).clamp(0.4, 1.0);
-        let shown = r.max(0.5);
-        let core = peak * ((shown + 0.5 - d) / (1.0 + f64::from(profile.wall) * shown)).clamp(0.0, 1.0);
+        let full = f64::from(profile.full_width);
+        let share = if profile.even_walls {
+            (1.0 + r) * 2.0 / (full * unit)
+        } else {
+            (0.4 + 0.6 * width / full).clamp(0.4, 1.0)
+        };
+        let (peak, shown) = (f64::from(profile.depth) * share.min(1.0), r.max(0.5));
+        let wall = if profile.even_walls { 1.0 } else { f64::from(profile.wall) };
+        let core = peak * ((shown + 0.5 - d) / (1.0 + wall * shown)).clamp(0.0, 1.0);
         let rim = f64::from(profile.rim_width) * unit;
         let edge = if rim > 0.0 { ((r + rim - d) / rim.max(1.0)).clamp(0.0, 1.0) } else { 0.0 };
         let strength = (2.0 * r / (1.0 - f64::from(profile.faintest)).max(1.0e-3)).min(1.0);
@@ -575,7 +585,9 @@ mod tests {
             let mut point = || PathPoint { pos: Vec2::new(pick(), pick()), width: pick() };
             let path = SegmentPath::straight(point(), point());
             let [depth, full_width, wall, rim_width, rim_depth, faintest] = std::array::from_fn(|_| pick());
-            stamp_path(&mut field, &Profile { depth, full_width, wall, rim_width, rim_depth, faintest }, &path);
+            let even_walls = depth > 0.0;
+            let profile = Profile { depth, full_width, wall, rim_width, rim_depth, faintest, even_walls };
+            stamp_path(&mut field, &profile, &path);
             stamp_dot(&mut field, Vec2::new(pick(), pick()), pick(), pick());
         }
     }

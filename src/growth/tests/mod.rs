@@ -76,6 +76,7 @@ fn random_params(rng: &mut Rng, small: bool) -> GrowthParams {
         courses: 0.0,
         draw_markers: rng.unit() < 0.2,
         max_nodes: 1_000_000,
+        zigzag: if rng.unit() < 0.5 { 0.0 } else { rng.unit() },
     };
     params.validate().expect("random parameters are valid");
     params

@@ -275,6 +275,7 @@ pub(super) fn random_rays(rng: &mut Rng) -> GrowthParams {
         fork_angle: rng.range(0.2, 1.5),
         reach: rng.range(0.1, 2.0),
         wander: 0.2 * rng.unit(),
+        zigzag: 0.0,
         roughness: 0.1 * rng.unit(),
         draw_connections: rng.unit() < 0.7,
         draw_islands: false,

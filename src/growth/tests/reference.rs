@@ -60,6 +60,17 @@ fn child_of(
 }
 
 /// Where a node is, and the direction in which its crack has come there.
+/// How far the next node of `node` strays.
+fn stray_of(p: &GrowthParams, seed: u64, nodes: &[(Vec2, u32)], node: usize) -> f32 {
+    let mut stray = 2.0 * hash_unit(seed ^ 0x57A6, nodes.len() as u64) - 1.0;
+    if p.zigzag > 0.0 {
+        let ancestors = std::iter::successors(nodes.get(node), |(_, parent)| nodes.get(*parent as usize));
+        let side = if ancestors.count() % 2 == 1 { 1.0 } else { -1.0 };
+        stray += p.zigzag * (side * (0.45 + 0.55 * stray.abs()) - stray);
+    }
+    p.wander * stray
+}
+
 fn on_its_way(nodes: &[(Vec2, u32)], node: usize) -> (Vec2, Vec2) {
     let (pos, parent) = nodes[node];
     (pos, nodes.get(parent as usize).map_or(Vec2::ZERO, |before| (pos - before.0).normalize_or_zero()))
@@ -99,7 +110,7 @@ impl Reference {
         }
         let before = self.nodes.len();
         for (node, set) in attracted.iter().enumerate().filter(|(_, set)| !set.is_empty()) {
-            let stray = p.wander * (2.0 * hash_unit(self.seed ^ 0x57A6, self.nodes.len() as u64) - 1.0);
+            let stray = stray_of(p, self.seed, &self.nodes, node);
             let to = child_of(p, self.extent, on_its_way(&self.nodes, node), set, |id| self.markers[id].0, stray);
             self.nodes.push((to, node as u32));
             self.impacts.push(self.impacts[node]);

@@ -1,6 +1,6 @@
 //! Crushed zones: what a hit leaves around itself.
 
-use super::{hash, noise};
+use super::{broken::Broken, hash, noise};
 use crate::{
     Grid,
     math::mix,
@@ -42,6 +42,20 @@ pub struct Crushed {
     pub chips: f32,
     /// How far dust and crumbs reach, radii. 1..=8; default 2.5.
     pub reach: f32,
+    /// Whether it is broken along straight chords into plates, with angular chips that throw shadows; else its outline and floor are as of
+    /// something crushed to powder. [`soft`](Self::soft), [`hole`](Self::hole) and [`flake`](Self::flake) do not count then. Default false.
+    pub broken: bool,
+    /// Radius of the deeper hollow in the middle of what is broken, as a share of the radius; it has more than half of the depth. 0..=1; default
+    /// 0 = a flat floor.
+    pub basin: f32,
+    /// How many smaller flakes have come off further out, where it is [`broken`](Self::broken): at energy 1, more with its root. 0..=16; default 0.
+    pub flakes: u32,
+    /// Share that the picture's own colour has in [`color`](Self::color), so that what is crushed has the tone of what it was. 0..=1; default 0.
+    pub tint: f32,
+    /// How far chips and dust of what is [`broken`](Self::broken) lie below it (a wall): 0 = all around, 1 = nearly all below. 0..=1; default 0.
+    pub fall: f32,
+    /// Width of a dark line around chips of what is [`broken`](Self::broken) (a drawing), pattern units, 0..=0.05; default 0 = none.
+    pub outline: f32,
 }
 
 impl Crushed {
@@ -61,6 +75,12 @@ impl Crushed {
         dust: 0.2,
         chips: 0.3,
         reach: 2.5,
+        broken: false,
+        basin: 0.0,
+        flakes: 0,
+        tint: 0.0,
+        fall: 0.0,
+        outline: 0.0,
     };
 
     /// The first field that is out of its range or not finite: its name, value and range.
@@ -82,6 +102,11 @@ impl Crushed {
             ("crushed.dust", self.dust, 0.0..=1.0, "0..=1"),
             ("crushed.chips", self.chips, 0.0..=1.0, "0..=1"),
             ("crushed.reach", self.reach, 1.0..=8.0, "1..=8"),
+            ("crushed.basin", self.basin, 0.0..=1.0, "0..=1"),
+            ("crushed.flakes", self.flakes as f32, 0.0..=16.0, "0..=16"),
+            ("crushed.tint", self.tint, 0.0..=1.0, "0..=1"),
+            ("crushed.fall", self.fall, 0.0..=1.0, "0..=1"),
+            ("crushed.outline", self.outline, 0.0..=0.05, "0..=0.05"),
         ];
         let is_bad = |(_, value, range, _): &(_, f32, std::ops::RangeInclusive<f32>, _)| !range.contains(value);
         fields.into_iter().find(is_bad).map(|(name, value, _, range)| (name, value, range))
@@ -95,6 +120,7 @@ impl Crushed {
             depth: scaled(self.depth, 0.0, 0.2),
             rough: scaled(self.rough, 0.0, 0.05),
             grain: scaled(self.grain, 0.0005, 0.1),
+            outline: scaled(self.outline, 0.0, 0.05),
             ..*self
         }
     }
@@ -119,17 +145,20 @@ pub(crate) struct Spot {
     pub(crate) shade: i8,
     /// How much of the hole there is.
     pub(crate) dark: u8,
+    /// How deep it is, 255 = as deep as the crater gets.
+    pub(crate) deep: u8,
 }
 
 impl Spot {
-    const NONE: Self = Self { slope: [0; 2], pale: 0, shade: 0, dark: 0 };
+    const NONE: Self = Self { slope: [0; 2], pale: 0, shade: 0, dark: 0, deep: 0 };
 
     /// Both, in any order: what is deeper in the hole or paler shows, and the steeper slope.
     fn with(self, other: Self) -> Self {
         let strength = |spot: Self| (spot.dark, spot.pale, spot.shade);
         let steep = |[x, y]: [i16; 2]| (i32::from(x).pow(2) + i32::from(y).pow(2), x, y);
         let slope = if steep(self.slope) >= steep(other.slope) { self.slope } else { other.slope };
-        Self { slope, ..if strength(self) >= strength(other) { self } else { other } }
+        let deep = self.deep.max(other.deep);
+        Self { slope, deep, ..if strength(self) >= strength(other) { self } else { other } }
     }
 }
 
@@ -284,8 +313,9 @@ impl CrushedField {
         let slot = &mut self.tiles[(tile.y * self.columns + tile.x) as usize];
         self.used += usize::from(slot.is_none());
         let texels = slot.get_or_insert_with(|| Box::new([Spot::NONE; (TILE * TILE) as usize]));
-        let shape = Shape::new(&self.crushed, self.frame.texels_per_unit(), radius);
-        shape.draw(texels, zone.pos, self.seed ^ index.wrapping_mul(0x9E37_79B1), rect, corner);
+        let seed = self.seed ^ index.wrapping_mul(0x9E37_79B1);
+        let shape = Shape::new(&self.crushed, self.frame.texels_per_unit(), radius, seed);
+        shape.draw(texels, zone.pos, seed, rect, corner);
         let Some(forbidden) = forbidden else { return };
         for y in rect.min.y..rect.max.y {
             for x in rect.min.x..rect.max.x {
@@ -323,34 +353,37 @@ impl CrushedField {
 }
 
 /// How far an outline strays at the most, for a raggedness of 1.
-const WIDEST: f32 = 1.1;
+pub(super) const WIDEST: f32 = 1.1;
 
 /// A crushed zone in texels.
-struct Shape<'a> {
-    crushed: &'a Crushed,
-    radius: f32,
-    depth: f32,
-    rough: f32,
-    grain: f32,
+pub(super) struct Shape<'a> {
+    pub(super) crushed: &'a Crushed,
+    pub(super) radius: f32,
+    pub(super) depth: f32,
+    pub(super) rough: f32,
+    pub(super) grain: f32,
+    broken: Option<Broken>,
 }
 
 /// What there is at a place.
 #[derive(Clone, Copy)]
-struct Place {
-    height: f32,
-    pale: f32,
-    shade: f32,
-    dark: f32,
+pub(super) struct Place {
+    pub(super) height: f32,
+    pub(super) pale: f32,
+    pub(super) shade: f32,
+    pub(super) dark: f32,
 }
 
 impl<'a> Shape<'a> {
-    fn new(crushed: &'a Crushed, unit: f32, radius: f32) -> Self {
+    fn new(crushed: &'a Crushed, unit: f32, radius: f32, seed: u32) -> Self {
+        let grain = (crushed.grain * unit).max(1.0);
         Self {
             crushed,
             radius,
             depth: crushed.depth * unit,
             rough: crushed.rough * unit,
-            grain: (crushed.grain * unit).max(1.0),
+            grain,
+            broken: crushed.broken.then(|| Broken::new(crushed, unit, radius, grain, seed)),
         }
     }
 
@@ -374,13 +407,15 @@ impl<'a> Shape<'a> {
                     let slope = 0.5 * (places[at - step].height - places[at + step].height);
                     (slope * SLOPE_UNIT).clamp(-32_000.0, 32_000.0) as i16
                 };
-                let Place { pale, shade, dark, .. } = places[at];
+                let Place { height, pale, shade, dark } = places[at];
+                let deep = if self.depth > 0.0 { -height / self.depth } else { 0.0 };
                 let spot = Spot {
                     // Nothing is lit in a hole.
                     slope: if dark > 0.5 { [0; 2] } else { [slope(1), slope(WIDE)] },
                     pale: (pale.clamp(0.0, 1.0) * 255.0 + 0.5) as u8,
                     shade: (shade * 128.0).clamp(-127.0, 127.0) as i8,
                     dark: (dark.clamp(0.0, 1.0) * 255.0 + 0.5) as u8,
+                    deep: (deep.clamp(0.0, 1.0) * 255.0 + 0.5) as u8,
                 };
                 let texel = &mut texels[(y + corner.y) * TILE as usize + x + corner.x];
                 *texel = texel.with(spot);
@@ -397,6 +432,10 @@ impl<'a> Shape<'a> {
         // No outline strays further than that.
         let widest = 1.0 + WIDEST * ragged;
         if radii > reach.max(flake).max(widest) + 0.1 {
+            return place;
+        }
+        if let Some(broken) = &self.broken {
+            self.break_off(&mut place, broken, off, at, seed);
             return place;
         }
         let way = off / distance.max(1.0e-3);

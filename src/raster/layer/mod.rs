@@ -1,5 +1,6 @@
 //! [`Layer`]: what a field holds beside depths, for looks that show it: plates, crushed zones and veils.
 
+mod broken;
 mod crushed;
 mod plates;
 mod veil;

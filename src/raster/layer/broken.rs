@@ -1,0 +1,395 @@
+//! What a hit breaks off along chords: outlines, facets, chips and their shadows.
+
+use super::{
+    crushed::{Crushed, Place, Shape, WIDEST},
+    hash, lattice, noise,
+};
+use crate::math::{mix, ops};
+use glam::Vec2;
+
+/// Way to the light: from the upper left.
+const TO_LIGHT: Vec2 = Vec2::new(-std::f32::consts::FRAC_1_SQRT_2, -std::f32::consts::FRAC_1_SQRT_2);
+
+/// Share of the depth that is outside the basin.
+const SHELF: f32 = 0.5;
+
+/// Share of that which is gained on the way to the middle.
+const BOWL: f32 = 0.4;
+
+/// Run of a wall, in its height.
+const WALL: f32 = 0.45;
+
+/// Length of shadows, in the height of what throws them, and how dark they are.
+const SHADOW: f32 = 0.75;
+const SHADE: f32 = 0.5;
+
+/// How much shadow there is where the edge that throws it is so far away.
+fn sink(within: f32) -> f32 {
+    (0.5 - 0.6 * within).clamp(0.0, 1.0)
+}
+
+/// A number in 0..1 for a pair of numbers.
+fn draw(seed: u32, x: i32, y: i32) -> f32 {
+    (hash(seed, x, y) >> 8) as i32 as f32 * (1.0 / 16_777_216.0)
+}
+
+/// Flat facets in -1..=1, about one unit wide: heights at the corners of a lattice of triangles, linear between.
+fn facets(seed: u32, at: Vec2) -> f32 {
+    const SKEW: f32 = 0.366_025_4;
+    let skewed = at + SKEW * (at.x + at.y);
+    let corner = skewed.floor();
+    let (x, y) = (corner.x as i32, corner.y as i32);
+    let Vec2 { x: u, y: v } = skewed - corner;
+    let height = |dx: i32, dy: i32| lattice(seed, x.wrapping_add(dx), y.wrapping_add(dy));
+    let (first, last) = (height(0, 0), height(1, 1));
+    if u > v {
+        first * (1.0 - u) + height(1, 0) * (u - v) + last * v
+    } else {
+        first * (1.0 - v) + height(0, 1) * (v - u) + last * u
+    }
+}
+
+/// The nearest of some scattered places, as of a stone.
+struct Cell {
+    /// A number of its own, -1..=1.
+    draw: f32,
+    /// How much further it is to the next one.
+    gap: f32,
+}
+
+impl Cell {
+    fn find(seed: u32, at: Vec2) -> Self {
+        let corner = at.floor();
+        let (mut nearest, mut next) = ((f32::MAX, 0, 0), f32::MAX);
+        for dy in -1..=1 {
+            for dx in -1..=1 {
+                let (x, y) = ((corner.x as i32).wrapping_add(dx), (corner.y as i32).wrapping_add(dy));
+                let site = Vec2::new(lattice(seed, x, y), lattice(seed ^ 0x77, x, y)) * 0.45;
+                let off = at - corner - Vec2::new(dx as f32 + 0.5, dy as f32 + 0.5) - site;
+                let distance = off.length();
+                if distance < nearest.0 {
+                    next = nearest.0;
+                    nearest = (distance, x, y);
+                } else if distance < next {
+                    next = distance;
+                }
+            }
+        }
+        let (distance, x, y) = nearest;
+        Self { draw: lattice(seed ^ 0x7A, x, y), gap: next - distance }
+    }
+}
+
+/// A polygon around a place, texels.
+struct Outline {
+    centre: Vec2,
+    /// How far its corners are away at the most.
+    reach: f32,
+    /// From the centre, in order of their [`turn`].
+    corners: Vec<(f32, Vec2)>,
+}
+
+/// A direction as a number in 0..4 that grows with its angle.
+fn turn(way: Vec2) -> f32 {
+    let share = way.y / (way.x.abs() + way.y.abs()).max(1.0e-6);
+    if way.x < 0.0 {
+        2.0 - share
+    } else if way.y < 0.0 {
+        4.0 + share
+    } else {
+        share
+    }
+}
+
+impl Outline {
+    /// About so many corners, between which sides are broken `levels` times.
+    fn new(centre: Vec2, radius: f32, count: u32, levels: u32, ragged: f32, seed: u32) -> Self {
+        let most = radius * (1.0 + WIDEST * ragged);
+        let phase = draw(seed, -1, 0);
+        let mut corners: Vec<Vec2> = (0..count as i32)
+            .map(|k| {
+                let turn = (k as f32 + phase + 0.7 * (draw(seed, k, 1) - 0.5)) / count as f32;
+                let far = radius * (1.0 + ragged * (1.4 * draw(seed, k, 2) - 0.7));
+                ops::unit(std::f32::consts::TAU * turn) * far
+            })
+            .collect();
+        for level in 0..levels as i32 {
+            let n = corners.len();
+            corners = (0..n)
+                .flat_map(|k| {
+                    let (a, b) = (corners[k], corners[(k + 1) % n]);
+                    let along = 0.3 + 0.4 * draw(seed, k as i32, 5 + 2 * level);
+                    let aside = 0.45 * ragged * (draw(seed, k as i32, 6 + 2 * level) - 0.5);
+                    [a, a + (b - a) * along + (b - a).perp() * aside]
+                })
+                .collect();
+        }
+        let mut corners: Vec<(f32, Vec2)> = corners
+            .into_iter()
+            .map(|corner| corner.clamp_length_max(most))
+            .map(|corner| (turn(corner), corner))
+            .collect();
+        corners.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let reach = corners.iter().map(|(_, corner)| corner.length()).fold(0.0, f32::max);
+        Self { centre, reach, corners }
+    }
+
+    /// How far inside its edge a place is, texels; below zero outside.
+    fn within(&self, at: Vec2) -> f32 {
+        let off = at - self.centre;
+        if off.length_squared() > (self.reach + 1.0) * (self.reach + 1.0) {
+            return -FAR_OUT;
+        }
+        let turn = turn(off);
+        let next = self.corners.partition_point(|corner| corner.0 <= turn);
+        let (Some(&(_, a)), Some(&(_, b))) = (
+            self.corners.get(next.checked_sub(1).unwrap_or(self.corners.len().saturating_sub(1))),
+            self.corners.get(if next < self.corners.len() { next } else { 0 }),
+        ) else {
+            return -FAR_OUT;
+        };
+        let side = b - a;
+        side.perp_dot(off - a) / side.length().max(0.1)
+    }
+}
+
+/// What is so many texels outside counts as far away.
+const FAR_OUT: f32 = 1.0e3;
+
+/// A chip that lies beside.
+struct Chip {
+    outline: Outline,
+    /// How much darker or brighter it is.
+    tone: f32,
+    /// Width of the line around it, texels.
+    ink: f32,
+}
+
+/// What has broken off, and where it lies; places from the hit, texels.
+pub(super) struct Broken {
+    /// The crater and the flakes around it.
+    off: Vec<Outline>,
+    basin: Option<Outline>,
+    chips: Vec<Chip>,
+}
+
+impl Broken {
+    pub(super) fn new(crushed: &Crushed, unit: f32, radius: f32, grain: f32, seed: u32) -> Self {
+        let Crushed { ragged, reach, fall, .. } = *crushed;
+        // The root of the energy.
+        let more = radius / (crushed.radius * unit).max(1.0e-3);
+        let pick = |k: u32, what: i32| draw(seed ^ 0x0B0E, k as i32, what);
+        let mut off = vec![Outline::new(Vec2::ZERO, radius, 6 + (3.0 * pick(0, 0)) as u32, 2, ragged, seed ^ 0x60)];
+        let flakes = (crushed.flakes as f32 * more).round().min(64.0) as u32;
+        for k in 0..flakes {
+            let size = radius / more.max(1.0) * (0.3 + 0.5 * pick(k, 1));
+            let far = radius * (1.0 + pick(k, 2) * (reach - 1.0)) - 1.8 * size;
+            let centre = ops::unit(std::f32::consts::TAU * pick(k, 3)) * far.max(0.0);
+            off.push(Outline::new(centre, size, 5, 1, 0.6, mix_in(seed, 0x100 + k)));
+        }
+        let basin = (crushed.basin > 0.0).then(|| {
+            let centre = Vec2::new(pick(0, 4) - 0.5, pick(0, 5) - 0.3) * (0.3 * radius);
+            Outline::new(centre, radius * crushed.basin, 7, 2, 0.8 * ragged, seed ^ 0x61)
+        });
+        let chips = (24.0 * crushed.chips * more).round().min(96.0) as u32;
+        let chips = (0..chips)
+            .map(|k| {
+                let size = (grain * (0.4 + pick(k, 6) * pick(k, 7))).min(0.4 * radius);
+                let mut way = ops::unit(std::f32::consts::TAU * pick(k, 8));
+                if way.y < 0.3 && pick(k, 9) < fall {
+                    way.y = 0.3 + way.y.abs();
+                }
+                let near = 0.95 + (0.85 * reach - 0.95) * pick(k, 10) * pick(k, 11).sqrt();
+                let centre = way.normalize_or(Vec2::Y) * (near * radius);
+                let outline =
+                    Outline::new(centre, size, 4 + (2.0 * pick(k, 12)) as u32, 0, 0.6, mix_in(seed, 0x200 + k));
+                Chip { outline, tone: 0.3 * pick(k, 13) - 0.18, ink: crushed.outline * unit }
+            })
+            .collect();
+        Self { off, basin, chips }
+    }
+
+    /// How far inside the edge of what has come off a place is.
+    fn within(&self, at: Vec2) -> f32 {
+        self.off.iter().map(|outline| outline.within(at)).fold(-FAR_OUT, f32::max)
+    }
+}
+
+/// Another seed for each.
+fn mix_in(seed: u32, k: u32) -> u32 {
+    mix(u64::from(seed) << 32 | u64::from(k)) as u32
+}
+
+impl Shape<'_> {
+    /// What is there of something that breaks along chords.
+    pub(super) fn break_off(&self, place: &mut Place, broken: &Broken, off: Vec2, at: Vec2, seed: u32) {
+        let Crushed { pale, speckle, dust, chips, reach, fall, .. } = *self.crushed;
+        let within = broken.within(off);
+        let inside = (within + 0.5).clamp(0.0, 1.0);
+        if inside > 0.0 {
+            // A steep wall, and a floor of plates, each tilted in its own way.
+            let share = if broken.basin.is_some() { SHELF } else { 1.0 };
+            let wall = (within / (WALL * share * self.depth).max(1.0)).clamp(0.0, 1.0);
+            let bowl = (within / (0.8 * self.radius).max(1.0)).clamp(0.0, 1.0);
+            let mut down = share * (wall + BOWL * (bowl - wall));
+            let mut shadow = sink(broken.within(off + TO_LIGHT * (SHADOW * share * self.depth)));
+            if let Some(basin) = &broken.basin {
+                let within = basin.within(off);
+                down += (1.0 - SHELF) * (within / (1.5 * WALL * self.depth).max(1.0)).clamp(0.0, 1.0);
+                if within > 0.0 {
+                    let length = SHADOW * (1.0 - SHELF) * self.depth;
+                    shadow = shadow.max(sink(basin.within(off + TO_LIGHT * length)));
+                }
+            }
+            let fold = |k: u32, size: f32| {
+                let warp =
+                    Vec2::new(noise(seed ^ k, at.x / size, at.y / size), noise(seed ^ k ^ 9, at.y / size, at.x / size));
+                facets(seed ^ k, at / size + 0.45 * warp)
+            };
+            let plate = fold(0x51, (0.42 * self.radius).max(2.0 * self.grain));
+            let small = fold(0x54, 1.7 * self.grain);
+            let stone = Cell::find(seed ^ 0x52, at / self.grain);
+            let fade = (0.5 * within).clamp(0.0, 1.0);
+            let bumps = plate + 0.4 * small;
+            place.height = -self.depth * down + self.rough * bumps * fade;
+            place.pale = pale * inside;
+            // Few stones are paler or darker than what they lie in.
+            let is_stone = stone.draw.abs() > 0.7;
+            let tone = if is_stone { 0.45 * stone.draw * (5.0 * stone.gap).min(1.0) } else { 0.10 * stone.draw };
+            let dirt = noise(seed ^ 0x53, 0.9 * at.x, 0.9 * at.y);
+            place.shade = speckle * (tone + 0.1 * plate + 0.16 * dirt) * inside;
+            place.dark = SHADE * shadow * inside * (SHADOW * self.depth).min(1.0);
+        }
+        if inside < 1.0 {
+            let sunk = 0.8 * fall;
+            let radii = (off - Vec2::new(0.0, sunk * self.radius)).length() / self.radius.max(0.5);
+            let left = 1.0 - ((radii - 0.7) / (reach - 0.7 - sunk).max(0.2)).clamp(0.0, 1.0);
+            if dust > 0.0 {
+                let cloud = 0.6 + 0.4 * noise(seed ^ 6, 0.7 * at.x, 0.7 * at.y);
+                place.pale = place.pale.max(dust * left * left * cloud * (1.0 - inside));
+            }
+            if self.crushed.outline <= 0.0 {
+                self.add_grit(place, at, (chips * left).min(0.5) * left, seed);
+            }
+        }
+        for chip in &broken.chips {
+            self.add_chip(place, chip, off);
+        }
+    }
+
+    /// A chip that lies there, or its shadow.
+    fn add_chip(&self, place: &mut Place, chip: &Chip, off: Vec2) {
+        let Chip { outline, tone, ink, .. } = chip;
+        let size = outline.reach;
+        if off.distance_squared(outline.centre) > (2.0 * size + 2.0) * (2.0 * size + 2.0) {
+            return;
+        }
+        let within = outline.within(off);
+        let inside = (within + 0.5).clamp(0.0, 1.0);
+        if inside < 1.0 && *ink <= 0.0 {
+            let shadow = (outline.within(off + TO_LIGHT * (0.45 * size)) + 0.5).clamp(0.0, 1.0);
+            place.dark = place.dark.max(SHADE * shadow * (1.0 - inside));
+        }
+        if inside > 0.0 {
+            place.dark *= 1.0 - inside;
+            place.shade += (tone - place.shade) * inside;
+            // It shows the surface's own face.
+            let pale = if *ink > 0.0 { 1.0 } else { 0.3 * self.crushed.pale };
+            place.pale += (pale - place.pale) * inside;
+            if *ink > 0.0 {
+                // On the side that is turned away it is wider.
+                let turned = 0.5 - 0.5 * (off - outline.centre).normalize_or_zero().dot(TO_LIGHT);
+                let edge = (ink * (0.8 + 0.7 * turned) - within + 0.5).clamp(0.0, 1.0);
+                place.dark = place.dark.max(edge * inside);
+                // Two flat faces.
+                let face = (off - outline.centre).dot(-TO_LIGHT) - 0.12 * size;
+                place.shade -= 0.3 * (face + 0.5).clamp(0.0, 1.0);
+            } else {
+                place.height += (0.9 * within).clamp(0.0, 0.35 * size);
+            }
+        }
+    }
+
+    /// Grit in some of the squares of a lattice.
+    fn add_grit(&self, place: &mut Place, at: Vec2, chance: f32, seed: u32) {
+        let side = (1.3 * self.grain).max(3.0);
+        let cell = (at / side).floor();
+        let (x, y) = (cell.x as i32, cell.y as i32);
+        if chance <= 0.0 || draw(seed ^ 30, x, y) >= chance {
+            return;
+        }
+        let radius = 0.09 * side * (1.0 + 1.4 * draw(seed ^ 31, x, y));
+        let middle = Vec2::new(draw(seed ^ 32, x, y), draw(seed ^ 33, x, y)) - 0.5;
+        let off = at - ((cell + 0.5) * side + middle * (0.5 * side));
+        let inside = |off: Vec2| (radius.max(0.6) - off.length() + 0.5).clamp(0.0, 1.0) * (radius / 0.6).min(1.0);
+        let shadow = inside(off + TO_LIGHT * (0.8 * radius + 0.5));
+        let grit = inside(off);
+        place.dark = place.dark.max(0.8 * SHADE * shadow * (1.0 - grit));
+        place.pale += (0.4 * self.crushed.pale - place.pale) * grit;
+        place.height += 0.6 * radius * grit;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        math::Rng,
+        pattern::{SurfaceFrame, Timeline},
+        raster::layer::{CrushedField, Spot},
+    };
+    use glam::UVec2;
+
+    /// From the centre outward a place leaves once, where the outline's own corners say.
+    #[test]
+    fn outlines_are_closed_and_stay_within_reach() {
+        let mut rng = Rng::new(8);
+        for seed in 0..200 {
+            let (centre, ragged) = (Vec2::new(100.0 * rng.unit(), 100.0 * rng.unit()), rng.unit());
+            let radius = 2.0 + 60.0 * rng.unit();
+            let outline = Outline::new(centre, radius, 4 + seed % 6, seed % 3, ragged, seed);
+            assert!(outline.reach <= radius * (1.0 + WIDEST * ragged) + 1.0e-3);
+            assert!(outline.within(centre) > 0.0, "seed {seed}");
+            for k in 0..64 {
+                let way = ops::unit(k as f32 * 0.1);
+                let mut was_inside = true;
+                for step in 0..400 {
+                    let is_inside = outline.within(centre + way * (step as f32 * 0.005 * outline.reach)) > 0.0;
+                    assert!(was_inside || !is_inside, "seed {seed}: back inside on way {k}");
+                    was_inside = is_inside;
+                }
+                assert!(!was_inside, "seed {seed}: it has no end on way {k}");
+            }
+        }
+    }
+
+    #[test]
+    fn facets_are_flat_and_join() {
+        let mut rng = Rng::new(9);
+        let mut flat = 0;
+        for _ in 0..2000 {
+            let at = Vec2::new(rng.range(-20.0, 20.0), rng.range(-20.0, 20.0));
+            let height = |by: f32| facets(7, at + Vec2::new(by, 0.6 * by));
+            assert!(height(0.0).abs() <= 1.0);
+            assert!((height(1.0e-3) - height(0.0)).abs() < 0.01, "a step at {at}");
+            flat += usize::from((height(0.02) - 2.0 * height(0.01) + height(0.0)).abs() < 1.0e-4);
+        }
+        assert!(flat > 1800, "{flat} of 2000 places are on a flat facet");
+    }
+
+    #[test]
+    fn what_breaks_is_deep_inside_and_level_far_away() {
+        let frame = SurfaceFrame::new(UVec2::splat(256)).unwrap();
+        for seed in 0..20 {
+            let crushed = Crushed { broken: true, basin: 0.6, depth: 0.02, radius: 0.1, ..Crushed::DEFAULT };
+            let mut field = CrushedField::new(&crushed, frame, seed);
+            let mut timeline = Timeline::default();
+            timeline.strike(0, Vec2::splat(0.5), 0.0, 1.0);
+            field.show(timeline.strikes(), timeline.strikes(), None, &mut Vec::new());
+            let mut row = [Spot::default(); 256];
+            field.read(0, 128, &mut row);
+            assert!(row[128].deep > 100 && row[128].pale > 0, "seed {seed}: {:?}", row[128]);
+            assert_eq!((row[0], row[255]), (Spot::default(), Spot::default()));
+        }
+    }
+}
