@@ -14,6 +14,8 @@ pub(super) struct Extras<'a, const ROOM: usize> {
     ids: Option<&'a Grid<u16>>,
     plates: &'a [Plate],
     crushed: Option<&'a CrushedField>,
+    /// Whether plates are gone in holes.
+    pub(super) are_gone: bool,
     /// Colour of what is crushed, 0..=255.
     pub(super) color: [f32; 3],
     veils: Option<&'a Grid<u8>>,
@@ -23,6 +25,7 @@ pub(super) struct Extras<'a, const ROOM: usize> {
     /// Width of a row of the patch with the texels around.
     stride: usize,
     height: usize,
+    min: Vec2,
 }
 
 struct Room<const ROOM: usize> {
@@ -42,12 +45,14 @@ impl<'a, const ROOM: usize> Extras<'a, ROOM> {
             ids: plates.map(|plates| plates.ids()),
             plates: plates.map_or(&[], |plates| plates.plates()),
             crushed,
+            are_gone: plates.is_some() && look.facets.is_some_and(|facets| facets.gone),
             color: crushed.map_or([0.0; 3], |crushed| crushed.settings().color.map(|channel| 255.0 * channel)),
             veils,
             room: Box::new(Room { plate: [0; ROOM], spot: [Spot::default(); ROOM], veil: [0; ROOM] }),
             last: Cell::new((0, Facet::NONE)),
             stride: 0,
             height: 0,
+            min: Vec2::ZERO,
         })
     }
 
@@ -64,7 +69,7 @@ impl<'a, const ROOM: usize> Extras<'a, ROOM> {
     #[inline(always)]
     pub(super) fn load(&mut self, rect: TexelRect) {
         let size = rect.size().as_usizevec2();
-        (self.stride, self.height) = (size.x + 2, size.y);
+        (self.stride, self.height, self.min) = (size.x + 2, size.y, rect.min.as_vec2());
         let Room { plate, spot, veil } = &mut *self.room;
         let rows = plate.chunks_exact_mut(self.stride).zip(spot.chunks_exact_mut(self.stride));
         for (((plate, spot), veil), y) in rows.zip(veil.chunks_exact_mut(self.stride)).zip(rect.min.y..rect.max.y) {
@@ -108,7 +113,13 @@ impl<'a, const ROOM: usize> Extras<'a, ROOM> {
     /// Adds the slopes of plates.
     #[inline(always)]
     pub(super) fn tilt(&self, patch: &mut Patch<ROOM>) {
-        if self.facets.is_some_and(|facets| facets.tilt > 0.0) {
+        if self.facets.is_some_and(|facets| facets.dish > 0.0) {
+            patch.tilt(|k| {
+                let at = self.min + Vec2::new((k % self.stride) as f32, (k / self.stride) as f32);
+                let facet = self.facet(self.room.plate[k]);
+                (Vec2::from(facet.tilt) - facet.dish * facet.from_middle(at)).to_array()
+            });
+        } else if self.facets.is_some_and(|facets| facets.tilt > 0.0) {
             patch.tilt(|k| self.facet(self.room.plate[k]).tilt);
         }
     }
@@ -121,7 +132,13 @@ impl<'a, const ROOM: usize> Extras<'a, ROOM> {
             return facet;
         }
         let facet = match (self.facets, self.plates.get(usize::from(id))) {
-            (Some(facets), Some(plate)) if id != 0 => facets.of(plate),
+            (Some(facets), Some(plate)) if id != 0 => {
+                let mut facet = facets.of(plate);
+                // The middle of its texels.
+                facet.is_gone = facets.gone
+                    && self.crushed.is_some_and(|crushed| crushed.is_hole(plate.centre, plate.extent + 2.0));
+                facet
+            }
             _ => Facet::NONE,
         };
         self.last.set((id, facet));
@@ -152,8 +169,14 @@ impl<'a, const ROOM: usize> Extras<'a, ROOM> {
 /// A plate as it looks.
 #[derive(Clone, Copy)]
 pub(super) struct Facet {
-    /// What the picture is multiplied by.
-    pub(super) tone: f32,
+    /// What the picture is multiplied by in its middle.
+    tone: f32,
+    /// How much it is dished, its middle, and one over the side of a square of its size.
+    dish: f32,
+    centre: Vec2,
+    inv_side: f32,
+    /// Whether it lies in a hole.
+    pub(super) is_gone: bool,
     /// Where it is taken from, texels away.
     pub(super) shift: [i32; 2],
     pub(super) tilt: [f32; 2],
@@ -165,8 +188,35 @@ pub(super) struct Facet {
 }
 
 impl Facet {
-    pub(super) const NONE: Self =
-        Self { tone: 1.0, shift: [0; 2], tilt: [0.0; 2], sheen: 0.0, gain: Vec2::ZERO, low: 0.0, high: 0.0 };
+    pub(super) const NONE: Self = Self {
+        tone: 1.0,
+        dish: 0.0,
+        centre: Vec2::ZERO,
+        inv_side: 0.0,
+        is_gone: false,
+        shift: [0; 2],
+        tilt: [0.0; 2],
+        sheen: 0.0,
+        gain: Vec2::ZERO,
+        low: 0.0,
+        high: 0.0,
+    };
+
+    /// The way from its middle to a place, at most 1 about.
+    #[inline(always)]
+    fn from_middle(&self, at: Vec2) -> Vec2 {
+        ((at - self.centre) * (2.0 * self.inv_side)).clamp(Vec2::NEG_ONE, Vec2::ONE)
+    }
+
+    /// What the picture is multiplied by at a texel: a dish is brighter where it faces the light from the upper left, and at its rim.
+    #[inline(always)]
+    pub(super) fn tone(&self, x: u32, y: u32) -> f32 {
+        if self.dish <= 0.0 {
+            return self.tone;
+        }
+        let way = self.from_middle(Vec2::new(x as f32, y as f32));
+        self.tone + self.dish * (0.5 * (way.x + way.y) + 0.5 * way.length_squared() - 0.25)
+    }
 
     /// Cover of the sheen at a texel.
     #[inline(always)]
@@ -186,7 +236,11 @@ impl Facets {
     /// How a plate looks.
     pub(super) fn of(&self, plate: &Plate) -> Facet {
         let [a, b, c, d, e, f] = plate.draws;
-        let weight = 1.0 - self.near + self.near * plate.near;
+        let [together, right, down] = plate.common.map(|common| self.bundle * common);
+        let (own, a) = (1.0 - 0.5 * self.bundle, a * (1.0 - 0.5 * self.bundle) + together);
+        let (b, c, d) = (own * b + right, own * c + down, d + 0.7 * right);
+        let share = if self.fade > 0.0 { (2.0 - 2.0 * plate.away / self.fade).clamp(0.0, 1.0) } else { 1.0 };
+        let weight = (1.0 - self.near + self.near * plate.near) * (share * share * (3.0 - 2.0 * share));
         let lean = Vec2::new(b, c);
         let shift = (self.shift * weight * lean).round().as_ivec2().to_array();
         // A few flash; of the others those that lean to the light shine a little.
@@ -197,6 +251,10 @@ impl Facets {
         let sheen = 0.5 * (low + high) - gain.dot(plate.centre);
         Facet {
             tone: 1.0 + self.tone * weight * a,
+            dish: self.dish * weight * (0.7 + 0.3 * e),
+            centre: plate.centre,
+            inv_side: plate.inv_side,
+            is_gone: false,
             shift,
             tilt: (self.tilt * weight * lean).to_array(),
             sheen,

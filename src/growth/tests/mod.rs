@@ -66,6 +66,7 @@ fn random_params(rng: &mut Rng, small: bool) -> GrowthParams {
         venation: Venation::Open,
         nucleation: 0.0,
         generations: 1 + rng.next_u32() % 3,
+        stars: 0.0,
         front: 0.0,
         tip_taper: if rng.unit() < 0.3 { 0.0 } else { 12.0 * rng.unit() },
         unevenness: 0.0,

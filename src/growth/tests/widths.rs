@@ -122,7 +122,7 @@ fn widths_of_growths_are_those_of_a_recount() {
         let mut is_met = vec![false; nodes.len()];
         for link in growth.network().links() {
             // What closes a cell beyond the reach of its hit stays a needle.
-            let is_needle = growth.divides() && growth.has_left(link.b);
+            let is_needle = growth.divides() && (growth.has_left(link.a) || growth.has_left(link.b));
             is_met[link.b as usize] |= link.kind != LinkKind::Connection && !is_needle;
         }
         if params.keeps_apart() {
