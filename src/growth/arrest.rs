@@ -431,8 +431,10 @@ impl CrackGrowth {
         let joined = self.link(link);
         if joined {
             self.is_met(node);
-            // What closes a cell at the rim stays a needle.
-            if !self.divides() || !self.has_left(tip) && !self.has_left(node) {
+            // What closes a cell at the rim gets thin.
+            if self.divides() && (self.has_left(tip) || self.has_left(node)) {
+                self.thin_end(tip);
+            } else {
                 self.widen_end(tip);
             }
             let width = self.network.nodes[tip as usize].width;

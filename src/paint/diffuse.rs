@@ -387,10 +387,10 @@ fn compose<const ROOM: usize>(
         let pale = f32::from(spot.pale) * (1.0 / 255.0);
         let mut dark = f32::from(spot.dark) * (1.0 / 255.0);
         if extras.are_gone {
-            // Whole plates are gone, or not at all.
-            match extras.plate(place + i) {
-                0 => {}
-                id => dark = if extras.facet(id).is_gone { 1.0 } else { 0.0 },
+            // Small plates are gone as a whole, or not at all.
+            match extras.facet(extras.plate(place + i)).is_gone {
+                None => {}
+                Some(is_gone) => dark = if is_gone { 1.0 } else { 0.0 },
             }
         }
         let tone = 1.0 + f32::from(spot.shade) * (1.0 / 128.0);

@@ -134,9 +134,9 @@ impl<'a, const ROOM: usize> Extras<'a, ROOM> {
         let facet = match (self.facets, self.plates.get(usize::from(id))) {
             (Some(facets), Some(plate)) if id != 0 => {
                 let mut facet = facets.of(plate);
-                // The middle of its texels.
-                facet.is_gone = facets.gone
-                    && self.crushed.is_some_and(|crushed| crushed.is_hole(plate.centre, plate.extent + 2.0));
+                if facets.gone {
+                    facet.is_gone = self.crushed.and_then(|crushed| crushed.is_gone(plate.centre, plate.extent));
+                }
                 facet
             }
             _ => Facet::NONE,
@@ -175,8 +175,8 @@ pub(super) struct Facet {
     dish: f32,
     centre: Vec2,
     inv_side: f32,
-    /// Whether it lies in a hole.
-    pub(super) is_gone: bool,
+    /// Whether it is gone in a hole, or whole beside one.
+    pub(super) is_gone: Option<bool>,
     /// Where it is taken from, texels away.
     pub(super) shift: [i32; 2],
     pub(super) tilt: [f32; 2],
@@ -193,7 +193,7 @@ impl Facet {
         dish: 0.0,
         centre: Vec2::ZERO,
         inv_side: 0.0,
-        is_gone: false,
+        is_gone: None,
         shift: [0; 2],
         tilt: [0.0; 2],
         sheen: 0.0,
@@ -254,7 +254,7 @@ impl Facets {
             dish: self.dish * weight * (0.7 + 0.3 * e),
             centre: plate.centre,
             inv_side: plate.inv_side,
-            is_gone: false,
+            is_gone: None,
             shift,
             tilt: (self.tilt * weight * lean).to_array(),
             sheen,
@@ -262,5 +262,50 @@ impl Facets {
             low,
             high,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PLATE: Plate = Plate {
+        centre: Vec2::new(50.0, 60.0),
+        inv_side: 0.05,
+        near: 0.5,
+        away: 0.1,
+        extent: 14.0,
+        draws: [0.5, -0.3, 0.8, 0.1, 0.4, -0.6],
+        common: [0.9, -0.4, 0.2],
+    };
+
+    /// Plates fade to nothing where they are told, and are as they are near the hit.
+    #[test]
+    fn plates_fade_out() {
+        let facets = Facets { fade: 0.4, dish: 0.2, ..Facets::DEFAULT };
+        let tone = |away: f32| facets.of(&Plate { away, ..PLATE }).tone(58, 66) - 1.0;
+        assert_eq!(tone(0.1), Facets { fade: 0.0, ..facets }.of(&PLATE).tone(58, 66) - 1.0);
+        assert!(tone(0.3).abs() < tone(0.1).abs() && tone(0.4) == 0.0 && tone(2.0) == 0.0);
+    }
+
+    /// A dish is brighter on the side that faces the light, by what it is told at the most.
+    #[test]
+    fn dishes_are_lit_from_the_upper_left() {
+        let facets = Facets { tone: 0.0, dish: 0.2, ..Facets::DEFAULT };
+        let facet = facets.of(&PLATE);
+        assert!(facet.tone(57, 67) > 1.02 && facet.tone(43, 53) < 1.0);
+        let all = (0..200).flat_map(|y| (0..200).map(move |x| (x, y))).map(|(x, y)| facet.tone(x, y));
+        assert!(all.into_iter().all(|tone| (0.7..=1.4).contains(&tone)));
+    }
+
+    /// Neighbours have in common what they are told.
+    #[test]
+    fn bundles_share_their_tone() {
+        let spread = |bundle: f32| {
+            let facets = Facets { tone: 0.4, bundle, ..Facets::DEFAULT };
+            let tone = |a: f32| facets.of(&Plate { draws: [a; 6], ..PLATE }).tone(50, 60);
+            tone(1.0) - tone(-1.0)
+        };
+        assert!(spread(1.0) < 0.6 * spread(0.0));
     }
 }

@@ -52,7 +52,8 @@ pub struct Facets {
     pub fade: f32,
     /// How much neighbours have in common, so that tones and tilts come in bundles: 0 = nothing, 1 = all. 0..=1; default 0.
     pub bundle: f32,
-    /// Whether plates of which the middle lies in the hole of a [crushed](Look::crushed) zone are gone, and no others; default no.
+    /// Whether plates smaller than the hole of a [crushed](Look::crushed) zone are gone as a whole if their middle lies in it, and else not at
+    /// all; default no.
     pub gone: bool,
 }
 

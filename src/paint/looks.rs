@@ -28,7 +28,7 @@ impl Look {
             color: [0.95, 0.98, 1.0],
             pale: 0.95,
             speckle: 0.5,
-            dust: 0.0,
+            dust: 0.22,
             chips: 0.05,
             reach: 2.6,
             needles: 0.7,
@@ -59,7 +59,7 @@ impl Look {
             ..Facets::DEFAULT
         }),
         crushed: Some(Crushed {
-            radius: 0.026,
+            radius: 0.03,
             ragged: 0.6,
             soft: 0.8,
             hole: 0.7,
@@ -254,13 +254,13 @@ impl Look {
             stop(0.50, [0.28, 0.22, 0.18], 0.58),
             stop(1.0, [0.15, 0.11, 0.09], 0.85),
         ]),
-        glint: 0.0,
+        glint: 0.6,
         grain: 0.08,
         sparkle: 0.3,
         catch: 0.45,
         relief: 0.0,
         crushed: Some(Crushed {
-            radius: 0.009,
+            radius: 0.010,
             ragged: 0.9,
             depth: 0.004,
             rough: 0.0008,
@@ -271,7 +271,7 @@ impl Look {
             dust: 0.0,
             chips: 0.0,
             reach: 4.0,
-            needles: 0.25,
+            needles: 0.45,
             ..Crushed::DEFAULT
         }),
         ..Self::GROOVE

@@ -5,7 +5,7 @@ use crate::{
     CrackPreset,
     growth::{
         CrackGrowth, GrowthParams,
-        width::{NOTCH, Widths},
+        width::{NOTCH, Widths, thinly},
     },
     math::{Rng, ops},
     pattern::{LinkKind, NO_PARENT, Node},
@@ -119,11 +119,12 @@ fn widths_of_growths_are_those_of_a_recount() {
         }
         while growth.step().grew() {}
         let nodes = growth.network().nodes();
-        let mut is_met = vec![false; nodes.len()];
+        let (mut is_met, mut is_thinned) = (vec![false; nodes.len()], vec![false; nodes.len()]);
         for link in growth.network().links() {
-            // What closes a cell beyond the reach of its hit stays a needle.
-            let is_needle = growth.divides() && (growth.has_left(link.a) || growth.has_left(link.b));
-            is_met[link.b as usize] |= link.kind != LinkKind::Connection && !is_needle;
+            // What closes a cell beyond the reach of its hit gets thin.
+            let is_thin = growth.divides() && (growth.has_left(link.a) || growth.has_left(link.b));
+            is_met[link.b as usize] |= link.kind != LinkKind::Connection && !is_thin;
+            is_thinned[link.b as usize] |= link.kind != LinkKind::Connection && is_thin;
         }
         if params.keeps_apart() {
             for (node, is_met) in nodes.iter().zip(&mut is_met) {
@@ -131,7 +132,11 @@ fn widths_of_growths_are_those_of_a_recount() {
             }
         }
         let beyond = params.tip_taper.ceil() as u32;
-        let behind = recount(nodes, |node| if is_met[node as usize] { 1 + beyond } else { 1 });
+        let behind = recount(nodes, |node| match node as usize {
+            node if is_met[node] => 1 + beyond,
+            node if is_thinned[node] => 1 + thinly(beyond),
+            _ => 1,
+        });
         for (index, (node, &behind)) in nodes.iter().zip(&behind).enumerate() {
             // Hits that have merged make wider ones.
             let generation = growth.division.as_ref().map_or(0, |division| division.generation_of(index as u32));

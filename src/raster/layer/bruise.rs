@@ -82,3 +82,29 @@ pub(super) fn broken_edge(turn: f32, out: f32, seed: u32) -> f32 {
     let fall = (1.0 - out).clamp(0.0, 1.0);
     (fall * (0.25 + 0.55 * coarse + 0.5 * fine * fine) + 0.25 * coarse * fine * fall.sqrt()).clamp(0.0, 1.0)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Cracks get fewer outward, and there are none where none are wanted.
+    #[test]
+    fn cracks_get_fewer_as_they_are_told() {
+        let covered = |dense: f32| {
+            let all = (0..64u32).flat_map(|y| (0..64u32).map(move |x| Vec2::new(x as f32, y as f32) - 31.7));
+            all.map(|off| bruise(off, off.length() / 32.0, dense, 1.0, 9).crack).sum::<f32>()
+        };
+        assert_eq!(covered(0.0), 0.0);
+        let some = [0.2, 0.5, 1.0].map(covered);
+        assert!(some[0] > 0.0 && some[0] < some[1] && some[1] < some[2], "{some:?}");
+    }
+
+    /// A hole is closed: its sides meet where a turn ends.
+    #[test]
+    fn sides_of_a_hole_meet() {
+        for seed in 0..50 {
+            assert!((chipped(0.0, seed) - chipped(1.0 - 1e-6, seed)).abs() < 1e-4);
+            assert!((0..100).all(|i| (0.7..=1.3).contains(&chipped(i as f32 * 0.01, seed))));
+        }
+    }
+}

@@ -307,18 +307,19 @@ impl CrushedField {
         }
     }
 
-    /// Whether a hole is at a place, of an impact that shows all within `around` of it anew when it is shown. Texels.
-    pub(crate) fn is_hole(&self, at: Vec2, around: f32) -> bool {
+    /// Whether a plate whose middle is at a place, and all of it within `extent` of it, is gone in a hole, or whole beside one; `None` if no hole
+    /// is there, or the plate is as large as that. Only holes of impacts that show all of the plate anew when they are shown. Texels.
+    pub(crate) fn is_gone(&self, at: Vec2, extent: f32) -> Option<bool> {
         let tile = at.max(Vec2::ZERO).as_uvec2().min(self.frame.size() - 1) / TILE;
-        let is_there = self.tiles.get((tile.y * self.columns + tile.x) as usize).is_some_and(Option::is_some);
-        is_there
-            && self.zones.iter().flatten().any(|zone| {
-                let hole = self.radius(zone.energy) * self.crushed.hole;
-                let off = at - zone.pos;
-                let (min, max) = ((at - around).max(Vec2::ZERO), (at + around).min(self.frame.size().as_vec2()));
-                let holds = zone.bounds.min.as_vec2().cmple(min).all() && zone.bounds.max.as_vec2().cmpge(max).all();
-                holds && off.length_squared() < hole * hole
-            })
+        self.tiles.get((tile.y * self.columns + tile.x) as usize)?.as_ref()?;
+        let around = extent + 2.0;
+        let (min, max) = ((at - around).max(Vec2::ZERO), (at + around).min(self.frame.size().as_vec2()));
+        let near = self.zones.iter().flatten().filter_map(|zone| {
+            let hole = self.radius(zone.energy) * self.crushed.hole;
+            let holds = zone.bounds.min.as_vec2().cmple(min).all() && zone.bounds.max.as_vec2().cmpge(max).all();
+            (holds && extent < hole).then(|| at.distance_squared(zone.pos) < hole * hole)
+        });
+        near.max()
     }
 
     /// Whether anything may be crushed in a rectangle.

@@ -101,8 +101,9 @@ impl VeilField {
         // Sheets of some directions catch more light than others.
         let ends = path.points().first().zip(path.points().last());
         let way = ends.map_or(Vec2::ZERO, |(from, to)| (to.pos - from.pos).normalize_or_zero());
-        let way = if (way.y, way.x) < (0.0, 0.0) { -way } else { way };
-        let lit = (0.62 + 0.6 * noise(self.seed ^ 3, 2.7 * way.x, 2.7 * way.y)).clamp(0.15, 1.0);
+        // Twice the angle: the same both ways.
+        let twice = 1.4 * way.rotate(way);
+        let lit = (0.62 + 0.6 * noise(self.seed ^ 3, twice.x, twice.y)).clamp(0.15, 1.0);
         for pair in path.points().windows(2) {
             let ends = [pair[0], pair[1]].map(|point| self.frame.to_texel(point.pos));
             let dense = [pair[0], pair[1]].map(|point| lit * (point.width / self.veil.full_width).clamp(0.0, 1.0));
