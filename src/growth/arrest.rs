@@ -2,6 +2,7 @@
 
 use super::{
     CrackGrowth, StartLayout,
+    divide::Division,
     pull::turned_at_most,
     rays::NO_RAY,
     walls::{Walls, crosses_itself},
@@ -436,6 +437,12 @@ impl CrackGrowth {
                 self.thin_end(tip);
             } else {
                 self.widen_end(tip);
+                // Of two ends that meet neither is one any more.
+                let is_thinner = |division: &Division| division.share(node) <= division.share(tip);
+                let is_end = self.network.nodes[node as usize].parent != NO_PARENT && self.child_of(node) == NO_PARENT;
+                if is_end && self.division.as_ref().is_some_and(is_thinner) {
+                    self.widen_end(node);
+                }
             }
             let width = self.network.nodes[tip as usize].width;
             if let Some(link) = self.network.links.last_mut() {

@@ -148,7 +148,7 @@ impl Division {
     }
 
     /// How much narrower than others the crack of a node is.
-    fn share(&self, node: u32) -> f32 {
+    pub(super) fn share(&self, node: u32) -> f32 {
         let generation = self.generations.get(node as usize).copied().unwrap_or(0);
         (0..generation).fold(1.0, |share, _| share * NARROWER)
     }

@@ -117,7 +117,7 @@ impl<'a, const ROOM: usize> Extras<'a, ROOM> {
             patch.tilt(|k| {
                 let at = self.min + Vec2::new((k % self.stride) as f32, (k / self.stride) as f32);
                 let facet = self.facet(self.room.plate[k]);
-                (Vec2::from(facet.tilt) - facet.dish * facet.from_middle(at)).to_array()
+                (Vec2::from(facet.tilt) - facet.dish * facet.off_middle(at)).to_array()
             });
         } else if self.facets.is_some_and(|facets| facets.tilt > 0.0) {
             patch.tilt(|k| self.facet(self.room.plate[k]).tilt);
@@ -204,7 +204,7 @@ impl Facet {
 
     /// The way from its middle to a place, at most 1 about.
     #[inline(always)]
-    fn from_middle(&self, at: Vec2) -> Vec2 {
+    fn off_middle(&self, at: Vec2) -> Vec2 {
         ((at - self.centre) * (2.0 * self.inv_side)).clamp(Vec2::NEG_ONE, Vec2::ONE)
     }
 
@@ -214,7 +214,7 @@ impl Facet {
         if self.dish <= 0.0 {
             return self.tone;
         }
-        let way = self.from_middle(Vec2::new(x as f32, y as f32));
+        let way = self.off_middle(Vec2::new(x as f32, y as f32));
         self.tone + self.dish * (0.5 * (way.x + way.y) + 0.5 * way.length_squared() - 0.25)
     }
 

@@ -228,12 +228,12 @@ impl Look {
             stop(0.75, [0.26, 0.19, 0.14], 0.97),
             stop(1.0, [0.12, 0.085, 0.06], 1.0),
         ]),
-        glint: 1.0,
+        glint: 0.8,
         relief: 0.014,
         curl: 0.07,
         curl_depth: 0.12,
         full_rim: 0.010,
-        facets: Some(Facets { tone: 0.07, tilt: 0.03, dish: 0.10, fade: 0.30, ..Facets::DEFAULT }),
+        facets: Some(Facets { tone: 0.085, tilt: 0.03, dish: 0.15, fade: 0.30, ..Facets::DEFAULT }),
         ..Self::GROOVE
     };
 
@@ -242,21 +242,21 @@ impl Look {
         curl: 0.10,
         full_rim: 0.012,
         relief: 0.02,
-        glint: 1.2,
-        facets: Some(Facets { tone: 0.065, tilt: 0.04, dish: 0.11, fade: 0.33, ..Facets::DEFAULT }),
+        glint: 0.95,
+        facets: Some(Facets { tone: 0.08, tilt: 0.04, dish: 0.16, fade: 0.33, ..Facets::DEFAULT }),
         ..Self::CLAY
     };
 
     /// The glaze of pottery: ink that has gone into hairlines, darker the wider they are, without relief.
     pub const STAIN: Self = Self {
         ramp: Cow::Borrowed(&[
-            stop(0.20, [0.36, 0.29, 0.24], 0.25),
-            stop(0.50, [0.28, 0.22, 0.18], 0.58),
-            stop(1.0, [0.15, 0.11, 0.09], 0.85),
+            stop(0.20, [0.30, 0.24, 0.20], 0.30),
+            stop(0.50, [0.22, 0.17, 0.14], 0.65),
+            stop(1.0, [0.12, 0.09, 0.07], 0.88),
         ]),
         glint: 0.6,
         grain: 0.08,
-        sparkle: 0.3,
+        sparkle: 0.25,
         catch: 0.45,
         relief: 0.0,
         crushed: Some(Crushed {
