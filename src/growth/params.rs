@@ -178,8 +178,8 @@ pub struct GrowthParams {
     /// With [`Venation::Dividing`]: cracks come in so many generations, each in domains that are 1.6 times smaller, and half as wide as the one
     /// before. 1..=4.
     pub generations: u32,
-    /// With [`Venation::Dividing`]: share of the cracks that begin with three arms, 120 degrees apart, in place of two, where the domain is as wide
-    /// as long: more cells with five and six sides. 0..=1.
+    /// With [`Venation::Dividing`]: share of the cracks that begin with three arms, 120 degrees apart, in place of two, where a domain is about as
+    /// wide as long: more cells have five and six sides. 0..=1.
     pub stars: f32,
     /// With [`Venation::Dividing`]: how far cracks may begin from the hit, pattern units for each step since it; 0 = anywhere at once. 0..=1.
     pub front: f32,

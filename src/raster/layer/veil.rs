@@ -103,7 +103,7 @@ impl VeilField {
         let way = ends.map_or(Vec2::ZERO, |(from, to)| (to.pos - from.pos).normalize_or_zero());
         // Twice the angle: the same both ways.
         let twice = 1.4 * way.rotate(way);
-        let lit = (0.62 + 0.6 * noise(self.seed ^ 3, twice.x, twice.y)).clamp(0.15, 1.0);
+        let lit = (0.74 + 0.5 * noise(self.seed ^ 3, twice.x, twice.y)).clamp(0.35, 1.0);
         for pair in path.points().windows(2) {
             let ends = [pair[0], pair[1]].map(|point| self.frame.to_texel(point.pos));
             let dense = [pair[0], pair[1]].map(|point| lit * (point.width / self.veil.full_width).clamp(0.0, 1.0));
