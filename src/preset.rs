@@ -8,7 +8,7 @@ pub use check::PresetError;
 
 use crate::{
     growth::{GrowthParams, MarkerLayout, StartLayout, Venation},
-    paint::Look,
+    paint::{Facets, Look},
     raster::Profile,
 };
 
@@ -185,10 +185,10 @@ impl CrackPreset {
             markers: MarkerLayout::Rays { sectors: 13, jitter: 0.7, through: 0.8 },
             reach: 0.42,
             starts: StartLayout::Crushed { count: 14, radius: 0.016 },
-            line_width: 0.0012,
+            line_width: 0.0010,
             line_growth: 0.3,
             murray: 1.6,
-            max_width: 0.0056,
+            max_width: 0.0052,
             unevenness: 0.2,
             wander: 0.03,
             roughness: 0.01,
@@ -224,11 +224,11 @@ impl CrackPreset {
             step_length: 0.0085,
             crack_radius: 0.02,
             num_iterations: 400,
-            num_lines_grid: 110,
-            num_columns_grid: 110,
+            num_lines_grid: 97,
+            num_columns_grid: 97,
             markers: MarkerLayout::PseudoGrid { occupancy: 1.0, jitter: 0.9 },
             venation: Venation::Dividing,
-            focus: 0.55,
+            focus: 1.0,
             front: 0.008,
             reach: 64.0,
             line_width: 0.0026,
@@ -267,11 +267,11 @@ impl CrackPreset {
             num_iterations: 400,
             markers: MarkerLayout::Rays { sectors: 34, jitter: 0.9, through: 0.0 },
             reach: 0.48,
-            starts: StartLayout::Crushed { count: 30, radius: 0.03 },
-            line_width: 0.0013,
+            starts: StartLayout::Crushed { count: 30, radius: 0.012 },
+            line_width: 0.0010,
             line_growth: 0.4,
             murray: 2.0,
-            max_width: 0.005,
+            max_width: 0.0034,
             unevenness: 0.4,
             wander: 0.05,
             roughness: 0.02,
@@ -305,7 +305,7 @@ impl CrackPreset {
     /// `line_growth` 0.5 and `draw_islands`, in a unit that they do not give.
     pub const CLAY: Self = Self {
         growth: GrowthParams {
-            kill_distance: 0.036,
+            kill_distance: 0.034,
             step_length: 0.017,
             crack_radius: 0.3,
             num_lines_grid: 42,
@@ -313,6 +313,8 @@ impl CrackPreset {
             markers: MarkerLayout::PseudoGrid { occupancy: 1.0, jitter: 0.9 },
             venation: Venation::Dividing,
             generations: 3,
+            stars: 0.7,
+            grain: 0.05,
             reach: 0.33,
             line_width: 0.0085,
             line_growth: 0.05,
@@ -320,13 +322,13 @@ impl CrackPreset {
             max_width: 0.02,
             unevenness: 0.2,
             inertia: 3.0,
-            wander: 0.16,
+            wander: 0.25,
             roughness: 0.07,
             arrest: 0.045,
             open_ends: 0.03,
             nucleation: 1.0,
             num_iterations: 400,
-            tip_taper: 8.0,
+            tip_taper: 10.0,
             ..GrowthParams::DEFAULT
         },
         profile: Profile {
@@ -354,6 +356,8 @@ impl CrackPreset {
             markers: MarkerLayout::PseudoGrid { occupancy: 1.0, jitter: 0.9 },
             venation: Venation::Dividing,
             generations: 3,
+            stars: 0.6,
+            grain: 0.07,
             reach: 0.37,
             line_width: 0.0105,
             line_growth: 0.05,
@@ -361,13 +365,13 @@ impl CrackPreset {
             max_width: 0.02,
             unevenness: 0.33,
             inertia: 2.0,
-            wander: 0.25,
-            roughness: 0.09,
+            wander: 0.36,
+            roughness: 0.11,
             arrest: 0.045,
             open_ends: 0.08,
             nucleation: 2.0,
             num_iterations: 400,
-            tip_taper: 8.0,
+            tip_taper: 10.0,
             ..GrowthParams::DEFAULT
         },
         profile: Profile {
@@ -395,14 +399,16 @@ impl CrackPreset {
             markers: MarkerLayout::PseudoGrid { occupancy: 1.0, jitter: 0.9 },
             venation: Venation::Dividing,
             generations: 2,
+            stars: 0.3,
+            grain: 0.06,
             reach: 0.33,
-            line_width: 0.0013,
+            line_width: 0.0021,
             tip_taper: 2.0,
             line_growth: 0.0,
-            max_width: 0.0013,
-            unevenness: 0.15,
+            max_width: 0.0021,
+            unevenness: 0.5,
             inertia: 3.0,
-            wander: 0.14,
+            wander: 0.2,
             roughness: 0.03,
             arrest: 0.05,
             nucleation: 3.0,
@@ -411,7 +417,7 @@ impl CrackPreset {
         },
         profile: Profile {
             depth: 1.0,
-            full_width: 0.003,
+            full_width: 0.0016,
             wall: 0.4,
             rim_width: 0.0,
             rim_depth: 0.0,
@@ -519,7 +525,9 @@ impl CrackPreset {
         let crushed = self.look.crushed.map(|crushed| crushed.scaled(by));
         let veil = self.look.veil.map(|veil| veil.scaled(by));
         let cel = self.look.cel.map(|cel| cel.scaled(by));
-        let look = Look { cel, crushed, veil, ..self.look.clone() };
+        let facets = self.look.facets.map(|facets| Facets { fade: (facets.fade * by).clamp(0.0, 16.0), ..facets });
+        let full_rim = (self.look.full_rim * by).clamp(0.0, 1.0);
+        let look = Look { cel, crushed, veil, facets, full_rim, ..self.look.clone() };
         Self { growth, profile, look, ..self.clone() }
     }
 

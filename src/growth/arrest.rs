@@ -2,6 +2,7 @@
 
 use super::{
     CrackGrowth, StartLayout,
+    divide::Division,
     pull::turned_at_most,
     rays::NO_RAY,
     walls::{Walls, crosses_itself},
@@ -16,8 +17,14 @@ const BENDS: [f32; 3] = [1.0, 0.4, 0.0];
 /// Cosine of the angle to the heading within which a crack is ahead of a tip: 60 degrees.
 pub(super) const AHEAD: f32 = 0.5;
 
+/// Cosine and sine of the most that what divides a domain turns from its way to meet another crack: 50 degrees. It does not hook round.
+const STEADY: (f32, f32) = (0.642_787_6, 0.766_044_4);
+
 /// A crack this many segment lengths away is met by the next segment.
 const LAST: f32 = 1.35;
+
+/// How much less what divides a domain likes to turn than to meet others aslant, by one minus the cosine.
+const HOOK: f32 = 4.0;
 
 /// Segment lengths that a tip needs to turn.
 const TURN: f32 = 2.5;
@@ -46,6 +53,8 @@ struct Runner {
     tip: u32,
     goal: Goal,
     steps_left: u32,
+    /// Its way when it set out.
+    course: Vec2,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -160,9 +169,11 @@ impl CrackGrowth {
                 return Advance::Stopped(heading);
             }
             Some((_, goal)) => {
-                let to = pos + turned_at_most(last, self.turned(pos, heading, goal)) * length;
+                let course = if last == Vec2::ZERO { heading } else { last };
+                let way = self.kept_to(course, turned_at_most(last, self.turned(pos, heading, goal)));
+                let to = pos + way * length;
                 let Some(tip) = self.extend(from, to, true) else { return Advance::Stopped(heading) };
-                self.run(Runner { tip, goal, steps_left: steps_for(reach, length) });
+                self.run(Runner { tip, goal, steps_left: steps_for(reach, length), course });
                 return Advance::Grown;
             }
         }
@@ -205,7 +216,8 @@ impl CrackGrowth {
         let goal = self.goal_ahead(tip, heading, distance, ahead);
         if let Some((_, goal)) = goal {
             self.seal(tip);
-            self.run(Runner { tip, goal, steps_left: steps_for(distance, self.params.step_length) });
+            let steps_left = steps_for(distance, self.params.step_length);
+            self.run(Runner { tip, goal, steps_left, course: heading });
         }
         goal.is_some()
     }
@@ -254,7 +266,8 @@ impl CrackGrowth {
             return None;
         }
         runner.steps_left = runner.steps_left.checked_sub(1)?;
-        let to = node.pos + turned_at_most(heading, self.turned(node.pos, heading, runner.goal)) * length;
+        let way = turned_at_most(heading, self.turned(node.pos, heading, runner.goal));
+        let to = node.pos + self.kept_to(runner.course, way) * length;
         runner.tip = self.extend(runner.tip, to, true)?;
         Some(runner)
     }
@@ -279,6 +292,15 @@ impl CrackGrowth {
         let keep = if self.divides() { (0.4 * way.length() / self.params.step_length).clamp(0.5, 2.0) } else { 0.5 };
         let way = way.normalize_or_zero();
         (keep * heading + way).normalize_or(way)
+    }
+
+    /// `way`, or as much of it as a crack that was on another when it set out may turn: what divides a domain does not hook round.
+    fn kept_to(&self, course: Vec2, way: Vec2) -> Vec2 {
+        if !self.divides() || course == Vec2::ZERO || course.dot(way) >= STEADY.0 {
+            return way;
+        }
+        let across = if course.perp_dot(way) < 0.0 { -course.perp() } else { course.perp() };
+        course * STEADY.0 + across * STEADY.1
     }
 
     /// The last segment: onto the crack or the border.
@@ -308,6 +330,7 @@ impl CrackGrowth {
             false => 0.0,
         };
         let least = least * heading.length();
+        let course = if self.divides() { self.heading_of(tip) } else { Vec2::ZERO };
         self.each_foreign(tip, reach * length, |node, distance_sq, way| {
             if way.dot(heading) > least * distance_sq.sqrt() {
                 let end = self.network.nodes[node as usize];
@@ -320,7 +343,8 @@ impl CrackGrowth {
                 } else {
                     along.dot(way / distance).abs()
                 };
-                nearby.push((distance / length + 3.0 * slant, node));
+                let turn = if course == Vec2::ZERO { 0.0 } else { 1.0 - way.dot(course) / distance };
+                nearby.push((distance / length + 3.0 * slant + HOOK * turn, node));
             }
         });
         nearby.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
@@ -408,9 +432,17 @@ impl CrackGrowth {
         let joined = self.link(link);
         if joined {
             self.is_met(node);
-            // What closes a cell at the rim stays a needle.
-            if !self.divides() || !self.has_left(tip) {
+            // What closes a cell at the rim gets thin.
+            if self.divides() && (self.has_left(tip) || self.has_left(node)) {
+                self.thin_end(tip);
+            } else {
                 self.widen_end(tip);
+                // Of two ends that meet neither is one any more.
+                let is_thinner = |division: &Division| division.share(node) <= division.share(tip);
+                let is_end = self.network.nodes[node as usize].parent != NO_PARENT && self.child_of(node) == NO_PARENT;
+                if is_end && self.division.as_ref().is_some_and(is_thinner) {
+                    self.widen_end(node);
+                }
             }
             let width = self.network.nodes[tip as usize].width;
             if let Some(link) = self.network.links.last_mut() {

@@ -73,6 +73,12 @@ const INVITES: f32 = 1.4;
 /// A crack begins in this step if its marker is still so much of its distance away from those that have begun in it.
 const STILL: f32 = 0.8;
 
+/// A domain that is no more than so many times as long as wide may be divided in three.
+const ROUND: f32 = 1.7;
+
+/// Within a grain a crack strays by this much of what it strays from grain to grain.
+const WITHIN_GRAIN: f32 = 0.3;
+
 /// Kill distances around a hit within which domains are finer and drawn out away from it.
 const AROUND: f32 = 14.0;
 
@@ -131,8 +137,9 @@ struct Across {
     way: Vec2,
     /// Where it would begin, in the middle of the longer way.
     middle: Vec2,
-    /// The longer way.
+    /// The longer way, and how many times as long it is.
     length: f32,
+    longer: f32,
 }
 
 impl Division {
@@ -141,7 +148,7 @@ impl Division {
     }
 
     /// How much narrower than others the crack of a node is.
-    fn share(&self, node: u32) -> f32 {
+    pub(super) fn share(&self, node: u32) -> f32 {
         let generation = self.generations.get(node as usize).copied().unwrap_or(0);
         (0..generation).fold(1.0, |share, _| share * NARROWER)
     }
@@ -253,8 +260,8 @@ impl CrackGrowth {
                 self.keep_tip(Tip { node, straight: 0, runs_out: false });
             } else if !matches!(self.params.starts, StartLayout::Crushed { .. }) && self.child_of(node) == NO_PARENT {
                 let Node { pos, impact, .. } = self.network.nodes[node as usize];
-                if let Some(Across { way, .. }) = self.across(pos, impact, node, self.params.crack_radius) {
-                    self.run_both_ways(node, way);
+                if let Some(across) = self.across(pos, impact, node, self.params.crack_radius) {
+                    self.run_out_of(node, across);
                 }
             }
         }
@@ -351,7 +358,7 @@ impl CrackGrowth {
         if !division.tips.iter().map(|tip| tip.node).chain(runners).all(is_quiet) {
             return;
         }
-        let Some(Across { way, middle, length }) =
+        let Some(across @ Across { middle, length, .. }) =
             self.across(candidate.pos, candidate.impact, candidate.marker, near.max(loaded))
         else {
             self.field.take(candidate.marker);
@@ -372,14 +379,18 @@ impl CrackGrowth {
         self.nucleated += 1;
         let node = self.network.nodes.len() as u32;
         self.bear(middle, NO_PARENT, 0, candidate.impact, 1.0);
-        self.run_both_ways(node, way);
+        self.run_out_of(node, across);
         self.show_markers();
     }
 
-    /// The first segments of a crack, either way across its domain.
-    fn run_both_ways(&mut self, node: u32, across: Vec2) {
+    /// The first segments of a crack, either way across its domain, or three ways.
+    fn run_out_of(&mut self, node: u32, Across { way, longer, .. }: Across) {
         let pos = self.network.nodes[node as usize].pos;
-        for way in [across, -across] {
+        let draw = hash_unit(self.seed ^ 0xA4, u64::from(node));
+        let is_star = self.params.stars > 0.0 && longer < ROUND && draw < self.params.stars;
+        let third = Vec2::new(-0.5, 0.866_025_4);
+        let ways = [way, if is_star { third.rotate(way) } else { -way }, Vec2::new(-0.5, -0.866_025_4).rotate(way)];
+        for way in ways.into_iter().take(if is_star { 3 } else { 2 }) {
             let born = self.network.nodes.len() as u32;
             if self.advance(node, pos + way * self.params.step_length) == Advance::Grown {
                 self.keep_tip(Tip { node: born, straight: 0, runs_out: false });
@@ -454,9 +465,13 @@ impl CrackGrowth {
         // In the middle of its length.
         let long = (best + AXES / 2) % AXES;
         let middle = pos + axes[long] * (0.4 * (seen[long][0].0 - seen[long][1].0));
+        let is_out =
+            |there: Vec2| (there - hit).length() > rim_towards(there - hit, reach, self.seed ^ u64::from(impact));
+        let middle = if is_out(middle) { pos } else { middle };
         let stray = 2.0 * self.params.wander * (2.0 * draw(0xA2) - 1.0);
         let way = (axes[best] + axes[best].perp() * stray).normalize_or(Vec2::X);
-        Some(Across { way, middle: middle.clamp(Vec2::ZERO, extent), length: around(long) })
+        let length = around(long);
+        Some(Across { way, middle: middle.clamp(Vec2::ZERO, extent), length, longer: length / around(best).max(1e-6) })
     }
 
     /// Remembers that a crack grows on from a node, if it may.
@@ -476,7 +491,7 @@ impl CrackGrowth {
         let Some(before) = self.network.nodes.get(this.parent as usize) else { return };
         let heading = (this.pos - before.pos).normalize_or_zero();
         let (length, child) = (self.params.step_length, self.network.nodes.len() as u32);
-        let stray = self.params.wander * (2.0 * hash_unit(self.seed ^ 0x57A6, u64::from(child)) - 1.0);
+        let stray = self.params.wander * self.stray(before.pos, this.pos, child);
         let drawn = self.drawn(this.pos, heading).map(|pull| {
             let direction = self.params.direct((pull + heading * self.params.inertia).normalize_or(heading));
             let mut direction = (direction + direction.perp() * stray).normalize_or_zero();
@@ -501,6 +516,16 @@ impl CrackGrowth {
         if let Some(arrest) = &mut self.arrest {
             arrest.seal(node);
         }
+    }
+
+    /// How much a crack strays at a node, -1..=1: where there are grains, from one to the next.
+    fn stray(&self, before: Vec2, pos: Vec2, child: u32) -> f32 {
+        let stray = 2.0 * hash_unit(self.seed ^ 0x57A6, u64::from(child)) - 1.0;
+        if self.params.grain <= 0.0 {
+            return stray;
+        }
+        let cell = |pos: Vec2| (pos / self.params.grain).as_uvec2();
+        if cell(before) == cell(pos) { WITHIN_GRAIN * stray } else { 2.0 * stray }
     }
 
     /// Where the markers of a tip that lie ahead draw it: eq. 2.

@@ -181,6 +181,9 @@ pub struct GrowthParams {
     /// With [`Venation::Dividing`]: cracks come in so many generations, each in domains that are 1.6 times smaller, and half as wide as the one
     /// before. 1..=4.
     pub generations: u32,
+    /// With [`Venation::Dividing`]: share of the cracks that begin with three arms, 120 degrees apart, in place of two, where a domain is about as
+    /// wide as long: more cells have five and six sides. 0..=1.
+    pub stars: f32,
     /// With [`Venation::Dividing`]: how far cracks may begin from the hit, pattern units for each step since it; 0 = anywhere at once. 0..=1.
     pub front: f32,
     /// How much one surface differs from the next, by its seed: widths, roughness, the spacing of markers, the number of starts and
@@ -234,6 +237,7 @@ impl GrowthParams {
         arrest: 0.0,
         nucleation: 0.0,
         generations: 1,
+        stars: 0.0,
         front: 0.0,
         variety: 0.0,
         courses: 0.0,
@@ -338,6 +342,7 @@ impl GrowthParams {
         arrest: f32 = 0.0, 1.0;
         nucleation: f32 = 0.0, 64.0;
         generations: u32 = 1.0, 4.0;
+        stars: f32 = 0.0, 1.0;
         front: f32 = 0.0, 1.0;
         variety: f32 = 0.0, 1.0;
         courses: f32 = 0.0, 1.0;

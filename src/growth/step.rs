@@ -248,6 +248,13 @@ impl CrackGrowth {
         }
     }
 
+    /// A tip that has met a crack at the rim of what its hit has loaded narrows, but not to nothing.
+    pub(super) fn thin_end(&mut self, tip: u32) {
+        if self.params.tip_taper > 0.0 {
+            self.widen_with(|widths, nodes, widened| widths.join_thinly(nodes, tip, widened));
+        }
+    }
+
     /// Lets `act` widen nodes, and notes which became wider.
     fn widen_with(&mut self, act: impl FnOnce(&mut Widths, &mut [Node], &mut dyn FnMut(u32))) {
         let mut widened = std::mem::take(&mut self.widened);

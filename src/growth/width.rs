@@ -87,6 +87,11 @@ pub(super) fn beyond(params: &GrowthParams) -> u32 {
     params.tip_taper.ceil() as u32
 }
 
+/// Of those, how many an end has that narrows.
+pub(super) const fn thinly(beyond: u32) -> u32 {
+    beyond * 2 / 5
+}
+
 impl Widths {
     pub(super) fn new(params: &GrowthParams) -> Self {
         let width = |count: u32| even_width(params, count);
@@ -206,10 +211,21 @@ impl Widths {
 
     /// An end that is free no longer: as if the crack ran on beyond it.
     pub(super) fn join(&mut self, nodes: &mut [Node], tip: u32, widened: impl FnMut(u32)) {
+        self.goes_on(nodes, tip, self.beyond, widened);
+    }
+
+    /// An end that meets another at the rim of what its hit has loaded: it narrows, but not to nothing.
+    pub(super) fn join_thinly(&mut self, nodes: &mut [Node], tip: u32, widened: impl FnMut(u32)) {
+        self.goes_on(nodes, tip, thinly(self.beyond), widened);
+    }
+
+    /// Counts so many nodes beyond an end.
+    fn goes_on(&mut self, nodes: &mut [Node], tip: u32, beyond: u32, widened: impl FnMut(u32)) {
         let form = &mut self.forms[tip as usize];
-        if self.beyond > 0 && form.counts == 1 {
-            form.counts += self.beyond;
-            self.told.push((tip, self.beyond));
+        let more = (1 + beyond).saturating_sub(form.counts);
+        if more > 0 {
+            form.counts += more;
+            self.told.push((tip, more));
             self.spread(nodes, widened);
         }
     }

@@ -230,8 +230,9 @@ impl Block<'_> {
                 }
             }
         }
+        let mut dark = [0.0; BLOCK];
         if RICH && let Some((extras, place)) = extras {
-            compose(extras, place, look, &facets, &under, &mut over);
+            dark = compose(extras, place, look, &facets, &under, &mut over);
         }
         let mut painted = [0; BLOCK];
         let (mut under_share, mut over_share, mut facing) = ([0.0; BLOCK], [1.0; BLOCK], [0.0; BLOCK]);
@@ -252,6 +253,10 @@ impl Block<'_> {
             // Light from the upper left, on a normal whose y runs down. Steep walls are not much brighter than others.
             let light = (self.x[i] + self.y[i]) * self.inv_len[i] * (-std::f32::consts::FRAC_1_SQRT_2 * look.glint);
             facing[i] = light / (1.0 + light.abs());
+            // Nothing is lit in a hole.
+            if RICH {
+                facing[i] *= 1.0 - dark[i];
+            }
         }
         for c in 0..3 {
             let (under, over) = (&under[c], &over[c]);
@@ -366,14 +371,15 @@ impl Block<'_> {
                     under.iter_mut().zip(moved).for_each(|(under, value)| under[i] = f32::from(value));
                 }
             }
-            under.iter_mut().for_each(|under| under[i] *= facet.tone);
+            let tone = facet.tone(x, at.y);
+            under.iter_mut().for_each(|under| under[i] *= tone);
             *sheen = facet.sheen(x, at.y);
         }
         sheen
     }
 }
 
-/// Lays the sheen of plates and what is crushed under the cracks, and holes over them.
+/// Lays the sheen of plates and what is crushed under the cracks, and holes over them; returns how dark those are.
 #[inline(always)]
 fn compose<const ROOM: usize>(
     extras: &Extras<'_, ROOM>,
@@ -382,11 +388,19 @@ fn compose<const ROOM: usize>(
     sheen: &[f32; BLOCK],
     under: &[[f32; BLOCK]; 3],
     over: &mut [[f32; BLOCK]; 4],
-) {
+) -> [f32; BLOCK] {
+    let mut holes = [0.0; BLOCK];
     for i in 0..BLOCK {
         let spot = extras.spot(place + i);
         let pale = f32::from(spot.pale) * (1.0 / 255.0);
-        let dark = f32::from(spot.dark) * (1.0 / 255.0);
+        let mut dark = f32::from(spot.dark) * (1.0 / 255.0);
+        if extras.are_gone {
+            // Small plates are gone as a whole, or not at all.
+            match extras.facet(extras.plate(place + i)).is_gone {
+                None => {}
+                Some(is_gone) => dark = if is_gone { 1.0 } else { 0.0 },
+            }
+        }
         // Shadows lie under the cracks, a hole has none.
         let (shade, hole) = if extras.shades { (dark, 0.0) } else { (0.0, dark) };
         let tone = 1.0 + f32::from(spot.shade) * (1.0 / 128.0);
@@ -402,5 +416,7 @@ fn compose<const ROOM: usize>(
         }
         let cover = over[3][i] + left * (1.0 - (1.0 - sheen) * (1.0 - veil) * (1.0 - pale) * (1.0 - shade));
         over[3][i] = cover * (1.0 - hole) + hole;
+        holes[i] = hole;
     }
+    holes
 }

@@ -14,6 +14,8 @@ pub(super) struct Extras<'a, const ROOM: usize> {
     ids: Option<&'a Grid<u16>>,
     plates: &'a [Plate],
     crushed: Option<&'a CrushedField>,
+    /// Whether plates are gone in holes.
+    pub(super) are_gone: bool,
     /// Colour of what is crushed, 0..=255, by its share.
     pub(super) color: [f32; 3],
     /// Share that the picture's own has in it.
@@ -29,6 +31,7 @@ pub(super) struct Extras<'a, const ROOM: usize> {
     /// Width of a row of the patch with the texels around.
     stride: usize,
     height: usize,
+    min: Vec2,
 }
 
 struct Room<const ROOM: usize> {
@@ -49,6 +52,7 @@ impl<'a, const ROOM: usize> Extras<'a, ROOM> {
             ids: plates.map(|plates| plates.ids()),
             plates: plates.map_or(&[], |plates| plates.plates()),
             crushed,
+            are_gone: plates.is_some() && look.facets.is_some_and(|facets| facets.gone),
             color: settings.map_or([0.0; 3], |all| all.color.map(|channel| 255.0 * channel * (1.0 - all.tint))),
             tint: settings.map_or(0.0, |all| all.tint),
             shades: settings.is_some_and(|all| all.broken),
@@ -58,6 +62,7 @@ impl<'a, const ROOM: usize> Extras<'a, ROOM> {
             last: Cell::new((0, Facet::NONE)),
             stride: 0,
             height: 0,
+            min: Vec2::ZERO,
         })
     }
 
@@ -74,7 +79,7 @@ impl<'a, const ROOM: usize> Extras<'a, ROOM> {
     #[inline(always)]
     pub(super) fn load(&mut self, rect: TexelRect) {
         let size = rect.size().as_usizevec2();
-        (self.stride, self.height) = (size.x + 2, size.y);
+        (self.stride, self.height, self.min) = (size.x + 2, size.y, rect.min.as_vec2());
         let Room { plate, spot, veil } = &mut *self.room;
         let rows = plate.chunks_exact_mut(self.stride).zip(spot.chunks_exact_mut(self.stride));
         for (((plate, spot), veil), y) in rows.zip(veil.chunks_exact_mut(self.stride)).zip(rect.min.y..rect.max.y) {
@@ -118,7 +123,13 @@ impl<'a, const ROOM: usize> Extras<'a, ROOM> {
     /// Adds the slopes of plates.
     #[inline(always)]
     pub(super) fn tilt(&self, patch: &mut Patch<ROOM>) {
-        if self.facets.is_some_and(|facets| facets.tilt > 0.0) {
+        if self.facets.is_some_and(|facets| facets.dish > 0.0) {
+            patch.tilt(|k| {
+                let at = self.min + Vec2::new((k % self.stride) as f32, (k / self.stride) as f32);
+                let facet = self.facet(self.room.plate[k]);
+                (Vec2::from(facet.tilt) - facet.dish * facet.off_middle(at)).to_array()
+            });
+        } else if self.facets.is_some_and(|facets| facets.tilt > 0.0) {
             patch.tilt(|k| self.facet(self.room.plate[k]).tilt);
         }
     }
@@ -131,7 +142,13 @@ impl<'a, const ROOM: usize> Extras<'a, ROOM> {
             return facet;
         }
         let facet = match (self.facets, self.plates.get(usize::from(id))) {
-            (Some(facets), Some(plate)) if id != 0 => facets.of(plate),
+            (Some(facets), Some(plate)) if id != 0 => {
+                let mut facet = facets.of(plate);
+                if facets.gone {
+                    facet.is_gone = self.crushed.and_then(|crushed| crushed.is_gone(plate.centre, plate.extent));
+                }
+                facet
+            }
             _ => Facet::NONE,
         };
         self.last.set((id, facet));
@@ -174,8 +191,14 @@ impl<'a, const ROOM: usize> Extras<'a, ROOM> {
 /// A plate as it looks.
 #[derive(Clone, Copy)]
 pub(super) struct Facet {
-    /// What the picture is multiplied by.
-    pub(super) tone: f32,
+    /// What the picture is multiplied by in its middle.
+    tone: f32,
+    /// How much it is dished, its middle, and one over the side of a square of its size.
+    dish: f32,
+    centre: Vec2,
+    inv_side: f32,
+    /// Whether it is gone in a hole, or whole beside one.
+    pub(super) is_gone: Option<bool>,
     /// Where it is taken from, texels away.
     pub(super) shift: [i32; 2],
     pub(super) tilt: [f32; 2],
@@ -187,8 +210,35 @@ pub(super) struct Facet {
 }
 
 impl Facet {
-    pub(super) const NONE: Self =
-        Self { tone: 1.0, shift: [0; 2], tilt: [0.0; 2], sheen: 0.0, gain: Vec2::ZERO, low: 0.0, high: 0.0 };
+    pub(super) const NONE: Self = Self {
+        tone: 1.0,
+        dish: 0.0,
+        centre: Vec2::ZERO,
+        inv_side: 0.0,
+        is_gone: None,
+        shift: [0; 2],
+        tilt: [0.0; 2],
+        sheen: 0.0,
+        gain: Vec2::ZERO,
+        low: 0.0,
+        high: 0.0,
+    };
+
+    /// The way from its middle to a place, at most 1 about.
+    #[inline(always)]
+    fn off_middle(&self, at: Vec2) -> Vec2 {
+        ((at - self.centre) * (2.0 * self.inv_side)).clamp(Vec2::NEG_ONE, Vec2::ONE)
+    }
+
+    /// What the picture is multiplied by at a texel: a dish is brighter where it faces the light from the upper left, and at its rim.
+    #[inline(always)]
+    pub(super) fn tone(&self, x: u32, y: u32) -> f32 {
+        if self.dish <= 0.0 {
+            return self.tone;
+        }
+        let way = self.off_middle(Vec2::new(x as f32, y as f32));
+        self.tone + self.dish * (0.5 * (way.x + way.y) + 0.5 * way.length_squared() - 0.25)
+    }
 
     /// Cover of the sheen at a texel.
     #[inline(always)]
@@ -208,7 +258,11 @@ impl Facets {
     /// How a plate looks.
     pub(super) fn of(&self, plate: &Plate) -> Facet {
         let [a, b, c, d, e, f] = plate.draws;
-        let weight = 1.0 - self.near + self.near * plate.near;
+        let [together, right, down] = plate.common.map(|common| self.bundle * common);
+        let (own, a) = (1.0 - 0.5 * self.bundle, a * (1.0 - 0.5 * self.bundle) + together);
+        let (b, c, d) = (own * b + right, own * c + down, d + 0.7 * right);
+        let share = if self.fade > 0.0 { (2.0 - 2.0 * plate.away / self.fade).clamp(0.0, 1.0) } else { 1.0 };
+        let weight = (1.0 - self.near + self.near * plate.near) * (share * share * (3.0 - 2.0 * share));
         let lean = Vec2::new(b, c);
         let shift = (self.shift * weight * lean).round().as_ivec2().to_array();
         // A few flash; of the others those that lean to the light shine a little.
@@ -219,6 +273,10 @@ impl Facets {
         let sheen = 0.5 * (low + high) - gain.dot(plate.centre);
         Facet {
             tone: 1.0 + self.tone * weight * a,
+            dish: self.dish * weight * (0.7 + 0.3 * e),
+            centre: plate.centre,
+            inv_side: plate.inv_side,
+            is_gone: None,
             shift,
             tilt: (self.tilt * weight * lean).to_array(),
             sheen,
@@ -226,5 +284,50 @@ impl Facets {
             low,
             high,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PLATE: Plate = Plate {
+        centre: Vec2::new(50.0, 60.0),
+        inv_side: 0.05,
+        near: 0.5,
+        away: 0.1,
+        extent: 14.0,
+        draws: [0.5, -0.3, 0.8, 0.1, 0.4, -0.6],
+        common: [0.9, -0.4, 0.2],
+    };
+
+    /// Plates fade to nothing where they are told, and are as they are near the hit.
+    #[test]
+    fn plates_fade_out() {
+        let facets = Facets { fade: 0.4, dish: 0.2, ..Facets::DEFAULT };
+        let tone = |away: f32| facets.of(&Plate { away, ..PLATE }).tone(58, 66) - 1.0;
+        assert_eq!(tone(0.1), Facets { fade: 0.0, ..facets }.of(&PLATE).tone(58, 66) - 1.0);
+        assert!(tone(0.3).abs() < tone(0.1).abs() && tone(0.4) == 0.0 && tone(2.0) == 0.0);
+    }
+
+    /// A dish is brighter on the side that faces the light, by what it is told at the most.
+    #[test]
+    fn dishes_are_lit_from_the_upper_left() {
+        let facets = Facets { tone: 0.0, dish: 0.2, ..Facets::DEFAULT };
+        let facet = facets.of(&PLATE);
+        assert!(facet.tone(57, 67) > 1.02 && facet.tone(43, 53) < 1.0);
+        let all = (0..200).flat_map(|y| (0..200).map(move |x| (x, y))).map(|(x, y)| facet.tone(x, y));
+        assert!(all.into_iter().all(|tone| (0.7..=1.4).contains(&tone)));
+    }
+
+    /// Neighbours have in common what they are told.
+    #[test]
+    fn bundles_share_their_tone() {
+        let spread = |bundle: f32| {
+            let facets = Facets { tone: 0.4, bundle, ..Facets::DEFAULT };
+            let tone = |a: f32| facets.of(&Plate { draws: [a; 6], ..PLATE }).tone(50, 60);
+            tone(1.0) - tone(-1.0)
+        };
+        assert!(spread(1.0) < 0.6 * spread(0.0));
     }
 }

@@ -44,12 +44,34 @@ pub struct Facets {
     pub sheen: [f32; 3],
     /// How much all of that is for plates near the hit: 0 = everywhere the same, 1 = next to nothing far away. Default 0.
     pub near: f32,
+    /// How much plates are dished, with rims that curl up: darker by up to this share on the side of the light, and brighter on the other.
+    /// 0..=1; default 0.
+    pub dish: f32,
+    /// How far from a hit of energy 1 plates fade out, so that what it has loaded ends nowhere; with the root of the energy. Pattern units, 0..=16;
+    /// default 0 = they do not.
+    pub fade: f32,
+    /// How much neighbours have in common, so that tones and tilts come in bundles: 0 = nothing, 1 = all. 0..=1; default 0.
+    pub bundle: f32,
+    /// Whether plates smaller than the hole of a [crushed](Look::crushed) zone are gone as a whole if their middle lies in it, and else not at
+    /// all; default no.
+    pub gone: bool,
 }
 
 impl Facets {
     /// The default: plates of slightly different tone, without reflections.
-    pub const DEFAULT: Self =
-        Self { tone: 0.1, tilt: 0.1, shift: 0.0, gleam: 0.0, flash: 0.1, sheen: [0.88, 0.94, 1.0], near: 0.0 };
+    pub const DEFAULT: Self = Self {
+        tone: 0.1,
+        tilt: 0.1,
+        shift: 0.0,
+        gleam: 0.0,
+        flash: 0.1,
+        sheen: [0.88, 0.94, 1.0],
+        near: 0.0,
+        dish: 0.0,
+        fade: 0.0,
+        bundle: 0.0,
+        gone: false,
+    };
 }
 
 impl Default for Facets {
@@ -141,6 +163,9 @@ pub struct Look {
     pub gloss: f32,
     /// How much the cover swells and fades along the way (glass, ice): up to this share of it is taken away. 0..=1; default 0.
     pub sparkle: f32,
+    /// How much less is seen of cracks that do not catch the light, by the direction in which they run and slowly along each (glass): up to this
+    /// share of their depth is left out. 0..=1; default 0.
+    pub catch: f32,
     /// How uneven the cover is from texel to texel (frosted glass): up to this share of it is taken away. 0..=1.
     pub grain: f32,
     /// Shift of the picture where the surface is tilted by the crack (refraction), texels at the steepest. 0..=16.
@@ -156,6 +181,8 @@ pub struct Look {
     pub curl_depth: f32,
     /// Cracks drawn with flat colours; default none, the ramp holds.
     pub cel: Option<Cel>,
+    /// Width of a crack from which on its rim is whole, pattern units; narrower ones have less of one. 0..=1; default 0 = all alike.
+    pub full_rim: f32,
     /// Closed cells as plates of their own; default none.
     pub facets: Option<Facets>,
     /// What a hit crushes around it; default nothing.
@@ -224,11 +251,13 @@ impl Look {
         gloss: 0.0,
         grain: 0.12,
         sparkle: 0.0,
+        catch: 0.0,
         shift: 0.0,
         relief: 0.012,
         curl: 0.0,
         curl_depth: 0.12,
         cel: None,
+        full_rim: 0.0,
         facets: None,
         crushed: None,
         veil: None,
@@ -280,7 +309,14 @@ impl Look {
     /// ```
     #[must_use]
     pub const fn layer(&self, seed: u64) -> LayerPlan {
-        LayerPlan { plates: self.facets.is_some(), crushed: self.crushed, veil: self.veil, seed }
+        LayerPlan {
+            plates: self.facets.is_some(),
+            crushed: self.crushed,
+            veil: self.veil,
+            catch: self.catch,
+            full_rim: self.full_rim,
+            seed,
+        }
     }
 }
 
@@ -435,6 +471,8 @@ impl Look {
         within("glint", self.glint, 0.0..=4.0, "0..=4")?;
         within("gloss", self.gloss, 0.0..=4.0, "0..=4")?;
         within("sparkle", self.sparkle, 0.0..=1.0, unit)?;
+        within("catch", self.catch, 0.0..=1.0, unit)?;
+        within("full_rim", self.full_rim, 0.0..=1.0, unit)?;
         within("grain", self.grain, 0.0..=1.0, unit)?;
         within("shift", self.shift, 0.0..=16.0, "0..=16")?;
         within("relief", self.relief, 0.0..=1.0, unit)?;
@@ -453,6 +491,9 @@ impl Look {
                 within("facets.sheen", channel, 0.0..=1.0, unit)?;
             }
             within("facets.near", facets.near, 0.0..=1.0, unit)?;
+            within("facets.dish", facets.dish, 0.0..=1.0, unit)?;
+            within("facets.fade", facets.fade, 0.0..=16.0, "0..=16")?;
+            within("facets.bundle", facets.bundle, 0.0..=1.0, unit)?;
         }
         match self.crushed.as_ref().and_then(Crushed::fault).or(self.veil.as_ref().and_then(Veil::fault)) {
             Some((field, value, range)) => Err(LookError::OutOfRange { field, value, range }),
@@ -621,6 +662,8 @@ mod tests {
             assert_eq!(refused(&Look { tint: bad, ..Look::GROOVE }), Some("tint"));
             assert_eq!(refused(&Look { gloss: bad, ..Look::GROOVE }), Some("gloss"));
             assert_eq!(refused(&Look { sparkle: bad, ..Look::GROOVE }), Some("sparkle"));
+            assert_eq!(refused(&Look { catch: bad, ..Look::GROOVE }), Some("catch"));
+            assert_eq!(refused(&Look { full_rim: bad, ..Look::GROOVE }), Some("full_rim"));
             assert_eq!(refused(&Look { curl: bad, ..Look::GROOVE }), Some("curl"));
             assert_eq!(refused(&Look { curl_depth: bad, ..Look::GROOVE }), Some("curl_depth"));
             let cel = |cel| refused(&Look { cel: Some(cel), ..Look::GROOVE });
@@ -638,6 +681,9 @@ mod tests {
             assert_eq!(facets(Facets { flash: bad, ..Facets::DEFAULT }), Some("facets.flash"));
             assert_eq!(facets(Facets { sheen: [0.0, 0.0, bad], ..Facets::DEFAULT }), Some("facets.sheen"));
             assert_eq!(facets(Facets { near: bad, ..Facets::DEFAULT }), Some("facets.near"));
+            assert_eq!(facets(Facets { dish: bad, ..Facets::DEFAULT }), Some("facets.dish"));
+            assert_eq!(facets(Facets { fade: bad, ..Facets::DEFAULT }), Some("facets.fade"));
+            assert_eq!(facets(Facets { bundle: bad, ..Facets::DEFAULT }), Some("facets.bundle"));
             let crushed = |crushed| refused(&Look { crushed: Some(crushed), ..Look::GROOVE });
             assert_eq!(crushed(Crushed { radius: bad, ..Crushed::DEFAULT }), Some("crushed.radius"));
             assert_eq!(crushed(Crushed { ragged: bad, ..Crushed::DEFAULT }), Some("crushed.ragged"));
@@ -658,6 +704,8 @@ mod tests {
             assert_eq!(crushed(Crushed { fall: bad, ..Crushed::DEFAULT }), Some("crushed.fall"));
             assert_eq!(crushed(Crushed { outline: bad, ..Crushed::DEFAULT }), Some("crushed.outline"));
             assert_eq!(crushed(Crushed { flakes: 17, ..Crushed::DEFAULT }), Some("crushed.flakes"));
+            assert_eq!(crushed(Crushed { needles: bad, ..Crushed::DEFAULT }), Some("crushed.needles"));
+            assert_eq!(crushed(Crushed { edge: bad, ..Crushed::DEFAULT }), Some("crushed.edge"));
             let veil = |veil| refused(&Look { veil: Some(veil), ..Look::GROOVE });
             assert_eq!(veil(Veil { reach: bad, ..Veil::DEFAULT }), Some("veil.reach"));
             assert_eq!(veil(Veil { full_width: bad, ..Veil::DEFAULT }), Some("veil.full_width"));

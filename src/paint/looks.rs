@@ -7,6 +7,7 @@ use std::borrow::Cow;
 impl Look {
     /// Window glass: bright hairlines, plates that reflect and shift what is behind them, a white crushed ring around a hole.
     pub const GLASS: Self = Self {
+        catch: 0.92,
         facets: Some(Facets {
             tone: 0.13,
             tilt: 0.10,
@@ -20,17 +21,18 @@ impl Look {
             radius: 0.026,
             ragged: 0.75,
             soft: 0.75,
-            hole: 0.30,
-            depth: 0.003,
+            hole: 0.45,
+            depth: 0.001,
             rough: 0.0006,
             grain: 0.0035,
             color: [0.95, 0.98, 1.0],
             pale: 0.95,
-            speckle: 0.55,
-            flake: 2.2,
-            dust: 0.10,
-            chips: 0.10,
-            reach: 2.2,
+            speckle: 0.5,
+            dust: 0.22,
+            chips: 0.05,
+            reach: 2.6,
+            needles: 0.7,
+            edge: 0.8,
             ..Crushed::DEFAULT
         }),
         ..Self::FROSTED
@@ -46,19 +48,21 @@ impl Look {
         glint: 0.5,
         relief: 0.002,
         facets: Some(Facets {
-            tone: 0.24,
+            tone: 0.26,
             tilt: 0.22,
             shift: 3.0,
-            gleam: 0.75,
+            gleam: 0.85,
             flash: 0.14,
-            near: 0.25,
+            near: 0.2,
+            bundle: 0.5,
+            gone: true,
             ..Facets::DEFAULT
         }),
         crushed: Some(Crushed {
-            radius: 0.02,
+            radius: 0.03,
             ragged: 0.6,
             soft: 0.8,
-            hole: 0.45,
+            hole: 0.7,
             depth: 0.001,
             rough: 0.0003,
             grain: 0.005,
@@ -66,9 +70,9 @@ impl Look {
             pale: 0.75,
             speckle: 0.5,
             flake: 0.0,
-            dust: 0.12,
+            dust: 0.15,
             chips: 0.0,
-            reach: 3.0,
+            reach: 3.5,
             ..Crushed::DEFAULT
         }),
         ..Self::FROSTED
@@ -76,7 +80,8 @@ impl Look {
 
     /// Laminated glass: a milky disc, lines that fade and shine along their way, plates that hold together.
     pub const LAMINATED_GLASS: Self = Self {
-        sparkle: 0.7,
+        sparkle: 0.5,
+        catch: 0.8,
         facets: Some(Facets {
             tone: 0.06,
             tilt: 0.05,
@@ -87,20 +92,19 @@ impl Look {
             ..Facets::DEFAULT
         }),
         crushed: Some(Crushed {
-            radius: 0.055,
-            ragged: 0.35,
+            radius: 0.06,
+            ragged: 0.9,
             soft: 1.0,
-            hole: 0.0,
-            depth: 0.0008,
-            rough: 0.0002,
-            grain: 0.004,
-            color: [0.93, 0.96, 0.97],
-            pale: 0.85,
-            speckle: 0.45,
-            flake: 0.0,
-            dust: 0.14,
+            depth: 0.0,
+            rough: 0.0005,
+            grain: 0.006,
+            color: [0.95, 0.98, 0.99],
+            pale: 1.0,
+            speckle: 0.4,
+            dust: 0.6,
             chips: 0.0,
-            reach: 2.6,
+            reach: 2.2,
+            needles: 0.8,
             ..Crushed::DEFAULT
         }),
         ..Self::FROSTED
@@ -116,7 +120,8 @@ impl Look {
         gloss: 0.6,
         glint: 0.5,
         sparkle: 0.5,
-        veil: Some(Veil { cover: 0.6, full_width: 0.012, ..Veil::DEFAULT }),
+        catch: 0.75,
+        veil: Some(Veil { reach: 0.17, full_width: 0.006, cover: 0.6, color: [0.88, 0.95, 1.0] }),
         facets: Some(Facets {
             tone: 0.07,
             tilt: 0.05,
@@ -125,22 +130,22 @@ impl Look {
             flash: 0.12,
             sheen: [0.85, 0.95, 1.0],
             near: 0.2,
+            ..Facets::DEFAULT
         }),
         crushed: Some(Crushed {
             radius: 0.055,
-            ragged: 0.7,
+            ragged: 0.9,
             soft: 1.0,
-            hole: 0.0,
-            depth: 0.0008,
-            rough: 0.0004,
-            grain: 0.0045,
-            color: [0.94, 0.98, 1.0],
-            pale: 0.9,
-            speckle: 0.6,
-            flake: 0.0,
-            dust: 0.10,
-            chips: 0.22,
+            depth: 0.0,
+            rough: 0.0008,
+            grain: 0.006,
+            color: [0.95, 0.98, 1.0],
+            pale: 0.95,
+            speckle: 0.5,
+            dust: 0.28,
+            chips: 0.0,
             reach: 2.6,
+            needles: 0.9,
             ..Crushed::DEFAULT
         }),
         ..Self::FROSTED
@@ -273,34 +278,52 @@ impl Look {
             stop(0.75, [0.26, 0.19, 0.14], 0.97),
             stop(1.0, [0.12, 0.085, 0.06], 1.0),
         ]),
-        glint: 1.0,
+        glint: 0.8,
         relief: 0.014,
         curl: 0.07,
         curl_depth: 0.12,
-        facets: Some(Facets { tone: 0.08, tilt: 0.03, ..Facets::DEFAULT }),
+        full_rim: 0.010,
+        facets: Some(Facets { tone: 0.085, tilt: 0.03, dish: 0.15, fade: 0.30, ..Facets::DEFAULT }),
         ..Self::GROOVE
     };
 
     /// Mud: plates of different tone with curled rims, brown depth.
     pub const MUD: Self = Self {
         curl: 0.10,
+        full_rim: 0.012,
         relief: 0.02,
-        glint: 1.2,
-        facets: Some(Facets { tone: 0.075, tilt: 0.04, ..Facets::DEFAULT }),
+        glint: 0.95,
+        facets: Some(Facets { tone: 0.08, tilt: 0.04, dish: 0.16, fade: 0.33, ..Facets::DEFAULT }),
         ..Self::CLAY
     };
 
     /// The glaze of pottery: ink that has gone into hairlines, darker the wider they are, without relief.
     pub const STAIN: Self = Self {
         ramp: Cow::Borrowed(&[
-            stop(0.35, [0.45, 0.38, 0.33], 0.32),
-            stop(0.60, [0.36, 0.29, 0.25], 0.48),
-            stop(1.0, [0.20, 0.155, 0.125], 0.75),
+            stop(0.20, [0.30, 0.24, 0.20], 0.30),
+            stop(0.50, [0.22, 0.17, 0.14], 0.65),
+            stop(1.0, [0.12, 0.09, 0.07], 0.88),
         ]),
-        glint: 0.0,
+        glint: 0.6,
         grain: 0.08,
-        sparkle: 0.3,
+        sparkle: 0.25,
+        catch: 0.45,
         relief: 0.0,
+        crushed: Some(Crushed {
+            radius: 0.010,
+            ragged: 0.9,
+            depth: 0.004,
+            rough: 0.0008,
+            grain: 0.004,
+            color: [0.90, 0.86, 0.79],
+            pale: 0.85,
+            speckle: 0.3,
+            dust: 0.0,
+            chips: 0.0,
+            reach: 4.0,
+            needles: 0.45,
+            ..Crushed::DEFAULT
+        }),
         ..Self::GROOVE
     };
 

@@ -5,6 +5,7 @@
 //!
 //! Beside depths a field may hold what some looks show ([`LayerPlan`]): plates, crushed zones and veils.
 
+mod catch;
 mod dirty;
 mod distance;
 mod layer;

@@ -40,6 +40,9 @@ pub(super) struct Section {
     rim: f32,
     pub(super) rim_depth: f32,
     pub(super) inv_rim: f32,
+    /// What a texel of half width adds to the share of its rim that a crack has, and the share without any.
+    rim_gain: f32,
+    rim_least: f32,
     /// What a texel of half width adds to the share of its depth that a thin line has.
     strength: f32,
 }
@@ -55,6 +58,7 @@ pub(super) struct Cut {
     pub(super) rim_reach: f32,
     /// 65535, less for lines thinner than a texel.
     pub(super) scale: f32,
+    pub(super) rim_depth: f32,
 }
 
 impl Section {
@@ -70,7 +74,17 @@ impl Section {
             rim_depth: if rim > 0.0 { at_door(profile.rim_depth, 1.0) } else { 0.0 },
             inv_rim: 1.0 / max(rim, 1.0),
             strength: 2.0 / max(1.0 - at_door(profile.faintest, 1.0), 1.0e-3),
+            rim_gain: 0.0,
+            rim_least: 1.0,
         }
+    }
+
+    /// The same with whole rims from a width of `full` pattern units on only, if that is not zero.
+    pub(super) fn with_rims(mut self, full: f32, texels_per_unit: f32) -> Self {
+        if full > 0.0 {
+            (self.rim_gain, self.rim_least) = (2.0 / max(full * texels_per_unit, 1.0e-3), 0.0);
+        }
+        self
     }
 
     pub(super) fn upright(depth: f32) -> Self {
@@ -83,6 +97,8 @@ impl Section {
             rim_depth: 0.0,
             inv_rim: 1.0,
             strength: 2.0,
+            rim_gain: 0.0,
+            rim_least: 1.0,
         }
     }
 
@@ -96,6 +112,7 @@ impl Section {
             inv_wall: 1.0 / (1.0 + self.wall * core),
             rim_reach: r + self.rim,
             scale: 65535.0 * min(self.strength * r, 1.0),
+            rim_depth: self.rim_depth * min(self.rim_least + self.rim_gain * r, 1.0),
         }
     }
 

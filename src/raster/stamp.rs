@@ -16,10 +16,13 @@
 //! cross-section of one texel (`r` = 1/2 in `core`) and only get fainter, by the last factor: a line 0.3 texels wide
 //! covers 0.3 texels of area (`faintest` 0) wherever it lies between the texel centres, and is never dotted. A needle fades out.
 //!
+//! Where a [plan](super::LayerPlan) says so, a line has only a share of that, by the light that it catches, and narrow ones less of a rim.
+//!
 //! The value depends on the texel and the capsule alone, and grows with `r`: stamps may come in any order.
 
 use super::{
     DepthField, DirtyTiles, Profile, TexelRect,
+    catch::Catch,
     section::{MAX_RADIUS, Section, at_door, clamp01, max, min},
 };
 use crate::{
@@ -77,10 +80,16 @@ fn stamp_pieces<const TELL: bool>(
     path: &SegmentPath,
     changed: &mut dyn FnMut(TexelRect),
 ) -> TexelRect {
-    let section = Section::new(profile, field.frame.texels_per_unit());
+    let unit = field.frame.texels_per_unit();
+    let plan = field.layer.plan();
+    let section = Section::new(profile, unit).with_rims(plan.full_rim, unit);
+    let catch = (plan.catch > 0.0).then(|| Catch::new(plan.catch, plan.seed));
     let mut bounds = TexelRect::default();
     for pair in path.points().windows(2) {
-        if let Some(capsule) = Capsule::clipped(&field.frame, field.depth.size(), &section, pair[0], pair[1]) {
+        if let Some(mut capsule) = Capsule::clipped(&field.frame, field.depth.size(), &section, pair[0], pair[1]) {
+            if let Some(catch) = &catch {
+                (capsule.catch_from, capsule.catch_gain) = catch.of(pair[0].pos, pair[1].pos);
+            }
             bounds = bounds.union(capsule.stamp::<TELL>(field, &section, changed));
         }
     }
@@ -122,6 +131,9 @@ struct Capsule {
     r_gain: f32,
     /// Beyond this distance from the centre line nothing is stamped.
     reach: f32,
+    /// Share of its depth that it has by the light that it catches: 1 if there is no such thing.
+    catch_from: f32,
+    catch_gain: f32,
 }
 
 impl Capsule {
@@ -153,10 +165,20 @@ impl Capsule {
         }
         let along = b - a;
         let len_sq = along.length_squared();
+        let whole = Self {
+            from: a,
+            along: Vec2::ZERO,
+            inv_len_sq: 0.0,
+            r_from: max(r_from, r_to),
+            r_gain: 0.0,
+            reach,
+            catch_from: 1.0,
+            catch_gain: 0.0,
+        };
         Some(if len_sq > 1.0e-12 {
-            Self { from: a, along, inv_len_sq: 1.0 / len_sq, r_from, r_gain: r_to - r_from, reach }
+            Self { along, inv_len_sq: 1.0 / len_sq, r_from, r_gain: r_to - r_from, ..whole }
         } else {
-            Self { from: a, along: Vec2::ZERO, inv_len_sq: 0.0, r_from: max(r_from, r_to), r_gain: 0.0, reach }
+            whole
         })
     }
 
@@ -319,9 +341,9 @@ impl Capsule {
             let cut = if TAPER { section.cut(self.r_from + t * self.r_gain) } else { uniform };
             let mut value = cut.peak * clamp01((cut.reach - distance) * cut.inv_wall);
             if RIM {
-                value = max(value, section.rim_depth * clamp01((cut.rim_reach - distance) * section.inv_rim));
+                value = max(value, cut.rim_depth * clamp01((cut.rim_reach - distance) * section.inv_rim));
             }
-            values[i] = value * cut.scale;
+            values[i] = value * (cut.scale * (self.catch_from + t * self.catch_gain));
         }
         let (mut old, mut new) = ([0.0; N], [0.0; N]);
         for i in 0..N {

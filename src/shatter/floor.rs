@@ -58,7 +58,7 @@ impl Floor {
         let base = up.dot(start) - self.height / length - clearance;
         let above = |time: f32| base + up.dot(motion(time).0);
         let pull = -up.dot(gravity);
-        if (above(0.0) < -clearance - 1e-4 && !must) || !(pull > 1e-4) {
+        if (above(0.0) < -clearance - 1e-4 && !must) || pull <= 1e-4 || pull.is_nan() {
             return None;
         }
         // It rises, if at all, before it falls: one crossing only.

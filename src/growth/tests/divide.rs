@@ -114,6 +114,43 @@ fn cells_close() {
     }
 }
 
+/// Few cracks turn by more than 75 degrees within four segments.
+#[test]
+fn cracks_do_not_hook_round() {
+    for (name, preset) in PRESETS.into_iter().filter(|(name, _)| *name != "tempered_glass") {
+        let (mut hooks, mut all) = (0, 0);
+        for growth in of_seeds(&preset, 2.0) {
+            let nodes = growth.network().nodes();
+            for node in 0..nodes.len() as u32 {
+                let before = |node: &u32| Some(nodes[*node as usize].parent).filter(|&parent| parent != NO_PARENT);
+                let line: Vec<u32> = std::iter::successors(Some(node), before).take(5).collect();
+                if let [a, b, _, c, d] = line[..] {
+                    let way = |from: u32, to: u32| nodes[to as usize].pos - nodes[from as usize].pos;
+                    hooks += usize::from(way(b, a).angle_to(way(d, c)).abs().to_degrees() > 75.0);
+                    all += 1;
+                }
+            }
+        }
+        println!("{name}: {hooks} hooks in {all}");
+        assert!(all > 1000 && 100 * hooks < all, "{name}: {hooks} hooks in {all}");
+    }
+}
+
+/// Where cracks begin with three arms, more cells have more sides than four.
+#[test]
+fn stars_have_three_arms() {
+    for (stars, arms) in [(0.0, 2), (1.0, 3)] {
+        let mut preset = CrackPreset::MUD;
+        preset.growth.stars = stars;
+        let starts = of_seeds(&preset, 1.0).filter(|growth| {
+            let nodes = growth.network().nodes();
+            nodes.iter().filter(|node| node.parent == 0).count() == arms
+        });
+        let count = starts.count();
+        assert!(count >= 20, "{count} of 24 hits begin with {arms} arms");
+    }
+}
+
 /// Dice all over the pane, finer at the hit, from there outward, whatever the energy.
 #[test]
 fn tempered_glass_goes_to_dice() {

@@ -66,6 +66,7 @@ fn random_params(rng: &mut Rng, small: bool) -> GrowthParams {
         venation: Venation::Open,
         nucleation: 0.0,
         generations: 1 + rng.next_u32() % 3,
+        stars: 0.0,
         front: 0.0,
         tip_taper: if rng.unit() < 0.3 { 0.0 } else { 12.0 * rng.unit() },
         unevenness: 0.0,
@@ -446,7 +447,7 @@ fn scaled_presets_are_in_order() {
     let wild = [0.0, -1.0, f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e30, -1e30, f32::MIN_POSITIVE, 1e-9, 0.1, 3.0];
     for name in CrackPreset::NAMES {
         let preset = CrackPreset::named(name).unwrap();
-        let some = (0..50).map(|_| (8.0 * rng.signed()).exp()).collect::<Vec<f32>>();
+        let some = (0..50).map(|_| crate::math::ops::exp(8.0 * rng.signed())).collect::<Vec<f32>>();
         for by in wild.into_iter().chain(some) {
             let scaled = preset.scaled(by);
             assert_eq!(scaled.validate(), Ok(()), "{name} by {by}");

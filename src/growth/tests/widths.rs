@@ -5,7 +5,7 @@ use crate::{
     CrackPreset,
     growth::{
         CrackGrowth, GrowthParams,
-        width::{NOTCH, Widths},
+        width::{NOTCH, Widths, thinly},
     },
     math::{Rng, ops},
     pattern::{LinkKind, NO_PARENT, Node},
@@ -119,11 +119,12 @@ fn widths_of_growths_are_those_of_a_recount() {
         }
         while growth.step().grew() {}
         let nodes = growth.network().nodes();
-        let mut is_met = vec![false; nodes.len()];
+        let (mut is_met, mut is_thinned) = (vec![false; nodes.len()], vec![false; nodes.len()]);
         for link in growth.network().links() {
-            // What closes a cell beyond the reach of its hit stays a needle.
-            let is_needle = growth.divides() && growth.has_left(link.b);
-            is_met[link.b as usize] |= link.kind != LinkKind::Connection && !is_needle;
+            // What closes a cell beyond the reach of its hit gets thin.
+            let is_thin = growth.divides() && (growth.has_left(link.a) || growth.has_left(link.b));
+            is_met[link.b as usize] |= link.kind != LinkKind::Connection && !is_thin;
+            is_thinned[link.b as usize] |= link.kind != LinkKind::Connection && is_thin;
         }
         if params.keeps_apart() {
             for (node, is_met) in nodes.iter().zip(&mut is_met) {
@@ -131,15 +132,26 @@ fn widths_of_growths_are_those_of_a_recount() {
             }
         }
         let beyond = params.tip_taper.ceil() as u32;
-        let behind = recount(nodes, |node| if is_met[node as usize] { 1 + beyond } else { 1 });
-        for (index, (node, &behind)) in nodes.iter().zip(&behind).enumerate() {
+        // What was met may have been an end, or have gone on since.
+        let mut may_be = vec![false; nodes.len()];
+        for link in growth.network().links().iter().filter(|_| growth.divides()) {
+            may_be[link.a as usize] |= link.kind != LinkKind::Connection;
+        }
+        let counts = |node: usize| match node {
+            node if is_met[node] => 1 + beyond,
+            node if is_thinned[node] => 1 + thinly(beyond),
+            _ => 1,
+        };
+        let behind = recount(nodes, |node| counts(node as usize));
+        let at_most = recount(nodes, |node| if may_be[node as usize] { 1 + beyond } else { counts(node as usize) });
+        for (index, ((node, &behind), &at_most)) in nodes.iter().zip(&behind).zip(&at_most).enumerate() {
             // Hits that have merged make wider ones.
             let generation = growth.division.as_ref().map_or(0, |division| division.generation_of(index as u32));
-            let share = 0.5f32.powi(i32::from(generation));
-            let most = promised(&params, behind) * growth.impacts()[node.impact as usize].widening * share;
-            let is_right = (most / NOTCH * 0.9999..=most * 1.0001).contains(&node.width);
-            assert!(is_right, "case {case}, node {index}: {behind} behind, {} is not {most}: {params:?}", node.width);
-            if params.tip_taper >= 2.0 && behind == 1 {
+            let share = 0.5f32.powi(i32::from(generation)) * growth.impacts()[node.impact as usize].widening;
+            let (least, most) = (promised(&params, behind) * share, promised(&params, at_most) * share);
+            let is_right = (least / NOTCH * 0.9999..=most * 1.0001).contains(&node.width);
+            assert!(is_right, "case {case}, node {index}: {behind} behind, {} is not {least}: {params:?}", node.width);
+            if params.tip_taper >= 2.0 && at_most == 1 {
                 free += 1;
                 assert!(node.width < 0.06 * params.line_width);
             }

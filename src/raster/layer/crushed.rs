@@ -1,13 +1,14 @@
 //! Crushed zones: what a hit leaves around itself.
 
-use super::{broken::Broken, hash, noise};
+use super::{broken::Broken, bruise, hash, noise};
 use crate::{
     Grid,
-    math::mix,
+    math::{mix, ops},
     pattern::{Strike, SurfaceFrame},
     raster::TexelRect,
 };
 use glam::{UVec2, Vec2};
+use std::f32::consts::TAU;
 
 /// What a hit crushes: a spot around it, by its energy. All of it is made from the seed and the place, at any resolution.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,6 +57,12 @@ pub struct Crushed {
     pub fall: f32,
     /// Width of a dark line around chips of what is [`broken`](Self::broken) (a drawing), pattern units, 0..=0.05; default 0 = none.
     pub outline: f32,
+    /// How much of it is short radial and ring cracks with flakes between them, fewer and fewer up to [`reach`](Self::reach), in place of powder
+    /// with an outline (laminated glass, ice). 0..=1; default 0.
+    pub needles: f32,
+    /// Width of the broken edge around the hole, which then has straight sides and is less dark towards it, as a share of the hole. 0..=4; default
+    /// 0 = none.
+    pub edge: f32,
 }
 
 impl Crushed {
@@ -81,6 +88,8 @@ impl Crushed {
         tint: 0.0,
         fall: 0.0,
         outline: 0.0,
+        needles: 0.0,
+        edge: 0.0,
     };
 
     /// The first field that is out of its range or not finite: its name, value and range.
@@ -107,6 +116,8 @@ impl Crushed {
             ("crushed.tint", self.tint, 0.0..=1.0, "0..=1"),
             ("crushed.fall", self.fall, 0.0..=1.0, "0..=1"),
             ("crushed.outline", self.outline, 0.0..=0.05, "0..=0.05"),
+            ("crushed.needles", self.needles, 0.0..=1.0, "0..=1"),
+            ("crushed.edge", self.edge, 0.0..=4.0, "0..=4"),
         ];
         let is_bad = |(_, value, range, _): &(_, f32, std::ops::RangeInclusive<f32>, _)| !range.contains(value);
         fields.into_iter().find(is_bad).map(|(name, value, _, range)| (name, value, range))
@@ -326,6 +337,21 @@ impl CrushedField {
         }
     }
 
+    /// Whether a plate whose middle is at a place, and all of it within `extent` of it, is gone in a hole, or whole beside one; `None` if no hole
+    /// is there, or the plate is as large as that. Only holes of impacts that show all of the plate anew when they are shown. Texels.
+    pub(crate) fn is_gone(&self, at: Vec2, extent: f32) -> Option<bool> {
+        let tile = at.max(Vec2::ZERO).as_uvec2().min(self.frame.size() - 1) / TILE;
+        self.tiles.get((tile.y * self.columns + tile.x) as usize)?.as_ref()?;
+        let around = extent + 2.0;
+        let (min, max) = ((at - around).max(Vec2::ZERO), (at + around).min(self.frame.size().as_vec2()));
+        let near = self.zones.iter().flatten().filter_map(|zone| {
+            let hole = self.radius(zone.energy) * self.crushed.hole;
+            let holds = zone.bounds.min.as_vec2().cmple(min).all() && zone.bounds.max.as_vec2().cmpge(max).all();
+            (holds && extent < hole).then(|| at.distance_squared(zone.pos) < hole * hole)
+        });
+        near.max()
+    }
+
     /// Whether anything may be crushed in a rectangle.
     pub(crate) fn touches(&self, rect: TexelRect) -> bool {
         let (min, max) = (rect.min / TILE, rect.max.map(|end| end.div_ceil(TILE)));
@@ -442,6 +468,9 @@ impl<'a> Shape<'a> {
         let grain = |k: u32, size: f32| noise(seed ^ k, at.x / size, at.y / size);
         let round = |k: u32, times: f32| noise(seed ^ k, way.x * times + 17.0, way.y * times + 31.0);
         let mut inside = 0.0;
+        if self.crushed.needles > 0.0 {
+            self.add_bruise(&mut place, off, radii, at, seed);
+        }
         if radii <= widest {
             let fine = grain(1, self.grain);
             let edge = 1.0 + ragged * (0.55 * round(2, 1.3) + 0.35 * round(3, 3.7) + 0.2 * fine);
@@ -454,28 +483,76 @@ impl<'a> Shape<'a> {
                 let fade = inside + soft * ((1.5 * rest).min(1.0) - inside);
                 // A broken edge is steep, a soft one has none.
                 let bowl = rest.sqrt() + soft * (rest * rest - rest.sqrt());
-                place.height = -self.depth * bowl + fade * self.rough * (0.6 * coarse + 0.4 * fine);
+                place.height += -self.depth * bowl + fade * self.rough * (0.6 * coarse + 0.4 * fine);
                 let grains = 1.0 - speckle * (0.5 + 0.5 * grain(5, 0.6 * self.grain)).clamp(0.0, 1.0);
-                place.pale = pale * fade * grains;
-                place.shade = speckle * (0.6 * coarse + 0.3 * fine) * inside;
+                place.pale = place.pale.max(pale * fade * grains * (1.0 - self.crushed.needles));
+                place.shade += speckle * (0.6 * coarse + 0.3 * fine) * inside * (1.0 - self.crushed.needles);
             }
         }
         if flake > 1.0 {
             self.add_flake(&mut place, way, radii, seed);
         }
-        if inside < 1.0 && radii < reach {
+        if (inside < 1.0 || self.crushed.needles > 0.0) && radii < reach {
             let left = 1.0 - ((radii - 0.8) / (reach - 0.8)).clamp(0.0, 1.0);
             if dust > 0.0 {
                 let cloud = 0.65 + 0.35 * grain(6, 5.0 * self.grain);
-                place.pale = place.pale.max(dust * left * left * cloud * (1.0 - inside));
+                let powder = inside * (1.0 - self.crushed.needles);
+                place.pale = place.pale.max(dust * left * left * cloud * (1.0 - powder));
             }
             self.add_crumb(&mut place, at, chips * left * left, seed);
         }
-        if hole > 0.0 && radii <= hole * (1.0 + WIDEST * ragged) + 1.0 {
+        if hole > 0.0 && self.crushed.edge > 0.0 {
+            self.add_hole(&mut place, off, seed);
+        } else if hole > 0.0 && radii <= hole * (1.0 + WIDEST * ragged) + 1.0 {
             let radius = self.radius * hole * (1.0 + 0.6 * ragged * (round(7, 1.9) + 0.5 * round(8, 4.3)));
             place.dark = (radius - distance + 0.5).clamp(0.0, 1.0);
         }
         place
+    }
+
+    /// Short cracks and flakes, fewer and fewer outward.
+    fn add_bruise(&self, place: &mut Place, off: Vec2, radii: f32, at: Vec2, seed: u32) {
+        let Crushed { ragged, pale, speckle, reach, needles, .. } = self.crushed;
+        let way = off.normalize_or_zero();
+        let round = |k: u32, times: f32| noise(seed ^ k, way.x * times + 17.0, way.y * times + 31.0);
+        let cloud = noise(seed ^ 10, at.x / (3.0 * self.grain), at.y / (3.0 * self.grain));
+        // No outline: what is near is dense, and what is far is not there in more and more places.
+        let stray = 1.0 + ragged * (0.45 * round(2, 1.3) + 0.4 * round(3, 3.7)) + 0.25 * ragged * cloud;
+        let q = radii / stray.max(0.3);
+        let left = (1.0 - q / reach).min(2.0 * (1.0 - radii / reach)).clamp(0.0, 1.0);
+        if left <= 0.0 {
+            return;
+        }
+        let dense = (1.5 * left * left).min(1.0);
+        let fine = (self.radius / (8.0 * self.grain)).sqrt().clamp(0.6, 3.0);
+        let bruise = bruise::bruise(off, q, dense, fine, seed);
+        let haze = (1.08 - 0.8 * q).clamp(0.0, 1.0);
+        let uneven = 1.0 - speckle * (0.5 + 0.5 * cloud) * (1.0 - 0.5 * haze);
+        let milk = ((1.5 * haze * haze).min(1.0) + 0.55 * bruise.flake * left * left) * uneven;
+        place.pale = place.pale.max(needles * pale * milk.max(bruise.crack * (0.35 + 0.65 * left)));
+        place.shade += needles * 0.35 * speckle * (bruise.flake - 0.3) * left;
+        place.height += self.rough * bruise.flake * left * left - self.rough * bruise.crack * left;
+    }
+
+    /// A hole with straight sides and a broken edge, through which its thick rim is seen.
+    fn add_hole(&self, place: &mut Place, off: Vec2, seed: u32) {
+        let Crushed { hole, edge, pale, .. } = self.crushed;
+        let (distance, whole) = (off.length(), self.radius * hole);
+        let wide = (edge * whole).max(1.5);
+        if distance > 1.3 * whole + wide + 1.0 {
+            return;
+        }
+        let turn = ops::atan2(off.y, off.x) * (1.0 / TAU) + 0.5;
+        let radius = whole * bruise::chipped(turn, seed);
+        let out = distance - radius;
+        let inside = (0.5 - out).clamp(0.0, 1.0);
+        // Glass is thick: within the hole its far wall is lit, its near one is in the dark.
+        let deep = (-out / (0.45 * whole).max(1.0)).clamp(0.0, 1.0);
+        let wall = bruise::broken_edge(turn, deep, seed ^ 0x33) * (0.6 + 0.4 * (off.x + off.y) / distance.max(1.0));
+        place.dark = inside * (0.45 + 0.55 * deep) * (1.0 - 0.5 * wall);
+        let rim = bruise::broken_edge(turn, (out / wide).max(0.0), seed) * (1.0 - inside);
+        place.pale = place.pale.max(pale * rim);
+        place.shade += 0.5 * (rim - 0.4) * (1.0 - inside);
     }
 
     /// A flat flake to one side of the hit, with arcs around it.

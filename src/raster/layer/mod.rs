@@ -1,6 +1,7 @@
 //! [`Layer`]: what a field holds beside depths, for looks that show it: plates, crushed zones and veils.
 
 mod broken;
+mod bruise;
 mod crushed;
 mod plates;
 mod veil;
@@ -27,6 +28,12 @@ pub struct LayerPlan {
     pub crushed: Option<Crushed>,
     /// Sheets along cracks; default none.
     pub veil: Option<Veil>,
+    /// How much of its depth a line has only where it catches the light: less of it is stamped of lines that run towards the light, and here
+    /// and there along each. 0..=1; default 0 = all lines are as deep as their profile says.
+    pub catch: f32,
+    /// Width of a crack from which on it has the whole rim of its profile; narrower ones have less. Pattern units, 0..=1; default 0 =
+    /// all have it.
+    pub full_rim: f32,
     /// Fixes all that is random in it; default 0.
     pub seed: u64,
 }

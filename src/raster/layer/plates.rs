@@ -1,6 +1,6 @@
 //! Plates: which closed cell each texel lies in.
 
-use super::tracker;
+use super::{noise, tracker};
 use crate::{
     Grid,
     math::mix,
@@ -21,9 +21,18 @@ pub(crate) struct Plate {
     pub(crate) inv_side: f32,
     /// How near it is to the hit that it comes from: 1 at the hit, towards 0 far away.
     pub(crate) near: f32,
+    /// How far away that hit is, pattern units, over the root of its energy.
+    pub(crate) away: f32,
+    /// How far from the centre its outline reaches, texels.
+    pub(crate) extent: f32,
     /// Random numbers, -1..=1.
     pub(crate) draws: [f32; 6],
+    /// The same, but smooth from plate to plate.
+    pub(crate) common: [f32; 3],
 }
+
+/// Bumps of what plates have in common, a pattern unit.
+const BUNDLES: f32 = 7.0;
 
 /// Cells, as they close.
 #[derive(Clone, Debug)]
@@ -39,8 +48,8 @@ pub(crate) struct PlateField {
     frozen: usize,
     skipped: usize,
     crossings: Vec<(u32, f32)>,
-    /// Where each impact is, from so many hits.
-    hits: Vec<Vec2>,
+    /// Where each impact is, and the energy with which it began, from so many hits.
+    hits: Vec<(Vec2, f32)>,
     strikes: usize,
     /// Texels that were written.
     written: u64,
@@ -54,7 +63,15 @@ impl PartialEq for PlateField {
 
 impl PlateField {
     pub(super) fn new(frame: SurfaceFrame, seed: u64) -> Self {
-        let none = Plate { centre: Vec2::ZERO, inv_side: 0.0, near: 0.0, draws: [0.0; 6] };
+        let none = Plate {
+            centre: Vec2::ZERO,
+            inv_side: 0.0,
+            near: 0.0,
+            away: 0.0,
+            extent: 0.0,
+            draws: [0.0; 6],
+            common: [0.0; 3],
+        };
         Self {
             frame,
             seed,
@@ -99,7 +116,7 @@ impl PlateField {
     ) {
         let new = timeline.strikes().get(self.strikes..).unwrap_or_default();
         self.strikes += new.len();
-        self.hits.extend(new.iter().filter(|strike| strike.before == 0.0).map(|strike| strike.pos));
+        self.hits.extend(new.iter().filter(|strike| strike.before == 0.0).map(|strike| (strike.pos, strike.energy)));
         self.cells.follow(network, timeline);
         let cells = std::mem::replace(&mut self.cells, CellTracker::new(Vec2::ZERO));
         if let Some(closings) = cells.closings() {
@@ -116,7 +133,7 @@ impl PlateField {
             for closing in all.get(self.shown()..count).unwrap_or_default() {
                 let (host, frozen) = (self.host(closing), self.frozen as u16);
                 let id = self.plates.len() as u16;
-                self.plates.push(self.plate(closing));
+                self.plates.push(self.plate(closing, closings.outline(closing)));
                 let is_host = |of: u16| of == host || (host == 0 && of <= frozen);
                 changed.push(self.fill(closings.outline(closing), is_host, id, forbidden));
             }
@@ -145,17 +162,24 @@ impl PlateField {
         self.skipped = self.cells.closings().map_or(0, |closings| closings.all().len());
     }
 
-    fn plate(&self, closing: &Closing) -> Plate {
+    fn plate(&self, closing: &Closing, outline: &[Vec2]) -> Plate {
         let unit = self.frame.texels_per_unit();
         let hit = self.hits.get(closing.impact as usize);
-        let near = hit.map_or(0.0, |hit| 1.0 / (1.0 + 6.0 * hit.distance(closing.centroid)));
+        let near = hit.map_or(0.0, |(hit, _)| 1.0 / (1.0 + 6.0 * hit.distance(closing.centroid)));
+        let away = hit.map_or(0.0, |(hit, energy)| hit.distance(closing.centroid) / energy.max(1.0e-6).sqrt());
+        let extent = outline.iter().map(|pos| pos.distance(closing.centroid)).fold(0.0, f32::max);
+        let common = [1u32, 2, 3].map(|k| {
+            let place = BUNDLES * closing.centroid;
+            (1.6 * noise(self.seed as u32 ^ k, place.x, place.y)).clamp(-1.0, 1.0)
+        });
         let mut state = mix(self.seed ^ mix(self.plates.len() as u64));
         let draws = std::array::from_fn(|_| {
             state = mix(state);
             (state >> 40) as f32 * (2.0 / 16_777_215.0) - 1.0
         });
         let side = (closing.area.max(0.0).sqrt() * unit).max(1.0);
-        Plate { centre: closing.centroid * unit, inv_side: 1.0 / side, near, draws }
+        let centre = closing.centroid * unit;
+        Plate { centre, inv_side: 1.0 / side, near, away, extent: extent * unit, draws, common }
     }
 
     /// Writes `to` on the texels with their centre inside an outline (even-odd) that belong to `from`; returns where.

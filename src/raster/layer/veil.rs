@@ -98,9 +98,15 @@ impl VeilField {
     /// Hangs a sheet from a line; returns the texels that it may have changed.
     pub(in crate::raster) fn stamp(&mut self, path: &SegmentPath) -> TexelRect {
         let mut bounds = TexelRect::default();
+        // Sheets of some directions catch more light than others.
+        let ends = path.points().first().zip(path.points().last());
+        let way = ends.map_or(Vec2::ZERO, |(from, to)| (to.pos - from.pos).normalize_or_zero());
+        // Twice the angle: the same both ways.
+        let twice = 1.4 * way.rotate(way);
+        let lit = (0.74 + 0.5 * noise(self.seed ^ 3, twice.x, twice.y)).clamp(0.35, 1.0);
         for pair in path.points().windows(2) {
             let ends = [pair[0], pair[1]].map(|point| self.frame.to_texel(point.pos));
-            let dense = [pair[0], pair[1]].map(|point| (point.width / self.veil.full_width).clamp(0.0, 1.0));
+            let dense = [pair[0], pair[1]].map(|point| lit * (point.width / self.veil.full_width).clamp(0.0, 1.0));
             bounds = bounds.union(self.stamp_piece(ends, dense));
         }
         bounds
@@ -134,11 +140,14 @@ impl VeilField {
                 }
                 let u = u.clamp(0.0, 1.0);
                 let place = at.dot(streak);
-                let curtain = 0.62 + 0.38 * noise(self.seed, place, 0.6 * s);
+                let curtain =
+                    0.80 + 0.13 * noise(self.seed, place, 0.6 * s) + 0.07 * noise(self.seed ^ 2, 4.3 * place, s);
                 // It ends at different distances.
-                let end = 0.7 + 0.3 * noise(self.seed ^ 1, 0.31 * place, 3.0);
+                let thick = dense[0] + (dense[1] - dense[0]) * u;
+                let end = (0.3 + 0.7 * thick) * (0.72 + 0.28 * noise(self.seed ^ 1, 0.31 * place, 3.0));
+                // Most of it next to the crack, a little far away.
                 let fall = (1.0 - s / end).max(0.0);
-                let value = (dense[0] + (dense[1] - dense[0]) * u) * fall * curtain;
+                let value = thick * fall * (0.3 + 0.7 * fall * fall) * curtain;
                 let value = (255.0 * value.clamp(0.0, 1.0) + 0.5) as u8;
                 let texel = &mut row[x as usize];
                 *texel = value.max(*texel);
