@@ -153,6 +153,17 @@ pub(super) fn stamp(active: &mut Active, scratch: &mut Scratch) {
     }
 }
 
+impl Active {
+    /// Crushes the surface where it was hit. It counts as part of the hit: of many hits in a frame only as many are applied as there is time for.
+    pub(super) fn crush(&mut self) {
+        if self.playback.is_none() {
+            let (moment, mut changed) = (self.moment(), Vec::new());
+            self.field.show_crushed(self.growth.timeline(), moment, &mut changed);
+            changed.into_iter().for_each(|rect| self.mark(rect));
+        }
+    }
+}
+
 /// Clears the field and stamps the whole network anew; at another time than the end that is left to the next
 /// [`paint_surfaces`].
 pub(super) fn stamp_anew(active: &mut Active) {

@@ -84,6 +84,13 @@ impl DepthField {
         changed.retain(|rect| !rect.is_empty());
     }
 
+    /// The same of what hits have crushed, and of nothing else.
+    #[cfg_attr(not(feature = "bevy"), expect(dead_code, reason = "surfaces of the plugin are hit"))]
+    pub(crate) fn show_crushed(&mut self, timeline: &Timeline, moment: Moment, changed: &mut Vec<TexelRect>) {
+        self.layer.show_crushed(timeline, moment, self.forbidden.as_ref(), changed);
+        changed.retain(|rect| !rect.is_empty());
+    }
+
     /// Goes on with a network whose oldest part was forgotten: what is shown stays.
     #[cfg_attr(not(feature = "bevy"), expect(dead_code, reason = "surfaces of the plugin forget"))]
     pub(crate) fn freeze_layer(&mut self, network: &Network, timeline: &Timeline) {

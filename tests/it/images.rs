@@ -447,7 +447,7 @@ fn t4_a_stretched_picture_looks_as_before() {
         let entity = app.world_mut().spawn((sprite, CrackSurface::default())).id();
         steps(&mut app, 3);
         let before = drawn(&mut app, &target);
-        hit(&mut app, CrackHit::uv(entity, Vec2::new(0.9, 0.5)).with_energy(0.02));
+        hit(&mut app, CrackHit::uv(entity, Vec2::new(0.9, 0.5)).with_energy(0.05));
         settle(&mut app, entity);
         let after = drawn(&mut app, &target);
         let changed = |x: usize, y: usize| {

@@ -239,8 +239,10 @@ fn sprites_are_hit_where_they_are_seen() {
             scale: Vec3::new(scale(rng), scale(rng), 1.0),
         };
         let parent = app.world_mut().spawn((transform(&mut rng), Visibility::default())).id();
-        let mut preset = CrackPreset::CONCRETE;
+        // Wide enough to be seen on so few texels; the crack alone.
+        let mut preset = CrackPreset::CONCRETE.scaled(4.0);
         preset.steps_per_second = 0.0;
+        preset.look.crushed = None;
         let entity = app
             .world_mut()
             .spawn((sprite.clone(), anchor, transform(&mut rng), CrackSurface::new(preset), ChildOf(parent)))

@@ -209,6 +209,16 @@ impl Broken {
         Self { off, basin, chips }
     }
 
+    /// Forgets what does not reach into a rectangle, texels from the hit.
+    pub(super) fn keep_near(&mut self, min: Vec2, max: Vec2, depth: f32) {
+        let is_near = |outline: &Outline, beyond: f32| {
+            let nearest = outline.centre.clamp(min - 1.0, max + 1.0);
+            nearest.distance_squared(outline.centre) <= (outline.reach + beyond) * (outline.reach + beyond)
+        };
+        self.off.retain(|outline| is_near(outline, 2.0 + SHADOW * depth));
+        self.chips.retain(|chip| is_near(&chip.outline, 2.0 + chip.outline.reach));
+    }
+
     /// How far inside the edge of what has come off a place is.
     fn within(&self, at: Vec2) -> f32 {
         self.off.iter().map(|outline| outline.within(at)).fold(-FAR_OUT, f32::max)

@@ -187,6 +187,24 @@ struct Zone {
     bounds: TexelRect,
 }
 
+/// What more impacts than so many crush on one tile does not show: there is nothing left to crush. The first ones count.
+const MOST: usize = 8;
+
+/// Energies at which a zone gets larger, from 1 to 2, and so on: a thousand little hits on one place do not draw it a thousand times.
+const LEVELS: [f32; 4] = [1.0, 1.189_207_1, std::f32::consts::SQRT_2, 1.681_792_8];
+
+/// The highest level that is not above an energy.
+fn level(energy: f32) -> f32 {
+    let mut octave = 1.0;
+    while octave > energy && octave > 1e-6 {
+        octave *= 0.5;
+    }
+    while 2.0 * octave <= energy && octave < 1e6 {
+        octave *= 2.0;
+    }
+    LEVELS.iter().rev().map(|level| octave * level).find(|level| *level <= energy).unwrap_or(energy)
+}
+
 /// Columns and rows of the tiles that a rectangle touches.
 fn tiles_of(rect: &TexelRect) -> impl Iterator<Item = UVec2> + use<> {
     let (min, max) = (rect.min / TILE, rect.max.map(|end| end.div_ceil(TILE)));
@@ -255,42 +273,58 @@ impl CrushedField {
         while self.shown > strikes.len() {
             self.shown -= 1;
             let Some(strike) = all.get(self.shown) else { continue };
-            anew.push(self.set(strike, strike.before));
+            self.set(strike, strike.before, &mut anew);
         }
         for strike in &strikes[self.shown..] {
             self.shown += 1;
-            let bounds = self.set(strike, strike.energy);
             if strike.before > 0.0 {
-                anew.push(bounds);
+                self.set(strike, strike.energy, &mut anew);
             } else {
+                self.set(strike, strike.energy, &mut Vec::new());
                 new.push(strike.impact);
             }
         }
-        let mut tiles: Vec<UVec2> = anew.iter().flat_map(tiles_of).collect();
-        tiles.sort_unstable_by_key(|tile| (tile.y, tile.x));
-        tiles.dedup();
-        for &tile in &tiles {
+        anew.sort_unstable_by_key(|tile| (tile.y, tile.x));
+        anew.dedup();
+        for &tile in &anew {
             let slot = (tile.y * self.columns + tile.x) as usize;
             self.used -= usize::from(self.tiles[slot].take().is_some());
-            for index in 0..self.zones.len() as u32 {
-                self.draw(index, tile, forbidden);
-            }
+            let zones: Vec<u32> = self.on(tile).take(MOST).collect();
+            zones.into_iter().for_each(|index| self.draw(index, tile, forbidden));
+            changed.push(self.texels_of(tile));
         }
         for index in new {
             let Some(Some(zone)) = self.zones.get(index as usize).copied() else { continue };
-            for tile in tiles_of(&zone.bounds) {
-                if tiles.binary_search_by_key(&(tile.y, tile.x), |tile| (tile.y, tile.x)).is_err() {
-                    self.draw(index, tile, forbidden);
-                }
+            let is_drawn = |tile: &UVec2| anew.binary_search_by_key(&(tile.y, tile.x), |tile| (tile.y, tile.x)).is_ok();
+            let tiles: Vec<UVec2> =
+                tiles_of(&zone.bounds).filter(|tile| !is_drawn(tile) && self.counts(index, *tile)).collect();
+            for tile in tiles {
+                self.draw(index, tile, forbidden);
+                changed.push(self.texels_of(tile).intersect(zone.bounds));
             }
-            changed.push(zone.bounds);
         }
-        changed.extend(anew);
     }
 
-    /// Gives the impact of a hit this energy; returns the texels that may be others now.
-    fn set(&mut self, strike: &Strike, energy: f32) -> TexelRect {
-        let index = strike.impact as usize;
+    fn texels_of(&self, tile: UVec2) -> TexelRect {
+        let min = tile * TILE;
+        TexelRect { min, max: (min + TILE).min(self.frame.size()) }
+    }
+
+    /// The impacts whose zones touch a tile, in order.
+    fn on(&self, tile: UVec2) -> impl Iterator<Item = u32> + '_ {
+        let rect = self.texels_of(tile);
+        let touches = move |zone: &Option<Zone>| zone.is_some_and(|zone| !zone.bounds.intersect(rect).is_empty());
+        (0..).zip(&self.zones).filter(move |(_, zone)| touches(zone)).map(|(index, _)| index)
+    }
+
+    /// Whether an impact is among the first on a tile, if its zone touches it.
+    fn counts(&self, index: u32, tile: UVec2) -> bool {
+        self.on(tile).take(MOST).take_while(|other| *other < index).count() < MOST
+    }
+
+    /// Gives the impact of a hit this energy; adds the tiles that may be others now.
+    fn set(&mut self, strike: &Strike, energy: f32, others: &mut Vec<UVec2>) {
+        let (index, energy) = (strike.impact as usize, level(energy));
         if self.zones.len() <= index {
             self.zones.resize(index + 1, None);
         }
@@ -304,8 +338,11 @@ impl CrushedField {
             Zone { pos, energy, bounds: TexelRect { min, max } }
         });
         let before = std::mem::replace(&mut self.zones[index], zone);
-        let bounds = |zone: Option<Zone>| zone.map_or(TexelRect::default(), |zone| zone.bounds);
-        bounds(before).union(bounds(zone))
+        if before != zone {
+            let bounds = |zone: Option<Zone>| zone.map_or(TexelRect::default(), |zone| zone.bounds);
+            let tiles = tiles_of(&bounds(before).union(bounds(zone)));
+            others.extend(tiles.filter(|tile| self.counts(strike.impact, *tile)));
+        }
     }
 
     fn radius(&self, energy: f32) -> f32 {
@@ -325,7 +362,10 @@ impl CrushedField {
         self.used += usize::from(slot.is_none());
         let texels = slot.get_or_insert_with(|| Box::new([Spot::NONE; (TILE * TILE) as usize]));
         let seed = self.seed ^ index.wrapping_mul(0x9E37_79B1);
-        let shape = Shape::new(&self.crushed, self.frame.texels_per_unit(), radius, seed);
+        let mut shape = Shape::new(&self.crushed, self.frame.texels_per_unit(), radius, seed);
+        if let Some(broken) = &mut shape.broken {
+            broken.keep_near(rect.min.as_vec2() - zone.pos, rect.max.as_vec2() - zone.pos, shape.depth);
+        }
         shape.draw(texels, zone.pos, seed, rect, corner);
         let Some(forbidden) = forbidden else { return };
         for y in rect.min.y..rect.max.y {
@@ -344,10 +384,13 @@ impl CrushedField {
         self.tiles.get((tile.y * self.columns + tile.x) as usize)?.as_ref()?;
         let around = extent + 2.0;
         let (min, max) = ((at - around).max(Vec2::ZERO), (at + around).min(self.frame.size().as_vec2()));
-        let near = self.zones.iter().flatten().filter_map(|zone| {
+        let plate = TexelRect { min: min.as_uvec2(), max: max.ceil().as_uvec2() };
+        let near = (0..).zip(&self.zones).filter_map(|(index, zone)| {
+            let zone = zone.as_ref()?;
             let hole = self.radius(zone.energy) * self.crushed.hole;
             let holds = zone.bounds.min.as_vec2().cmple(min).all() && zone.bounds.max.as_vec2().cmpge(max).all();
-            (holds && extent < hole).then(|| at.distance_squared(zone.pos) < hole * hole)
+            let shows = || tiles_of(&plate).all(|tile| self.counts(index, tile));
+            (holds && extent < hole && shows()).then(|| at.distance_squared(zone.pos) < hole * hole)
         });
         near.max()
     }

@@ -79,6 +79,17 @@ impl Layer {
         if let Some(plates) = &mut self.plates {
             plates.show(network, timeline, moment, forbidden, changed);
         }
+        self.show_crushed(timeline, moment, forbidden, changed);
+    }
+
+    /// Shows what hits have crushed until then, and nothing else.
+    pub(super) fn show_crushed(
+        &mut self,
+        timeline: &Timeline,
+        moment: Moment,
+        forbidden: Option<&Grid<bool>>,
+        changed: &mut Vec<TexelRect>,
+    ) {
         if let Some(crushed) = &mut self.crushed {
             let count = timeline.entries(moment.begun()).strikes;
             crushed.show(&timeline.strikes()[..count], timeline.strikes(), forbidden, changed);
