@@ -239,8 +239,8 @@ fn sprites_are_hit_where_they_are_seen() {
             scale: Vec3::new(scale(rng), scale(rng), 1.0),
         };
         let parent = app.world_mut().spawn((transform(&mut rng), Visibility::default())).id();
-        // Wide enough to be seen on so few texels; the crack alone.
-        let mut preset = CrackPreset::CONCRETE.scaled(4.0);
+        // Bold enough to be seen on so few texels; the crack alone.
+        let mut preset = CrackPreset::TOON;
         preset.steps_per_second = 0.0;
         preset.look.crushed = None;
         let entity = app
@@ -267,7 +267,7 @@ fn sprites_are_hit_where_they_are_seen() {
         // One node, drawn nowhere yet: let it grow a little and look where the texels change.
         app.world_mut().get_mut::<CrackSurface>(entity).unwrap().preset.as_mut().unwrap().steps_per_second = 50.0;
         let before = texels(&app, &app.world().get::<Sprite>(entity).unwrap().image.clone());
-        for _ in 0..3 {
+        for _ in 0..6 {
             app.update();
         }
         let after = texels(&app, &app.world().get::<Sprite>(entity).unwrap().image.clone());
