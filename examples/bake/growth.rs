@@ -3,13 +3,13 @@
 use crate::{
     maps::write_maps,
     own::own_picture,
-    painting::{depths, fitted, paint},
+    painting::{fitted, paint},
     pictures::read_picture,
 };
 use bevy_crack::{
     CrackPreset,
     growth::{CrackGrowth, HitOutcome},
-    paint::{Look, LookTable, paint_glow},
+    paint::{BaseTexels, Look, LookTable, PaintTargets, paint_glow, paint_into},
     pattern::{CrackMask, LinkKind, Moment, NO_PARENT, Network, SurfaceFrame},
     raster::{DepthField, TexelRect, stamp_dot, stamp_path},
 };
@@ -223,4 +223,14 @@ fn describe(network: &Network, options: &Options) -> serde_json::Value {
         .collect();
     json!({ "preset": options.preset, "seed": options.seed, "extent": network.extent().to_array(),
             "nodes": nodes, "links": links, "segments": segments })
+}
+
+/// The depth map of cracks and craters.
+fn depths(field: &DepthField, table: &LookTable) -> Vec<u8> {
+    let (size, rect) = (field.frame.size(), TexelRect::whole(field.frame.size()));
+    let mut depth = vec![0; field.depth.as_slice().len()];
+    let base = BaseTexels { size, diffuse: &[], normal: None, depth: None };
+    let mut targets = PaintTargets { diffuse: None, normal: None, depth: Some(&mut depth) };
+    paint_into(base, field, table, rect, UVec2::ZERO, &mut targets);
+    depth
 }

@@ -33,13 +33,3 @@ pub(crate) fn paint(base: &RgbaImage, field: &DepthField, table: &LookTable) -> 
     );
     [diffuse, normal]
 }
-
-/// The depth map of cracks and craters.
-pub(crate) fn depths(field: &DepthField, table: &LookTable) -> Vec<u8> {
-    let (size, rect) = (field.frame.size(), TexelRect::whole(field.frame.size()));
-    let mut depth = vec![0; field.depth.as_slice().len()];
-    let base = BaseTexels { size, diffuse: &[], normal: None, depth: None };
-    let mut targets = PaintTargets { diffuse: None, normal: None, depth: Some(&mut depth) };
-    paint_into(base, field, table, rect, UVec2::ZERO, &mut targets);
-    depth
-}

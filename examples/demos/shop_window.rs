@@ -356,7 +356,8 @@ fn play_script(
     if script.is_at(BURST_AT) {
         shatter.speed = SLOW;
         // Out on the street, where it is seen.
-        commands.entity(entity).shatter_cracks(ShatterRequest::ALL.with_direction(Vec3::new(-0.25, 0.1, 1.0)));
+        let direction = Some(Vec3::new(-0.25, 0.1, 1.0));
+        commands.entity(entity).shatter_cracks(ShatterRequest { direction, ..ShatterRequest::ALL });
     }
     if script.is_at(FAST_AT) {
         shatter.speed = 1.0;
