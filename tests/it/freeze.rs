@@ -10,6 +10,8 @@ fn preset() -> CrackPreset {
     let mut preset = small_preset();
     preset.growth.max_nodes = MOST;
     preset.growth.draw_islands = true;
+    // What is crushed is made anew where it is hit again; this is about cracks.
+    preset.look.crushed = None;
     preset
 }
 
