@@ -12,6 +12,8 @@ fn preset() -> CrackPreset {
     preset.growth.draw_islands = true;
     // What is crushed is made anew where it is hit again; this is about cracks.
     preset.look.crushed = None;
+    // As wide as texels, or what is lit and what is in shadow cancel out in some.
+    (preset.growth.line_width, preset.growth.max_width) = (0.012, 0.03);
     preset
 }
 
