@@ -204,7 +204,6 @@ fn apply(world: &mut World, entity: Entity, hit: QueuedHit, timer: &Timer) -> Re
         let energy = hit.energy.min(HARDEST);
         active.struck = Some(Struck { pos, energy, direction: hit.direction });
         active.hits += 1;
-        active.crush();
         if is_left && !surfaces.laying_out.contains(&entity) {
             surfaces.laying_out.push_back(entity);
         }

@@ -171,10 +171,11 @@ impl Active {
         self.playback.as_ref().is_some_and(|playback| playback.shown != self.moment())
     }
 
-    /// Whether growth has ended and all of it is shown.
+    /// Whether growth has ended and all of it is shown, what was crushed with it.
     pub(super) fn is_complete(&self) -> bool {
         let end = Moment::after(self.growth.timeline().end());
-        !self.growth.is_growing() && self.playback.as_ref().is_none_or(|playback| playback.shown == end)
+        let is_shown = self.playback.as_ref().is_none_or(|playback| playback.shown == end);
+        !self.growth.is_growing() && is_shown && !self.field.is_behind()
     }
 
     /// Lets time pass.

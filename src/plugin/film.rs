@@ -87,7 +87,7 @@ impl Out {
         match self {
             Self::Task(task, _) => task.take_back().or_else(|| task.finish().flatten()),
             Self::Slices(mut shot) => {
-                while matches!(shot.stage, Stage::Draw) {
+                while matches!(shot.stage, Stage::Draw | Stage::Crush) {
                     shot.step();
                 }
                 Some(shot)

@@ -2,7 +2,7 @@
 
 use super::{
     CellClosed, CrackBudget, CrackFinished, CrackState, CrackStatus, CrackTextures, CrackTip,
-    budget::{FrameClock, share_out},
+    budget::{FrameClock, Timer, share_out},
     surfaces::{Active, Surfaces, Touched, batch},
     textures::{self, MAPS},
     upload::{Packer, Uploads},
@@ -23,6 +23,9 @@ const BUDGET_SHARE: f32 = 0.9;
 
 /// So many of them are painted one after the other: fewer are not worth another thread.
 const SHARE: usize = 4;
+
+/// Tiles of what hits have crushed that a surface draws in a frame at the most, however much time there is.
+const CRUSHED: usize = 8;
 
 /// Buffers kept from frame to frame.
 #[derive(Default)]
@@ -62,8 +65,9 @@ pub(super) fn paint_surfaces(
     }
     let Some(mut images) = images else { return };
     let timer = clock.start(&budget, BUDGET_SHARE);
+    let most_crushed = if budget.is_boundless() { usize::MAX } else { CRUSHED };
     let Surfaces { active, dirty, .. } = &mut *surfaces;
-    let mut left = Vec::new();
+    let (mut left, mut behind) = (Vec::new(), Vec::new());
     while left.is_empty() && !dirty.is_empty() {
         let mut jobs: Vec<Job> = batch(active, dirty, |entity, active| Some(Job::new(entity, active, &mut images)));
         let shares = jobs.len().div_ceil(SHARE);
@@ -78,7 +82,7 @@ pub(super) fn paint_surfaces(
                     let expected = Duration::from_nanos(last.load(Ordering::Relaxed));
                     if (i, k) == (0, 0) || !timer.has_no_time_for(expected) {
                         let start = Instant::now();
-                        job.paint(scratch, packer);
+                        job.paint(scratch, packer, most_crushed, &timer);
                         last.store(start.elapsed().as_nanos() as u64, Ordering::Relaxed);
                     }
                 }
@@ -91,6 +95,10 @@ pub(super) fn paint_surfaces(
                 continue;
             }
             tell_painted(active, entity, before, &mut states, &mut commands);
+            if active.field.is_behind() {
+                active.is_dirty = true;
+                behind.push(entity);
+            }
         }
         if timer.is_over() {
             break;
@@ -102,6 +110,7 @@ pub(super) fn paint_surfaces(
             active.is_late = true;
         }
     }
+    dirty.extend(behind);
     clock.stop(&timer);
 }
 
@@ -112,20 +121,21 @@ impl<'a> Job<'a> {
         Self { entity, active, canvas, before, is_painted: false }
     }
 
-    fn paint(&mut self, scratch: &mut Scratch, packer: &mut Packer) {
+    fn paint(&mut self, scratch: &mut Scratch, packer: &mut Packer, most_crushed: usize, timer: &Timer) {
         stamp(self.active, scratch);
+        crush(self.active, scratch, most_crushed, timer);
         self.canvas.paint(self.active, packer, &mut scratch.rects);
         self.active.cells.update(self.active.growth.network());
         self.is_painted = true;
     }
 }
 
-/// Stamps what has grown since the last time into the field, or whatever is to be shown.
+/// Stamps what has grown since the last time into the field, or whatever is to be shown, but for what hits have [crushed](crush).
 pub(super) fn stamp(active: &mut Active, scratch: &mut Scratch) {
     let moment = active.moment();
     if let Some(playback) = &mut active.playback {
         let (growth, redrawn) = (&active.growth, &mut scratch.redrawn);
-        playback.replay.show(&mut active.field, growth.network(), growth.timeline(), moment, redrawn);
+        playback.replay.show_lines(&mut active.field, growth.network(), growth.timeline(), moment, redrawn);
         playback.shown = moment;
         active.touched.follow(redrawn);
         redrawn.changed.iter().for_each(|rect| active.mark(*rect));
@@ -143,7 +153,7 @@ pub(super) fn stamp(active: &mut Active, scratch: &mut Scratch) {
         }
     }
     let timeline = active.growth.timeline();
-    active.field.show_layer(active.growth.network(), timeline, moment, &mut scratch.rects);
+    active.field.begin_layer(active.growth.network(), timeline, moment, &mut scratch.rects);
     scratch.rects.drain(..).for_each(|rect| active.mark(rect));
     active.growth.take_markers(&mut scratch.markers);
     let radius = active.growth.params().line_width;
@@ -153,14 +163,12 @@ pub(super) fn stamp(active: &mut Active, scratch: &mut Scratch) {
     }
 }
 
-impl Active {
-    /// Crushes the surface where it was hit. It counts as part of the hit: of many hits in a frame only as many are applied as there is time for.
-    pub(super) fn crush(&mut self) {
-        if self.playback.is_none() {
-            let (moment, mut changed) = (self.moment(), Vec::new());
-            self.field.show_crushed(self.growth.timeline(), moment, &mut changed);
-            changed.into_iter().for_each(|rect| self.mark(rect));
-        }
+/// Draws some of what hits have crushed: a tile at least if any is left, and no more than `most`.
+fn crush(active: &mut Active, scratch: &mut Scratch, most: usize, timer: &Timer) {
+    if active.field.is_behind() {
+        let is_over = |drawn: usize| drawn == most || timer.is_over();
+        (1..).find(|drawn| !active.field.crush(1, &mut scratch.rects) || is_over(*drawn));
+        scratch.rects.drain(..).for_each(|rect| active.mark(rect));
     }
 }
 

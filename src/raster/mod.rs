@@ -80,15 +80,33 @@ impl DepthField {
     /// Network and timeline must be those of one growth, which may have grown since the last time. What it holds depends on the moment
     /// alone. A cell that closes costs its own area once, a hit its crushed zone. [`Replay::show`] does it by itself.
     pub fn show_layer(&mut self, network: &Network, timeline: &Timeline, moment: Moment, changed: &mut Vec<TexelRect>) {
+        self.begin_layer(network, timeline, moment, changed);
+        self.crush(usize::MAX, changed);
+    }
+
+    /// The same, but for what hits have crushed: that is drawn by [`crush`](Self::crush).
+    pub(crate) fn begin_layer(
+        &mut self,
+        network: &Network,
+        timeline: &Timeline,
+        moment: Moment,
+        changed: &mut Vec<TexelRect>,
+    ) {
         self.layer.show(network, timeline, moment, self.forbidden.as_ref(), changed);
         changed.retain(|rect| !rect.is_empty());
     }
 
-    /// The same of what hits have crushed, and of nothing else.
-    #[cfg_attr(not(feature = "bevy"), expect(dead_code, reason = "surfaces of the plugin are hit"))]
-    pub(crate) fn show_crushed(&mut self, timeline: &Timeline, moment: Moment, changed: &mut Vec<TexelRect>) {
-        self.layer.show_crushed(timeline, moment, self.forbidden.as_ref(), changed);
+    /// Draws what hits have crushed, at most so many tiles of 32 x 32 texels, from each hit outward. Returns whether any are left.
+    pub(crate) fn crush(&mut self, tiles: usize, changed: &mut Vec<TexelRect>) -> bool {
+        let is_left = self.layer.crush(tiles, self.forbidden.as_ref(), changed);
         changed.retain(|rect| !rect.is_empty());
+        is_left
+    }
+
+    /// Whether any are left.
+    #[cfg_attr(not(feature = "bevy"), expect(dead_code, reason = "surfaces of the plugin are hit"))]
+    pub(crate) fn is_behind(&self) -> bool {
+        self.layer.is_behind()
     }
 
     /// Goes on with a network whose oldest part was forgotten: what is shown stays.

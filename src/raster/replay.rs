@@ -184,6 +184,19 @@ impl Replay {
         to: Moment,
         redrawn: &mut Redrawn,
     ) {
+        self.show_lines(field, network, timeline, to, redrawn);
+        field.crush(usize::MAX, &mut redrawn.changed);
+    }
+
+    /// The same, but for what hits have [crushed](DepthField::crush).
+    pub(crate) fn show_lines(
+        &mut self,
+        field: &mut DepthField,
+        network: &Network,
+        timeline: &Timeline,
+        to: Moment,
+        redrawn: &mut Redrawn,
+    ) {
         self.begin(field, network, timeline, to, redrawn);
         while !self.draw(field, network, timeline, usize::MAX, redrawn) {}
         self.end(field, network, timeline, redrawn);
@@ -359,7 +372,8 @@ impl Replay {
         self.drawn == self.marked.len()
     }
 
-    /// The last part: notes the texels of the marked tiles that differ from before, and makes all else that the field holds follow.
+    /// The last part but one: notes the texels of the marked tiles that differ from before, and makes all else that the field holds follow,
+    /// but for what hits have [crushed](DepthField::crush).
     pub(crate) fn end(
         &mut self,
         field: &mut DepthField,
@@ -383,7 +397,7 @@ impl Replay {
             }
         }
         self.marked.clear();
-        field.show_layer(network, timeline, self.at, &mut redrawn.changed);
+        field.begin_layer(network, timeline, self.at, &mut redrawn.changed);
     }
 
     /// Puts into the index what was written since the last time; returns how much was in it before.

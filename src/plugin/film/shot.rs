@@ -73,6 +73,8 @@ pub(super) enum Stage {
     /// As it was.
     Begin,
     Draw,
+    /// What hits have crushed is being drawn.
+    Crush,
     /// What is left to paint.
     Paint(Vec<TexelRect>),
     Made,
@@ -95,6 +97,11 @@ impl Shot {
             Stage::Draw => {
                 if self.replay.draw(&mut self.field, network, timeline, SEGMENTS, &mut self.redrawn) {
                     self.replay.end(&mut self.field, network, timeline, &mut self.redrawn);
+                    self.stage = Stage::Crush;
+                }
+            }
+            Stage::Crush => {
+                if !self.field.crush(1, &mut self.redrawn.changed) {
                     self.stage = Stage::Paint(self.plan());
                 }
             }

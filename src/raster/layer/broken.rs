@@ -395,7 +395,8 @@ mod tests {
             let mut field = CrushedField::new(&crushed, frame, seed);
             let mut timeline = Timeline::default();
             timeline.strike(0, Vec2::splat(0.5), 0.0, 1.0);
-            field.show(timeline.strikes(), timeline.strikes(), None, &mut Vec::new());
+            field.follow(timeline.strikes(), timeline.strikes());
+            field.draw_some(usize::MAX, None, &mut Vec::new());
             let mut row = [Spot::default(); 256];
             field.read(0, 128, &mut row);
             assert!(row[128].deep > 100 && row[128].pale > 0, "seed {seed}: {:?}", row[128]);

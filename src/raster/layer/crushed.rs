@@ -8,7 +8,10 @@ use crate::{
     raster::TexelRect,
 };
 use glam::{UVec2, Vec2};
-use std::f32::consts::TAU;
+use std::{
+    collections::{BTreeSet, VecDeque},
+    f32::consts::TAU,
+};
 
 /// What a hit crushes: a spot around it, by its energy. All of it is made from the seed and the place, at any resolution.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -225,6 +228,16 @@ pub(crate) struct CrushedField {
     columns: u32,
     tiles: Vec<Option<Box<Tile>>>,
     used: usize,
+    /// What is still to be drawn, in this order.
+    waiting: VecDeque<Waiting>,
+}
+
+/// A tile that is not drawn yet.
+#[derive(Clone, Copy, Debug)]
+struct Waiting {
+    tile: UVec2,
+    /// The impact that has crushed it since; `None` = all of the tile is to be drawn anew.
+    impact: Option<u32>,
 }
 
 /// What is shown, not the way there.
@@ -246,6 +259,7 @@ impl CrushedField {
             columns: count.x,
             tiles: vec![None; count.element_product() as usize],
             used: 0,
+            waiting: VecDeque::new(),
         }
     }
 
@@ -257,18 +271,12 @@ impl CrushedField {
         &self.crushed
     }
 
-    /// Shows the first hits of `all`, those in `strikes`.
-    pub(super) fn show(
-        &mut self,
-        strikes: &[Strike],
-        all: &[Strike],
-        forbidden: Option<&Grid<bool>>,
-        changed: &mut Vec<TexelRect>,
-    ) {
+    /// Takes up the first hits of `all`, those in `strikes`: from then on it [has to be drawn](Self::draw_some) as they have left it.
+    pub(super) fn follow(&mut self, strikes: &[Strike], all: &[Strike]) {
         if self.shown == strikes.len() || self.crushed.radius <= 0.0 {
             return;
         }
-        // Tiles of impacts that are others now are made anew; what is new is laid over them.
+        // Tiles of impacts that have changed are drawn anew; what is new is laid over them.
         let (mut anew, mut new) = (Vec::new(), Vec::new());
         while self.shown > strikes.len() {
             self.shown -= 1;
@@ -284,25 +292,61 @@ impl CrushedField {
                 new.push(strike.impact);
             }
         }
-        anew.sort_unstable_by_key(|tile| (tile.y, tile.x));
-        anew.dedup();
-        for &tile in &anew {
-            let slot = (tile.y * self.columns + tile.x) as usize;
-            self.used -= usize::from(self.tiles[slot].take().is_some());
-            let zones: Vec<u32> = self.on(tile).take(MOST).collect();
-            zones.into_iter().for_each(|index| self.draw(index, tile, forbidden));
-            changed.push(self.texels_of(tile));
+        let key = |tile: UVec2| (tile.y, tile.x);
+        let before = self.waiting.iter().filter(|waiting| waiting.impact.is_none()).map(|waiting| key(waiting.tile));
+        let mut is_anew: BTreeSet<(u32, u32)> = before.collect();
+        anew.sort_unstable_by_key(|tile| key(*tile));
+        anew.retain(|tile| is_anew.insert(key(*tile)));
+        if !anew.is_empty() {
+            self.waiting.retain(|Waiting { tile, impact }| impact.is_none() || !is_anew.contains(&key(*tile)));
+            self.waiting.extend(anew.into_iter().map(|tile| Waiting { tile, impact: None }));
         }
         for index in new {
             let Some(Some(zone)) = self.zones.get(index as usize).copied() else { continue };
-            let is_drawn = |tile: &UVec2| anew.binary_search_by_key(&(tile.y, tile.x), |tile| (tile.y, tile.x)).is_ok();
-            let tiles: Vec<UVec2> =
+            let is_drawn = |tile: &UVec2| is_anew.contains(&key(*tile));
+            let mut tiles: Vec<UVec2> =
                 tiles_of(&zone.bounds).filter(|tile| !is_drawn(tile) && self.counts(index, *tile)).collect();
-            for tile in tiles {
-                self.draw(index, tile, forbidden);
-                changed.push(self.texels_of(tile).intersect(zone.bounds));
+            // From the hit outward.
+            let middle = |tile: UVec2| (tile * TILE + TILE / 2).as_vec2();
+            tiles.sort_by(|a, b| {
+                let far = |tile: UVec2| middle(tile).distance_squared(zone.pos);
+                far(*a).total_cmp(&far(*b))
+            });
+            self.waiting.extend(tiles.into_iter().map(|tile| Waiting { tile, impact: Some(index) }));
+        }
+    }
+
+    /// Whether tiles are still to be drawn.
+    pub(super) fn is_behind(&self) -> bool {
+        !self.waiting.is_empty()
+    }
+
+    /// Draws at most so many tiles; appends the rectangles of the texels that may be others now. Returns whether any are left.
+    ///
+    /// What it shows when none is left depends on the hits alone, not on the slices.
+    pub(super) fn draw_some(
+        &mut self,
+        most: usize,
+        forbidden: Option<&Grid<bool>>,
+        changed: &mut Vec<TexelRect>,
+    ) -> bool {
+        for _ in 0..most {
+            let Some(Waiting { tile, impact }) = self.waiting.pop_front() else { break };
+            let texels = self.texels_of(tile);
+            let Some(impact) = impact else {
+                let slot = (tile.y * self.columns + tile.x) as usize;
+                self.used -= usize::from(self.tiles[slot].take().is_some());
+                let zones: Vec<u32> = self.on(tile).take(MOST).collect();
+                zones.into_iter().for_each(|index| self.draw(index, tile, forbidden));
+                changed.push(texels);
+                continue;
+            };
+            if let Some(Some(zone)) = self.zones.get(impact as usize) {
+                changed.push(texels.intersect(zone.bounds));
+                self.draw(impact, tile, forbidden);
             }
         }
+        self.is_behind()
     }
 
     fn texels_of(&self, tile: UVec2) -> TexelRect {
@@ -380,8 +424,6 @@ impl CrushedField {
     /// Whether a plate whose middle is at a place, and all of it within `extent` of it, is gone in a hole, or whole beside one; `None` if no hole
     /// is there, or the plate is as large as that. Only holes of impacts that show all of the plate anew when they are shown. Texels.
     pub(crate) fn is_gone(&self, at: Vec2, extent: f32) -> Option<bool> {
-        let tile = at.max(Vec2::ZERO).as_uvec2().min(self.frame.size() - 1) / TILE;
-        self.tiles.get((tile.y * self.columns + tile.x) as usize)?.as_ref()?;
         let around = extent + 2.0;
         let (min, max) = ((at - around).max(Vec2::ZERO), (at + around).min(self.frame.size().as_vec2()));
         let plate = TexelRect { min: min.as_uvec2(), max: max.ceil().as_uvec2() };
@@ -641,5 +683,97 @@ impl<'a> Shape<'a> {
             place.pale = place.pale.max(self.crushed.pale.max(0.4) * inside);
             place.shade += (0.5 * draw(27) - 0.25) * inside;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{math::Rng, pattern::Timeline};
+
+    /// Hits here and there, some of which merge with earlier ones and come long after them.
+    fn timeline(rng: &mut Rng) -> Timeline {
+        let mut timeline = Timeline::default();
+        let mut energies = Vec::<f32>::new();
+        for _ in 0..30 {
+            let energy = rng.range(0.1, 3.0);
+            let pos = |impact: usize| 0.2 + 0.6 * Vec2::new((impact % 4) as f32, (impact / 4) as f32) / 4.0;
+            if rng.range(0.0, 1.0) < 0.4 && !energies.is_empty() {
+                let impact = rng.range(0.0, energies.len() as f32) as usize % energies.len();
+                timeline.strike(impact as u32, pos(impact), energies[impact], energies[impact] + energy);
+                energies[impact] += energy;
+            } else {
+                timeline.strike(energies.len() as u32, pos(energies.len()), 0.0, energy);
+                energies.push(energy);
+            }
+        }
+        timeline
+    }
+
+    #[test]
+    fn slices_and_the_way_there_do_not_matter() {
+        let frame = SurfaceFrame::new(UVec2::new(200, 140)).unwrap();
+        for seed in 0..12 {
+            let mut rng = Rng::new(seed);
+            let timeline = timeline(&mut rng);
+            let all = timeline.strikes();
+            let crushed = Crushed { broken: seed % 2 == 0, radius: 0.06, ..Crushed::DEFAULT };
+            let mut field = CrushedField::new(&crushed, frame, seed);
+            let mut shown = Grid::new(frame.size(), Spot::NONE);
+            for _ in 0..80 {
+                let count = rng.range(0.0, all.len() as f32 + 1.0) as usize;
+                field.follow(&all[..count.min(all.len())], all);
+                let mut changed = Vec::new();
+                field.draw_some(rng.range(0.0, 12.0) as usize, None, &mut changed);
+                copy(&field, &changed, &mut shown);
+            }
+            let count = rng.range(0.0, all.len() as f32 + 1.0) as usize;
+            field.follow(&all[..count.min(all.len())], all);
+            let mut changed = Vec::new();
+            while field.draw_some(3, None, &mut changed) {}
+            copy(&field, &changed, &mut shown);
+            let mut at_once = CrushedField::new(&crushed, frame, seed);
+            at_once.follow(&all[..count.min(all.len())], all);
+            assert!(at_once.is_behind() == (count > 0) && !field.is_behind());
+            at_once.draw_some(usize::MAX, None, &mut Vec::new());
+            let whole = TexelRect::whole(frame.size());
+            let mut expected = Grid::new(frame.size(), Spot::NONE);
+            copy(&at_once, &[whole], &mut expected);
+            let mut now = Grid::new(frame.size(), Spot::NONE);
+            copy(&field, &[whole], &mut now);
+            assert!(now == expected, "seed {seed}");
+            assert!(shown == expected, "seed {seed}: some texels changed without notice");
+        }
+    }
+
+    fn copy(field: &CrushedField, rects: &[TexelRect], to: &mut Grid<Spot>) {
+        for rect in rects {
+            for y in rect.min.y..rect.max.y {
+                field.read(rect.min.x, y, &mut to.row_mut(y as usize)[rect.min.x as usize..rect.max.x as usize]);
+            }
+        }
+    }
+
+    #[test]
+    fn it_is_drawn_from_the_hit_outward() {
+        let frame = SurfaceFrame::new(UVec2::splat(512)).unwrap();
+        let mut field = CrushedField::new(&Crushed { radius: 0.2, ..Crushed::DEFAULT }, frame, 1);
+        let mut timeline = Timeline::default();
+        timeline.strike(0, Vec2::new(0.3, 0.6), 0.0, 1.0);
+        field.follow(timeline.strikes(), timeline.strikes());
+        let mut last = 0.0;
+        loop {
+            let mut changed = Vec::new();
+            let is_left = field.draw_some(1, None, &mut changed);
+            let [rect] = changed[..] else { panic!("one tile, not {}", changed.len()) };
+            let middle = (rect.min / TILE * TILE + TILE / 2).as_vec2();
+            let far = middle.distance(frame.to_texel(Vec2::new(0.3, 0.6)));
+            assert!(far >= last, "{far} after {last}");
+            last = far;
+            if !is_left {
+                break;
+            }
+        }
+        assert!(last > 200.0);
     }
 }

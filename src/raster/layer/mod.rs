@@ -68,6 +68,7 @@ impl Layer {
         *self = Self::new(std::mem::take(&mut self.plan), frame);
     }
 
+    /// Shows it, but for what hits have crushed, which is left to [`crush`](Self::crush).
     pub(super) fn show(
         &mut self,
         network: &Network,
@@ -79,21 +80,20 @@ impl Layer {
         if let Some(plates) = &mut self.plates {
             plates.show(network, timeline, moment, forbidden, changed);
         }
-        self.show_crushed(timeline, moment, forbidden, changed);
-    }
-
-    /// Shows what hits have crushed until then, and nothing else.
-    pub(super) fn show_crushed(
-        &mut self,
-        timeline: &Timeline,
-        moment: Moment,
-        forbidden: Option<&Grid<bool>>,
-        changed: &mut Vec<TexelRect>,
-    ) {
         if let Some(crushed) = &mut self.crushed {
             let count = timeline.entries(moment.begun()).strikes;
-            crushed.show(&timeline.strikes()[..count], timeline.strikes(), forbidden, changed);
+            crushed.follow(&timeline.strikes()[..count], timeline.strikes());
         }
+    }
+
+    /// Draws at most so many tiles of what hits have crushed. Returns whether any are left.
+    pub(super) fn crush(&mut self, tiles: usize, forbidden: Option<&Grid<bool>>, changed: &mut Vec<TexelRect>) -> bool {
+        self.crushed.as_mut().is_some_and(|crushed| crushed.draw_some(tiles, forbidden, changed))
+    }
+
+    /// Whether any are left.
+    pub(super) fn is_behind(&self) -> bool {
+        self.crushed.as_ref().is_some_and(|crushed| crushed.is_behind())
     }
 
     /// Goes on with a network whose oldest part was forgotten.
