@@ -73,8 +73,8 @@ pub(crate) struct Options {
     /// The picture to crack; by default plain concrete
     #[arg(long)]
     base: Option<PathBuf>,
-    /// groove, frosted or toon; dark or bright: the plain modulation of the paper
-    #[arg(long, default_value = "groove")]
+    /// concrete, plaster, groove, frosted or toon; dark or bright: the plain modulation of the paper
+    #[arg(long, default_value = "concrete")]
     look: String,
     /// Also frames of an animation, and an animated GIF
     #[arg(long, value_enum)]

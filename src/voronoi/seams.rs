@@ -282,15 +282,27 @@ impl Tracer {
         let (least, gain) = (params.least_width, params.width - params.least_width);
         let of_stroke = params.stroke_width / frame.texels_per_unit();
         let widths = Widths { least, gain, taper: params.taper, full, of_stroke };
-        let to_seam = |((line, costs), birth): ((&Line, &Vec<Cost>), usize)| {
+        let mut ways: Vec<Way> = (lines.iter().zip(&costs))
+            .map(|(line, costs)| {
+                let ends = line.ends.map(|end| joints[end].pos);
+                let crossings = line.crossings.iter().map(Crossing::pos);
+                // A vertex has the cost of the crossing beside it.
+                let of = |i: usize| costs.get(i).map_or(0.0, |cost| widths.of(*cost));
+                let last = costs.len().saturating_sub(1);
+                Way {
+                    ends: line.ends,
+                    places: std::iter::once(ends[0]).chain(crossings).chain([ends[1]]).collect(),
+                    widths: std::iter::once(0).chain(0..costs.len()).chain([last]).map(of).collect(),
+                }
+            })
+            .collect();
+        if !guides.layers.is_empty() {
+            let on_border: Vec<bool> = joints.iter().map(|joint| joint.on_border).collect();
+            run_out(&mut ways, &on_border, RUN_OUT / frame.texels_per_unit());
+        }
+        let to_seam = |((line, way), birth): ((&Line, &Way), usize)| {
             let first = line.crossings.first()?;
-            let places: Vec<Vec2> = std::iter::once(joints[line.ends[0]].pos)
-                .chain(line.crossings.iter().map(Crossing::pos))
-                .chain([joints[line.ends[1]].pos])
-                .collect();
-            // A vertex has the cost of the crossing beside it.
-            let cost = |i: usize| costs[i.saturating_sub(1).min(costs.len() - 1)];
-            let point = |i: usize| PathPoint { pos: frame.to_pos(places[i]), width: widths.of(cost(i)) };
+            let point = |i: usize| PathPoint { pos: frame.to_pos(way.places[i]), width: way.widths[i] };
             // On which side the first crossing has its texel as one leaves the first vertex; left is where y is less
             // for x that grows.
             let [a, b] = self.beside(first);
@@ -303,10 +315,10 @@ impl Tracer {
                 left: finest.region(left),
                 right: finest.region(right),
                 level: birth as u32,
-                points: simplify(&places).into_iter().map(point).collect(),
+                points: simplify(&way.places).into_iter().map(point).collect(),
             })
         };
-        seams.seams = lines.iter().zip(&costs).zip(births).filter_map(to_seam).collect();
+        seams.seams = lines.iter().zip(&ways).zip(births).filter_map(to_seam).collect();
         let vertex = |joint: &Joint| SeamVertex { pos: frame.to_pos(joint.pos), on_border: joint.on_border };
         seams.vertices = joints.iter().map(vertex).collect();
         (seams, full)
@@ -453,6 +465,74 @@ impl Widths {
     fn of(&self, Cost { cost, stroke, uneven }: Cost) -> f32 {
         let width = self.least + self.gain * ops::powf((cost / self.full).min(1.0), self.taper);
         width.max((self.of_stroke * stroke).min(MOST * (self.least + self.gain)) * uneven)
+    }
+}
+
+/// A line with its widths.
+struct Way {
+    ends: [usize; 2],
+    /// Texels.
+    places: Vec<Vec2>,
+    /// Pattern units.
+    widths: Vec<f32>,
+}
+
+impl Way {
+    /// Makes it nowhere widen by more than `slope` in a texel. Returns whether it has become thinner anywhere.
+    fn run_out(&mut self, slope: f32) -> bool {
+        let n = self.widths.len();
+        let mut is_thinner = false;
+        let mut pass = |from: usize, to: usize, places: &[Vec2]| {
+            let most = self.widths[from] + slope * places[from].distance(places[to]);
+            if self.widths[to] > most {
+                self.widths[to] = most;
+                is_thinner = true;
+            }
+        };
+        (1..n).for_each(|i| pass(i - 1, i, &self.places));
+        (1..n).rev().for_each(|i| pass(i, i - 1, &self.places));
+        is_thinner
+    }
+}
+
+/// How much a crack widens at most along its way, where there are guides: strokes end in needles that run on as the thin cracks beyond.
+/// With more they look cut, with less short strokes get lost.
+const RUN_OUT: f32 = 0.22;
+
+/// Lets wide cracks run out where they do not go on: none is wider at a vertex than the second widest there, and none widens by more than
+/// `slope` in a texel.
+fn run_out(ways: &mut [Way], on_border: &[bool], slope: f32) {
+    let mut widest = vec![[0.0f32; 2]; on_border.len()];
+    // It is thinned out along a stroke from vertex to vertex; there are few in each.
+    for _ in 0..16 {
+        widest.fill([0.0; 2]);
+        for way in &*ways {
+            for (end, width) in way.ends.iter().zip([way.widths.first(), way.widths.last()]) {
+                let widest = &mut widest[*end];
+                let width = width.copied().unwrap_or(0.0);
+                let at = widest.iter().position(|other| width > *other);
+                if let Some(at) = at {
+                    widest[at..].rotate_right(1);
+                    widest[at] = width;
+                }
+            }
+        }
+        let mut is_thinner = false;
+        for way in &mut *ways {
+            for (end, at) in way.ends.into_iter().zip([0, way.widths.len().saturating_sub(1)]) {
+                let [_, second] = widest[end];
+                if let Some(width) = way.widths.get_mut(at)
+                    && !on_border[end]
+                    && *width > second
+                {
+                    (*width, is_thinner) = (second, true);
+                }
+            }
+            is_thinner |= way.run_out(slope);
+        }
+        if !is_thinner {
+            break;
+        }
     }
 }
 

@@ -568,6 +568,38 @@ fn fronts_only_open_and_end_with_all_seams() {
     assert!(field == full);
 }
 
+/// Strokes end in needles: no crack widens faster than by a slope, and none is alone as wide as it is where it meets others.
+#[test]
+fn strokes_run_out() {
+    for seed in 0..6 {
+        let mut rng = Rng::new(seed);
+        let guide = Guide::new(drawing(&mut rng, UVec2::new(300, 200)));
+        let (_, seams) = made(&VoronoiParams::DEFAULT, &[guide], [300, 200], seed);
+        let mut widths = vec![Vec::new(); seams.vertices.len()];
+        let (mut steepest, mut widest) = (0.0f32, 0.0f32);
+        for seam in &seams.seams {
+            widths[seam.from as usize].push(seam.points[0].width);
+            widths[seam.to as usize].push(seam.points[seam.points.len() - 1].width);
+            for pair in seam.points.windows(2) {
+                let slope = (pair[1].width - pair[0].width).abs() / pair[0].pos.distance(pair[1].pos).max(1.0e-6);
+                steepest = steepest.max(slope);
+                widest = widest.max(pair[0].width);
+            }
+        }
+        // The line is a little shorter than the way along all its texels.
+        assert!(steepest < 0.3, "seed {seed}: {steepest}");
+        assert!(widest > 0.01, "seed {seed}: no stroke is wide");
+        for (vertex, mut widths) in seams.vertices.iter().zip(widths) {
+            widths.sort_by(f32::total_cmp);
+            if let [.., second, first] = widths[..]
+                && !vertex.on_border
+            {
+                assert_eq!(first, second, "seed {seed} at {}", vertex.pos);
+            }
+        }
+    }
+}
+
 /// A change here changes the patterns of all users.
 #[test]
 fn maps_are_frozen() {
