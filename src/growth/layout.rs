@@ -350,6 +350,12 @@ impl CrackGrowth {
         !self.lay_out(markers) && self.field.settle_some(&self.network.nodes, &self.nodes, markers)
     }
 
+    /// Whether [`prepare_step`](Self::prepare_step) has begun and is not done. A hit would do the rest of it at once.
+    #[cfg_attr(not(feature = "bevy"), expect(dead_code, reason = "surfaces of the plugin are hit"))]
+    pub(crate) const fn is_preparing(&self) -> bool {
+        self.layout.is_some() || self.field.is_settling()
+    }
+
     /// Whether markers of a hit are still to be laid out.
     #[must_use]
     pub const fn is_laying_out(&self) -> bool {

@@ -4,6 +4,7 @@ use super::{
     CrackBudget, CrackClock, CrackError, CrackFailed, CrackState, CrackStats, CrackStatus, CrackTextures, HitPoint,
     budget::{FrameClock, Timer},
     carrier::{self, Found, Kind},
+    clock,
     error::Called,
     mask, picture,
     plan::{Blank, Draft, Plan, Readings},
@@ -50,11 +51,17 @@ pub(super) fn apply_hits(world: &mut World) {
             make_others(world);
             break;
         }
-        // A hit comes after the markers of the one before it.
-        let active = world.resource::<Surfaces>().active.get(&entity);
-        if active.is_some_and(|active| active.growth.is_laying_out()) {
-            world.resource_mut::<HitQueue>().park();
-            continue;
+        // A hit comes after the markers of the one before it, all in their places.
+        match prepare_some(&mut world.resource_mut::<Surfaces>(), entity) {
+            Some(true) => {
+                has_worked = true;
+                continue;
+            }
+            Some(false) => {
+                world.resource_mut::<HitQueue>().park();
+                continue;
+            }
+            None => {}
         }
         // A hit beside a surface makes nothing for it.
         let ready = if is_missed(world, entity) { Ok(true) } else { prepare::make_ready(world, entity) };
@@ -78,6 +85,18 @@ pub(super) fn apply_hits(world: &mut World) {
         }
     }
     world.resource_mut::<FrameClock>().stop(&timer);
+}
+
+/// Goes on with the markers of a surface that have no places yet; `None` if all have, `false` if they are being laid out, which comes first.
+fn prepare_some(surfaces: &mut Surfaces, entity: Entity) -> Option<bool> {
+    let growth = &mut surfaces.active.get_mut(&entity)?.growth;
+    growth.is_preparing().then(|| {
+        let has_places = !growth.is_laying_out();
+        if has_places {
+            growth.prepare_step(clock::SLICE);
+        }
+        has_places
+    })
 }
 
 /// Goes on with the markers of hits, the oldest first, one slice at least. Returns whether there was any.
@@ -204,6 +223,7 @@ fn apply(world: &mut World, entity: Entity, hit: QueuedHit, timer: &Timer) -> Re
         let energy = hit.energy.min(HARDEST);
         active.struck = Some(Struck { pos, energy, direction: hit.direction });
         active.hits += 1;
+        active.note_hit();
         if is_left && !surfaces.laying_out.contains(&entity) {
             surfaces.laying_out.push_back(entity);
         }

@@ -91,7 +91,7 @@ const MAX_DUE: f64 = 64.0;
 const MAX_LATE: f64 = 4.0;
 
 /// Markers that are taken up between two looks at the frame's clock.
-const SLICE: u32 = 8192;
+pub(super) const SLICE: u32 = 8192;
 
 /// The most steps a second that baked cracks appear in.
 const MOST_STEPS: f64 = 1e6;

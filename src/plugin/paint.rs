@@ -163,6 +163,16 @@ pub(super) fn stamp(active: &mut Active, scratch: &mut Scratch) {
     }
 }
 
+impl Active {
+    /// Finds out what a hit crushes, which counts as part of the hit. It is drawn when the surface is painted.
+    pub(super) fn note_hit(&mut self) {
+        if self.playback.is_none() {
+            let moment = self.moment();
+            self.field.follow_hits(self.growth.timeline(), moment);
+        }
+    }
+}
+
 /// Draws some of what hits have crushed: a tile at least if any is left, and no more than `most`.
 fn crush(active: &mut Active, scratch: &mut Scratch, most: usize, timer: &Timer) {
     if active.field.is_behind() {

@@ -96,6 +96,12 @@ impl DepthField {
         changed.retain(|rect| !rect.is_empty());
     }
 
+    /// Takes up the hits until then, so that what they have crushed can be drawn; [`begin_layer`](Self::begin_layer) does it by itself.
+    #[cfg_attr(not(feature = "bevy"), expect(dead_code, reason = "surfaces of the plugin are hit"))]
+    pub(crate) fn follow_hits(&mut self, timeline: &Timeline, moment: Moment) {
+        self.layer.follow(timeline, moment);
+    }
+
     /// Draws what hits have crushed, at most so many tiles of 32 x 32 texels, from each hit outward. Returns whether any are left.
     pub(crate) fn crush(&mut self, tiles: usize, changed: &mut Vec<TexelRect>) -> bool {
         let is_left = self.layer.crush(tiles, self.forbidden.as_ref(), changed);

@@ -220,7 +220,7 @@ fn i5_ten_thousand_hits_on_one_point_cost_no_more_than_the_first() {
 #[test]
 fn i6_ten_thousand_hits_in_one_frame_stay_in_the_budget() {
     const BUDGET: f32 = 2.0;
-    let run = |milliseconds: f32| {
+    let run = |milliseconds: f32, most: usize| {
         let mut app = app();
         app.world_mut().resource_mut::<CrackBudget>().milliseconds = milliseconds;
         let entity = spawn_picture(&mut app, UVec2::splat(128));
@@ -232,32 +232,34 @@ fn i6_ten_thousand_hits_in_one_frame_stay_in_the_budget() {
         let mut times = vec![timed_step(&mut app)];
         let stats = counts(&app);
         assert_eq!((stats.sent, stats.rejected), (10_000, 0));
-        while counts(&app).queued > 0 {
+        while counts(&app).queued > 0 && times.len() < most {
             times.push(timed_step(&mut app));
-            assert!(times.len() < 20_000, "the queue does not drain");
         }
         let stats = counts(&app);
-        assert_eq!(stats.applied + stats.merged + stats.rejected, 10_000);
-        settle(&mut app, entity);
+        assert_eq!(stats.applied + stats.merged + stats.rejected + stats.queued, 10_000);
+        if milliseconds > 0.0 {
+            assert_eq!(stats.queued, 0, "the queue does not drain");
+            settle(&mut app, entity);
+        }
         times
     };
     // Other programs run on the machine, and all runs do the same: the shortest of several runs counts, for each frame of
     // those without a budget, which show what one hit, one step and one surface cost, and for the longest frame of the others.
-    let mut ones = run(0.0);
+    let mut ones = run(0.0, 3000);
     for _ in 0..2 {
-        for (one, again) in ones.iter_mut().zip(run(0.0)) {
+        for (one, again) in ones.iter_mut().zip(run(0.0, 3000)) {
             *one = again.min(*one);
         }
     }
     let one = ones.iter().skip(1).max().copied().unwrap();
     let limit = Duration::from_secs_f32(BUDGET * 1.5 / 1000.0) + one;
     let longest_of = |times: Vec<Duration>| times.into_iter().max().unwrap();
-    let mut longest = longest_of(run(BUDGET));
+    let mut longest = longest_of(run(BUDGET, 20_000));
     for _ in 0..20 {
         if longest <= limit {
             break;
         }
-        longest = longest.min(longest_of(run(BUDGET)));
+        longest = longest.min(longest_of(run(BUDGET, 20_000)));
     }
     println!("the longest frame {longest:?}, {limit:?} allowed (one step: {one:?})");
     assert!(longest <= limit, "a frame of {longest:?}, {limit:?} allowed");

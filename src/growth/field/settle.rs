@@ -7,8 +7,10 @@ use crate::{
 };
 use glam::UVec2;
 
-/// What a node that looks at the markers within its reach costs, in markers that are looked at.
+/// What a node costs that looks at the markers within its reach, in markers that are moved; and so many of those that it looks at cost as
+/// much as one that is moved.
 const VISIT: u32 = 8;
+const LOOKS: f32 = 8.0;
 
 /// How far a field has come with its newborn markers.
 #[derive(Clone, Debug, Default)]
@@ -85,7 +87,8 @@ impl MarkerField {
             Phase::Recall => self.relations.as_ref().map_or(0, |_| self.x.len() - LANES),
             Phase::Visit => nodes.len(),
         } as u64;
-        let slice = cursor.slice(count, if settling.phase == Phase::Visit { VISIT } else { 1 });
+        let cost = if settling.phase == Phase::Visit { self.visit_cost() } else { 1 };
+        let slice = cursor.slice(count, cost);
         let slice = slice.start as usize..slice.end as usize;
         let is_over = cursor.is_at(count);
         match settling.phase {
@@ -140,6 +143,13 @@ impl MarkerField {
             Phase::Visit => slice.for_each(|index| self.visit(index as u32, nodes, grid)),
         }
         is_over
+    }
+
+    /// What a node costs that looks at the markers around it, on average: many hits lay theirs over each other.
+    fn visit_cost(&self) -> u32 {
+        let around = (2.0 * self.radius * self.per_unit + 1.0).min(self.cells.as_vec2());
+        let share = around.element_product() / self.cells.as_vec2().element_product();
+        VISIT + (share * self.x.len() as f32 / LOOKS) as u32
     }
 
     /// Cells of half the radius, but with a few markers to each.

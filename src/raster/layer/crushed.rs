@@ -8,10 +8,7 @@ use crate::{
     raster::TexelRect,
 };
 use glam::{UVec2, Vec2};
-use std::{
-    collections::{BTreeSet, VecDeque},
-    f32::consts::TAU,
-};
+use std::{collections::VecDeque, f32::consts::TAU};
 
 /// What a hit crushes: a spot around it, by its energy. All of it is made from the seed and the place, at any resolution.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -230,6 +227,8 @@ pub(crate) struct CrushedField {
     used: usize,
     /// What is still to be drawn, in this order.
     waiting: VecDeque<Waiting>,
+    /// Which tiles are to be drawn anew.
+    is_anew: Vec<bool>,
 }
 
 /// A tile that is not drawn yet.
@@ -260,6 +259,7 @@ impl CrushedField {
             tiles: vec![None; count.element_product() as usize],
             used: 0,
             waiting: VecDeque::new(),
+            is_anew: vec![false; count.element_product() as usize],
         }
     }
 
@@ -292,20 +292,19 @@ impl CrushedField {
                 new.push(strike.impact);
             }
         }
-        let key = |tile: UVec2| (tile.y, tile.x);
-        let before = self.waiting.iter().filter(|waiting| waiting.impact.is_none()).map(|waiting| key(waiting.tile));
-        let mut is_anew: BTreeSet<(u32, u32)> = before.collect();
-        anew.sort_unstable_by_key(|tile| key(*tile));
-        anew.retain(|tile| is_anew.insert(key(*tile)));
+        anew.sort_unstable_by_key(|tile| (tile.y, tile.x));
+        let columns = self.columns;
+        let slot = |tile: UVec2| (tile.y * columns + tile.x) as usize;
+        anew.retain(|tile| !std::mem::replace(&mut self.is_anew[slot(*tile)], true));
         if !anew.is_empty() {
-            self.waiting.retain(|Waiting { tile, impact }| impact.is_none() || !is_anew.contains(&key(*tile)));
+            let Self { waiting, is_anew, .. } = self;
+            waiting.retain(|Waiting { tile, impact }| impact.is_none() || !is_anew[slot(*tile)]);
             self.waiting.extend(anew.into_iter().map(|tile| Waiting { tile, impact: None }));
         }
         for index in new {
             let Some(Some(zone)) = self.zones.get(index as usize).copied() else { continue };
-            let is_drawn = |tile: &UVec2| is_anew.contains(&key(*tile));
-            let mut tiles: Vec<UVec2> =
-                tiles_of(&zone.bounds).filter(|tile| !is_drawn(tile) && self.counts(index, *tile)).collect();
+            let is_wanted = |tile: &UVec2| !self.is_anew[slot(*tile)] && self.counts(index, *tile);
+            let mut tiles: Vec<UVec2> = tiles_of(&zone.bounds).filter(is_wanted).collect();
             // From the hit outward.
             let middle = |tile: UVec2| (tile * TILE + TILE / 2).as_vec2();
             tiles.sort_by(|a, b| {
@@ -335,6 +334,7 @@ impl CrushedField {
             let texels = self.texels_of(tile);
             let Some(impact) = impact else {
                 let slot = (tile.y * self.columns + tile.x) as usize;
+                self.is_anew[slot] = false;
                 self.used -= usize::from(self.tiles[slot].take().is_some());
                 let zones: Vec<u32> = self.on(tile).take(MOST).collect();
                 zones.into_iter().for_each(|index| self.draw(index, tile, forbidden));

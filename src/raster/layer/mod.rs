@@ -80,6 +80,11 @@ impl Layer {
         if let Some(plates) = &mut self.plates {
             plates.show(network, timeline, moment, forbidden, changed);
         }
+        self.follow(timeline, moment);
+    }
+
+    /// Takes up the hits until then.
+    pub(super) fn follow(&mut self, timeline: &Timeline, moment: Moment) {
         if let Some(crushed) = &mut self.crushed {
             let count = timeline.entries(moment.begun()).strikes;
             crushed.follow(&timeline.strikes()[..count], timeline.strikes());
