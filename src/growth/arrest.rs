@@ -2,7 +2,7 @@
 
 use super::{
     CrackGrowth, StartLayout,
-    divide::Division,
+    divide::{Division, MUCH_WIDER},
     pull::turned_at_most,
     rays::NO_RAY,
     walls::{Walls, crosses_itself},
@@ -25,6 +25,9 @@ const LAST: f32 = 1.35;
 
 /// How much less what divides a domain likes to turn than to meet others aslant, by one minus the cosine.
 const HOOK: f32 = 4.0;
+
+/// How much less a steady crack likes to meet another where a third does, segment lengths.
+const TAKEN: f32 = 2.0;
 
 /// Segment lengths that a tip needs to turn.
 const TURN: f32 = 2.5;
@@ -253,6 +256,9 @@ impl CrackGrowth {
     }
 
     fn advance_runner(&mut self, mut runner: Runner) -> Option<Runner> {
+        if self.is_over(runner.tip) {
+            return None;
+        }
         let node = self.network.nodes[runner.tip as usize];
         let heading = self.heading_of(runner.tip);
         let length = self.params.step_length;
@@ -344,11 +350,15 @@ impl CrackGrowth {
                     along.dot(way / distance).abs()
                 };
                 let turn = if course == Vec2::ZERO { 0.0 } else { 1.0 - way.dot(course) / distance };
-                nearby.push((distance / length + 3.0 * slant + HOOK * turn, node));
+                let taken = if self.is_met_already(node) { TAKEN } else { 0.0 };
+                nearby.push((distance / length + 3.0 * slant + HOOK * turn + taken, node));
             }
         });
         nearby.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        nearby.into_iter().take(5).any(|(_, node)| self.join(node, tip, LinkKind::Junction))
+        nearby.into_iter().take(5).any(|(_, node)| {
+            self.end_beside(node, tip).is_some_and(|end| self.join(end, tip, LinkKind::Junction))
+                || self.join(node, tip, LinkKind::Junction)
+        })
     }
 
     /// Bears a node at `to` if its line touches no other; if it does, joins the crack that is in the way.
@@ -432,13 +442,15 @@ impl CrackGrowth {
         let joined = self.link(link);
         if joined {
             self.is_met(node);
+            self.note_meeting(node, tip);
             // What closes a cell at the rim gets thin.
-            if self.divides() && (self.has_left(tip) || self.has_left(node)) {
+            if self.divides() && (self.has_left(tip) || self.has_left(node) || self.is_much_wider(tip, node)) {
                 self.thin_end(tip);
             } else {
                 self.widen_end(tip);
                 // Of two ends that meet neither is one any more.
-                let is_thinner = |division: &Division| division.share(node) <= division.share(tip);
+                let like = if self.params.steady > 0.0 { MUCH_WIDER } else { 1.0 };
+                let is_thinner = |division: &Division| division.share(node) <= like * division.share(tip);
                 let is_end = self.network.nodes[node as usize].parent != NO_PARENT && self.child_of(node) == NO_PARENT;
                 if is_end && self.division.as_ref().is_some_and(is_thinner) {
                     self.widen_end(node);

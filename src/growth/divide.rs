@@ -64,8 +64,29 @@ const STRANDED: f32 = 3.0;
 /// Cosine of the angle to its way up to which it looks for that.
 const ASIDE: f32 = 0.25;
 
+/// How much larger that is for a steady crack.
+const STEADY_ASIDE: f32 = 0.35;
+
 /// How much less a crack likes to begin where it would meet others aslant.
 const SLANT: f32 = 0.25;
+
+/// The same of a steady crack, besides.
+const STEEP: f32 = 0.75;
+
+/// Cosine of the angle between the ways of two tips below which they come towards each other.
+const HEAD_ON: f32 = 0.2;
+
+/// The same above which a steady crack does not make for a tip that waits: they run side by side.
+const ALONG: f32 = 0.6;
+
+/// A steady crack narrows where it meets one that is so many times narrower.
+pub(super) const MUCH_WIDER: f32 = 1.7;
+
+/// From which share of the way to the rim on cracks thin out.
+const THINS: f32 = 0.4;
+
+/// How many times larger domains are at the rim than nearer to the hit, less one.
+const SPARSER: f32 = 0.8;
 
 /// A tip that has left the region of its hit is met from so many times as far as other cracks.
 const INVITES: f32 = 1.4;
@@ -91,8 +112,8 @@ pub(super) struct Division {
     fresh: Range<u32>,
     /// The generation that begins now.
     generation: u8,
-    /// Generation of each node's crack; none = the first.
-    generations: Vec<u8>,
+    /// Of each node's crack; none = the first generation, as wide as it may be.
+    kinds: Vec<Kind>,
     /// Steps at which the impacts came, and radii of what they have loaded.
     begun: Vec<(u32, f32)>,
     /// Tips that have left what their hit has loaded, and wait for a crack that meets them.
@@ -101,9 +122,27 @@ pub(super) struct Division {
     seen: u32,
 }
 
+/// What the nodes of a crack have in common.
+#[derive(Clone, Copy, Debug)]
+struct Kind {
+    generation: u8,
+    /// Whether another crack has met this one here.
+    is_met: bool,
+    /// Whether it ends here, as it has met another, or that one has met it head on.
+    is_over: bool,
+    /// How much narrower it is than others of its generation.
+    narrower: f32,
+}
+
+impl Kind {
+    const FIRST: Self = Self { generation: 0, is_met: false, is_over: false, narrower: 1.0 };
+}
+
 #[derive(Clone, Copy, Debug)]
 struct Tip {
     node: u32,
+    /// The way in which its crack began.
+    course: Vec2,
     /// Steps that it has run straight on.
     straight: u16,
     /// Whether it has waited at the rim for long enough.
@@ -147,28 +186,32 @@ impl Division {
         (params.venation == Venation::Dividing).then(Self::default)
     }
 
-    /// How much narrower than others the crack of a node is.
-    pub(super) fn share(&self, node: u32) -> f32 {
-        let generation = self.generations.get(node as usize).copied().unwrap_or(0);
-        (0..generation).fold(1.0, |share, _| share * NARROWER)
+    fn kind(&self, node: u32) -> Kind {
+        self.kinds.get(node as usize).copied().unwrap_or(Kind::FIRST)
     }
 
-    /// Notes the generation of a newborn node; returns how many times as wide as others it is.
-    pub(super) fn bear(&mut self, node: u32, parent: u32) -> f32 {
-        let generation = match self.generations.get(parent as usize) {
-            Some(&generation) => generation,
-            None if parent == NO_PARENT => self.generation,
-            None => 0,
+    /// How much narrower than others the crack of a node is.
+    pub(super) fn share(&self, node: u32) -> f32 {
+        let Kind { generation, narrower, .. } = self.kind(node);
+        (0..generation).fold(narrower, |share, _| share * NARROWER)
+    }
+
+    /// Notes the crack of a newborn node, which is so much narrower than others if it begins here; returns how many times as wide as others it is.
+    pub(super) fn bear(&mut self, node: u32, parent: u32, narrower: f32) -> f32 {
+        let kind = match self.kinds.get(parent as usize) {
+            Some(&kind) => Kind { is_met: false, is_over: false, ..kind },
+            None if parent == NO_PARENT => Kind { generation: self.generation, narrower, ..Kind::FIRST },
+            None => Kind::FIRST,
         };
-        self.generations.resize(node as usize, 0);
-        self.generations.push(generation);
+        self.kinds.resize(node as usize, Kind::FIRST);
+        self.kinds.push(kind);
         self.share(node)
     }
 
     /// The generation of a node's crack.
     #[cfg(test)]
     pub(super) fn generation_of(&self, node: u32) -> u8 {
-        self.generations.get(node as usize).copied().unwrap_or(0)
+        self.kind(node).generation
     }
 
     /// How far an impact has loaded the surface.
@@ -196,7 +239,7 @@ impl Division {
 
     /// Forgets the first nodes.
     pub(super) fn forget(&mut self, first: u32) {
-        self.generations.drain(..self.generations.len().min(first as usize));
+        self.kinds.drain(..self.kinds.len().min(first as usize));
         self.fresh = self.fresh.start.saturating_sub(first)..self.fresh.end.saturating_sub(first);
         self.seen = self.seen.saturating_sub(first);
         for tips in [&mut self.tips, &mut self.resting] {
@@ -211,9 +254,10 @@ impl Division {
 
 impl GrowthParams {
     /// How far from all cracks a marker must be for one of this generation to begin at it.
-    fn loaded(&self, generation: u8, from_hit: f32) -> f32 {
+    fn loaded(&self, generation: u8, from_hit: f32, reach: f32) -> f32 {
         let coarser = (u32::from(generation) + 1..self.generations).fold(1.0, |by, _| by * COARSER);
-        self.kill_distance * coarser / (1.0 + self.focus * self.near_hit(from_hit))
+        let further = 1.0 + SPARSER * self.thinning * towards_rim(from_hit, reach);
+        self.kill_distance * coarser * further / (1.0 + self.focus * self.near_hit(from_hit))
     }
 
     /// 1 at the hit, 0 where domains know nothing of it any more.
@@ -257,7 +301,7 @@ impl CrackGrowth {
         self.steps = self.steps.saturating_add(1);
         for node in fresh {
             if self.network.nodes[node as usize].parent != NO_PARENT {
-                self.keep_tip(Tip { node, straight: 0, runs_out: false });
+                self.keep_tip(Tip { node, course: self.heading_of(node), straight: 0, runs_out: false });
             } else if !matches!(self.params.starts, StartLayout::Crushed { .. }) && self.child_of(node) == NO_PARENT {
                 let Node { pos, impact, .. } = self.network.nodes[node as usize];
                 if let Some(across) = self.across(pos, impact, node, self.params.crack_radius) {
@@ -294,7 +338,7 @@ impl CrackGrowth {
             let (params, impacts, generation) = (&self.params, &self.impacts, division.generation);
             let is_last = u32::from(generation) + 1 >= params.generations;
             let narrow = if is_last { NARROW } else { 1.0 };
-            let finest = narrow * params.loaded(generation, 0.0);
+            let finest = narrow * params.loaded(generation, 0.0, f32::INFINITY);
             let fronts: Vec<f32> = (0..impacts.len() as u32).map(|impact| self.front(impact)).collect();
             let mut nearest = f32::INFINITY;
             self.field.each_beyond(finest * finest, |marker, id, pos, near_sq, impact| {
@@ -306,7 +350,8 @@ impl CrackGrowth {
                     return;
                 }
                 let from_hit = from_hit_sq.sqrt();
-                let loaded = narrow * params.loaded(generation, from_hit);
+                let reach = division.begun.get(impact as usize).map_or(f32::INFINITY, |begun| begun.1);
+                let loaded = narrow * params.loaded(generation, from_hit, reach);
                 if near_sq > loaded * loaded {
                     nearest = nearest.min(from_hit - front);
                     found.push(Candidate { marker, id, impact, pos, near_sq, from_hit });
@@ -342,7 +387,8 @@ impl CrackGrowth {
     fn begin_crack(&mut self, candidate: Candidate) {
         let near_sq = self.field.near_sq(candidate.marker);
         let Some(division) = &self.division else { return };
-        let loaded = self.params.loaded(division.generation, candidate.from_hit);
+        let reach = division.begun.get(candidate.impact as usize).map_or(f32::INFINITY, |begun| begun.1);
+        let loaded = self.params.loaded(division.generation, candidate.from_hit, reach);
         if near_sq < STILL * STILL * candidate.near_sq || self.room() < 3 {
             return;
         }
@@ -393,7 +439,7 @@ impl CrackGrowth {
         for way in ways.into_iter().take(if is_star { 3 } else { 2 }) {
             let born = self.network.nodes.len() as u32;
             if self.advance(node, pos + way * self.params.step_length) == Advance::Grown {
-                self.keep_tip(Tip { node: born, straight: 0, runs_out: false });
+                self.keep_tip(Tip { node: born, course: way, straight: 0, runs_out: false });
             }
         }
         if let Some(arrest) = &mut self.arrest {
@@ -427,8 +473,19 @@ impl CrackGrowth {
         sight
     }
 
-    /// How a crack would divide the domain around a place, as far as can be seen from there; none where it could not end at others.
+    /// How a crack would divide the domain around a place; none where it could not end at others.
     fn across(&self, pos: Vec2, impact: u32, draws: u32, clearance: f32) -> Option<Across> {
+        let across = self.across_from(pos, impact, draws, clearance)?;
+        if self.params.steady <= 0.0 {
+            return Some(across);
+        }
+        // From its middle the domain is seen better.
+        let again = self.across_from(across.middle, impact, draws, clearance);
+        Some(again.map_or(across, |again| Across { middle: across.middle, ..again }))
+    }
+
+    /// The same as far as can be seen from that place.
+    fn across_from(&self, pos: Vec2, impact: u32, draws: u32, clearance: f32) -> Option<Across> {
         let draw = |what: u64| hash_unit(self.seed ^ what, u64::from(draws));
         let turn = PI * draw(0xA1);
         let axes: [Vec2; AXES] = std::array::from_fn(|i| ops::unit(turn + PI * i as f32 / AXES as f32));
@@ -457,7 +514,7 @@ impl CrackGrowth {
         let sum = |i: usize| seen[i % AXES][0].0 + seen[i % AXES][1].0;
         let around = |i: usize| 0.5 * sum(i) + 0.25 * (sum(i + 1) + sum(i + AXES - 1));
         let score = |i: usize| {
-            let slant = 1.0 + SLANT * (seen[i][0].1 + seen[i][1].1);
+            let slant = 1.0 + (SLANT + STEEP * self.params.steady) * (seen[i][0].1 + seen[i][1].1);
             around(i) * slant * (1.0 + 1.2 * near_hit * (1.0 - axes[i].dot(out).abs()))
         };
         let may_leave = self.division.as_ref().is_none_or(|division| division.generation == 0);
@@ -468,7 +525,7 @@ impl CrackGrowth {
         let is_out =
             |there: Vec2| (there - hit).length() > rim_towards(there - hit, reach, self.seed ^ u64::from(impact));
         let middle = if is_out(middle) { pos } else { middle };
-        let stray = 2.0 * self.params.wander * (2.0 * draw(0xA2) - 1.0);
+        let stray = 2.0 * self.params.wander * (1.0 - 0.7 * self.params.steady) * (2.0 * draw(0xA2) - 1.0);
         let way = (axes[best] + axes[best].perp() * stray).normalize_or(Vec2::X);
         let length = around(long);
         Some(Across { way, middle: middle.clamp(Vec2::ZERO, extent), length, longer: length / around(best).max(1e-6) })
@@ -486,10 +543,14 @@ impl CrackGrowth {
 
     /// Grows a tip by a segment: after its markers, straight on where it has none.
     fn advance_tip(&mut self, tip: Tip) {
-        let Tip { node, straight, runs_out } = tip;
+        let Tip { node, course, straight, runs_out } = tip;
+        if self.is_over(node) {
+            return;
+        }
         let this = self.network.nodes[node as usize];
         let Some(before) = self.network.nodes.get(this.parent as usize) else { return };
-        let heading = (this.pos - before.pos).normalize_or_zero();
+        let last = (this.pos - before.pos).normalize_or_zero();
+        let heading = (last + (course - last) * self.params.steady).normalize_or(last);
         let (length, child) = (self.params.step_length, self.network.nodes.len() as u32);
         let stray = self.params.wander * self.stray(before.pos, this.pos, child);
         let drawn = self.drawn(this.pos, heading).map(|pull| {
@@ -511,7 +572,7 @@ impl CrackGrowth {
         }
         let to = to.unwrap_or(this.pos + (heading + heading.perp() * stray).normalize_or_zero() * length);
         if self.advance(node, to) == Advance::Grown {
-            self.keep_tip(Tip { node: child, straight: straight + u16::from(runs_straight), runs_out });
+            self.keep_tip(Tip { node: child, course, straight: straight + u16::from(runs_straight), runs_out });
         }
         if let Some(arrest) = &mut self.arrest {
             arrest.seal(node);
@@ -598,7 +659,8 @@ impl CrackGrowth {
     fn closes(&mut self, tip: u32) -> bool {
         let Node { pos, parent, .. } = self.network.nodes[tip as usize];
         let heading = self.network.nodes.get(parent as usize).map_or(Vec2::ZERO, |before| pos - before.pos);
-        !self.stays_open(tip) && self.run_on(tip, heading.normalize_or_zero(), CLOSE * self.params.kill_distance, ASIDE)
+        let aside = ASIDE + STEADY_ASIDE * self.params.steady;
+        !self.stays_open(tip) && self.run_on(tip, heading.normalize_or_zero(), CLOSE * self.params.kill_distance, aside)
     }
 
     /// Whether a node has left what its hit has loaded.
@@ -629,7 +691,8 @@ impl CrackGrowth {
             let way = nodes[tip.node as usize].pos - pos;
             let distance = way.length();
             let is_near = distance <= INVITES * reach && distance > 0.0 && way.dot(heading) >= ahead * distance;
-            (is_near && !self.is_kin(from, tip.node)).then_some((distance, tip.node))
+            let is_aside = self.params.steady > 0.0 && self.heading_of(tip.node).dot(heading) > ALONG;
+            (is_near && !is_aside && !self.is_kin(from, tip.node)).then_some((distance, tip.node))
         });
         near.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
     }
@@ -646,6 +709,73 @@ impl CrackGrowth {
         }
     }
 
+    /// Whether the crack of a tip is so much wider than that of a node that it narrows where it meets it, if it is steady.
+    pub(super) fn is_much_wider(&self, tip: u32, node: u32) -> bool {
+        let width = |node: u32| {
+            let Node { pos, impact, .. } = self.network.nodes[node as usize];
+            let energy = self.impacts.get(impact as usize).map_or(1.0, |impact| impact.widening);
+            self.division.as_ref().map_or(1.0, |division| division.share(node)) * self.thinned(pos, impact) * energy
+        };
+        self.params.steady > 0.0 && width(tip) > MUCH_WIDER * width(node)
+    }
+
+    /// Whether another crack meets that of a node there, if that makes a difference.
+    pub(super) fn is_met_already(&self, node: u32) -> bool {
+        self.params.steady > 0.0 && self.division.as_ref().is_some_and(|division| division.kind(node).is_met)
+    }
+
+    /// The free end of the crack of a node, a segment or two further on, which a steady tip meets in its place: no cell lies between the two ends.
+    pub(super) fn end_beside(&self, node: u32, tip: u32) -> Option<u32> {
+        if self.params.steady <= 0.0 || !self.divides() {
+            return None;
+        }
+        let child = |node: u32| Some(self.child_of(node)).filter(|&child| child != NO_PARENT);
+        let first = child(node)?;
+        let end = child(first).unwrap_or(first);
+        let (pos, extent) = (self.network.nodes[end as usize].pos, self.network.extent());
+        let is_free = child(end).is_none()
+            && !self.is_over(end)
+            && self.are_head_on(end, tip)
+            && !(pos.cmpeq(Vec2::ZERO) | pos.cmpeq(extent)).any()
+            && !self.is_kin(end, tip);
+        let near = 2.0 * self.params.step_length;
+        (is_free && pos.distance_squared(self.network.nodes[tip as usize].pos) <= near * near).then_some(end)
+    }
+
+    /// Whether a steady crack ends at a node.
+    pub(super) fn is_over(&self, node: u32) -> bool {
+        self.params.steady > 0.0 && self.division.as_ref().is_some_and(|division| division.kind(node).is_over)
+    }
+
+    /// Whether two ends come towards each other.
+    fn are_head_on(&self, one: u32, other: u32) -> bool {
+        self.heading_of(one).dot(self.heading_of(other)) < HEAD_ON
+    }
+
+    /// Notes that a tip has met another crack at a node.
+    pub(super) fn note_meeting(&mut self, node: u32, tip: u32) {
+        let ends_both = self.child_of(node) == NO_PARENT && self.are_head_on(node, tip);
+        let Some(division) = &mut self.division else { return };
+        if let Some(kind) = division.kinds.get_mut(node as usize) {
+            (kind.is_met, kind.is_over) = (true, kind.is_over || ends_both);
+        }
+        if let Some(kind) = division.kinds.get_mut(tip as usize) {
+            kind.is_over = true;
+        }
+    }
+
+    /// How many times as wide as others a crack of an impact is at a place: less towards the rim.
+    pub(super) fn thinned(&self, pos: Vec2, impact: u32) -> f32 {
+        if self.params.thinning <= 0.0 {
+            return 1.0;
+        }
+        let begun = self.division.as_ref().and_then(|division| division.begun.get(impact as usize));
+        let (Some((_, reach)), Some(hit)) = (begun, self.impacts.get(impact as usize)) else { return 1.0 };
+        let way = pos - hit.pos;
+        let rim = rim_towards(way, *reach, self.seed ^ u64::from(impact));
+        1.0 - self.params.thinning * towards_rim(way.length(), rim)
+    }
+
     /// Shows the markers what has been born.
     fn show_markers(&mut self) {
         let last = self.network.nodes.len() as u32;
@@ -654,6 +784,12 @@ impl CrackGrowth {
             self.field.visit(node, &self.network.nodes, &self.nodes);
         }
     }
+}
+
+/// 0 as far from a hit as all is loaded alike, 1 a little beyond the rim.
+fn towards_rim(from_hit: f32, rim: f32) -> f32 {
+    let share = ((from_hit / rim.max(1e-6) - THINS) / (1.1 - THINS)).clamp(0.0, 1.0);
+    share * share * (3.0 - 2.0 * share)
 }
 
 /// How far a hit loads the surface in a direction, at most `reach`: no two alike, and none round.

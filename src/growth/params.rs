@@ -184,6 +184,14 @@ pub struct GrowthParams {
     /// With [`Venation::Dividing`]: share of the cracks that begin with three arms, 120 degrees apart, in place of two, where a domain is about as
     /// wide as long: more cells have five and six sides. 0..=1.
     pub stars: f32,
+    /// With [`Venation::Dividing`]: how much cracks keep to the way in which they began, with kinks about it in place of bends, straight across the
+    /// widest place of their domain: plates are polygons, and no two cracks meet a third from either side of one place. 0..=1; default 0.
+    pub steady: f32,
+    /// With [`Venation::Dividing`]: how much thinner cracks are towards the rim of what their hit has loaded, and how much larger domains: at 1
+    /// there is next to nothing at the rim. 0..=1; default 0.
+    pub thinning: f32,
+    /// With [`Venation::Dividing`]: how much narrower than others of its generation a crack is at the most. 0..=0.9; default 0.
+    pub mixed: f32,
     /// With [`Venation::Dividing`]: how far cracks may begin from the hit, pattern units for each step since it; 0 = anywhere at once. 0..=1.
     pub front: f32,
     /// How much one surface differs from the next, by its seed: widths, roughness, the spacing of markers, the number of starts and
@@ -238,6 +246,9 @@ impl GrowthParams {
         nucleation: 0.0,
         generations: 1,
         stars: 0.0,
+        steady: 0.0,
+        thinning: 0.0,
+        mixed: 0.0,
         front: 0.0,
         variety: 0.0,
         courses: 0.0,
@@ -343,6 +354,9 @@ impl GrowthParams {
         nucleation: f32 = 0.0, 64.0;
         generations: u32 = 1.0, 4.0;
         stars: f32 = 0.0, 1.0;
+        steady: f32 = 0.0, 1.0;
+        thinning: f32 = 0.0, 1.0;
+        mixed: f32 = 0.0, 0.9;
         front: f32 = 0.0, 1.0;
         variety: f32 = 0.0, 1.0;
         courses: f32 = 0.0, 1.0;

@@ -270,31 +270,74 @@ impl Look {
         ..Self::GROOVE
     };
 
-    /// Clay: plates of slightly different tone with lit rims, brown depth.
+    /// Clay: flat plates of slightly different tone, brown hairlines and cracks between them, a pale dent where it was hit.
     pub const CLAY: Self = Self {
         ramp: Cow::Borrowed(&[
-            stop(0.16, [0.80, 0.74, 0.68], 0.05),
-            stop(0.35, [0.46, 0.37, 0.29], 0.85),
-            stop(0.75, [0.26, 0.19, 0.14], 0.97),
-            stop(1.0, [0.12, 0.085, 0.06], 1.0),
+            stop(0.085, [1.0, 0.97, 0.92], 0.03),
+            stop(0.22, [0.74, 0.67, 0.59], 0.60),
+            stop(0.55, [0.50, 0.42, 0.34], 0.92),
+            stop(1.0, [0.20, 0.155, 0.12], 1.0),
         ]),
-        glint: 0.8,
-        relief: 0.014,
-        curl: 0.07,
-        curl_depth: 0.12,
-        full_rim: 0.010,
-        facets: Some(Facets { tone: 0.085, tilt: 0.03, dish: 0.15, fade: 0.30, ..Facets::DEFAULT }),
+        glint: 1.0,
+        relief: 0.007,
+        curl: 0.03,
+        curl_depth: 0.08,
+        full_rim: 0.008,
+        facets: Some(Facets { tone: 0.11, tilt: 0.02, dish: 0.07, fade: 0.33, ..Facets::DEFAULT }),
+        crushed: Some(Crushed {
+            radius: 0.032,
+            ragged: 0.8,
+            depth: 0.009,
+            rough: 0.005,
+            grain: 0.006,
+            color: [0.94, 0.86, 0.76],
+            pale: 0.7,
+            speckle: 0.4,
+            dust: 0.25,
+            chips: 0.5,
+            reach: 2.6,
+            broken: true,
+            basin: 0.5,
+            tint: 0.6,
+            ..Crushed::DEFAULT
+        }),
         ..Self::GROOVE
     };
 
-    /// Mud: plates of different tone with curled rims, brown depth.
+    /// Mud: dished plates of different tone with curled rims, deep brown gaps with a lit wall and one in the dark, a dark dent where it was hit.
     pub const MUD: Self = Self {
-        curl: 0.10,
-        full_rim: 0.012,
-        relief: 0.02,
-        glint: 0.95,
-        facets: Some(Facets { tone: 0.08, tilt: 0.04, dish: 0.16, fade: 0.33, ..Facets::DEFAULT }),
-        ..Self::CLAY
+        ramp: Cow::Borrowed(&[
+            stop(0.085, [0.85, 0.79, 0.72], 0.02),
+            stop(0.20, [0.60, 0.51, 0.42], 0.70),
+            stop(0.45, [0.50, 0.40, 0.315], 0.92),
+            stop(0.68, [0.30, 0.225, 0.17], 0.97),
+            stop(0.86, [0.09, 0.064, 0.046], 1.0),
+            stop(1.0, [0.05, 0.036, 0.026], 1.0),
+        ]),
+        glint: 2.3,
+        relief: 0.024,
+        curl: 0.07,
+        curl_depth: 0.08,
+        full_rim: 0.02,
+        facets: Some(Facets { tone: 0.12, tilt: 0.05, dish: 0.17, fade: 0.38, ..Facets::DEFAULT }),
+        crushed: Some(Crushed {
+            radius: 0.042,
+            ragged: 0.8,
+            depth: 0.016,
+            rough: 0.007,
+            grain: 0.011,
+            color: [0.38, 0.29, 0.225],
+            pale: 0.75,
+            speckle: 0.45,
+            dust: 0.12,
+            chips: 0.35,
+            reach: 2.4,
+            broken: true,
+            basin: 0.6,
+            tint: 0.75,
+            ..Crushed::DEFAULT
+        }),
+        ..Self::GROOVE
     };
 
     /// The glaze of pottery: ink that has gone into hairlines, darker the wider they are, without relief.
@@ -310,18 +353,20 @@ impl Look {
         catch: 0.45,
         relief: 0.0,
         crushed: Some(Crushed {
-            radius: 0.010,
+            radius: 0.016,
             ragged: 0.9,
-            depth: 0.004,
-            rough: 0.0008,
+            depth: 0.006,
+            rough: 0.0012,
             grain: 0.004,
-            color: [0.90, 0.86, 0.79],
+            color: [0.80, 0.66, 0.52],
             pale: 0.85,
             speckle: 0.3,
             dust: 0.0,
-            chips: 0.0,
-            reach: 4.0,
-            needles: 0.45,
+            chips: 0.1,
+            reach: 2.6,
+            broken: true,
+            flakes: 2,
+            tint: 0.35,
             ..Crushed::DEFAULT
         }),
         ..Self::GROOVE

@@ -142,12 +142,79 @@ fn stars_have_three_arms() {
     for (stars, arms) in [(0.0, 2), (1.0, 3)] {
         let mut preset = CrackPreset::MUD;
         preset.growth.stars = stars;
+        preset.growth.starts = StartLayout::Point;
         let starts = of_seeds(&preset, 1.0).filter(|growth| {
             let nodes = growth.network().nodes();
             nodes.iter().filter(|node| node.parent == 0).count() == arms
         });
         let count = starts.count();
         assert!(count >= 20, "{count} of 24 hits begin with {arms} arms");
+    }
+}
+
+/// Steady cracks are nearly as long as the straight way between their ends, whatever their kinks.
+#[test]
+fn steady_cracks_run_straight() {
+    let straightness = |steady: f32| {
+        let mut preset = CrackPreset::MUD;
+        preset.growth.steady = steady;
+        let mut shares = Vec::new();
+        for growth in of_seeds(&preset, 2.0) {
+            let (nodes, step) = (growth.network().nodes(), growth.params().step_length);
+            for node in 0..nodes.len() as u32 {
+                let before = |node: &u32| Some(nodes[*node as usize].parent).filter(|&parent| parent != NO_PARENT);
+                if let Some(far) = std::iter::successors(Some(node), before).nth(12) {
+                    shares.push(nodes[node as usize].pos.distance(nodes[far as usize].pos) / (12.0 * step));
+                }
+            }
+        }
+        median(shares)
+    };
+    let (bent, straight) = (straightness(0.0), straightness(1.0));
+    assert!(straight > 0.93 && straight > bent, "{straight} of the way, {bent} else");
+}
+
+/// Cracks that thin out are thinner at the rim of what their hit has loaded, and as wide as others near the hit.
+#[test]
+fn cracks_thin_out() {
+    let widths = |thinning: f32| {
+        let mut preset = CrackPreset::CLAY;
+        (preset.growth.thinning, preset.growth.mixed) = (thinning, 0.0);
+        let (mut near, mut far) = (Vec::new(), Vec::new());
+        for growth in of_seeds(&preset, 1.0) {
+            let hit = growth.impacts()[0].pos;
+            let reach = growth.division.as_ref().unwrap().reach_of(0).unwrap();
+            for node in growth.network().nodes() {
+                match node.pos.distance(hit) / reach {
+                    ..0.3 => near.push(node.width),
+                    0.8.. => far.push(node.width),
+                    _ => {}
+                }
+            }
+        }
+        (near.iter().copied().fold(0.0, f32::max), far.iter().copied().fold(0.0, f32::max))
+    };
+    let (even, thin) = (widths(0.0), widths(0.8));
+    assert!((thin.0 / even.0 - 1.0).abs() < 0.15 && thin.1 < 0.7 * even.1, "{even:?} and {thin:?}");
+}
+
+/// Of one generation some cracks are narrower than others, by what they are told at the most; each is alike along its way.
+#[test]
+fn cracks_of_a_generation_are_mixed() {
+    let mut preset = CrackPreset::CLAY;
+    for mixed in [0.0, 0.5] {
+        preset.growth.mixed = mixed;
+        let growth = grown(&preset, Vec2::splat(0.5), 4.0, 3);
+        let division = growth.division.as_ref().unwrap();
+        let nodes = growth.network().nodes();
+        let mut shares = Vec::new();
+        for node in (0..nodes.len() as u32).filter(|&node| division.generation_of(node) == 0) {
+            let parent = nodes[node as usize].parent;
+            shares.push(division.share(node));
+            assert!(parent == NO_PARENT || division.share(parent) == division.share(node));
+        }
+        let least = shares.iter().copied().fold(1.0, f32::min);
+        assert!(least >= 1.0 - mixed && (mixed == 0.0 || least < 1.0 - 0.5 * mixed), "{least} of {mixed}");
     }
 }
 
@@ -222,7 +289,7 @@ fn generations_are_of_their_widths() {
     for (name, preset, shares) in [
         ("clay", CrackPreset::CLAY, &[0.5, 0.25][..]),
         ("mud", CrackPreset::MUD, &[0.5, 0.25]),
-        ("glaze", CrackPreset::GLAZE, &[0.5]),
+        ("glaze", CrackPreset::GLAZE, &[0.5, 0.25]),
     ] {
         let mut widths = vec![Vec::new(); shares.len() + 1];
         for growth in of_seeds(&preset, 4.0) {
