@@ -200,6 +200,8 @@ pub struct GrowthParams {
     /// Height of the courses of bricks in whose joints cracks run, where the [mask](crate::pattern::CrackMask) shows no lines; where it shows
     /// courses of bricks, those. Then no crack is wider than a joint. Pattern units, 0..=1; 0 = the surface is no masonry.
     pub courses: f32,
+    /// How far lines as a whole sway off their way, whatever that follows: uneven joints. Pattern units, 0..=0.05; 0 = not at all.
+    pub sway: f32,
     /// Whether the markers themselves are drawn.
     pub draw_markers: bool,
     /// The most nodes that a surface has at once, 1..=1000000. In the engine a hit for which less than a quarter of them is left freezes
@@ -252,6 +254,7 @@ impl GrowthParams {
         front: 0.0,
         variety: 0.0,
         courses: 0.0,
+        sway: 0.0,
         draw_markers: false,
         max_nodes: 20_000,
     };
@@ -360,6 +363,7 @@ impl GrowthParams {
         front: f32 = 0.0, 1.0;
         variety: f32 = 0.0, 1.0;
         courses: f32 = 0.0, 1.0;
+        sway: f32 = 0.0, 0.05;
         max_nodes: u32 = 1.0, 1_000_000.0;
     }
 
@@ -532,6 +536,7 @@ impl GrowthParams {
         length(&mut scaled.arrest, 0.0, 1.0);
         length(&mut scaled.grain, 0.0, 1.0);
         length(&mut scaled.courses, 0.0, 1.0);
+        length(&mut scaled.sway, 0.0, 0.05);
         length(&mut scaled.front, 0.0, 1.0);
         // So many on the same surface.
         let count = |count: u32| ((count as f32 / by).round() as u32).clamp(1, 512);

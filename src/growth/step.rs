@@ -126,7 +126,7 @@ impl CrackGrowth {
             }
         }
         let params = params.varied(seed);
-        let network = Network::new(extent, params.roughness, seed);
+        let network = Network::new(extent, params.roughness, seed).with_sway(params.sway);
         let mut growth = Self {
             arrest: params.keeps_apart().then(|| Arrest::new(&network, params.step_length)),
             division: Division::new(&params),
@@ -542,7 +542,7 @@ impl CrackGrowth {
         &self.params
     }
 
-    /// Takes up other parameters; what is grown stays, `roughness` included.
+    /// Takes up other parameters; what is grown stays, `roughness` and `sway` included.
     ///
     /// # Errors
     /// If a parameter is out of its range; nothing changes then.

@@ -405,6 +405,10 @@ fn compose<const ROOM: usize>(
         let (shade, hole) = if extras.shades { (dark, 0.0) } else { (0.0, dark) };
         let tone = 1.0 + f32::from(spot.shade) * (1.0 / 128.0);
         let veil = f32::from(extras.veil(place + i)) * look.veil_cover;
+        if extras.is_bare() {
+            let share = extras.left(place + i);
+            over.iter_mut().for_each(|over| over[i] *= share);
+        }
         let (left, sheen) = (1.0 - over[3][i], sheen[i]);
         for c in 0..3 {
             let veiled = look.sheen[c] * sheen * (1.0 - veil) + look.veil[c] * veil;

@@ -22,6 +22,8 @@ pub(super) struct Extras<'a, const ROOM: usize> {
     pub(super) tint: f32,
     /// Whether what is dark in it is a shadow, not a hole.
     pub(super) shades: bool,
+    /// How much of cracks is gone where it has come off.
+    bare: f32,
     /// What a step of its depth is in the depth map.
     deep: f32,
     veils: Option<&'a Grid<u8>>,
@@ -56,6 +58,7 @@ impl<'a, const ROOM: usize> Extras<'a, ROOM> {
             color: settings.map_or([0.0; 3], |all| all.color.map(|channel| 255.0 * channel * (1.0 - all.tint))),
             tint: settings.map_or(0.0, |all| all.tint),
             shades: settings.is_some_and(|all| all.broken),
+            bare: settings.map_or(0.0, |all| if all.broken { all.bare } else { 0.0 }),
             deep: settings.map_or(0.0, |all| all.depth * look.deep),
             veils,
             room: Box::new(Room { plate: [0; ROOM], spot: [Spot::default(); ROOM], veil: [0; ROOM] }),
@@ -115,6 +118,9 @@ impl<'a, const ROOM: usize> Extras<'a, ROOM> {
         if self.crushed.is_some() {
             for (touch, spot) in patch.touch[..n].iter_mut().zip(&self.room.spot) {
                 *touch |= u16::from(*spot != Spot::default());
+            }
+            if self.bare > 0.0 {
+                patch.level(|k| self.left(k));
             }
             patch.tilt(|k| self.room.spot[k].slope.map(|slope| f32::from(slope) * (1.0 / SLOPE_UNIT)));
         }
@@ -180,6 +186,19 @@ impl<'a, const ROOM: usize> Extras<'a, ROOM> {
             let deep = f32::from(spot.deep) * self.deep;
             *out = (*out).max(if deep < 255.0 { round(deep) as u8 } else { 255 });
         }
+    }
+
+    /// Whether cracks are less where something has come off.
+    #[inline(always)]
+    pub(super) const fn is_bare(&self) -> bool {
+        self.bare > 0.0
+    }
+
+    /// Share of a crack that is left on the floor of what has come off.
+    #[inline(always)]
+    pub(super) fn left(&self, place: usize) -> f32 {
+        let deep = (f32::from(self.room.spot[place].deep) * (1.0 / 64.0)).min(1.0);
+        1.0 - self.bare * deep
     }
 
     #[inline(always)]

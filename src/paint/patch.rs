@@ -139,6 +139,18 @@ impl<const ROOM: usize> Patch<ROOM> {
         }
     }
 
+    /// Leaves only a share of the slopes of the cracks; what is added later is whole.
+    #[inline(always)]
+    pub(super) fn level(&mut self, mut share: impl FnMut(usize) -> f32) {
+        let n = self.len;
+        let (x, y) = (&mut self.x[..n], &mut self.y[..n]);
+        for k in 0..n {
+            let share = share(k);
+            x[k] *= share;
+            y[k] *= share;
+        }
+    }
+
     /// Places in all rows.
     pub(super) const fn len(&self) -> usize {
         self.len

@@ -75,6 +75,7 @@ pub enum SegmentId {
 pub struct Network {
     extent: Vec2,
     roughness: f32,
+    sway: f32,
     seed: u64,
     pub(crate) nodes: Vec<Node>,
     pub(crate) links: Vec<Link>,
@@ -91,7 +92,22 @@ impl Network {
     /// `seed` fixes the paths.
     #[must_use]
     pub const fn new(extent: Vec2, roughness: f32, seed: u64) -> Self {
-        Self { extent, roughness, seed, nodes: Vec::new(), links: Vec::new(), forgotten: (0, 0), numbers: Vec::new() }
+        Self {
+            extent,
+            roughness,
+            sway: 0.0,
+            seed,
+            nodes: Vec::new(),
+            links: Vec::new(),
+            forgotten: (0, 0),
+            numbers: Vec::new(),
+        }
+    }
+
+    /// The same with lines that sway off their way by up to so much, pattern units.
+    pub(crate) fn with_sway(mut self, sway: f32) -> Self {
+        self.sway = sway;
+        self
     }
 
     /// Size of the surface, pattern units.
@@ -161,7 +177,8 @@ impl Network {
             SegmentId::Branch(child) => u64::from(child) + self.forgotten.0,
             SegmentId::Link(link) => self.number(link) | 1 << 32,
         };
-        rough_path(ends, widths, self.roughness * bend, self.extent, self.seed, salt)
+        let path = rough_path(ends, widths, self.roughness * bend, self.extent, self.seed, salt);
+        if self.sway > 0.0 { path.swayed(self.sway, self.extent, self.seed) } else { path }
     }
 
     /// The number that a link had at first.

@@ -1,6 +1,6 @@
 //! The rough line of one segment.
 
-use crate::math::Rng;
+use crate::math::{Rng, hash_unit};
 use glam::Vec2;
 
 /// The most points that a [`SegmentPath`] has.
@@ -47,6 +47,30 @@ impl SegmentPath {
         self
     }
 
+    /// The same line, each point moved by up to `by` (pattern units) as places beside it are: lines that meet still do; and a third wider or
+    /// narrower, more at some ends. What lies on the border
+    /// of `0..=extent` stays there.
+    #[must_use]
+    pub(super) fn swayed(mut self, by: f32, extent: Vec2, seed: u64) -> Self {
+        for end in [0, self.len - 1] {
+            // Here and there something is chipped off where lines meet.
+            let Vec2 { x, y } = self.points[end].pos;
+            let chip = hash_unit(seed ^ 0x54, u64::from(x.to_bits()) << 32 | u64::from(y.to_bits()));
+            self.points[end].width *= 1.0 + (1.8 * chip - 0.9).max(0.0);
+        }
+        for point in &mut self.points[..self.len] {
+            let room = point.pos.min(extent - point.pos).max(Vec2::ZERO);
+            let way = |what: u64| {
+                let wide = smooth(seed ^ what, point.pos / (18.0 * by));
+                0.6 * wide + 0.4 * smooth(seed ^ what ^ 0x50, point.pos / (3.5 * by))
+            };
+            let off = Vec2::new(way(0x51), way(0x52)) * (room * 0.25).min(Vec2::splat(by));
+            point.width *= 1.0 + 0.35 * smooth(seed ^ 0x53, point.pos / (2.5 * by));
+            point.pos = (point.pos + off).clamp(Vec2::ZERO, extent);
+        }
+        self
+    }
+
     /// The line up to a share of its points, 0..=1, the last one between two of them.
     #[must_use]
     pub(super) fn up_to(mut self, share: f32) -> Self {
@@ -65,6 +89,21 @@ impl SegmentPath {
         }
         self
     }
+}
+
+/// Smooth noise in `-1..=1`, whose bumps are about one unit wide.
+fn smooth(seed: u64, at: Vec2) -> f32 {
+    let corner = at.floor();
+    let t = at - corner;
+    let t = t * t * (Vec2::splat(3.0) - 2.0 * t);
+    let (x, y) = (corner.x as i32, corner.y as i32);
+    let value = |dx: i32, dy: i32| {
+        let (x, y) = (x.wrapping_add(dx) as u32, y.wrapping_add(dy) as u32);
+        2.0 * hash_unit(seed, u64::from(x) << 32 | u64::from(y)) - 1.0
+    };
+    let row = |dy: i32| value(0, dy) + (value(1, dy) - value(0, dy)) * t.x;
+    let top = row(0);
+    top + (row(1) - top) * t.y
 }
 
 /// Pieces of a rough line are about this long (pattern units): 4 texels of a 512-texel surface, half the length at which

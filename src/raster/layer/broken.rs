@@ -23,10 +23,17 @@ const WALL: f32 = 0.45;
 const SHADOW: f32 = 0.75;
 const SHADE: f32 = 0.5;
 
+/// The same within what crumbles.
+const LONG_SHADOW: f32 = 1.1;
+const DEEP_SHADE: f32 = 0.62;
+
 /// How much shadow there is where the edge that throws it is so far away.
-fn sink(within: f32) -> f32 {
-    (0.5 - 0.6 * within).clamp(0.0, 1.0)
+fn sink(within: f32, soft: f32) -> f32 {
+    (0.5 - within / soft).clamp(0.0, 1.0)
 }
+
+/// Texels over which a hard shadow ends.
+const HARD: f32 = 1.0 / 0.6;
 
 /// A number in 0..1 for a pair of numbers.
 fn draw(seed: u32, x: i32, y: i32) -> f32 {
@@ -87,6 +94,8 @@ struct Outline {
     reach: f32,
     /// From the centre, in order of their [`turn`].
     corners: Vec<(f32, Vec2)>,
+    /// Whether narrow tips are as near to their edge as they are wide.
+    is_worn: bool,
 }
 
 /// A direction as a number in 0..4 that grows with its angle.
@@ -131,7 +140,21 @@ impl Outline {
             .collect();
         corners.sort_by(|a, b| a.0.total_cmp(&b.0));
         let reach = corners.iter().map(|(_, corner)| corner.length()).fold(0.0, f32::max);
-        Self { centre, reach, corners }
+        Self { centre, reach, corners, is_worn: false }
+    }
+
+    /// The same, longer one way and shorter across it.
+    fn stretched(mut self, seed: u32) -> Self {
+        self.is_worn = true;
+        let way = ops::unit(std::f32::consts::PI * draw(seed, -2, 0));
+        let (by, most) = (1.0 + 0.5 * draw(seed, -2, 1), self.reach);
+        for (at, corner) in &mut self.corners {
+            let along = way * corner.dot(way);
+            *corner = (along * by + (*corner - along) / by).clamp_length_max(most);
+            *at = turn(*corner);
+        }
+        self.corners.sort_by(|a, b| a.0.total_cmp(&b.0));
+        self
     }
 
     /// How far inside its edge a place is, texels; below zero outside.
@@ -141,17 +164,31 @@ impl Outline {
             return -FAR_OUT;
         }
         let turn = turn(off);
-        let next = self.corners.partition_point(|corner| corner.0 <= turn);
-        let (Some(&(_, a)), Some(&(_, b))) = (
-            self.corners.get(next.checked_sub(1).unwrap_or(self.corners.len().saturating_sub(1))),
-            self.corners.get(if next < self.corners.len() { next } else { 0 }),
-        ) else {
-            return -FAR_OUT;
-        };
+        let n = self.corners.len();
+        let next = self.corners.partition_point(|corner| corner.0 <= turn) + n;
+        let corner = |k: usize| self.corners.get(k % n.max(1)).map(|corner| corner.1);
+        let (Some(a), Some(b)) = (corner(next - 1), corner(next)) else { return -FAR_OUT };
         let side = b - a;
-        side.perp_dot(off - a) / side.length().max(0.1)
+        let within = side.perp_dot(off - a) / side.length().max(0.1);
+        if !self.is_worn {
+            return within;
+        }
+        // The sides of its sector and of those beside it.
+        let mut nearest = f32::MAX;
+        for k in 0..=2 * BESIDE {
+            let (Some(from), Some(to)) = (corner(next + n + k - BESIDE - 1), corner(next + n + k - BESIDE)) else {
+                continue;
+            };
+            let side = to - from;
+            let share = ((off - from).dot(side) / side.length_squared().max(0.01)).clamp(0.0, 1.0);
+            nearest = nearest.min(off.distance_squared(from + side * share));
+        }
+        if within > 0.0 { nearest.sqrt() } else { -nearest.sqrt() }
     }
 }
+
+/// So many sides on either side of a sector count for how near an edge is.
+const BESIDE: usize = 3;
 
 /// What is so many texels outside counts as far away.
 const FAR_OUT: f32 = 1.0e3;
@@ -179,28 +216,50 @@ impl Broken {
         // The root of the energy.
         let more = radius / (crushed.radius * unit).max(1.0e-3);
         let pick = |k: u32, what: i32| draw(seed ^ 0x0B0E, k as i32, what);
-        let mut off = vec![Outline::new(Vec2::ZERO, radius, 6 + (3.0 * pick(0, 0)) as u32, 2, ragged, seed ^ 0x60)];
+        let crumbles = crushed.jag > 0.0;
+        // What is less ragged has longer chords.
+        let levels = if crumbles && ragged < 0.65 { 1 } else { 2 };
+        let shape = |outline: Outline, k: u32| if crumbles { outline.stretched(mix_in(seed, k)) } else { outline };
+        let count = 6 + (3.0 * pick(0, 0)) as u32;
+        let mut off = vec![shape(Outline::new(Vec2::ZERO, radius, count, levels, ragged, seed ^ 0x60), 0x300)];
         let flakes = (crushed.flakes as f32 * more).round().min(64.0) as u32;
+        let one = radius / more.max(1.0) * more.max(1.0).sqrt();
         for k in 0..flakes {
-            let size = radius / more.max(1.0) * (0.3 + 0.5 * pick(k, 1));
-            let far = radius * (1.0 + pick(k, 2) * (reach - 1.0)) - 1.8 * size;
+            // A few large ones beside the hit, small ones further out.
+            let is_beside = k % 3 == 0;
+            let size = one * if is_beside { 0.5 + 0.3 * pick(k, 1) } else { 0.22 + 0.4 * pick(k, 1) * pick(k, 14) };
+            let far = if is_beside {
+                0.75 * radius + 0.5 * size
+            } else {
+                radius * (0.9 + pick(k, 2) * pick(k, 15) * (reach - 1.0))
+            };
+            let far = far.min(radius * reach - 1.8 * size);
             let centre = ops::unit(std::f32::consts::TAU * pick(k, 3)) * far.max(0.0);
-            off.push(Outline::new(centre, size, 5, 1, 0.6, mix_in(seed, 0x100 + k)));
+            let seed = mix_in(seed, 0x100 + k);
+            off.push(shape(Outline::new(centre, size, 5, levels, 0.6, seed), 0x340 + k));
         }
         let basin = (crushed.basin > 0.0).then(|| {
             let centre = Vec2::new(pick(0, 4) - 0.5, pick(0, 5) - 0.3) * (0.3 * radius);
-            Outline::new(centre, radius * crushed.basin, 7, 2, 0.8 * ragged, seed ^ 0x61)
+            shape(Outline::new(centre, radius * crushed.basin, 7, 2, 0.8 * ragged, seed ^ 0x61), 0x301)
         });
         let chips = (24.0 * crushed.chips * more).round().min(96.0) as u32;
         let chips = (0..chips)
             .map(|k| {
-                let size = (grain * (0.4 + pick(k, 6) * pick(k, 7))).min(0.4 * radius);
+                let size = if crumbles {
+                    // Many small ones, few large ones.
+                    grain * (0.3 + 0.13 * (1.0 / (0.12 + pick(k, 6)) - 0.9))
+                } else {
+                    grain * (0.4 + pick(k, 6) * pick(k, 7))
+                };
+                let size = size.min(0.4 * radius);
                 let mut way = ops::unit(std::f32::consts::TAU * pick(k, 8));
                 if way.y < 0.3 && pick(k, 9) < fall {
                     way.y = 0.3 + way.y.abs();
                 }
                 let near = 0.95 + (0.85 * reach - 0.95) * pick(k, 10) * pick(k, 11).sqrt();
-                let centre = way.normalize_or(Vec2::Y) * (near * radius);
+                let far = near * radius;
+                let far = if crumbles { far.min(radius * reach - 2.2 * size) } else { far };
+                let centre = way.normalize_or(Vec2::Y) * far;
                 let outline =
                     Outline::new(centre, size, 4 + (2.0 * pick(k, 12)) as u32, 0, 0.6, mix_in(seed, 0x200 + k));
                 Chip { outline, tone: 0.3 * pick(k, 13) - 0.18, ink: crushed.outline * unit }
@@ -215,7 +274,7 @@ impl Broken {
             let nearest = outline.centre.clamp(min - 1.0, max + 1.0);
             nearest.distance_squared(outline.centre) <= (outline.reach + beyond) * (outline.reach + beyond)
         };
-        self.off.retain(|outline| is_near(outline, 2.0 + SHADOW * depth));
+        self.off.retain(|outline| is_near(outline, 3.0 + LONG_SHADOW.max(SHADOW) * depth));
         self.chips.retain(|chip| is_near(&chip.outline, 2.0 + chip.outline.reach));
     }
 
@@ -230,71 +289,184 @@ fn mix_in(seed: u32, k: u32) -> u32 {
     mix(u64::from(seed) << 32 | u64::from(k)) as u32
 }
 
+/// A rounded stone at a place.
+struct Stone {
+    /// Its height there, texels; below zero where it has fallen out.
+    height: f32,
+    /// How much darker or brighter it is than what it lies in.
+    tone: f32,
+}
+
+impl Stone {
+    /// Sides of the squares in which there is one at the most, in grains, and with which chance.
+    const SIZES: [(f32, f32); 4] = [(3.1, 0.55), (1.9, 0.65), (1.15, 0.7), (0.7, 0.7)];
+
+    /// The largest one at a place, if there is any; `share` is how many there are.
+    fn find(seed: u32, at: Vec2, grain: f32, share: f32) -> Option<Self> {
+        let mut turned = at;
+        for ((size, chance), k) in Self::SIZES.into_iter().zip(0u32..) {
+            // Each size has squares of its own, turned against the others.
+            turned = Vec2::new(0.8 * turned.x - 0.6 * turned.y, 0.6 * turned.x + 0.8 * turned.y);
+            let side = (size * grain).max(2.0);
+            let cell = (turned / side).floor();
+            let (x, y) = (cell.x as i32, cell.y as i32);
+            let pick = |what: u32| draw(seed ^ (what + 16 * k), x, y);
+            if pick(1) >= chance * share {
+                continue;
+            }
+            let radius = 0.24 + 0.22 * pick(2);
+            let middle = Vec2::new(pick(3) - 0.5, pick(4) - 0.5) * (1.0 - 2.0 * radius);
+            let off = turned / side - cell - 0.5 - middle;
+            let way = Vec2::new(pick(5) - 0.5, pick(6) - 0.5).normalize_or(Vec2::X);
+            let (u, v) = (off.dot(way).abs(), (1.0 + 0.4 * pick(7)) * off.perp_dot(way).abs());
+            let far = (0.6 * (u * u + v * v).sqrt() + 0.33 * (u + v)) / radius;
+            if far < 1.0 {
+                let rise = radius * side * (1.0 - far * far);
+                let own = pick(8) - 0.5;
+                return Some(if pick(9) < 0.14 {
+                    Self { height: -0.5 * rise, tone: -0.22 }
+                } else {
+                    Self { height: 0.55 * rise, tone: 0.12 + 1.5 * own * own.abs() - 0.18 * far * far * far }
+                });
+            }
+        }
+        None
+    }
+}
+
 impl Shape<'_> {
+    /// How far inside the edge of what has come off a place is, crumbs and all.
+    fn within(&self, broken: &Broken, off: Vec2, at: Vec2, seed: u32) -> f32 {
+        let within = broken.within(off);
+        if self.jag <= 0.0 || within < -1.0 {
+            return within;
+        }
+        let (wide, fine) = ((3.5 * self.jag).max(3.0), (1.2 * self.jag).max(1.3));
+        let noise = |k: u32, size: f32| 0.5 + 0.5 * noise(seed ^ k, at.x / size, at.y / size);
+        within - self.jag * (1.3 * noise(0x58, wide) + 0.7 * noise(0x59, fine))
+    }
+
     /// What is there of something that breaks along chords.
     pub(super) fn break_off(&self, place: &mut Place, broken: &Broken, off: Vec2, at: Vec2, seed: u32) {
-        let Crushed { pale, speckle, dust, chips, reach, fall, .. } = *self.crushed;
-        let within = broken.within(off);
+        let Crushed { dust, chips, reach, fall, .. } = *self.crushed;
+        let within = self.within(broken, off, at, seed);
         let inside = (within + 0.5).clamp(0.0, 1.0);
         if inside > 0.0 {
-            // A steep wall, and a floor of plates, each tilted in its own way.
-            let share = if broken.basin.is_some() { SHELF } else { 1.0 };
-            let wall = (within / (WALL * share * self.depth).max(1.0)).clamp(0.0, 1.0);
-            let bowl = (within / (0.8 * self.radius).max(1.0)).clamp(0.0, 1.0);
-            let mut down = share * (wall + BOWL * (bowl - wall));
-            let mut shadow = sink(broken.within(off + TO_LIGHT * (SHADOW * share * self.depth)));
-            if let Some(basin) = &broken.basin {
-                let within = basin.within(off);
-                down += (1.0 - SHELF) * (within / (1.5 * WALL * self.depth).max(1.0)).clamp(0.0, 1.0);
-                if within > 0.0 {
-                    let length = SHADOW * (1.0 - SHELF) * self.depth;
-                    shadow = shadow.max(sink(basin.within(off + TO_LIGHT * length)));
-                }
-            }
-            let fold = |k: u32, size: f32| {
-                let warp =
-                    Vec2::new(noise(seed ^ k, at.x / size, at.y / size), noise(seed ^ k ^ 9, at.y / size, at.x / size));
-                facets(seed ^ k, at / size + 0.45 * warp)
-            };
-            let plate = fold(0x51, (0.42 * self.radius).max(2.0 * self.grain));
-            let small = fold(0x54, 1.7 * self.grain);
-            let stone = Cell::find(seed ^ 0x52, at / self.grain);
-            let fade = (0.5 * within).clamp(0.0, 1.0);
-            let bumps = plate + 0.4 * small;
-            place.height = -self.depth * down + self.rough * bumps * fade;
-            place.pale = pale * inside;
-            // Few stones are paler or darker than what they lie in.
-            let is_stone = stone.draw.abs() > 0.7;
-            let tone = if is_stone { 0.45 * stone.draw * (5.0 * stone.gap).min(1.0) } else { 0.10 * stone.draw };
-            let dirt = noise(seed ^ 0x53, 0.9 * at.x, 0.9 * at.y);
-            place.shade = speckle * (tone + 0.1 * plate + 0.16 * dirt) * inside;
-            place.dark = SHADE * shadow * inside * (SHADOW * self.depth).min(1.0);
+            self.add_floor(place, broken, (within, inside), off, at, seed);
         }
         if inside < 1.0 {
             let sunk = 0.8 * fall;
             let radii = (off - Vec2::new(0.0, sunk * self.radius)).length() / self.radius.max(0.5);
             let left = 1.0 - ((radii - 0.7) / (reach - 0.7 - sunk).max(0.2)).clamp(0.0, 1.0);
             if dust > 0.0 {
-                let cloud = 0.6 + 0.4 * noise(seed ^ 6, 0.7 * at.x, 0.7 * at.y);
+                let mut cloud = 0.6 + 0.4 * noise(seed ^ 6, 0.7 * at.x, 0.7 * at.y);
+                if self.jag > 0.0 && fall > 0.0 {
+                    // It runs down in streaks.
+                    let wide = 1.5 * self.grain;
+                    cloud *= 1.0 - fall * (0.4 - 0.4 * noise(seed ^ 8, at.x / wide, at.y / (7.0 * wide)));
+                }
                 place.pale = place.pale.max(dust * left * left * cloud * (1.0 - inside));
             }
-            if self.crushed.outline <= 0.0 {
+            if self.jag > 0.0 {
+                self.add_crumbs(place, at, (1.2 * chips * left).min(0.6) * left, inside, seed);
+            } else if self.crushed.outline <= 0.0 {
                 self.add_grit(place, at, (chips * left).min(0.5) * left, seed);
             }
         }
         for chip in &broken.chips {
-            self.add_chip(place, chip, off);
+            self.add_chip(place, chip, off, at, seed);
         }
     }
 
+    /// Where it has come off: a steep wall, and a floor in the shadow of the edge.
+    fn add_floor(
+        &self,
+        place: &mut Place,
+        broken: &Broken,
+        (within, inside): (f32, f32),
+        off: Vec2,
+        at: Vec2,
+        seed: u32,
+    ) {
+        let Crushed { pale, speckle, stones, .. } = *self.crushed;
+        let crumbles = self.jag > 0.0;
+        let bump = |k: u32, size: f32| noise(seed ^ k, at.x / size, at.y / size);
+        let share = if broken.basin.is_some() { SHELF } else { 1.0 };
+        // Here and there a wall is a slope.
+        let slope = bump(0x5A, (0.35 * self.radius).max(4.0));
+        let run = if crumbles { 0.8 + 2.6 * slope.max(0.0) } else { 1.0 };
+        let wall = (within / (run * WALL * share * self.depth).max(1.0)).clamp(0.0, 1.0);
+        let bowl = (within / (0.8 * self.radius).max(1.0)).clamp(0.0, 1.0);
+        let mut down = share * (wall + BOWL * (bowl - wall));
+        let (long, shade) = if crumbles { (LONG_SHADOW, DEEP_SHADE) } else { (SHADOW, SHADE) };
+        let length = long * share * self.depth;
+        // Where its edge is far away a shadow is soft.
+        let soft = if crumbles { (0.7 * length).max(HARD) } else { HARD };
+        let mut shadow = sink(self.within(broken, off + TO_LIGHT * length, at + TO_LIGHT * length, seed), soft);
+        let mut sunk = 0.0;
+        if let Some(basin) = &broken.basin {
+            let within = basin.within(off) - 2.0 * self.jag * (0.5 + 0.5 * bump(0x5B, (3.0 * self.jag).max(2.0)));
+            sunk = (within / (1.5 * WALL * self.depth).max(1.0)).clamp(0.0, 1.0);
+            down += (1.0 - SHELF) * sunk;
+            if within > 0.0 {
+                let length = long * (1.0 - SHELF) * self.depth;
+                shadow = shadow.max(sink(basin.within(off + TO_LIGHT * length), soft));
+            }
+        }
+        let fold = |k: u32, size: f32| {
+            let warp =
+                Vec2::new(noise(seed ^ k, at.x / size, at.y / size), noise(seed ^ k ^ 9, at.y / size, at.x / size));
+            facets(seed ^ k, at / size + 0.45 * warp)
+        };
+        let plate = fold(0x51, (0.42 * self.radius).max(2.0 * self.grain));
+        let small = fold(0x54, 1.7 * self.grain);
+        let fade = (0.5 * within).clamp(0.0, 1.0);
+        let mut bumps = self.rough * (plate + if crumbles { 0.2 } else { 0.4 } * small) * fade;
+        let tone = if crumbles {
+            let coarse = bump(0x56, 2.2 * self.grain) + 0.7 * bump(0x5F, 0.3 * self.radius + 6.0 * self.grain);
+            let sand = lattice(seed ^ 0x57, at.x.floor() as i32, at.y.floor() as i32);
+            // The lattices of noise are not to be seen.
+            let turned = Vec2::new(0.8 * at.x - 0.6 * at.y, 0.6 * at.x + 0.8 * at.y);
+            let pit = noise(seed ^ 0x65, 0.42 * turned.x, 0.42 * turned.y);
+            let sand = 0.3 * sand + 0.5 * pit - 0.9 * (-pit - 0.55).max(0.0);
+            bumps += 0.6 * self.rough * pit * fade;
+            // Next to the wall less of the sky is seen.
+            let corner = (1.0 - within / (1.3 * self.depth).max(1.0)).clamp(0.0, 1.0);
+            let mut tone = 0.30 * coarse + 0.16 * plate + 0.5 * sand - 0.6 * corner * wall - 0.3 * sunk;
+            if stones > 0.0
+                && let Some(stone) = Stone::find(seed ^ 0x5C, at, self.grain, stones)
+            {
+                let shown = fade * wall;
+                tone += (1.8 * stone.tone - 0.55 * tone) * shown;
+                bumps += stone.height * shown;
+            }
+            tone
+        } else {
+            let stone = Cell::find(seed ^ 0x52, at / self.grain);
+            // Few stones are paler or darker than what they lie in.
+            let is_stone = stone.draw.abs() > 0.7;
+            let tone = if is_stone { 0.45 * stone.draw * (5.0 * stone.gap).min(1.0) } else { 0.10 * stone.draw };
+            tone + 0.1 * plate + 0.16 * noise(seed ^ 0x53, 0.9 * at.x, 0.9 * at.y)
+        };
+        place.height = -self.depth * down + bumps;
+        // The wall is of what has come off, not of what lay under it.
+        place.pale = pale * inside * if crumbles { 0.15 + 0.85 * wall } else { 1.0 };
+        place.shade = speckle * tone * inside;
+        place.dark = shade * shadow * inside * (SHADOW * self.depth).min(1.0);
+    }
+
     /// A chip that lies there, or its shadow.
-    fn add_chip(&self, place: &mut Place, chip: &Chip, off: Vec2) {
+    fn add_chip(&self, place: &mut Place, chip: &Chip, off: Vec2, at: Vec2, seed: u32) {
         let Chip { outline, tone, ink, .. } = chip;
         let size = outline.reach;
         if off.distance_squared(outline.centre) > (2.0 * size + 2.0) * (2.0 * size + 2.0) {
             return;
         }
-        let within = outline.within(off);
+        let crumbles = self.jag > 0.0;
+        let mut within = outline.within(off);
+        if crumbles {
+            within -= 0.14 * size * (1.0 + noise(seed ^ 0x66, 2.2 * at.x / size, 2.2 * at.y / size));
+        }
         let inside = (within + 0.5).clamp(0.0, 1.0);
         if inside < 1.0 && *ink <= 0.0 {
             let shadow = (outline.within(off + TO_LIGHT * (0.45 * size)) + 0.5).clamp(0.0, 1.0);
@@ -302,7 +474,8 @@ impl Shape<'_> {
         }
         if inside > 0.0 {
             place.dark *= 1.0 - inside;
-            place.shade += (tone - place.shade) * inside;
+            let face = if crumbles { 0.16 * noise(seed ^ 0x67, 0.5 * at.x, 0.5 * at.y) } else { 0.0 };
+            place.shade += (tone + face - place.shade) * inside;
             // It shows the surface's own face.
             let pale = if *ink > 0.0 { 1.0 } else { 0.3 * self.crushed.pale };
             place.pale += (pale - place.pale) * inside;
@@ -315,9 +488,39 @@ impl Shape<'_> {
                 let face = (off - outline.centre).dot(-TO_LIGHT) - 0.12 * size;
                 place.shade -= 0.3 * (face + 0.5).clamp(0.0, 1.0);
             } else {
-                place.height += (0.9 * within).clamp(0.0, 0.35 * size);
+                place.height += (0.9 * within).clamp(0.0, if crumbles { 0.2 * size } else { 0.35 * size });
             }
         }
+    }
+
+    /// Angular grit in some of the squares of a lattice: much that is small, little that is large.
+    fn add_crumbs(&self, place: &mut Place, at: Vec2, chance: f32, inside: f32, seed: u32) {
+        let side = (1.7 * self.grain).max(4.0);
+        let cell = (at / side).floor();
+        let (x, y) = (cell.x as i32, cell.y as i32);
+        let pick = |what: u32| draw(seed ^ (0x80 + what), x, y);
+        if chance <= 0.0 || pick(0) >= chance {
+            return;
+        }
+        let radius = (0.065 * side / (pick(1) + 0.03).sqrt()).max(0.6);
+        let middle = Vec2::new(pick(2) - 0.5, pick(3) - 0.5) * (side - 3.2 * radius).max(0.0);
+        let off = at - ((cell + 0.5) * side + middle);
+        let way = Vec2::new(pick(4) - 0.5, pick(5) - 0.5).normalize_or(Vec2::X);
+        let sides = [
+            (way, 0.55 + 0.5 * pick(6)),
+            (-way, 0.55 + 0.5 * pick(7)),
+            (way.perp(), 0.5 + 0.4 * pick(8)),
+            (-way.perp(), 0.5 + 0.4 * pick(9)),
+            ((way + way.perp()) * 0.707, 0.45 + 0.4 * pick(10)),
+        ];
+        let within = |off: Vec2| sides.iter().map(|(way, far)| far * radius - off.dot(*way)).fold(FAR_OUT, f32::min);
+        let (here, open) = (within(off), 1.0 - inside);
+        let grit = (here + 0.5).clamp(0.0, 1.0) * open;
+        let shadow = (within(off + TO_LIGHT * (0.7 * radius + 0.4)) + 0.5).clamp(0.0, 1.0) * open;
+        place.dark = place.dark.max(0.8 * SHADE * shadow) * (1.0 - grit);
+        place.pale += (0.45 * self.crushed.pale - place.pale) * grit;
+        place.shade += (0.5 * pick(11) - 0.2 - place.shade) * grit;
+        place.height += here.clamp(0.0, 0.5 * radius) * 0.9 * open;
     }
 
     /// Grit in some of the squares of a lattice.

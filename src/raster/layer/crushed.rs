@@ -63,6 +63,14 @@ pub struct Crushed {
     /// Width of the broken edge around the hole, which then has straight sides and is less dark towards it, as a share of the hole. 0..=4; default
     /// 0 = none.
     pub edge: f32,
+    /// How much less is seen of cracks on the floor of what is [`broken`](Self::broken) off: what they ran through is gone. 0..=1; default 0.
+    pub bare: f32,
+    /// How far the edge of what is [`broken`](Self::broken) off strays from its chords, as material that crumbles: its wall is of uneven slope
+    /// then, and pieces are longer one way. Pattern units, 0..=0.05; default 0 = clean chords.
+    pub jag: f32,
+    /// Share of the floor of what is [`broken`](Self::broken) off that is rounded stones of several sizes in something finer (the aggregate of
+    /// concrete); else it is of one grain. 0..=1; default 0.
+    pub stones: f32,
 }
 
 impl Crushed {
@@ -90,6 +98,9 @@ impl Crushed {
         outline: 0.0,
         needles: 0.0,
         edge: 0.0,
+        bare: 0.0,
+        jag: 0.0,
+        stones: 0.0,
     };
 
     /// The first field that is out of its range or not finite: its name, value and range.
@@ -118,6 +129,9 @@ impl Crushed {
             ("crushed.outline", self.outline, 0.0..=0.05, "0..=0.05"),
             ("crushed.needles", self.needles, 0.0..=1.0, "0..=1"),
             ("crushed.edge", self.edge, 0.0..=4.0, "0..=4"),
+            ("crushed.bare", self.bare, 0.0..=1.0, "0..=1"),
+            ("crushed.jag", self.jag, 0.0..=0.05, "0..=0.05"),
+            ("crushed.stones", self.stones, 0.0..=1.0, "0..=1"),
         ];
         let is_bad = |(_, value, range, _): &(_, f32, std::ops::RangeInclusive<f32>, _)| !range.contains(value);
         fields.into_iter().find(is_bad).map(|(name, value, _, range)| (name, value, range))
@@ -132,6 +146,7 @@ impl Crushed {
             rough: scaled(self.rough, 0.0, 0.05),
             grain: scaled(self.grain, 0.0005, 0.1),
             outline: scaled(self.outline, 0.0, 0.05),
+            jag: scaled(self.jag, 0.0, 0.05),
             ..*self
         }
     }
@@ -473,6 +488,7 @@ pub(super) struct Shape<'a> {
     pub(super) depth: f32,
     pub(super) rough: f32,
     pub(super) grain: f32,
+    pub(super) jag: f32,
     broken: Option<Broken>,
 }
 
@@ -494,6 +510,7 @@ impl<'a> Shape<'a> {
             depth: crushed.depth * unit,
             rough: crushed.rough * unit,
             grain,
+            jag: crushed.jag * unit,
             broken: crushed.broken.then(|| Broken::new(crushed, unit, radius, grain, seed)),
         }
     }
