@@ -165,7 +165,7 @@ impl CrackPreset {
         profile: Profile {
             depth: 1.0,
             full_width: 0.006,
-            wall: 0.4,
+            wall: 0.5,
             rim_width: 0.003,
             rim_depth: 0.12,
             faintest: 0.0,

@@ -699,6 +699,9 @@ mod tests {
             assert_eq!(crushed(Crushed { dust: bad, ..Crushed::DEFAULT }), Some("crushed.dust"));
             assert_eq!(crushed(Crushed { chips: bad, ..Crushed::DEFAULT }), Some("crushed.chips"));
             assert_eq!(crushed(Crushed { reach: bad, ..Crushed::DEFAULT }), Some("crushed.reach"));
+            assert_eq!(crushed(Crushed { bare: bad, ..Crushed::DEFAULT }), Some("crushed.bare"));
+            assert_eq!(crushed(Crushed { jag: bad, ..Crushed::DEFAULT }), Some("crushed.jag"));
+            assert_eq!(crushed(Crushed { stones: bad, ..Crushed::DEFAULT }), Some("crushed.stones"));
             assert_eq!(crushed(Crushed { tint: bad, ..Crushed::DEFAULT }), Some("crushed.tint"));
             assert_eq!(crushed(Crushed { basin: bad, ..Crushed::DEFAULT }), Some("crushed.basin"));
             assert_eq!(crushed(Crushed { fall: bad, ..Crushed::DEFAULT }), Some("crushed.fall"));

@@ -6,7 +6,9 @@ use crate::{
     growth::CrackGrowth,
     math::Rng,
     pattern::{Moment, PathPoint, SegmentPath, SurfaceFrame},
-    raster::{DepthField, DirtyTiles, Profile, Redrawn, Replay, TexelRect, stamp_dot, stamp_path, stamp_path_with},
+    raster::{
+        Crushed, DepthField, DirtyTiles, Profile, Redrawn, Replay, TexelRect, stamp_dot, stamp_path, stamp_path_with,
+    },
 };
 use glam::{UVec2, Vec2};
 
@@ -466,4 +468,37 @@ fn presets_that_grow_painted_where_they_change_equal_the_whole() {
         let anew = drawn(&preset, &growth, frame, Moment::after(growth.timeline().end()));
         assert!(field.layer() == anew.layer(), "{name}: what has come step by step is not what comes at once");
     }
+}
+
+/// On the floor of what has come off no crack is seen where none is to be, and beside it all of it is.
+#[test]
+fn a_bare_floor_shows_no_crack() {
+    let mut rng = Rng::new(23);
+    let size = UVec2::splat(160);
+    let frame = SurfaceFrame::new(size).unwrap();
+    let canvas = Canvas::new(&mut rng, size);
+    let paint = |bare: f32, is_cracked: bool| {
+        let crushed =
+            Crushed { broken: true, bare, radius: 0.2, depth: 0.01, rough: 0.0, chips: 0.0, ..Crushed::DEFAULT };
+        let look = Look { crushed: Some(crushed), ..Look::GROOVE };
+        let mut field = DepthField::new(frame);
+        field.lay(look.layer(5));
+        let mut growth = CrackGrowth::new(CrackPreset::CONCRETE.growth, frame.extent(), 3).unwrap();
+        growth.hit(Vec2::splat(0.5), 1.0);
+        growth.step();
+        let timeline = growth.timeline();
+        field.show_layer(growth.network(), timeline, Moment::after(timeline.end()), &mut Vec::new());
+        if is_cracked {
+            let point = |x| PathPoint { pos: Vec2::new(x, 0.5), width: 0.02 };
+            stamp_path(&mut field, &Profile::DEFAULT, &SegmentPath::straight(point(0.0), point(1.0)));
+        }
+        let mut out = canvas.untouched();
+        canvas.paint(&field, &table(&look, &field), TexelRect::whole(size), UVec2::ZERO, &mut out);
+        out
+    };
+    let texel = |out: &[Vec<u8>; 3], x: usize| [0, 1].map(|map| out[map][4 * (80 * 160 + x)..][..4].to_vec());
+    let (plain, cracked, bare) = (paint(1.0, false), paint(0.0, true), paint(1.0, true));
+    assert_eq!(texel(&bare, 80), texel(&plain, 80));
+    assert_ne!(texel(&cracked, 80), texel(&plain, 80));
+    assert_eq!(texel(&bare, 4), texel(&cracked, 4));
 }

@@ -78,6 +78,7 @@ fn random_params(rng: &mut Rng, small: bool) -> GrowthParams {
         directed: 0.0,
         variety: 0.0,
         courses: 0.0,
+        sway: 0.01,
         draw_markers: rng.unit() < 0.2,
         max_nodes: 1_000_000,
         zigzag: if rng.unit() < 0.5 { 0.0 } else { rng.unit() },

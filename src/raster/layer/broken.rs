@@ -299,7 +299,7 @@ struct Stone {
 
 impl Stone {
     /// Sides of the squares in which there is one at the most, in grains, and with which chance.
-    const SIZES: [(f32, f32); 4] = [(3.1, 0.55), (1.9, 0.65), (1.15, 0.7), (0.7, 0.7)];
+    const SIZES: [(f32, f32); 4] = [(3.0, 0.5), (2.0, 0.65), (1.25, 0.7), (0.75, 0.6)];
 
     /// The largest one at a place, if there is any; `share` is how many there are.
     fn find(seed: u32, at: Vec2, grain: f32, share: f32) -> Option<Self> {
@@ -326,7 +326,7 @@ impl Stone {
                 return Some(if pick(9) < 0.14 {
                     Self { height: -0.5 * rise, tone: -0.22 }
                 } else {
-                    Self { height: 0.55 * rise, tone: 0.12 + 1.5 * own * own.abs() - 0.18 * far * far * far }
+                    Self { height: 0.55 * rise, tone: 0.16 + 1.7 * own * own.abs() - 0.3 * far * far * far }
                 });
             }
         }
@@ -432,12 +432,15 @@ impl Shape<'_> {
             bumps += 0.6 * self.rough * pit * fade;
             // Next to the wall less of the sky is seen.
             let corner = (1.0 - within / (1.3 * self.depth).max(1.0)).clamp(0.0, 1.0);
-            let mut tone = 0.30 * coarse + 0.16 * plate + 0.5 * sand - 0.6 * corner * wall - 0.3 * sunk;
+            let mut tone = 0.30 * coarse + 0.16 * plate + (0.5 - 0.2 * stones) * sand
+                - 0.14 * stones
+                - 0.6 * corner * wall
+                - 0.3 * sunk;
             if stones > 0.0
                 && let Some(stone) = Stone::find(seed ^ 0x5C, at, self.grain, stones)
             {
                 let shown = fade * wall;
-                tone += (1.8 * stone.tone - 0.55 * tone) * shown;
+                tone += (1.8 * stone.tone - 0.7 * tone) * shown;
                 bumps += stone.height * shown;
             }
             tone
@@ -574,6 +577,35 @@ mod tests {
                 assert!(!was_inside, "seed {seed}: it has no end on way {k}");
             }
         }
+    }
+
+    /// What is worn has its edge where it was, and is no further from it than from any of its sides.
+    #[test]
+    fn worn_outlines_have_the_same_edge() {
+        let mut rng = Rng::new(10);
+        for seed in 0..60 {
+            let worn = Outline::new(Vec2::ZERO, 30.0, 4 + seed % 6, seed % 3, 0.6, seed).stretched(seed);
+            let clean = Outline { is_worn: false, corners: worn.corners.clone(), ..worn };
+            let n = worn.corners.len();
+            for _ in 0..200 {
+                let at = Vec2::new(rng.range(-40.0, 40.0), rng.range(-40.0, 40.0));
+                let within = worn.within(at);
+                assert_eq!(within > 0.0, clean.within(at) > 0.0, "seed {seed} at {at}");
+                let nearest = worn.corners.iter().map(|corner| corner.1.distance(at)).fold(f32::MAX, f32::min);
+                assert!(within < nearest + 1.0e-3 || n < 8, "seed {seed} at {at}: {within} of {nearest}");
+            }
+        }
+    }
+
+    /// About the share that is asked for is stones, large ones and small ones; without any there are none.
+    #[test]
+    fn stones_cover_what_they_are_told() {
+        let count = |share: f32| {
+            let at = |k: u32| Vec2::new((k % 200) as f32, (k / 200) as f32);
+            (0..40_000).filter(|&k| Stone::find(3, at(k), 6.0, share).is_some()).count() as f32 / 40_000.0
+        };
+        let (none, some, all) = (count(0.0), count(0.5), count(1.0));
+        assert!(none == 0.0 && (0.2..0.6).contains(&some) && (0.4..0.9).contains(&all), "{none} {some} {all}");
     }
 
     #[test]
