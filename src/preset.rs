@@ -155,11 +155,11 @@ impl CrackPreset {
             inertia: 1.5,
             wander: 0.3,
             forks: 0.02,
-            roughness: 0.11,
+            roughness: 0.09,
             arrest: 0.06,
             variety: 0.0,
             courses: 0.0625,
-            sway: 0.0055,
+            sway: 0.0036,
             ..GrowthParams::DEFAULT
         },
         profile: Profile {

@@ -63,12 +63,6 @@ const LONGEST_RUN: f32 = 0.9;
 /// How much a crack in masonry likes to go on upwards or downwards, as it last did.
 const STAIRS: f32 = 0.4;
 
-/// How much it likes to go on to the side to which it last went: it does not run back and forth below itself.
-const STEADY: f32 = 0.5;
-
-/// So many segments back it still knows that side.
-const REMEMBERED: u32 = 8;
-
 /// How much it likes to leave at a side of the wall that is near.
 const OUT: f32 = 5.0;
 
@@ -76,7 +70,7 @@ const OUT: f32 = 5.0;
 const NEAR_HIT: f32 = 0.7;
 
 /// Share of the nodes along a brick at which a hairline splits it.
-const SPLIT: f32 = 0.11;
+const SPLIT: f32 = 0.06;
 
 const FIXED: f32 = 16_777_216.0;
 pub(super) const NO_PULL: u32 = u32::MAX;
@@ -296,17 +290,6 @@ impl CrackGrowth {
         if self.network.nodes[at as usize].parent == NO_PARENT {
             run *= 2.0;
         }
-        let (mut sideways, mut at) = (0.0, node);
-        for _ in 0..REMEMBERED {
-            let Node { pos, parent, .. } = self.network.nodes[at as usize];
-            let Some(before) = self.network.nodes.get(parent as usize) else { break };
-            let way = pos - before.pos;
-            if way.x.abs() > way.y.abs() {
-                sideways = way.x.signum();
-                break;
-            }
-            at = parent;
-        }
         let mut ways: Vec<(f32, Way)> = masonry
             .ways(pos)
             .into_iter()
@@ -316,7 +299,7 @@ impl CrackGrowth {
                 let too_far = is_level && run > LONGEST_RUN * masonry.brick();
                 let liking = way.dot(course) + 0.55 * draw(if is_level { 0xB2 } else { 0xB3 });
                 // A staircase goes on up or down as before.
-                let stairs = STAIRS * rise * way.y + STEADY * sideways * way.x;
+                let stairs = STAIRS * rise * way.y;
                 // Out to the side, rather than up and down beside the border.
                 let to = pos.x + way.x * far;
                 let out = if is_level && (to <= 0.0 || to >= self.network.extent().x) { OUT } else { 0.0 };

@@ -231,8 +231,8 @@ impl Look {
         ]),
         crushed: Some(Crushed {
             radius: 0.034,
-            ragged: 0.62,
-            depth: 0.017,
+            ragged: 0.75,
+            depth: 0.016,
             rough: 0.005,
             grain: 0.006,
             color: [0.60, 0.40, 0.31],

@@ -47,9 +47,8 @@ impl SegmentPath {
         self
     }
 
-    /// The same line, each point moved by up to `by` (pattern units) as places beside it are: lines that meet still do; and up to 1.8 times as
-    /// wide, or a fifth. What lies on the border
-    /// of `0..=extent` stays there.
+    /// The same line, each point moved by up to `by` (pattern units) as places beside it are: lines that meet still do. Here and there it is
+    /// narrower. What lies on the border of `0..=extent` stays there.
     #[must_use]
     pub(super) fn swayed(mut self, by: f32, extent: Vec2, seed: u64) -> Self {
         for point in &mut self.points[..self.len] {
@@ -61,7 +60,7 @@ impl SegmentPath {
             let off = Vec2::new(way(0x51), way(0x52)) * (room * 0.25).min(Vec2::splat(by));
             let [wide, fine] =
                 [(0x53, 4.0), (0x54, 1.3)].map(|(what, size)| smooth(seed ^ what, point.pos / (size * by)));
-            point.width *= 1.0 + 0.45 * wide + 0.35 * fine;
+            point.width *= (0.9 + 0.45 * wide + 0.35 * fine).clamp(0.2, 1.0);
             point.pos = (point.pos + off).clamp(Vec2::ZERO, extent);
         }
         self
@@ -173,7 +172,7 @@ mod tests {
             moved = moved.max(meets.pos.distance(a));
             for (point, was) in first.points().iter().zip(line((c, a)).points()) {
                 assert!((point.pos - was.pos).abs().max_element() <= by + 1.0e-6);
-                assert!(point.width > 0.15 * was.width && point.width < 1.85 * was.width);
+                assert!(point.width > 0.19 * was.width && point.width <= was.width);
             }
         }
         assert!(moved > 0.5 * by, "{moved}");
