@@ -224,16 +224,17 @@ impl CrackPreset {
     /// Tempered glass: the whole pane goes to small dice, from the hit outward.
     pub const TEMPERED_GLASS: Self = Self {
         growth: GrowthParams {
-            kill_distance: 0.011,
-            step_length: 0.0085,
+            kill_distance: 0.0100,
+            step_length: 0.0077,
             crack_radius: 0.02,
             num_iterations: 400,
-            num_lines_grid: 97,
-            num_columns_grid: 97,
+            num_lines_grid: 107,
+            num_columns_grid: 107,
             markers: MarkerLayout::PseudoGrid { occupancy: 1.0, jitter: 0.9 },
             venation: Venation::Dividing,
             focus: 1.0,
             front: 0.008,
+            patches: 0.9,
             reach: 64.0,
             line_width: 0.0026,
             tip_taper: 0.0,
@@ -457,11 +458,11 @@ impl CrackPreset {
             num_iterations: 400,
             markers: MarkerLayout::Rays { sectors: 5, jitter: 0.8, through: 1.0 },
             reach: 1.0,
-            starts: StartLayout::Crushed { count: 6, radius: 0.012 },
-            line_width: 0.0019,
+            starts: StartLayout::Crushed { count: 6, radius: 0.006 },
+            line_width: 0.0016,
             line_growth: 0.3,
             murray: 1.7,
-            max_width: 0.009,
+            max_width: 0.0068,
             unevenness: 0.3,
             wander: 0.06,
             roughness: 0.03,
@@ -497,17 +498,18 @@ impl CrackPreset {
             num_columns_grid: 16,
             markers: MarkerLayout::PseudoGrid { occupancy: 1.0, jitter: 1.0 },
             focus: 0.5,
-            reach: 0.3,
+            reach: 0.33,
+            uneven: 0.5,
             starts: StartLayout::Arms { count: 5 },
-            line_width: 0.0016,
-            line_growth: 7.4,
+            line_width: 0.0021,
+            line_growth: 4.2,
             murray: 1.4,
-            max_width: 0.042,
+            max_width: 0.036,
             tip_taper: 0.0,
             inertia: 1.6,
             wander: 0.6,
             zigzag: 0.75,
-            forks: 0.14,
+            forks: 0.18,
             fork_angle: 0.9,
             roughness: 0.0,
             arrest: 0.12,
@@ -544,7 +546,11 @@ impl CrackPreset {
         let crushed = self.look.crushed.map(|crushed| crushed.scaled(by));
         let veil = self.look.veil.map(|veil| veil.scaled(by));
         let cel = self.look.cel.map(|cel| cel.scaled(by));
-        let facets = self.look.facets.map(|facets| Facets { fade: (facets.fade * by).clamp(0.0, 16.0), ..facets });
+        let facets = self.look.facets.map(|facets| Facets {
+            fade: (facets.fade * by).clamp(0.0, 16.0),
+            thick: (facets.thick * by).clamp(0.0, 0.02),
+            ..facets
+        });
         let full_rim = (self.look.full_rim * by).clamp(0.0, 1.0);
         let look = Look { cel, crushed, veil, facets, full_rim, ..self.look.clone() };
         Self { growth, profile, look, ..self.clone() }

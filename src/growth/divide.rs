@@ -52,6 +52,9 @@ const LONG: f32 = 1.05;
 /// Beyond the rim within so many times as far as is looked, a domain is open.
 const BEYOND: f32 = 1.5;
 
+/// Radians of the shortest wave in which the size of domains changes from place to place, a kill distance.
+const PATCHES: f32 = 0.95;
+
 /// How much less far than its reach a hit loads the surface in some directions, as a share.
 const UNEVEN: f32 = 0.3;
 
@@ -260,6 +263,21 @@ impl GrowthParams {
         self.kill_distance * coarser * further / (1.0 + self.focus * self.near_hit(from_hit))
     }
 
+    /// How many times further it must be from them at a place, 1 at least.
+    fn patch(&self, pos: Vec2, seed: u64) -> f32 {
+        if self.patches <= 0.0 {
+            return 1.0;
+        }
+        // Waves of a few kill distances, in all directions.
+        let wave = |k: u64| {
+            let way = ops::unit(2.0 * PI * hash_unit(seed ^ 0xA6, k)) * (PATCHES / (1.0 + 0.35 * k as f32));
+            ops::unit(way.dot(pos) / self.kill_distance + 2.0 * PI * hash_unit(seed ^ 0xA7, k)).x
+        };
+        let sum: f32 = (0..5).map(wave).sum();
+        let share = (0.5 + 0.33 * sum).clamp(0.0, 1.0);
+        1.0 + self.patches * share * share
+    }
+
     /// 1 at the hit, 0 where domains know nothing of it any more.
     fn near_hit(&self, from_hit: f32) -> f32 {
         if self.focus <= 0.0 {
@@ -351,7 +369,8 @@ impl CrackGrowth {
                 }
                 let from_hit = from_hit_sq.sqrt();
                 let reach = division.begun.get(impact as usize).map_or(f32::INFINITY, |begun| begun.1);
-                let loaded = narrow * params.loaded(generation, from_hit, reach);
+                let patch = params.patch(pos, self.seed);
+                let loaded = narrow * (params.loaded(generation, from_hit, reach) * patch);
                 if near_sq > loaded * loaded {
                     nearest = nearest.min(from_hit - front);
                     found.push(Candidate { marker, id, impact, pos, near_sq, from_hit });
@@ -388,7 +407,8 @@ impl CrackGrowth {
         let near_sq = self.field.near_sq(candidate.marker);
         let Some(division) = &self.division else { return };
         let reach = division.begun.get(candidate.impact as usize).map_or(f32::INFINITY, |begun| begun.1);
-        let loaded = self.params.loaded(division.generation, candidate.from_hit, reach);
+        let patch = self.params.patch(candidate.pos, self.seed);
+        let loaded = self.params.loaded(division.generation, candidate.from_hit, reach) * patch;
         if near_sq < STILL * STILL * candidate.near_sq || self.room() < 3 {
             return;
         }

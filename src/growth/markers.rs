@@ -24,10 +24,27 @@ pub(super) struct Region {
 
 impl Region {
     /// Share of the way from the centre to the rim; `None` outside of the region or the surface.
-    fn share(&self, pos: Vec2) -> Option<f32> {
+    fn share(&self, pos: Vec2, uneven: f32, seed: u64) -> Option<f32> {
+        let away = self.away(pos, uneven, seed);
         let distance = pos.distance(self.center);
+        let distance = if away < 1.0 { distance / away } else { distance };
         let inside = pos.cmpge(Vec2::ZERO).all() && pos.cmple(self.extent).all();
         (inside && distance >= self.inner && distance < self.outer).then_some(distance / self.outer)
+    }
+
+    /// How far the hit reaches in the direction of a place, as a share of how far it does at the most.
+    fn away(&self, pos: Vec2, uneven: f32, seed: u64) -> f32 {
+        if uneven <= 0.0 {
+            return 1.0;
+        }
+        let way = (pos - self.center).normalize_or(Vec2::X);
+        // Cosines of multiples of the angle, each turned by a draw.
+        let (mut power, mut sum) = (way, 0.0);
+        for wave in 2..=5u64 {
+            power = power.rotate(way);
+            sum += power.dot(ops::unit(TAU * hash_unit(seed ^ 0xA4, wave)));
+        }
+        1.0 - uneven * (0.5 + 0.35 * sum).clamp(0.0, 1.0)
     }
 }
 
@@ -56,7 +73,7 @@ pub(super) fn lay_out(
     let apart = spacing(params, region.extent);
     // Where a marker comes to lie that is offered a place, if it does.
     let settle = |pos: Vec2, chance: f32, probability: f32| {
-        let share = region.share(pos)?;
+        let share = region.share(pos, params.uneven, seed)?;
         let mut thinned = if params.focus > 0.0 { ops::powf(1.0 - share, params.focus) } else { 1.0 };
         let mut pos = pos;
         if !mask.is_empty() {
@@ -322,4 +339,24 @@ pub(super) fn starts(
         *place = place.clamp(Vec2::ZERO, extent);
     }
     places
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An uneven hit reaches nowhere further than an even one, and in some directions less far.
+    #[test]
+    fn uneven_hits_reach_less_far_in_some_directions() {
+        let region = Region { center: Vec2::splat(0.5), inner: 0.0, outer: 0.4, extent: Vec2::ONE };
+        for seed in 0..50 {
+            let reach = |uneven: f32| {
+                (0..64).map(move |i| region.away(region.center + ops::unit(TAU * i as f32 / 64.0) * 0.1, uneven, seed))
+            };
+            assert!(reach(0.0).all(|share| share == 1.0));
+            let (least, most) =
+                reach(0.8).fold((1.0f32, 0.0f32), |(low, high), share| (low.min(share), high.max(share)));
+            assert!(least >= 0.2 - 1.0e-6 && most <= 1.0 && most - least > 0.2, "{least} to {most}");
+        }
+    }
 }

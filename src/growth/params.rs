@@ -121,6 +121,9 @@ pub struct GrowthParams {
     pub focus: f32,
     /// Radius around a hit of energy 1 that markers populate; grows with the root of the energy. Pattern units, 0.01..=64.
     pub reach: f32,
+    /// How much less far a hit reaches in some directions than in others: up to this share of it, for markers that are not on rays. With
+    /// [`Venation::Dividing`] it reaches unevenly anyway. 0..=0.9.
+    pub uneven: f32,
     /// The nodes with which a hit begins.
     pub starts: StartLayout,
     /// Width of a crack at its tip. Pattern units, 0.0005..=0.2.
@@ -194,6 +197,8 @@ pub struct GrowthParams {
     pub mixed: f32,
     /// With [`Venation::Dividing`]: how far cracks may begin from the hit, pattern units for each step since it; 0 = anywhere at once. 0..=1.
     pub front: f32,
+    /// With [`Venation::Dividing`]: how much larger domains are here and there, in patches of a few of them: up to so many times more than one. 0..=4.
+    pub patches: f32,
     /// How much one surface differs from the next, by its seed: widths, roughness, the spacing of markers, the number of starts and
     /// of free ends, the axis. 0 = not at all; at 1 each differs by a factor of up to 2 either way, mostly much less. 0..=1.
     pub variety: f32,
@@ -222,6 +227,7 @@ impl GrowthParams {
         venation: Venation::Open,
         focus: 0.0,
         reach: 0.6,
+        uneven: 0.0,
         starts: StartLayout::Point,
         line_width: 0.004,
         line_growth: 0.4,
@@ -252,6 +258,7 @@ impl GrowthParams {
         thinning: 0.0,
         mixed: 0.0,
         front: 0.0,
+        patches: 0.0,
         variety: 0.0,
         courses: 0.0,
         sway: 0.0,
@@ -334,6 +341,7 @@ impl GrowthParams {
         num_columns_grid: u32 = 1.0, 512.0;
         focus: f32 = 0.0, 4.0;
         reach: f32 = 0.01, 64.0;
+        uneven: f32 = 0.0, 0.9;
         line_width: f32 = 0.0005, 0.2;
         line_growth: f32 = 0.0, 16.0;
         murray: f32 = 1.0, 8.0;
@@ -361,6 +369,7 @@ impl GrowthParams {
         thinning: f32 = 0.0, 1.0;
         mixed: f32 = 0.0, 0.9;
         front: f32 = 0.0, 1.0;
+        patches: f32 = 0.0, 4.0;
         variety: f32 = 0.0, 1.0;
         courses: f32 = 0.0, 1.0;
         sway: f32 = 0.0, 0.05;

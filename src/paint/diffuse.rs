@@ -220,7 +220,7 @@ impl Block<'_> {
         at: UVec2,
     ) -> [u32; BLOCK] {
         // Channel by channel, so that each loop works on many texels at once.
-        let mut over = self.over::<RICH>(look, at);
+        let mut over = self.over::<ROOM, RICH>(look, extras, at);
         let mut under = self.picture(frame, look, at);
         let facets = if RICH { self.plates(frame, extras, at, &mut under) } else { [0.0; BLOCK] };
         if look.tint > 0.0 {
@@ -232,7 +232,7 @@ impl Block<'_> {
         }
         let mut dark = [0.0; BLOCK];
         if RICH && let Some((extras, place)) = extras {
-            dark = compose(extras, place, look, &facets, &under, &mut over);
+            dark = compose((extras, place, at), look, &facets, &under, &mut over);
         }
         let mut painted = [0; BLOCK];
         let (mut under_share, mut over_share, mut facing) = ([0.0; BLOCK], [1.0; BLOCK], [0.0; BLOCK]);
@@ -281,7 +281,12 @@ impl Block<'_> {
 
     /// What lies over the picture: three colours times cover, and cover. Texel by texel, the four of each at once, then turned.
     #[inline(always)]
-    fn over<const RICH: bool>(&self, look: &LookTable, at: UVec2) -> [[f32; BLOCK]; 4] {
+    fn over<const ROOM: usize, const RICH: bool>(
+        &self,
+        look: &LookTable,
+        extras: Option<(&Extras<'_, ROOM>, usize)>,
+        at: UVec2,
+    ) -> [[f32; BLOCK]; 4] {
         let mut share = [1.0; BLOCK];
         if look.grain > 0.0 {
             let noise = noise(at.x, at.y);
@@ -294,6 +299,22 @@ impl Block<'_> {
                 let (x, y) = ((at.x + i as u32) as f32 * look.sparkle_scale, at.y as f32 * look.sparkle_scale);
                 *share *= 1.0 - look.sparkle * (0.5 + 0.5 * smooth_noise(0x5EED, x, y));
             }
+        }
+        if RICH
+            && let Some((extras, place)) = extras
+            && let Some(cel) = look.cel.as_ref().filter(|cel| cel.has_floor)
+        {
+            let mut over = [[0.0; BLOCK]; 4];
+            for i in 0..BLOCK {
+                let pit = extras.spot(place + i).pit;
+                if self.depth[i] != 0 || pit[0] != 0 {
+                    let at = [(at.x + i as u32) as f32, at.y as f32];
+                    let floor = extras.veil(place + i);
+                    let layer = cel.layer_over(self.depth[i], [self.x[i], self.y[i]], floor, pit, at);
+                    over.iter_mut().zip(layer).for_each(|(over, part)| over[i] = part * share[i]);
+                }
+            }
+            return over;
         }
         if RICH && *self.depth == [0; BLOCK] {
             return [[0.0; BLOCK]; 4];
@@ -382,8 +403,7 @@ impl Block<'_> {
 /// Lays the sheen of plates and what is crushed under the cracks, and holes over them; returns how dark those are.
 #[inline(always)]
 fn compose<const ROOM: usize>(
-    extras: &Extras<'_, ROOM>,
-    place: usize,
+    (extras, place, at): (&Extras<'_, ROOM>, usize, UVec2),
     look: &LookTable,
     sheen: &[f32; BLOCK],
     under: &[[f32; BLOCK]; 3],
@@ -397,8 +417,24 @@ fn compose<const ROOM: usize>(
         if extras.are_gone {
             // Small plates are gone as a whole, or not at all.
             match extras.facet(extras.plate(place + i)).is_gone {
+                // What is larger than the hole stands.
+                None if look.thick > 0.0 && extras.plate(place + i) != 0 => dark = 0.0,
                 None => {}
-                Some(is_gone) => dark = if is_gone { 1.0 } else { 0.0 },
+                Some(is_gone) => {
+                    dark = if is_gone { 1.0 } else { 0.0 };
+                    if is_gone && look.thick > 0.0 {
+                        let side = extras.side(at.x + i as u32, at.y, look.thick);
+                        // The line at its edge stays, and what is seen of the sides of those beside it.
+                        dark -= side.line * over[3][i].clamp(0.0, 1.0);
+                        for c in 0..3 {
+                            let face = HOLE * under[c][i] * (1.0 - side.face) + look.side[c] * side.face * side.tone;
+                            over[c][i] = over[c][i] * (1.0 - dark) + face * dark;
+                        }
+                        over[3][i] = 1.0;
+                        holes[i] = dark;
+                        continue;
+                    }
+                }
             }
         }
         // Shadows lie under the cracks, a hole has none.
@@ -413,11 +449,22 @@ fn compose<const ROOM: usize>(
         for c in 0..3 {
             let veiled = look.sheen[c] * sheen * (1.0 - veil) + look.veil[c] * veil;
             let crushed = extras.color[c] + under[c][i] * extras.tint;
-            let below = veiled * (1.0 - pale) + crushed * tone * pale;
-            let below = below * (1.0 - shade) + HOLE * under[c][i] * shade;
-            let crack = over[c][i] + below * left;
-            over[c][i] = crack * (1.0 - hole) + HOLE * under[c][i] * hole;
+            let mut crack = over[c][i];
+            if extras.is_drawn {
+                crack = (crack + veiled * left) * (1.0 - pale) + crushed * tone * pale;
+                crack = crack * (1.0 - shade) + HOLE * under[c][i] * shade;
+            } else {
+                let below = veiled * (1.0 - pale) + crushed * tone * pale;
+                let below = below * (1.0 - shade) + HOLE * under[c][i] * shade;
+                crack += below * left;
+            }
+            let mut void = HOLE * under[c][i];
+            if extras.has_walls {
+                void += (crushed * tone - void) * pale;
+            }
+            over[c][i] = crack * (1.0 - hole) + void * hole;
         }
+        // What lies over or under a crack covers as much.
         let cover = over[3][i] + left * (1.0 - (1.0 - sheen) * (1.0 - veil) * (1.0 - pale) * (1.0 - shade));
         over[3][i] = cover * (1.0 - hole) + hole;
         holes[i] = hole;

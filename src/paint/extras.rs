@@ -24,6 +24,10 @@ pub(super) struct Extras<'a, const ROOM: usize> {
     pub(super) shades: bool,
     /// How much of cracks is gone where it has come off.
     bare: f32,
+    /// Whether it is drawn, chips over cracks.
+    pub(super) is_drawn: bool,
+    /// Whether what is pale in a hole is its wall.
+    pub(super) has_walls: bool,
     /// What a step of its depth is in the depth map.
     deep: f32,
     veils: Option<&'a Grid<u8>>,
@@ -47,7 +51,8 @@ impl<'a, const ROOM: usize> Extras<'a, ROOM> {
     pub(super) fn of(field: &'a DepthField, look: &'a LookTable) -> Option<Self> {
         let layer = field.layer();
         let plates = layer.plates().filter(|_| look.facets.is_some());
-        let (crushed, veils) = (layer.crushed(), layer.veil().filter(|_| look.veil_cover > 0.0));
+        let has_floor = look.cel.is_some_and(|cel| cel.has_floor);
+        let (crushed, veils) = (layer.crushed(), layer.veil().filter(|_| look.veil_cover > 0.0 || has_floor));
         let settings = crushed.map(CrushedField::settings);
         (plates.is_some() || crushed.is_some() || veils.is_some()).then(|| Self {
             facets: look.facets.as_ref().filter(|_| plates.is_some()),
@@ -59,6 +64,8 @@ impl<'a, const ROOM: usize> Extras<'a, ROOM> {
             tint: settings.map_or(0.0, |all| all.tint),
             shades: settings.is_some_and(|all| all.broken),
             bare: settings.map_or(0.0, |all| if all.broken { all.bare } else { 0.0 }),
+            has_walls: settings.is_some_and(|all| !all.broken && all.hole > 0.0 && all.edge > 0.0),
+            is_drawn: settings.is_some_and(|all| all.broken && all.outline > 0.0),
             deep: settings.map_or(0.0, |all| all.depth * look.deep),
             veils,
             room: Box::new(Room { plate: [0; ROOM], spot: [Spot::default(); ROOM], veil: [0; ROOM] }),
@@ -161,6 +168,46 @@ impl<'a, const ROOM: usize> Extras<'a, ROOM> {
         facet
     }
 
+    /// What is seen of the sides of plates from a texel whose own is gone.
+    pub(super) fn side(&self, x: u32, y: u32, thick: f32) -> Side {
+        let mut side = Side { line: 0.0, face: 0.0, tone: 1.0 };
+        let Some(ids) = self.ids else { return side };
+        let own = ids.get(x, y).unwrap_or(0);
+        let stands = |by: Vec2| {
+            let (x, y) = (x.checked_add_signed(by.x.round() as i32)?, y.checked_add_signed(by.y.round() as i32)?);
+            let id = ids.get(x, y)?;
+            if id == own {
+                return None;
+            }
+            let facet = self.facet(id);
+            (facet.is_gone != Some(true)).then_some(facet.tone)
+        };
+        // Lines at the edge of the hole, not those that were in it.
+        let near = [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0), (2.0, 0.0), (-2.0, 0.0), (0.0, 2.0), (0.0, -2.0)];
+        side.line = if near.iter().any(|&(x, y)| stands(Vec2::new(x, y)).is_some()) { 1.0 } else { 0.0 };
+        // The side that faces the light is seen at the lower right, the others less of.
+        for (way, reach, bright) in [
+            (Vec2::new(0.6, 0.8), 1.0, 1.0),
+            (Vec2::new(0.9, 0.45), 0.85, 0.85),
+            (Vec2::new(-0.45, 0.9), 0.75, 0.62),
+            (Vec2::new(0.9, -0.45), 0.6, 0.5),
+            (Vec2::new(-0.8, -0.6), 0.4, 0.30),
+        ] {
+            let mut far = 1.0;
+            while far <= reach * thick {
+                if let Some(tone) = stands(way * far) {
+                    let face = bright * (1.0 - 0.7 * far / (reach * thick));
+                    if face > side.face {
+                        (side.face, side.tone) = (face, tone);
+                    }
+                    break;
+                }
+                far += 1.0;
+            }
+        }
+        side
+    }
+
     #[inline(always)]
     pub(super) fn plate(&self, place: usize) -> u16 {
         self.room.plate[place]
@@ -205,6 +252,15 @@ impl<'a, const ROOM: usize> Extras<'a, ROOM> {
     pub(super) fn spot(&self, place: usize) -> Spot {
         self.room.spot[place]
     }
+}
+
+/// What is seen of the sides of plates in a hole.
+pub(super) struct Side {
+    /// How much of cracks is seen: those at the edge of the hole.
+    pub(super) line: f32,
+    /// How bright the side is, and the tone of the plate that it belongs to.
+    pub(super) face: f32,
+    pub(super) tone: f32,
 }
 
 /// A plate as it looks.
@@ -286,6 +342,9 @@ impl Facets {
         let shift = (self.shift * weight * lean).round().as_ivec2().to_array();
         // A few flash; of the others those that lean to the light shine a little.
         let strength = if d > 1.0 - 2.0 * self.flash { 0.45 + 0.55 * e.abs() } else { 0.25 * f.max(0.0) };
+        // In patches: the nearer to their middle the brighter, each a little different.
+        let glow = (1.15 * plate.common[0] + 0.34 * d + 0.35 * plate.common[2]).clamp(0.0, 1.0);
+        let strength = strength + self.sweep * (glow * (0.55 + 0.45 * e.abs()) - strength);
         let high = self.gleam * strength * weight.sqrt();
         let low = 0.25 * high;
         let gain = lean.normalize_or(Vec2::Y) * (high - low) * plate.inv_side;

@@ -3,7 +3,7 @@
 use super::patch::Curve;
 use crate::{
     pattern::MAX_SIDE,
-    raster::{Crushed, LayerPlan, Veil},
+    raster::{Crushed, LayerPlan, PIT_STEPS, Veil, noise as smooth_noise},
 };
 use glam::Vec4;
 use std::{
@@ -55,6 +55,13 @@ pub struct Facets {
     /// Whether plates smaller than the hole of a [crushed](Look::crushed) zone are gone as a whole if their middle lies in it, and else not at
     /// all; default no.
     pub gone: bool,
+    /// How much of what they [reflect](Self::gleam) comes in broad patches of neighbours, the brightest in the middle, in place of here and there.
+    /// 0..=1; default 0.
+    pub sweep: f32,
+    /// How thick plates are whose neighbours are [gone](Self::gone): their broken sides are seen in the hole. Pattern units, 0..=0.02; default 0.
+    pub thick: f32,
+    /// Colour of those sides, sRGB 0..=1; default that of the edge of a pane.
+    pub side: [f32; 3],
 }
 
 impl Facets {
@@ -71,6 +78,9 @@ impl Facets {
         fade: 0.0,
         bundle: 0.0,
         gone: false,
+        sweep: 0.0,
+        thick: 0.0,
+        side: [0.62, 0.86, 0.78],
     };
 }
 
@@ -96,6 +106,10 @@ pub struct Cel {
     pub outline: f32,
     /// How far inside the edge the lit wall ends, pattern units, 0..=0.5; default 0.012.
     pub wall: f32,
+    /// How far the floor of a crack is moved towards the light, as a share of its half width, up to [`wall`](Self::wall): the lit wall is what the
+    /// floor leaves open, so it runs out in a point where the crack turns, and each straight side has a tone of its own. 0..=1; default 0 = a band as
+    /// wide as the wall along all that faces the light. A look with a [veil](Look::veil) has the band.
+    pub slant: f32,
     /// Colour of the line, sRGB 0..=1; default a warm black.
     pub ink: [f32; 3],
     /// Colour inside, sRGB 0..=1; default a dark brown.
@@ -110,6 +124,7 @@ impl Cel {
         wide: 0.04,
         outline: 0.0035,
         wall: 0.012,
+        slant: 0.0,
         ink: [0.075, 0.05, 0.055],
         fill: [0.16, 0.105, 0.10],
         lit: [0.46, 0.31, 0.24],
@@ -130,6 +145,7 @@ impl Cel {
         within("cel.wide", self.wide, 0.0001..=0.5, "0.0001..=0.5")?;
         within("cel.outline", self.outline, 0.0..=0.1, "0..=0.1")?;
         within("cel.wall", self.wall, 0.0..=0.5, "0..=0.5")?;
+        within("cel.slant", self.slant, 0.0..=1.0, "0..=1")?;
         for (field, color) in [("cel.ink", self.ink), ("cel.fill", self.fill), ("cel.lit", self.lit)] {
             for channel in color {
                 within(field, channel, 0.0..=1.0, "0..=1")?;
@@ -311,8 +327,16 @@ impl Look {
     pub const fn layer(&self, seed: u64) -> LayerPlan {
         LayerPlan {
             plates: self.facets.is_some(),
+            thick: match self.facets {
+                Some(facets) => facets.thick,
+                None => 0.0,
+            },
             crushed: self.crushed,
             veil: self.veil,
+            floor: match self.cel {
+                Some(cel) => [cel.slant, cel.wall],
+                None => [0.0; 2],
+            },
             catch: self.catch,
             full_rim: self.full_rim,
             seed,
@@ -377,10 +401,18 @@ pub(super) struct Strokes {
     step: f32,
     outline: f32,
     wall: f32,
+    /// Whether what is lit is what the floor leaves open.
+    pub(super) has_floor: bool,
+    /// Bumps of its outline, a texel.
+    wobble: f32,
     ink: [f32; 3],
     fill: [f32; 3],
     lit: [f32; 3],
 }
+
+/// Bumps of the width of an outline, a pattern unit, and how much it varies.
+const WOBBLES: f32 = 13.0;
+const WOBBLE: f32 = 0.35;
 
 /// A wall is lit that faces the light by more than this (a cosine).
 const LIT: f32 = 0.2;
@@ -392,6 +424,8 @@ impl Strokes {
             step: cel.wide * texels_per_unit * (1.0 / 65535.0),
             outline: (cel.outline * texels_per_unit).max(1.0),
             wall: cel.wall * texels_per_unit,
+            has_floor: cel.slant > 0.0,
+            wobble: WOBBLES / texels_per_unit,
             ink,
             fill,
             lit,
@@ -417,6 +451,31 @@ impl Strokes {
     }
 }
 
+impl Strokes {
+    /// The same at a place with a floor, which covers so much of it, and a pit.
+    #[inline(always)]
+    pub(super) fn layer_over(&self, depth: u16, [x, y]: [f32; 2], floor: u8, pit: [u8; 3], at: [f32; 2]) -> [f32; 4] {
+        let share = |value: f32| value.clamp(0.0, 1.0);
+        let (crack, hollow) = (f32::from(depth) * self.step, f32::from(pit[0]) * (1.0 / PIT_STEPS));
+        let inside = crack.max(hollow);
+        let cover = share(inside);
+        let bold = self.outline * (1.0 + WOBBLE * smooth_noise(0x1A4, at[0] * self.wobble, at[1] * self.wobble));
+        let open = share(inside - bold);
+        let steep = (x * x + y * y).sqrt();
+        let facing = if steep > 1.0e-6 { -std::f32::consts::FRAC_1_SQRT_2 * (x + y) / steep } else { 0.0 };
+        let facing = if hollow > crack { f32::from(pit[2]) * (2.0 / 255.0) - 1.0 } else { facing };
+        let floor = f32::from(floor.max(pit[1])) * (1.0 / 255.0);
+        // Flat tones: one for each straight side.
+        let least = if hollow > crack { 0.15 } else { 0.0 };
+        let lit = (0.22 + 0.9 * facing).clamp(least, 1.0) * (1.0 - floor);
+        let color = |c: usize| {
+            let within = self.fill[c] + (self.lit[c] - self.fill[c]) * lit;
+            (self.ink[c] + (within - self.ink[c]) * open) * cover
+        };
+        [color(0), color(1), color(2), cover]
+    }
+}
+
 /// A [`Look`] made ready to paint with.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LookTable {
@@ -434,6 +493,9 @@ pub struct LookTable {
     pub(super) facets: Option<Facets>,
     /// Colour that plates reflect, 0..=255.
     pub(super) sheen: [f32; 3],
+    /// Colour of their sides, 0..=255, and how thick they are, texels.
+    pub(super) side: [f32; 3],
+    pub(super) thick: f32,
     /// Colour of veils, 0..=255, and what a step of their density covers; nothing if there are none.
     pub(super) veil: [f32; 3],
     pub(super) veil_cover: f32,
@@ -490,6 +552,11 @@ impl Look {
             for channel in facets.sheen {
                 within("facets.sheen", channel, 0.0..=1.0, unit)?;
             }
+            for channel in facets.side {
+                within("facets.side", channel, 0.0..=1.0, unit)?;
+            }
+            within("facets.sweep", facets.sweep, 0.0..=1.0, unit)?;
+            within("facets.thick", facets.thick, 0.0..=0.02, "0..=0.02")?;
             within("facets.near", facets.near, 0.0..=1.0, unit)?;
             within("facets.dish", facets.dish, 0.0..=1.0, unit)?;
             within("facets.fade", facets.fade, 0.0..=16.0, "0..=16")?;
@@ -589,6 +656,8 @@ impl LookTable {
             curve: look.curve(),
             cel: look.cel.map(|cel| Strokes::new(&cel, texels_per_unit)),
             facets,
+            side: facets.map_or([0.0; 3], |facets| facets.side.map(|channel| 255.0 * channel)),
+            thick: facets.map_or(0.0, |facets| facets.thick * texels_per_unit),
             sheen: facets.map_or([0.0; 3], |facets| facets.sheen.map(|channel| 255.0 * channel)),
             veil: look.veil.map_or([0.0; 3], |veil| veil.color.map(|channel| 255.0 * channel)),
             veil_cover: look.veil.map_or(0.0, |veil| veil.cover * (1.0 / 255.0)),
@@ -670,6 +739,7 @@ mod tests {
             assert_eq!(cel(Cel { wide: bad, ..Cel::DEFAULT }), Some("cel.wide"));
             assert_eq!(cel(Cel { outline: bad, ..Cel::DEFAULT }), Some("cel.outline"));
             assert_eq!(cel(Cel { wall: bad, ..Cel::DEFAULT }), Some("cel.wall"));
+            assert_eq!(cel(Cel { slant: bad, ..Cel::DEFAULT }), Some("cel.slant"));
             assert_eq!(cel(Cel { ink: [bad, 0.0, 0.0], ..Cel::DEFAULT }), Some("cel.ink"));
             assert_eq!(cel(Cel { fill: [0.0, bad, 0.0], ..Cel::DEFAULT }), Some("cel.fill"));
             assert_eq!(cel(Cel { lit: [0.0, 0.0, bad], ..Cel::DEFAULT }), Some("cel.lit"));
@@ -684,6 +754,9 @@ mod tests {
             assert_eq!(facets(Facets { dish: bad, ..Facets::DEFAULT }), Some("facets.dish"));
             assert_eq!(facets(Facets { fade: bad, ..Facets::DEFAULT }), Some("facets.fade"));
             assert_eq!(facets(Facets { bundle: bad, ..Facets::DEFAULT }), Some("facets.bundle"));
+            assert_eq!(facets(Facets { sweep: bad, ..Facets::DEFAULT }), Some("facets.sweep"));
+            assert_eq!(facets(Facets { thick: bad, ..Facets::DEFAULT }), Some("facets.thick"));
+            assert_eq!(facets(Facets { side: [0.0, bad, 0.0], ..Facets::DEFAULT }), Some("facets.side"));
             let crushed = |crushed| refused(&Look { crushed: Some(crushed), ..Look::GROOVE });
             assert_eq!(crushed(Crushed { radius: bad, ..Crushed::DEFAULT }), Some("crushed.radius"));
             assert_eq!(crushed(Crushed { ragged: bad, ..Crushed::DEFAULT }), Some("crushed.ragged"));
@@ -706,13 +779,19 @@ mod tests {
             assert_eq!(crushed(Crushed { basin: bad, ..Crushed::DEFAULT }), Some("crushed.basin"));
             assert_eq!(crushed(Crushed { fall: bad, ..Crushed::DEFAULT }), Some("crushed.fall"));
             assert_eq!(crushed(Crushed { outline: bad, ..Crushed::DEFAULT }), Some("crushed.outline"));
+            assert_eq!(crushed(Crushed { pit: bad, ..Crushed::DEFAULT }), Some("crushed.pit"));
+            assert_eq!(crushed(Crushed { ticks: 17, ..Crushed::DEFAULT }), Some("crushed.ticks"));
             assert_eq!(crushed(Crushed { flakes: 17, ..Crushed::DEFAULT }), Some("crushed.flakes"));
             assert_eq!(crushed(Crushed { needles: bad, ..Crushed::DEFAULT }), Some("crushed.needles"));
+            assert_eq!(crushed(Crushed { crazing: bad, ..Crushed::DEFAULT }), Some("crushed.crazing"));
+            assert_eq!(crushed(Crushed { bubbles: 65, ..Crushed::DEFAULT }), Some("crushed.bubbles"));
             assert_eq!(crushed(Crushed { edge: bad, ..Crushed::DEFAULT }), Some("crushed.edge"));
             let veil = |veil| refused(&Look { veil: Some(veil), ..Look::GROOVE });
             assert_eq!(veil(Veil { reach: bad, ..Veil::DEFAULT }), Some("veil.reach"));
             assert_eq!(veil(Veil { full_width: bad, ..Veil::DEFAULT }), Some("veil.full_width"));
             assert_eq!(veil(Veil { cover: bad, ..Veil::DEFAULT }), Some("veil.cover"));
+            assert_eq!(veil(Veil { uneven: bad, ..Veil::DEFAULT }), Some("veil.uneven"));
+            assert_eq!(veil(Veil { bubbles: bad, ..Veil::DEFAULT }), Some("veil.bubbles"));
             assert_eq!(veil(Veil { color: [bad, 0.0, 0.0], ..Veil::DEFAULT }), Some("veil.color"));
             let glow = |stops: &[ColorStop]| refused(&Look { glow: stops.to_vec().into(), ..Look::GROOVE });
             assert_eq!(glow(&[stop(bad, [0.0; 3], 0.0)]), Some("glow.depth"));
@@ -749,6 +828,22 @@ mod tests {
         assert!(close(at(5.0, to_light), cel.lit, 1.0), "the wall that faces the light");
         assert!(close(at(5.0, off_light), cel.fill, 1.0), "the other wall");
         assert!(close(at(20.0, to_light), cel.fill, 1.0), "further inside");
+    }
+
+    #[test]
+    fn what_a_floor_leaves_open_is_lit() {
+        let cel = Cel { wide: 0.1, outline: 0.002, wall: 0.02, slant: 0.8, ..Cel::DEFAULT };
+        let strokes = Strokes::new(&cel, 500.0);
+        let at = |slope: [f32; 2], floor: u8, pit: [u8; 3]| strokes.layer_over(20_000, slope, floor, pit, [3.0, 4.0]);
+        let (to_light, off_light) = ([-1.0, -1.0], [1.0, 1.0]);
+        let bright = |got: [f32; 4]| got[0] + got[1] + got[2];
+        let fill = 255.0 * (cel.fill[0] + cel.fill[1] + cel.fill[2]);
+        assert!((bright(at(to_light, 255, [0; 3])) - fill).abs() < 0.1, "the floor");
+        assert!((bright(at(off_light, 0, [0; 3])) - fill).abs() < 0.1, "the wall in the shade");
+        assert!(bright(at(to_light, 0, [0; 3])) > 2.0 * fill, "the lit wall");
+        // A pit that is deeper than the crack has walls of its own.
+        assert!(bright(at(off_light, 0, [255, 0, 255])) > 2.0 * fill);
+        assert_eq!(strokes.layer_over(0, to_light, 0, [0; 3], [0.0; 2]), [0.0; 4]);
     }
 
     #[test]

@@ -7,14 +7,21 @@ use std::borrow::Cow;
 impl Look {
     /// Window glass: bright hairlines, plates that reflect and shift what is behind them, a white crushed ring around a hole.
     pub const GLASS: Self = Self {
-        catch: 0.92,
+        ramp: Cow::Borrowed(&[
+            stop(0.05, [0.84, 0.90, 0.91], 0.14),
+            stop(0.18, [0.88, 0.93, 0.94], 0.33),
+            stop(0.40, [0.93, 0.97, 0.97], 0.55),
+            stop(0.75, [0.97, 0.99, 1.0], 0.85),
+            stop(1.0, [0.98, 1.0, 1.0], 0.95),
+        ]),
+        catch: 0.8,
         facets: Some(Facets {
-            tone: 0.13,
+            tone: 0.11,
             tilt: 0.10,
             shift: 3.0,
-            gleam: 0.55,
+            gleam: 0.46,
             flash: 0.16,
-            near: 0.55,
+            near: 0.68,
             ..Facets::DEFAULT
         }),
         crushed: Some(Crushed {
@@ -28,11 +35,11 @@ impl Look {
             color: [0.95, 0.98, 1.0],
             pale: 0.95,
             speckle: 0.5,
-            dust: 0.22,
-            chips: 0.05,
+            dust: 0.2,
+            chips: 0.0,
             reach: 2.6,
             needles: 0.7,
-            edge: 0.8,
+            edge: 0.9,
             ..Crushed::DEFAULT
         }),
         ..Self::FROSTED
@@ -41,21 +48,23 @@ impl Look {
     /// Tempered glass: dice, each with its own tone and glitter.
     pub const TEMPERED_GLASS: Self = Self {
         ramp: Cow::Borrowed(&[
-            stop(0.10, [0.84, 0.90, 0.90], 0.06),
-            stop(0.45, [0.88, 0.94, 0.93], 0.28),
-            stop(1.0, [0.93, 0.98, 0.97], 0.62),
+            stop(0.10, [0.84, 0.90, 0.90], 0.05),
+            stop(0.45, [0.86, 0.93, 0.92], 0.20),
+            stop(1.0, [0.93, 0.98, 0.97], 0.50),
         ]),
-        glint: 0.5,
-        relief: 0.002,
+        glint: 0.66,
+        relief: 0.0026,
         facets: Some(Facets {
             tone: 0.26,
             tilt: 0.22,
             shift: 3.0,
-            gleam: 0.85,
+            gleam: 0.66,
             flash: 0.14,
             near: 0.2,
-            bundle: 0.5,
+            bundle: 0.6,
             gone: true,
+            sweep: 0.85,
+            thick: 0.011,
             ..Facets::DEFAULT
         }),
         crushed: Some(Crushed {
@@ -71,7 +80,7 @@ impl Look {
             speckle: 0.5,
             flake: 0.0,
             dust: 0.15,
-            chips: 0.0,
+            chips: 0.05,
             reach: 3.5,
             ..Crushed::DEFAULT
         }),
@@ -113,20 +122,29 @@ impl Look {
     /// Ice: bright lines, a white bruise with bubbles.
     pub const ICE: Self = Self {
         ramp: Cow::Borrowed(&[
-            stop(0.08, [0.86, 0.94, 0.98], 0.05),
-            stop(0.40, [0.92, 0.97, 1.0], 0.55),
-            stop(1.0, [0.98, 1.0, 1.0], 0.92),
+            stop(0.06, [0.34, 0.41, 0.46], 0.0),
+            stop(0.14, [0.34, 0.41, 0.46], 0.26),
+            stop(0.26, [0.80, 0.88, 0.92], 0.20),
+            stop(0.55, [0.92, 0.97, 1.0], 0.62),
+            stop(1.0, [0.98, 1.0, 1.0], 0.95),
         ]),
         gloss: 0.6,
         glint: 0.5,
         sparkle: 0.5,
         catch: 0.75,
-        veil: Some(Veil { reach: 0.17, full_width: 0.006, cover: 0.6, color: [0.88, 0.95, 1.0] }),
+        veil: Some(Veil {
+            reach: 0.19,
+            full_width: 0.005,
+            cover: 0.8,
+            color: [0.88, 0.95, 1.0],
+            uneven: 1.0,
+            bubbles: 0.5,
+        }),
         facets: Some(Facets {
-            tone: 0.07,
-            tilt: 0.05,
+            tone: 0.05,
+            tilt: 0.03,
             shift: 2.0,
-            gleam: 0.22,
+            gleam: 0.12,
             flash: 0.12,
             sheen: [0.85, 0.95, 1.0],
             near: 0.2,
@@ -142,10 +160,12 @@ impl Look {
             color: [0.95, 0.98, 1.0],
             pale: 0.95,
             speckle: 0.5,
-            dust: 0.28,
+            dust: 0.2,
             chips: 0.0,
             reach: 2.6,
             needles: 0.9,
+            crazing: 0.9,
+            bubbles: 30,
             ..Crushed::DEFAULT
         }),
         ..Self::FROSTED
@@ -262,9 +282,17 @@ impl Look {
         grain: 0.0,
         relief: 0.02,
         opaque: true,
-        cel: Some(Cel::DEFAULT),
+        cel: Some(Cel {
+            outline: 0.0046,
+            wall: 0.018,
+            slant: 0.8,
+            ink: [0.055, 0.04, 0.05],
+            fill: [0.10, 0.065, 0.07],
+            lit: [0.60, 0.40, 0.29],
+            ..Cel::DEFAULT
+        }),
         crushed: Some(Crushed {
-            radius: 0.06,
+            radius: 0.055,
             ragged: 0.3,
             depth: 0.0,
             rough: 0.0,
@@ -273,11 +301,13 @@ impl Look {
             pale: 0.0,
             speckle: 0.0,
             dust: 0.0,
-            chips: 0.2,
+            chips: 0.13,
             reach: 2.8,
             broken: true,
             tint: 0.65,
-            outline: 0.0020,
+            outline: 0.0026,
+            pit: 0.8,
+            ticks: 4,
             ..Crushed::DEFAULT
         }),
         ..Self::GROOVE

@@ -17,7 +17,7 @@ mod stamp;
 pub use dirty::DirtyTiles;
 pub use distance::{MAX_DISTANCE, crack_distance};
 pub use layer::{Crushed, LayerPlan, Veil};
-pub(crate) use layer::{CrushedField, Layer, Plate, SLOPE_UNIT, Spot, noise};
+pub(crate) use layer::{CrushedField, Layer, PIT_STEPS, Plate, SLOPE_UNIT, Spot, noise};
 pub use rect::TexelRect;
 pub use replay::{DOT_DEPTH, Redrawn, Replay};
 pub use stamp::{stamp_dot, stamp_path, stamp_path_with};

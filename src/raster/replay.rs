@@ -465,12 +465,12 @@ impl Replay {
         let reach = (radius + self.profile.rim_width.max(0.0)) * field.frame.texels_per_unit() + 2.5;
         let hang = match (part.what, &field.layer.veil) {
             (What::Segment(_), Some(veil)) => veil.hang(),
-            _ => Vec2::ZERO,
+            _ => (Vec2::ZERO, Vec2::ZERO),
         };
         let (low, high) = (field.frame.to_texel(low), field.frame.to_texel(high));
         let rect = TexelRect {
-            min: (low + hang.min(Vec2::ZERO) - reach).max(Vec2::ZERO).as_uvec2(),
-            max: (high + hang.max(Vec2::ZERO) + reach).ceil().max(Vec2::ZERO).as_uvec2().min(self.size),
+            min: (low + hang.0 - reach).max(Vec2::ZERO).as_uvec2(),
+            max: (high + hang.1 + reach).ceil().max(Vec2::ZERO).as_uvec2().min(self.size),
         };
         let before = part.rect;
         part.rect = before.union(rect);

@@ -82,6 +82,8 @@ fn random_params(rng: &mut Rng, small: bool) -> GrowthParams {
         draw_markers: rng.unit() < 0.2,
         max_nodes: 1_000_000,
         zigzag: if rng.unit() < 0.5 { 0.0 } else { rng.unit() },
+        uneven: 0.0,
+        patches: 0.0,
     };
     params.validate().expect("random parameters are valid");
     params

@@ -1,14 +1,14 @@
 //! What a hit breaks off along chords: outlines, facets, chips and their shadows.
 
 use super::{
-    crushed::{Crushed, Place, Shape, WIDEST},
+    crushed::{Crushed, PIT_STEPS, Place, Shape, WIDEST},
     hash, lattice, noise,
 };
 use crate::math::{mix, ops};
 use glam::Vec2;
 
 /// Way to the light: from the upper left.
-const TO_LIGHT: Vec2 = Vec2::new(-std::f32::consts::FRAC_1_SQRT_2, -std::f32::consts::FRAC_1_SQRT_2);
+pub(super) const TO_LIGHT: Vec2 = Vec2::new(-std::f32::consts::FRAC_1_SQRT_2, -std::f32::consts::FRAC_1_SQRT_2);
 
 /// Share of the depth that is outside the basin.
 const SHELF: f32 = 0.5;
@@ -88,10 +88,10 @@ impl Cell {
 }
 
 /// A polygon around a place, texels.
-struct Outline {
+pub(super) struct Outline {
     centre: Vec2,
     /// How far its corners are away at the most.
-    reach: f32,
+    pub(super) reach: f32,
     /// From the centre, in order of their [`turn`].
     corners: Vec<(f32, Vec2)>,
     /// Whether narrow tips are as near to their edge as they are wide.
@@ -112,7 +112,7 @@ fn turn(way: Vec2) -> f32 {
 
 impl Outline {
     /// About so many corners, between which sides are broken `levels` times.
-    fn new(centre: Vec2, radius: f32, count: u32, levels: u32, ragged: f32, seed: u32) -> Self {
+    pub(super) fn new(centre: Vec2, radius: f32, count: u32, levels: u32, ragged: f32, seed: u32) -> Self {
         let most = radius * (1.0 + WIDEST * ragged);
         let phase = draw(seed, -1, 0);
         let mut corners: Vec<Vec2> = (0..count as i32)
@@ -158,20 +158,28 @@ impl Outline {
     }
 
     /// How far inside its edge a place is, texels; below zero outside.
-    fn within(&self, at: Vec2) -> f32 {
+    pub(super) fn within(&self, at: Vec2) -> f32 {
+        self.side(at).0
+    }
+
+    /// The same, and the way inward from the side that is there.
+    pub(super) fn side(&self, at: Vec2) -> (f32, Vec2) {
         let off = at - self.centre;
         if off.length_squared() > (self.reach + 1.0) * (self.reach + 1.0) {
-            return -FAR_OUT;
+            return (-FAR_OUT, Vec2::ZERO);
         }
         let turn = turn(off);
         let n = self.corners.len();
         let next = self.corners.partition_point(|corner| corner.0 <= turn) + n;
         let corner = |k: usize| self.corners.get(k % n.max(1)).map(|corner| corner.1);
-        let (Some(a), Some(b)) = (corner(next - 1), corner(next)) else { return -FAR_OUT };
+        let (Some(a), Some(b)) = (corner(next - 1), corner(next)) else {
+            return (-FAR_OUT, Vec2::ZERO);
+        };
         let side = b - a;
         let within = side.perp_dot(off - a) / side.length().max(0.1);
+        let inward = side.perp().normalize_or_zero();
         if !self.is_worn {
-            return within;
+            return (within, inward);
         }
         // The sides of its sector and of those beside it.
         let mut nearest = f32::MAX;
@@ -183,7 +191,7 @@ impl Outline {
             let share = ((off - from).dot(side) / side.length_squared().max(0.01)).clamp(0.0, 1.0);
             nearest = nearest.min(off.distance_squared(from + side * share));
         }
-        if within > 0.0 { nearest.sqrt() } else { -nearest.sqrt() }
+        (if within > 0.0 { nearest.sqrt() } else { -nearest.sqrt() }, inward)
     }
 }
 
@@ -208,6 +216,10 @@ pub(super) struct Broken {
     off: Vec<Outline>,
     basin: Option<Outline>,
     chips: Vec<Chip>,
+    /// Strokes from one place to another, as wide at the first.
+    ticks: Vec<[Vec2; 2]>,
+    thick: f32,
+    pit: Option<Outline>,
 }
 
 impl Broken {
@@ -243,7 +255,8 @@ impl Broken {
             shape(Outline::new(centre, radius * crushed.basin, 7, 2, 0.8 * ragged, seed ^ 0x61), 0x301)
         });
         let chips = (24.0 * crushed.chips * more).round().min(96.0) as u32;
-        let chips = (0..chips)
+        let is_drawn = crushed.outline > 0.0;
+        let chips: Vec<Chip> = (0..chips)
             .map(|k| {
                 let size = if crumbles {
                     // Many small ones, few large ones.
@@ -256,7 +269,8 @@ impl Broken {
                 if way.y < 0.3 && pick(k, 9) < fall {
                     way.y = 0.3 + way.y.abs();
                 }
-                let near = 0.95 + (0.85 * reach - 0.95) * pick(k, 10) * pick(k, 11).sqrt();
+                let least = if is_drawn { 1.25 } else { 0.95 };
+                let near = least + (0.85 * reach - least) * pick(k, 10) * pick(k, 11).sqrt();
                 let far = near * radius;
                 let far = if crumbles { far.min(radius * reach - 2.2 * size) } else { far };
                 let centre = way.normalize_or(Vec2::Y) * far;
@@ -265,7 +279,20 @@ impl Broken {
                 Chip { outline, tone: 0.3 * pick(k, 13) - 0.18, ink: crushed.outline * unit }
             })
             .collect();
-        Self { off, basin, chips }
+        let pit = (crushed.pit > 0.0).then(|| {
+            Outline::new(Vec2::ZERO, radius * crushed.pit, 5 + (2.6 * pick(0, 20)) as u32, 1, 0.55, seed ^ 0x62)
+        });
+        // Two behind each of the first chips.
+        let ticks = (0..crushed.ticks)
+            .zip(chips.iter().flat_map(|chip: &Chip| [chip, chip]))
+            .map(|(k, Chip { outline, .. })| {
+                let way = outline.centre.normalize_or(Vec2::Y);
+                let side = way.perp() * (if k % 2 == 0 { 0.5 } else { -0.5 });
+                let near = outline.centre - (way * (1.5 + 0.4 * pick(k, 22)) + side) * outline.reach;
+                [near, near - way * (1.0 + 1.1 * pick(k, 24)) * outline.reach]
+            })
+            .collect();
+        Self { off, basin, chips, ticks, thick: 0.8 * crushed.outline * unit, pit }
     }
 
     /// Forgets what does not reach into a rectangle, texels from the hit.
@@ -373,8 +400,28 @@ impl Shape<'_> {
                 self.add_grit(place, at, (chips * left).min(0.5) * left, seed);
             }
         }
+        for [from, to] in &broken.ticks {
+            // It begins blunt and ends in a point.
+            let (along, off) = (*to - *from, off - *from);
+            let t = (off.dot(along) / along.length_squared().max(1.0e-6)).clamp(0.0, 1.0);
+            let inside = broken.thick * (1.0 - t * t) + 0.5 - (off - along * t).length();
+            place.dark = place.dark.max(inside.clamp(0.0, 1.0));
+        }
         for chip in &broken.chips {
             self.add_chip(place, chip, off, at, seed);
+        }
+        if let Some(pit) = &broken.pit {
+            let (within, inward) = pit.side(off);
+            if within > -0.5 {
+                // Its floor is smaller, and lies to the side of the light.
+                let floor = pit.within((off - TO_LIGHT * (0.2 * pit.reach)) * 1.35);
+                let byte = |value: f32| (value.clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
+                place.pit = [
+                    byte((within + 0.5) * PIT_STEPS / 255.0),
+                    byte(floor + 0.5),
+                    byte(0.5 + 0.5 * inward.dot(TO_LIGHT)),
+                ];
+            }
         }
     }
 

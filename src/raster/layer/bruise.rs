@@ -60,27 +60,74 @@ pub(super) fn bruise(off: Vec2, q: f32, dense: f32, fine: f32, seed: u32) -> Bru
     found
 }
 
-/// How far a hole with straight chipped sides reaches in a direction, about 1; `turn` as a share of a full one.
-pub(super) fn chipped(turn: f32, seed: u32) -> f32 {
-    const SIDES: u32 = 11;
-    let at = turn * SIDES as f32;
-    let corner = |i: i32| {
-        let i = i.rem_euclid(SIDES as i32);
-        0.72 + 0.56 * (hash(seed ^ 60, i, 0) >> 8) as i32 as f32 * (1.0 / 16_777_216.0)
-    };
-    let (low, share) = (at.floor() as i32, at - at.floor());
-    corner(low) + (corner(low + 1) - corner(low)) * share
+/// A cloud of short cracks that cross each other, each with a sheet to one side that fades: `off` is the way from the hit in texels, `left` how
+/// much of the cloud is left there, 0..=1.
+pub(super) fn crazed(off: Vec2, radius: f32, left: f32, seed: u32) -> Bruise {
+    let mut found = Bruise::default();
+    let out = off.normalize_or_zero();
+    for (sheet, size) in [0.54f32, 0.38, 0.25, 0.15].into_iter().enumerate() {
+        let side = (size * radius).max(3.0);
+        let seed = seed ^ 0x77 ^ (sheet as u32).wrapping_mul(0x51ED_270B);
+        let corner = (off / side).floor();
+        for (dx, dy) in [(-1, -1), (0, -1), (1, -1), (-1, 0), (0, 0), (1, 0), (-1, 1), (0, 1), (1, 1)] {
+            let (x, y) = ((corner.x as i32).wrapping_add(dx), (corner.y as i32).wrapping_add(dy));
+            let draw = |k: u32| (hash(seed ^ k, x, y) >> 8) as i32 as f32 * (1.0 / 16_777_216.0);
+            let middle = Vec2::new(x as f32 + draw(1), y as f32 + draw(2)) * side;
+            // Fewer outward: by where the middle is.
+            let near = 1.2 - (0.46 + 0.16 * draw(11)) * middle.length() / radius;
+            let near = near.clamp(0.0, 1.0) * (0.35 + 0.65 * left);
+            if draw(3) >= 0.9 * near {
+                continue;
+            }
+            // Most of them run away from the hit, or across.
+            let any = ops::unit(TAU * draw(4));
+            let way = match () {
+                () if draw(5) < 0.4 => (middle.normalize_or(out) + 0.5 * any).normalize_or(Vec2::X),
+                () if draw(5) < 0.6 => (middle.normalize_or(out).perp() + 0.5 * any).normalize_or(Vec2::X),
+                () => any,
+            };
+            let half = side * (0.3 + 0.55 * draw(6));
+            let (along, across) = ((off - middle).dot(way) / half, (off - middle).perp_dot(way));
+            if along.abs() >= 1.0 {
+                continue;
+            }
+            let taper = 1.0 - along * along;
+            let strength = (0.2 + 0.8 * draw(7)) * (0.3 + 0.7 * near);
+            found.crack =
+                found.crack.max(strength * taper.sqrt() * (0.75 - 0.9 * (across.abs() - 0.35).max(0.0)).max(0.0));
+            // Its sheet, to one side, with a slanting end.
+            let deep = side * (0.12 + 0.5 * draw(8)) * (1.0 - along * (0.8 * draw(9) - 0.4)) * taper.sqrt();
+            let inside = (across + 0.5).clamp(0.0, 1.0) * (deep - across + 0.5).clamp(0.0, 1.0);
+            if inside > 0.0 {
+                let fall = (1.0 - across / deep.max(1.0)).clamp(0.0, 1.0);
+                found.flake = found.flake + (1.0 - found.flake) * inside * draw(10) * near * (0.25 + 0.7 * fall * fall);
+            }
+        }
+    }
+    found.crack = found.crack.min(1.0);
+    found
 }
 
-/// The broken edge of a hole, 0..=1: facets of their own brightness. `out` is the way outward from the hole in widths of the edge.
-pub(super) fn broken_edge(turn: f32, out: f32, seed: u32) -> f32 {
-    let facet = |sides: u32, k: u32, shift: f32| {
-        let cell = ((turn * sides as f32 + shift * out).floor() as i32).rem_euclid(sides as i32);
-        (hash(seed ^ k, cell, (2.0 * out).floor() as i32) >> 8) as i32 as f32 * (1.0 / 16_777_216.0)
-    };
-    let (coarse, fine) = (facet(13, 61, 0.7), facet(29, 62, -1.1));
-    let fall = (1.0 - out).clamp(0.0, 1.0);
-    (fall * (0.25 + 0.55 * coarse + 0.5 * fine * fine) + 0.25 * coarse * fine * fall.sqrt()).clamp(0.0, 1.0)
+/// So many bubbles around a hit of this radius, in strings and clusters: places from it, and radii. Texels.
+pub(super) fn bubbles(count: u32, radius: f32, reach: f32, grain: f32, seed: u32) -> Vec<(Vec2, f32)> {
+    let draw = |i: u32, k: u32| (hash(seed ^ 0xB0B ^ k, i as i32, 3) >> 8) as i32 as f32 * (1.0 / 16_777_216.0);
+    (0..count.min(64))
+        .map(|i| {
+            let (group, place) = (i / 6, (i % 6) as f32);
+            let from = ops::unit(TAU * draw(group, 1)) * (radius * (0.5 + (0.5 * reach - 0.5) * draw(group, 2)));
+            let way = (from.normalize_or(Vec2::X) + 0.9 * ops::unit(TAU * draw(group, 3))).normalize_or(Vec2::X);
+            let stray = ops::unit(TAU * draw(i, 4)) * draw(i, 5);
+            // Every third group is a cluster.
+            let middle = if group % 3 == 2 {
+                from + stray * (3.0 * grain)
+            } else {
+                from + way * (place * grain * (1.1 + 0.7 * draw(i, 6))) + stray * (0.4 * grain)
+            };
+            let size = draw(i, 7);
+            let limit = radius * reach - 2.0;
+            (middle.clamp_length_max(0.9 * limit.max(0.0)), grain * (0.13 + 0.42 * size * size))
+        })
+        .collect()
 }
 
 #[cfg(test)]
@@ -99,12 +146,24 @@ mod tests {
         assert!(some[0] > 0.0 && some[0] < some[1] && some[1] < some[2], "{some:?}");
     }
 
-    /// A hole is closed: its sides meet where a turn ends.
+    /// Bubbles stay within reach, and there are as many as are asked for.
     #[test]
-    fn sides_of_a_hole_meet() {
-        for seed in 0..50 {
-            assert!((chipped(0.0, seed) - chipped(1.0 - 1e-6, seed)).abs() < 1e-4);
-            assert!((0..100).all(|i| (0.7..=1.3).contains(&chipped(i as f32 * 0.01, seed))));
+    fn bubbles_stay_within_reach() {
+        for seed in 0..40 {
+            let all = bubbles(40, 30.0, 2.5, 4.0, seed);
+            assert_eq!(all.len(), 40);
+            assert!(all.iter().all(|(at, radius)| at.length() + radius < 2.5 * 30.0 && *radius > 0.0), "seed {seed}");
         }
+        assert!(bubbles(0, 30.0, 2.5, 4.0, 1).is_empty());
+    }
+
+    /// The cloud of short cracks ends.
+    #[test]
+    fn the_cloud_thins_out() {
+        let covered = |distance: f32| {
+            let at = |i: u32| ops::unit(i as f32 * 0.1) * distance;
+            (0..63).map(|i| crazed(at(i), 30.0, (1.0 - distance / 75.0).max(0.0), 5).flake).sum::<f32>()
+        };
+        assert!(covered(8.0) > 3.0 * covered(55.0), "{} {}", covered(8.0), covered(55.0));
     }
 }

@@ -1,14 +1,18 @@
 //! Crushed zones: what a hit leaves around itself.
 
-use super::{broken::Broken, bruise, hash, noise};
+use super::{
+    broken::{Broken, Outline, TO_LIGHT},
+    bruise::{self, Bruise},
+    hash, noise,
+};
 use crate::{
     Grid,
-    math::{mix, ops},
+    math::mix,
     pattern::{Strike, SurfaceFrame},
     raster::TexelRect,
 };
 use glam::{UVec2, Vec2};
-use std::{collections::VecDeque, f32::consts::TAU};
+use std::collections::VecDeque;
 
 /// What a hit crushes: a spot around it, by its energy. All of it is made from the seed and the place, at any resolution.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,9 +61,19 @@ pub struct Crushed {
     pub fall: f32,
     /// Width of a dark line around chips of what is [`broken`](Self::broken) (a drawing), pattern units, 0..=0.05; default 0 = none.
     pub outline: f32,
+    /// Radius of a drawn pit with straight sides in the middle of what is [`broken`](Self::broken), as a share of the radius: it is shown as part of
+    /// [drawn](crate::paint::Cel) cracks with a [`slant`](crate::paint::Cel::slant). 0..=2; default 0 = none.
+    pub pit: f32,
+    /// How many strokes of ink follow the chips of what is [`broken`](Self::broken), two each (a drawing). 0..=16; default 0.
+    pub ticks: u32,
     /// How much of it is short radial and ring cracks with flakes between them, fewer and fewer up to [`reach`](Self::reach), in place of powder
     /// with an outline (laminated glass, ice). 0..=1; default 0.
     pub needles: f32,
+    /// How much of that is a cloud of short cracks that cross each other, each with a small sheet to one side (ice), in place of radial ones. 0..=1;
+    /// default 0.
+    pub crazing: f32,
+    /// How many bubbles lie around it, in strings and clusters. 0..=64; default 0.
+    pub bubbles: u32,
     /// Width of the broken edge around the hole, which then has straight sides and is less dark towards it, as a share of the hole. 0..=4; default
     /// 0 = none.
     pub edge: f32,
@@ -96,7 +110,11 @@ impl Crushed {
         tint: 0.0,
         fall: 0.0,
         outline: 0.0,
+        pit: 0.0,
+        ticks: 0,
         needles: 0.0,
+        crazing: 0.0,
+        bubbles: 0,
         edge: 0.0,
         bare: 0.0,
         jag: 0.0,
@@ -127,7 +145,11 @@ impl Crushed {
             ("crushed.tint", self.tint, 0.0..=1.0, "0..=1"),
             ("crushed.fall", self.fall, 0.0..=1.0, "0..=1"),
             ("crushed.outline", self.outline, 0.0..=0.05, "0..=0.05"),
+            ("crushed.pit", self.pit, 0.0..=2.0, "0..=2"),
+            ("crushed.ticks", self.ticks as f32, 0.0..=16.0, "0..=16"),
             ("crushed.needles", self.needles, 0.0..=1.0, "0..=1"),
+            ("crushed.crazing", self.crazing, 0.0..=1.0, "0..=1"),
+            ("crushed.bubbles", self.bubbles as f32, 0.0..=64.0, "0..=64"),
             ("crushed.edge", self.edge, 0.0..=4.0, "0..=4"),
             ("crushed.bare", self.bare, 0.0..=1.0, "0..=1"),
             ("crushed.jag", self.jag, 0.0..=0.05, "0..=0.05"),
@@ -173,18 +195,24 @@ pub(crate) struct Spot {
     pub(crate) dark: u8,
     /// How deep it is, 255 = as deep as the crater gets.
     pub(crate) deep: u8,
+    /// A drawn pit: how far inside its edge it is in shares of [`PIT_STEPS`] of a texel, how much its floor covers, and how its side faces the light,
+    /// 0 = away from it, 255 = squarely.
+    pub(crate) pit: [u8; 3],
 }
 
+/// Steps of a texel in which the edge of a pit is known.
+pub(crate) const PIT_STEPS: f32 = 8.0;
+
 impl Spot {
-    const NONE: Self = Self { slope: [0; 2], pale: 0, shade: 0, dark: 0, deep: 0 };
+    const NONE: Self = Self { slope: [0; 2], pale: 0, shade: 0, dark: 0, deep: 0, pit: [0; 3] };
 
     /// Both, in any order: what is deeper in the hole or paler shows, and the steeper slope.
     fn with(self, other: Self) -> Self {
         let strength = |spot: Self| (spot.dark, spot.pale, spot.shade);
         let steep = |[x, y]: [i16; 2]| (i32::from(x).pow(2) + i32::from(y).pow(2), x, y);
         let slope = if steep(self.slope) >= steep(other.slope) { self.slope } else { other.slope };
-        let deep = self.deep.max(other.deep);
-        Self { slope, deep, ..if strength(self) >= strength(other) { self } else { other } }
+        let (deep, pit) = (self.deep.max(other.deep), self.pit.max(other.pit));
+        Self { slope, deep, pit, ..if strength(self) >= strength(other) { self } else { other } }
     }
 }
 
@@ -244,6 +272,8 @@ pub(crate) struct CrushedField {
     waiting: VecDeque<Waiting>,
     /// Which tiles are to be drawn anew.
     is_anew: Vec<bool>,
+    /// How far beside a plate its side is seen, texels.
+    beyond: u32,
 }
 
 /// A tile that is not drawn yet.
@@ -275,7 +305,13 @@ impl CrushedField {
             used: 0,
             waiting: VecDeque::new(),
             is_anew: vec![false; count.element_product() as usize],
+            beyond: 0,
         }
+    }
+
+    /// The same beside plates of this thickness.
+    pub(super) fn with_sides(self, thick: f32) -> Self {
+        Self { beyond: super::plates::beyond(thick, self.frame), ..self }
     }
 
     pub(super) fn is_empty(&self) -> bool {
@@ -425,6 +461,11 @@ impl CrushedField {
         if let Some(broken) = &mut shape.broken {
             broken.keep_near(rect.min.as_vec2() - zone.pos, rect.max.as_vec2() - zone.pos, shape.depth);
         }
+        let (min, max) = (rect.min.as_vec2() - zone.pos - 2.0, rect.max.as_vec2() - zone.pos + 2.0);
+        shape.bubbles.retain(|&(middle, radius)| {
+            let far = middle.clamp(min, max).distance_squared(middle);
+            far <= (radius + 1.0) * (radius + 1.0)
+        });
         shape.draw(texels, zone.pos, seed, rect, corner);
         let Some(forbidden) = forbidden else { return };
         for y in rect.min.y..rect.max.y {
@@ -439,7 +480,7 @@ impl CrushedField {
     /// Whether a plate whose middle is at a place, and all of it within `extent` of it, is gone in a hole, or whole beside one; `None` if no hole
     /// is there, or the plate is as large as that. Only holes of impacts that show all of the plate anew when they are shown. Texels.
     pub(crate) fn is_gone(&self, at: Vec2, extent: f32) -> Option<bool> {
-        let around = extent + 2.0;
+        let around = extent + 2.0 + self.beyond as f32;
         let (min, max) = ((at - around).max(Vec2::ZERO), (at + around).min(self.frame.size().as_vec2()));
         let plate = TexelRect { min: min.as_uvec2(), max: max.ceil().as_uvec2() };
         let near = (0..).zip(&self.zones).filter_map(|(index, zone)| {
@@ -490,6 +531,10 @@ pub(super) struct Shape<'a> {
     pub(super) grain: f32,
     pub(super) jag: f32,
     broken: Option<Broken>,
+    /// A hole with a broken edge, and how far that reaches.
+    hole: Option<[Outline; 2]>,
+    /// From the hit, and their radii, texels.
+    bubbles: Vec<(Vec2, f32)>,
 }
 
 /// What there is at a place.
@@ -499,6 +544,11 @@ pub(super) struct Place {
     pub(super) pale: f32,
     pub(super) shade: f32,
     pub(super) dark: f32,
+    pub(super) pit: [u8; 3],
+}
+
+impl Place {
+    const NONE: Self = Self { height: 0.0, pale: 0.0, shade: 0.0, dark: 0.0, pit: [0; 3] };
 }
 
 impl<'a> Shape<'a> {
@@ -512,6 +562,18 @@ impl<'a> Shape<'a> {
             grain,
             jag: crushed.jag * unit,
             broken: crushed.broken.then(|| Broken::new(crushed, unit, radius, grain, seed)),
+            hole: (crushed.hole > 0.0 && crushed.edge > 0.0).then(|| {
+                let hole = crushed.hole * radius;
+                // Within what other outlines reach.
+                let most = radius * crushed.reach.max(1.0 + WIDEST * crushed.ragged) / (1.0 + 0.75 * WIDEST);
+                let around = (hole + (0.75 * crushed.edge * hole).max(1.5)).min(most);
+                let centre = Vec2::ZERO;
+                [
+                    Outline::new(centre, hole, 6 + (seed >> 3) % 3, 2, 0.62, seed ^ 0x71),
+                    Outline::new(centre, around, 8 + (seed >> 5) % 4, 1, 0.75, seed ^ 0x72),
+                ]
+            }),
+            bubbles: bruise::bubbles(crushed.bubbles, radius, crushed.reach, grain, seed),
         }
     }
 
@@ -519,7 +581,7 @@ impl<'a> Shape<'a> {
     fn draw(&self, texels: &mut Tile, centre: Vec2, seed: u32, rect: TexelRect, corner: UVec2) {
         const WIDE: usize = TILE as usize + 2;
         // Heights around each texel are needed for its slope.
-        let mut places = [Place { height: 0.0, pale: 0.0, shade: 0.0, dark: 0.0 }; WIDE * WIDE];
+        let mut places = [Place::NONE; WIDE * WIDE];
         let (size, first) = (rect.size().as_usizevec2(), rect.min.as_vec2() - 0.5);
         for y in 0..size.y + 2 {
             for x in 0..size.x + 2 {
@@ -535,7 +597,7 @@ impl<'a> Shape<'a> {
                     let slope = 0.5 * (places[at - step].height - places[at + step].height);
                     (slope * SLOPE_UNIT).clamp(-32_000.0, 32_000.0) as i16
                 };
-                let Place { height, pale, shade, dark } = places[at];
+                let Place { height, pale, shade, dark, pit } = places[at];
                 let deep = if self.depth > 0.0 { -height / self.depth } else { 0.0 };
                 let spot = Spot {
                     // Nothing is lit in a hole.
@@ -544,6 +606,7 @@ impl<'a> Shape<'a> {
                     shade: (shade * 128.0).clamp(-127.0, 127.0) as i8,
                     dark: (dark.clamp(0.0, 1.0) * 255.0 + 0.5) as u8,
                     deep: (deep.clamp(0.0, 1.0) * 255.0 + 0.5) as u8,
+                    pit,
                 };
                 let texel = &mut texels[(y + corner.y) * TILE as usize + x + corner.x];
                 *texel = texel.with(spot);
@@ -554,7 +617,7 @@ impl<'a> Shape<'a> {
     /// `off` is the way from the centre, `at` the place in the field.
     fn place(&self, off: Vec2, at: Vec2, seed: u32) -> Place {
         let Crushed { ragged, soft, hole, pale, speckle, flake, dust, chips, reach, .. } = *self.crushed;
-        let mut place = Place { height: 0.0, pale: 0.0, shade: 0.0, dark: 0.0 };
+        let mut place = Place::NONE;
         let distance = off.length();
         let radii = distance / self.radius.max(0.5);
         // No outline strays further than that.
@@ -603,8 +666,21 @@ impl<'a> Shape<'a> {
             }
             self.add_crumb(&mut place, at, chips * left * left, seed);
         }
-        if hole > 0.0 && self.crushed.edge > 0.0 {
-            self.add_hole(&mut place, off, seed);
+        for &(middle, radius) in &self.bubbles {
+            let (off, out) = (off - middle, off.distance(middle));
+            let inside = (radius + 0.5 - out).clamp(0.0, 1.0);
+            if inside > 0.0 {
+                // A bright ring, brighter where the light leaves it, and a highlight.
+                let ring = (1.0 - (radius - 0.7 - out).abs() / 1.2).clamp(0.0, 1.0);
+                let leaves = 0.5 + 0.35 * (off.x + off.y) / out.max(0.5);
+                let light = (0.34 * radius + 0.5 - (off + 0.38 * radius).length()).clamp(0.0, 1.0);
+                let white = (ring * leaves).max(light);
+                place.pale += (white.max(0.10) - place.pale) * (0.8 * inside);
+                place.shade += (0.3 * white - 0.25 * (1.0 - white) - place.shade) * inside;
+            }
+        }
+        if let Some(hole) = &self.hole {
+            self.add_hole(&mut place, hole, off);
         } else if hole > 0.0 && radii <= hole * (1.0 + WIDEST * ragged) + 1.0 {
             let radius = self.radius * hole * (1.0 + 0.6 * ragged * (round(7, 1.9) + 0.5 * round(8, 4.3)));
             place.dark = (radius - distance + 0.5).clamp(0.0, 1.0);
@@ -627,34 +703,56 @@ impl<'a> Shape<'a> {
         }
         let dense = (1.5 * left * left).min(1.0);
         let fine = (self.radius / (8.0 * self.grain)).sqrt().clamp(0.6, 3.0);
-        let bruise = bruise::bruise(off, q, dense, fine, seed);
-        let haze = (1.08 - 0.8 * q).clamp(0.0, 1.0);
+        let crazing = self.crushed.crazing;
+        let mut bruise = if crazing < 1.0 { bruise::bruise(off, q, dense, fine, seed) } else { Bruise::default() };
+        let mut haze = (1.08 - 0.8 * q).clamp(0.0, 1.0);
+        if crazing > 0.0 {
+            let crazed = bruise::crazed(off, self.radius, left, seed);
+            bruise.crack = bruise.crack * (1.0 - crazing) + crazed.crack * crazing;
+            bruise.flake = bruise.flake * (1.0 - crazing) + crazed.flake * crazing;
+            // No even milk.
+            haze *= 1.0 - crazing * (0.12 - 0.35 * cloud - 0.3 * crazed.flake);
+            place.shade += crazing * needles * (0.5 * crazed.flake - 0.22) * left;
+        }
         let uneven = 1.0 - speckle * (0.5 + 0.5 * cloud) * (1.0 - 0.5 * haze);
-        let milk = ((1.5 * haze * haze).min(1.0) + 0.55 * bruise.flake * left * left) * uneven;
+        let milk = ((1.5 * haze * haze).min(1.0) + (0.55 + 0.75 * crazing) * bruise.flake * left * left) * uneven;
         place.pale = place.pale.max(needles * pale * milk.max(bruise.crack * (0.35 + 0.65 * left)));
         place.shade += needles * 0.35 * speckle * (bruise.flake - 0.3) * left;
         place.height += self.rough * bruise.flake * left * left - self.rough * bruise.crack * left;
     }
 
-    /// A hole with straight sides and a broken edge, through which its thick rim is seen.
-    fn add_hole(&self, place: &mut Place, off: Vec2, seed: u32) {
-        let Crushed { hole, edge, pale, .. } = self.crushed;
-        let (distance, whole) = (off.length(), self.radius * hole);
-        let wide = (edge * whole).max(1.5);
-        if distance > 1.3 * whole + wide + 1.0 {
-            return;
+    /// A hole with straight sides: its broken wall is seen within, chips with sharp sides have come off around it.
+    fn add_hole(&self, place: &mut Place, [hole, shell]: &[Outline; 2], off: Vec2) {
+        let pale = self.crushed.pale;
+        let (within, inward) = hole.side(off);
+        let inside = (within + 0.5).clamp(0.0, 1.0);
+        let line = |far: f32, thick: f32| (thick + 0.5 - far.abs()).clamp(0.0, 1.0);
+        if inside < 1.0 {
+            let (chip, slope) = shell.side(off);
+            let chipped = (chip + 0.5).clamp(0.0, 1.0) * (1.0 - inside);
+            if chipped > 0.0 {
+                // Each chip leaves a flat face that slopes down to the hole, with a sharp side.
+                let facing = slope.dot(TO_LIGHT);
+                let fall = (-within / (chip - within).max(1.0)).clamp(0.0, 1.0);
+                let face = 0.14 + 0.40 * facing.max(0.0) + 0.30 * (1.0 - fall);
+                let side = 0.75 * line(chip - 0.6, 0.4) * (0.35 + 0.65 * facing.abs());
+                let edge = 0.9 * line(within + 0.8, 0.5);
+                let keep = 1.0 - 0.75 * chipped;
+                place.pale = (place.pale * keep).max(pale * chipped * face.max(side).max(edge));
+                place.shade -= 0.28 * chipped * (-facing).max(0.0);
+            }
         }
-        let turn = ops::atan2(off.y, off.x) * (1.0 / TAU) + 0.5;
-        let radius = whole * bruise::chipped(turn, seed);
-        let out = distance - radius;
-        let inside = (0.5 - out).clamp(0.0, 1.0);
-        // Glass is thick: within the hole its far wall is lit, its near one is in the dark.
-        let deep = (-out / (0.45 * whole).max(1.0)).clamp(0.0, 1.0);
-        let wall = bruise::broken_edge(turn, deep, seed ^ 0x33) * (0.6 + 0.4 * (off.x + off.y) / distance.max(1.0));
-        place.dark = inside * (0.45 + 0.55 * deep) * (1.0 - 0.5 * wall);
-        let rim = bruise::broken_edge(turn, (out / wide).max(0.0), seed) * (1.0 - inside);
-        place.pale = place.pale.max(pale * rim);
-        place.shade += 0.5 * (rim - 0.4) * (1.0 - inside);
+        if inside > 0.0 {
+            // Glass is thick: more is seen of its far wall, which is lit.
+            let void = (hole.within((off - TO_LIGHT * (0.16 * hole.reach)) * 1.2) + 0.5).clamp(0.0, 1.0);
+            let facing = inward.dot(TO_LIGHT);
+            let bright =
+                (0.10 + 0.50 * facing.max(0.0)).max(0.85 * line(within - 0.7, 0.5) * (0.4 + 0.6 * facing.max(0.0)));
+            let wall = bright.max(0.45 * (1.0 - 2.0 * (void - 0.5).abs())) * (1.0 - void);
+            place.dark = inside;
+            place.pale += (pale * wall - place.pale) * inside;
+            place.shade *= 1.0 - inside;
+        }
     }
 
     /// A flat flake to one side of the hit, with arcs around it.

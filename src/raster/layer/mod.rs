@@ -7,7 +7,7 @@ mod plates;
 mod veil;
 
 pub use crushed::Crushed;
-pub(crate) use crushed::{CrushedField, SLOPE_UNIT, Spot};
+pub(crate) use crushed::{CrushedField, PIT_STEPS, SLOPE_UNIT, Spot};
 pub(crate) use plates::Plate;
 pub use veil::Veil;
 pub(super) use veil::VeilField;
@@ -24,10 +24,15 @@ use plates::PlateField;
 pub struct LayerPlan {
     /// Whether it is to know which closed cell each texel lies in; default no.
     pub plates: bool,
+    /// How thick plates are beside those that are gone in a hole, pattern units, 0..=0.02; default 0.
+    pub thick: f32,
     /// Crushed zones at the hits; default none.
     pub crushed: Option<Crushed>,
     /// Sheets along cracks; default none.
     pub veil: Option<Veil>,
+    /// How far the floor of a crack is moved to the upper left, and what of the crack it covers is kept: as a share of its half width, and pattern
+    /// units at the most. Not with a veil. 0..=1 and 0..=0.5; default 0 = no floor.
+    pub floor: [f32; 2],
     /// How much of its depth a line has only where it catches the light: less of it is stamped of lines that run towards the light, and here
     /// and there along each. 0..=1; default 0 = all lines are as deep as their profile says.
     pub catch: f32,
@@ -42,7 +47,7 @@ impl LayerPlan {
     /// Bytes that it takes for each texel of the field, about; crushed zones take theirs where they are.
     #[must_use]
     pub const fn bytes_per_texel(&self) -> u64 {
-        (if self.plates { 2 } else { 0 }) + (if self.veil.is_some() { 1 } else { 0 })
+        (if self.plates { 2 } else { 0 }) + (if self.veil.is_some() || self.floor[0] > 0.0 { 1 } else { 0 })
     }
 }
 
@@ -57,9 +62,15 @@ pub(crate) struct Layer {
 
 impl Layer {
     pub(super) fn new(plan: LayerPlan, frame: SurfaceFrame) -> Self {
-        let plates = plan.plates.then(|| Box::new(PlateField::new(frame, plan.seed)));
-        let crushed = plan.crushed.as_ref().map(|crushed| Box::new(CrushedField::new(crushed, frame, plan.seed)));
-        let veil = plan.veil.as_ref().map(|veil| Box::new(VeilField::new(veil, frame, plan.seed)));
+        let plates = plan.plates.then(|| Box::new(PlateField::new(frame, plan.seed, plan.thick)));
+        let crushed = plan
+            .crushed
+            .as_ref()
+            .map(|crushed| Box::new(CrushedField::new(crushed, frame, plan.seed).with_sides(plan.thick)));
+        let veil = match &plan.veil {
+            Some(veil) => Some(Box::new(VeilField::new(veil, frame, plan.seed))),
+            None => (plan.floor[0] > 0.0).then(|| Box::new(VeilField::floor(plan.floor, frame))),
+        };
         Self { plan, plates, crushed, veil }
     }
 

@@ -53,6 +53,13 @@ pub(crate) struct PlateField {
     strikes: usize,
     /// Texels that were written.
     written: u64,
+    /// How far away from a plate what is shown of it is seen, texels.
+    beyond: u32,
+}
+
+/// How far the side of a plate is seen beside it, texels.
+pub(crate) fn beyond(thick: f32, frame: SurfaceFrame) -> u32 {
+    if thick > 0.0 { (thick.min(0.02) * frame.texels_per_unit()).ceil() as u32 + 2 } else { 0 }
 }
 
 impl PartialEq for PlateField {
@@ -62,7 +69,7 @@ impl PartialEq for PlateField {
 }
 
 impl PlateField {
-    pub(super) fn new(frame: SurfaceFrame, seed: u64) -> Self {
+    pub(super) fn new(frame: SurfaceFrame, seed: u64, thick: f32) -> Self {
         let none = Plate {
             centre: Vec2::ZERO,
             inv_side: 0.0,
@@ -84,6 +91,7 @@ impl PlateField {
             hits: Vec::new(),
             strikes: 0,
             written: 0,
+            beyond: beyond(thick, frame),
         }
     }
 
@@ -127,7 +135,8 @@ impl PlateField {
                 let last = self.shown() - 1;
                 let to = self.host(&all[last]);
                 let from = (self.frozen + last + 1) as u16;
-                changed.push(self.fill(closings.outline(&all[last]), |id| id == from, to, None));
+                let rect = self.fill(closings.outline(&all[last]), |id| id == from, to, None);
+                changed.push(rect.grow(self.beyond, self.ids.size()));
                 self.plates.pop();
             }
             for closing in all.get(self.shown()..count).unwrap_or_default() {
@@ -135,7 +144,8 @@ impl PlateField {
                 let id = self.plates.len() as u16;
                 self.plates.push(self.plate(closing, closings.outline(closing)));
                 let is_host = |of: u16| of == host || (host == 0 && of <= frozen);
-                changed.push(self.fill(closings.outline(closing), is_host, id, forbidden));
+                let rect = self.fill(closings.outline(closing), is_host, id, forbidden);
+                changed.push(rect.grow(self.beyond, self.ids.size()));
             }
         }
         self.cells = cells;
@@ -233,7 +243,7 @@ mod tests {
     use crate::{math::Rng, pattern::random::planar_network};
 
     fn field(size: UVec2) -> PlateField {
-        PlateField::new(SurfaceFrame::new(size).unwrap(), 3)
+        PlateField::new(SurfaceFrame::new(size).unwrap(), 3, 0.0)
     }
 
     /// A network that has only the nodes and links of the births up to `birth`, and its timeline: each comes in the step after.
