@@ -119,6 +119,7 @@ impl CrackPreset {
             open_ends: 0.06,
             roughness: 0.12,
             arrest: 0.06,
+            starts: StartLayout::Arms { count: 4 },
             variety: 0.15,
             ..GrowthParams::DEFAULT
         },
@@ -224,7 +225,7 @@ impl CrackPreset {
     /// Tempered glass: the whole pane goes to small dice, from the hit outward.
     pub const TEMPERED_GLASS: Self = Self {
         growth: GrowthParams {
-            kill_distance: 0.0100,
+            kill_distance: 0.0094,
             step_length: 0.0077,
             crack_radius: 0.02,
             num_iterations: 400,
@@ -234,12 +235,12 @@ impl CrackPreset {
             venation: Venation::Dividing,
             focus: 1.0,
             front: 0.008,
-            patches: 0.9,
+            patches: 0.8,
             reach: 64.0,
-            line_width: 0.0026,
+            line_width: 0.0020,
             tip_taper: 0.0,
             line_growth: 0.0,
-            max_width: 0.0026,
+            max_width: 0.0020,
             unevenness: 0.2,
             inertia: 3.0,
             wander: 0.1,
@@ -251,7 +252,7 @@ impl CrackPreset {
         },
         profile: Profile {
             depth: 1.0,
-            full_width: 0.003,
+            full_width: 0.0026,
             wall: 0.5,
             rim_width: 0.0,
             rim_depth: 0.0,

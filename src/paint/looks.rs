@@ -63,7 +63,7 @@ impl Look {
             near: 0.2,
             bundle: 0.6,
             gone: true,
-            sweep: 0.85,
+            sweep: 0.5,
             thick: 0.011,
             ..Facets::DEFAULT
         }),
@@ -342,6 +342,9 @@ impl Look {
             broken: true,
             basin: 0.5,
             tint: 0.6,
+            bare: 0.8,
+            jag: 0.0022,
+            stones: 0.15,
             ..Crushed::DEFAULT
         }),
         ..Self::GROOVE
@@ -367,7 +370,7 @@ impl Look {
             radius: 0.042,
             ragged: 0.8,
             depth: 0.016,
-            rough: 0.007,
+            rough: 0.0045,
             grain: 0.011,
             color: [0.38, 0.29, 0.225],
             pale: 0.75,
@@ -377,7 +380,10 @@ impl Look {
             reach: 2.4,
             broken: true,
             basin: 0.6,
-            tint: 0.75,
+            tint: 0.55,
+            bare: 0.75,
+            jag: 0.003,
+            stones: 0.2,
             ..Crushed::DEFAULT
         }),
         ..Self::GROOVE
@@ -410,6 +416,8 @@ impl Look {
             broken: true,
             flakes: 2,
             tint: 0.35,
+            bare: 0.95,
+            jag: 0.0008,
             ..Crushed::DEFAULT
         }),
         ..Self::GROOVE
