@@ -137,8 +137,8 @@ impl Look {
             full_width: 0.005,
             cover: 0.8,
             color: [0.88, 0.95, 1.0],
-            uneven: 1.0,
-            bubbles: 0.5,
+            uneven: 0.75,
+            bubbles: 0.12,
         }),
         facets: Some(Facets {
             tone: 0.05,
@@ -164,8 +164,8 @@ impl Look {
             chips: 0.0,
             reach: 2.6,
             needles: 0.9,
-            crazing: 0.9,
-            bubbles: 30,
+            crazing: 0.5,
+            bubbles: 12,
             ..Crushed::DEFAULT
         }),
         ..Self::FROSTED
