@@ -23,6 +23,8 @@ use std::{
 };
 
 /// Where cracks like to run, where they do not, and where they never go. See [`CrackMask`].
+///
+/// Cracks that [divide](crate::growth::Venation::Dividing) what there is (tempered glass, plaster, clay, mud, glaze) hardly mind where they like to run.
 #[derive(Reflect, Clone, Debug, Default, PartialEq)]
 #[reflect(Default, SerializeWithRegistry)]
 pub enum CrackMaskSource {
