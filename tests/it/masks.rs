@@ -293,7 +293,7 @@ mod in_apps {
         render::render_resource::{Extent3d, TextureDimension, TextureFormat},
     };
     use bevy_crack::{
-        growth::{CrackGrowth, GrowthParams},
+        growth::CrackGrowth,
         paint::{BaseTexels, LookTable, PaintTargets, paint_into},
         pattern::{CrackMask, Moment, SurfaceFrame},
         prelude::*,
