@@ -366,7 +366,7 @@ mod tests {
     /// the cracks are those of hits that take effect at once.
     #[test]
     fn b5_the_markers_of_hits_are_laid_out_within_the_budget() {
-        let preset = CrackPreset::TEMPERED_GLASS.scaled(0.2);
+        let preset = CrackPreset::TEMPERED_GLASS.scaled(0.3);
         let mut app = app(CrackBudget { milliseconds: 0.0, ..default() });
         let places = [Vec2::splat(0.5), Vec2::new(0.2, 0.7)];
         let entities: Vec<Entity> = (0..3)
