@@ -189,6 +189,14 @@ impl VeilField {
         TexelRect { min: low, max: high }.intersect(TexelRect::whole(self.density.size()))
     }
 
+    /// Texels that a sheet along a piece of a crack may touch.
+    fn bounds_of(&self, [a, b]: [Vec2; 2], hang: Vec2) -> TexelRect {
+        let limit = self.density.size().as_vec2();
+        let min = (a.min(b) + hang.min(Vec2::ZERO) - 1.0).floor().clamp(Vec2::ZERO, limit).as_uvec2();
+        let max = (a.max(b) + hang.max(Vec2::ZERO) + 1.0).ceil().clamp(Vec2::ZERO, limit).as_uvec2();
+        TexelRect { min, max }
+    }
+
     /// As [`stamp_piece`](Self::stamp_piece), of a sheet that is not like the others. `twice` is the direction of the crack, twice the angle.
     fn stamp_uneven(&mut self, [a, b]: [Vec2; 2], dense: [f32; 2], twice: Vec2) -> TexelRect {
         // Few hang to the other side, and between both there is a direction without any.
@@ -196,14 +204,8 @@ impl VeilField {
         let hang = if side < 0.0 { -self.hang } else { self.hang };
         let along = b - a;
         let det = along.perp_dot(hang);
-        if !det.is_finite() || det.abs() < 1.0e-3 || dense == [0.0; 2] {
-            return TexelRect::default();
-        }
-        let limit = self.density.size().as_vec2();
-        let low = (a.min(b) + hang.min(Vec2::ZERO) - 1.0).floor().clamp(Vec2::ZERO, limit).as_uvec2();
-        let high = (a.max(b) + hang.max(Vec2::ZERO) + 1.0).ceil().clamp(Vec2::ZERO, limit).as_uvec2();
-        let rect = TexelRect { min: low, max: high };
-        if rect.is_empty() {
+        let rect = self.bounds_of([a, b], hang);
+        if !det.is_finite() || det.abs() < 1.0e-3 || dense == [0.0; 2] || rect.is_empty() {
             return TexelRect::default();
         }
         let (uneven, unit) = (self.veil.uneven, 1.0 / self.frame.texels_per_unit());
@@ -306,14 +308,8 @@ impl VeilField {
     fn stamp_piece(&mut self, [a, b]: [Vec2; 2], dense: [f32; 2]) -> TexelRect {
         let (along, hang) = (b - a, self.hang);
         let det = along.perp_dot(hang);
-        if !det.is_finite() || det.abs() < 1.0e-3 || dense == [0.0; 2] {
-            return TexelRect::default();
-        }
-        let limit = self.density.size().as_vec2();
-        let low = (a.min(b) + hang.min(Vec2::ZERO) - 1.0).floor().clamp(Vec2::ZERO, limit).as_uvec2();
-        let high = (a.max(b) + hang.max(Vec2::ZERO) + 1.0).ceil().clamp(Vec2::ZERO, limit).as_uvec2();
-        let rect = TexelRect { min: low, max: high };
-        if rect.is_empty() {
+        let rect = self.bounds_of([a, b], hang);
+        if !det.is_finite() || det.abs() < 1.0e-3 || dense == [0.0; 2] || rect.is_empty() {
             return TexelRect::default();
         }
         let inv = 1.0 / det;
