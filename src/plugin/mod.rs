@@ -16,75 +16,32 @@
 //! app.add_plugins(CrackPlugins).add_systems(Update, crack);
 //! ```
 
-mod activate;
+mod api;
 mod bake;
-mod beside;
-mod budget;
 mod carrier;
-mod clock;
-mod error;
-#[cfg(feature = "3d")]
-mod faces;
-mod film;
-mod freeze;
-mod grow;
-mod guided;
+mod draw;
+mod gpu;
 #[cfg(all(test, feature = "2d"))]
 mod headless;
-mod heal;
-mod hit;
-mod later;
-mod layout;
-#[cfg(feature = "2d")]
-mod lit;
-mod mask;
-#[cfg(any(feature = "2d", feature = "3d"))]
-mod material;
-#[cfg(any(feature = "2d", feature = "3d"))]
-mod mesh;
-mod paint;
-mod picture;
-#[cfg(any(feature = "2d", feature = "3d"))]
-mod place;
-mod plan;
-mod prepare;
-mod preset;
-mod queue;
-mod read;
-mod reflect;
+mod hits;
+mod jobs;
+mod life;
 mod shards;
-mod space;
-#[cfg(feature = "2d")]
-mod sprite;
-mod state;
+mod source;
 mod surface;
-mod surfaces;
-mod textures;
-mod upload;
-#[cfg_attr(not(any(feature = "2d", feature = "3d")), expect(dead_code, reason = "there are no kinds then"))]
-mod warm;
-mod watch;
 
-pub use budget::{CrackBudget, CrackStats};
-pub use clock::{CrackClock, CrackDrive};
-pub use error::CrackError;
-pub use guided::{BakeProgress, CrackBaked, CrackGuide, GuideSource, GuidedAppearance, GuidedCracks};
-pub use heal::CrackCommandsExt;
-pub use hit::{CrackHit, HitPoint};
-#[cfg(feature = "2d")]
-pub use lit::{CrackLight2d, CrackLitMaterial, CrackLitUniform, MAX_LIGHTS};
-pub use mask::CrackMaskSource;
-#[cfg(any(feature = "2d", feature = "3d"))]
-pub use place::{CrackPlace, CrackPlaces};
-pub use preset::PresetSource;
-pub use shards::{
-    CrackShards, GravitySpace, Reassembled, Shard, ShardsError, ShatterCracks, ShatterFailed, ShatterRequest,
-    ShatterWhen, Shattered,
+pub use api::{
+    BakeProgress, CellClosed, CrackBaked, CrackBudget, CrackClock, CrackDrive, CrackError, CrackFailed, CrackFinished,
+    CrackGuide, CrackHit, CrackMaps, CrackMaskSource, CrackResolution, CrackShards, CrackState, CrackStats,
+    CrackStatus, CrackSurface, CrackSystems, CrackTextures, CrackTip, CrackUploadStats, GravitySpace, GuideSource,
+    GuidedAppearance, GuidedCracks, HitPoint, PresetSource, Reassembled, Shard, ShardsError, ShatterCracks,
+    ShatterFailed, ShatterRequest, ShatterWhen, Shattered,
 };
-pub use state::{CellClosed, CrackFailed, CrackFinished, CrackState, CrackStatus, CrackTip};
-pub use surface::{CrackMaps, CrackResolution, CrackSurface};
-pub use textures::CrackTextures;
-pub use upload::CrackUploadStats;
+#[cfg(feature = "2d")]
+pub use carrier::lit::{CrackLight2d, CrackLitMaterial, CrackLitUniform, MAX_LIGHTS};
+#[cfg(any(feature = "2d", feature = "3d"))]
+pub use carrier::place::{CrackPlace, CrackPlaces};
+pub use life::commands::CrackCommandsExt;
 
 use bevy::{
     app::{PluginGroup, PluginGroupBuilder, PostUpdate},
@@ -107,21 +64,6 @@ pub mod prelude {
     #[cfg(any(feature = "2d", feature = "3d"))]
     pub use super::{CrackPlace, CrackPlaces};
     pub use crate::preset::CrackPreset;
-}
-
-/// The stages of a frame, in order, in `PostUpdate`, all but the first after transforms are propagated and before asset events.
-#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum CrackSystems {
-    /// After this set, which comes before transforms are propagated, shards are where they belong in this frame.
-    Shatter,
-    /// After this set, every hit of this frame is queued, and as many as the budget allows are in their growths.
-    Hit,
-    /// After this set, networks have made the steps that are due, as many as the budget allows.
-    Grow,
-    /// After this set, changed texels are painted on the CPU, as many surfaces as the budget allows.
-    Paint,
-    /// After this set, the rectangles to upload are handed to the render world.
-    Upload,
 }
 
 /// Everything that the crate brings into an app: [`CrackPlugin`].
@@ -164,19 +106,28 @@ impl Plugin for CrackPlugin {
             .init_resource::<CrackBudget>()
             .init_resource::<CrackStats>()
             .init_resource::<CrackUploadStats>()
-            .init_resource::<upload::Uploads>()
-            .init_resource::<later::Later>()
-            .init_resource::<shards::Spares>()
-            .init_resource::<budget::FrameClock>()
-            .init_resource::<queue::HitQueue>()
-            .init_resource::<mask::PictureMasks>()
-            .init_resource::<picture::BasePictures>()
-            .init_resource::<surfaces::Surfaces>()
-            .init_resource::<bake::Bakes>()
-            .init_resource::<prepare::Preparations>()
-            .init_resource::<warm::Warmth>()
+            .init_resource::<gpu::uploads::Uploads>()
+            .init_resource::<jobs::deferred::Later>()
+            .init_resource::<shards::body::Spares>()
+            .init_resource::<jobs::frame_time::FrameClock>()
+            .init_resource::<surface::queue::HitQueue>()
+            .init_resource::<source::mask::PictureMasks>()
+            .init_resource::<source::picture::BasePictures>()
+            .init_resource::<surface::owners::Owners>()
+            .init_resource::<surface::queues::Queues>()
+            .init_resource::<gpu::memory::TextureMemory>()
+            .init_resource::<source::picture::FrameCount>()
+            .init_resource::<jobs::threads::Threads>()
+            .init_resource::<shards::request::ShardQueue>()
+            .init_resource::<bake::work::Bakes>()
+            .init_resource::<surface::prepare::Preparations>()
+            .init_resource::<carrier::pipelines::Warmth>()
             .add_message::<CrackHit>()
-            .add_observer(hit::receive_hit)
+            .add_observer(hits::collect::receive_hit)
+            .add_observer(bake::work::cancel_removed)
+            .add_observer(life::heal::disown_added)
+            .add_observer(life::heal::heal_removed)
+            .add_observer(life::heal::heal_closed)
             .configure_sets(
                 PostUpdate,
                 (Hit, Grow, Paint, Upload).chain().after(TransformSystems::Propagate).before(AssetEventSystems),
@@ -185,38 +136,42 @@ impl Plugin for CrackPlugin {
             .add_systems(
                 PostUpdate,
                 (
-                    (warm::note_fresh, warm::watch_views, warm::warm_up)
+                    (surface::warm::note_fresh, surface::warm::watch_views, surface::warm::warm_up)
                         .chain()
-                        .run_if(warm::is_connected)
+                        .run_if(carrier::pipelines::is_connected)
                         .in_set(Shatter)
-                        .before(shards::fly_shards),
+                        .before(shards::fly::fly_shards),
                     (
-                        shards::fly_shards,
-                        shards::shatter_when_due,
-                        shards::shatter_surfaces.run_if(shards::any_requests),
+                        shards::fly::fly_shards,
+                        shards::request::shatter_when_due,
+                        shards::release::shatter_surfaces.run_if(shards::request::any_requests),
                     )
                         .chain()
                         .in_set(Shatter),
                     (
                         (
-                            budget::start_frame,
-                            watch::watch_surfaces,
-                            watch::watch_pictures,
-                            preset::watch_presets,
-                            guided::watch_guided,
+                            jobs::frame_time::start_frame,
+                            life::watch::watch_surfaces,
+                            life::watch::watch_pictures,
+                            life::watch::watch_presets,
+                            bake::work::watch_guided,
                         ),
-                        watch::update_changed.run_if(watch::any_changed),
-                        hit::collect_hits,
-                        prepare::prepare_surfaces.run_if(prepare::any_preparing),
-                        activate::apply_hits.run_if(activate::any_hits),
+                        life::change::update_changed.run_if(life::watch::any_changed),
+                        hits::collect::collect_hits,
+                        surface::prepare::prepare_surfaces.run_if(surface::prepare::any_preparing),
+                        hits::apply::apply_hits.run_if(hits::apply::any_hits),
                     )
                         .chain()
                         .in_set(Hit),
-                    (clock::follow_clocks, grow::grow_surfaces, bake::bake_guided.run_if(bake::any_baking))
+                    (
+                        draw::clock::follow_clocks,
+                        draw::grow::grow_surfaces,
+                        bake::system::bake_guided.run_if(bake::work::any_baking),
+                    )
                         .chain()
                         .in_set(Grow),
-                    (film::show_films.run_if(film::any_filmed), paint::paint_surfaces).chain().in_set(Paint),
-                    (upload::drop_unwanted, budget::end_frame).chain().in_set(Upload),
+                    (draw::async_playback::play_async, draw::paint::paint_surfaces).chain().in_set(Paint),
+                    (gpu::uploads::drop_unwanted, jobs::frame_time::end_frame).chain().in_set(Upload),
                 ),
             );
         // What a sprite shows changes by hits, by bakes and when cracks have closed, and then the engine cuts it into parts.
@@ -226,26 +181,26 @@ impl Plugin for CrackPlugin {
         app.add_systems(
             PostUpdate,
             (
-                watch::watch::<Sprite>,
-                watch::watch::<MeshMaterial2d<ColorMaterial>>,
-                watch::watch::<MeshMaterial2d<CrackLitMaterial>>,
+                life::watch::watch::<Sprite>,
+                life::watch::watch::<MeshMaterial2d<ColorMaterial>>,
+                life::watch::watch::<MeshMaterial2d<CrackLitMaterial>>,
             )
                 .in_set(Hit)
-                .before(watch::update_changed),
+                .before(life::change::update_changed),
         );
         #[cfg(feature = "3d")]
         app.add_systems(
             PostUpdate,
-            watch::watch::<MeshMaterial3d<StandardMaterial>>.in_set(Hit).before(watch::update_changed),
+            life::watch::watch::<MeshMaterial3d<StandardMaterial>>.in_set(Hit).before(life::change::update_changed),
         );
     }
 
     fn finish(&self, app: &mut App) {
-        app.insert_resource(picture::NearestByDefault::of(app));
-        preset::add_assets(app);
-        upload::connect(app);
-        warm::connect(app);
+        app.insert_resource(source::picture::NearestByDefault::of(app));
+        source::preset::add_assets(app);
+        gpu::fetch::connect(app);
+        carrier::pipelines::connect(app);
         #[cfg(feature = "2d")]
-        lit::add_material(app);
+        carrier::lit::add_material(app);
     }
 }

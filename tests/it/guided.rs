@@ -547,3 +547,21 @@ fn a_wall_of_tiles_is_baked_as_a_whole() {
     step(&mut app);
     assert_eq!(get::<Sprite>(&app, entity).image_mode, sprite.image_mode);
 }
+
+/// `CrackFailed` promises it, whoever sends it.
+#[test]
+fn a_bake_that_fails_refuses_the_hits_that_wait() {
+    let mut app = guided_app();
+    let preset = app.world().resource::<Assets<CrackPreset>>().reserve_handle();
+    let image = add(&mut app, picture(UVec2::splat(32)));
+    let entity = app.world_mut().spawn((Sprite::from_image(image), CrackSurface::new(preset))).id();
+    hit(&mut app, center(entity));
+    step(&mut app);
+    assert_eq!(counts(&app).queued, 1, "its preset never comes");
+    let wild = GuidedCracks::new(CrackGuide::new(Grid::new(UVec2::new(3, 1), 0.5)).with_gamma(f32::NAN));
+    app.world_mut().entity_mut(entity).insert(wild);
+    steps(&mut app, 2);
+    let told = &told(&app).failed;
+    assert!(told.iter().any(|(failed, error)| *failed == entity && matches!(error, CrackError::OutOfRange { .. })));
+    assert_eq!((counts(&app).rejected, counts(&app).queued), (1, 0));
+}

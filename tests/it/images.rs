@@ -17,7 +17,7 @@ use bevy::{
         render_asset::RenderAssetBytesPerFrame,
         render_resource::{AstcBlock, AstcChannel, Extent3d, TextureDimension, TextureFormat},
     },
-    sprite::{BorderRect, SliceScaleMode},
+    sprite::{Anchor, BorderRect, SliceScaleMode},
 };
 use bevy_crack::{math::Rng, plugin::CrackUploadStats, prelude::*};
 use std::{
@@ -424,6 +424,33 @@ fn t4_repeated_and_sliced_sprites_look_as_before() {
         let most = film.iter().map(|frame| changed(frame)).max();
         assert!(most < Some(1500), "{:?}, as its cracks close: {most:?} texels", sprite.image_mode);
         assert_eq!(changed(&film[19]), 0, "{:?}", sprite.image_mode);
+        app.world_mut().despawn(entity);
+        step(&mut app);
+    }
+}
+
+/// The engine shows such a sprite as if its anchor was its centre, until it has a size of its own: it must not jump when it cracks.
+#[test]
+fn t4_a_repeated_sprite_with_an_anchor_stays_where_it_is() {
+    let Some((_one, mut app)) = gpu_app() else { return };
+    let target = spawn_camera(&mut app, UVec2::new(128, 96));
+    let image = add(&mut app, picture(UVec2::new(48, 32)));
+    for resolution in [CrackResolution::Picture, CrackResolution::Fixed(UVec2::new(100, 90))] {
+        let image_mode = SpriteImageMode::Tiled { tile_x: true, tile_y: true, stretch_value: 0.5 };
+        let sprite = Sprite { image: image.clone(), image_mode, ..default() };
+        let entity = app.world_mut().spawn((sprite, Anchor::BOTTOM_LEFT, surface_of(resolution))).id();
+        steps(&mut app, 3);
+        let before = drawn(&mut app, &target);
+        // Where it is seen: a corner of it, and not where its anchor would have it.
+        let rejected = counts(&app).rejected;
+        hit(&mut app, CrackHit::world(entity, Vec3::new(40.0, 25.0, 0.0)).with_energy(0.02));
+        hit(&mut app, CrackHit::world(entity, Vec3::new(-20.0, -12.0, 0.0)).with_energy(0.02));
+        steps(&mut app, 10);
+        assert_eq!((counts(&app).rejected, counts(&app).queued), (rejected + 1, 0));
+        let after = drawn(&mut app, &target);
+        let pairs = after.as_chunks::<4>().0.iter().zip(before.as_chunks::<4>().0);
+        let edge = pairs.filter(|(a, b)| (a[0] > 50) != (b[0] > 50)).count();
+        assert!(after != before && edge < 200, "{edge} texels are elsewhere");
         app.world_mut().despawn(entity);
         step(&mut app);
     }

@@ -1,14 +1,14 @@
 //! What a bake needs: it is looked for in the frames until all of it is there.
 
 use super::{
-    super::{
-        CrackError, GuideSource, GuidedCracks, picture,
-        plan::{Copies, Plan},
-        read::Reading,
-        surfaces::Surfaces,
-    },
-    Bake, Bakes, Work,
-    job::{MAX_SIDE, MapJob, Source, Surface},
+    map_job::{MAX_SIDE, MapJob, Source, Surface},
+    work::{Bake, Work},
+};
+use crate::plugin::{
+    api::{CrackError, GuideSource, GuidedCracks},
+    jobs::{copy::PictureCopies, threads::Threads},
+    source::picture,
+    surface::{cracked::active, inputs::Copies, plan::Plan},
 };
 use bevy::prelude::*;
 
@@ -17,9 +17,9 @@ pub(super) fn begin(world: &mut World, entity: Entity, bake: &mut Bake) -> Resul
     let Some(guided) = world.get::<GuidedCracks>(entity).cloned() else { return Ok(None) };
     guided.validate()?;
     let mut copies = Copies::default();
-    let known = world.resource::<Surfaces>().active.get(&entity).and_then(|active| {
-        let rect = active.views.get(active.view)?.rect;
-        Some(Surface::Known(active.base.clone(), rect))
+    let known = active(world, entity).and_then(|active| {
+        let rect = active.canvas.views.get(active.canvas.view)?.rect;
+        Some(Surface::Known(active.canvas.base.clone(), rect))
     });
     let surface = match known {
         Some(surface) => surface,
@@ -60,7 +60,7 @@ pub(super) fn begin(world: &mut World, entity: Entity, bake: &mut Bake) -> Resul
     let side = size.max_element();
     let scale = f64::from(guided.max_side.clamp(1, side.max(1))) / f64::from(side.max(1));
     let size = (size.as_dvec2() * scale).round().as_uvec2().max(UVec2::ONE);
-    let has_threads = world.resource::<Bakes>().pool().is_some();
-    let Some(reading) = Reading::new(copies.0, images, has_threads) else { return Ok(None) };
+    let has_threads = world.resource::<Threads>().pool().is_some();
+    let Some(reading) = PictureCopies::new(copies.0, images, has_threads) else { return Ok(None) };
     Ok(Some(Work::Reading(reading, Box::new(MapJob::new(guided, size, surface, sources)))))
 }

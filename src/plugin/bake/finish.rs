@@ -1,26 +1,33 @@
 //! From a network to a surface that shows it: growth, depth field and textures are made beside the frames, and a frame takes them up
 //! by handing them over.
 
-use super::{
-    super::{
-        CrackError, CrackSurface,
-        activate::{frame, look},
-        clock::First,
-        film::Film,
-        paint::stamp_all,
-        picture::BasePicture,
-        surfaces::{Active, Added, Touched},
-        textures::{self, MAPS, Maps, Picture},
-        upload::Stager,
-        watch::{Past, grown_anew},
-    },
-    job::{Lines, SLICE},
-};
+use super::map_job::{Lines, SLICE};
 use crate::{
     CrackPreset,
     growth::CrackGrowth,
     paint::LookTable,
     pattern::{CellTracker, CrackMask, Moment},
+    plugin::{
+        api::{
+            CrackError, CrackSurface,
+            textures::{MAPS, Maps},
+        },
+        draw::async_playback::AsyncPlayback,
+        gpu::{
+            buffer::Stager,
+            textures::{self, Picture},
+        },
+        source::picture::BasePicture,
+        surface::{
+            active::Active,
+            cracks::Added,
+            frame::{frame, look},
+            regrow::{Past, grown_anew},
+            stamp::stamp_all,
+            tile_set::Touched,
+            time::First,
+        },
+    },
     raster::{DepthField, Redrawn, Replay, TexelRect},
 };
 use bevy::prelude::*;
@@ -48,18 +55,18 @@ impl Order {
     pub(super) fn of(active: &Active, seconds: Option<f32>, stager: Option<Stager>) -> Option<Self> {
         let past = Past::of(active);
         let seconds = seconds.filter(|_| past.hits.is_empty());
-        let [diffuse, normal, depth, emissive] = active.textures.all().map(|texture| texture.is_some());
+        let [diffuse, normal, depth, emissive] = active.canvas.textures.all().map(|texture| texture.is_some());
         Some(Self {
             surface: active.surface.clone(),
             preset: active.preset.clone(),
-            base: active.base.clone(),
-            mask: active.growth.mask().clone(),
-            rect: active.views.get(active.view)?.rect,
+            base: active.canvas.base.clone(),
+            mask: active.cracks.growth.mask().clone(),
+            rect: active.canvas.views.get(active.canvas.view)?.rect,
             maps: Maps { diffuse, normal, depth, emissive },
             past,
-            hits: active.hits,
+            hits: active.cracks.hits,
             first: active.first(seconds),
-            has_clock: active.clock.is_some(),
+            has_clock: active.playhead.clock.is_some(),
             is_new: false,
             stager,
         })
@@ -67,14 +74,14 @@ impl Order {
 
     /// Whether the outcome is good for a surface as it is now; steps that it has grown since can be made up for.
     pub(super) fn fits(&self, active: &Active) -> bool {
-        let view = active.views.get(active.view);
+        let view = active.canvas.views.get(active.canvas.view);
         !self.is_new
-            && self.hits == active.hits
-            && self.past.hits.len() == active.growth.impacts().len()
-            && Arc::ptr_eq(&self.base, &active.base)
-            && Arc::ptr_eq(&self.mask, active.growth.mask())
+            && self.hits == active.cracks.hits
+            && self.past.hits.len() == active.cracks.growth.impacts().len()
+            && Arc::ptr_eq(&self.base, &active.canvas.base)
+            && Arc::ptr_eq(&self.mask, active.cracks.growth.mask())
             && view.is_some_and(|view| view.rect == self.rect)
-            && self.has_clock == active.clock.is_some()
+            && self.has_clock == active.playhead.clock.is_some()
             && self.surface == active.surface
             && self.preset == active.preset
     }
@@ -120,7 +127,7 @@ pub(super) struct Finished {
     pub(super) look: LookTable,
     pub(super) replay: Option<(Replay, Moment)>,
     /// If it is to show other times.
-    pub(super) film: Option<Box<Film>>,
+    pub(super) playback: Option<AsyncPlayback>,
     /// The texels of each texture, and the same where the renderer can read them.
     pub(super) pictures: [Option<Picture>; MAPS],
 }
@@ -149,7 +156,7 @@ impl Finish {
             }
             Stage::Paint { growth, cells, drawn, texels, .. } => {
                 let Drawn { field, touched, look, replay } = *drawn;
-                let film = replay.is_some().then(|| Box::new(Film::new(&growth, &texels)));
+                let playback = replay.is_some().then(|| AsyncPlayback::new(&growth, &texels));
                 let pictures = textures::stage(texels, order.base.size, order.stager.as_ref());
                 return Ok(Next::Done(Box::new(Finished {
                     order,
@@ -161,7 +168,7 @@ impl Finish {
                     touched,
                     look,
                     replay,
-                    film,
+                    playback,
                     pictures,
                 })));
             }

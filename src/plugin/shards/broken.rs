@@ -1,31 +1,24 @@
 //! [`Broken`]: a surface that has shattered.
 
 use super::{
-    CrackShards, Plane, ShatterCracks,
+    batch::Batch,
     body::{Body, LEVELS},
-    holes::Holes,
-    order::Batch,
+    form::Shape,
 };
 use crate::{
-    plugin::{carrier::Carrier, paint::stamp_anew, surfaces::Active},
-    raster::TexelRect,
+    plugin::{
+        api::{CrackShards, ShatterCracks},
+        carrier::{kind::Carrier, plane::Plane},
+        gpu::memory::TextureBytes,
+        surface::{active::Active, stamp::stamp_anew},
+    },
     shatter::{BreakAgain, Flight, RimLook, Shards, Support},
 };
 use bevy::{asset::UntypedHandle, prelude::*};
 use std::{collections::VecDeque, sync::Arc};
 
-/// The last hit of a surface.
-#[derive(Clone, Copy)]
-pub(in crate::plugin) struct Struck {
-    /// Pattern units.
-    pub(in crate::plugin) pos: Vec2,
-    pub(in crate::plugin) energy: f32,
-    /// In the world.
-    pub(in crate::plugin) direction: Vec3,
-}
-
 /// What a surface that has shattered is made of.
-pub(in crate::plugin) struct Broken {
+pub(crate) struct Broken {
     /// The pieces it was cut into last.
     pub(super) cut: Arc<Shards>,
     pub(super) support: Support,
@@ -38,9 +31,6 @@ pub(in crate::plugin) struct Broken {
     pub(super) plane: Plane,
     /// How the rims of shards look.
     pub(super) rim: RimLook,
-    pub(in crate::plugin) holes: Holes,
-    /// Cracks that were carried on when it was cut, and are drawn.
-    pub(in crate::plugin) carried: Vec<Arc<[Vec<Vec2>]>>,
     /// Pieces that are out of their places and fragments of them, by id: fragments come after what they were part of.
     pub(super) pieces: Vec<Piece>,
     /// What is to leave in the next frames.
@@ -67,8 +57,8 @@ pub(in crate::plugin) struct Broken {
     pub(super) wear: [Option<UntypedHandle>; LEVELS + 1],
     /// Material of their sides.
     pub(super) inside: Option<UntypedHandle>,
-    /// Bytes of the picture, counted against the budget.
-    pub(super) bytes: u64,
+    /// Bytes of the picture.
+    pub(super) _bytes: TextureBytes,
 }
 
 /// A piece that is out of its place, or a fragment of one.
@@ -105,14 +95,20 @@ pub(super) struct Piece {
     pub(super) level: usize,
 }
 
+impl Piece {
+    /// What its form follows from.
+    pub(super) fn shape(&self) -> Shape<'_> {
+        Shape { cut: &self.cut, number: self.number, uv: self.uv, seed: self.seed }
+    }
+}
+
 impl Broken {
     pub(super) fn new(
         (cut, support): (Arc<Shards>, Support),
         grown: (usize, usize),
         settings: ShatterCracks,
-        (whole, bytes): (Handle<Image>, u64),
+        (whole, bytes): (Handle<Image>, TextureBytes),
         plane: Plane,
-        active: &Active,
     ) -> Self {
         Self {
             cut,
@@ -122,8 +118,6 @@ impl Broken {
             whole,
             plane,
             rim: RimLook::PLAIN,
-            holes: Holes::new(active.field.frame.size()),
-            carried: Vec::new(),
             pieces: Vec::new(),
             waiting: VecDeque::new(),
             is_fresh: true,
@@ -137,12 +131,12 @@ impl Broken {
             end: 0.0,
             wear: Default::default(),
             inside: None,
-            bytes,
+            _bytes: bytes,
         }
     }
 
     /// Writes on the surface what has become of it.
-    pub(super) fn tell(&self, world: &mut World, surface: Entity) {
+    pub(super) fn report(&self, world: &mut World, surface: Entity) {
         let report = CrackShards {
             pieces: self.cut.clone(),
             gone: self.pieces.iter().filter(|piece| piece.part_of.is_none()).count() as u32,
@@ -162,6 +156,30 @@ impl Broken {
     /// Where the piece with this id is in the list.
     pub(super) fn index_of(&self, id: u32) -> Option<usize> {
         self.pieces.binary_search_by_key(&id, |piece| piece.id).ok()
+    }
+
+    /// Takes the entity of a piece away.
+    pub(super) fn hide(&mut self, world: &mut World, carrier: &Carrier, index: usize) {
+        if let Some(body) = self.pieces.get_mut(index).and_then(|piece| piece.body.take()) {
+            self.pieces[index].spare = self.put_away(world, carrier, body);
+        }
+    }
+
+    /// Takes a body away, for another shard if nobody else has made something of it. Returns its number among the spare ones.
+    pub(super) fn put_away(&self, world: &mut World, carrier: &Carrier, body: Body) -> Option<u64> {
+        if self.settings.fly {
+            return body.park(world, carrier);
+        }
+        world.try_despawn(body.entity).ok();
+        None
+    }
+
+    /// Shows a piece no more: it makes room for others. Returns whether it is there.
+    pub(super) fn spend(&mut self, world: &mut World, active: &Active, piece: u32) -> bool {
+        let Some(index) = self.index_of(piece) else { return false };
+        self.pieces[index].is_spent = true;
+        self.hide(world, &active.carrier, index);
+        true
     }
 
     /// What has waited to leave stays after all.
@@ -210,22 +228,56 @@ impl Broken {
     }
 }
 
-/// Makes a surface whole again: its shards and holes go. Returns the bytes that it no longer needs.
-pub(in crate::plugin) fn drop_shards(world: &mut World, entity: Entity, active: &mut Active) -> u64 {
-    active.renew();
-    let Some(mut broken) = active.broken.take() else { return 0 };
+/// The pieces of a surface that has shattered. They are taken out while shards come and go.
+#[derive(Component)]
+#[component(storage = "SparseSet", clone_behavior = Ignore)]
+pub(crate) struct Pieces(Option<Box<Broken>>);
+
+impl Pieces {
+    pub(super) fn get(&self) -> Option<&Broken> {
+        self.0.as_deref()
+    }
+
+    /// Whether some of what was released is still to leave.
+    pub(super) fn is_waiting(&self) -> bool {
+        self.0.as_ref().is_some_and(|broken| !broken.waiting.is_empty())
+    }
+}
+
+/// The pieces of a surface, if it has shattered.
+pub(super) fn broken(world: &World, surface: Entity) -> Option<&Broken> {
+    world.get::<Pieces>(surface)?.get()
+}
+
+/// Takes the pieces of a surface out, for [`put_back`].
+pub(super) fn take(world: &mut World, surface: Entity) -> Option<Box<Broken>> {
+    world.get_mut::<Pieces>(surface)?.0.take()
+}
+
+/// Puts the pieces of a surface back.
+pub(super) fn put_back(world: &mut World, surface: Entity, broken: Box<Broken>) {
+    if let Some(mut pieces) = world.get_mut::<Pieces>(surface) {
+        pieces.0 = Some(broken);
+    } else if let Ok(mut entity) = world.get_entity_mut(surface) {
+        entity.insert(Pieces(Some(broken)));
+    }
+}
+
+/// Makes a surface whole again: its shards and holes go.
+pub(crate) fn drop_shards(world: &mut World, entity: Entity, active: &mut Active) {
+    active.bump_revision();
+    let Some(mut broken) = take(world, entity) else { return };
     for index in 0..broken.pieces.len() {
         broken.hide(world, &active.carrier, index);
     }
-    (active.carrier.kind.open)(world, entity, &active.carrier, false);
-    if !broken.carried.is_empty() {
+    active.carrier.kind.open(world, entity, &active.carrier, false);
+    active.drawing.cutouts = None;
+    if !core::mem::take(&mut active.drawing.carried).is_empty() {
         stamp_anew(active);
     }
     if let Ok(mut entity) = world.get_entity_mut(entity) {
-        entity.remove::<CrackShards>();
+        entity.remove::<(CrackShards, Pieces)>();
     }
-    active.bytes -= broken.bytes;
-    active.mind_holes();
-    active.mark(TexelRect::whole(active.field.frame.size()));
-    broken.bytes
+    active.avoid_holes();
+    active.mark_all();
 }

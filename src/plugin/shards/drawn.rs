@@ -1,78 +1,20 @@
 //! Cracks that were carried on when a surface was cut are drawn on it.
 
-use super::ShatterCracks;
 use crate::{
-    paint::{Look, LookTable},
-    pattern::{PathPoint, SegmentPath},
+    paint::LookTable,
     plugin::{
-        beside::throw_away,
-        picture::BasePicture,
-        surfaces::Active,
-        textures::{self, MAPS, TextureKind},
-        upload::Uploads,
+        api::textures::MAPS,
+        gpu::{
+            textures::{self, TextureKind},
+            uploads::Uploads,
+        },
+        jobs::background::drop_in_background,
+        source::picture::BasePicture,
+        surface::{active::Active, stamp::stamp_hairlines},
     },
-    raster::{DepthField, DirtyTiles, Profile, TexelRect, stamp_path},
-    shatter::RimLook,
+    raster::{DepthField, DirtyTiles, Profile, TexelRect},
 };
 use bevy::prelude::*;
-
-/// How wide a crack is that was carried on, as a share of the narrowest that grow.
-const HAIR: f32 = 0.5;
-
-impl Active {
-    /// Draws lines as cracks into the field.
-    pub(super) fn stamp_lines(&mut self, lines: &[Vec<Vec2>]) {
-        let width = self.hair();
-        let mut rects = Vec::new();
-        stamp(&mut self.field, &self.profile, width, lines, |rect| rects.push(rect));
-        rects.into_iter().for_each(|rect| self.mark(rect));
-    }
-
-    fn hair(&self) -> f32 {
-        HAIR * self.growth.params().line_width
-    }
-
-    /// Draws the cracks that were carried on once more: the field has been drawn anew.
-    pub(in crate::plugin) fn stamp_carried(&mut self) {
-        if let Some(broken) = self.broken.take() {
-            broken.carried.iter().for_each(|lines| self.stamp_lines(lines));
-            self.broken = Some(broken);
-        }
-    }
-
-    /// How the rims of its shards look.
-    pub(super) fn rim(&self, settings: &ShatterCracks) -> RimLook {
-        rim_for(settings, &self.preset.look)
-    }
-}
-
-/// How the rims of shards look.
-pub(in crate::plugin) fn rim_for(settings: &ShatterCracks, look: &Look) -> RimLook {
-    settings.rim.unwrap_or_else(|| rim_of(look))
-}
-
-fn stamp(
-    field: &mut DepthField,
-    profile: &Profile,
-    width: f32,
-    lines: &[Vec<Vec2>],
-    mut changed: impl FnMut(TexelRect),
-) {
-    for pair in lines.iter().flat_map(|line| line.windows(2)) {
-        let [from, to] = [pair[0], pair[1]].map(|pos| PathPoint { pos, width });
-        changed(stamp_path(field, profile, &SegmentPath::straight(from, to)));
-    }
-}
-
-fn rim_of(look: &Look) -> RimLook {
-    match look {
-        // The picture behind is seen through the walls of the cracks.
-        Look { shift, opaque: true, .. } if *shift > 0.0 => RimLook::GLASS,
-        // Drawn, or as thin as ink.
-        Look { opaque: true, .. } | Look { relief: 0.0, .. } => RimLook::PLAIN,
-        _ => RimLook::STONE,
-    }
-}
 
 /// What lines are drawn with beside the frames.
 pub(super) struct Sketch {
@@ -89,15 +31,15 @@ pub(super) struct Sketch {
 impl Sketch {
     /// `None` if nothing is shown.
     pub(super) fn new(active: &Active) -> Option<Self> {
-        let textures = &active.textures;
+        let textures = &active.canvas.textures;
         Some(Self {
-            field: active.field.clone(),
-            profile: active.profile,
-            look: active.look.clone(),
+            field: active.drawing.field.clone(),
+            profile: active.drawing.profile,
+            look: active.canvas.look.clone(),
             width: active.hair(),
             maps: textures.all().map(|texture| texture.is_some()),
-            view: active.views.get(active.view)?.rect,
-            painted: active.painted,
+            view: active.canvas.views.get(active.canvas.view)?.rect,
+            painted: active.drawing.painted,
         })
     }
 
@@ -105,7 +47,7 @@ impl Sketch {
     pub(super) fn draw(mut self, lines: &[Vec<Vec2>], base: &BasePicture) -> Drawn {
         let size = self.field.frame.size();
         let mut dirty = DirtyTiles::new(size);
-        stamp(&mut self.field, &self.profile, self.width, lines, |rect| dirty.mark(rect.grow(1, size)));
+        stamp_hairlines(&mut self.field, &self.profile, self.width, lines, |rect| dirty.mark(rect.grow(1, size)));
         let mut rects = Vec::new();
         dirty.take_rects(&mut rects);
         rects.iter_mut().for_each(|rect| *rect = rect.intersect(TexelRect::whole(self.view.size())));
@@ -131,20 +73,20 @@ pub(super) struct Drawn {
 impl Drawn {
     /// Whether the surface still looks as it did.
     pub(super) fn fits(&self, active: &Active) -> bool {
-        let view = active.views.get(active.view).map(|view| view.rect);
-        self.sketch.painted == active.painted && view == Some(self.sketch.view)
+        let view = active.canvas.views.get(active.canvas.view).map(|view| view.rect);
+        self.sketch.painted == active.drawing.painted && view == Some(self.sketch.view)
     }
 
     /// Puts on the surface what was painted.
     pub(super) fn put_on(self, world: &mut World, active: &mut Active) {
         let Self { sketch, rects, maps } = self;
-        let (size, origin, shown) = (active.base.size, sketch.view.min, active.view);
-        for (_, view) in active.views.iter_mut().enumerate().filter(|(index, _)| *index != shown) {
+        let (size, origin, shown) = (active.canvas.base.size, sketch.view.min, active.canvas.view);
+        for (_, view) in active.canvas.views.iter_mut().enumerate().filter(|(index, _)| *index != shown) {
             rects.iter().for_each(|rect| view.dirty.mark(*rect));
         }
         world.resource_scope(|world, mut images: Mut<Assets<Image>>| {
             let mut uploads = world.resource_mut::<Uploads>();
-            for ((texture, map), kind) in active.textures.all().into_iter().zip(&maps).zip(&textures::KINDS) {
+            for ((texture, map), kind) in active.canvas.textures.all().into_iter().zip(&maps).zip(&textures::KINDS) {
                 // Without an asset event, which would upload the whole image.
                 if let (Some(texture), Some(map)) = (texture, map)
                     && let Some(data) = images.get_mut_untracked(texture).and_then(|image| image.data.as_mut())
@@ -155,13 +97,13 @@ impl Drawn {
                     }
                 }
             }
-            if let (Some(broken), Some(diffuse)) = (&active.broken, &active.textures.diffuse)
+            if let (Some(holes), Some(diffuse)) = (&active.drawing.cutouts, &active.canvas.textures.diffuse)
                 && let Some(data) = images.get_mut_untracked(diffuse).and_then(|image| image.data.as_mut())
             {
-                rects.iter().for_each(|rect| broken.holes.cut_out(data, size, origin, *rect));
+                rects.iter().for_each(|rect| holes.cut_out(data, size, origin, *rect));
             }
         });
-        throw_away((core::mem::replace(&mut active.field, sketch.field), maps));
+        drop_in_background((core::mem::replace(&mut active.drawing.field, sketch.field), maps));
     }
 }
 

@@ -1,21 +1,21 @@
 //! Shards in motion.
 
 use super::{
-    Broken, Reassembled, ShatterCracks, Spares,
-    body::Shown,
-    broken::Piece,
-    drop_shards,
-    holes::{bounds, spans_of},
+    body::Spares,
+    broken::{self, Broken, Piece, drop_shards},
     order::MOST_NEW,
-    release::{count_shown, make_room},
+    release::{count_shown, make_room, with_active},
+    request::ShardQueue,
+    show::Shown,
+    spans::{bounds, spans_of},
 };
 use crate::{
     math::mix,
     plugin::{
-        CrackBudget,
-        carrier::Carrier,
-        later::hold,
-        surfaces::{Active, Surfaces},
+        api::{CrackBudget, Reassembled, ShatterCracks},
+        carrier::kind::Carrier,
+        jobs::deferred::hold,
+        surface::{active::Active, cracked::with_queues},
     },
     shatter::Pose,
 };
@@ -59,60 +59,67 @@ impl Room {
 }
 
 /// Lets time pass for all shards and puts them where they are then.
-pub(in crate::plugin) fn fly_shards(world: &mut World) {
+pub(crate) fn fly_shards(world: &mut World) {
     let seconds = world.get_resource::<Time>().map_or(DEFAULT_FRAME, |time| time.delta_secs());
     let mut whole = Vec::new();
     hold(world, |world| {
-        world.resource_scope(|world, mut surfaces: Mut<Surfaces>| fly_all(world, &mut surfaces, seconds, &mut whole));
+        world.resource_scope(|world, mut queue: Mut<ShardQueue>| fly_all(world, &mut queue, seconds, &mut whole));
     });
     for entity in whole {
         world.trigger(Reassembled { entity });
     }
 }
 
-fn fly_all(world: &mut World, surfaces: &mut Surfaces, seconds: f32, whole: &mut Vec<Entity>) {
+fn fly_all(world: &mut World, queue: &mut ShardQueue, seconds: f32, whole: &mut Vec<Entity>) {
     let budget = world.resource::<CrackBudget>();
-    let (most, is_boundless) = (budget.max_shards, budget.is_boundless());
-    let mut broken = core::mem::take(&mut surfaces.broken);
-    let shown = if broken.is_empty() { 0 } else { count_shown(world, surfaces) };
-    let mut room = Room { new: if is_boundless { usize::MAX } else { MOST_NEW }, all: most.saturating_sub(shown) };
+    let (most, is_unlimited) = (budget.max_shards, budget.is_unlimited());
+    let mut surfaces = core::mem::take(&mut queue.broken);
+    let shown = if surfaces.is_empty() { 0 } else { count_shown(world, queue) };
+    let mut room = Room { new: if is_unlimited { usize::MAX } else { MOST_NEW }, all: most.saturating_sub(shown) };
     let mut fresh = Vec::new();
-    broken.retain(|&entity| {
-        let Some(active) = surfaces.active.get_mut(&entity) else { return false };
-        let Some(pieces) = active.broken.take() else { return false };
-        match fly(world, entity, active, pieces, seconds, &mut room) {
-            (Fate::Broken, pieces) => fresh.push((entity, pieces)),
-            (Fate::Mended, pieces) => {
-                active.renew();
-                active.mind_holes();
-                surfaces.soil(entity);
-                fresh.push((entity, pieces));
+    surfaces.retain(|&entity| {
+        let fly = |world: &mut World, active: &mut Active| {
+            let broken = broken::take(world, entity)?;
+            let (fate, pieces) = fly(world, entity, active, broken, seconds, &mut room);
+            match fate {
+                Fate::Broken => {}
+                Fate::Mended => {
+                    active.bump_revision();
+                    active.avoid_holes();
+                }
+                Fate::Whole => drop_shards(world, entity, active),
             }
-            (Fate::Whole, _) => {
-                let bytes = drop_shards(world, entity, active);
-                surfaces.bytes -= bytes;
-                surfaces.soil(entity);
-                whole.push(entity);
-                return false;
-            }
+            Some((fate, pieces))
+        };
+        let Some((fate, pieces)) = with_active(world, entity, fly).flatten() else { return false };
+        if !matches!(fate, Fate::Broken) {
+            with_queues(world, entity, |queues, turn| queues.mark_dirty(entity, turn));
         }
+        if matches!(fate, Fate::Whole) {
+            whole.push(entity);
+            return false;
+        }
+        fresh.push((entity, pieces));
         true
     });
-    surfaces.broken = broken;
-    surfaces.new_shards = room.new;
+    queue.broken = surfaces;
+    queue.new = room.new;
     // The oldest make room only for what is shown anew.
     for (entity, mut pieces) in fresh.into_iter().filter(|(_, pieces)| !pieces.is_empty()) {
         pieces.truncate(most);
-        make_room(world, surfaces, pieces.len());
-        let Some(active) = surfaces.active.get_mut(&entity) else { continue };
-        let Some(mut broken) = active.broken.take() else { continue };
-        let shards = broken.spawn(world, entity, &active.carrier, pieces);
-        broken.tell(world, entity);
-        active.broken = Some(broken);
-        surfaces.shards.extend(shards.into_iter().map(|(shard, piece)| (shard, entity, piece)));
-        Spares::shrink_to(world, most.saturating_sub(surfaces.shards.len()));
+        let show = |world: &mut World, active: &mut Active| {
+            let mut broken = broken::take(world, entity)?;
+            make_room(world, queue, pieces.len(), (entity, active, &mut broken));
+            let shards = broken.spawn(world, entity, &active.carrier, pieces);
+            broken.report(world, entity);
+            broken::put_back(world, entity, broken);
+            Some(shards)
+        };
+        let Some(shards) = with_active(world, entity, show).flatten() else { continue };
+        queue.shown.extend(shards.into_iter().map(|(shard, piece)| (shard, entity, piece)));
+        Spares::shrink_to(world, most.saturating_sub(queue.shown.len()));
     }
-    Spares::trim(world, !surfaces.broken.is_empty(), surfaces.shards.len(), is_boundless);
+    Spares::trim(world, !queue.broken.is_empty(), queue.shown.len(), is_unlimited);
 }
 
 fn fly(
@@ -133,13 +140,13 @@ fn fly(
     let time = seek.map_or(before + run, f64::from);
     broken.time = if time.is_nan() { 0.0 } else { time.clamp(0.0, MAX_TIME) };
     if run < 0.0 && time <= 0.0 {
-        active.broken = Some(broken);
+        broken::put_back(world, surface, broken);
         return (Fate::Whole, Vec::new());
     }
     let now = broken.time;
     // Some may have had to wait for their turn.
     if now == before && !broken.is_behind && !broken.has_faded {
-        active.broken = Some(broken);
+        broken::put_back(world, surface, broken);
         return (Fate::Broken, Vec::new());
     }
     let mut fate = Fate::Broken;
@@ -163,9 +170,11 @@ fn fly(
             }
             continue;
         }
-        broken.holes.set(&spans_of(&piece.cut, piece.number, active.field.frame), false);
+        if let Some(holes) = &mut active.drawing.cutouts {
+            holes.set(&spans_of(&piece.cut, piece.number, active.drawing.field.frame), false);
+        }
         broken.put_back(&piece);
-        active.mark(bounds(&piece.cut, piece.number, active.field.frame));
+        active.mark(bounds(&piece.cut, piece.number, active.drawing.field.frame));
         fate = Fate::Mended;
     }
     let is_over = before > broken.end && now > broken.end;
@@ -189,8 +198,8 @@ fn fly(
             index += 1;
         }
     }
-    broken.tell(world, surface);
-    active.broken = Some(broken);
+    broken.report(world, surface);
+    broken::put_back(world, surface, broken);
     (fate, fresh)
 }
 

@@ -1,7 +1,9 @@
 //! [`Form`]: the meshes of a shard, made on any thread.
 
-use super::{Plane, broken::Piece};
-use crate::shatter::{MeshFrame, RimLook, ShardMesh, Shards};
+use crate::{
+    plugin::carrier::plane::Plane,
+    shatter::{MeshFrame, RimLook, ShardMesh, Shards},
+};
 use bevy::{
     asset::RenderAssetUsages,
     mesh::{Indices, PrimitiveTopology},
@@ -31,9 +33,22 @@ pub(super) struct Origin {
     style: Style,
 }
 
+/// A piece as far as its form goes.
+#[derive(Clone, Copy)]
+pub(super) struct Shape<'a> {
+    /// The pieces it is one of, and its number among them.
+    pub(super) cut: &'a Arc<Shards>,
+    pub(super) number: u32,
+    /// The part of the texture that it shows.
+    pub(super) uv: [Vec2; 2],
+    /// Fixes what is random about it.
+    pub(super) seed: u64,
+}
+
 impl Origin {
-    pub(super) fn of(style: Style, piece: &Piece) -> Self {
-        Self { shards: Arc::downgrade(&piece.cut), number: piece.number, uv: piece.uv, seed: piece.seed, style }
+    pub(super) fn of(style: Style, shape: Shape<'_>) -> Self {
+        let Shape { cut, number, uv, seed } = shape;
+        Self { shards: Arc::downgrade(cut), number, uv, seed, style }
     }
 }
 
@@ -93,8 +108,8 @@ impl Style {
     }
 
     /// The meshes of pieces, by all threads that there are.
-    pub(super) fn forms(&self, pieces: &[&Piece]) -> Vec<Form> {
-        let form = |piece: &&Piece| self.form(&piece.cut, piece.number, piece.uv, piece.seed);
+    pub(super) fn forms(&self, pieces: &[Shape<'_>]) -> Vec<Form> {
+        let form = |piece: &Shape<'_>| self.form(piece.cut, piece.number, piece.uv, piece.seed);
         match ComputeTaskPool::try_get() {
             Some(pool) if pieces.len() > CHUNK => {
                 let chunks =

@@ -1,18 +1,27 @@
 //! From a surface to its shards, beside the frames: nothing here touches the world but [`Order::of`], which looks at it.
 
 use super::{
-    Broken, GravitySpace, Plane, ShardsError, ShatterCracks, ShatterRequest,
+    batch::{Batch, Leaving},
+    broken::{Broken, broken},
     drawn::{Drawn, Sketch},
-    form::{Form, Style},
-    holes::{Holes, Scan, Span, join_spans},
+    form::Style,
+    spans::{Scan, join_spans},
 };
 use crate::{
     Grid,
     math::mix,
     pattern::{Network, SurfaceFrame},
-    plugin::{CrackBudget, picture::BasePicture, space, surfaces::Active},
+    plugin::{
+        api::{CrackBudget, GravitySpace, ShardsError, ShatterCracks, ShatterRequest, shatter::rim_for},
+        carrier::{plane::Plane, space},
+        source::picture::BasePicture,
+        surface::{
+            active::Active,
+            cutouts::{Holes, Span},
+        },
+    },
     raster::{DirtyTiles, TexelRect},
-    shatter::{Anchor, BreakAgain, Burst, Cuts, Flight, RimLook, Shards, ShatterError, Support, shatter},
+    shatter::{Anchor, Burst, Cuts, RimLook, Shards, ShatterError, Support, shatter},
 };
 use bevy::prelude::*;
 use std::{collections::VecDeque, sync::Arc};
@@ -26,8 +35,8 @@ const MOST_REACH: f32 = 64.0;
 
 /// What a surface is to lose, and all that was to be known of it when that was asked for.
 pub(super) struct Order {
-    /// What the surface was then, see [`Active::version`].
-    version: Arc<()>,
+    /// What the surface was then, see [`Active::revision`].
+    revision: Arc<()>,
     settings: ShatterCracks,
     rim: RimLook,
     plane: Plane,
@@ -39,11 +48,11 @@ pub(super) struct Order {
     seed: u64,
     /// Nodes and links of the network.
     grown: (usize, usize),
-    pieces: Pieces,
+    pieces: CutFrom,
     /// Whether it is whole.
     is_first: bool,
     sketch: Option<Sketch>,
-    /// Pieces that were released before.
+    /// CutFrom that were released before.
     released: u32,
     /// The most that leave in one frame.
     batch: usize,
@@ -55,7 +64,7 @@ pub(super) struct Order {
 }
 
 /// Where the pieces come from.
-enum Pieces {
+enum CutFrom {
     /// What has been cut stays cut, and what held it holds it.
     Cut(Arc<Shards>, Support),
     /// The same, but something else holds it.
@@ -66,7 +75,7 @@ enum Pieces {
 
 /// What leaves a surface.
 pub(super) struct Made {
-    version: Arc<()>,
+    revision: Arc<()>,
     pub(super) settings: ShatterCracks,
     pub(super) rim: RimLook,
     pub(super) plane: Plane,
@@ -85,33 +94,10 @@ pub(super) struct Made {
     pub(super) room: Vec<u8>,
 }
 
-/// Pieces that leave in one frame.
-pub(super) struct Batch {
-    pub(super) leaving: Vec<Leaving>,
-    /// Their texels, row by row.
-    pub(super) spans: Vec<Span>,
-    /// Rectangles that cover them, texels of the field.
-    pub(super) rects: Vec<TexelRect>,
-    /// The part of the texture that the surface showed.
-    pub(super) uv: [Vec2; 2],
-}
-
-/// A piece that leaves its place.
-pub(super) struct Leaving {
-    pub(super) number: u32,
-    pub(super) flight: Flight,
-    pub(super) seed: u64,
-    /// How it breaks again, and how many seconds after the blow.
-    pub(super) again: Option<(BreakAgain, f32)>,
-    /// Its meshes, unless nothing of it can be seen.
-    pub(super) form: Option<Box<Form>>,
-    spans: Vec<Span>,
-}
-
 impl Made {
     /// Whether the surface is still what it was.
     pub(super) fn fits(&self, active: &Active) -> bool {
-        Arc::ptr_eq(&self.version, &active.version)
+        Arc::ptr_eq(&self.revision, &active.revision)
     }
 }
 
@@ -139,23 +125,22 @@ impl Order {
             let name = "thickness";
             return Err(ShatterError::OutOfRange { name, value, min: 0.0, max: 10.0 }.into());
         }
-        let rim = active.rim(&settings);
+        let rim = rim_for(&settings, &active.preset.look);
         rim.validate()?;
         if let Some(again) = settings.again {
             again.validate()?;
         }
-        let network = active.growth.network();
+        let network = active.cracks.growth.network();
         let extent = network.extent();
-        let (pos, energy, direction) = active
-            .struck
-            .map_or((0.5 * extent, 1.0, Vec3::ZERO), |struck| (struck.pos, struck.energy, struck.direction));
+        let (pos, energy, direction) =
+            active.cracks.last_hit.map_or((0.5 * extent, 1.0, Vec3::ZERO), |hit| (hit.pos, hit.energy, hit.direction));
         let from = request.uv.map_or(pos, |uv| uv * extent);
-        let plane =
-            (active.carrier.kind.plane)(world, entity, active).map_err(|reason| ShardsError::NotFlat { reason })?;
+        let seen = active.canvas.seen().ok_or(ShardsError::NotFlat { reason: "it shows nothing" })?;
+        let plane = active.carrier.kind.plane(world, entity, seen).map_err(|reason| ShardsError::NotFlat { reason })?;
         let back = world.get::<GlobalTransform>(entity).and_then(space::to_local).unwrap_or_default();
         let direction = back.transform_vector3(space::direction(request.direction.unwrap_or(direction)));
         let direction = plane.rotation.inverse() * space::direction(direction);
-        let broken = active.broken.as_deref();
+        let broken = broken(world, entity);
         let released = broken.map_or(0, |broken| broken.released);
         let seed = active.surface.seed;
         let energy = request.energy.unwrap_or(energy);
@@ -169,7 +154,7 @@ impl Order {
         if let (Some(height), Some(place)) =
             (settings.floor.filter(|height| height.is_finite()), world.get::<GlobalTransform>(entity))
         {
-            let is_solid = active.carrier.kind.is_solid;
+            let is_solid = active.carrier.kind.is_solid();
             let thickness = is_solid.then(|| plane.thickness(settings.thickness, extent));
             if let Some(floor) = plane.floor(extent, place, height, thickness) {
                 burst = burst.with_floor(floor)?;
@@ -179,20 +164,21 @@ impl Order {
         let same = |broken: &Broken| broken.grown == grown && broken.settings.cut == settings.cut;
         let pieces = match broken {
             Some(broken) if same(broken) && broken.settings.anchor == settings.anchor => {
-                Pieces::Cut(broken.cut.clone(), broken.support.clone())
+                CutFrom::Cut(broken.cut.clone(), broken.support.clone())
             }
-            Some(broken) if same(broken) => Pieces::Held(broken.cut.clone(), broken.support.clone()),
-            Some(Broken { cut, support, carried, .. }) => {
-                Pieces::Lines(network.clone(), carried.clone(), Some((cut.clone(), support.clone())))
+            Some(broken) if same(broken) => CutFrom::Held(broken.cut.clone(), broken.support.clone()),
+            Some(Broken { cut, support, .. }) => {
+                let carried = &active.drawing.carried;
+                CutFrom::Lines(network.clone(), carried.clone(), Some((cut.clone(), support.clone())))
             }
-            None => Pieces::Lines(network.clone(), Vec::new(), None),
+            None => CutFrom::Lines(network.clone(), Vec::new(), None),
         };
-        let is_sketched = settings.cut.carry_on && matches!(pieces, Pieces::Lines(..));
+        let is_sketched = settings.cut.carry_on && matches!(pieces, CutFrom::Lines(..));
         Ok(Self {
-            version: active.version.clone(),
+            revision: active.revision.clone(),
             rim,
             plane,
-            is_solid: active.carrier.kind.is_solid,
+            is_solid: active.carrier.kind.is_solid(),
             from,
             reach: if is_everything { MOST_REACH } else { request.reach },
             burst,
@@ -202,11 +188,15 @@ impl Order {
             is_first: broken.is_none(),
             sketch: if is_sketched { Sketch::new(active) } else { None },
             released,
-            batch: if budget.is_boundless() { usize::MAX } else { MOST_NEW },
-            holes: broken.map(|broken| broken.holes.clone()),
-            base: active.base.clone(),
-            frame: active.field.frame,
-            view: active.views.get(active.view).map_or(TexelRect::whole(active.base.size), |view| view.rect),
+            batch: if budget.is_unlimited() { usize::MAX } else { MOST_NEW },
+            holes: active.drawing.cutouts.clone(),
+            base: active.canvas.base.clone(),
+            frame: active.drawing.field.frame,
+            view: active
+                .canvas
+                .views
+                .get(active.canvas.view)
+                .map_or(TexelRect::whole(active.canvas.base.size), |view| view.rect),
             alpha_mask: active.surface.alpha_mask,
             settings,
         })
@@ -214,14 +204,14 @@ impl Order {
 
     /// Makes all that needs no world.
     pub(super) fn make(self) -> Result<Made, ShardsError> {
-        let is_new = matches!(self.pieces, Pieces::Lines(..));
+        let is_new = matches!(self.pieces, CutFrom::Lines(..));
         let (cut, mut support) = match self.pieces {
-            Pieces::Cut(cut, support) => (cut, support),
-            Pieces::Held(cut, support) => {
+            CutFrom::Cut(cut, support) => (cut, support),
+            CutFrom::Held(cut, support) => {
                 let support = support.held_by(&cut, self.settings.anchor);
                 (cut, support)
             }
-            Pieces::Lines(network, carried, before) => {
+            CutFrom::Lines(network, carried, before) => {
                 let mut cuts = Cuts::from_network(&network)?;
                 for line in carried.iter().flat_map(|lines| lines.iter()) {
                     cuts.add_line(line)?;
@@ -285,7 +275,7 @@ impl Order {
             _ => None,
         };
         Ok(Made {
-            version: self.version,
+            revision: self.revision,
             settings,
             rim: self.rim,
             plane: self.plane,

@@ -1,158 +1,112 @@
 //! From requests to shards: they are made beside the frames, and a frame takes them up.
 
 use super::{
-    Broken, Shard, ShardsError, ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen, Shattered, Spares,
-    body::Shown,
-    broken::Piece,
-    holes::{Span, cut_span},
-    order::{Batch, Leaving, MOST_NEW, Made, Order},
+    batch::{Batch, Leaving},
+    body::Spares,
+    broken::{self, Broken, Piece, Pieces},
+    order::{MOST_NEW, Made, Order},
+    request::{FRAMES, Request, ShardQueue, frames},
+    show::Shown,
 };
 use crate::{
     plugin::{
-        CrackBudget, CrackState, CrackStatus,
-        beside::{Beside, PATIENCE},
-        error::Called,
-        later::hold,
-        paint::paint_now,
-        surfaces::{Active, Surfaces},
-        textures,
-        upload::Uploads,
-        warm,
+        api::{CrackBudget, Shard, ShardsError, ShatterCracks, ShatterFailed, Shattered, error::EntityLabel},
+        draw::paint::paint_now,
+        gpu::{
+            memory::{TextureBytes, TextureMemory},
+            textures,
+            uploads::Uploads,
+        },
+        jobs::{
+            background::{BackgroundJob, PATIENCE},
+            deferred::hold,
+        },
+        surface::{
+            active::Active,
+            cracked,
+            cutouts::{Holes, Span, cut_span},
+            warm,
+        },
     },
     raster::TexelRect,
 };
 use bevy::{asset::UntypedHandle, platform::time::Instant, prelude::*};
 
-/// Frames from a request to its shards, at the least, where the renderer is ready to draw them: the same on every machine, however long
-/// they take to make.
-const FRAMES: u32 = 2;
-
-/// One more for so many nodes of cracks, unless frames may take any time; where these are more, no frame waits for them.
-const NODES: usize = 500;
-
-/// And the most.
-const MOST_FRAMES: u32 = 20;
-
-/// Frames from a request to its shards.
-fn frames(world: &World, active: &Active) -> u32 {
-    if world.resource::<CrackBudget>().is_boundless() {
-        return FRAMES;
-    }
-    let more = active.growth.network().nodes().len() / NODES;
-    (FRAMES + u32::try_from(more).unwrap_or(MOST_FRAMES)).min(MOST_FRAMES)
-}
-
-/// A surface that is to shatter.
-pub(in crate::plugin) struct Request {
-    pub(in crate::plugin) entity: Entity,
-    request: ShatterRequest,
-    /// Once its shards are being made, and how many frames ago that was begun.
-    work: Option<(Beside<Order, Result<Made, ShardsError>>, u32)>,
-    /// How many of them it takes.
-    frames: u32,
-    /// When it was begun.
-    since: Instant,
-}
-
-impl Request {
-    pub(in crate::plugin) fn new(entity: Entity, request: ShatterRequest) -> Self {
-        Self { entity, request, work: None, frames: FRAMES, since: Instant::now() }
-    }
-}
-
-/// Asks for shards where they are to fall by themselves.
-pub(in crate::plugin) fn shatter_when_due(
-    changed: Query<(Entity, &ShatterCracks, &CrackState), Changed<CrackState>>,
-    mut surfaces: ResMut<Surfaces>,
-) {
-    for (entity, settings, state) in &changed {
-        let Some(active) = surfaces.active.get_mut(&entity) else { continue };
-        let (nodes, cells) = (active.growth.network().nodes().len(), active.cells_told);
-        let is_due = match settings.when {
-            ShatterWhen::Never => false,
-            ShatterWhen::AtDamage(damage) => {
-                state.status == CrackStatus::Done && state.damage >= damage && nodes > active.fell_at.0
-            }
-            ShatterWhen::CellsAsTheyClose => cells > active.fell_at.1,
-        };
-        if is_due {
-            active.fell_at = (nodes, cells);
-            let request = ShatterRequest { reach: settings.reach, ..ShatterRequest::ALL };
-            // One that has not begun will do for both.
-            let is_same = |other: &Request| (other.entity, other.request) == (entity, request) && other.work.is_none();
-            if !surfaces.requests.iter().any(is_same) {
-                surfaces.requests.push(Request::new(entity, request));
-            }
-        }
-    }
-}
-
-/// Whether any surface is to shatter, or has begun to.
-pub(in crate::plugin) fn any_requests(surfaces: Res<Surfaces>) -> bool {
-    let is_waiting = |entity| surfaces.active.get(entity).is_some_and(Active::is_shattering);
-    !surfaces.requests.is_empty() || surfaces.broken.iter().any(is_waiting)
-}
-
-impl Active {
-    /// Whether some of what was released is still to leave.
-    fn is_shattering(&self) -> bool {
-        self.broken.as_ref().is_some_and(|broken| !broken.waiting.is_empty())
-    }
-}
-
 /// Shatters the surfaces that are to, one request after the other.
-pub(in crate::plugin) fn shatter_surfaces(world: &mut World) {
-    let (mut told, mut failed) = (Vec::new(), Vec::new());
+pub(crate) fn shatter_surfaces(world: &mut World) {
+    let (mut shattered, mut failed) = (Vec::new(), Vec::new());
     hold(world, |world| {
-        world.resource_scope(|world, mut surfaces: Mut<Surfaces>| {
-            let requests = core::mem::take(&mut surfaces.requests);
+        world.resource_scope(|world, mut queue: Mut<ShardQueue>| {
+            let requests = core::mem::take(&mut queue.requests);
             // Those that have begun first.
-            for entity in surfaces.broken.clone() {
-                told.extend(let_go(world, entity, &mut surfaces));
+            for entity in queue.broken.clone() {
+                shattered.extend(
+                    with_active(world, entity, |world, active| let_go(world, entity, active, &mut queue)).flatten(),
+                );
             }
             for request in requests {
                 let entity = request.entity;
-                let is_first = surfaces.requests.iter().all(|other| other.entity != entity);
-                let left = world.resource::<CrackBudget>().max_texture_bytes.saturating_sub(surfaces.bytes);
-                let Some(active) = surfaces.active.get_mut(&entity) else { continue };
-                // The shards are to show what the surface will.
-                if active.is_dirty || active.is_shattering() || !is_first {
-                    surfaces.requests.push(request);
-                    continue;
-                }
-                let is_warm = warm::can_break(world, entity, active);
-                let outcome = match proceed(world, active, request, is_warm) {
-                    Ok(Progress::Wait(request)) => {
-                        surfaces.requests.push(request);
-                        continue;
-                    }
-                    Ok(Progress::Made(made)) => {
-                        let (bytes, was_broken) = (active.bytes, active.broken.is_some());
-                        let outcome = release(world, entity, active, *made, left);
-                        let (more, is_broken) = (active.bytes - bytes, active.broken.is_some());
-                        surfaces.bytes += more;
-                        if is_broken && !was_broken {
-                            surfaces.broken.push(entity);
-                        }
-                        outcome
-                    }
-                    Err(error) => Err(error),
-                };
+                let outcome = with_active(world, entity, |world, active| attend(world, active, request, &mut queue));
                 match outcome {
-                    Ok(()) => told.extend(let_go(world, entity, &mut surfaces)),
-                    Err(error) => failed.push(ShatterFailed { entity, error }),
+                    Some(Ok(event)) => shattered.extend(event),
+                    Some(Err(error)) => failed.push(ShatterFailed { entity, error }),
+                    None => {}
                 }
             }
         });
     });
-    for mut event in told {
+    for mut event in shattered {
         event.shards.retain(|shard| world.get::<Shard>(*shard).is_some());
         world.trigger(event);
     }
     for event in failed {
-        warn!("{} cannot shatter: {}", Called::of(world, event.entity), event.error);
+        warn!("{} cannot shatter: {}", EntityLabel::of(world, event.entity), event.error);
         world.trigger(event);
     }
+}
+
+/// Does something with the world and a surface beside it.
+pub(super) fn with_active<T>(
+    world: &mut World,
+    entity: Entity,
+    work: impl FnOnce(&mut World, &mut Active) -> T,
+) -> Option<T> {
+    let mut active = cracked::take(world, entity)?;
+    let result = work(world, &mut active);
+    cracked::put_back(world, entity, active);
+    Some(result)
+}
+
+/// Goes on with a request; it goes back to the queue if it has to wait.
+fn attend(
+    world: &mut World,
+    active: &mut Active,
+    request: Request,
+    queue: &mut ShardQueue,
+) -> Result<Option<Shattered>, ShardsError> {
+    let entity = request.entity;
+    let is_first = queue.requests.iter().all(|other| other.entity != entity);
+    let is_shattering = world.get::<Pieces>(entity).is_some_and(Pieces::is_waiting);
+    // The shards are to show what the surface will.
+    if active.turn.is_dirty || is_shattering || !is_first {
+        queue.requests.push(request);
+        return Ok(None);
+    }
+    let is_warm = warm::can_break(world, entity, active);
+    let outcome = match proceed(world, active, request, is_warm) {
+        Ok(Progress::Wait(request)) => {
+            queue.requests.push(request);
+            return Ok(None);
+        }
+        Ok(Progress::Made(made)) => release(world, entity, active, *made),
+        Err(error) => Err(error),
+    };
+    active.turn.is_to_shatter = false;
+    if broken::broken(world, entity).is_some() && !queue.broken.contains(&entity) {
+        queue.broken.push(entity);
+    }
+    outcome?;
+    Ok(let_go(world, entity, active, queue))
 }
 
 enum Progress {
@@ -165,7 +119,7 @@ fn proceed(world: &World, active: &Active, mut request: Request, is_warm: bool) 
     let order = |request: &Request| Order::of(world, request.entity, active, &request.request);
     let made = match request.work.take() {
         None => {
-            request.work = Some((Beside::start(order(&request)?, Order::make), 1));
+            request.work = Some((BackgroundJob::start(order(&request)?, Order::make), 1));
             (request.frames, request.since) = (frames(world, active), Instant::now());
             return Ok(Progress::Wait(request));
         }
@@ -197,46 +151,57 @@ fn proceed(world: &World, active: &Active, mut request: Request, is_warm: bool) 
 }
 
 /// Counts the shards that are shown.
-pub(super) fn count_shown(world: &World, surfaces: &mut Surfaces) -> usize {
+pub(super) fn count_shown(world: &World, queue: &mut ShardQueue) -> usize {
     // Entities are used again: only those count that still are the same piece.
-    surfaces.shards.retain(|&(entity, of, piece)| {
+    queue.shown.retain(|&(entity, of, piece)| {
         world.get::<Shard>(entity).is_some_and(|shard| shard.surface == of && shard.piece == piece)
     });
-    surfaces.shards.len()
+    queue.shown.len()
 }
 
-/// The oldest shards go if there are too many with so many more.
-pub(super) fn make_room(world: &mut World, surfaces: &mut Surfaces, more: usize) {
-    let shown = count_shown(world, surfaces);
+/// The oldest shards go if there are too many with so many more. `own` is the surface that is in hand, with its state and its pieces.
+pub(super) fn make_room(world: &mut World, queue: &mut ShardQueue, more: usize, own: (Entity, &Active, &mut Broken)) {
+    let shown = count_shown(world, queue);
     let excess = (shown + more).saturating_sub(world.resource::<CrackBudget>().max_shards).min(shown);
+    let (in_hand, own_active, own_broken) = own;
     let mut shortened = Vec::new();
-    for (_, surface, [piece, _]) in surfaces.shards.drain(..excess) {
-        let Some(active) = surfaces.active.get_mut(&surface) else { continue };
-        if let Some(broken) = &mut active.broken
-            && let Some(index) = broken.index_of(piece)
-        {
-            broken.pieces[index].is_spent = true;
-            broken.hide(world, &active.carrier, index);
+    for (_, surface, [piece, _]) in queue.shown.drain(..excess) {
+        let is_gone = if surface == in_hand {
+            own_broken.spend(world, own_active, piece)
+        } else {
+            let spend = |world: &mut World, active: &mut Active| {
+                let mut broken = broken::take(world, surface)?;
+                let is_gone = broken.spend(world, active, piece);
+                broken::put_back(world, surface, broken);
+                Some(is_gone)
+            };
+            with_active(world, surface, spend).flatten().unwrap_or(false)
+        };
+        if is_gone {
             shortened.push(surface);
         }
     }
     shortened.dedup();
     for surface in shortened {
-        if let Some(broken) = surfaces.active.get(&surface).and_then(|active| active.broken.as_ref()) {
-            broken.tell(world, surface);
+        if surface == in_hand {
+            own_broken.report(world, surface);
+        } else if let Some(broken) = broken::take(world, surface) {
+            broken.report(world, surface);
+            broken::put_back(world, surface, broken);
         }
     }
 }
 
-/// Takes up what is to leave a surface.
-fn release(world: &mut World, entity: Entity, active: &mut Active, made: Made, left: u64) -> Result<(), ShardsError> {
+/// Cuts out of a surface what is to leave it.
+fn release(world: &mut World, entity: Entity, active: &mut Active, made: Made) -> Result<(), ShardsError> {
     if made.batches.is_empty() {
         return Ok(());
     }
-    let is_first = active.broken.is_none();
+    let before = broken::take(world, entity);
+    let is_first = before.is_none();
     let Made { settings, rim, plane, grown, cut, is_new, support, batches, drawn, density, room, .. } = made;
     if is_first {
-        can_copy_picture(world, active, left)?;
+        can_copy_picture(world, active)?;
     }
     if is_new && !cut.carried().is_empty() {
         match drawn.filter(|drawn| drawn.fits(active)) {
@@ -247,45 +212,42 @@ fn release(world: &mut World, entity: Entity, active: &mut Active, made: Made, l
             }
         }
     }
-    let mut broken = match active.broken.take() {
+    let mut broken = match before {
         Some(broken) => broken,
         None => {
             let picture = copy_picture(world, active, room)?;
-            (active.carrier.kind.open)(world, entity, &active.carrier, true);
-            Box::new(Broken::new((cut.clone(), support.clone()), grown, settings.clone(), picture, plane, active))
+            active.carrier.kind.open(world, entity, &active.carrier, true);
+            active.drawing.cutouts = Some(Holes::new(active.drawing.field.frame.size()));
+            Box::new(Broken::new((cut.clone(), support.clone()), grown, settings.clone(), picture, plane))
         }
     };
     if is_new && !cut.carried().is_empty() {
-        broken.carried.push(cut.shared_carried());
+        active.drawing.carried.push(cut.shared_carried());
     }
     broken.inside = inside(world, active, &settings, rim.bright, broken.inside.take());
     (broken.cut, broken.support, broken.grown) = (cut, support, grown);
     (broken.settings, broken.plane, broken.rim) = (settings, plane, rim);
     broken.is_fresh = is_first;
     (broken.waiting, broken.since, broken.has_begun) = (batches, broken.time, false);
-    if is_first {
-        active.bytes += broken.bytes;
-    }
-    broken.tell(world, entity);
-    active.broken = Some(broken);
-    active.growth.set_density(density);
+    broken.report(world, entity);
+    broken::put_back(world, entity, broken);
+    active.cracks.growth.set_density(density);
     Ok(())
 }
 
 /// Lets the pieces go that leave a surface in this frame, if there is room for any.
-fn let_go(world: &mut World, entity: Entity, surfaces: &mut Surfaces) -> Option<Shattered> {
+fn let_go(world: &mut World, entity: Entity, active: &mut Active, queue: &mut ShardQueue) -> Option<Shattered> {
     let budget = world.resource::<CrackBudget>();
-    let (most, is_boundless) = (budget.max_shards, budget.is_boundless());
-    let batch = surfaces.active.get(&entity)?.broken.as_ref()?.waiting.front()?;
+    let (most, is_unlimited) = (budget.max_shards, budget.is_unlimited());
+    let batch = broken::broken(world, entity)?.waiting.front()?;
     let new = batch.leaving.iter().filter(|leaving| leaving.form.is_some()).count();
-    if new > surfaces.new_shards && surfaces.new_shards < MOST_NEW && !is_boundless {
+    if new > queue.new && queue.new < MOST_NEW && !is_unlimited {
         // Others have made some in this frame.
         return None;
     }
-    surfaces.new_shards = surfaces.new_shards.saturating_sub(new);
-    make_room(world, surfaces, new);
-    let active = surfaces.active.get_mut(&entity)?;
-    let mut broken = active.broken.take()?;
+    queue.new = queue.new.saturating_sub(new);
+    let mut broken = broken::take(world, entity)?;
+    make_room(world, queue, new, (entity, active, &mut broken));
     if !core::mem::replace(&mut broken.has_begun, true) {
         broken.since = broken.time;
     }
@@ -293,12 +255,12 @@ fn let_go(world: &mut World, entity: Entity, surfaces: &mut Surfaces) -> Option<
         Some(batch) => depart(world, entity, active, &mut broken, batch, most),
         None => Vec::new(),
     };
-    broken.tell(world, entity);
+    broken.report(world, entity);
     let rest = broken.waiting.iter().map(|batch| batch.leaving.len() as u32).sum();
-    active.broken = Some(broken);
-    active.renew();
-    surfaces.shards.extend(shards.iter().map(|(shard, piece)| (*shard, entity, *piece)));
-    Spares::shrink_to(world, most.saturating_sub(surfaces.shards.len()));
+    broken::put_back(world, entity, broken);
+    active.bump_revision();
+    queue.shown.extend(shards.iter().map(|(shard, piece)| (*shard, entity, *piece)));
+    Spares::shrink_to(world, most.saturating_sub(queue.shown.len()));
     let shards: Vec<Entity> = shards.into_iter().map(|(shard, _)| shard).collect();
     (!shards.is_empty()).then_some(Shattered { entity, shards, rest })
 }
@@ -315,7 +277,9 @@ fn depart(
     if !core::mem::take(&mut broken.is_fresh) {
         refresh(world, active, broken, &rects);
     }
-    broken.holes.set(&spans, true);
+    if let Some(holes) = &mut active.drawing.cutouts {
+        holes.set(&spans, true);
+    }
     punch(world, active, &spans, &rects);
     broken.pieces.reserve(leaving.len());
     let mut shown = Vec::with_capacity(leaving.len());
@@ -352,13 +316,15 @@ fn depart(
 
 /// Bytes of a copy of the surface's picture on the CPU and the GPU.
 fn copy_bytes(active: &Active) -> u64 {
-    8 * u64::from(active.base.size.x) * u64::from(active.base.size.y)
+    8 * u64::from(active.canvas.base.size.x) * u64::from(active.canvas.base.size.y)
 }
 
 /// Whether the surface's picture can be copied.
-fn can_copy_picture(world: &World, active: &Active, left: u64) -> Result<(), ShardsError> {
-    let diffuse = active.textures.diffuse.as_ref().ok_or(ShardsError::NoDiffuse)?;
+fn can_copy_picture(world: &World, active: &Active) -> Result<(), ShardsError> {
+    let diffuse = active.canvas.textures.diffuse.as_ref().ok_or(ShardsError::NoDiffuse)?;
     let needed = copy_bytes(active);
+    let left =
+        world.resource::<CrackBudget>().max_texture_bytes.saturating_sub(world.resource::<TextureMemory>().used());
     if needed > left {
         return Err(ShardsError::TextureBudget { needed, left });
     }
@@ -367,8 +333,12 @@ fn can_copy_picture(world: &World, active: &Active, left: u64) -> Result<(), Sha
 }
 
 /// A copy of the surface's picture, in memory that is there, and its bytes.
-fn copy_picture(world: &mut World, active: &Active, mut room: Vec<u8>) -> Result<(Handle<Image>, u64), ShardsError> {
-    let diffuse = active.textures.diffuse.as_ref().ok_or(ShardsError::NoDiffuse)?;
+fn copy_picture(
+    world: &mut World,
+    active: &Active,
+    mut room: Vec<u8>,
+) -> Result<(Handle<Image>, TextureBytes), ShardsError> {
+    let diffuse = active.canvas.textures.diffuse.as_ref().ok_or(ShardsError::NoDiffuse)?;
     let mut images = world.get_resource_mut::<Assets<Image>>().ok_or(ShardsError::NoAssets { name: "Image" })?;
     let shown = images.get(diffuse).ok_or(ShardsError::NoDiffuse)?;
     room.clear();
@@ -376,23 +346,27 @@ fn copy_picture(world: &mut World, active: &Active, mut room: Vec<u8>) -> Result
     let copy = textures::DIFFUSE.image(shown.size(), room, &shown.sampler).ok_or(ShardsError::NoDiffuse)?;
     let copy = images.add(copy);
     world.resource_mut::<Uploads>().expect_whole();
-    Ok((copy, copy_bytes(active)))
+    Ok((copy, world.resource::<TextureMemory>().count(copy_bytes(active))))
 }
 
 /// Brings what is about to leave up to date in the copy of the picture: more cracks have grown since.
 fn refresh(world: &mut World, active: &Active, broken: &Broken, rects: &[TexelRect]) {
-    let (Some(diffuse), Some(view)) = (&active.textures.diffuse, active.views.get(active.view)) else { return };
+    let (Some(diffuse), Some(view)) = (&active.canvas.textures.diffuse, active.canvas.views.get(active.canvas.view))
+    else {
+        return;
+    };
+    let Some(holes) = &active.drawing.cutouts else { return };
     let Some(mut images) = world.get_resource_mut::<Assets<Image>>() else { return };
     // Without an asset event, which would upload the whole image.
     let Some(mut copy) = images.get_mut_untracked(&broken.whole).and_then(|image| image.data.take()) else { return };
-    let (size, field) = (active.base.size, active.field.frame.size());
+    let (size, field) = (active.canvas.base.size, active.drawing.field.frame.size());
     let shown = TexelRect::whole(view.rect.size());
     // One more, for those who blend neighbouring texels.
     let rects = rects.iter().map(|rect| rect.grow(1, field).intersect(shown)).filter(|rect| !rect.is_empty());
     let mut changed = Vec::new();
     if let Some(shown) = images.get(diffuse).and_then(|image| image.data.as_ref()) {
         for rect in rects {
-            broken.holes.copy_present(shown, &mut copy, size, view.rect.min, rect);
+            holes.copy_present(shown, &mut copy, size, view.rect.min, rect);
             changed.push(TexelRect { min: rect.min + view.rect.min, max: rect.max + view.rect.min });
         }
     }
@@ -407,12 +381,12 @@ fn refresh(world: &mut World, active: &Active, broken: &Broken, rects: &[TexelRe
 
 /// Makes the surface transparent where pieces leave it: nothing is painted for that.
 fn punch(world: &mut World, active: &mut Active, spans: &[Span], rects: &[TexelRect]) {
-    let shown = active.view;
-    for (_, view) in active.views.iter_mut().enumerate().filter(|(index, _)| *index != shown) {
+    let shown = active.canvas.view;
+    for (_, view) in active.canvas.views.iter_mut().enumerate().filter(|(index, _)| *index != shown) {
         rects.iter().for_each(|rect| view.dirty.mark(*rect));
     }
-    let (Some(diffuse), Some(view)) = (&active.textures.diffuse, active.views.get(shown)) else { return };
-    let (size, origin, within) = (active.base.size, view.rect.min, view.rect.size());
+    let (Some(diffuse), Some(view)) = (&active.canvas.textures.diffuse, active.canvas.views.get(shown)) else { return };
+    let (size, origin, within) = (active.canvas.base.size, view.rect.min, view.rect.size());
     let Some(mut images) = world.get_resource_mut::<Assets<Image>>() else { return };
     // Without an asset event, which would upload the whole image.
     if let Some(data) = images.get_mut_untracked(diffuse).and_then(|image| image.data.as_mut()) {
@@ -438,13 +412,13 @@ fn inside(
 ) -> Option<UntypedHandle> {
     #[cfg(feature = "3d")]
     if let Some(inside) = &settings.inside {
-        return active.carrier.kind.is_solid.then(|| inside.clone().untyped());
+        return active.carrier.kind.is_solid().then(|| inside.clone().untyped());
     }
     let carrier = &active.carrier;
-    if before.is_some() || !carrier.kind.is_solid {
+    if before.is_some() || !carrier.kind.is_solid() {
         return before;
     }
-    (carrier.kind.inside)(world, carrier, active.base.mean(), bright)
+    carrier.kind.side_material(world, carrier, active.canvas.base.mean(), bright)
 }
 
 #[cfg(all(test, feature = "2d"))]
@@ -476,12 +450,12 @@ mod tests {
             app.update();
         }
         for around in [Vec2::splat(0.2), Vec2::splat(0.8)] {
-            let painted = |app: &App| app.world().resource::<Surfaces>().active[&entity].painted;
+            let painted = |app: &App| cracked::active(app.world(), entity).map(|active| active.drawing.painted);
             let (before, shown) = (painted(&app), app.world().get::<CrackShards>(entity).map_or(0, |told| told.shown));
             app.world_mut().commands().entity(entity).shatter_cracks(ShatterRequest::around(around, 0.1));
             app.update();
             let is_made = |app: &App| {
-                let requests = &app.world().resource::<Surfaces>().requests;
+                let requests = &app.world().resource::<ShardQueue>().requests;
                 requests.iter().any(|request| request.work.as_ref().is_some_and(|(work, _)| work.is_done()))
             };
             while !is_made(&app) {
@@ -489,9 +463,9 @@ mod tests {
             }
             (0..22).for_each(|_| app.update());
             assert!(app.world().get::<CrackShards>(entity).is_some_and(|told| told.shown > shown));
-            let active = &app.world().resource::<Surfaces>().active[&entity];
+            let active = cracked::active(app.world(), entity).expect("it has cracked");
             assert_eq!(painted(&app), before, "a whole frame's painting");
-            assert!(active.views.iter().all(|view| view.dirty.is_empty()), "texels to paint");
+            assert!(active.canvas.views.iter().all(|view| view.dirty.is_empty()), "texels to paint");
         }
     }
 }

@@ -1,0 +1,31 @@
+//! Everything that a game sees: components, events, resources. Types, no systems.
+
+pub(crate) mod budget;
+pub(crate) mod clock;
+pub(crate) mod error;
+pub(crate) mod guided;
+pub(crate) mod hit;
+pub(crate) mod mask;
+pub(crate) mod preset;
+mod reflect;
+pub(crate) mod shatter;
+pub(crate) mod state;
+pub(crate) mod surface;
+pub(crate) mod systems;
+pub(crate) mod textures;
+
+pub use budget::{CrackBudget, CrackStats, CrackUploadStats};
+pub use clock::{CrackClock, CrackDrive};
+pub use error::CrackError;
+pub use guided::{BakeProgress, CrackBaked, CrackGuide, GuideSource, GuidedAppearance, GuidedCracks};
+pub use hit::{CrackHit, HitPoint};
+pub use mask::CrackMaskSource;
+pub use preset::PresetSource;
+pub use shatter::{
+    CrackShards, GravitySpace, Reassembled, Shard, ShardsError, ShatterCracks, ShatterFailed, ShatterRequest,
+    ShatterWhen, Shattered,
+};
+pub use state::{CellClosed, CrackFailed, CrackFinished, CrackState, CrackStatus, CrackTip};
+pub use surface::{CrackMaps, CrackResolution, CrackSurface};
+pub use systems::CrackSystems;
+pub use textures::CrackTextures;

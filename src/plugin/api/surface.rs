@@ -1,0 +1,128 @@
+//! [`CrackSurface`]: this sprite or mesh can crack.
+
+use super::{CrackMaskSource, CrackState, PresetSource};
+use bevy::prelude::*;
+
+/// This sprite, 2D mesh or 3D mesh can crack.
+///
+/// Costs nothing until the first hit. Then the surface gets textures of its own, which start as copies of its pictures;
+/// everybody else who shows those pictures keeps the originals. Removing the component heals it: the originals are back, and
+/// [`CrackState`] is as at the start.
+///
+/// `Sprite::image` and the material in `MeshMaterial2d` or `MeshMaterial3d` are the surface's own while it is cracked. A
+/// copy of a material is changed through the handle that the entity has then, not through the one it was spawned with, and is dropped
+/// by healing; another image or material put in its place is cracked as the first one was. A sprite that repeats or slices its picture shows
+/// it laid out in its texture while it is cracked, at the size that it had when that was made, and its `image_mode` is `Tiled` without tiles.
+///
+/// On a 3D mesh some of whose faces show the same part of the picture, as those of a `Cuboid` or a `Cylinder`, only that face cracks which is hit
+/// first; hits on others are refused until it is healed. Its textures hold the picture twice, and `Mesh3d` is a copy with other texture
+/// coordinates while it is cracked. A face is what hangs together in the texture coordinates, or a side of a box. A box no thicker than a
+/// quarter of its width and height, as it is scaled in the world, is a slab: it cracks through, so that its back shows what its front shows,
+/// and is hit from all sides. Where a face shows a part of the picture twice itself, where the picture repeats, faces share vertices, or there
+/// are more than 65,536 triangles, the mesh stays as it is, and cracks show wherever their place of the picture does.
+#[derive(Component, Reflect, Clone, Debug, PartialEq)]
+#[reflect(Component, Default)]
+#[require(CrackState)]
+pub struct CrackSurface {
+    /// How cracks grow and look, here or in a file. A changed look and profile show on all cracks at once, changed growth on what
+    /// grows from then on; invalid changes are refused with one warning.
+    pub preset: PresetSource,
+    /// Seed of the pattern. A change takes effect after healing.
+    pub seed: u64,
+    /// Size of the textures. A change takes effect when they are made anew: after healing, or with another picture.
+    pub resolution: CrackResolution,
+    /// Which maps are written. A change takes effect as one of `resolution`.
+    pub write: CrackMaps,
+    /// Whether transparent texels refuse hits and attract no cracks; default true.
+    pub alpha_mask: bool,
+    /// Where cracks like to run and where they never go; by default as the preset has it. A change takes effect as one of `resolution`, and so
+    /// does one of what the preset has.
+    pub mask: CrackMaskSource,
+}
+
+impl CrackSurface {
+    /// A surface of the given material (a [`CrackPreset`](crate::CrackPreset) or the handle of one), with seed 0, everything
+    /// else by default.
+    #[must_use]
+    pub fn new(preset: impl Into<PresetSource>) -> Self {
+        Self {
+            preset: preset.into(),
+            seed: 0,
+            resolution: CrackResolution::Picture,
+            write: CrackMaps { diffuse: true, normal: true, depth: true },
+            alpha_mask: true,
+            mask: CrackMaskSource::Auto,
+        }
+    }
+
+    /// The same with another seed.
+    #[must_use]
+    pub fn with_seed(mut self, seed: u64) -> Self {
+        self.seed = seed;
+        self
+    }
+
+    /// The same with textures of another size.
+    #[must_use]
+    pub fn with_resolution(mut self, resolution: CrackResolution) -> Self {
+        self.resolution = resolution;
+        self
+    }
+
+    /// The same with only these maps.
+    #[must_use]
+    pub fn with_maps(mut self, maps: CrackMaps) -> Self {
+        self.write = maps;
+        self
+    }
+
+    /// The same with a mask.
+    #[must_use]
+    pub fn with_mask(mut self, mask: CrackMaskSource) -> Self {
+        self.mask = mask;
+        self
+    }
+}
+
+impl Default for CrackSurface {
+    fn default() -> Self {
+        Self::new(PresetSource::default())
+    }
+}
+
+/// Size of a surface's textures.
+#[derive(Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum CrackResolution {
+    /// As its picture; with more columns or rows where it is shown stretched by more than 1.4, so that the cracks are not, be it the sprite's
+    /// `custom_size`, the mesh's texture coordinates or a scale that stretches it. That is seen to when the textures are made, as far as two
+    /// million texels and the memory allow, and not for sprites with a `rect` or an atlas, nor for pictures whose sampler shows texels as
+    /// squares. Where a sprite repeats its picture or shows it in nine parts, as many texels as it shows of it, up to two million. Without a picture,
+    /// 512 texels along the longer side, or 256 along the shorter one if that is more.
+    ///
+    /// A texel takes 14 to 24 bytes in all, and for a coin [`Fixed`](Self::Fixed) of 64 x 64 is plenty.
+    #[default]
+    Picture,
+    /// This size, the picture being resampled; cracks are stretched with a picture that is. Sprites with a `rect` or an atlas keep the size of their picture.
+    Fixed(UVec2),
+}
+
+/// Which maps of a surface are written.
+///
+/// With a look that [glows](crate::paint::Look::glow) when a surface first cracks, 3D meshes whose material has no emissive picture of its own get an
+/// emissive map as well.
+#[derive(Reflect, Clone, Copy, Debug, PartialEq, Eq)]
+#[reflect(Default)]
+pub struct CrackMaps {
+    /// The picture itself.
+    pub diffuse: bool,
+    /// Normals, tangent space.
+    pub normal: bool,
+    /// Depth for parallax mapping: 3D meshes only.
+    pub depth: bool,
+}
+
+impl Default for CrackMaps {
+    fn default() -> Self {
+        Self { diffuse: true, normal: true, depth: true }
+    }
+}

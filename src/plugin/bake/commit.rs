@@ -1,0 +1,210 @@
+//! What the frames do of a bake: they order a surface, and take up what was made.
+
+use super::{
+    finish::{Finish, Finished, Next, Order},
+    map_job::Lines,
+    work::{Bake, Job, Work},
+};
+use crate::plugin::{
+    api::{CrackClock, CrackError, CrackStatus, CrackTextures, GuidedAppearance, GuidedCracks},
+    draw::async_playback::{self, AsyncPlayback},
+    gpu::uploads::Uploads,
+    jobs::background::drop_in_background,
+    shards::broken::drop_shards,
+    surface::{
+        active::Active,
+        cracked::{self, active, has_cracked, with_queues},
+        create::{install, make_ready_now, set_status},
+        inputs::Readings,
+        plan::Plan,
+        prepare::MAX_LANDING,
+        queues::Queues,
+        regrow::Past,
+        time::First,
+    },
+};
+use bevy::{prelude::*, render::renderer::RenderDevice};
+
+/// So often the surface may change while its cracks are made beside the frames; then they are made between two of them.
+const MAX_ROUNDS: u32 = 8;
+
+/// The seconds in which cracks appear; `None` = at once.
+fn seconds(world: &World, entity: Entity) -> Option<f32> {
+    match world.get::<GuidedCracks>(entity)?.appearance {
+        GuidedAppearance::AtOnce => None,
+        GuidedAppearance::Front { seconds, .. } | GuidedAppearance::Widen { seconds } => Some(seconds),
+    }
+    .filter(|seconds| *seconds > 0.0)
+}
+
+/// Has the surface made with these cracks, as it is now; from the start if it is another one.
+pub(super) fn order(world: &mut World, entity: Entity, bake: &mut Bake, lines: Lines) -> Result<(), CrackError> {
+    let seconds = seconds(world, entity);
+    let stager = world.resource::<Uploads>().stager(world.get_resource::<RenderDevice>());
+    if !has_cracked(world, entity) {
+        let (Some(plan), Some(ground)) = (&mut bake.plan, &lines.ground) else { return Ok(()) };
+        if !plan.is_current(world, entity) {
+            return Ok(());
+        }
+        if plan.has_room(world) {
+            let clock = world.get::<CrackClock>(entity).copied();
+            let order = Order {
+                surface: plan.surface.clone(),
+                preset: plan.preset.clone(),
+                base: ground.base.clone(),
+                mask: ground.mask.clone(),
+                rect: plan.pictures.rect,
+                maps: plan.pictures.maps,
+                past: Past { hits: Vec::new(), steps: 0 },
+                hits: 0,
+                first: First::of(clock, 0.0, seconds),
+                has_clock: clock.is_some(),
+                is_new: true,
+                stager,
+            };
+            if plan.textures.is_none() {
+                plan.make_room(world)?;
+            }
+            bake.work = Work::Ready(Job::Finish(Box::new(Finish::new(order, lines))));
+            return Ok(());
+        }
+        // Coarser textures, or an error.
+        if !make_ready_now(world, entity)? {
+            return Ok(());
+        }
+    }
+    let active = active(world, entity);
+    if let Some(order) = active.and_then(|active| Order::of(active, seconds, stager)) {
+        bake.work = Work::Ready(Job::Finish(Box::new(Finish::new(order, lines))));
+    }
+    Ok(())
+}
+
+/// Applies what was made; `None` if it has to wait for the renderer, or be made anew.
+pub(super) fn commit(
+    world: &mut World,
+    entity: Entity,
+    bake: &mut Bake,
+    mut finished: Box<Finished>,
+    frames: u32,
+) -> Result<Option<Option<f32>>, CrackError> {
+    let covered = finished.covered;
+    match (cracked::take(world, entity), bake.plan.take()) {
+        (Some(active), plan) => {
+            bake.plan = plan;
+            if finished.order.fits(&active) {
+                replace(world, entity, active, *finished);
+                return Ok(Some(covered));
+            }
+            cracked::put_back(world, entity, active);
+        }
+        (None, Some(mut plan))
+            if finished.order.is_new
+                && finished.order.has_clock == world.get::<CrackClock>(entity).is_some()
+                && plan.has_room(world)
+                && plan.is_current(world, entity) =>
+        {
+            let textures = plan.textures.take().unwrap_or_default();
+            if frames == 0 {
+                textures.fill(world, &mut finished.pictures);
+            }
+            if frames < MAX_LANDING && textures.are_staged(world) {
+                plan.textures = Some(textures);
+                bake.plan = Some(plan);
+                bake.work = Work::Landing(finished, frames + 1);
+                return Ok(None);
+            }
+            settle(world, entity, *plan, textures, *finished);
+            return Ok(Some(covered));
+        }
+        (None, plan) => bake.plan = plan,
+    }
+    again(world, entity, bake, *finished)?;
+    Ok(None)
+}
+
+/// Has a surface made anew that has changed meanwhile.
+fn again(world: &mut World, entity: Entity, bake: &mut Bake, finished: Finished) -> Result<(), CrackError> {
+    let Finished { order: past, added, covered, growth, cells, field, pictures, replay, .. } = finished;
+    drop_in_background((growth, cells, field, pictures, replay));
+    let ground = Readings { base: past.base, mask: past.mask };
+    let ground = past.is_new.then_some(ground);
+    order(world, entity, bake, Lines { network: added.network, opening: added.opening, covered, ground })?;
+    bake.rounds += 1;
+    if bake.rounds < MAX_ROUNDS {
+        return Ok(());
+    }
+    match core::mem::replace(&mut bake.work, Work::Wanted) {
+        Work::Ready(Job::Finish(mut finish)) => loop {
+            match finish.step()? {
+                Next::More(more) => finish = more,
+                Next::Done(finished) => {
+                    bake.work = Work::Landing(finished, 0);
+                    return Ok(());
+                }
+            }
+        },
+        work => bake.work = work,
+    }
+    Ok(())
+}
+
+/// Makes a surface of one that has not cracked before, whose textures are where they are shown from.
+fn settle(world: &mut World, entity: Entity, plan: Plan, textures: CrackTextures, finished: Finished) {
+    let seconds = seconds(world, entity);
+    let is_outdated = plan.is_outdated;
+    let Finished { order, added, growth, cells, field, touched, look, replay, playback, .. } = finished;
+    let ground = plan.ground(world, Readings { base: order.base, mask: order.mask }, look, textures);
+    let mut active = Box::new(Active::new(ground, growth, field));
+    (active.drawing.touched, active.cracks.cells, active.cracks.added, active.canvas.is_outdated) =
+        (touched, cells, Some(added), is_outdated);
+    active.show_made(replay, seconds);
+    install(world, entity, active);
+    // It may show another part of its pictures, or they have changed.
+    world.resource_mut::<Queues>().changed.push(entity);
+    begin_to_show(world, entity, playback);
+}
+
+/// Puts baked cracks on a surface that has cracked before and is taken out of the others.
+fn replace(world: &mut World, entity: Entity, mut active: Box<Active>, mut finished: Finished) {
+    let seconds = seconds(world, entity);
+    async_playback::stop(world, entity, &mut active);
+    // Shards are of the cells that were.
+    drop_shards(world, entity, &mut active);
+    let textures = active.canvas.textures.clone();
+    textures.fill(world, &mut finished.pictures);
+    let Finished { order, added, growth, cells, field, touched, look, replay, playback, pictures, .. } = finished;
+    // Steps that it has grown since are made up for.
+    active.playhead.due += f64::from(Past::of(&active).steps.saturating_sub(order.past.steps));
+    let before = (
+        core::mem::replace(&mut active.cracks.growth, growth),
+        core::mem::replace(&mut active.cracks.cells, cells),
+        core::mem::replace(&mut active.drawing.field, field),
+        core::mem::replace(&mut active.drawing.touched, touched),
+        core::mem::replace(&mut active.canvas.look, look),
+        active.cracks.added.replace(added),
+        pictures,
+    );
+    let is_untouched = order.past.hits.is_empty();
+    let shown_before = active.show_made(replay, seconds.filter(|_| is_untouched));
+    active.cracks.cells_reported = 1;
+    active.fell_at = (0, 1);
+    active.cracks.tips_from = 0;
+    active.mark_all();
+    // All that is shown is painted.
+    if let Some(view) = active.canvas.views.get_mut(active.canvas.view) {
+        view.dirty.clear();
+    }
+    cracked::put_back(world, entity, active);
+    begin_to_show(world, entity, playback);
+    drop_in_background((before, shown_before));
+}
+
+fn begin_to_show(world: &mut World, entity: Entity, playback: Option<AsyncPlayback>) {
+    async_playback::start(world, entity, playback);
+    with_queues(world, entity, |queues, turn| {
+        queues.start_growing(entity, turn);
+        queues.mark_dirty(entity, turn);
+    });
+    set_status(world, entity, CrackStatus::Growing);
+}

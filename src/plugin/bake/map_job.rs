@@ -1,0 +1,172 @@
+//! From guides to a network: what a bake does before it knows of its surface.
+
+use crate::{
+    Grid,
+    pattern::Network,
+    plugin::{
+        api::{CrackError, GuidedAppearance, GuidedCracks},
+        source::{
+            mask,
+            picture::{self, BasePicture, Space},
+        },
+        surface::inputs::{Readings, SurfaceInputs},
+    },
+    raster::TexelRect,
+    voronoi::{self, Guide, Seams, VoronoiBake},
+};
+use bevy::{
+    asset::RenderAssetUsages,
+    image::{CompressedImageFormats, ImageSampler, ImageType},
+    prelude::*,
+};
+use std::{sync::Arc, vec};
+
+/// Texels of a slice: well below a millisecond.
+pub(super) const SLICE: u32 = 1 << 14;
+
+/// Longest side of a guide, texels.
+pub(super) const MAX_SIDE: u32 = 8192;
+
+/// The most bytes of a guide.
+const MAX_BYTES: u64 = 256 << 20;
+
+/// Steps in which the cracks of a front open behind its tip.
+const FRONT_OPENING: u32 = 12;
+
+/// Steps in which cracks open that widen all at once.
+const WIDE_OPENING: u32 = 32;
+
+/// Shares of the whole that reading the guides and drawing the lines are told to be.
+const READ: f32 = 0.1;
+
+pub(super) const MAPPED: f32 = 0.95;
+
+/// A map as a machine that is stepped; depends on nothing but itself.
+pub(super) struct MapJob {
+    pub(super) guided: GuidedCracks,
+    pub(super) size: UVec2,
+    /// Copies of the pictures of surface, mask and guides.
+    pub(super) copies: Vec<Image>,
+    pub(super) surface: Surface,
+    pub(super) sources: vec::IntoIter<(Source, f32)>,
+    guides: Vec<Guide>,
+    map: Option<VoronoiBake>,
+    pub(super) progress: f32,
+}
+
+/// The surface that is to crack.
+pub(super) enum Surface {
+    /// Its picture and the part that is shown.
+    Known(Arc<BasePicture>, TexelRect),
+    /// It has not cracked yet.
+    Raw(Box<SurfaceInputs>),
+    Read(Readings, TexelRect),
+}
+
+/// A guide that is not read yet.
+pub(super) enum Source {
+    /// Index of the copy.
+    Image(usize),
+    Grid(Arc<Grid<f32>>),
+    Png(Arc<[u8]>),
+    /// The surface's own picture.
+    Own,
+}
+
+/// The cracks of a bake, and the surface if that was read for it.
+pub(super) struct Lines {
+    pub(super) network: Network,
+    pub(super) opening: u32,
+    pub(super) covered: Option<f32>,
+    pub(super) ground: Option<Readings>,
+}
+
+impl MapJob {
+    pub(super) fn new(guided: GuidedCracks, size: UVec2, surface: Surface, sources: Vec<(Source, f32)>) -> Self {
+        let (copies, guides) = (Vec::new(), Vec::with_capacity(sources.len()));
+        Self { guided, size, copies, surface, sources: sources.into_iter(), guides, map: None, progress: 0.0 }
+    }
+
+    /// A slice of the work.
+    pub(super) fn step(&mut self) -> Result<Option<Lines>, CrackError> {
+        if let Surface::Raw(raw) = &self.surface {
+            let ground = raw.read(&self.copies)?;
+            self.surface = Surface::Read(ground, raw.plan.rect);
+            return Ok(None);
+        }
+        if let Some((source, gamma)) = self.sources.next() {
+            let index = self.guides.len();
+            let image = self.read(source).map_err(|reason| CrackError::Guide { index, reason })?;
+            self.guides.push(Guide { image, gamma });
+            self.progress = READ * self.guides.len() as f32 / (self.guides.len() + self.sources.len()) as f32;
+            return Ok(None);
+        }
+        let Some(map) = &mut self.map else {
+            let (params, guides) = (self.guided.params.clone(), core::mem::take(&mut self.guides));
+            let map = VoronoiBake::new(params, guides, self.size, self.guided.seed);
+            self.map = Some(map.map_err(|error| CrackError::Bake { reason: error.to_string() })?);
+            return Ok(None);
+        };
+        if let voronoi::BakeProgress::Working(share) = map.step((SLICE / self.size.x).max(1) as usize) {
+            self.progress = READ + (MAPPED - READ) * share;
+            return Ok(None);
+        }
+        let Some((map, seams)) = self.map.take().map(VoronoiBake::finish) else { return Ok(None) };
+        let covered = map.strokes().map(|strokes| strokes.covered);
+        drop(map);
+        let (network, opening) = lines(&seams, self.guided.appearance);
+        let ground = if let Surface::Read(ground, _) = &self.surface { Some(ground.clone()) } else { None };
+        Ok(Some(Lines { network, opening, covered, ground }))
+    }
+
+    fn read(&self, source: Source) -> Result<Grid<f32>, String> {
+        let decoded;
+        let image = match source {
+            Source::Grid(grid) => return Ok(Arc::unwrap_or_clone(grid)),
+            Source::Own => {
+                let (base, rect) = match &self.surface {
+                    Surface::Known(base, rect) | Surface::Read(Readings { base, .. }, rect) => (base, *rect),
+                    Surface::Raw(_) => return Err("it was not read".into()),
+                };
+                let rgba = mask::part(&base.diffuse, base.size, rect);
+                let picture = voronoi::lightness(rect.size(), &rgba).ok_or("its size is wrong")?;
+                return Ok(voronoi::edges(&picture));
+            }
+            Source::Image(index) => self.copies.get(index).ok_or("it was not read")?,
+            Source::Png(file) => {
+                decoded = decode(&file)?;
+                &decoded
+            }
+        };
+        let size = picture::readable_size(image).map_err(|error| error.to_string())?;
+        let rgba = picture::read(image, Space::Srgb, size).map_err(|error| error.to_string())?;
+        Ok(voronoi::ink(size, &rgba).ok_or("its size is wrong")?)
+    }
+}
+
+/// The seams in the order in which they come, and the steps in which each opens.
+fn lines(seams: &Seams, appearance: GuidedAppearance) -> (Network, u32) {
+    if let GuidedAppearance::Front { from, .. } = appearance {
+        return (seams.network(from * seams.extent), FRONT_OPENING);
+    }
+    let mut network = seams.network(Vec2::ZERO);
+    network.nodes.iter_mut().for_each(|node| node.birth = 0);
+    network.links.iter_mut().for_each(|link| link.birth = 0);
+    (network, if matches!(appearance, GuidedAppearance::AtOnce) { 0 } else { WIDE_OPENING })
+}
+
+/// A PNG file as an image; what is too large is refused before memory is taken.
+fn decode(file: &[u8]) -> Result<Image, String> {
+    // Signature, length of the header, its name; width, height, bits, kind of colour.
+    let header = file.strip_prefix(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR").and_then(|rest| rest.first_chunk::<10>());
+    let &[a, b, c, d, e, f, g, h, bits, _] = header.ok_or("it is no PNG file")?;
+    let (width, height) = (u32::from_be_bytes([a, b, c, d]), u32::from_be_bytes([e, f, g, h]));
+    let texel = 4 * u64::from(bits.div_ceil(8));
+    if width.max(height) > MAX_SIDE || u64::from(width) * u64::from(height) * texel > MAX_BYTES {
+        return Err(format!("{width} x {height} texels are beyond the limit of {MAX_SIDE} a side and 256 MiB"));
+    }
+    let (kind, sampler) = (ImageType::MimeType("image/png"), ImageSampler::Default);
+    let usage = RenderAssetUsages::MAIN_WORLD;
+    Image::from_buffer(file, kind, CompressedImageFormats::NONE, true, sampler, usage)
+        .map_err(|error| error.to_string().lines().next().unwrap_or_default().to_owned())
+}

@@ -1,0 +1,8 @@
+//! Guided cracks: from guides to cracks on a surface, in background tasks or in slices of frames.
+
+mod begin;
+mod commit;
+mod finish;
+mod map_job;
+pub(crate) mod system;
+pub(crate) mod work;

@@ -1,0 +1,226 @@
+//! A bake and its work.
+
+use super::{
+    finish::{Finish, Finished, Next},
+    map_job::{Lines, MAPPED, MapJob},
+};
+use crate::plugin::{
+    api::{BakeProgress, CrackError, CrackSurface, GuidedCracks},
+    jobs::{background::guarded, copy::PictureCopies},
+    surface::plan::Plan,
+};
+use bevy::{
+    ecs::entity::EntityHashSet,
+    prelude::*,
+    tasks::{AsyncComputeTaskPool, Task},
+};
+use std::{
+    sync::{
+        Arc,
+        atomic::{AtomicBool, AtomicU32, Ordering},
+    },
+    thread::{self, ThreadId},
+};
+
+/// The bakes that go on, in order.
+#[derive(Resource, Default)]
+pub(crate) struct Bakes {
+    pub(super) list: Vec<(Entity, Bake)>,
+    /// While the list is worked on: the bakes that were cancelled meanwhile.
+    pub(super) cancelled: Option<EntityHashSet>,
+}
+
+/// A bake that goes on.
+pub(super) struct Bake {
+    pub(super) work: Work,
+    /// The surface, if it has not cracked when the bake began.
+    pub(super) plan: Option<Box<Plan>>,
+    /// How often its surface has changed too late.
+    pub(super) rounds: u32,
+}
+
+pub(super) enum Work {
+    /// Its pictures may not be there yet.
+    Wanted,
+    /// Pictures are copied.
+    Reading(PictureCopies, Box<MapJob>),
+    /// Others come first.
+    Ready(Job),
+    Task(Run),
+    Slices(Job),
+    /// Textures are on their way to the renderer, for so many frames.
+    Landing(Box<Finished>, u32),
+}
+
+impl Work {
+    pub(super) const fn is_running(&self) -> bool {
+        matches!(self, Self::Task(_) | Self::Slices(_))
+    }
+}
+
+impl Bakes {
+    /// Begins a bake anew.
+    pub(crate) fn want(&mut self, entity: Entity) {
+        self.cancel(entity);
+        if let Some(cancelled) = &mut self.cancelled {
+            cancelled.remove(&entity);
+        }
+        self.list.push((entity, Bake { work: Work::Wanted, plan: None, rounds: 0 }));
+    }
+
+    /// Ends a bake silently.
+    pub(crate) fn cancel(&mut self, entity: Entity) {
+        self.list.retain(|(baked, _)| *baked != entity);
+        if let Some(cancelled) = &mut self.cancelled {
+            cancelled.insert(entity);
+        }
+    }
+
+    /// What was read of the picture before this frame is another one now.
+    pub(crate) fn forget_picture(&mut self, picture: AssetId<Image>, frame: u64) {
+        for (_, Bake { work, plan, .. }) in &mut self.list {
+            let is_past = plan.as_mut().is_none_or(|plan| plan.forget_picture(picture, frame));
+            if let Work::Reading(reading, _) = work
+                && is_past
+            {
+                reading.forget(picture);
+            }
+        }
+    }
+}
+
+/// Whether any bake goes on.
+pub(crate) fn any_baking(bakes: Res<Bakes>) -> bool {
+    !bakes.list.is_empty()
+}
+
+/// No bake any more.
+fn reset(progress: &mut Mut<BakeProgress>) {
+    progress.set_if_neq(BakeProgress(0.0));
+}
+
+/// Ends the bake of a surface that is healed.
+pub(crate) fn cancel(world: &mut World, entity: Entity) {
+    if let Some(mut bakes) = world.get_resource_mut::<Bakes>() {
+        bakes.cancel(entity);
+    }
+    if let Some(mut progress) = world.get_mut::<BakeProgress>(entity) {
+        reset(&mut progress);
+    }
+}
+
+/// A task at work, which stops within a slice when this is dropped.
+pub(super) struct Run {
+    pub(super) task: Task<Outcome>,
+    pub(super) line: Arc<Line>,
+}
+
+/// What a task and its surface tell one another.
+pub(super) struct Line {
+    cancelled: AtomicBool,
+    /// The bits of the progress.
+    pub(super) progress: AtomicU32,
+}
+
+impl Drop for Run {
+    fn drop(&mut self) {
+        self.line.cancelled.store(true, Ordering::Relaxed);
+    }
+}
+
+/// What comes back from a task.
+pub(super) enum Outcome {
+    /// It runs where it was started, which would stand still meanwhile.
+    NoThread(Job),
+    Ended(Result<Made, CrackError>),
+}
+
+impl Run {
+    pub(super) fn start(pool: &AsyncComputeTaskPool, job: Job) -> Self {
+        let progress = AtomicU32::new(job.progress().to_bits());
+        let line = Arc::new(Line { cancelled: AtomicBool::new(false), progress });
+        let (lined, home) = (line.clone(), thread::current().id());
+        Self { task: pool.spawn(async move { work(job, &lined, home) }), line }
+    }
+}
+
+/// The work of a task.
+fn work(mut job: Job, line: &Line, home: ThreadId) -> Outcome {
+    if thread::current().id() == home {
+        return Outcome::NoThread(job);
+    }
+    loop {
+        if line.cancelled.load(Ordering::Relaxed) {
+            return Outcome::Ended(Err(CrackError::Bake { reason: "cancelled".into() }));
+        }
+        line.progress.store(job.progress().to_bits(), Ordering::Relaxed);
+        job = match guarded(|| job.step()) {
+            Ok(Step::More(job)) => job,
+            Ok(Step::Made(made)) => return Outcome::Ended(Ok(made)),
+            Err(error) => return Outcome::Ended(Err(error)),
+        };
+    }
+}
+
+/// The two parts of a bake, machines that are stepped: between them it is seen what has become of the surface.
+pub(super) enum Job {
+    Map(Box<MapJob>),
+    Finish(Box<Finish>),
+}
+
+pub(super) enum Made {
+    Lines(Lines),
+    Surface(Box<Finished>),
+}
+
+pub(super) enum Step {
+    More(Job),
+    Made(Made),
+}
+
+impl Job {
+    /// A slice of the work.
+    pub(super) fn step(self) -> Result<Step, CrackError> {
+        Ok(match self {
+            Self::Map(mut map) => match map.step()? {
+                Some(lines) => Step::Made(Made::Lines(lines)),
+                None => Step::More(Self::Map(map)),
+            },
+            Self::Finish(finish) => match finish.step()? {
+                Next::More(finish) => Step::More(Self::Finish(finish)),
+                Next::Done(finished) => Step::Made(Made::Surface(finished)),
+            },
+        })
+    }
+
+    pub(super) fn progress(&self) -> f32 {
+        match self {
+            Self::Map(map) => map.progress,
+            Self::Finish(_) => MAPPED,
+        }
+    }
+}
+
+/// Notes what is to be baked.
+pub(crate) fn watch_guided(
+    changed: Query<Entity, (With<GuidedCracks>, With<CrackSurface>, Or<(Changed<GuidedCracks>, Added<CrackSurface>)>)>,
+    mut bakes: ResMut<Bakes>,
+) {
+    for entity in &changed {
+        bakes.want(entity);
+    }
+}
+
+/// Cancels the bake of a component that goes. The cracks of a bake that is done stay.
+pub(crate) fn cancel_removed(
+    guided: On<Remove, GuidedCracks>,
+    mut bakes: ResMut<Bakes>,
+    mut progress: Query<&mut BakeProgress>,
+) {
+    bakes.cancel(guided.entity);
+    if let Ok(mut progress) = progress.get_mut(guided.entity)
+        && progress.0 < 1.0
+    {
+        reset(&mut progress);
+    }
+}

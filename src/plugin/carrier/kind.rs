@@ -1,0 +1,221 @@
+//! [`Carrier`]: what shows a surface's pictures, and the trait of its kinds.
+
+use super::{plane::Plane, shard_visual::ShardVisuals};
+use crate::{
+    plugin::{
+        api::{
+            error::CrackError,
+            hit::HitPoint,
+            textures::{CrackTextures, Maps},
+        },
+        source::layout::Layout,
+    },
+    raster::TexelRect,
+};
+#[cfg(feature = "2d")]
+use bevy::sprite::SpriteImageMode;
+use bevy::{
+    asset::{UntypedAssetId, UntypedHandle},
+    prelude::*,
+};
+use std::sync::Arc;
+
+/// What an entity shows.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Shown {
+    /// The sprite's image, or the material.
+    pub(crate) asset: UntypedHandle,
+    pub(crate) diffuse: Option<Handle<Image>>,
+    pub(crate) normal: Option<Handle<Image>>,
+    pub(crate) depth: Option<Handle<Image>>,
+    /// The part of the image that is shown; `None` = all of it. Its size cannot change then.
+    pub(crate) rect: Option<URect>,
+    /// How the picture is laid out, if it is not merely stretched.
+    pub(crate) layout: Option<Arc<Layout>>,
+    /// The size that it was given, where there is no picture.
+    pub(crate) size: Option<Vec2>,
+    /// Maps that it can make use of.
+    pub(crate) maps: Maps,
+}
+
+impl Shown {
+    /// The texels that it shows of a picture of this size; `None` if there are none. All that is to be known of a part of a picture goes
+    /// through here: a `rect` may lie anywhere, and a frame of an atlas may be cut off by the sheet's edge.
+    pub(crate) fn texels(&self, size: UVec2) -> Option<TexelRect> {
+        let whole = TexelRect::whole(size);
+        let seen = self.rect.map_or(whole, |URect { min, max }| TexelRect { min, max }.intersect(whole));
+        (!seen.is_empty()).then_some(seen)
+    }
+
+    pub(crate) fn pictures(&self) -> impl Iterator<Item = &Handle<Image>> {
+        [&self.diffuse, &self.normal, &self.depth].into_iter().flatten()
+    }
+
+    /// Whether the same pictures are shown, as large a part of them, wherever that lies: another frame of an animation.
+    pub(crate) fn is_like(&self, other: &Self) -> bool {
+        let moved = Self { rect: other.rect, size: other.size, ..self.clone() };
+        let size = |shown: &Self| shown.rect.map(|URect { min, max }| max.saturating_sub(min));
+        let is_as_large = size(self) == size(other);
+        moved == *other && is_as_large && (self.diffuse.is_some() || self.size == other.size)
+    }
+}
+
+/// What a look at an entity finds.
+#[cfg_attr(not(any(feature = "2d", feature = "3d")), expect(dead_code, reason = "there are no kinds then"))]
+pub(crate) enum Found {
+    /// Something of another kind.
+    Other,
+    /// Something whose assets are not there yet.
+    Waiting,
+    Shown(Box<Shown>),
+    Unusable(CrackError),
+}
+
+/// How to deal with one kind of carrier.
+pub(crate) trait CarrierKind: Send + Sync {
+    /// What the entity shows, if it is of this kind.
+    fn inspect(&self, world: &World, entity: Entity) -> Found;
+
+    /// Makes the entity show `textures`; called again when they have changed. `relief` is the depth of a crack in units of the texture.
+    fn attach(&self, world: &mut World, entity: Entity, carrier: &mut Carrier, textures: &CrackTextures, relief: f32);
+
+    /// Gives back what the entity showed before.
+    fn detach(&self, world: &mut World, entity: Entity, carrier: &Carrier);
+
+    /// Whether the renderer can draw the entity with another look. If not, it is asked to make what it needs.
+    fn can_draw(&self, world: &mut World, entity: Entity, look: &NextLook<'_>) -> bool;
+
+    /// Width of the whole picture over its height, as it is shown in the world. The picture has the size `picture`; `given` is the size
+    /// that the crate has given to a sprite. `None` where it cannot be told.
+    fn aspect(&self, world: &World, entity: Entity, picture: Option<Vec2>, given: Option<Vec2>) -> Option<f32>;
+
+    /// Whether the textures hold the picture twice: see `faces`.
+    fn is_twofold(&self, _world: &World, _entity: Entity) -> bool {
+        false
+    }
+
+    /// Where a hit lands. `point` is the same place in the entity's own space, if it is known. Chooses what of the entity cracks if it `is_blank`.
+    fn aim(
+        &self,
+        _world: &mut World,
+        _entity: Entity,
+        at: HitPoint,
+        _point: Option<Vec3>,
+        _is_blank: bool,
+    ) -> HitPoint {
+        at
+    }
+
+    /// Texture coordinates in the shown part of a point in the entity's own space. `size` is that of the cracked surface, texels, if there
+    /// is one.
+    fn locate(&self, world: &World, entity: Entity, local: Vec3, size: Option<UVec2>) -> Result<Vec2, &'static str>;
+
+    /// Checks whether the mesh can show normals.
+    fn check_mesh(&self, _world: &World, _entity: Entity) -> Result<(), CrackError> {
+        Ok(())
+    }
+
+    /// Where the picture lies in the entity's own space, if it is flat. `seen` is the part of its texture that it shows.
+    fn plane(&self, world: &World, entity: Entity, seen: TexelRect) -> Result<Plane, &'static str>;
+
+    /// Makes what it shows transparent where its texture is, or has no holes any more.
+    fn open(&self, _world: &mut World, _entity: Entity, _carrier: &Carrier, _has_holes: bool) {}
+
+    /// Whether its shards have thickness.
+    fn is_solid(&self) -> bool {
+        false
+    }
+
+    /// The material of its shards, with the picture given, `opacity` (0..=1) of it being there.
+    fn shard_material(
+        &self,
+        world: &mut World,
+        entity: Entity,
+        carrier: &Carrier,
+        picture: &Handle<Image>,
+        opacity: f32,
+    ) -> Option<UntypedHandle>;
+
+    /// The material of the sides of its shards, if they have any. `mean` is the mean colour of the picture, sRGB.
+    fn side_material(
+        &self,
+        _world: &mut World,
+        _carrier: &Carrier,
+        _mean: [f32; 3],
+        _bright: f32,
+    ) -> Option<UntypedHandle> {
+        None
+    }
+
+    /// The entities of its shards.
+    fn shards(&self) -> &'static dyn ShardVisuals;
+}
+
+/// What shows the pictures of a surface, and what it showed before.
+pub(crate) struct Carrier {
+    pub(crate) kind: &'static dyn CarrierKind,
+    /// What it showed before.
+    pub(crate) shown: Shown,
+    /// The sprite's image or the material that it shows now; `None` = as before.
+    pub(crate) own: Option<UntypedHandle>,
+    /// The mesh before, and the mesh with tangents.
+    pub(crate) mesh: Option<(Handle<Mesh>, Handle<Mesh>)>,
+    /// The size that was given to the sprite.
+    pub(crate) size: Option<Vec2>,
+    /// Whether its textures hold the picture twice, one above the other: the upper one cracks.
+    pub(crate) is_twofold: bool,
+    /// How the sprite laid out its picture, if its texture has it laid out.
+    #[cfg(feature = "2d")]
+    pub(crate) mode: Option<SpriteImageMode>,
+}
+
+impl Carrier {
+    /// It still shows what it showed.
+    pub(crate) fn new(kind: &'static dyn CarrierKind, shown: Shown) -> Self {
+        Self {
+            kind,
+            shown,
+            own: None,
+            mesh: None,
+            size: None,
+            is_twofold: false,
+            #[cfg(feature = "2d")]
+            mode: None,
+        }
+    }
+
+    /// What of textures of this size cracks where all of a picture is shown.
+    pub(crate) fn whole(&self, texels: UVec2) -> TexelRect {
+        TexelRect::whole(if self.is_twofold { UVec2::new(texels.x, texels.y / 2) } else { texels })
+    }
+
+    /// Ids of the pictures it was made from.
+    pub(crate) fn sources(&self) -> impl Iterator<Item = AssetId<Image>> + '_ {
+        self.shown.pictures().map(Handle::id)
+    }
+
+    /// Ids of the assets made for it, besides textures.
+    pub(crate) fn owned(&self) -> impl Iterator<Item = UntypedAssetId> + '_ {
+        self.own.iter().map(UntypedHandle::id).chain(self.mesh.iter().map(|(_, own)| own.id().untyped()))
+    }
+
+    /// Whether `asset` is what the entity should show.
+    pub(crate) fn is_showing(&self, asset: &UntypedHandle) -> bool {
+        asset.id() == self.own.as_ref().unwrap_or(&self.shown.asset).id()
+    }
+}
+
+/// What a surface is going to look like.
+pub(crate) enum NextLook<'a> {
+    /// It shows these maps.
+    Cracked(Maps),
+    /// It has holes, and there are shards.
+    Broken {
+        maps: Maps,
+        /// What it showed before it cracked.
+        original: &'a UntypedHandle,
+        has_rims: bool,
+        /// The material of their sides, if one was given.
+        inside: Option<UntypedHandle>,
+    },
+}

@@ -1,0 +1,272 @@
+//! One moment of a surface, drawn and painted beside the frames.
+
+use crate::{
+    growth::CrackGrowth,
+    paint::LookTable,
+    pattern::{Moment, Network, Timeline},
+    plugin::{
+        api::textures::MAPS,
+        gpu::textures,
+        gpu::{
+            buffer::{Staged, Stager},
+            textures::TextureKind,
+        },
+        source::picture::BasePicture,
+        surface::tile_set::Touched,
+    },
+    raster::{DepthField, DirtyTiles, Redrawn, Replay, TexelRect},
+};
+use bevy::prelude::*;
+use std::sync::Arc;
+
+/// Texels that are painted in a slice, and segments that are looked at: well below a millisecond.
+pub(crate) const SLICE: u64 = 1 << 14;
+
+const SEGMENTS: usize = 256;
+
+/// Parts of a side, each with one rectangle to upload at the most.
+const PARTS: u32 = 8;
+
+/// A network and its past, as they were when they were copied.
+pub(crate) struct TimelineSnapshot {
+    network: Network,
+    timeline: Timeline,
+}
+
+impl TimelineSnapshot {
+    pub(crate) fn of(growth: &CrackGrowth) -> Arc<Self> {
+        Arc::new(Self { network: growth.network().clone(), timeline: growth.timeline().clone() })
+    }
+
+    pub(crate) fn is_of(&self, growth: &CrackGrowth) -> bool {
+        // Nothing is ever changed but by an entry more.
+        self.timeline.entries(u32::MAX) == growth.timeline().entries(u32::MAX)
+    }
+}
+
+/// The texels that were shown before those that are.
+pub(crate) struct Back {
+    pub(crate) texels: [Option<Vec<u8>>; MAPS],
+    /// Texels of the field that have changed since.
+    pub(crate) behind: Vec<TexelRect>,
+}
+
+/// A moment as a machine that is stepped, with all that it takes out of the surface meanwhile.
+pub(crate) struct FrameJob {
+    pub(crate) timeline: Arc<TimelineSnapshot>,
+    pub(crate) moment: Moment,
+    pub(crate) base: Arc<BasePicture>,
+    pub(crate) look: LookTable,
+    /// Which textures there are, and the part of them that is shown.
+    pub(crate) maps: [bool; MAPS],
+    pub(crate) rect: TexelRect,
+    pub(crate) stager: Option<Stager>,
+    pub(crate) field: DepthField,
+    pub(crate) replay: Replay,
+    pub(crate) touched: Touched,
+    pub(crate) back: Option<Back>,
+    /// What is not as the textures show it.
+    pub(crate) dirty: DirtyTiles,
+    pub(crate) redrawn: Redrawn,
+    pub(crate) stage: Stage,
+    /// The same when it is made: texels of the field.
+    pub(crate) changed: Vec<TexelRect>,
+    pub(crate) staged: [Option<Staged>; MAPS],
+}
+
+pub(crate) enum Stage {
+    /// As it was.
+    Begin,
+    Draw,
+    /// What hits have crushed is being drawn.
+    Crush,
+    /// What is left to paint.
+    Paint(Vec<TexelRect>),
+    Made,
+}
+
+impl FrameJob {
+    pub(crate) fn finish(mut self: Box<Self>) -> Box<Self> {
+        while !self.step() {}
+        self
+    }
+
+    /// A slice of the work; says whether it was the last one.
+    pub(crate) fn step(&mut self) -> bool {
+        let TimelineSnapshot { network, timeline } = &*self.timeline;
+        match &mut self.stage {
+            Stage::Begin => {
+                self.replay.begin(&mut self.field, network, timeline, self.moment, &mut self.redrawn);
+                self.stage = Stage::Draw;
+            }
+            Stage::Draw => {
+                if self.replay.draw(&mut self.field, network, timeline, SEGMENTS, &mut self.redrawn) {
+                    self.replay.end(&mut self.field, network, timeline, &mut self.redrawn);
+                    self.stage = Stage::Crush;
+                }
+            }
+            Stage::Crush => {
+                if !self.field.crush(1, &mut self.redrawn.changed) {
+                    self.stage = Stage::Paint(self.plan());
+                }
+            }
+            Stage::Paint(rects) => {
+                let mut slice = Vec::new();
+                let mut area = 0;
+                while let Some(rect) = rects.pop_if(|rect| area == 0 || area + rect.area() <= SLICE) {
+                    area += rect.area();
+                    slice.push(rect);
+                }
+                self.paint(&slice);
+                if area == 0 {
+                    self.stage();
+                    self.stage = Stage::Made;
+                }
+            }
+            Stage::Made => {}
+        }
+        matches!(self.stage, Stage::Made)
+    }
+
+    /// Finds out what is to be painted.
+    fn plan(&mut self) -> Vec<TexelRect> {
+        let Self { redrawn, touched, dirty, field, .. } = self;
+        touched.follow(redrawn);
+        let size = field.frame.size();
+        redrawn.changed.iter().for_each(|rect| dirty.mark(rect.grow(1, size)));
+        self.changed.clear();
+        dirty.take_rects(&mut self.changed);
+        let mut rects = Vec::new();
+        match &self.back {
+            Some(back) => {
+                self.changed.iter().chain(&back.behind).for_each(|rect| dirty.mark(*rect));
+                dirty.take_rects(&mut rects);
+            }
+            None => {
+                let mut kinds = textures::KINDS.iter().zip(self.maps);
+                let texels = [(); MAPS].map(|()| {
+                    let (kind, _) = kinds.next().filter(|(_, is_wanted)| *is_wanted)?;
+                    Some((kind.texels)(&self.base))
+                });
+                self.back = Some(Back { texels, behind: Vec::new() });
+                rects.push(TexelRect::whole(size));
+            }
+        }
+        let shown = TexelRect::whole(self.rect.size());
+        rects.into_iter().flat_map(|rect| bands(rect.intersect(shown))).collect()
+    }
+
+    fn paint(&mut self, rects: &[TexelRect]) {
+        let Some(back) = &mut self.back else { return };
+        let texels = back.texels.each_mut().map(Option::as_deref_mut);
+        textures::paint(&self.base, &self.field, &self.look, rects, self.rect.min, texels);
+    }
+
+    /// Brings what has changed to where the renderer can read it.
+    fn stage(&mut self) {
+        let (Some(stager), Some(back)) = (&self.stager, &self.back) else { return };
+        let rects = self.in_image(&gather(&self.changed, self.field.frame.size()));
+        let mut kinds = textures::KINDS.iter().map(TextureKind::texel);
+        self.staged = back.texels.each_ref().map(|texels| {
+            let texel = kinds.next()?;
+            stager.stage(texels.as_ref()?, self.base.size, texel, &rects)
+        });
+    }
+
+    /// Rectangles of the field in the image.
+    pub(crate) fn in_image(&self, rects: &[TexelRect]) -> Vec<TexelRect> {
+        let (origin, shown) = (self.rect.min, TexelRect::whole(self.rect.size()));
+        let rects = rects.iter().map(|rect| rect.intersect(shown)).filter(|rect| !rect.is_empty());
+        rects.map(|rect| TexelRect { min: rect.min + origin, max: rect.max + origin }).collect()
+    }
+}
+
+/// A rectangle in parts of no more than a slice, or a row.
+fn bands(rect: TexelRect) -> impl Iterator<Item = TexelRect> {
+    let rows = (SLICE / u64::from(rect.size().x.max(1))).max(1);
+    (rect.min.y..rect.max.y).step_by(rows as usize).map(move |y| TexelRect {
+        min: UVec2::new(rect.min.x, y),
+        max: UVec2::new(rect.max.x, rect.max.y.min(y + rows as u32)),
+    })
+}
+
+/// Few rectangles around all of these: each costs a copy of its own, and the thread of the frames orders them.
+pub(crate) fn gather(rects: &[TexelRect], size: UVec2) -> Vec<TexelRect> {
+    let side = (size / PARTS + 1).max(UVec2::ONE);
+    let mut parts = vec![TexelRect::default(); (PARTS * PARTS) as usize];
+    for rect in rects.iter().filter(|rect| !rect.is_empty()) {
+        let (first, last) = (rect.min / side, (rect.max - 1) / side);
+        for y in first.y..=last.y {
+            for x in first.x..=last.x {
+                let min = UVec2::new(x, y) * side;
+                if let Some(part) = parts.get_mut((y * PARTS + x) as usize) {
+                    *part = part.union(rect.intersect(TexelRect { min, max: min + side }));
+                }
+            }
+        }
+    }
+    // Those beside one another together, unless that is much more.
+    let mut gathered = Vec::<TexelRect>::new();
+    for row in parts.chunks(PARTS as usize) {
+        let mut before = TexelRect::default();
+        for part in row.iter().filter(|part| !part.is_empty()) {
+            let both = before.union(*part);
+            if !before.is_empty() && 4 * both.area() <= 5 * (before.area() + part.area()) {
+                before = both;
+                gathered.pop();
+            } else {
+                before = *part;
+            }
+            gathered.push(before);
+        }
+    }
+    gathered
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Rng;
+
+    fn random_rects(rng: &mut Rng, size: UVec2) -> Vec<TexelRect> {
+        let mut corner = || UVec2::new(rng.next_u32() % size.x, rng.next_u32() % size.y);
+        let rect = |(a, b): (UVec2, UVec2)| TexelRect { min: a.min(b), max: a.max(b) + 1 };
+        (0..6).map(|_| rect((corner(), corner()))).collect()
+    }
+
+    #[test]
+    fn few_rectangles_hold_them_all() {
+        let mut rng = Rng::new(8);
+        for size in [[1, 1], [7, 300], [64, 64], [1000, 700]].map(UVec2::from) {
+            for n in 0..7 {
+                let rects = random_rects(&mut rng, size).split_off(n.min(6));
+                let gathered = gather(&rects, size);
+                assert!(gathered.len() <= 64);
+                let of = |rects: &[TexelRect]| -> Vec<bool> {
+                    let at = |i: u32| UVec2::new(i % size.x, i / size.x);
+                    let is_in = |at: UVec2, r: &TexelRect| at.cmpge(r.min).all() && at.cmplt(r.max).all();
+                    (0..size.element_product()).map(|i| rects.iter().any(|r| is_in(at(i), r))).collect()
+                };
+                let (wanted, got) = (of(&rects), of(&gathered));
+                assert!(wanted.iter().zip(&got).all(|(wanted, got)| got >= wanted), "{rects:?} {gathered:?}");
+                let area: u64 = gathered.iter().map(|rect| rect.area()).sum();
+                assert_eq!(area, got.iter().filter(|is| **is).count() as u64, "each texel once");
+            }
+        }
+    }
+
+    #[test]
+    fn bands_are_the_rectangle() {
+        for size in [[1, 40_000], [40_000, 3], [500, 333]].map(UVec2::from) {
+            let rect = TexelRect { min: UVec2::new(3, 5), max: UVec2::new(3, 5) + size };
+            let mut y = rect.min.y;
+            for band in bands(rect) {
+                assert!(band.min == UVec2::new(3, y) && band.max.x == rect.max.x && !band.is_empty());
+                assert!(band.area() <= SLICE || band.size().y == 1);
+                y = band.max.y;
+            }
+            assert_eq!(y, rect.max.y);
+        }
+        assert_eq!(bands(TexelRect::default()).count(), 0);
+    }
+}

@@ -1,0 +1,9 @@
+//! Each frame: growth, time, painting.
+
+pub(crate) mod async_playback;
+pub(crate) mod clock;
+pub(crate) mod frame_job;
+pub(crate) mod freeze;
+pub(crate) mod grow;
+pub(crate) mod paint;
+pub(crate) mod report;

@@ -1,0 +1,8 @@
+//! Textures, and their way to the GPU.
+
+pub(crate) mod buffer;
+pub(crate) mod fetch;
+pub(crate) mod memory;
+pub(crate) mod pack;
+pub(crate) mod textures;
+pub(crate) mod uploads;

@@ -1,0 +1,195 @@
+//! Upload of rectangles into GPU textures that exist.
+//!
+//! The texels on the CPU (`Image::data`) are the truth. Painting changes them without an asset event, notes the
+//! rectangle here and packs its texels, while the cache still has them, the way the GPU wants them; the extraction, which
+//! sees both worlds, puts them where the GPU reads them. The commands to copy them into the textures are made beside the
+//! renderer's preparations. Whatever else makes the renderer prepare an image again uploads all of `data`,
+//! cracks included.
+
+use super::{
+    buffer::{Packed, Staged, Stager},
+    pack::{Changed, Memory, Packer},
+};
+use crate::raster::TexelRect;
+use bevy::{platform::collections::HashMap, prelude::*, render::renderer::RenderDevice};
+use std::sync::Arc;
+
+/// Above this many rectangles that nobody fetches, or that were fetched and wait, the one around them all is uploaded of each image.
+const MAX_UNFETCHED: usize = 1024;
+
+const MAX_WAITING: usize = 1 << 16;
+
+/// Rectangles to upload.
+#[derive(Resource, Default)]
+pub(crate) struct Uploads {
+    /// Whether there is a renderer that fetches them.
+    pub(super) is_wanted: bool,
+    pub(super) rects: Vec<Changed>,
+    pub(super) packers: Vec<Packer>,
+    /// Where the texels of `rects` are packed that are: from the renderer, which is done with it.
+    pub(super) packed: Option<Packed>,
+    /// Number of rectangles up to which they are not thinned out again.
+    limit: usize,
+    /// Whether the renderer has fetched them since they were last looked at.
+    pub(super) is_fetched: bool,
+    /// Whether whole textures are on their way.
+    pub(super) has_whole: bool,
+    /// Pictures, or parts of them, that come before the rectangles.
+    pub(super) staged: Vec<(AssetId<Image>, Staged)>,
+}
+
+impl Uploads {
+    /// Notes that a surface shows a texture from this frame on that the GPU does not have yet. Were it to wait for its turn under
+    /// [`RenderAssetBytesPerFrame`](bevy::render::render_asset::RenderAssetBytesPerFrame), the surface would vanish
+    /// meanwhile: the limit does not hold in this frame.
+    pub(crate) fn expect_whole(&mut self) {
+        self.has_whole = self.is_wanted;
+    }
+
+    /// Notes that texels of an image have changed.
+    pub(crate) fn push(&mut self, image: AssetId<Image>, rect: TexelRect) {
+        if self.is_wanted && !rect.is_empty() {
+            self.rects.push(Changed { image, rect, place: None });
+        }
+    }
+
+    /// Lends some packers to `paint`, and takes what they have packed, one after the other. What they have no room for is packed when
+    /// the renderer fetches it.
+    pub(crate) fn pack(&mut self, count: usize, paint: impl FnOnce(&mut [Packer])) {
+        let memory = self.packed.as_ref().map(|packed| packed.memory.clone());
+        self.lend(count, memory.as_ref());
+        paint(&mut self.packers[..count]);
+        self.packers.iter_mut().for_each(|packer| self.rects.append(&mut packer.rects));
+    }
+
+    pub(super) fn lend(&mut self, count: usize, memory: Option<&Arc<Memory>>) {
+        let is_wanted = self.is_wanted;
+        let known = self.packers.len().max(count);
+        self.packers.resize_with(known, || Packer::new(is_wanted));
+        self.packers[..count].iter_mut().for_each(|packer| packer.lend(memory));
+    }
+
+    /// Takes what is packed, so that nobody writes to it any more.
+    pub(super) fn close(&mut self) -> Option<Packed> {
+        self.packers.iter_mut().for_each(Packer::close);
+        self.packed.take()
+    }
+
+    /// What brings whole pictures to the renderer, if there is one.
+    pub(crate) fn stager(&self, device: Option<&RenderDevice>) -> Option<Stager> {
+        // In a browser the device stays on its thread.
+        let device = device.filter(|_| self.is_wanted && !cfg!(target_arch = "wasm32"))?;
+        Some(Stager::new(device))
+    }
+
+    /// Notes that all of an image has changed to what is staged, if it is.
+    pub(crate) fn push_whole(&mut self, image: AssetId<Image>, size: UVec2, staged: Option<Staged>) {
+        self.staged.retain(|(other, _)| *other != image);
+        self.push_staged(image, size, &[TexelRect::whole(size)], staged);
+    }
+
+    /// The same of parts of an image.
+    pub(crate) fn push_staged(
+        &mut self,
+        image: AssetId<Image>,
+        size: UVec2,
+        rects: &[TexelRect],
+        staged: Option<Staged>,
+    ) {
+        // What is packed is older, and would come after it.
+        self.rects.iter_mut().filter(|changed| changed.image == image).for_each(|changed| changed.place = None);
+        match staged {
+            // Nobody fetches them: no more are kept.
+            Some(_) if self.is_staged(image) => self.push_whole(image, size, None),
+            Some(staged) if self.is_wanted => self.staged.push((image, staged)),
+            _ => rects.iter().for_each(|rect| self.push(image, *rect)),
+        }
+    }
+
+    /// Whether all of an image waits for its upload.
+    pub(crate) fn is_staged(&self, image: AssetId<Image>) -> bool {
+        self.staged.iter().any(|(other, _)| *other == image)
+    }
+
+    /// Replaces the rectangles of each image by the one around them.
+    fn thin_out(&mut self) {
+        let mut places = HashMap::<AssetId<Image>, usize>::default();
+        let mut thin = Vec::<Changed>::new();
+        for Changed { image, rect, .. } in self.rects.drain(..) {
+            match places.get(&image) {
+                Some(place) => thin[*place].rect = thin[*place].rect.union(rect),
+                None => {
+                    places.insert(image, thin.len());
+                    thin.push(Changed { image, rect, place: None });
+                }
+            }
+        }
+        self.rects = thin;
+        if let Some(packed) = self.close() {
+            self.packed = Some(packed.anew());
+        }
+    }
+}
+
+/// Keeps the list short when the renderer does not fetch it (a minimised window).
+pub(crate) fn drop_unwanted(mut uploads: ResMut<Uploads>) {
+    let most = if core::mem::take(&mut uploads.is_fetched) { MAX_WAITING } else { MAX_UNFETCHED };
+    if uploads.rects.len() > uploads.limit.max(most) {
+        uploads.thin_out();
+        uploads.limit = 2 * uploads.rects.len();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_packed_gives_way_to_what_comes_later() {
+        let ids = [1, 2].map(|n| AssetId::Uuid { uuid: bevy::asset::uuid::Uuid::from_u128(n) });
+        let size = UVec2::new(20, 10);
+        let data = vec![7; 800];
+        let rect = |x| TexelRect { min: UVec2::new(x, 2), max: UVec2::new(x + 3, 6) };
+        let mut uploads = Uploads { is_wanted: true, ..default() };
+        let fill = |uploads: &mut Uploads| {
+            uploads.lend(2, Some(&super::super::pack::tests::memory(1 << 18).0));
+            uploads.pack(2, |packers| {
+                for (packer, x) in packers.iter_mut().zip([4, 9]) {
+                    packer.push(ids.into_iter().map(|id| Some((id, &data[..]))), size, rect(x));
+                }
+            });
+        };
+        let packed = |uploads: &Uploads, id| -> Vec<bool> {
+            let changed = uploads.rects.iter().filter(|changed| changed.image == id);
+            changed.map(|changed| changed.place.is_some()).collect()
+        };
+        fill(&mut uploads);
+        uploads.push_whole(ids[0], size, None);
+        assert_eq!(packed(&uploads, ids[0]), [false, false, false], "older than the whole");
+        assert_eq!(packed(&uploads, ids[1]), [true, true]);
+        // Thinned out: one rectangle of each image around all of its own, packed when it is fetched.
+        fill(&mut uploads);
+        uploads.thin_out();
+        assert_eq!(uploads.rects.len(), 2);
+        for (changed, around) in uploads.rects.iter().zip([TexelRect::whole(size), rect(4).union(rect(9))]) {
+            assert!(changed.rect == around && changed.place.is_none(), "{:?}", changed.rect);
+        }
+    }
+
+    #[test]
+    fn only_what_nobody_fetches_is_thinned_out() {
+        for is_fetched in [true, false] {
+            let mut app = App::new();
+            app.init_resource::<Uploads>().add_systems(Update, drop_unwanted);
+            let mut uploads = app.world_mut().resource_mut::<Uploads>();
+            (uploads.is_wanted, uploads.is_fetched) = (true, is_fetched);
+            for x in 0..=MAX_UNFETCHED as u32 {
+                let min = UVec2::new(x, 0);
+                uploads.push(AssetId::default(), TexelRect { min, max: min + 1 });
+            }
+            app.update();
+            let left = app.world().resource::<Uploads>().rects.len();
+            assert_eq!(left, if is_fetched { MAX_UNFETCHED + 1 } else { 1 });
+        }
+    }
+}

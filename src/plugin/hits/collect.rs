@@ -1,0 +1,73 @@
+//! Hits of a frame are queued.
+
+use crate::plugin::{
+    api::{CrackBudget, CrackHit, CrackStats, CrackSurface, HitPoint, error::EntityLabel},
+    carrier::space,
+    jobs::frame_time::FrameClock,
+    surface::queue::{HitQueue, QueuedHit},
+};
+use bevy::{ecs::query::QueryEntityError, prelude::*};
+
+/// Keeps a hit sent as an event for [`collect_hits`].
+pub(crate) fn receive_hit(hit: On<CrackHit>, mut queue: ResMut<HitQueue>) {
+    queue.inbox.push(*hit);
+}
+
+/// Takes all hits of the frame, events first, and queues them with their surfaces.
+pub(crate) fn collect_hits(
+    mut messages: MessageReader<CrackHit>,
+    mut queue: ResMut<HitQueue>,
+    mut stats: ResMut<CrackStats>,
+    budget: Res<CrackBudget>,
+    mut clock: ResMut<FrameClock>,
+    surfaces: Query<Option<&GlobalTransform>, With<CrackSurface>>,
+    names: Query<&Name>,
+) {
+    if queue.inbox.is_empty() && messages.is_empty() {
+        return;
+    }
+    // All of them, whatever it takes; what it takes is not there for the others.
+    let timer = clock.start(&budget, 1.0);
+    let mut inbox = core::mem::take(&mut queue.inbox);
+    for hit in inbox.iter().chain(messages.read()) {
+        stats.sent += 1;
+        let at = match surfaces.get(hit.entity) {
+            Ok(transform) => localize(hit, transform),
+            Err(QueryEntityError::NotSpawned(_)) => {
+                queue.miss(hit.entity, &mut stats);
+                continue;
+            }
+            Err(_) => Err("the entity has no `CrackSurface`"),
+        };
+        match at {
+            Err(reason) => {
+                let surface = EntityLabel { entity: hit.entity, name: names.get(hit.entity).ok() };
+                queue.reject(&surface, reason, &mut stats);
+            }
+            Ok(_) if hit.energy == 0.0 => stats.ignored += 1,
+            Ok(at) => {
+                let waiting = QueuedHit { at, point: None, energy: hit.energy, direction: hit.direction };
+                queue.push(hit.entity, waiting, budget.max_queued_per_surface, &mut stats);
+            }
+        }
+    }
+    inbox.clear();
+    queue.inbox = inbox;
+    clock.stop(&timer);
+}
+
+/// World points become local ones at once: the surface may move before the hit's turn comes.
+fn localize(hit: &CrackHit, transform: Option<&GlobalTransform>) -> Result<HitPoint, &'static str> {
+    if !hit.is_finite() {
+        return Err("a coordinate, the energy or the direction is not finite");
+    }
+    if hit.energy < 0.0 {
+        return Err("the energy is negative");
+    }
+    let HitPoint::World(point) = hit.at else { return Ok(hit.at) };
+    let transform = transform.ok_or("the surface has no `GlobalTransform`")?;
+    let back =
+        space::to_local(transform).ok_or("the surface's transform has a scale of zero, or cannot be inverted")?;
+    let local = back.transform_point3(point);
+    if local.is_finite() { Ok(HitPoint::Local(local)) } else { Err("the point is too far away") }
+}

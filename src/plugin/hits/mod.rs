@@ -1,0 +1,4 @@
+//! From hits to growth.
+
+pub(crate) mod apply;
+pub(crate) mod collect;

@@ -1,0 +1,254 @@
+//! Changes are applied: other presets, other pictures, another frame of an animation.
+
+use crate::{
+    CrackPreset,
+    pattern::CellTracker,
+    plugin::{
+        api::{CrackError, CrackState, CrackStatus, CrackSurface, error::EntityLabel},
+        carrier::{
+            kind::{Carrier, CarrierKind, Found, Shown},
+            kinds,
+        },
+        draw::async_playback::recall,
+        gpu::memory::TextureMemory,
+        jobs::deferred::hold,
+        shards::broken::drop_shards,
+        source::{mask::MaskFrom, picture::FrameCount, preset},
+        surface::{
+            active::Active,
+            cracked::{self, active, with_queues},
+            create::{attach, make_textures, report_textures, set_status},
+            frame::{frame, look},
+            picture_plan::draft,
+            plan::resolve_mask,
+            prepare::fail,
+            queues::Queues,
+            regrow::regrow,
+            stamp::stamp_anew,
+        },
+    },
+    raster::DepthField,
+};
+use bevy::prelude::*;
+use std::sync::Arc;
+
+/// Applies what has changed. What is not loaded yet is looked at again in the next frame.
+pub(crate) fn update_changed(world: &mut World) {
+    hold(world, apply_changes);
+}
+
+fn apply_changes(world: &mut World) {
+    let mut changed = core::mem::take(&mut world.resource_mut::<Queues>().changed);
+    changed.sort_unstable();
+    changed.dedup();
+    changed.retain(|&entity| {
+        let Some(mut active) = cracked::take(world, entity) else { return false };
+        let before = (active.canvas.base.clone(), active.canvas.textures.clone());
+        let outcome =
+            cracked::with_other_assets(world, entity, &mut active, |world, active| update(world, entity, active));
+        let is_growing = active.cracks.growth.is_growing();
+        let has_new_textures = !Arc::ptr_eq(&before.0, &active.canvas.base) || before.1 != active.canvas.textures;
+        cracked::put_back(world, entity, active);
+        with_queues(world, entity, |queues, turn| {
+            queues.mark_dirty(entity, turn);
+            if is_growing {
+                queues.start_growing(entity, turn);
+            }
+        });
+        if has_new_textures {
+            report_textures(world, entity);
+        }
+        match outcome {
+            Ok(is_done) => {
+                if is_done {
+                    recover(world, entity);
+                }
+                !is_done
+            }
+            Err(error) => {
+                fail(world, entity, error);
+                false
+            }
+        }
+    });
+    world.resource_mut::<Queues>().changed.append(&mut changed);
+}
+
+/// A surface that failed over a picture that is whole again goes on.
+fn recover(world: &mut World, entity: Entity) {
+    let is_growing = active(world, entity).is_some_and(|active| active.turn.is_growing);
+    if matches!(world.get::<CrackState>(entity).map(|state| &state.status), Some(CrackStatus::Failed(_))) {
+        set_status(world, entity, if is_growing { CrackStatus::Growing } else { CrackStatus::Done });
+    }
+}
+
+/// `false` if the new picture is not there yet. On an error the cracks stay as they are.
+fn update(world: &mut World, entity: Entity, active: &mut Active) -> Result<bool, CrackError> {
+    if !update_settings(world, entity, active) {
+        return Ok(false);
+    }
+    let (mut kind, mut found) = kinds::inspect(world, entity);
+    if active.carrier.shown.layout.is_some()
+        && matches!(&found, Found::Shown(shown) if !active.carrier.is_showing(&shown.asset))
+    {
+        // Another picture is laid out as the one before, unless somebody says otherwise.
+        active.carrier.kind.detach(world, entity, &active.carrier);
+        (kind, found) = kinds::inspect(world, entity);
+    }
+    let shown = match found {
+        Found::Shown(shown) => *shown,
+        Found::Waiting => return Ok(false),
+        Found::Unusable(error) => return Err(error),
+        Found::Other => return Ok(true),
+    };
+    if active.carrier.is_showing(&shown.asset) {
+        // A part of the picture is shown as it is, not of textures of another size.
+        let is_part = shown.rect.is_some()
+            && active.canvas.unstretched.is_some_and(|size| active.canvas.base.size.cmpgt(size).any());
+        // Somebody has it laid out in another way.
+        let is_laid_out = shown.layout.is_some() && active.carrier.own.is_some();
+        if active.canvas.is_outdated || is_part || is_laid_out {
+            // What it shows now are our textures; the pictures are those it was made from.
+            let is_new = is_laid_out || active.carrier.own.is_none();
+            let layout = if is_new { shown.layout } else { active.carrier.shown.layout.clone() };
+            let original = Shown { rect: shown.rect, layout, ..active.carrier.shown.clone() };
+            return update_picture(world, entity, active, None, original);
+        }
+        if let Some(rect) = shown.texels(active.carrier.whole(active.canvas.base.size).size()) {
+            active.show(rect);
+        }
+        return Ok(true);
+    }
+    // Somebody gave it another picture.
+    let Some(kind) = kind else { return Ok(true) };
+    update_picture(world, entity, active, Some(kind), shown)
+}
+
+/// Applies other settings; a preset that is invalid is refused and the old one stays. `false` if it is not there yet.
+fn update_settings(world: &mut World, entity: Entity, active: &mut Active) -> bool {
+    if let Some(surface) = world.get::<CrackSurface>(entity)
+        && *surface != active.surface
+    {
+        // Remembered even if refused, so that it is refused once only.
+        active.surface = surface.clone();
+        active.has_new_settings = true;
+    }
+    if !active.has_new_settings {
+        return true;
+    }
+    let preset = preset::resolve(world, &active.surface.preset);
+    if matches!(preset, Ok(None)) {
+        return false;
+    }
+    active.has_new_settings = false;
+    match preset.and_then(|preset| preset.map_or(Ok(()), |preset| update_preset(world, entity, active, preset))) {
+        Ok(()) => {}
+        Err(error) => warn!("the changed preset of {} is not used: {error}", EntityLabel::of(world, entity)),
+    }
+    true
+}
+
+fn update_preset(
+    world: &mut World,
+    entity: Entity,
+    active: &mut Active,
+    preset: CrackPreset,
+) -> Result<(), CrackError> {
+    if preset == active.preset {
+        return Ok(());
+    }
+    let look = look(&preset, active.drawing.field.frame)?;
+    recall(world, entity, active);
+    if preset.growth != active.preset.growth {
+        let outcome = active.cracks.growth.set_params(preset.growth.clone());
+        outcome.map_err(|error| CrackError::Preset { reason: error.to_string() })?;
+    }
+    active.canvas.look = look;
+    let plan = preset.look.layer(active.surface.seed);
+    if active.drawing.profile != preset.profile || *active.drawing.field.plan() != plan {
+        active.drawing.profile = preset.profile;
+        active.drawing.field.lay(plan);
+        stamp_anew(active);
+    }
+    active.playhead.rate = preset.steps_per_second;
+    active.preset = preset;
+    active.mark_all();
+    Ok(())
+}
+
+/// It is shown by something else from now on.
+fn change_carrier(
+    world: &mut World,
+    entity: Entity,
+    active: &mut Active,
+    kind: &'static dyn CarrierKind,
+    shown: &Shown,
+) {
+    active.canvas.offered.clear();
+    let carrier = Carrier::new(kind, shown.clone());
+    if shown.asset.type_id() == active.carrier.shown.asset.type_id() {
+        let (mesh, size) = (active.carrier.mesh.take(), active.carrier.size);
+        active.carrier = Carrier { mesh, size, ..carrier };
+    } else {
+        active.carrier.kind.detach(world, entity, &active.carrier);
+        active.carrier = carrier;
+    }
+}
+
+/// Reads the pictures anew and paints the cracks over them; `false` if they are not there yet. `other` is how to deal with them if somebody
+/// gave them to it. Until they are accepted it is dealt with as before: its shards are of the kind that it was.
+fn update_picture(
+    world: &mut World,
+    entity: Entity,
+    active: &mut Active,
+    other: Option<&'static dyn CarrierKind>,
+    shown: Shown,
+) -> Result<bool, CrackError> {
+    active.canvas.is_outdated = true;
+    active.canvas.offered = if other.is_some() { shown.pictures().map(Handle::id).collect() } else { Vec::new() };
+    let Some(draft) = draft(world, entity, active, other, &shown)? else { return Ok(false) };
+    let from = MaskFrom::new(&active.surface.mask, &active.preset);
+    let Some(mask) = resolve_mask(world, from, &shown, &draft)? else { return Ok(false) };
+    let frame = frame(draft.plan.rect)?;
+    let look = look(&active.preset, frame)?;
+    recall(world, entity, active);
+    let regrown = regrow(active, frame, mask.clone())?;
+    active.canvas.textures = make_textures(world, &draft, Some(&active.canvas.textures))?;
+    // Shards show the picture that was.
+    drop_shards(world, entity, active);
+    if let Some(kind) = other {
+        change_carrier(world, entity, active, kind, &shown);
+    }
+    active.canvas.is_outdated = false;
+    active.canvas.read_at = world.resource::<FrameCount>().0;
+    if let Some(growth) = regrown {
+        active.drawing.frozen = None;
+        active.cracks.cells = CellTracker::new(frame.extent());
+        active.cracks.cells.update(growth.network());
+        active.cracks.cells_reported = active.cracks.cells.cells().len();
+        active.cracks.growth = growth;
+    }
+    if active.surface.alpha_mask {
+        active.cracks.growth.set_density(draft.base.density(draft.plan.rect));
+    }
+    let had_mask = !active.cracks.growth.mask().is_empty();
+    active.cracks.growth.set_mask(mask.clone());
+    active.bytes = world.resource::<TextureMemory>().count(draft.plan.bytes);
+    active.canvas.unstretched = draft.plan.unstretched;
+    active.canvas.base = draft.base;
+    // What the mask forbids may be elsewhere now.
+    if frame != active.drawing.field.frame || had_mask || !mask.is_empty() {
+        active.canvas.look = look;
+        active.drawing.field = DepthField::new(frame);
+        active.drawing.field.forbid(&mask);
+        active.drawing.field.lay(active.preset.look.layer(active.surface.seed));
+        stamp_anew(active);
+    }
+    active.canvas.views.clear();
+    active.show(draft.plan.rect);
+    active.carrier.shown = shown;
+    active.carrier.is_twofold = draft.plan.is_twofold;
+    // The material is made anew: one that exists keeps showing a texture of the old size.
+    attach(world, entity, active);
+    Ok(true)
+}

@@ -1,0 +1,99 @@
+//! Healing, and what happens when a surface goes.
+
+use crate::plugin::{
+    api::{CrackState, CrackStats, CrackSurface, CrackTextures},
+    bake::work,
+    carrier::{kind::Found, kinds},
+    draw::{
+        async_playback::{self, AsyncPlayback},
+        grow::CracksClosed,
+    },
+    jobs::deferred::when_free,
+    shards::{broken::drop_shards, request::cancel_requests},
+    surface::{
+        cracked::{self, active_mut, with_queues},
+        owners::Owners,
+        prepare,
+        queue::HitQueue,
+    },
+};
+use bevy::prelude::*;
+
+pub(super) fn close(world: &mut World, entity: Entity, seconds: f32) {
+    work::cancel(world, entity);
+    let is_closing = active_mut(world, entity).is_some_and(|active| active.close(seconds));
+    if is_closing {
+        with_queues(world, entity, |queues, turn| queues.wake(entity, turn));
+        async_playback::start(world, entity, None);
+    } else {
+        heal_now(world, entity);
+    }
+}
+
+pub(super) fn heal(world: &mut World, entity: Entity) {
+    // At once, wherever the list of bakes is; hits that come after this stay.
+    work::cancel(world, entity);
+    purge(world, entity);
+    when_free(world, move |world| heal_now(world, entity));
+}
+
+fn heal_now(world: &mut World, entity: Entity) {
+    forget(world, entity);
+    if let Some(mut state) = world.get_mut::<CrackState>(entity) {
+        state.set_if_neq(CrackState::default());
+    }
+}
+
+pub(super) fn purge(world: &mut World, entity: Entity) {
+    if !world.contains_resource::<HitQueue>() {
+        return;
+    }
+    world.resource_scope(|world, mut queue: Mut<HitQueue>| {
+        if let Some(mut stats) = world.get_resource_mut::<CrackStats>() {
+            queue.purge(entity, &mut stats);
+        }
+    });
+}
+
+/// Drops growth and textures and gives the entity back what it showed before.
+fn forget(world: &mut World, entity: Entity) {
+    work::cancel(world, entity);
+    prepare::cancel(world, entity);
+    cancel_requests(world, entity);
+    let Some(mut active) = cracked::remove(world, entity) else { return };
+    drop_shards(world, entity, &mut active);
+    active.carrier.kind.detach(world, entity, &active.carrier);
+    if let Ok(mut entity) = world.get_entity_mut(entity) {
+        entity.remove::<(CrackTextures, AsyncPlayback)>();
+    }
+}
+
+/// A surface whose component goes is healed when commands are applied.
+pub(crate) fn heal_removed(surface: On<Remove, CrackSurface>, mut commands: Commands) {
+    let entity = surface.entity;
+    commands.queue(move |world: &mut World| heal(world, entity));
+}
+
+/// Cracks that have closed are healed.
+pub(crate) fn heal_closed(closed: On<CracksClosed>, mut commands: Commands) {
+    let entity = closed.entity;
+    commands.queue(move |world: &mut World| heal(world, entity));
+}
+
+/// A clone of a cracked entity shows the private textures of its original: it is given the original pictures.
+pub(crate) fn disown_added(surface: On<Add, CrackSurface>, owners: Res<Owners>, mut commands: Commands) {
+    if owners.has_any() {
+        let entity = surface.entity;
+        commands.queue(move |world: &mut World| when_free(world, move |world| disown(world, entity)));
+    }
+}
+
+fn disown(world: &mut World, entity: Entity) {
+    let (_, Found::Shown(shown)) = kinds::inspect(world, entity) else { return };
+    let owner = world.resource::<Owners>().owner(shown.asset.id()).filter(|owner| *owner != entity);
+    let Some(owner) = owner else { return };
+    if let Some(active) = cracked::take(world, owner) {
+        active.carrier.kind.detach(world, entity, &active.carrier);
+        cracked::put_back(world, owner, active);
+    }
+}

@@ -1,0 +1,6 @@
+//! What happens to a surface from outside: healing, changed components and pictures, the end of its entity.
+
+pub(crate) mod change;
+pub(crate) mod commands;
+pub(crate) mod heal;
+pub(crate) mod watch;

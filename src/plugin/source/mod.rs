@@ -1,0 +1,6 @@
+//! From assets to values: pictures, masks, presets.
+
+pub(crate) mod layout;
+pub(crate) mod mask;
+pub(crate) mod picture;
+pub(crate) mod preset;

@@ -1,0 +1,147 @@
+//! [`Active`]: a surface that has been hit.
+
+use super::{canvas::Canvas, cracks::Cracks, drawing::Drawing, playhead::Playhead};
+use crate::{
+    CrackPreset, Grid,
+    growth::CrackGrowth,
+    paint::LookTable,
+    plugin::{
+        api::{surface::CrackSurface, textures::CrackTextures},
+        carrier::kind::Carrier,
+        gpu::memory::TextureBytes,
+        source::picture::BasePicture,
+    },
+    raster::{DepthField, TexelRect},
+};
+use bevy::{asset::UntypedAssetId, prelude::*};
+use std::sync::Arc;
+
+/// A surface that has been hit.
+pub(crate) struct Active {
+    /// The component as it was when it was last looked at.
+    pub(crate) surface: CrackSurface,
+    /// The preset in use; that of the component unless it was refused.
+    pub(crate) preset: CrackPreset,
+    /// Whether the component or the preset has changed and was not applied yet.
+    pub(crate) has_new_settings: bool,
+    pub(crate) cracks: Cracks,
+    pub(crate) drawing: Drawing,
+    pub(crate) canvas: Canvas,
+    pub(crate) playhead: Playhead,
+    pub(crate) carrier: Carrier,
+    pub(crate) turn: Turn,
+    /// Bytes of its textures.
+    pub(crate) bytes: TextureBytes,
+    /// Nodes of the network and closed cells when shards last fell by themselves.
+    pub(crate) fell_at: (usize, usize),
+    /// What its shards are made from: changes whenever shards leave or return, or the surface becomes another.
+    pub(crate) revision: Arc<()>,
+}
+
+/// In which queues a surface is.
+#[derive(Default)]
+pub(crate) struct Turn {
+    /// Whether it is in a growing queue: it grows, or its time passes.
+    pub(crate) is_growing: bool,
+    /// Whether it is in the dirty queue.
+    pub(crate) is_dirty: bool,
+    /// Whether a frame had no time to paint it: its growth waits for that.
+    pub(crate) is_late: bool,
+    /// Whether its end has not been reported yet.
+    pub(crate) is_open: bool,
+    /// Whether it is to shatter: nothing else makes its pictures then.
+    pub(crate) is_to_shatter: bool,
+}
+
+/// What a surface is made of before it cracks.
+pub(crate) struct Ground {
+    pub(crate) surface: CrackSurface,
+    pub(crate) preset: CrackPreset,
+    pub(crate) look: LookTable,
+    pub(crate) base: Arc<BasePicture>,
+    pub(crate) textures: CrackTextures,
+    pub(crate) carrier: Carrier,
+    pub(crate) bytes: TextureBytes,
+    pub(crate) rect: TexelRect,
+    pub(crate) unstretched: Option<UVec2>,
+    pub(crate) read_at: u64,
+}
+
+impl Active {
+    /// A surface whose textures show what is in the field.
+    pub(crate) fn new(ground: Ground, growth: CrackGrowth, field: DepthField) -> Self {
+        let Ground { surface, preset, look, base, textures, carrier, bytes, rect, unstretched, read_at } = ground;
+        let mut canvas = Canvas {
+            look,
+            base,
+            textures,
+            views: Vec::new(),
+            view: 0,
+            unstretched,
+            read_at,
+            is_outdated: false,
+            offered: Vec::new(),
+        };
+        canvas.show(rect, field.frame.size());
+        canvas.views.iter_mut().for_each(|view| view.dirty.clear());
+        Self {
+            cracks: Cracks::new(growth),
+            drawing: Drawing::new(field, preset.profile),
+            canvas,
+            playhead: Playhead::new(preset.steps_per_second),
+            carrier,
+            turn: Turn::default(),
+            bytes,
+            fell_at: (0, 1),
+            revision: Arc::default(),
+            surface,
+            preset,
+            has_new_settings: false,
+        }
+    }
+
+    /// Marks texels of the field as changed, in all views.
+    pub(crate) fn mark(&mut self, rect: TexelRect) {
+        self.canvas.mark(rect, self.drawing.field.frame.size());
+    }
+
+    /// Marks the whole field as changed, in all views.
+    pub(crate) fn mark_all(&mut self) {
+        self.mark(TexelRect::whole(self.drawing.field.frame.size()));
+    }
+
+    /// Shows the cracks in `rect` of the image from now on.
+    pub(crate) fn show(&mut self, rect: TexelRect) {
+        self.canvas.show(rect, self.drawing.field.frame.size());
+    }
+
+    /// Its shards are made from something else from now on.
+    pub(crate) fn bump_revision(&mut self) {
+        self.revision = Arc::default();
+    }
+
+    /// Keeps what grows from now on out of the holes of the picture and of shards.
+    pub(crate) fn avoid_holes(&mut self) {
+        self.cracks.growth.set_density(self.density());
+    }
+
+    /// Where cracks may go: not over holes.
+    fn density(&self) -> Option<Grid<f32>> {
+        let rect = self.canvas.seen()?;
+        let base = self.surface.alpha_mask.then_some(&*self.canvas.base);
+        match &self.drawing.cutouts {
+            Some(holes) => holes.density(rect, base),
+            None => base?.density(rect),
+        }
+    }
+
+    /// Ids of the pictures it was made from, and of those that it is to be made from.
+    pub(crate) fn sources(&self) -> impl Iterator<Item = AssetId<Image>> + '_ {
+        self.carrier.sources().chain(self.canvas.offered.iter().copied())
+    }
+
+    /// Ids of the assets that were made for it.
+    pub(crate) fn owned(&self) -> impl Iterator<Item = UntypedAssetId> + '_ {
+        self.canvas.textures.handles().map(|handle| handle.id().untyped()).chain(self.carrier.owned())
+    }
+}

@@ -1,0 +1,67 @@
+//! [`Canvas`]: what cracks are painted on.
+
+use crate::{
+    paint::LookTable,
+    plugin::{api::textures::CrackTextures, source::picture::BasePicture},
+    raster::{DirtyTiles, TexelRect},
+};
+use bevy::prelude::*;
+use std::sync::Arc;
+
+/// The most parts of an image that are remembered; one that is forgotten is painted anew when it is shown again.
+const MAX_VIEWS: usize = 256;
+
+/// The textures of a surface, and what is painted into them.
+pub(crate) struct Canvas {
+    pub(crate) look: LookTable,
+    pub(crate) base: Arc<BasePicture>,
+    pub(crate) textures: CrackTextures,
+    pub(crate) views: Vec<View>,
+    /// Index of the view that is shown.
+    pub(crate) view: usize,
+    /// The size that the textures would have if the picture were not shown stretched; `None` if another size was asked for.
+    pub(crate) unstretched: Option<UVec2>,
+    /// The frame in which the pictures were read, see `FrameCount`.
+    pub(crate) read_at: u64,
+    /// Whether the pictures have changed since.
+    pub(crate) is_outdated: bool,
+    /// Pictures that somebody has given the entity, until they are accepted.
+    pub(crate) offered: Vec<AssetId<Image>>,
+}
+
+/// A part of the image that shows the cracks: the whole image, or a frame of an atlas.
+pub(crate) struct View {
+    pub(crate) rect: TexelRect,
+    /// What is stamped into the field but not painted here yet, in texels of the field.
+    pub(crate) dirty: DirtyTiles,
+}
+
+impl Canvas {
+    /// The part of the image that is shown.
+    pub(crate) fn seen(&self) -> Option<TexelRect> {
+        self.views.get(self.view).map(|view| view.rect)
+    }
+
+    /// Marks texels of a field of `size` as changed, in all views.
+    pub(crate) fn mark(&mut self, rect: TexelRect, size: UVec2) {
+        // A normal depends on the texels around it.
+        let rect = rect.grow(1, size);
+        for view in &mut self.views {
+            view.dirty.mark(rect);
+        }
+    }
+
+    /// Shows the cracks of a field of `size` in `rect` of the image from now on.
+    pub(crate) fn show(&mut self, rect: TexelRect, size: UVec2) {
+        let known = self.views.iter().position(|view| view.rect == rect);
+        self.view = known.unwrap_or_else(|| {
+            let mut dirty = DirtyTiles::new(size);
+            dirty.mark(TexelRect::whole(size));
+            if self.views.len() >= MAX_VIEWS {
+                self.views.remove(0);
+            }
+            self.views.push(View { rect, dirty });
+            self.views.len() - 1
+        });
+    }
+}

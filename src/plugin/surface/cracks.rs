@@ -1,0 +1,48 @@
+//! [`Cracks`]: the cracks of a surface.
+
+use crate::{
+    growth::CrackGrowth,
+    pattern::{CellTracker, Network},
+};
+use bevy::prelude::*;
+
+/// The cracks of a surface, and what was reported of them.
+pub(crate) struct Cracks {
+    pub(crate) growth: CrackGrowth,
+    pub(crate) cells: CellTracker,
+    /// Cells whose closing has been reported, with the one that is there from the start.
+    pub(crate) cells_reported: usize,
+    /// The cracks of a bake.
+    pub(crate) added: Option<Added>,
+    /// Hits that started or fed a crack.
+    pub(crate) hits: u32,
+    pub(crate) last_hit: Option<LastHit>,
+    /// Nodes that were there when tips were last listed.
+    pub(crate) tips_from: usize,
+}
+
+/// Cracks that have not grown: the result of a bake.
+pub(crate) struct Added {
+    pub(crate) network: Network,
+    /// See [`CrackGrowth::add_cracks`].
+    pub(crate) opening: u32,
+    /// How many steps of growth they take.
+    pub(crate) steps: u32,
+}
+
+/// The last hit of a surface.
+#[derive(Clone, Copy)]
+pub(crate) struct LastHit {
+    /// Pattern units.
+    pub(crate) pos: Vec2,
+    pub(crate) energy: f32,
+    /// In the world.
+    pub(crate) direction: Vec3,
+}
+
+impl Cracks {
+    pub(crate) fn new(growth: CrackGrowth) -> Self {
+        let cells = CellTracker::new(growth.network().extent());
+        Self { growth, cells, cells_reported: 1, added: None, hits: 0, last_hit: None, tips_from: 0 }
+    }
+}

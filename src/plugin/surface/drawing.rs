@@ -1,0 +1,55 @@
+//! [`Drawing`]: what is drawn of the cracks of a surface, before it is painted.
+
+use super::{cutouts::Holes, tile_set::Touched};
+use crate::{
+    Grid,
+    raster::{DepthField, Profile},
+};
+use bevy::prelude::*;
+use std::sync::Arc;
+
+/// The depths of a surface.
+pub(crate) struct Drawing {
+    pub(crate) field: DepthField,
+    pub(crate) profile: Profile,
+    /// Tiles that a crack has touched.
+    pub(crate) touched: Touched,
+    /// What it has forgotten and still shows.
+    pub(crate) frozen: Option<Frozen>,
+    /// Cracks that were carried on when it was cut into shards.
+    pub(crate) carried: Vec<Arc<[Vec<Vec2>]>>,
+    /// The texels that have left it with shards; `None` = it is whole.
+    pub(crate) cutouts: Option<Holes>,
+    /// How often it has been painted.
+    pub(crate) painted: u64,
+}
+
+impl Drawing {
+    pub(crate) fn new(field: DepthField, profile: Profile) -> Self {
+        let touched = Touched::new(field.frame.size());
+        Self { field, profile, touched, frozen: None, carried: Vec::new(), cutouts: None, painted: 0 }
+    }
+}
+
+/// What a surface has forgotten of its cracks, and still shows.
+pub(crate) struct Frozen {
+    /// All of the picture when they were frozen.
+    pub(crate) depth: Grid<u16>,
+    pub(crate) nodes: u32,
+    /// Cells that they closed.
+    pub(crate) cells: u32,
+}
+
+impl Frozen {
+    /// Draws it into a field of any size.
+    pub(crate) fn draw(&self, field: &mut DepthField) {
+        let (from, to) = (self.depth.size(), field.depth.size());
+        for y in 0..to.y {
+            let row = self.depth.row((u64::from(y) * u64::from(from.y) / u64::from(to.y)) as usize);
+            for (x, depth) in (0u64..).zip(field.depth.row_mut(y as usize)) {
+                let frozen = row.get((x * u64::from(from.x) / u64::from(to.x)) as usize);
+                *depth = (*depth).max(frozen.copied().unwrap_or(0));
+            }
+        }
+    }
+}

@@ -1,0 +1,110 @@
+//! [`SurfaceInputs`]: what a surface is read from, by any thread.
+
+use super::{
+    frame::{frame, look},
+    picture_plan::PicturePlan,
+};
+use crate::{
+    CrackPreset,
+    growth::CrackGrowth,
+    paint::LookTable,
+    pattern::CrackMask,
+    plugin::{
+        api::{CrackError, CrackSurface},
+        source::{
+            mask::{self, MaskKey},
+            picture::BasePicture,
+        },
+    },
+    raster::{DepthField, TexelRect},
+};
+use bevy::prelude::*;
+use std::sync::Arc;
+
+/// The pictures of which a copy is needed, each once.
+#[derive(Default)]
+pub(crate) struct Copies(pub(crate) Vec<Handle<Image>>);
+
+impl Copies {
+    pub(crate) fn add(&mut self, picture: &Handle<Image>) -> usize {
+        self.0.iter().position(|known| known == picture).unwrap_or_else(|| {
+            self.0.push(picture.clone());
+            self.0.len() - 1
+        })
+    }
+}
+
+/// What a surface is to be read from, by any thread.
+pub(crate) struct SurfaceInputs {
+    pub(crate) plan: PicturePlan,
+    pub(super) base: RawBase,
+    pub(super) mask: RawMask,
+}
+
+pub(super) enum RawBase {
+    Read(Arc<BasePicture>),
+    /// Indices of the copies.
+    Pictures([Option<usize>; 3]),
+}
+
+pub(super) enum RawMask {
+    Made(Arc<CrackMask>),
+    FromPicture(MaskKey),
+    /// Indices of the copies of its layers.
+    Images([Option<usize>; 3]),
+}
+
+/// What was read of a surface.
+#[derive(Clone)]
+pub(crate) struct Readings {
+    pub(crate) base: Arc<BasePicture>,
+    pub(crate) mask: Arc<CrackMask>,
+}
+
+impl SurfaceInputs {
+    pub(crate) fn read(&self, copies: &[Image]) -> Result<Readings, CrackError> {
+        let copy = |index: Option<usize>| index.and_then(|index| copies.get(index));
+        let base = match &self.base {
+            RawBase::Read(base) => base.clone(),
+            RawBase::Pictures(pictures) => Arc::new(self.plan.read(pictures.map(copy))?),
+        };
+        let mask = match &self.mask {
+            RawMask::Made(mask) => mask.clone(),
+            RawMask::FromPicture(key) => key.make(&base.diffuse),
+            RawMask::Images(layers) => {
+                let [weak, strong, forbidden] = layers.map(|index| copy(index).map(mask::layer).transpose());
+                Arc::new(CrackMask { weak: weak?, strong: strong?, forbidden: forbidden? })
+            }
+        };
+        Ok(Readings { base, mask })
+    }
+}
+
+/// What cracks grow and are drawn in, before the first.
+pub(crate) struct Blank {
+    pub(crate) growth: CrackGrowth,
+    pub(crate) field: DepthField,
+    pub(crate) look: LookTable,
+}
+
+impl Blank {
+    pub(crate) fn new(
+        surface: &CrackSurface,
+        preset: &CrackPreset,
+        Readings { base, mask }: &Readings,
+        rect: TexelRect,
+    ) -> Result<Self, CrackError> {
+        let frame = frame(rect)?;
+        let look = look(preset, frame)?;
+        let mut growth = CrackGrowth::new(preset.growth.clone(), frame.extent(), surface.seed)
+            .map_err(|error| CrackError::Preset { reason: error.to_string() })?;
+        if surface.alpha_mask {
+            growth.set_density(base.density(rect));
+        }
+        growth.set_mask(mask.clone());
+        let mut field = DepthField::new(frame);
+        field.forbid(mask);
+        field.lay(preset.look.layer(surface.seed));
+        Ok(Self { growth, field, look })
+    }
+}

@@ -1,0 +1,132 @@
+//! From networks to depths: what is stamped into the field of a surface.
+
+use super::{active::Active, tile_set::Touched};
+use crate::{
+    growth::CrackGrowth,
+    pattern::{Moment, PathPoint, SegmentId, SegmentPath},
+    raster::{DOT_DEPTH, DepthField, Profile, Redrawn, TexelRect, stamp_dot, stamp_path, stamp_path_with},
+};
+use bevy::prelude::*;
+
+/// Buffers kept from frame to frame.
+#[derive(Default)]
+pub(crate) struct Scratch {
+    segments: Vec<SegmentId>,
+    markers: Vec<Vec2>,
+    redrawn: Redrawn,
+    pub(crate) rects: Vec<TexelRect>,
+}
+
+/// Stamps what has grown since the last time into the field, or whatever is to be shown, but for what hits have crushed.
+pub(crate) fn stamp(active: &mut Active, scratch: &mut Scratch) {
+    let moment = active.moment();
+    if let Some(playback) = &mut active.playhead.playback {
+        let (growth, redrawn) = (&active.cracks.growth, &mut scratch.redrawn);
+        playback.replay.show_lines(&mut active.drawing.field, growth.network(), growth.timeline(), moment, redrawn);
+        playback.shown = moment;
+        active.drawing.touched.follow(redrawn);
+        redrawn.changed.iter().for_each(|rect| active.mark(*rect));
+        if !redrawn.changed.is_empty() {
+            active.stamp_carried();
+        }
+        return;
+    }
+    active.cracks.growth.take_changed(&mut scratch.segments);
+    for segment in scratch.segments.drain(..) {
+        if let Some(path) = active.cracks.growth.network().path(segment) {
+            let changed = &mut |rect| scratch.rects.push(rect);
+            let rect = stamp_path_with(&mut active.drawing.field, &active.drawing.profile, &path, changed);
+            active.drawing.touched.mark(rect);
+        }
+    }
+    let timeline = active.cracks.growth.timeline();
+    active.drawing.field.begin_layer(active.cracks.growth.network(), timeline, moment, &mut scratch.rects);
+    scratch.rects.drain(..).for_each(|rect| active.mark(rect));
+    active.cracks.growth.take_markers(&mut scratch.markers);
+    let radius = active.cracks.growth.params().line_width;
+    for marker in scratch.markers.drain(..) {
+        let rect = stamp_dot(&mut active.drawing.field, marker, radius, DOT_DEPTH);
+        active.mark(rect);
+    }
+}
+
+impl Active {
+    /// Finds out what a hit crushes, which counts as part of the hit. It is drawn when the surface is painted.
+    pub(crate) fn note_hit(&mut self) {
+        if self.playhead.playback.is_none() {
+            let moment = self.moment();
+            self.drawing.field.follow_hits(self.cracks.growth.timeline(), moment);
+        }
+    }
+}
+
+/// Clears the field and stamps the whole network anew; at another time than the end that is left to the next
+/// painting.
+pub(crate) fn stamp_anew(active: &mut Active) {
+    let frame = active.drawing.field.frame;
+    active.drawing.field.clear();
+    active.drawing.touched = Touched::new(frame.size());
+    if let Some(frozen) = &active.drawing.frozen {
+        frozen.draw(&mut active.drawing.field);
+    }
+    if let Some(playback) = &mut active.playhead.playback {
+        playback.start_over(frame, active.drawing.profile);
+        return;
+    }
+    stamp_all(&active.cracks.growth, &active.drawing.profile, &mut active.drawing.field, &mut active.drawing.touched);
+    active.stamp_carried();
+}
+
+/// Stamps the end of a growth into an untouched field.
+pub(crate) fn stamp_all(growth: &CrackGrowth, profile: &Profile, field: &mut DepthField, touched: &mut Touched) {
+    let (network, timeline) = (growth.network(), growth.timeline());
+    let end = Moment::after(timeline.end());
+    for dot in (0..).map_while(|dot| timeline.dot_at(dot, end)) {
+        stamp_dot(field, dot.pos, dot.radius, DOT_DEPTH);
+    }
+    for segment in network.segments() {
+        if let Some(path) = network.path(segment) {
+            touched.mark(stamp_path(field, profile, &path));
+        }
+    }
+    field.show_layer(network, timeline, end, &mut Vec::new());
+}
+
+/// How wide a crack is that was carried on, as a share of the narrowest that grow.
+const HAIR: f32 = 0.5;
+
+impl Active {
+    /// Draws lines as cracks into the field.
+    pub(crate) fn stamp_lines(&mut self, lines: &[Vec<Vec2>]) {
+        let width = self.hair();
+        let mut rects = Vec::new();
+        stamp_hairlines(&mut self.drawing.field, &self.drawing.profile, width, lines, |rect| rects.push(rect));
+        rects.into_iter().for_each(|rect| self.mark(rect));
+    }
+
+    /// The width of a crack that was carried on, pattern units.
+    pub(crate) fn hair(&self) -> f32 {
+        HAIR * self.cracks.growth.params().line_width
+    }
+
+    /// Draws the cracks that were carried on once more: the field has been drawn anew.
+    fn stamp_carried(&mut self) {
+        for lines in self.drawing.carried.clone() {
+            self.stamp_lines(&lines);
+        }
+    }
+}
+
+/// Draws lines as cracks of this width.
+pub(crate) fn stamp_hairlines(
+    field: &mut DepthField,
+    profile: &Profile,
+    width: f32,
+    lines: &[Vec<Vec2>],
+    mut changed: impl FnMut(TexelRect),
+) {
+    for pair in lines.iter().flat_map(|line| line.windows(2)) {
+        let [from, to] = [pair[0], pair[1]].map(|pos| PathPoint { pos, width });
+        changed(stamp_path(field, profile, &SegmentPath::straight(from, to)));
+    }
+}
