@@ -4,9 +4,10 @@
 //! markers lie still, sorted by the cells of a uniform grid, and remember their nearest node; a newborn node looks once at
 //! the markers within its reach and wins those that it is nearest to.
 
+mod newborn;
 mod settle;
 
-use self::settle::Settling;
+use self::newborn::{Newborn, Settling};
 use super::{
     GrowthParams,
     closed::{Bond, Relations},
@@ -34,17 +35,6 @@ pub(super) struct Marker {
     pub(super) pos: Vec2,
     /// Order of birth, for ties.
     pub(super) id: u32,
-}
-
-/// A marker that has not settled.
-#[derive(Clone, Copy, Debug)]
-struct Newborn {
-    pos: Vec2,
-    id: u32,
-    loyal: u32,
-    given_up: u8,
-    /// Squared distance beyond which nothing is nearer.
-    near_sq: f32,
 }
 
 /// A marker that was given up so often dies.

@@ -1,6 +1,6 @@
 //! Cracks that have not grown: those of a picture, say.
 
-use super::{CrackGrowth, pull::NO_PULL};
+use super::{pull::NO_PULL, state::CrackGrowth};
 use crate::pattern::{Link, NO_IMPACT, NO_PARENT, Network, Node, SegmentId};
 use glam::Vec2;
 

@@ -1,6 +1,6 @@
 //! Forgetting the oldest cracks, so that a surface may be hit for ever.
 
-use super::{CrackGrowth, arrest::Arrest, nodes::NodeGrid};
+use super::{arrest::Arrest, nodes::NodeGrid, state::CrackGrowth};
 use crate::pattern::{NO_IMPACT, SegmentId};
 
 impl CrackGrowth {

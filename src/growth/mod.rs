@@ -31,23 +31,40 @@
 //! # Ok::<(), bevy_crack::growth::ParamError>(())
 //! ```
 
+mod advance;
+mod aim;
 mod arrest;
+mod birth;
+mod bound;
 mod changes;
 mod closed;
+mod cursor;
 mod divide;
+mod division;
+mod domain;
 mod field;
 mod foreign;
 mod forget;
+mod grow_rays;
+mod hit;
 mod impact;
+mod join;
+mod lay_out;
 mod layout;
 mod links;
 mod markers;
 mod masonry;
 mod nodes;
+mod others;
 mod params;
 mod plan;
 mod pull;
 mod rays;
+mod region;
+mod settings;
+mod starts;
+mod state;
+mod steer;
 mod step;
 #[cfg(test)]
 mod tests;
@@ -56,4 +73,5 @@ mod width;
 
 pub use impact::{HitOutcome, Impact, MAX_ENERGY, Rejected};
 pub use params::{GrowthParams, MAX_MARKERS, MarkerLayout, ParamError, StartLayout, Venation};
-pub use step::{Census, CrackGrowth, StepReport};
+pub use state::{Census, CrackGrowth};
+pub use step::StepReport;

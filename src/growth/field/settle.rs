@@ -1,8 +1,11 @@
 //! Markers that were laid out take their places among the others, in slices if need be.
 
-use super::{ANY_IMPACT, DEAD, LANES, MarkerField, NO_NODE, Newborn, get_ready};
+use super::{
+    ANY_IMPACT, DEAD, LANES, MarkerField, NO_NODE, get_ready,
+    newborn::{Newborn, Phase, Settling},
+};
 use crate::{
-    growth::{layout::Cursor, nodes::NodeGrid},
+    growth::{cursor::Cursor, nodes::NodeGrid},
     pattern::Node,
 };
 use glam::UVec2;
@@ -11,40 +14,6 @@ use glam::UVec2;
 /// much as one that is moved.
 const VISIT: u32 = 8;
 const LOOKS: f32 = 8.0;
-
-/// How far a field has come with its newborn markers.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Settling {
-    phase: Phase,
-    cursor: Cursor,
-    all: Vec<Newborn>,
-    /// The cell of each of them.
-    homes: Vec<u32>,
-    /// The next place of each cell.
-    next: Vec<u32>,
-}
-
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-enum Phase {
-    /// The living are taken out of their places.
-    #[default]
-    Gather,
-    /// Cells get to know how many they will have.
-    Count,
-    /// All get a place.
-    Place,
-    /// What they know of nodes already holds.
-    Recall,
-    /// Nodes look at them.
-    Visit,
-}
-
-impl Settling {
-    /// Markers that are nowhere else.
-    pub(super) fn in_hand(&self) -> usize {
-        if self.phase == Phase::Count { self.all.len() } else { 0 }
-    }
-}
 
 impl MarkerField {
     /// Takes up the newborn markers: forgets the dead, sorts all into cells, and lets every node win what it is nearest to.

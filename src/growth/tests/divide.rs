@@ -2,7 +2,7 @@
 
 use super::{arrest::assert_planar, *};
 use crate::{
-    growth::divide::{AXES, rim_towards},
+    growth::{division::rim_towards, domain::AXES},
     pattern::{CellTracker, SurfaceFrame},
     raster::{DepthField, Profile, stamp_path},
 };

@@ -1,0 +1,110 @@
+//! Nodes are born, and make others wider.
+
+use super::{
+    division::{Division, rim_towards, towards_rim},
+    pull::NO_PULL,
+    rays::NO_RAY,
+    state::CrackGrowth,
+    width::Widths,
+};
+use crate::{
+    math::hash_unit,
+    pattern::{NO_PARENT, Node},
+};
+use glam::Vec2;
+
+impl CrackGrowth {
+    /// Adds a node; the caller lets it visit the markers.
+    pub(super) fn bear(&mut self, pos: Vec2, parent: u32, generation: u32, impact: u32, bend: f32) {
+        let first = self.network.nodes.len() as u32;
+        self.bear_thin(pos, parent, generation, impact, bend);
+        self.widen_with(|widths, nodes, widened| widths.push(nodes, first, widened));
+    }
+
+    /// Adds a node of which the others do not know yet.
+    pub(super) fn bear_thin(&mut self, pos: Vec2, parent: u32, generation: u32, impact: u32, bend: f32) {
+        let node = self.network.nodes.len() as u64;
+        let wider = self.impacts.get(impact as usize).map_or(1.0, |impact| impact.widening);
+        let (mixed, draw) = (self.params.mixed, hash_unit(self.seed ^ 0xA5, node));
+        let share = |division: &mut Division| division.bear(node as u32, parent, 1.0 - mixed * draw);
+        let wider = self.division.as_mut().map_or(1.0, share) * wider * self.thinned(pos, impact);
+        let width = self.widths.tip(parent, || hash_unit(self.seed ^ 0x1D, node), wider);
+        if let Some(arrest) = &mut self.arrest {
+            arrest.push_node(false);
+        }
+        self.network.nodes.push(Node { pos, width, parent, generation, birth: self.steps, impact, bend });
+        self.nodes.push(pos);
+        let from = self.network.nodes.get(parent as usize).map_or(pos, |parent| parent.pos);
+        self.courses.push((pos - from).normalize_or_zero());
+        self.pull_of.push(NO_PULL);
+        self.changes.push_node(parent);
+        self.timeline.add_node(width);
+        self.inherit_ray(node as u32, parent);
+    }
+
+    /// A tip that has met a crack is as wide there as further back.
+    pub(super) fn widen_end(&mut self, tip: u32) {
+        if self.params.tip_taper > 0.0 {
+            self.widen_with(|widths, nodes, widened| widths.join(nodes, tip, widened));
+        }
+    }
+
+    /// A tip that has met a crack at the rim of what its hit has loaded narrows, but not to nothing.
+    pub(super) fn thin_end(&mut self, tip: u32) {
+        if self.params.tip_taper > 0.0 {
+            self.widen_with(|widths, nodes, widened| widths.join_thinly(nodes, tip, widened));
+        }
+    }
+
+    /// Lets `act` widen nodes, and notes which became wider.
+    pub(super) fn widen_with(&mut self, act: impl FnOnce(&mut Widths, &mut [Node], &mut dyn FnMut(u32))) {
+        let mut widened = std::mem::take(&mut self.widened);
+        act(&mut self.widths, &mut self.network.nodes, &mut |node| widened.push(node));
+        for node in widened.drain(..) {
+            let wider = self.network.nodes[node as usize];
+            self.changes.widened(node, wider.parent != NO_PARENT);
+            self.timeline.widen(node, wider.width);
+        }
+        self.widened = widened;
+    }
+
+    /// How many times as wide as others a crack of an impact is at a place: less towards the rim.
+    pub(super) fn thinned(&self, pos: Vec2, impact: u32) -> f32 {
+        if self.params.thinning <= 0.0 {
+            return 1.0;
+        }
+        let begun = self.division.as_ref().and_then(|division| division.begun.get(impact as usize));
+        let (Some((_, reach)), Some(hit)) = (begun, self.impacts.get(impact as usize)) else { return 1.0 };
+        let way = pos - hit.pos;
+        let rim = rim_towards(way, *reach, self.seed ^ u64::from(impact));
+        1.0 - self.params.thinning * towards_rim(way.length(), rim)
+    }
+
+    /// A node is on the ray of that from which it grew.
+    pub(super) fn inherit_ray(&mut self, node: u32, parent: u32) {
+        if let Some(&ray) = self.field.ray_of.get(parent as usize)
+            && ray != NO_RAY
+        {
+            self.put_on_ray(node, ray);
+        }
+    }
+
+    /// Says on which ray a node is.
+    pub(super) fn put_on_ray(&mut self, node: u32, ray: u32) {
+        let ray_of = &mut self.field.ray_of;
+        if ray_of.len() <= node as usize {
+            ray_of.resize(node as usize + 1, NO_RAY);
+        }
+        ray_of[node as usize] = ray;
+        let last = self.rays.last_of(ray);
+        if ray != NO_RAY && self.network.nodes[node as usize].generation >= last {
+            self.seal(node);
+        }
+    }
+
+    pub(super) fn seal(&mut self, node: u32) {
+        if let Some(arrest) = &mut self.arrest {
+            arrest.seal(node);
+        }
+    }
+}

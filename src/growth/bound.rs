@@ -1,0 +1,41 @@
+//! How large a growth can become.
+
+use super::{
+    arrest, closed, divide, field,
+    params::{GrowthParams, MarkerLayout, PROGRESS, Venation},
+    plan, rays,
+};
+
+impl GrowthParams {
+    /// The most nodes that `markers` markers and `starts` starts can make: growth ends by itself within as many steps.
+    ///
+    /// Each new node either kills a marker or brings one closer by at least `D²/4` of squared distance, and no marker
+    /// begins further than [`crack_radius`](Self::crack_radius) from the node that it attracts. With closed venation a marker
+    /// attracts no more than six nodes at once, and for no longer than twice as many steps. With arrest a marker counts for each
+    /// time that it may be given up, every node may be a tip that runs on, and with nucleation every marker a start;
+    /// each node may fork.
+    #[must_use]
+    pub fn most_nodes(&self, markers: u64, starts: u64) -> u64 {
+        let approaches = ((self.crack_radius / self.step_length).powi(2) / PROGRESS).ceil() as u64;
+        let mut births = markers * (2 + approaches);
+        if self.venation == Venation::Closed {
+            births = 6 * markers * u64::from(closed::patience(self));
+        }
+        if matches!(self.markers, MarkerLayout::Rays { .. }) {
+            // A first node, and a line from each ring.
+            let chord = u64::from(rays::chord_steps(plan::LONGEST_CHORD, self.step_length));
+            births += markers * (1 + u64::from(plan::MOST_RINGS) * chord);
+        }
+        let starts = starts + if self.nucleation > 0.0 || self.venation == Venation::Dividing { markers } else { 0 };
+        if self.venation == Venation::Dividing {
+            // Each start has two tips, which may run straight on.
+            births += 2 * starts * (1 + u64::from(divide::STRAIGHT));
+        }
+        if !self.keeps_apart() {
+            return starts + births;
+        }
+        let run = u64::from(arrest::steps_for(self.arrest.max(self.island_distance), self.step_length)) + 2;
+        let each = if self.forks > 0.0 { 2 } else { 1 };
+        each * (starts + births * u64::from(field::MOST_GIVEN_UP)) * (1 + run)
+    }
+}

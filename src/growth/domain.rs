@@ -1,0 +1,140 @@
+//! How a crack would divide the domain around a place.
+
+use super::{division::rim_towards, state::CrackGrowth};
+use crate::math::{hash_unit, ops};
+use glam::Vec2;
+use std::f32::consts::PI;
+
+/// Axes along which the width of a domain is measured.
+pub(super) const AXES: usize = 8;
+
+/// How far the width of a domain is measured, in distances to its nearest crack.
+const FAR: f32 = 2.5;
+
+/// A side on which a domain is open counts as so many times as far as is looked.
+const OPEN: f32 = 2.0;
+
+/// Beyond the rim within so many times as far as is looked, a domain is open.
+const BEYOND: f32 = 1.5;
+
+/// How much less a crack likes to begin where it would meet others aslant.
+const SLANT: f32 = 0.25;
+
+/// The same of a steady crack, besides.
+const STEEP: f32 = 0.75;
+
+/// Per axis: how far the nearest crack is one way, and how far from a right angle the axis meets it, 0..=1.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sight {
+    pub(super) distance: [f32; AXES],
+    slant: [f32; AXES],
+}
+
+/// How a crack would divide a domain.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Across {
+    /// Along the shorter way.
+    pub(super) way: Vec2,
+    /// Where it would begin, in the middle of the longer way.
+    pub(super) middle: Vec2,
+    /// The longer way, and how many times as long it is.
+    pub(super) length: f32,
+    pub(super) longer: f32,
+}
+
+impl CrackGrowth {
+    /// The nearest cracks within `far` of a place, ahead and back along each axis.
+    pub(super) fn look_around(&self, pos: Vec2, axes: &[Vec2; AXES], far: f32) -> [Sight; 2] {
+        let mut sight = [Sight { distance: [f32::INFINITY; AXES], slant: [0.0; AXES] }; 2];
+        let Some(arrest) = &self.arrest else { return sight };
+        arrest.walls.each_near(pos, far, |from, to| {
+            let (from, way) = (from - pos, to - from);
+            let length_sq = way.length_squared();
+            // For all axes alike, without a branch, so that they are taken at once.
+            for (i, axis) in axes.iter().enumerate() {
+                let (slope, across) = (axis.perp_dot(way), axis.perp_dot(from));
+                let share = -across / slope;
+                let distance = axis.dot(from) + share * axis.dot(way);
+                let slant = 1.0 - slope * slope / length_sq;
+                let is_on = (0.0..=1.0).contains(&share);
+                for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
+                    let sight = &mut sight[side];
+                    let ahead = sign * distance;
+                    let is_nearer = is_on & (ahead >= 0.0) & (ahead < sight.distance[i]);
+                    sight.distance[i] = if is_nearer { ahead } else { sight.distance[i] };
+                    sight.slant[i] = if is_nearer { slant } else { sight.slant[i] };
+                }
+            }
+        });
+        sight
+    }
+
+    /// How a crack would divide the domain around a place; none where it could not end at others.
+    pub(super) fn across(&self, pos: Vec2, impact: u32, draws: u32, clearance: f32) -> Option<Across> {
+        let across = self.across_from(pos, impact, draws, clearance)?;
+        if self.params.steady <= 0.0 {
+            return Some(across);
+        }
+        // From its middle the domain is seen better.
+        let again = self.across_from(across.middle, impact, draws, clearance);
+        Some(again.map_or(across, |again| Across { middle: across.middle, ..again }))
+    }
+
+    /// The same as far as can be seen from that place.
+    fn across_from(&self, pos: Vec2, impact: u32, draws: u32, clearance: f32) -> Option<Across> {
+        let draw = |what: u64| hash_unit(self.seed ^ what, u64::from(draws));
+        let turn = PI * draw(0xA1);
+        let axes: [Vec2; AXES] = std::array::from_fn(|i| ops::unit(turn + PI * i as f32 / AXES as f32));
+        let far = FAR * clearance;
+        let sight = self.look_around(pos, &axes, far);
+        let (extent, hit) = (self.network.extent(), self.impacts.get(impact as usize).map_or(pos, |impact| impact.pos));
+        let begun = self.division.as_ref().and_then(|division| division.begun.get(impact as usize));
+        let reach = begun.map_or(f32::INFINITY, |begun| begun.1);
+        let mut is_closed = [true; AXES];
+        let mut seen = [[(0.0, 0.0); 2]; AXES];
+        for (i, seen) in seen.iter_mut().enumerate() {
+            for (side, way) in [axes[i], -axes[i]].into_iter().enumerate() {
+                let (border, slant) = to_border(pos, way, extent);
+                let crack = sight[side].distance[i];
+                seen[side] = if border < crack { (border, slant) } else { (crack, sight[side].slant[i]) };
+                let distance = seen[side].0;
+                if distance > far {
+                    let there = pos + way * distance.min(BEYOND * far) - hit;
+                    let leaves = there.length() > rim_towards(there, reach, self.seed ^ u64::from(impact));
+                    is_closed[i] &= !leaves;
+                    seen[side] = (if leaves { OPEN * far } else { far }, 0.5);
+                }
+            }
+        }
+        let (out, near_hit) = ((pos - hit).normalize_or_zero(), self.params.near_hit(pos.distance(hit)));
+        let sum = |i: usize| seen[i % AXES][0].0 + seen[i % AXES][1].0;
+        let around = |i: usize| 0.5 * sum(i) + 0.25 * (sum(i + 1) + sum(i + AXES - 1));
+        let score = |i: usize| {
+            let slant = 1.0 + (SLANT + STEEP * self.params.steady) * (seen[i][0].1 + seen[i][1].1);
+            around(i) * slant * (1.0 + 1.2 * near_hit * (1.0 - axes[i].dot(out).abs()))
+        };
+        let may_leave = self.division.as_ref().is_none_or(|division| division.generation == 0);
+        let best = (0..AXES).filter(|&i| may_leave || is_closed[i]).min_by(|&a, &b| score(a).total_cmp(&score(b)))?;
+        // In the middle of its length.
+        let long = (best + AXES / 2) % AXES;
+        let middle = pos + axes[long] * (0.4 * (seen[long][0].0 - seen[long][1].0));
+        let is_out =
+            |there: Vec2| (there - hit).length() > rim_towards(there - hit, reach, self.seed ^ u64::from(impact));
+        let middle = if is_out(middle) { pos } else { middle };
+        let stray = 2.0 * self.params.wander * (1.0 - 0.7 * self.params.steady) * (2.0 * draw(0xA2) - 1.0);
+        let way = (axes[best] + axes[best].perp() * stray).normalize_or(Vec2::X);
+        let length = around(long);
+        Some(Across { way, middle: middle.clamp(Vec2::ZERO, extent), length, longer: length / around(best).max(1e-6) })
+    }
+}
+
+/// How far the border is from `pos` in a direction, and how far from a right angle it would be met.
+fn to_border(pos: Vec2, way: Vec2, extent: Vec2) -> (f32, f32) {
+    let along = |pos: f32, way: f32, extent: f32| match () {
+        () if way > 0.0 => (extent - pos) / way,
+        () if way < 0.0 => -pos / way,
+        () => f32::INFINITY,
+    };
+    let (x, y) = (along(pos.x, way.x, extent.x), along(pos.y, way.y, extent.y));
+    if x < y { (x, way.y * way.y) } else { (y, way.x * way.x) }
+}

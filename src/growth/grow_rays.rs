@@ -1,0 +1,163 @@
+//! Rays as they grow: which node is on which, where they fork, and the rings between them.
+//!
+//! Each ray follows markers of its own (a marker attracts the nodes of its ray alone, by eq. 2 of Couto et al.). A node at which the plan has a
+//! fork bears the first node of another ray beside it; when both corners of a line of a ring are there, a tip sets out from one
+//! to the other, a segment a step, and is joined to it (`draw_connections`).
+
+use super::{
+    params::MAX_MARKERS,
+    plan::{Blow, Plan},
+    rays::{Corner, Fork, NO_NODE, NO_RAY, Walker, chord_steps},
+    region::density_at,
+    state::CrackGrowth,
+};
+use crate::{
+    math::{hash_unit, mix},
+    pattern::{Dot, Link, LinkKind},
+};
+use glam::Vec2;
+
+impl CrackGrowth {
+    /// The rays of an impact, if the layout has any.
+    pub(super) fn plan_rays(&self, impact: u32, reach: f32) -> Option<Plan> {
+        let hit = self.impacts.get(impact as usize)?;
+        let seed = mix(self.seed ^ mix(u64::from(impact)));
+        let blow = Blow { pos: hit.pos, energy: hit.first_energy, reach, seed };
+        Plan::new(&self.params, blow, self.network.extent())
+    }
+
+    /// Begins the rays of a plan: the rim from `first` on, of which `born` tells the places that are there, and the markers.
+    pub(super) fn begin_rays(&mut self, plan: &Plan, impact: u32, born: &[(usize, u32)]) -> u32 {
+        let is_over = !self.is_growing();
+        let first = self.rays.take_up(plan, impact, is_over);
+        if born.is_empty() {
+            // The hit is on a crack, from which it has sprouted: each sprout is on the ray that is nearest to its direction.
+            let center = self.impacts[impact as usize].pos;
+            for node in self.newborn.clone() {
+                let way = (self.network.nodes[node as usize].pos - center).normalize_or_zero();
+                let nearest = (0..plan.rays.len()).filter(|&i| plan.rays[i].from.is_none()).max_by(|&a, &b| {
+                    let towards = |i: usize| (plan.rays[i].line[0] - center).normalize_or_zero().dot(way);
+                    towards(a).total_cmp(&towards(b))
+                });
+                if let Some(ray) = nearest {
+                    self.put_on_ray(node, first + ray as u32);
+                }
+            }
+        }
+        for (i, &(place, node)) in born.iter().enumerate() {
+            if let Some(ray) = plan.rim[place].ray {
+                self.put_on_ray(node, first + ray as u32);
+            }
+            // The rim, where it goes on to the next place.
+            let (next, to) = born[(i + 1) % born.len()];
+            let follows = next == (place + 1) % plan.rim.len();
+            let is_twice = born.len() == 2 && i == 1;
+            if follows && plan.rim[place].goes_on && node != to && !is_twice {
+                let width = self.params.line_width * self.impacts[impact as usize].widening;
+                let birth = self.steps;
+                self.link(Link { a: node, b: to, width, birth, kind: LinkKind::Connection, bend: 0.0 });
+            }
+        }
+        first
+    }
+
+    /// Lays out the markers of the rays of a plan, the first of which is called `name`.
+    pub(super) fn lay_out_rays(&mut self, plan: &Plan, name: u32) {
+        let extent = self.network.extent();
+        for (i, ray) in (0u32..).zip(&plan.rays) {
+            for &pos in ray.line.iter().skip(1) {
+                if self.field.living_at_most() >= MAX_MARKERS || self.is_barren(pos) {
+                    continue;
+                }
+                self.field.add(pos, name + i, f32::INFINITY);
+                let is_inside = pos.cmpge(Vec2::ZERO).all() && pos.cmple(extent).all();
+                if self.params.draw_markers && is_inside {
+                    self.shown_markers.push(pos);
+                    self.timeline.add_dot(Dot { pos, radius: self.params.line_width });
+                }
+            }
+        }
+    }
+
+    /// Whether no marker may be here.
+    fn is_barren(&self, pos: Vec2) -> bool {
+        let extent = self.network.extent();
+        density_at(self.density.as_ref(), pos, extent) <= 0.0 || self.mask.is_forbidden(pos / extent)
+    }
+
+    /// What the nodes from `first` on bring about: forks, and lines of rings; and a step of those that are on their way.
+    pub(super) fn advance_rays(&mut self, first: u32) {
+        let mut node = first;
+        while (node as usize) < self.network.nodes.len() {
+            let ray = self.field.ray_of.get(node as usize).copied().unwrap_or(NO_RAY);
+            if ray != NO_RAY {
+                self.branch_off(node, (ray, self.network.nodes[node as usize].generation));
+            }
+            node += 1;
+        }
+        for walker in std::mem::take(&mut self.rays.walkers) {
+            if let Some(on) = self.walk(walker) {
+                self.rays.walkers.push(on);
+            }
+        }
+    }
+
+    fn branch_off(&mut self, node: u32, at: (u32, u32)) {
+        let pos = self.network.nodes[node as usize].pos;
+        let length = self.params.step_length;
+        let from = self.rays.forks.partition_point(|fork| fork.at < at);
+        for i in from..self.rays.forks.len() {
+            let Fork { at: here, ray, way } = self.rays.forks[i];
+            if here != at {
+                break;
+            }
+            if let Some(child) = self.extend(node, pos + way * length, false) {
+                self.put_on_ray(child, ray);
+            }
+        }
+        let from = self.rays.corners.partition_point(|corner| corner.at < at);
+        for i in from..self.rays.corners.len() {
+            let Corner { at: here, chord, end } = self.rays.corners[i];
+            if here != at {
+                break;
+            }
+            let ends = &mut self.rays.chords[chord as usize];
+            ends[end] = node;
+            if let [from, to] = *ends
+                && from != NO_NODE
+                && to != NO_NODE
+            {
+                let apart = self.network.nodes[from as usize].pos.distance(self.network.nodes[to as usize].pos);
+                self.rays.walkers.push(Walker { tip: from, to, wait: 2, steps_left: chord_steps(apart, length) });
+            }
+        }
+    }
+
+    /// One segment of a line of a ring; `None` when it has come to its end.
+    fn walk(&mut self, mut walker: Walker) -> Option<Walker> {
+        if walker.wait > 0 {
+            walker.wait -= 1;
+            return Some(walker);
+        }
+        let (from, to) = (self.network.nodes[walker.tip as usize].pos, self.network.nodes[walker.to as usize].pos);
+        let segments = (from.distance(to) / self.params.step_length - 0.01).ceil().max(1.0);
+        if segments < 1.5 {
+            if !self.join(walker.to, walker.tip, LinkKind::Connection) {
+                self.join_near(walker.tip, to - from, 1.5);
+            }
+            return None;
+        }
+        walker.steps_left = walker.steps_left.checked_sub(1)?;
+        // Another crack may have come between.
+        if self.params.arrest > 0.0 && segments > 2.5 && self.ends_soon(walker.tip, (to - from).normalize_or_zero()) {
+            return None;
+        }
+        // As many equal segments as it takes, each a little aside.
+        let stray = self.params.wander * (2.0 * hash_unit(self.seed ^ 0xC1, self.network.nodes.len() as u64) - 1.0);
+        let way = (to - from) / segments;
+        let child = self.extend(walker.tip, from + way + way.perp() * stray, true)?;
+        self.put_on_ray(child, NO_RAY);
+        walker.tip = child;
+        Some(walker)
+    }
+}

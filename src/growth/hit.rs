@@ -1,0 +1,313 @@
+//! Hits: where cracks begin, and what a hit on older cracks does.
+
+use super::{
+    field::ANY_IMPACT,
+    impact::{HitOutcome, Impact, MAX_ENERGY, Rejected, widening},
+    params::StartLayout,
+    region::Region,
+    starts,
+    state::CrackGrowth,
+};
+use crate::{
+    math::mix,
+    pattern::{Link, LinkKind, NO_PARENT, Node},
+};
+use glam::Vec2;
+
+/// Half the width of the widest crack in which a hit is looked for, pattern units.
+const WIDE: f32 = 0.1;
+
+/// How much further a hit reaches, as a share, where it has next to no room.
+const MORE_REACH: f32 = 1.6;
+
+impl CrackGrowth {
+    /// Hits the surface at `pos` (pattern units) with `energy` (1 = an ordinary hit; 4 reaches twice as far).
+    ///
+    /// Lays out starts and markers; growth happens in [`step`](Self::step). A hit as good as on top of an earlier one adds
+    /// its energy to that one, so hammering on one spot costs no more than one hard hit.
+    pub fn hit(&mut self, pos: Vec2, energy: f32) -> HitOutcome {
+        let outcome = self.begin_hit(pos, energy);
+        self.finish_layout();
+        outcome
+    }
+
+    /// As [`hit`](Self::hit), but its markers are left to [`lay_out`](Self::lay_out), so that a hit that makes many of them can take several
+    /// frames. The cracks are the same.
+    ///
+    /// ```
+    /// use bevy_crack::{CrackPreset, growth::CrackGrowth};
+    ///
+    /// let fine = CrackPreset::TEMPERED_GLASS.scaled(0.1).growth;
+    /// let mut growth = CrackGrowth::new(fine, [1.0, 1.0].into(), 7)?;
+    /// growth.begin_hit([0.5, 0.5].into(), 1.0);
+    /// let mut slices = 1;
+    /// while growth.lay_out(4096) {
+    ///     slices += 1;
+    /// }
+    /// assert!(slices > 4);
+    /// # Ok::<(), bevy_crack::growth::ParamError>(())
+    /// ```
+    pub fn begin_hit(&mut self, pos: Vec2, energy: f32) -> HitOutcome {
+        self.finish_layout();
+        if !pos.is_finite() || !energy.is_finite() {
+            return HitOutcome::Rejected(Rejected::NotFinite);
+        }
+        if energy < 0.0 {
+            return HitOutcome::Rejected(Rejected::NegativeEnergy);
+        }
+        let extent = self.network.extent();
+        if pos.cmplt(Vec2::ZERO).any() || pos.cmpgt(extent).any() {
+            return HitOutcome::Rejected(Rejected::OffSurface);
+        }
+        if energy == 0.0 {
+            return HitOutcome::Nothing;
+        }
+        if self.mask.is_forbidden(pos / extent) {
+            return HitOutcome::Rejected(Rejected::Forbidden);
+        }
+        if self.room() == 0 {
+            return HitOutcome::Rejected(Rejected::Full);
+        }
+        self.timeline.begin(self.steps.saturating_add(1));
+        let merge = self.params.step_length.max(self.params.kill_distance).min(0.05);
+        let nearest = (0u32..)
+            .zip(&self.impacts)
+            .map(|(i, impact)| (impact.pos.distance_squared(pos), i))
+            .min_by(|a, b| a.0.total_cmp(&b.0));
+        if let Some((distance_sq, index)) = nearest
+            && distance_sq <= merge * merge
+        {
+            let impact = &mut self.impacts[index as usize];
+            let before = impact.energy;
+            impact.energy = (before + energy).min(MAX_ENERGY);
+            let (center, after) = (impact.pos, impact.energy);
+            if after > before {
+                let crushes = self.masonry.as_ref().and_then(|masonry| masonry.nearest(center)).unwrap_or(center);
+                self.timeline.strike(index, crushes, before, after);
+                self.widen(index);
+                let reach = self.reach(center, after);
+                self.populate(index, center, self.reach(center, before), reach);
+                if let Some(division) = &mut self.division {
+                    division.go_on(index, reach);
+                }
+                self.steps_left = self.params.num_iterations;
+            }
+            return HitOutcome::Merged(index);
+        }
+        let index = self.impacts.len() as u32;
+        let energy = energy.min(MAX_ENERGY);
+        // In masonry a hit crushes where its cracks begin.
+        let crushes = self.masonry.as_ref().and_then(|masonry| masonry.nearest(pos)).unwrap_or(pos);
+        self.impacts.push(Impact { pos, energy, first_energy: energy, widening: widening(energy) });
+        self.timeline.strike(index, crushes, 0.0, energy);
+        let reach = self.reach(pos, energy);
+        let first = self.network.nodes.len() as u32;
+        let seed = mix(self.seed ^ mix(u64::from(index)));
+        let plan = self.plan_rays(index, reach);
+        let places = match &plan {
+            Some(plan) => plan.rim.iter().map(|rim| rim.pos.clamp(Vec2::ZERO, extent)).collect(),
+            None => starts::starts(self.params.starts, (pos, energy), reach, extent, seed),
+        };
+        let mut born = Vec::new();
+        for (i, place) in places.into_iter().enumerate() {
+            let place = self.masonry.as_ref().and_then(|masonry| masonry.nearest(place)).unwrap_or(place);
+            let is_free = !self.nodes.any_within(place, 1e-4) && !self.is_on_crack(place, index);
+            if is_free && !self.mask.is_forbidden(place / extent) {
+                born.push((i, self.network.nodes.len() as u32));
+                self.bear(place, NO_PARENT, 0, index, 1.0);
+            }
+        }
+        if first == self.network.nodes.len() as u32 {
+            self.sprout(pos, index);
+        } else if plan.is_some() {
+            // The rim is joined below.
+        } else if matches!(self.params.starts, StartLayout::Crushed { .. }) {
+            self.crush(first);
+        } else if let StartLayout::Arms { count } = self.params.starts {
+            self.branch_out(first, starts::arms(count, (pos, energy), self.params.reach, extent, seed));
+        }
+        self.newborn = first..self.network.nodes.len() as u32;
+        let named = plan.map(|plan| (self.begin_rays(&plan, index, &born), plan));
+        for node in first..self.network.nodes.len() as u32 {
+            self.field.visit(node, &self.network.nodes, &self.nodes);
+        }
+        if self.arrest.is_some() {
+            self.unshown.push(first);
+        }
+        self.join_newborn();
+        if let Some((name, plan)) = named {
+            self.lay_out_rays(&plan, name);
+        }
+        self.populate(index, pos, 0.0, reach);
+        if let Some(division) = &mut self.division {
+            division.begin(self.newborn.clone(), self.steps, reach);
+        }
+        self.steps_left = self.params.num_iterations;
+        HitOutcome::Started(index)
+    }
+
+    /// How far the first hit of an impact reached.
+    #[cfg(test)]
+    pub(super) fn reach_of(&self, impact: u32) -> f32 {
+        let Impact { pos, first_energy, .. } = self.impacts[impact as usize];
+        self.reach(pos, first_energy)
+    }
+
+    /// How far a hit reaches: further where the border leaves it less room.
+    fn reach(&self, pos: Vec2, energy: f32) -> f32 {
+        let room = starts::room(pos, self.params.reach, self.network.extent());
+        self.params.reach * energy.sqrt() * (1.0 + MORE_REACH * (1.0 - room))
+    }
+
+    /// The first segment of each arm of a hit. What else is around the hit is left to them.
+    fn branch_out(&mut self, start: u32, directions: Vec<Vec2>) {
+        let pos = self.network.nodes[start as usize].pos;
+        let born = self.network.nodes.len();
+        if let Some(masonry) = self.masonry.clone() {
+            let ways = masonry.ways(pos);
+            // Up or down; the arms to the left and the right go the other way round the bricks.
+            let upright: Vec2 = ways.iter().map(|(way, _)| *way * Vec2::Y).sum();
+            for way in ways {
+                let child = self.extend(start, masonry.end(pos, way, self.params.step_length), false);
+                if let Some(child) = child.filter(|_| way.0.x != 0.0) {
+                    self.courses[child as usize] = (way.0 - 0.7 * upright).normalize_or(way.0);
+                }
+            }
+            return;
+        }
+        for direction in directions {
+            // Where another is too near, a little further on.
+            for turn in [0.0f32, 0.15, -0.15, 0.3, -0.3, 0.5, -0.5, 0.8, -0.8] {
+                let direction = direction + direction.perp() * turn;
+                let to = pos + self.params.direct(direction).normalize_or(direction) * self.params.step_length;
+                let is_inside = to.cmpgt(Vec2::ZERO).all() && to.cmplt(self.network.extent()).all();
+                if !is_inside || self.room() == 0 {
+                    continue;
+                }
+                if self.arrest.is_none() {
+                    self.bear(to, start, 1, self.network.nodes[start as usize].impact, 1.0);
+                    break;
+                }
+                if self.extend(start, to, false).is_some() {
+                    break;
+                }
+            }
+        }
+        if self.network.nodes.len() > born + 1
+            && let Some(arrest) = &mut self.arrest
+        {
+            arrest.seal(start);
+        }
+    }
+
+    fn populate(&mut self, impact: u32, center: Vec2, inner: f32, outer: f32) {
+        let extent = self.network.extent();
+        // In masonry cracks begin in a joint.
+        let center = self.masonry.as_ref().and_then(|masonry| masonry.nearest(center)).unwrap_or(center);
+        let region = Region { center, inner, outer, extent };
+        let seed = mix(self.seed ^ mix(u64::from(impact) | 1 << 40));
+        // The rays of a hit are its own: older cracks do not sprout towards them.
+        let loyal = if self.params.keeps_apart() { impact } else { ANY_IMPACT };
+        self.begin_layout(region, (impact, loyal), seed);
+    }
+
+    /// A hit from which nothing could grow, so narrow is its place, leaves a short crack all the same.
+    pub(super) fn show_hits(&mut self) {
+        while let Some(start) = self.unshown.pop() {
+            let born = self.network.nodes.len();
+            let Some(&node) = self.network.nodes.get(start as usize) else { continue };
+            let of_hit = |other: &Node| other.impact == node.impact && other.parent != NO_PARENT;
+            if self.network.nodes[start as usize..].iter().any(of_hit) {
+                continue;
+            }
+            // It takes a step of its own.
+            self.steps = self.steps.saturating_add(1);
+            self.timeline.begin(self.steps);
+            let length = self.params.step_length;
+            for way in [Vec2::X, Vec2::NEG_X, Vec2::Y, Vec2::NEG_Y] {
+                let to = (node.pos + way * length).clamp(Vec2::ZERO, self.network.extent());
+                if to.distance(node.pos) > 0.25 * length && self.extend(start, to, true).is_some() {
+                    break;
+                }
+            }
+            self.newborn = born as u32..self.network.nodes.len() as u32;
+        }
+    }
+
+    /// Whether a place lies on a crack, or as good as: at its line, or within the width of one of another impact.
+    fn is_on_crack(&self, place: Vec2, impact: u32) -> bool {
+        let Some(arrest) = self.arrest.as_ref().filter(|_| self.params.keeps_apart()) else { return false };
+        arrest.walls.any_within(place, 0.3 * self.params.step_length) || self.is_in_wide_crack(place, impact)
+    }
+
+    fn is_in_wide_crack(&self, place: Vec2, impact: u32) -> bool {
+        let mut is_in = false;
+        self.nodes.within(place, WIDE, |node, distance_sq| {
+            let node = self.network.nodes[node as usize];
+            is_in |= node.impact != impact && distance_sq <= 0.25 * node.width * node.width;
+        });
+        is_in
+    }
+
+    /// Joins the nodes of a rim, from `first` on, to each other.
+    fn crush(&mut self, first: u32) {
+        let last = self.network.nodes.len() as u32;
+        let extent = self.network.extent();
+        for node in first..last {
+            let next = if node + 1 == last { first } else { node + 1 };
+            let at = |node: u32| self.network.nodes[node as usize].pos;
+            // Not along the border, and two are joined once.
+            let is_along = |border: Vec2| (at(node).cmpeq(border) & at(next).cmpeq(border)).any();
+            let is_joined = next == node || (next == first && last - first == 2);
+            if !(is_joined || is_along(Vec2::ZERO) || is_along(extent)) {
+                let width = self.params.line_width;
+                let (birth, kind) = (self.steps, LinkKind::Connection);
+                self.link(Link { a: next, b: node, width, birth, kind, bend: 0.0 });
+            }
+        }
+    }
+
+    /// Widens the cracks of an impact that was hit again, as if all had come at once.
+    fn widen(&mut self, impact: u32) {
+        let Impact { energy, widening, .. } = self.impacts[impact as usize];
+        let wider = self::widening(energy);
+        // In steps that can be seen, so that a thousand little hits do not repaint it all a thousand times.
+        if wider < 1.05 * widening {
+            return;
+        }
+        self.impacts[impact as usize].widening = wider;
+        for node in 0..self.network.nodes.len() as u32 {
+            let this = &mut self.network.nodes[node as usize];
+            if this.impact == impact {
+                this.width = self.widths.at_most(this.width * (wider / widening)).min(0.4).max(this.width);
+                self.widths.scale(node, wider / widening);
+                let (width, parent) = (this.width, this.parent);
+                self.changes.widened(node, parent != NO_PARENT);
+                self.timeline.widen(node, width);
+            }
+        }
+    }
+
+    /// A hit on a crack: new cracks start from it to either side; where there is no room, from the nearest place where there is.
+    fn sprout(&mut self, pos: Vec2, impact: u32) {
+        let length = self.params.step_length;
+        let mut near = Vec::new();
+        self.nodes.within(pos, WIDE.max(3.0 * length), |node, distance_sq| near.push((distance_sq, node)));
+        near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let first = self.network.nodes.len();
+        for (_, index) in near.into_iter().take(12) {
+            let nodes = &self.network.nodes;
+            let node = nodes[index as usize];
+            let beside = nodes.get(node.parent as usize).or_else(|| nodes.get(self.child_of(index) as usize));
+            let across = beside.map_or(Vec2::X, |other| (node.pos - other.pos).perp().normalize_or(Vec2::X));
+            // Out of the crack, however wide it is.
+            let way_out = length.max(0.5 * (node.width + length));
+            for way in [across, -across] {
+                self.extend_of(impact, index, node.pos + way * way_out, false);
+            }
+            if self.network.nodes.len() > first {
+                break;
+            }
+        }
+    }
+}

@@ -1,0 +1,47 @@
+//! What may be changed while a pattern grows: its parameters, and where its cracks may run.
+
+use super::{
+    division::Division,
+    params::{GrowthParams, ParamError},
+    state::CrackGrowth,
+};
+use crate::{Grid, pattern::CrackMask};
+use std::sync::Arc;
+
+impl CrackGrowth {
+    /// Where markers of later hits may be: a probability 0..=1 over the whole surface, at any resolution, sampled at the
+    /// nearest cell; `None` = everywhere. Values that are not finite count as 0.
+    pub fn set_density(&mut self, density: Option<Grid<f32>>) {
+        self.finish_layout();
+        self.density = density.filter(|grid| grid.size().min_element() > 0);
+    }
+
+    /// Where cracks of later hits and steps like to run, avoid to, and never go; an empty mask = everywhere alike.
+    ///
+    /// Markers move to the weakest place near them, cracks steer along what is weak and around what is strong, and no line
+    /// enters a forbidden texel. A hit on one is [rejected](super::Rejected::Forbidden). What is grown stays.
+    pub fn set_mask(&mut self, mask: impl Into<Arc<CrackMask>>) {
+        self.finish_layout();
+        self.mask = mask.into();
+        self.mind_others();
+        self.lay_bricks();
+    }
+
+    /// Takes up other parameters; what is grown stays, `roughness` and `sway` included.
+    ///
+    /// # Errors
+    /// If a parameter is out of its range; nothing changes then.
+    pub fn set_params(&mut self, params: GrowthParams) -> Result<(), ParamError> {
+        params.validate()?;
+        self.finish_layout();
+        let params = params.varied(self.seed);
+        self.field.set_params(&params);
+        self.widths.set_params(&params);
+        let division = Division::new(&params).map(|new| self.division.take().unwrap_or(new));
+        self.division = division;
+        self.params = params;
+        self.mind_others();
+        self.lay_bricks();
+        Ok(())
+    }
+}

@@ -1,0 +1,274 @@
+//! What a growth knows: [`CrackGrowth`], and what can be asked of it.
+
+use super::{
+    arrest::Arrest,
+    changes::Changes,
+    division::Division,
+    field::MarkerField,
+    impact::Impact,
+    layout::Layout,
+    links::Linker,
+    masonry::Masonry,
+    nodes::NodeGrid,
+    params::{GrowthParams, MarkerLayout, ParamError},
+    pull::Pull,
+    rays::Rays,
+    width::Widths,
+};
+use crate::{
+    Grid,
+    pattern::{CrackMask, Network, Node, SegmentId, Timeline},
+};
+use glam::Vec2;
+use std::{ops::Range, sync::Arc};
+
+/// Where all markers are: the other numbers add up to `total`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub struct Census {
+    /// Markers ever made.
+    pub total: u32,
+    /// Reached and removed.
+    pub killed: u32,
+    /// Attracting a node.
+    pub attracting: u32,
+    /// Out of every node's reach.
+    pub waiting: u32,
+}
+
+/// A growing crack pattern on one surface.
+///
+/// ```
+/// use bevy_crack::growth::{CrackGrowth, GrowthParams};
+///
+/// let mut growth = CrackGrowth::new(GrowthParams::default(), [1.0, 1.0].into(), 7)?;
+/// growth.hit([0.5, 0.5].into(), 1.0);
+/// while growth.step().grew() {}
+/// assert!(growth.network().nodes().len() > 100);
+/// assert_eq!(growth.census().attracting, 0);
+/// # Ok::<(), bevy_crack::growth::ParamError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct CrackGrowth {
+    pub(super) params: GrowthParams,
+    pub(super) seed: u64,
+    pub(super) network: Network,
+    pub(super) field: MarkerField,
+    pub(super) nodes: NodeGrid,
+    /// Only where cracks must not cross.
+    pub(super) arrest: Option<Arrest>,
+    /// Only where cracks divide domains.
+    pub(super) division: Option<Division>,
+    pub(super) widths: Widths,
+    pub(super) linker: Linker,
+    pub(super) rays: Rays,
+    pub(super) impacts: Vec<Impact>,
+    /// What the last hit has still to lay out.
+    pub(super) layout: Option<Box<Layout>>,
+    pub(super) density: Option<Grid<f32>>,
+    pub(super) mask: Arc<CrackMask>,
+    /// The joints in which cracks run.
+    pub(super) masonry: Option<Arc<Masonry>>,
+    pub(super) steps: u32,
+    pub(super) steps_left: u32,
+    /// Cracks that began by themselves, and markers that were tried for it.
+    pub(super) nucleated: u32,
+    pub(super) tried: u32,
+    /// First nodes of hits whose growth has not ended.
+    pub(super) unshown: Vec<u32>,
+    /// Nodes that have not grown here.
+    pub(super) added: usize,
+    pub(super) newborn: Range<u32>,
+    /// Links that are among the changes.
+    pub(super) links_told: u32,
+    /// Places of markers made since they were last asked for.
+    pub(super) shown_markers: Vec<Vec2>,
+    pub(super) changes: Changes,
+    pub(super) timeline: Timeline,
+    pub(super) pulls: Vec<Pull>,
+    /// Where cracks are rays: what each of `pulls` must keep to.
+    pub(super) ways: Vec<[Vec2; 3]>,
+    /// Per node: the direction in which its crack runs, but for its kinks; zero for a start.
+    pub(super) courses: Vec<Vec2>,
+    /// Node and entry in `pulls`, in order of the nodes.
+    pub(super) order: Vec<(u32, u32)>,
+    /// Per node: its entry in `pulls` during a step.
+    pub(super) pull_of: Vec<u32>,
+    /// Nodes that one birth has made wider; empty in between.
+    pub(super) widened: Vec<u32>,
+}
+
+impl CrackGrowth {
+    /// A pattern without cracks on a surface of `extent` pattern units (see
+    /// [`SurfaceFrame::extent`](crate::pattern::SurfaceFrame::extent)).
+    ///
+    /// # Errors
+    /// If a parameter is out of its range, or `extent` (named so) is not within 0.0001..=64.
+    pub fn new(params: GrowthParams, extent: Vec2, seed: u64) -> Result<Self, ParamError> {
+        params.validate()?;
+        for value in extent.to_array() {
+            if !(1e-4..=64.0).contains(&value) {
+                return Err(ParamError::OutOfRange { name: "extent", value: f64::from(value), min: 1e-4, max: 64.0 });
+            }
+        }
+        let params = params.varied(seed);
+        let network = Network::new(extent, params.roughness, seed).with_sway(params.sway);
+        let mut growth = Self {
+            arrest: params.keeps_apart().then(|| Arrest::new(&network, params.step_length)),
+            division: Division::new(&params),
+            network,
+            field: MarkerField::new(extent, &params),
+            nodes: NodeGrid::new(extent, 2.0 * params.step_length.max(params.kill_distance)),
+            widths: Widths::new(&params),
+            linker: Linker::default(),
+            rays: Rays::default(),
+            impacts: Vec::new(),
+            layout: None,
+            density: None,
+            mask: Arc::default(),
+            masonry: None,
+            steps: 0,
+            steps_left: 0,
+            nucleated: 0,
+            tried: 0,
+            unshown: Vec::new(),
+            added: 0,
+            newborn: 0..0,
+            links_told: 0,
+            shown_markers: Vec::new(),
+            changes: Changes::default(),
+            timeline: Timeline::default(),
+            pulls: Vec::new(),
+            ways: Vec::new(),
+            courses: Vec::new(),
+            order: Vec::new(),
+            pull_of: Vec::new(),
+            widened: Vec::new(),
+            params,
+            seed,
+        };
+        growth.lay_bricks();
+        Ok(growth)
+    }
+
+    /// Finds the joints in which cracks run.
+    pub(super) fn lay_bricks(&mut self) {
+        let (extent, courses) = (self.network.extent(), self.params.courses);
+        let is_masonry = courses > 0.0 && self.params.arrest > 0.0;
+        self.masonry = match &self.mask.weak {
+            _ if !is_masonry => None,
+            Some(weak) => Masonry::find(weak, extent),
+            None => Some(Masonry::regular(extent, courses, self.seed)),
+        }
+        .map(Arc::new);
+        self.widths.set_widest(self.masonry.as_ref().map_or(f32::INFINITY, |masonry| masonry.joint()));
+    }
+
+    /// Keeps account of lines if cracks must not cross, or if there are places that they must not enter.
+    pub(super) fn mind_others(&mut self) {
+        let must = self.params.keeps_apart() || self.mask.forbidden.is_some();
+        if must != self.arrest.is_some() {
+            self.arrest = must.then(|| Arrest::new(&self.network, self.params.step_length));
+        }
+    }
+
+    /// Whether another step may grow something.
+    #[must_use]
+    pub const fn is_growing(&self) -> bool {
+        self.steps_left > 0
+    }
+
+    /// Nodes and segments so far.
+    #[must_use]
+    pub const fn network(&self) -> &Network {
+        &self.network
+    }
+
+    /// When all of it came.
+    #[must_use]
+    pub const fn timeline(&self) -> &Timeline {
+        &self.timeline
+    }
+
+    /// The impacts so far.
+    #[must_use]
+    pub fn impacts(&self) -> &[Impact] {
+        &self.impacts
+    }
+
+    /// Number of steps in which something grew.
+    #[must_use]
+    pub const fn steps(&self) -> u32 {
+        self.steps
+    }
+
+    /// Indices of the nodes born in the last step or hit.
+    #[must_use]
+    pub fn newborn(&self) -> Range<u32> {
+        self.newborn.clone()
+    }
+
+    /// Appends the segments that are new or wider since the last call, each once, and forgets them.
+    pub fn take_changed(&mut self, changed: &mut Vec<SegmentId>) {
+        for segment in self.changes.list.drain(..) {
+            if let SegmentId::Branch(node) = segment {
+                self.changes.kin[node as usize].is_listed = false;
+            }
+            changed.push(segment);
+        }
+    }
+
+    /// Appends the places of markers made since the last call, if `draw_markers` is set.
+    pub fn take_markers(&mut self, markers: &mut Vec<Vec2>) {
+        markers.append(&mut self.shown_markers);
+    }
+
+    /// Where all markers are.
+    #[must_use]
+    pub fn census(&self) -> Census {
+        let (living, attracting) = self.field.living();
+        Census { total: self.field.made, killed: self.field.killed, attracting, waiting: living - attracting }
+    }
+
+    /// The parameters, as [varied](GrowthParams::varied) by the seed.
+    #[must_use]
+    pub const fn params(&self) -> &GrowthParams {
+        &self.params
+    }
+
+    /// Where cracks may run.
+    #[cfg(feature = "bevy")]
+    pub(crate) const fn mask(&self) -> &Arc<CrackMask> {
+        &self.mask
+    }
+
+    /// How many more nodes may grow.
+    pub(super) fn room(&self) -> usize {
+        (self.params.max_nodes as usize + self.added).saturating_sub(self.network.nodes.len())
+    }
+
+    /// The last child of a node, or [`NO_PARENT`].
+    pub(super) fn child_of(&self, node: u32) -> u32 {
+        self.changes.kin[node as usize].child
+    }
+
+    /// The direction of the segment to a node; zero for a start.
+    pub(super) fn heading_of(&self, node: u32) -> Vec2 {
+        let Node { pos, parent, .. } = self.network.nodes[node as usize];
+        self.network.nodes.get(parent as usize).map_or(Vec2::ZERO, |parent| (pos - parent.pos).normalize_or_zero())
+    }
+
+    /// Whether cracks divide domains.
+    pub(super) const fn divides(&self) -> bool {
+        self.division.is_some()
+    }
+
+    /// Whether every ray has markers of its own.
+    pub(super) const fn has_rays(&self) -> bool {
+        matches!(self.params.markers, MarkerLayout::Rays { .. })
+    }
+
+    /// Whether cracks are rays that keep to their way.
+    pub(super) fn are_rays(&self) -> bool {
+        self.arrest.is_some() && self.has_rays()
+    }
+}
