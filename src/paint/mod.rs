@@ -5,19 +5,27 @@
 //! dirty rectangle painted alone equals the whole painted anew, bit for bit. Where the field is untouched, the
 //! painted texel is the base texel.
 
+mod cel;
 mod diffuse;
 mod extras;
+mod facets;
 mod glow;
 mod look;
 mod looks;
 mod modulate;
 mod patch;
+mod range;
 mod rows;
+mod table;
 #[cfg(test)]
 mod tests;
 mod texel;
 
+pub use cel::Cel;
+pub use facets::Facets;
 pub use glow::paint_glow;
-pub use look::{Cel, ColorStop, Facets, Look, LookError, LookTable};
+pub use look::{ColorStop, Look};
 pub use modulate::{Modulation, modulate};
+pub use range::LookError;
+pub use table::LookTable;
 pub use texel::{BaseTexels, PaintTargets, paint_into, paint_rects};

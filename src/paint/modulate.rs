@@ -49,10 +49,10 @@ const NOTHING: f32 = 1.0 / 512.0;
 /// If a number is out of its range or not finite.
 pub fn modulate(picture: &mut [u8], field: &DepthField, modulation: &Modulation) -> Result<(), LookError> {
     let Modulation { fade, tone, depth } = *modulation;
-    super::look::within("fade", fade, 0.0001..=0.2, "0.0001..=0.2")?;
-    super::look::within("depth", depth, 0.0..=1.0, "0..=1")?;
+    super::range::within("fade", fade, 0.0001..=0.2, "0.0001..=0.2")?;
+    super::range::within("depth", depth, 0.0..=1.0, "0..=1")?;
     for channel in tone {
-        super::look::within("tone", channel, 0.0..=1.0, "0..=1")?;
+        super::range::within("tone", channel, 0.0..=1.0, "0..=1")?;
     }
     let texels = picture.as_chunks_mut::<4>().0;
     if texels.len() < field.depth.as_slice().len() {

@@ -7,10 +7,12 @@ use super::{
     noise::Noise,
     params::MAX_LEVELS,
     resample::Resampler,
-    seams::{Guidance, Seams, Tracer},
+    seams::Seams,
     search::BLOCK,
     sites::{sites, texel},
     strokes::Astride,
+    trace::Tracer,
+    widths::Guidance,
 };
 use crate::{Grid, math::Rng, pattern::SurfaceFrame};
 use glam::UVec2;

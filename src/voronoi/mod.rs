@@ -46,6 +46,8 @@ mod sites;
 mod strokes;
 #[cfg(test)]
 mod tests;
+mod trace;
+mod widths;
 
 pub use bake::{BakeProgress, VoronoiBake, VoronoiMap};
 pub use edges::edges;

@@ -1,6 +1,6 @@
 //! Bruises: a crushed zone that is made of short radial and ring cracks with angular flakes between them.
 
-use super::hash;
+use super::noise::hash;
 use crate::math::ops;
 use glam::Vec2;
 use std::f32::consts::TAU;

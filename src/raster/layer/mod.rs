@@ -1,21 +1,30 @@
 //! [`Layer`]: what a field holds beside depths, for looks that show it: plates, crushed zones and veils.
 
+mod break_off;
 mod broken;
 mod bruise;
 mod crushed;
+mod noise;
+mod outline;
 mod plates;
+mod shape;
+mod spot;
+mod stone;
 mod veil;
+mod zones;
 
 pub use crushed::Crushed;
-pub(crate) use crushed::{CrushedField, PIT_STEPS, SLOPE_UNIT, Spot};
+pub(crate) use noise::noise;
 pub(crate) use plates::Plate;
+pub(crate) use spot::{PIT_STEPS, SLOPE_UNIT, Spot};
 pub use veil::Veil;
 pub(super) use veil::VeilField;
+pub(crate) use zones::CrushedField;
 
 use super::TexelRect;
 use crate::{
     Grid,
-    pattern::{CellTracker, Moment, Network, SurfaceFrame, Timeline},
+    pattern::{Moment, Network, SurfaceFrame, Timeline},
 };
 use plates::PlateField;
 
@@ -134,37 +143,4 @@ impl Layer {
     pub(crate) fn crushed(&self) -> Option<&CrushedField> {
         self.crushed.as_deref().filter(|crushed| !crushed.is_empty())
     }
-}
-
-/// A tracker of the cells of a network.
-fn tracker(frame: SurfaceFrame) -> CellTracker {
-    CellTracker::recording(frame.extent())
-}
-
-/// A number in `-1..=1` at a lattice point.
-#[inline(always)]
-fn lattice(seed: u32, x: i32, y: i32) -> f32 {
-    let hash = hash(seed, x, y);
-    (hash >> 8) as i32 as f32 * (2.0 / 16_777_215.0) - 1.0
-}
-
-#[inline(always)]
-fn hash(seed: u32, x: i32, y: i32) -> u32 {
-    let mut h = seed ^ (x as u32).wrapping_mul(0x9E37_79B1) ^ (y as u32).wrapping_mul(0x85EB_CA77);
-    h = (h ^ (h >> 15)).wrapping_mul(0x2C1B_3C6D);
-    h = (h ^ (h >> 12)).wrapping_mul(0x297A_2D39);
-    h ^ (h >> 15)
-}
-
-/// Smooth noise in `-1..=1`, whose bumps are about one unit wide.
-#[inline(always)]
-pub(crate) fn noise(seed: u32, x: f32, y: f32) -> f32 {
-    let (fx, fy) = (x.floor(), y.floor());
-    let (ix, iy) = (fx as i32, fy as i32);
-    let ease = |t: f32| t * t * (3.0 - 2.0 * t);
-    let (tx, ty) = (ease(x - fx), ease(y - fy));
-    let at = |dx: i32, dy: i32| lattice(seed, ix.wrapping_add(dx), iy.wrapping_add(dy));
-    let top = at(0, 0) + (at(1, 0) - at(0, 0)) * tx;
-    let low = at(0, 1) + (at(1, 1) - at(0, 1)) * tx;
-    top + (low - top) * ty
 }

@@ -1,6 +1,6 @@
 //! Plates: which closed cell each texel lies in.
 
-use super::{noise, tracker};
+use super::noise::noise;
 use crate::{
     Grid,
     math::mix,
@@ -82,7 +82,7 @@ impl PlateField {
         Self {
             frame,
             seed,
-            cells: tracker(frame),
+            cells: CellTracker::recording(frame.extent()),
             ids: Grid::new(frame.size(), 0),
             plates: vec![none],
             frozen: 0,
@@ -166,7 +166,7 @@ impl PlateField {
 
     /// Keeps what is shown as it is, and goes on with what is left of the network.
     pub(super) fn freeze(&mut self, network: &Network, timeline: &Timeline) {
-        self.cells = tracker(self.frame);
+        self.cells = CellTracker::recording(self.frame.extent());
         self.cells.follow(network, timeline);
         self.frozen = self.plates.len() - 1;
         self.skipped = self.cells.closings().map_or(0, |closings| closings.all().len());

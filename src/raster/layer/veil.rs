@@ -1,6 +1,6 @@
 //! Veils: translucent sheets that hang from cracks to one side, as in clear ice.
 
-use super::noise;
+use super::noise::noise;
 use crate::{
     Grid,
     math::{mix, ops},

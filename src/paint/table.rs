@@ -1,0 +1,346 @@
+//! [`LookTable`]: a look made ready to paint with.
+
+use super::{
+    cel::Strokes,
+    facets::Facets,
+    look::{ColorStop, Look},
+    patch::Curve,
+    range::{LookError, within},
+};
+use crate::pattern::MAX_SIDE;
+use glam::Vec4;
+use std::sync::{Arc, Mutex, PoisonError, Weak};
+
+/// Bumps of what swells and fades along cracks, a pattern unit.
+const SPARKLES: f32 = 28.0;
+
+/// Steps of the baked ramp: one for each value of the high byte of a depth.
+const STEPS: usize = 256;
+
+/// What a depth puts over the picture: colour times cover in 0..=255 (sRGB), and cover 0..=1.
+pub(super) type Layer = Vec4;
+
+/// Nothing, then the ramp at depths 0, 256, .. 65280, each with what is gained up to the next: linear between, so that slow
+/// gradients have no steps.
+type Ramp = [[Layer; 2]; STEPS + 1];
+
+/// Ramps in use, with the stops that they are made from. Surfaces with the same stops share one: so the processor's caches hold one
+/// while many surfaces are painted, and not each surface's own.
+static RAMPS: Mutex<Vec<(Vec<ColorStop>, Weak<Ramp>)>> = Mutex::new(Vec::new());
+
+/// No more than so many are shared.
+const MAX_SHARED: usize = 64;
+
+/// A [`Look`] made ready to paint with.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LookTable {
+    ramp: Arc<Ramp>,
+    glow: Option<Arc<Ramp>>,
+    pub(super) tint: f32,
+    pub(super) glint: f32,
+    pub(super) gloss: f32,
+    pub(super) sparkle: f32,
+    /// Bumps of it a texel.
+    pub(super) sparkle_scale: f32,
+    /// Where rims curl up.
+    pub(super) curve: Option<Box<Curve>>,
+    pub(super) cel: Option<Strokes>,
+    pub(super) facets: Option<Facets>,
+    /// Colour that plates reflect, 0..=255.
+    pub(super) sheen: [f32; 3],
+    /// Colour of their sides, 0..=255, and how thick they are, texels.
+    pub(super) side: [f32; 3],
+    pub(super) thick: f32,
+    /// Colour of veils, 0..=255, and what a step of their density covers; nothing if there are none.
+    pub(super) veil: [f32; 3],
+    pub(super) veil_cover: f32,
+    pub(super) grain: f32,
+    pub(super) shift: f32,
+    /// Share of a depth map's range that a pattern unit of depth is.
+    pub(super) deep: f32,
+    /// From the Sobel sum of `u16` depths to the slope of the surface.
+    pub(super) slope: f32,
+    pub(super) opaque: bool,
+}
+
+impl Look {
+    /// How far down the surface is at each depth, 65536 = at the bottom.
+    fn curve(&self) -> Option<Box<Curve>> {
+        (self.curl > 0.0).then(|| {
+            Box::new(Curve(std::array::from_fn(|step| {
+                let depth = step as f32 / STEPS as f32;
+                let rim = (1.0 - (depth / self.curl_depth - 1.0).abs()).max(0.0);
+                ((depth - self.curl * rim) * 65535.0) as i32
+            })))
+        })
+    }
+}
+
+/// Colour and cover at `depth` (0..=1); before the first stop the cover rises from zero, after the last nothing changes.
+fn at(stops: &[ColorStop], depth: f32) -> ([f32; 3], f32) {
+    let Some(first) = stops.first() else { return ([0.0; 3], 0.0) };
+    let mut low =
+        ColorStop { depth: 0.0, color: first.color, cover: if first.depth > 0.0 { 0.0 } else { first.cover } };
+    for &high in stops {
+        if depth < high.depth {
+            let t = (depth - low.depth) / (high.depth - low.depth);
+            let mix = |a: f32, b: f32| a + (b - a) * t;
+            let color = std::array::from_fn(|i| mix(low.color[i], high.color[i]));
+            return (color, mix(low.cover, high.cover));
+        }
+        low = high;
+    }
+    (low.color, low.cover)
+}
+
+fn ramp(stops: &[ColorStop]) -> Ramp {
+    let layer = |step: usize| {
+        let (color, cover) = at(stops, step as f32 / STEPS as f32);
+        let [r, g, b] = color.map(|channel| 255.0 * channel * cover);
+        Layer::new(r, g, b, cover)
+    };
+    let mut ramp = [[Layer::ZERO; 2]; STEPS + 1];
+    for (step, place) in ramp[1..].iter_mut().enumerate() {
+        *place = [layer(step), layer(step + 1) - layer(step)];
+    }
+    ramp
+}
+
+fn shared_ramp(wanted: &[ColorStop]) -> Arc<Ramp> {
+    let mut ramps = RAMPS.lock().unwrap_or_else(PoisonError::into_inner);
+    let known = ramps.iter().find(|(stops, _)| **stops == *wanted).and_then(|(_, ramp)| ramp.upgrade());
+    known.unwrap_or_else(|| {
+        ramps.retain(|(_, ramp)| ramp.strong_count() > 0);
+        let ramp = Arc::new(ramp(wanted));
+        if ramps.len() < MAX_SHARED {
+            ramps.push((wanted.to_vec(), Arc::downgrade(&ramp)));
+        }
+        ramp
+    })
+}
+
+impl LookTable {
+    /// Tables for `look`; `texels_per_unit` as in [`SurfaceFrame`](crate::pattern::SurfaceFrame).
+    ///
+    /// # Errors
+    /// If a field is out of its range or not finite.
+    pub fn new(look: &Look, texels_per_unit: f32) -> Result<Self, LookError> {
+        look.validate()?;
+        within("texels_per_unit", texels_per_unit, f32::MIN_POSITIVE..=MAX_SIDE as f32, "above 0, up to 16384")?;
+        let ramp = shared_ramp(&look.ramp);
+        let glow = (!look.glow.is_empty()).then(|| shared_ramp(&look.glow));
+        // Sobel's kernel weighs a slope of one depth step per texel with 8.
+        let slope = look.relief * texels_per_unit / (8.0 * 65535.0);
+        let Look { tint, glint, gloss, sparkle, grain, shift, opaque, facets, .. } = *look;
+        Ok(Self {
+            ramp,
+            glow,
+            tint,
+            glint,
+            gloss,
+            sparkle,
+            sparkle_scale: SPARKLES / texels_per_unit,
+            curve: look.curve(),
+            cel: look.cel.map(|cel| Strokes::new(&cel, texels_per_unit)),
+            facets,
+            side: facets.map_or([0.0; 3], |facets| facets.side.map(|channel| 255.0 * channel)),
+            thick: facets.map_or(0.0, |facets| facets.thick * texels_per_unit),
+            sheen: facets.map_or([0.0; 3], |facets| facets.sheen.map(|channel| 255.0 * channel)),
+            veil: look.veil.map_or([0.0; 3], |veil| veil.color.map(|channel| 255.0 * channel)),
+            veil_cover: look.veil.map_or(0.0, |veil| veil.cover * (1.0 / 255.0)),
+            grain,
+            shift,
+            deep: if look.relief > 0.0 { 1.0 / look.relief } else { 0.0 },
+            slope,
+            opaque,
+        })
+    }
+
+    /// Whether cracks give off light.
+    pub(super) const fn glows(&self) -> bool {
+        self.glow.is_some()
+    }
+
+    /// The light at a depth: three colours, 0..=255.
+    pub(super) fn light(&self, depth: u16) -> [f32; 3] {
+        let Some(glow) = &self.glow else { return [0.0; 3] };
+        let [low, gain] = glow[usize::from(depth >> 8) + usize::from(depth != 0)];
+        let [r, g, b, _] = (low + gain * Self::between(depth)).to_array();
+        [r, g, b]
+    }
+
+    /// What the ramp puts over the picture at `depth`, which lies so far [between](Self::between) two steps.
+    #[inline(always)]
+    pub(super) fn layer(&self, depth: u16, between: f32) -> Layer {
+        // Depth zero lies at the first entry, without a branch.
+        let [low, gain] = self.ramp[usize::from(depth >> 8) + usize::from(depth != 0)];
+        low + gain * between
+    }
+
+    /// How far `depth` is from the step before it to the one after, 0..1.
+    #[inline(always)]
+    pub(super) fn between(depth: u16) -> f32 {
+        f32::from(depth & 255) * (1.0 / 256.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        paint::{cel::Cel, look::stop},
+        raster::{Crushed, Veil},
+    };
+
+    fn layer(table: &LookTable, depth: u16) -> [f32; 4] {
+        table.layer(depth, LookTable::between(depth)).to_array()
+    }
+
+    fn refused(look: &Look) -> Option<&'static str> {
+        match LookTable::new(look, 512.0) {
+            Ok(_) => None,
+            Err(LookError::OutOfRange { field, .. }) => Some(field),
+        }
+    }
+
+    #[test]
+    fn the_constants_are_valid() {
+        for name in Look::NAMES {
+            assert_eq!(refused(&Look::named(name).unwrap()), None, "{name}");
+        }
+        assert_eq!(Look::named("no such"), None);
+        assert_eq!(refused(&Look { ramp: vec![].into(), ..Look::GROOVE }), None);
+    }
+
+    #[test]
+    fn numbers_out_of_range_are_named() {
+        for bad in [-0.1, 17.0, f32::NAN, f32::INFINITY] {
+            assert_eq!(refused(&Look { glint: bad, ..Look::GROOVE }), Some("glint"));
+            assert_eq!(refused(&Look { grain: bad, ..Look::GROOVE }), Some("grain"));
+            assert_eq!(refused(&Look { shift: bad, ..Look::GROOVE }), Some("shift"));
+            assert_eq!(refused(&Look { relief: bad, ..Look::GROOVE }), Some("relief"));
+            assert_eq!(refused(&Look { tint: bad, ..Look::GROOVE }), Some("tint"));
+            assert_eq!(refused(&Look { gloss: bad, ..Look::GROOVE }), Some("gloss"));
+            assert_eq!(refused(&Look { sparkle: bad, ..Look::GROOVE }), Some("sparkle"));
+            assert_eq!(refused(&Look { catch: bad, ..Look::GROOVE }), Some("catch"));
+            assert_eq!(refused(&Look { full_rim: bad, ..Look::GROOVE }), Some("full_rim"));
+            assert_eq!(refused(&Look { curl: bad, ..Look::GROOVE }), Some("curl"));
+            assert_eq!(refused(&Look { curl_depth: bad, ..Look::GROOVE }), Some("curl_depth"));
+            let cel = |cel| refused(&Look { cel: Some(cel), ..Look::GROOVE });
+            assert_eq!(cel(Cel { wide: bad, ..Cel::DEFAULT }), Some("cel.wide"));
+            assert_eq!(cel(Cel { outline: bad, ..Cel::DEFAULT }), Some("cel.outline"));
+            assert_eq!(cel(Cel { wall: bad, ..Cel::DEFAULT }), Some("cel.wall"));
+            assert_eq!(cel(Cel { slant: bad, ..Cel::DEFAULT }), Some("cel.slant"));
+            assert_eq!(cel(Cel { ink: [bad, 0.0, 0.0], ..Cel::DEFAULT }), Some("cel.ink"));
+            assert_eq!(cel(Cel { fill: [0.0, bad, 0.0], ..Cel::DEFAULT }), Some("cel.fill"));
+            assert_eq!(cel(Cel { lit: [0.0, 0.0, bad], ..Cel::DEFAULT }), Some("cel.lit"));
+            let facets = |facets| refused(&Look { facets: Some(facets), ..Look::GROOVE });
+            assert_eq!(facets(Facets { tone: bad, ..Facets::DEFAULT }), Some("facets.tone"));
+            assert_eq!(facets(Facets { tilt: bad, ..Facets::DEFAULT }), Some("facets.tilt"));
+            assert_eq!(facets(Facets { shift: bad, ..Facets::DEFAULT }), Some("facets.shift"));
+            assert_eq!(facets(Facets { gleam: bad, ..Facets::DEFAULT }), Some("facets.gleam"));
+            assert_eq!(facets(Facets { flash: bad, ..Facets::DEFAULT }), Some("facets.flash"));
+            assert_eq!(facets(Facets { sheen: [0.0, 0.0, bad], ..Facets::DEFAULT }), Some("facets.sheen"));
+            assert_eq!(facets(Facets { near: bad, ..Facets::DEFAULT }), Some("facets.near"));
+            assert_eq!(facets(Facets { dish: bad, ..Facets::DEFAULT }), Some("facets.dish"));
+            assert_eq!(facets(Facets { fade: bad, ..Facets::DEFAULT }), Some("facets.fade"));
+            assert_eq!(facets(Facets { bundle: bad, ..Facets::DEFAULT }), Some("facets.bundle"));
+            assert_eq!(facets(Facets { sweep: bad, ..Facets::DEFAULT }), Some("facets.sweep"));
+            assert_eq!(facets(Facets { thick: bad, ..Facets::DEFAULT }), Some("facets.thick"));
+            assert_eq!(facets(Facets { side: [0.0, bad, 0.0], ..Facets::DEFAULT }), Some("facets.side"));
+            let crushed = |crushed| refused(&Look { crushed: Some(crushed), ..Look::GROOVE });
+            assert_eq!(crushed(Crushed { radius: bad, ..Crushed::DEFAULT }), Some("crushed.radius"));
+            assert_eq!(crushed(Crushed { ragged: bad, ..Crushed::DEFAULT }), Some("crushed.ragged"));
+            assert_eq!(crushed(Crushed { soft: bad, ..Crushed::DEFAULT }), Some("crushed.soft"));
+            assert_eq!(crushed(Crushed { hole: bad, ..Crushed::DEFAULT }), Some("crushed.hole"));
+            assert_eq!(crushed(Crushed { depth: bad, ..Crushed::DEFAULT }), Some("crushed.depth"));
+            assert_eq!(crushed(Crushed { rough: bad, ..Crushed::DEFAULT }), Some("crushed.rough"));
+            assert_eq!(crushed(Crushed { grain: bad, ..Crushed::DEFAULT }), Some("crushed.grain"));
+            assert_eq!(crushed(Crushed { color: [0.0, bad, 0.0], ..Crushed::DEFAULT }), Some("crushed.color"));
+            assert_eq!(crushed(Crushed { pale: bad, ..Crushed::DEFAULT }), Some("crushed.pale"));
+            assert_eq!(crushed(Crushed { speckle: bad, ..Crushed::DEFAULT }), Some("crushed.speckle"));
+            assert_eq!(crushed(Crushed { flake: bad, ..Crushed::DEFAULT }), Some("crushed.flake"));
+            assert_eq!(crushed(Crushed { dust: bad, ..Crushed::DEFAULT }), Some("crushed.dust"));
+            assert_eq!(crushed(Crushed { chips: bad, ..Crushed::DEFAULT }), Some("crushed.chips"));
+            assert_eq!(crushed(Crushed { reach: bad, ..Crushed::DEFAULT }), Some("crushed.reach"));
+            assert_eq!(crushed(Crushed { bare: bad, ..Crushed::DEFAULT }), Some("crushed.bare"));
+            assert_eq!(crushed(Crushed { jag: bad, ..Crushed::DEFAULT }), Some("crushed.jag"));
+            assert_eq!(crushed(Crushed { stones: bad, ..Crushed::DEFAULT }), Some("crushed.stones"));
+            assert_eq!(crushed(Crushed { tint: bad, ..Crushed::DEFAULT }), Some("crushed.tint"));
+            assert_eq!(crushed(Crushed { basin: bad, ..Crushed::DEFAULT }), Some("crushed.basin"));
+            assert_eq!(crushed(Crushed { fall: bad, ..Crushed::DEFAULT }), Some("crushed.fall"));
+            assert_eq!(crushed(Crushed { outline: bad, ..Crushed::DEFAULT }), Some("crushed.outline"));
+            assert_eq!(crushed(Crushed { pit: bad, ..Crushed::DEFAULT }), Some("crushed.pit"));
+            assert_eq!(crushed(Crushed { ticks: 17, ..Crushed::DEFAULT }), Some("crushed.ticks"));
+            assert_eq!(crushed(Crushed { flakes: 17, ..Crushed::DEFAULT }), Some("crushed.flakes"));
+            assert_eq!(crushed(Crushed { needles: bad, ..Crushed::DEFAULT }), Some("crushed.needles"));
+            assert_eq!(crushed(Crushed { crazing: bad, ..Crushed::DEFAULT }), Some("crushed.crazing"));
+            assert_eq!(crushed(Crushed { bubbles: 65, ..Crushed::DEFAULT }), Some("crushed.bubbles"));
+            assert_eq!(crushed(Crushed { edge: bad, ..Crushed::DEFAULT }), Some("crushed.edge"));
+            let veil = |veil| refused(&Look { veil: Some(veil), ..Look::GROOVE });
+            assert_eq!(veil(Veil { reach: bad, ..Veil::DEFAULT }), Some("veil.reach"));
+            assert_eq!(veil(Veil { full_width: bad, ..Veil::DEFAULT }), Some("veil.full_width"));
+            assert_eq!(veil(Veil { cover: bad, ..Veil::DEFAULT }), Some("veil.cover"));
+            assert_eq!(veil(Veil { uneven: bad, ..Veil::DEFAULT }), Some("veil.uneven"));
+            assert_eq!(veil(Veil { bubbles: bad, ..Veil::DEFAULT }), Some("veil.bubbles"));
+            assert_eq!(veil(Veil { color: [bad, 0.0, 0.0], ..Veil::DEFAULT }), Some("veil.color"));
+            let glow = |stops: &[ColorStop]| refused(&Look { glow: stops.to_vec().into(), ..Look::GROOVE });
+            assert_eq!(glow(&[stop(bad, [0.0; 3], 0.0)]), Some("glow.depth"));
+            assert_eq!(glow(&[stop(0.5, [bad, 0.0, 0.0], 0.0)]), Some("glow.color"));
+            assert_eq!(glow(&[stop(0.5, [0.0; 3], bad)]), Some("glow.cover"));
+            let ramp = |stops: &[ColorStop]| refused(&Look { ramp: stops.to_vec().into(), ..Look::GROOVE });
+            assert_eq!(ramp(&[stop(bad, [0.0; 3], 0.0)]), Some("ramp.depth"));
+            assert_eq!(ramp(&[stop(0.5, [0.0, bad, 0.0], 0.0)]), Some("ramp.color"));
+            assert_eq!(ramp(&[stop(0.5, [0.0; 3], bad)]), Some("ramp.cover"));
+            assert!(LookTable::new(&Look::GROOVE, bad.min(0.0)).is_err(), "texels per unit {bad}");
+        }
+        let unordered = vec![stop(0.5, [0.0; 3], 0.0), stop(0.4, [0.0; 3], 0.0)];
+        assert_eq!(refused(&Look { ramp: unordered.into(), ..Look::GROOVE }), Some("ramp.depth"));
+        assert_eq!(
+            refused(&Look { ramp: vec![stop(0.5, [0.0; 3], 0.0); 17].into(), ..Look::GROOVE }),
+            Some("ramp.len()")
+        );
+    }
+
+    #[test]
+    fn equal_stops_share_a_ramp_and_others_do_not() {
+        let stops = vec![stop(0.3, [0.1, 0.9, 0.2], 0.7), stop(0.9, [0.4, 0.2, 0.3], 1.0)];
+        let look = Look { ramp: stops.clone().into(), ..Look::GROOVE };
+        let table = |look: &Look| LookTable::new(look, 512.0).unwrap();
+        let (first, second) = (table(&look), table(&Look { glint: 0.1, ..look.clone() }));
+        assert!(Arc::ptr_eq(&first.ramp, &second.ramp), "not shared");
+        let other = table(&Look { ramp: stops[..1].to_vec().into(), ..Look::GROOVE });
+        assert_ne!(first.ramp, other.ramp);
+        let before = *first.ramp;
+        drop((first, second));
+        assert_eq!(*table(&look).ramp, before);
+        // Many looks at once: those that are not shared are right as well.
+        let tables: Vec<_> = (0..2 * MAX_SHARED)
+            .map(|i| {
+                let stops = vec![stop(0.5, [0.0, 0.0, i as f32 / 255.0], 1.0)];
+                (i, table(&Look { ramp: stops.into(), ..Look::GROOVE }))
+            })
+            .collect();
+        for (i, table) in tables {
+            assert_eq!(layer(&table, 0x8000)[2], i as f32 / 255.0 * 255.0);
+        }
+    }
+
+    #[test]
+    fn the_ramp_is_linear_between_its_stops() {
+        let ramp = vec![stop(0.25, [1.0, 0.0, 0.0], 0.5), stop(0.75, [0.0, 0.0, 1.0], 1.0)];
+        let look = Look { ramp: ramp.into(), ..Look::GROOVE };
+        let look_at = |depth| at(&look.ramp, depth);
+        assert_eq!(look_at(0.125), ([1.0, 0.0, 0.0], 0.25));
+        assert_eq!(look_at(0.5), ([0.5, 0.0, 0.5], 0.75));
+        assert_eq!(look_at(1.0), ([0.0, 0.0, 1.0], 1.0));
+        let table = LookTable::new(&look, 512.0).unwrap();
+        assert_eq!(layer(&table, 0), [0.0; 4]);
+        assert_eq!(layer(&table, 0x8000), [0.5 * 0.75 * 255.0, 0.0, 0.5 * 0.75 * 255.0, 0.75]);
+        // Two stops at one depth are a step, and a first stop at zero covers all but depth zero itself.
+        let step = vec![stop(0.0, [1.0; 3], 1.0), stop(0.5, [1.0; 3], 1.0), stop(0.5, [0.0; 3], 1.0)];
+        let table = LookTable::new(&Look { ramp: step.into(), ..Look::GROOVE }, 512.0).unwrap();
+        assert_eq!(layer(&table, 1)[3], 1.0);
+        assert_eq!((layer(&table, 0), layer(&table, 0x8000)[0], layer(&table, 0x7F00)[0]), ([0.0; 4], 0.0, 255.0));
+    }
+}

@@ -1,0 +1,265 @@
+//! What a hit breaks off along chords: outlines, facets, chips and their shadows.
+
+use super::{
+    broken::{Broken, Chip, LONG_SHADOW, SHADOW},
+    crushed::Crushed,
+    noise::{draw, lattice, noise},
+    outline::FAR_OUT,
+    shape::{Place, Shape, TO_LIGHT},
+    spot::PIT_STEPS,
+    stone::{Cell, Stone, facets},
+};
+use glam::Vec2;
+
+/// Share of the depth that is outside the basin.
+const SHELF: f32 = 0.5;
+
+/// Share of that which is gained on the way to the middle.
+const BOWL: f32 = 0.4;
+
+/// Run of a wall, in its height.
+const WALL: f32 = 0.45;
+
+const SHADE: f32 = 0.5;
+
+const DEEP_SHADE: f32 = 0.62;
+
+/// How much shadow there is where the edge that throws it is so far away.
+fn sink(within: f32, soft: f32) -> f32 {
+    (0.5 - within / soft).clamp(0.0, 1.0)
+}
+
+/// Texels over which a hard shadow ends.
+const HARD: f32 = 1.0 / 0.6;
+
+impl Shape<'_> {
+    /// How far inside the edge of what has come off a place is, crumbs and all.
+    fn within(&self, broken: &Broken, off: Vec2, at: Vec2, seed: u32) -> f32 {
+        let within = broken.within(off);
+        if self.jag <= 0.0 || within < -1.0 {
+            return within;
+        }
+        let (wide, fine) = ((3.5 * self.jag).max(3.0), (1.2 * self.jag).max(1.3));
+        let noise = |k: u32, size: f32| 0.5 + 0.5 * noise(seed ^ k, at.x / size, at.y / size);
+        within - self.jag * (1.3 * noise(0x58, wide) + 0.7 * noise(0x59, fine))
+    }
+
+    /// What is there of something that breaks along chords.
+    pub(super) fn break_off(&self, place: &mut Place, broken: &Broken, off: Vec2, at: Vec2, seed: u32) {
+        let Crushed { dust, chips, reach, fall, .. } = *self.crushed;
+        let within = self.within(broken, off, at, seed);
+        let inside = (within + 0.5).clamp(0.0, 1.0);
+        if inside > 0.0 {
+            self.add_floor(place, broken, (within, inside), off, at, seed);
+        }
+        if inside < 1.0 {
+            let sunk = 0.8 * fall;
+            let radii = (off - Vec2::new(0.0, sunk * self.radius)).length() / self.radius.max(0.5);
+            let left = 1.0 - ((radii - 0.7) / (reach - 0.7 - sunk).max(0.2)).clamp(0.0, 1.0);
+            if dust > 0.0 {
+                let mut cloud = 0.6 + 0.4 * noise(seed ^ 6, 0.7 * at.x, 0.7 * at.y);
+                if self.jag > 0.0 && fall > 0.0 {
+                    // It runs down in streaks.
+                    let wide = 1.5 * self.grain;
+                    cloud *= 1.0 - fall * (0.4 - 0.4 * noise(seed ^ 8, at.x / wide, at.y / (7.0 * wide)));
+                }
+                place.pale = place.pale.max(dust * left * left * cloud * (1.0 - inside));
+            }
+            if self.jag > 0.0 {
+                self.add_crumbs(place, at, (1.2 * chips * left).min(0.6) * left, inside, seed);
+            } else if self.crushed.outline <= 0.0 {
+                self.add_grit(place, at, (chips * left).min(0.5) * left, seed);
+            }
+        }
+        for [from, to] in &broken.ticks {
+            // It begins blunt and ends in a point.
+            let (along, off) = (*to - *from, off - *from);
+            let t = (off.dot(along) / along.length_squared().max(1.0e-6)).clamp(0.0, 1.0);
+            let inside = broken.thick * (1.0 - t * t) + 0.5 - (off - along * t).length();
+            place.dark = place.dark.max(inside.clamp(0.0, 1.0));
+        }
+        for chip in &broken.chips {
+            self.add_chip(place, chip, off, at, seed);
+        }
+        if let Some(pit) = &broken.pit {
+            let (within, inward) = pit.side(off);
+            if within > -0.5 {
+                // Its floor is smaller, and lies to the side of the light.
+                let floor = pit.within((off - TO_LIGHT * (0.2 * pit.reach)) * 1.35);
+                let byte = |value: f32| (value.clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
+                place.pit = [
+                    byte((within + 0.5) * PIT_STEPS / 255.0),
+                    byte(floor + 0.5),
+                    byte(0.5 + 0.5 * inward.dot(TO_LIGHT)),
+                ];
+            }
+        }
+    }
+
+    /// Where it has come off: a steep wall, and a floor in the shadow of the edge.
+    fn add_floor(
+        &self,
+        place: &mut Place,
+        broken: &Broken,
+        (within, inside): (f32, f32),
+        off: Vec2,
+        at: Vec2,
+        seed: u32,
+    ) {
+        let Crushed { pale, speckle, stones, .. } = *self.crushed;
+        let crumbles = self.jag > 0.0;
+        let bump = |k: u32, size: f32| noise(seed ^ k, at.x / size, at.y / size);
+        let share = if broken.basin.is_some() { SHELF } else { 1.0 };
+        // Here and there a wall is a slope.
+        let slope = bump(0x5A, (0.35 * self.radius).max(4.0));
+        let run = if crumbles { 0.8 + 2.6 * slope.max(0.0) } else { 1.0 };
+        let wall = (within / (run * WALL * share * self.depth).max(1.0)).clamp(0.0, 1.0);
+        let bowl = (within / (0.8 * self.radius).max(1.0)).clamp(0.0, 1.0);
+        let mut down = share * (wall + BOWL * (bowl - wall));
+        let (long, shade) = if crumbles { (LONG_SHADOW, DEEP_SHADE) } else { (SHADOW, SHADE) };
+        let length = long * share * self.depth;
+        // Where its edge is far away a shadow is soft.
+        let soft = if crumbles { (0.7 * length).max(HARD) } else { HARD };
+        let mut shadow = sink(self.within(broken, off + TO_LIGHT * length, at + TO_LIGHT * length, seed), soft);
+        let mut sunk = 0.0;
+        if let Some(basin) = &broken.basin {
+            let within = basin.within(off) - 2.0 * self.jag * (0.5 + 0.5 * bump(0x5B, (3.0 * self.jag).max(2.0)));
+            sunk = (within / (1.5 * WALL * self.depth).max(1.0)).clamp(0.0, 1.0);
+            down += (1.0 - SHELF) * sunk;
+            if within > 0.0 {
+                let length = long * (1.0 - SHELF) * self.depth;
+                shadow = shadow.max(sink(basin.within(off + TO_LIGHT * length), soft));
+            }
+        }
+        let fold = |k: u32, size: f32| {
+            let warp =
+                Vec2::new(noise(seed ^ k, at.x / size, at.y / size), noise(seed ^ k ^ 9, at.y / size, at.x / size));
+            facets(seed ^ k, at / size + 0.45 * warp)
+        };
+        let plate = fold(0x51, (0.42 * self.radius).max(2.0 * self.grain));
+        let small = fold(0x54, 1.7 * self.grain);
+        let fade = (0.5 * within).clamp(0.0, 1.0);
+        let mut bumps = self.rough * (plate + if crumbles { 0.2 } else { 0.4 } * small) * fade;
+        let tone = if crumbles {
+            let coarse = bump(0x56, 2.2 * self.grain) + 0.7 * bump(0x5F, 0.3 * self.radius + 6.0 * self.grain);
+            let sand = lattice(seed ^ 0x57, at.x.floor() as i32, at.y.floor() as i32);
+            // The lattices of noise are not to be seen.
+            let turned = Vec2::new(0.8 * at.x - 0.6 * at.y, 0.6 * at.x + 0.8 * at.y);
+            let pit = noise(seed ^ 0x65, 0.42 * turned.x, 0.42 * turned.y);
+            let sand = 0.3 * sand + 0.5 * pit - 0.9 * (-pit - 0.55).max(0.0);
+            bumps += 0.6 * self.rough * pit * fade;
+            // Next to the wall less of the sky is seen.
+            let corner = (1.0 - within / (1.3 * self.depth).max(1.0)).clamp(0.0, 1.0);
+            let mut tone = 0.30 * coarse + 0.16 * plate + (0.5 - 0.2 * stones) * sand
+                - 0.14 * stones
+                - 0.6 * corner * wall
+                - 0.3 * sunk;
+            if stones > 0.0
+                && let Some(stone) = Stone::find(seed ^ 0x5C, at, self.grain, stones)
+            {
+                let shown = fade * wall;
+                tone += (1.8 * stone.tone - 0.7 * tone) * shown;
+                bumps += stone.height * shown;
+            }
+            tone
+        } else {
+            let stone = Cell::find(seed ^ 0x52, at / self.grain);
+            // Few stones are paler or darker than what they lie in.
+            let is_stone = stone.draw.abs() > 0.7;
+            let tone = if is_stone { 0.45 * stone.draw * (5.0 * stone.gap).min(1.0) } else { 0.10 * stone.draw };
+            tone + 0.1 * plate + 0.16 * noise(seed ^ 0x53, 0.9 * at.x, 0.9 * at.y)
+        };
+        place.height = -self.depth * down + bumps;
+        // The wall is of what has come off, not of what lay under it.
+        place.pale = pale * inside * if crumbles { 0.15 + 0.85 * wall } else { 1.0 };
+        place.shade = speckle * tone * inside;
+        place.dark = shade * shadow * inside * (SHADOW * self.depth).min(1.0);
+    }
+
+    /// A chip that lies there, or its shadow.
+    fn add_chip(&self, place: &mut Place, chip: &Chip, off: Vec2, at: Vec2, seed: u32) {
+        let Chip { outline, tone, ink, .. } = chip;
+        let size = outline.reach;
+        if off.distance_squared(outline.centre) > (2.0 * size + 2.0) * (2.0 * size + 2.0) {
+            return;
+        }
+        let crumbles = self.jag > 0.0;
+        let mut within = outline.within(off);
+        if crumbles {
+            within -= 0.14 * size * (1.0 + noise(seed ^ 0x66, 2.2 * at.x / size, 2.2 * at.y / size));
+        }
+        let inside = (within + 0.5).clamp(0.0, 1.0);
+        if inside < 1.0 && *ink <= 0.0 {
+            let shadow = (outline.within(off + TO_LIGHT * (0.45 * size)) + 0.5).clamp(0.0, 1.0);
+            place.dark = place.dark.max(SHADE * shadow * (1.0 - inside));
+        }
+        if inside > 0.0 {
+            place.dark *= 1.0 - inside;
+            let face = if crumbles { 0.16 * noise(seed ^ 0x67, 0.5 * at.x, 0.5 * at.y) } else { 0.0 };
+            place.shade += (tone + face - place.shade) * inside;
+            // It shows the surface's own face.
+            let pale = if *ink > 0.0 { 1.0 } else { 0.3 * self.crushed.pale };
+            place.pale += (pale - place.pale) * inside;
+            if *ink > 0.0 {
+                // On the side that is turned away it is wider.
+                let turned = 0.5 - 0.5 * (off - outline.centre).normalize_or_zero().dot(TO_LIGHT);
+                let edge = (ink * (0.8 + 0.7 * turned) - within + 0.5).clamp(0.0, 1.0);
+                place.dark = place.dark.max(edge * inside);
+                // Two flat faces.
+                let face = (off - outline.centre).dot(-TO_LIGHT) - 0.12 * size;
+                place.shade -= 0.3 * (face + 0.5).clamp(0.0, 1.0);
+            } else {
+                place.height += (0.9 * within).clamp(0.0, if crumbles { 0.2 * size } else { 0.35 * size });
+            }
+        }
+    }
+
+    /// Angular grit in some of the squares of a lattice: much that is small, little that is large.
+    fn add_crumbs(&self, place: &mut Place, at: Vec2, chance: f32, inside: f32, seed: u32) {
+        let side = (1.7 * self.grain).max(4.0);
+        let cell = (at / side).floor();
+        let (x, y) = (cell.x as i32, cell.y as i32);
+        let pick = |what: u32| draw(seed ^ (0x80 + what), x, y);
+        if chance <= 0.0 || pick(0) >= chance {
+            return;
+        }
+        let radius = (0.065 * side / (pick(1) + 0.03).sqrt()).max(0.6);
+        let middle = Vec2::new(pick(2) - 0.5, pick(3) - 0.5) * (side - 3.2 * radius).max(0.0);
+        let off = at - ((cell + 0.5) * side + middle);
+        let way = Vec2::new(pick(4) - 0.5, pick(5) - 0.5).normalize_or(Vec2::X);
+        let sides = [
+            (way, 0.55 + 0.5 * pick(6)),
+            (-way, 0.55 + 0.5 * pick(7)),
+            (way.perp(), 0.5 + 0.4 * pick(8)),
+            (-way.perp(), 0.5 + 0.4 * pick(9)),
+            ((way + way.perp()) * 0.707, 0.45 + 0.4 * pick(10)),
+        ];
+        let within = |off: Vec2| sides.iter().map(|(way, far)| far * radius - off.dot(*way)).fold(FAR_OUT, f32::min);
+        let (here, open) = (within(off), 1.0 - inside);
+        let grit = (here + 0.5).clamp(0.0, 1.0) * open;
+        let shadow = (within(off + TO_LIGHT * (0.7 * radius + 0.4)) + 0.5).clamp(0.0, 1.0) * open;
+        place.dark = place.dark.max(0.8 * SHADE * shadow) * (1.0 - grit);
+        place.pale += (0.45 * self.crushed.pale - place.pale) * grit;
+        place.shade += (0.5 * pick(11) - 0.2 - place.shade) * grit;
+        place.height += here.clamp(0.0, 0.5 * radius) * 0.9 * open;
+    }
+
+    /// Grit in some of the squares of a lattice.
+    fn add_grit(&self, place: &mut Place, at: Vec2, chance: f32, seed: u32) {
+        let side = (1.3 * self.grain).max(3.0);
+        let cell = (at / side).floor();
+        let (x, y) = (cell.x as i32, cell.y as i32);
+        if chance <= 0.0 || draw(seed ^ 30, x, y) >= chance {
+            return;
+        }
+        let radius = 0.09 * side * (1.0 + 1.4 * draw(seed ^ 31, x, y));
+        let middle = Vec2::new(draw(seed ^ 32, x, y), draw(seed ^ 33, x, y)) - 0.5;
+        let off = at - ((cell + 0.5) * side + middle * (0.5 * side));
+        let inside = |off: Vec2| (radius.max(0.6) - off.length() + 0.5).clamp(0.0, 1.0) * (radius / 0.6).min(1.0);
+        let shadow = inside(off + TO_LIGHT * (0.8 * radius + 0.5));
+        let grit = inside(off);
+        place.dark = place.dark.max(0.8 * SHADE * shadow * (1.0 - grit));
+        place.pale += (0.4 * self.crushed.pale - place.pale) * grit;
+        place.height += 0.6 * radius * grit;
+    }
+}

@@ -1,0 +1,181 @@
+//! A crushed zone in texels: what is there at a place.
+
+use super::{
+    broken::Broken,
+    bruise::{self, Bruise},
+    crushed::Crushed,
+    noise::{hash, lattice, noise},
+    outline::{Outline, WIDEST},
+};
+use glam::Vec2;
+
+/// Way to the light: from the upper left.
+pub(super) const TO_LIGHT: Vec2 = Vec2::new(-std::f32::consts::FRAC_1_SQRT_2, -std::f32::consts::FRAC_1_SQRT_2);
+
+/// A crushed zone in texels.
+pub(super) struct Shape<'a> {
+    pub(super) crushed: &'a Crushed,
+    pub(super) radius: f32,
+    pub(super) depth: f32,
+    pub(super) rough: f32,
+    pub(super) grain: f32,
+    pub(super) jag: f32,
+    pub(super) broken: Option<Broken>,
+    /// A hole with a broken edge, and how far that reaches.
+    pub(super) hole: Option<[Outline; 2]>,
+    /// From the hit, and their radii, texels.
+    pub(super) bubbles: Vec<(Vec2, f32)>,
+}
+
+/// What there is at a place.
+#[derive(Clone, Copy)]
+pub(super) struct Place {
+    pub(super) height: f32,
+    pub(super) pale: f32,
+    pub(super) shade: f32,
+    pub(super) dark: f32,
+    pub(super) pit: [u8; 3],
+}
+
+impl Place {
+    pub(super) const NONE: Self = Self { height: 0.0, pale: 0.0, shade: 0.0, dark: 0.0, pit: [0; 3] };
+}
+
+impl<'a> Shape<'a> {
+    pub(super) fn new(crushed: &'a Crushed, unit: f32, radius: f32, seed: u32) -> Self {
+        let grain = (crushed.grain * unit).max(1.0);
+        Self {
+            crushed,
+            radius,
+            depth: crushed.depth * unit,
+            rough: crushed.rough * unit,
+            grain,
+            jag: crushed.jag * unit,
+            broken: crushed.broken.then(|| Broken::new(crushed, unit, radius, grain, seed)),
+            hole: (crushed.hole > 0.0 && crushed.edge > 0.0).then(|| {
+                let hole = crushed.hole * radius;
+                // Within what other outlines reach.
+                let most = radius * crushed.reach.max(1.0 + WIDEST * crushed.ragged) / (1.0 + 0.75 * WIDEST);
+                let around = (hole + (0.75 * crushed.edge * hole).max(1.5)).min(most);
+                let centre = Vec2::ZERO;
+                [
+                    Outline::new(centre, hole, 6 + (seed >> 3) % 3, 2, 0.62, seed ^ 0x71),
+                    Outline::new(centre, around, 8 + (seed >> 5) % 4, 1, 0.75, seed ^ 0x72),
+                ]
+            }),
+            bubbles: bruise::bubbles(crushed.bubbles, radius, crushed.reach, grain, seed),
+        }
+    }
+
+    /// Short cracks and flakes, fewer and fewer outward.
+    pub(super) fn add_bruise(&self, place: &mut Place, off: Vec2, radii: f32, at: Vec2, seed: u32) {
+        let Crushed { ragged, pale, speckle, reach, needles, .. } = self.crushed;
+        let way = off.normalize_or_zero();
+        let round = |k: u32, times: f32| noise(seed ^ k, way.x * times + 17.0, way.y * times + 31.0);
+        let cloud = noise(seed ^ 10, at.x / (3.0 * self.grain), at.y / (3.0 * self.grain));
+        // No outline: what is near is dense, and what is far is not there in more and more places.
+        let stray = 1.0 + ragged * (0.45 * round(2, 1.3) + 0.4 * round(3, 3.7)) + 0.25 * ragged * cloud;
+        let q = radii / stray.max(0.3);
+        let left = (1.0 - q / reach).min(2.0 * (1.0 - radii / reach)).clamp(0.0, 1.0);
+        if left <= 0.0 {
+            return;
+        }
+        let dense = (1.5 * left * left).min(1.0);
+        let fine = (self.radius / (8.0 * self.grain)).sqrt().clamp(0.6, 3.0);
+        let crazing = self.crushed.crazing;
+        let mut bruise = if crazing < 1.0 { bruise::bruise(off, q, dense, fine, seed) } else { Bruise::default() };
+        let mut haze = (1.08 - 0.8 * q).clamp(0.0, 1.0);
+        if crazing > 0.0 {
+            let crazed = bruise::crazed(off, self.radius, left, seed);
+            bruise.crack = bruise.crack * (1.0 - crazing) + crazed.crack * crazing;
+            bruise.flake = bruise.flake * (1.0 - crazing) + crazed.flake * crazing;
+            // No even milk.
+            haze *= 1.0 - crazing * (0.12 - 0.35 * cloud - 0.3 * crazed.flake);
+            place.shade += crazing * needles * (0.5 * crazed.flake - 0.22) * left;
+        }
+        let uneven = 1.0 - speckle * (0.5 + 0.5 * cloud) * (1.0 - 0.5 * haze);
+        let milk = ((1.5 * haze * haze).min(1.0) + (0.55 + 0.75 * crazing) * bruise.flake * left * left) * uneven;
+        place.pale = place.pale.max(needles * pale * milk.max(bruise.crack * (0.35 + 0.65 * left)));
+        place.shade += needles * 0.35 * speckle * (bruise.flake - 0.3) * left;
+        place.height += self.rough * bruise.flake * left * left - self.rough * bruise.crack * left;
+    }
+
+    /// A hole with straight sides: its broken wall is seen within, chips with sharp sides have come off around it.
+    pub(super) fn add_hole(&self, place: &mut Place, [hole, shell]: &[Outline; 2], off: Vec2) {
+        let pale = self.crushed.pale;
+        let (within, inward) = hole.side(off);
+        let inside = (within + 0.5).clamp(0.0, 1.0);
+        let line = |far: f32, thick: f32| (thick + 0.5 - far.abs()).clamp(0.0, 1.0);
+        if inside < 1.0 {
+            let (chip, slope) = shell.side(off);
+            let chipped = (chip + 0.5).clamp(0.0, 1.0) * (1.0 - inside);
+            if chipped > 0.0 {
+                // Each chip leaves a flat face that slopes down to the hole, with a sharp side.
+                let facing = slope.dot(TO_LIGHT);
+                let fall = (-within / (chip - within).max(1.0)).clamp(0.0, 1.0);
+                let face = 0.14 + 0.40 * facing.max(0.0) + 0.30 * (1.0 - fall);
+                let side = 0.75 * line(chip - 0.6, 0.4) * (0.35 + 0.65 * facing.abs());
+                let edge = 0.9 * line(within + 0.8, 0.5);
+                let keep = 1.0 - 0.75 * chipped;
+                place.pale = (place.pale * keep).max(pale * chipped * face.max(side).max(edge));
+                place.shade -= 0.28 * chipped * (-facing).max(0.0);
+            }
+        }
+        if inside > 0.0 {
+            // Glass is thick: more is seen of its far wall, which is lit.
+            let void = (hole.within((off - TO_LIGHT * (0.16 * hole.reach)) * 1.2) + 0.5).clamp(0.0, 1.0);
+            let facing = inward.dot(TO_LIGHT);
+            let bright =
+                (0.10 + 0.50 * facing.max(0.0)).max(0.85 * line(within - 0.7, 0.5) * (0.4 + 0.6 * facing.max(0.0)));
+            let wall = bright.max(0.45 * (1.0 - 2.0 * (void - 0.5).abs())) * (1.0 - void);
+            place.dark = inside;
+            place.pale += (pale * wall - place.pale) * inside;
+            place.shade *= 1.0 - inside;
+        }
+    }
+
+    /// A flat flake to one side of the hit, with arcs around it.
+    pub(super) fn add_flake(&self, place: &mut Place, way: Vec2, q: f32, seed: u32) {
+        let side = Vec2::new(lattice(seed, 1, 7), lattice(seed, 5, 3)).normalize_or(Vec2::Y);
+        let facing = way.dot(side);
+        let reach = 1.0 + (self.crushed.flake - 1.0) * (0.45 + 0.55 * facing).max(0.0);
+        let inside = ((reach - q) * self.radius + 0.5).clamp(0.0, 1.0);
+        if inside <= 0.0 || q <= 0.9 {
+            return;
+        }
+        let share = ((q - 1.0) / (reach - 1.0).max(0.05)).clamp(0.0, 1.0);
+        // Arcs, wider apart outward; each a steep step and a gentle way back.
+        let arcs = 5.0 * share.sqrt() + 0.4 * noise(seed ^ 9, way.x * 2.0, way.y * 2.0);
+        let saw = arcs - arcs.floor();
+        let strength = inside * (1.0 - 0.6 * share);
+        place.height -= 0.35 * self.depth * (1.0 - share) * inside + 0.25 * self.depth * saw * strength;
+        place.pale = place.pale.max(self.crushed.pale * strength * (0.04 + 0.30 * saw * saw * saw));
+        // Its rim catches the light.
+        let rim = (1.0 - ((reach - q) * self.radius - 1.0).abs() / 1.2).clamp(0.0, 1.0);
+        place.pale = place.pale.max(0.5 * self.crushed.pale * rim);
+    }
+
+    /// A crumb in some of the squares of a lattice.
+    pub(super) fn add_crumb(&self, place: &mut Place, at: Vec2, chance: f32, seed: u32) {
+        let side = 2.6 * self.grain;
+        let cell = (at / side).floor();
+        let (x, y) = (cell.x as i32, cell.y as i32);
+        let draw = |k: u32| (hash(seed ^ k, x, y) >> 8) as i32 as f32 * (1.0 / 16_777_216.0);
+        if draw(20) >= chance {
+            return;
+        }
+        let radius = self.grain * (0.35 + 0.85 * draw(21) * draw(22));
+        let middle = (cell + 0.5) * side + (Vec2::new(draw(23), draw(24)) - 0.5) * (side - 2.0 * radius).max(0.0);
+        let off = at - middle;
+        // An angular one: a square on its corner, turned.
+        let turn = Vec2::new(draw(25) - 0.5, draw(26) - 0.5).normalize_or(Vec2::X);
+        let (u, v) = (off.dot(turn).abs(), off.perp_dot(turn).abs());
+        let far = (0.75 * u + 0.75 * v).max(u.max(v)) / radius;
+        let inside = ((1.0 - far) * radius + 0.5).clamp(0.0, 1.0);
+        if inside > 0.0 {
+            place.height += 0.9 * radius * (1.0 - far).clamp(0.0, 0.6);
+            place.pale = place.pale.max(self.crushed.pale.max(0.4) * inside);
+            place.shade += (0.5 * draw(27) - 0.25) * inside;
+        }
+    }
+}

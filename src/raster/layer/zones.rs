@@ -1,0 +1,537 @@
+//! Crushed zones: what a hit leaves around itself.
+
+use super::{
+    crushed::Crushed,
+    noise::noise,
+    outline::WIDEST,
+    shape::{Place, Shape},
+    spot::{SLOPE_UNIT, Spot, TILE, Tile},
+};
+use crate::{
+    Grid,
+    math::mix,
+    pattern::{Strike, SurfaceFrame},
+    raster::TexelRect,
+};
+use glam::{UVec2, Vec2};
+use std::collections::VecDeque;
+
+/// One impact that has crushed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Zone {
+    /// Texels.
+    pos: Vec2,
+    energy: f32,
+    bounds: TexelRect,
+}
+
+/// What more impacts than so many crush on one tile does not show: there is nothing left to crush. The first ones count.
+const MOST: usize = 8;
+
+/// Energies at which a zone gets larger, from 1 to 2, and so on: a thousand little hits on one place do not draw it a thousand times.
+const LEVELS: [f32; 4] = [1.0, 1.189_207_1, std::f32::consts::SQRT_2, 1.681_792_8];
+
+/// The highest level that is not above an energy.
+fn level(energy: f32) -> f32 {
+    let mut octave = 1.0;
+    while octave > energy && octave > 1e-6 {
+        octave *= 0.5;
+    }
+    while 2.0 * octave <= energy && octave < 1e6 {
+        octave *= 2.0;
+    }
+    LEVELS.iter().rev().map(|level| octave * level).find(|level| *level <= energy).unwrap_or(energy)
+}
+
+/// Columns and rows of the tiles that a rectangle touches.
+fn tiles_of(rect: &TexelRect) -> impl Iterator<Item = UVec2> + use<> {
+    let (min, max) = (rect.min / TILE, rect.max.map(|end| end.div_ceil(TILE)));
+    let columns = if rect.is_empty() { 0..0 } else { min.x..max.x };
+    (min.y..max.y).flat_map(move |y| columns.clone().map(move |x| UVec2::new(x, y)))
+}
+
+/// Crushed zones of all impacts, in tiles that are only there where they are.
+#[derive(Clone, Debug)]
+pub(crate) struct CrushedField {
+    crushed: Crushed,
+    frame: SurfaceFrame,
+    seed: u32,
+    /// By impact.
+    zones: Vec<Option<Zone>>,
+    /// Hits that are taken up.
+    shown: usize,
+    columns: u32,
+    tiles: Vec<Option<Box<Tile>>>,
+    used: usize,
+    /// What is still to be drawn, in this order.
+    waiting: VecDeque<Waiting>,
+    /// Which tiles are to be drawn anew.
+    is_anew: Vec<bool>,
+    /// How far beside a plate its side is seen, texels.
+    beyond: u32,
+}
+
+/// A tile that is not drawn yet.
+#[derive(Clone, Copy, Debug)]
+struct Waiting {
+    tile: UVec2,
+    /// The impact that has crushed it since; `None` = all of the tile is to be drawn anew.
+    impact: Option<u32>,
+}
+
+/// What is shown, not the way there.
+impl PartialEq for CrushedField {
+    fn eq(&self, other: &Self) -> bool {
+        self.crushed == other.crushed && self.frame == other.frame && self.tiles == other.tiles
+    }
+}
+
+impl CrushedField {
+    pub(super) fn new(crushed: &Crushed, frame: SurfaceFrame, seed: u64) -> Self {
+        let count = frame.size().map(|side| side.div_ceil(TILE));
+        Self {
+            crushed: *crushed,
+            frame,
+            seed: mix(seed ^ 0xC4) as u32,
+            zones: Vec::new(),
+            shown: 0,
+            columns: count.x,
+            tiles: vec![None; count.element_product() as usize],
+            used: 0,
+            waiting: VecDeque::new(),
+            is_anew: vec![false; count.element_product() as usize],
+            beyond: 0,
+        }
+    }
+
+    /// The same beside plates of this thickness.
+    pub(super) fn with_sides(self, thick: f32) -> Self {
+        Self { beyond: super::plates::beyond(thick, self.frame), ..self }
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.used == 0
+    }
+
+    pub(crate) const fn settings(&self) -> &Crushed {
+        &self.crushed
+    }
+
+    /// Takes up the first hits of `all`, those in `strikes`: from then on it [has to be drawn](Self::draw_some) as they have left it.
+    pub(super) fn follow(&mut self, strikes: &[Strike], all: &[Strike]) {
+        if self.shown == strikes.len() || self.crushed.radius <= 0.0 {
+            return;
+        }
+        // Tiles of impacts that have changed are drawn anew; what is new is laid over them.
+        let (mut anew, mut new) = (Vec::new(), Vec::new());
+        while self.shown > strikes.len() {
+            self.shown -= 1;
+            let Some(strike) = all.get(self.shown) else { continue };
+            self.set(strike, strike.before, &mut anew);
+        }
+        for strike in &strikes[self.shown..] {
+            self.shown += 1;
+            if strike.before > 0.0 {
+                self.set(strike, strike.energy, &mut anew);
+            } else {
+                self.set(strike, strike.energy, &mut Vec::new());
+                new.push(strike.impact);
+            }
+        }
+        anew.sort_unstable_by_key(|tile| (tile.y, tile.x));
+        let columns = self.columns;
+        let slot = |tile: UVec2| (tile.y * columns + tile.x) as usize;
+        anew.retain(|tile| !std::mem::replace(&mut self.is_anew[slot(*tile)], true));
+        if !anew.is_empty() {
+            let Self { waiting, is_anew, .. } = self;
+            waiting.retain(|Waiting { tile, impact }| impact.is_none() || !is_anew[slot(*tile)]);
+            self.waiting.extend(anew.into_iter().map(|tile| Waiting { tile, impact: None }));
+        }
+        for index in new {
+            let Some(Some(zone)) = self.zones.get(index as usize).copied() else { continue };
+            let is_wanted = |tile: &UVec2| !self.is_anew[slot(*tile)] && self.counts(index, *tile);
+            let mut tiles: Vec<UVec2> = tiles_of(&zone.bounds).filter(is_wanted).collect();
+            // From the hit outward.
+            let middle = |tile: UVec2| (tile * TILE + TILE / 2).as_vec2();
+            tiles.sort_by(|a, b| {
+                let far = |tile: UVec2| middle(tile).distance_squared(zone.pos);
+                far(*a).total_cmp(&far(*b))
+            });
+            self.waiting.extend(tiles.into_iter().map(|tile| Waiting { tile, impact: Some(index) }));
+        }
+    }
+
+    /// Whether tiles are still to be drawn.
+    pub(super) fn is_behind(&self) -> bool {
+        !self.waiting.is_empty()
+    }
+
+    /// Draws at most so many tiles; appends the rectangles of the texels that may be others now. Returns whether any are left.
+    ///
+    /// What it shows when none is left depends on the hits alone, not on the slices.
+    pub(super) fn draw_some(
+        &mut self,
+        most: usize,
+        forbidden: Option<&Grid<bool>>,
+        changed: &mut Vec<TexelRect>,
+    ) -> bool {
+        for _ in 0..most {
+            let Some(Waiting { tile, impact }) = self.waiting.pop_front() else { break };
+            let texels = self.texels_of(tile);
+            let Some(impact) = impact else {
+                let slot = (tile.y * self.columns + tile.x) as usize;
+                self.is_anew[slot] = false;
+                self.used -= usize::from(self.tiles[slot].take().is_some());
+                let zones: Vec<u32> = self.on(tile).take(MOST).collect();
+                zones.into_iter().for_each(|index| self.draw(index, tile, forbidden));
+                changed.push(texels);
+                continue;
+            };
+            if let Some(Some(zone)) = self.zones.get(impact as usize) {
+                changed.push(texels.intersect(zone.bounds));
+                self.draw(impact, tile, forbidden);
+            }
+        }
+        self.is_behind()
+    }
+
+    fn texels_of(&self, tile: UVec2) -> TexelRect {
+        let min = tile * TILE;
+        TexelRect { min, max: (min + TILE).min(self.frame.size()) }
+    }
+
+    /// The impacts whose zones touch a tile, in order.
+    fn on(&self, tile: UVec2) -> impl Iterator<Item = u32> + '_ {
+        let rect = self.texels_of(tile);
+        let touches = move |zone: &Option<Zone>| zone.is_some_and(|zone| !zone.bounds.intersect(rect).is_empty());
+        (0..).zip(&self.zones).filter(move |(_, zone)| touches(zone)).map(|(index, _)| index)
+    }
+
+    /// Whether an impact is among the first on a tile, if its zone touches it.
+    fn counts(&self, index: u32, tile: UVec2) -> bool {
+        self.on(tile).take(MOST).take_while(|other| *other < index).count() < MOST
+    }
+
+    /// Gives the impact of a hit this energy; adds the tiles that may be others now.
+    fn set(&mut self, strike: &Strike, energy: f32, others: &mut Vec<UVec2>) {
+        let (index, energy) = (strike.impact as usize, level(energy));
+        if self.zones.len() <= index {
+            self.zones.resize(index + 1, None);
+        }
+        let zone = (energy > 0.0).then(|| {
+            let pos = self.frame.to_texel(strike.pos);
+            let Crushed { reach, flake, ragged, .. } = self.crushed;
+            let radius = self.radius(energy) * reach.max(flake).max(1.0 + WIDEST * ragged);
+            let limit = self.frame.size().as_vec2();
+            let min = (pos - radius - 2.0).floor().clamp(Vec2::ZERO, limit).as_uvec2();
+            let max = (pos + radius + 2.0).ceil().clamp(Vec2::ZERO, limit).as_uvec2();
+            Zone { pos, energy, bounds: TexelRect { min, max } }
+        });
+        let before = std::mem::replace(&mut self.zones[index], zone);
+        if before != zone {
+            let bounds = |zone: Option<Zone>| zone.map_or(TexelRect::default(), |zone| zone.bounds);
+            let tiles = tiles_of(&bounds(before).union(bounds(zone)));
+            others.extend(tiles.filter(|tile| self.counts(strike.impact, *tile)));
+        }
+    }
+
+    fn radius(&self, energy: f32) -> f32 {
+        self.crushed.radius * self.frame.texels_per_unit() * energy.sqrt()
+    }
+
+    /// Lays what an impact has crushed over a tile, if it touches it.
+    fn draw(&mut self, index: u32, tile: UVec2, forbidden: Option<&Grid<bool>>) {
+        let Some(Some(zone)) = self.zones.get(index as usize).copied() else { return };
+        let corner = tile * TILE;
+        let rect = TexelRect { min: corner, max: (corner + TILE).min(self.frame.size()) }.intersect(zone.bounds);
+        if rect.is_empty() {
+            return;
+        }
+        let radius = self.radius(zone.energy);
+        let slot = &mut self.tiles[(tile.y * self.columns + tile.x) as usize];
+        self.used += usize::from(slot.is_none());
+        let texels = slot.get_or_insert_with(|| Box::new([Spot::NONE; (TILE * TILE) as usize]));
+        let seed = self.seed ^ index.wrapping_mul(0x9E37_79B1);
+        let mut shape = Shape::new(&self.crushed, self.frame.texels_per_unit(), radius, seed);
+        if let Some(broken) = &mut shape.broken {
+            broken.keep_near(rect.min.as_vec2() - zone.pos, rect.max.as_vec2() - zone.pos, shape.depth);
+        }
+        let (min, max) = (rect.min.as_vec2() - zone.pos - 2.0, rect.max.as_vec2() - zone.pos + 2.0);
+        shape.bubbles.retain(|&(middle, radius)| {
+            let far = middle.clamp(min, max).distance_squared(middle);
+            far <= (radius + 1.0) * (radius + 1.0)
+        });
+        shape.draw(texels, zone.pos, seed, rect, corner);
+        let Some(forbidden) = forbidden else { return };
+        for y in rect.min.y..rect.max.y {
+            for x in rect.min.x..rect.max.x {
+                if forbidden.get(x, y) == Some(true) {
+                    texels[((y - corner.y) * TILE + x - corner.x) as usize] = Spot::NONE;
+                }
+            }
+        }
+    }
+
+    /// Whether a plate whose middle is at a place, and all of it within `extent` of it, is gone in a hole, or whole beside one; `None` if no hole
+    /// is there, or the plate is as large as that. Only holes of impacts that show all of the plate anew when they are shown. Texels.
+    pub(crate) fn is_gone(&self, at: Vec2, extent: f32) -> Option<bool> {
+        let around = extent + 2.0 + self.beyond as f32;
+        let (min, max) = ((at - around).max(Vec2::ZERO), (at + around).min(self.frame.size().as_vec2()));
+        let plate = TexelRect { min: min.as_uvec2(), max: max.ceil().as_uvec2() };
+        let near = (0..).zip(&self.zones).filter_map(|(index, zone)| {
+            let zone = zone.as_ref()?;
+            let hole = self.radius(zone.energy) * self.crushed.hole;
+            let holds = zone.bounds.min.as_vec2().cmple(min).all() && zone.bounds.max.as_vec2().cmpge(max).all();
+            let shows = || tiles_of(&plate).all(|tile| self.counts(index, tile));
+            (holds && extent < hole && shows()).then(|| at.distance_squared(zone.pos) < hole * hole)
+        });
+        near.max()
+    }
+
+    /// Whether anything may be crushed in a rectangle.
+    pub(crate) fn touches(&self, rect: TexelRect) -> bool {
+        let (min, max) = (rect.min / TILE, rect.max.map(|end| end.div_ceil(TILE)));
+        (min.y..max.y).any(|y| (min.x..max.x).any(|x| self.tiles[(y * self.columns + x) as usize].is_some()))
+    }
+
+    /// The texels of row `y` from column `x` on.
+    pub(crate) fn read(&self, x: u32, y: u32, to: &mut [Spot]) {
+        let mut rest = to;
+        let mut x = x;
+        while !rest.is_empty() {
+            let within = x % TILE;
+            let (now, later) = rest.split_at_mut(rest.len().min((TILE - within) as usize));
+            match self.tiles.get((y / TILE * self.columns + x / TILE) as usize) {
+                Some(Some(tile)) => {
+                    let first = (y % TILE * TILE + within) as usize;
+                    now.copy_from_slice(&tile[first..first + now.len()]);
+                }
+                _ => now.fill(Spot::NONE),
+            }
+            x += now.len() as u32;
+            rest = later;
+        }
+    }
+}
+
+impl Shape<'_> {
+    /// Lays it over the texels `rect` of a tile whose first texel is at `corner`.
+    fn draw(&self, texels: &mut Tile, centre: Vec2, seed: u32, rect: TexelRect, corner: UVec2) {
+        const WIDE: usize = TILE as usize + 2;
+        // Heights around each texel are needed for its slope.
+        let mut places = [Place::NONE; WIDE * WIDE];
+        let (size, first) = (rect.size().as_usizevec2(), rect.min.as_vec2() - 0.5);
+        for y in 0..size.y + 2 {
+            for x in 0..size.x + 2 {
+                let at = first + Vec2::new(x as f32, y as f32);
+                places[y * WIDE + x] = self.place(at - centre, at, seed);
+            }
+        }
+        let corner = (rect.min - corner).as_usizevec2();
+        for y in 0..size.y {
+            for x in 0..size.x {
+                let at = (y + 1) * WIDE + x + 1;
+                let slope = |step: usize| {
+                    let slope = 0.5 * (places[at - step].height - places[at + step].height);
+                    (slope * SLOPE_UNIT).clamp(-32_000.0, 32_000.0) as i16
+                };
+                let Place { height, pale, shade, dark, pit } = places[at];
+                let deep = if self.depth > 0.0 { -height / self.depth } else { 0.0 };
+                let spot = Spot {
+                    // Nothing is lit in a hole.
+                    slope: if dark > 0.5 { [0; 2] } else { [slope(1), slope(WIDE)] },
+                    pale: (pale.clamp(0.0, 1.0) * 255.0 + 0.5) as u8,
+                    shade: (shade * 128.0).clamp(-127.0, 127.0) as i8,
+                    dark: (dark.clamp(0.0, 1.0) * 255.0 + 0.5) as u8,
+                    deep: (deep.clamp(0.0, 1.0) * 255.0 + 0.5) as u8,
+                    pit,
+                };
+                let texel = &mut texels[(y + corner.y) * TILE as usize + x + corner.x];
+                *texel = texel.with(spot);
+            }
+        }
+    }
+
+    /// `off` is the way from the centre, `at` the place in the field.
+    fn place(&self, off: Vec2, at: Vec2, seed: u32) -> Place {
+        let Crushed { ragged, soft, hole, pale, speckle, flake, dust, chips, reach, .. } = *self.crushed;
+        let mut place = Place::NONE;
+        let distance = off.length();
+        let radii = distance / self.radius.max(0.5);
+        // No outline strays further than that.
+        let widest = 1.0 + WIDEST * ragged;
+        if radii > reach.max(flake).max(widest) + 0.1 {
+            return place;
+        }
+        if let Some(broken) = &self.broken {
+            self.break_off(&mut place, broken, off, at, seed);
+            return place;
+        }
+        let way = off / distance.max(1.0e-3);
+        let grain = |k: u32, size: f32| noise(seed ^ k, at.x / size, at.y / size);
+        let round = |k: u32, times: f32| noise(seed ^ k, way.x * times + 17.0, way.y * times + 31.0);
+        let mut inside = 0.0;
+        if self.crushed.needles > 0.0 {
+            self.add_bruise(&mut place, off, radii, at, seed);
+        }
+        if radii <= widest {
+            let fine = grain(1, self.grain);
+            let edge = 1.0 + ragged * (0.55 * round(2, 1.3) + 0.35 * round(3, 3.7) + 0.2 * fine);
+            let outline = (self.radius * edge).max(0.5);
+            // One texel of soft edge.
+            inside = (outline - distance + 0.5).clamp(0.0, 1.0);
+            if inside > 0.0 {
+                let coarse = grain(4, 2.3 * self.grain);
+                let rest = (1.0 - distance / outline).clamp(0.0, 1.0);
+                let fade = inside + soft * ((1.5 * rest).min(1.0) - inside);
+                // A broken edge is steep, a soft one has none.
+                let bowl = rest.sqrt() + soft * (rest * rest - rest.sqrt());
+                place.height += -self.depth * bowl + fade * self.rough * (0.6 * coarse + 0.4 * fine);
+                let grains = 1.0 - speckle * (0.5 + 0.5 * grain(5, 0.6 * self.grain)).clamp(0.0, 1.0);
+                place.pale = place.pale.max(pale * fade * grains * (1.0 - self.crushed.needles));
+                place.shade += speckle * (0.6 * coarse + 0.3 * fine) * inside * (1.0 - self.crushed.needles);
+            }
+        }
+        if flake > 1.0 {
+            self.add_flake(&mut place, way, radii, seed);
+        }
+        if (inside < 1.0 || self.crushed.needles > 0.0) && radii < reach {
+            let left = 1.0 - ((radii - 0.8) / (reach - 0.8)).clamp(0.0, 1.0);
+            if dust > 0.0 {
+                let cloud = 0.65 + 0.35 * grain(6, 5.0 * self.grain);
+                let powder = inside * (1.0 - self.crushed.needles);
+                place.pale = place.pale.max(dust * left * left * cloud * (1.0 - powder));
+            }
+            self.add_crumb(&mut place, at, chips * left * left, seed);
+        }
+        for &(middle, radius) in &self.bubbles {
+            let (off, out) = (off - middle, off.distance(middle));
+            let inside = (radius + 0.5 - out).clamp(0.0, 1.0);
+            if inside > 0.0 {
+                // A bright ring, brighter where the light leaves it, and a highlight.
+                let ring = (1.0 - (radius - 0.7 - out).abs() / 1.2).clamp(0.0, 1.0);
+                let leaves = 0.5 + 0.35 * (off.x + off.y) / out.max(0.5);
+                let light = (0.34 * radius + 0.5 - (off + 0.38 * radius).length()).clamp(0.0, 1.0);
+                let white = (ring * leaves).max(light);
+                place.pale += (white.max(0.10) - place.pale) * (0.8 * inside);
+                place.shade += (0.3 * white - 0.25 * (1.0 - white) - place.shade) * inside;
+            }
+        }
+        if let Some(hole) = &self.hole {
+            self.add_hole(&mut place, hole, off);
+        } else if hole > 0.0 && radii <= hole * (1.0 + WIDEST * ragged) + 1.0 {
+            let radius = self.radius * hole * (1.0 + 0.6 * ragged * (round(7, 1.9) + 0.5 * round(8, 4.3)));
+            place.dark = (radius - distance + 0.5).clamp(0.0, 1.0);
+        }
+        place
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{math::Rng, pattern::Timeline};
+
+    /// Hits here and there, some of which merge with earlier ones and come long after them.
+    fn timeline(rng: &mut Rng) -> Timeline {
+        let mut timeline = Timeline::default();
+        let mut energies = Vec::<f32>::new();
+        for _ in 0..30 {
+            let energy = rng.range(0.1, 3.0);
+            let pos = |impact: usize| 0.2 + 0.6 * Vec2::new((impact % 4) as f32, (impact / 4) as f32) / 4.0;
+            if rng.range(0.0, 1.0) < 0.4 && !energies.is_empty() {
+                let impact = rng.range(0.0, energies.len() as f32) as usize % energies.len();
+                timeline.strike(impact as u32, pos(impact), energies[impact], energies[impact] + energy);
+                energies[impact] += energy;
+            } else {
+                timeline.strike(energies.len() as u32, pos(energies.len()), 0.0, energy);
+                energies.push(energy);
+            }
+        }
+        timeline
+    }
+
+    #[test]
+    fn slices_and_the_way_there_do_not_matter() {
+        let frame = SurfaceFrame::new(UVec2::new(200, 140)).unwrap();
+        for seed in 0..12 {
+            let mut rng = Rng::new(seed);
+            let timeline = timeline(&mut rng);
+            let all = timeline.strikes();
+            let crushed = Crushed { broken: seed % 2 == 0, radius: 0.06, ..Crushed::DEFAULT };
+            let mut field = CrushedField::new(&crushed, frame, seed);
+            let mut shown = Grid::new(frame.size(), Spot::NONE);
+            for _ in 0..80 {
+                let count = rng.range(0.0, all.len() as f32 + 1.0) as usize;
+                field.follow(&all[..count.min(all.len())], all);
+                let mut changed = Vec::new();
+                field.draw_some(rng.range(0.0, 12.0) as usize, None, &mut changed);
+                copy(&field, &changed, &mut shown);
+            }
+            let count = rng.range(0.0, all.len() as f32 + 1.0) as usize;
+            field.follow(&all[..count.min(all.len())], all);
+            let mut changed = Vec::new();
+            while field.draw_some(3, None, &mut changed) {}
+            copy(&field, &changed, &mut shown);
+            let mut at_once = CrushedField::new(&crushed, frame, seed);
+            at_once.follow(&all[..count.min(all.len())], all);
+            assert!(at_once.is_behind() == (count > 0) && !field.is_behind());
+            at_once.draw_some(usize::MAX, None, &mut Vec::new());
+            let whole = TexelRect::whole(frame.size());
+            let mut expected = Grid::new(frame.size(), Spot::NONE);
+            copy(&at_once, &[whole], &mut expected);
+            let mut now = Grid::new(frame.size(), Spot::NONE);
+            copy(&field, &[whole], &mut now);
+            assert!(now == expected, "seed {seed}");
+            assert!(shown == expected, "seed {seed}: some texels changed without notice");
+        }
+    }
+
+    fn copy(field: &CrushedField, rects: &[TexelRect], to: &mut Grid<Spot>) {
+        for rect in rects {
+            for y in rect.min.y..rect.max.y {
+                field.read(rect.min.x, y, &mut to.row_mut(y as usize)[rect.min.x as usize..rect.max.x as usize]);
+            }
+        }
+    }
+
+    #[test]
+    fn it_is_drawn_from_the_hit_outward() {
+        let frame = SurfaceFrame::new(UVec2::splat(512)).unwrap();
+        let mut field = CrushedField::new(&Crushed { radius: 0.2, ..Crushed::DEFAULT }, frame, 1);
+        let mut timeline = Timeline::default();
+        timeline.strike(0, Vec2::new(0.3, 0.6), 0.0, 1.0);
+        field.follow(timeline.strikes(), timeline.strikes());
+        let mut last = 0.0;
+        loop {
+            let mut changed = Vec::new();
+            let is_left = field.draw_some(1, None, &mut changed);
+            let [rect] = changed[..] else { panic!("one tile, not {}", changed.len()) };
+            let middle = (rect.min / TILE * TILE + TILE / 2).as_vec2();
+            let far = middle.distance(frame.to_texel(Vec2::new(0.3, 0.6)));
+            assert!(far >= last, "{far} after {last}");
+            last = far;
+            if !is_left {
+                break;
+            }
+        }
+        assert!(last > 200.0);
+    }
+
+    #[test]
+    fn what_breaks_is_deep_inside_and_level_far_away() {
+        let frame = SurfaceFrame::new(UVec2::splat(256)).unwrap();
+        for seed in 0..20 {
+            let crushed = Crushed { broken: true, basin: 0.6, depth: 0.02, radius: 0.1, ..Crushed::DEFAULT };
+            let mut field = CrushedField::new(&crushed, frame, seed);
+            let mut timeline = Timeline::default();
+            timeline.strike(0, Vec2::splat(0.5), 0.0, 1.0);
+            field.follow(timeline.strikes(), timeline.strikes());
+            field.draw_some(usize::MAX, None, &mut Vec::new());
+            let mut row = [Spot::default(); 256];
+            field.read(0, 128, &mut row);
+            assert!(row[128].deep > 100 && row[128].pale > 0, "seed {seed}: {:?}", row[128]);
+            assert_eq!((row[0], row[255]), (Spot::default(), Spot::default()));
+        }
+    }
+}

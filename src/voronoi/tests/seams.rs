@@ -1,0 +1,205 @@
+//! Seams, and the networks that they become.
+
+use super::{drawing, made};
+use crate::{
+    Grid,
+    math::Rng,
+    voronoi::{Front, Guide, Seam, SiteLayout, VoronoiParams},
+};
+use glam::{UVec2, Vec2};
+use std::collections::BTreeMap;
+
+#[test]
+fn cracks_cover_the_strokes() {
+    let mut rng = Rng::new(12);
+    for seed in 0..6 {
+        let image = drawing(&mut rng, UVec2::new(300, 300));
+        let report = |layout: SiteLayout| {
+            let params = VoronoiParams { layout, ..VoronoiParams::DEFAULT };
+            made(&params, &[Guide::new(image.clone())], [400, 400], seed).0.strokes()
+        };
+        let report = report(SiteLayout::Astride).unwrap();
+        assert!(report.covered >= 0.95 && report.length > 1.0, "{report:?}");
+    }
+}
+
+/// Signed area to the left of a line, texels: negative if it runs round its left side clockwise on the screen.
+fn sweep(seam: &Seam) -> f64 {
+    let points: Vec<_> = seam.points.iter().map(|point| point.pos.as_dvec2()).collect();
+    0.5 * points.windows(2).map(|pair| pair[0].perp_dot(pair[1])).sum::<f64>()
+}
+
+#[test]
+fn seams_meet_in_their_vertices_alone() {
+    let mut rng = Rng::new(31);
+    for seed in 0..8 {
+        let guides = [Guide::new(drawing(&mut rng, UVec2::new(60, 60)))];
+        let params = VoronoiParams { sites: 90, levels: 1 + (seed % 3) as u32, ..VoronoiParams::DEFAULT };
+        let (map, seams) = made(&params, &guides[..(seed % 2) as usize], [120, 90], seed);
+        let mut ends = vec![0; seams.vertices.len()];
+        let mut pieces = Vec::new();
+        for (i, seam) in seams.seams.iter().enumerate() {
+            assert!(seam.left != seam.right && seam.points.len() >= 2);
+            assert_eq!(seam.points[0].pos, seams.vertices[seam.from as usize].pos);
+            assert_eq!(seam.points[seam.points.len() - 1].pos, seams.vertices[seam.to as usize].pos);
+            ends[seam.from as usize] += 1;
+            ends[seam.to as usize] += 1;
+            let n = seam.points.len() - 1;
+            pieces.extend(seam.points.windows(2).enumerate().map(|(k, pair)| {
+                let name = |k: usize| match k {
+                    0 => (usize::MAX, seam.from as usize),
+                    k if k == n => (usize::MAX, seam.to as usize),
+                    k => (i, k),
+                };
+                ([pair[0].pos, pair[1].pos], [name(k), name(k + 1)])
+            }));
+        }
+        for (vertex, ends) in seams.vertices.iter().zip(ends) {
+            let (pos, extent) = (vertex.pos, seams.extent);
+            let on_border = pos.x == 0.0 || pos.y == 0.0 || pos.x == extent.x || pos.y == extent.y;
+            assert_eq!(vertex.on_border, on_border);
+            assert!(if on_border { ends == 1 } else { (2..=4).contains(&ends) }, "{vertex:?} has {ends} ends");
+        }
+        for (i, (a, a_names)) in pieces.iter().enumerate() {
+            for (b, b_names) in &pieces[i + 1..] {
+                let apart = a[0].min(a[1]).cmpgt(b[0].max(b[1])).any() || b[0].min(b[1]).cmpgt(a[0].max(a[1])).any();
+                if apart || a_names.iter().any(|name| b_names.contains(name)) {
+                    continue;
+                }
+                let side = |from: Vec2, to: Vec2, p: Vec2| (to - from).as_dvec2().perp_dot((p - from).as_dvec2());
+                let crossed = side(a[0], a[1], b[0]) * side(a[0], a[1], b[1]) <= 0.0
+                    && side(b[0], b[1], a[0]) * side(b[0], b[1], a[1]) <= 0.0;
+                assert!(!crossed, "{a:?} crosses {b:?}");
+            }
+        }
+        // Round a region that does not reach the border, its seams enclose about as much as it has texels.
+        let regions = map.regions().unwrap();
+        let (w, h) = (regions.width(), regions.height());
+        let (mut texels, mut areas, mut inner) = (BTreeMap::new(), BTreeMap::new(), BTreeMap::new());
+        for (i, &region) in regions.as_slice().iter().enumerate() {
+            *texels.entry(region).or_insert(0.0) += 1.0;
+            let border = i % w == 0 || i % w == w - 1 || i < w || i / w == h - 1;
+            *inner.entry(region).or_insert(true) &= !border;
+        }
+        for seam in &seams.seams {
+            // y is down: a region to the right is run round with growing angle, its area is positive.
+            *areas.entry(seam.right).or_insert(0.0) += sweep(seam) * 8100.0;
+            *areas.entry(seam.left).or_insert(0.0) -= sweep(seam) * 8100.0;
+        }
+        for (region, texels) in texels.iter().filter(|(region, _)| inner[region]) {
+            let area: f64 = areas[region];
+            assert!((area - texels).abs() < 4.0 + 0.2 * texels, "region {region}: {area} instead of {texels}");
+        }
+    }
+}
+
+/// A region that lies wholly within another one has a ring of a seam.
+#[test]
+fn islands_have_rings() {
+    let mut wall = Grid::new(UVec2::splat(40), 0.0);
+    for y in 10..30 {
+        for x in 10..30 {
+            let edge = !(14..26).contains(&x) || !(14..26).contains(&y);
+            wall.row_mut(y)[x] = if edge { 1.0 } else { 0.0 };
+        }
+    }
+    let layout = SiteLayout::Given(vec![Vec2::splat(0.05), Vec2::splat(0.5)]);
+    let params = VoronoiParams { layout, ..VoronoiParams::DEFAULT };
+    let (_, seams) = made(&params, &[Guide { gamma: 200.0, ..Guide::new(wall) }], [40, 40], 1);
+    assert_eq!((seams.seams.len(), seams.vertices.len()), (1, 1));
+    let seam = &seams.seams[0];
+    assert_eq!((seam.from, seam.to), (0, 0));
+    let area = sweep(seam).abs() * 1600.0;
+    assert!((150.0..300.0).contains(&area), "{area}");
+}
+
+#[test]
+fn networks_hold_every_seam_and_are_in_order_of_birth() {
+    let mut rng = Rng::new(77);
+    for seed in 0..4 {
+        let guide = Guide::new(drawing(&mut rng, UVec2::new(80, 80)));
+        let (_, seams) = made(&VoronoiParams::DEFAULT, &[guide], [160, 120], seed);
+        let network = seams.network(Vec2::new(0.4, 0.6));
+        let length: f64 = network
+            .segments()
+            .map(|segment| {
+                let (a, b) = network.ends(segment).unwrap();
+                let at = |i: u32| network.nodes()[i as usize].pos.as_dvec2();
+                assert_eq!(network.path(segment).unwrap().points().len(), 2, "the line is straight");
+                at(a).distance(at(b))
+            })
+            .sum();
+        let want: f64 = seams
+            .seams
+            .iter()
+            .flat_map(|seam| seam.points.windows(2))
+            .map(|pair| pair[0].pos.as_dvec2().distance(pair[1].pos.as_dvec2()))
+            .sum();
+        assert!((length / want - 1.0).abs() < 1.0e-6, "{length} of {want}");
+        assert!(network.nodes().is_sorted_by_key(|node| node.birth) && network.links().is_sorted_by_key(|l| l.birth));
+        for (i, node) in (0u32..).zip(network.nodes()) {
+            assert!(node.width > 0.0 && (node.parent < i || node.parent == crate::pattern::NO_PARENT));
+        }
+        let first = network.nodes()[0].pos.distance(Vec2::new(0.4, 0.6));
+        assert!(network.nodes().iter().all(|node| node.pos.distance(Vec2::new(0.4, 0.6)) >= first));
+    }
+}
+
+#[test]
+fn fronts_only_open_and_end_with_all_seams() {
+    let (map, seams) = made(&VoronoiParams::DEFAULT, &[], [200, 150], 4);
+    let profile = crate::raster::Profile::DEFAULT;
+    let empty = crate::raster::DepthField::new(*map.frame());
+    let mut full = empty.clone();
+    seams.stamp(&mut full, &profile);
+    let front = Front::new(&seams, Vec2::splat(0.5));
+    let mut last = empty.clone();
+    for i in 0..=10 {
+        let mut field = empty.clone();
+        seams.stamp_front(&mut field, &profile, &front, front.reach() * i as f32 / 10.0);
+        let mut pairs = last.depth.as_slice().iter().zip(field.depth.as_slice());
+        // Equal but for the last bits of the f32 arithmetic.
+        assert!(pairs.all(|(&before, &now)| now.saturating_add(64) >= before), "a crack has closed at {i}");
+        assert!(i == 10 || field != full);
+        last = field;
+    }
+    assert!(last == full);
+    let mut field = empty.clone();
+    seams.stamp_front(&mut field, &profile, &front, -1.0);
+    seams.stamp_share(&mut field, &profile, 0.0);
+    assert!(field == empty);
+    seams.stamp_share(&mut field, &profile, 7.0);
+    assert!(field == full);
+}
+
+/// Strokes end in needles: no crack widens faster than by a slope, and none is alone as wide as it is where it meets others.
+#[test]
+fn strokes_run_out() {
+    for seed in 0..6 {
+        let mut rng = Rng::new(seed);
+        let guide = Guide::new(drawing(&mut rng, UVec2::new(300, 200)));
+        let (_, seams) = made(&VoronoiParams::DEFAULT, &[guide], [300, 200], seed);
+        let mut widths = vec![Vec::new(); seams.vertices.len()];
+        let (mut steepest, mut widest) = (0.0f32, 0.0f32);
+        for seam in &seams.seams {
+            widths[seam.from as usize].push(seam.points[0].width);
+            widths[seam.to as usize].push(seam.points[seam.points.len() - 1].width);
+            for pair in seam.points.windows(2) {
+                let slope = (pair[1].width - pair[0].width).abs() / pair[0].pos.distance(pair[1].pos).max(1.0e-6);
+                steepest = steepest.max(slope);
+                widest = widest.max(pair[0].width);
+            }
+        }
+        // The line is a little shorter than the way along all its texels.
+        assert!(steepest < 0.3, "seed {seed}: {steepest}");
+        assert!(widest > 0.01, "seed {seed}: no stroke is wide");
+        for (vertex, mut widths) in seams.vertices.iter().zip(widths) {
+            widths.sort_by(f32::total_cmp);
+            if let [.., second, first] = widths[..]
+                && !vertex.on_border
+            {
+                assert_eq!(first, second, "seed {seed} at {}", vertex.pos);
+            }
+        }
+    }
+}
