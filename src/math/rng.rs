@@ -1,9 +1,13 @@
 //! A small random generator with a frozen stream.
 
+use rand_core::{Infallible, TryRng};
+use rand_pcg::Pcg32;
+
 /// PCG-XSH-RR 64/32 (O'Neill 2014), seeded through `SplitMix64`.
 ///
 /// The stream is part of the crate's contract: a seed gives the same numbers in every version and on every machine.
-/// Each consumer draws from a stream of its own, so that a new consumer does not shift the others.
+/// Each consumer draws from a stream of its own, so that a new consumer does not shift the others. It is a generator of
+/// [`rand_core`], so that distributions of `rand` can draw from it.
 ///
 /// ```
 /// use bevy_crack::math::Rng;
@@ -16,9 +20,11 @@
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Rng {
     seed: u64,
-    state: u64,
-    increment: u64,
+    core: Pcg32,
 }
+
+/// The inverse of the factor by which the state of a [`Pcg32`] goes on, modulo 2⁶⁴.
+const BACK: u64 = 0xC097_EF87_329E_28A5;
 
 /// One round of `SplitMix64`: a good 64-bit hash of `x`.
 #[must_use]
@@ -38,9 +44,11 @@ pub(crate) fn hash_unit(seed: u64, index: u64) -> f32 {
 impl Rng {
     /// A generator for `seed`. Every seed is good, zero included.
     #[must_use]
-    pub const fn new(seed: u64) -> Self {
+    pub fn new(seed: u64) -> Self {
         let increment = mix(seed ^ 0xDA3E_39CB_94B9_5BDB) | 1;
-        Self { seed, state: mix(seed).wrapping_add(increment), increment }
+        // `Pcg32` goes on by one state before the first number; here the first one is that of `mix(seed) + increment`.
+        let state = mix(seed).wrapping_mul(BACK).wrapping_sub(increment);
+        Self { seed, core: Pcg32::new(state, increment >> 1) }
     }
 
     /// An independent generator for the consumer called `name`; does not advance `self`.
@@ -53,17 +61,14 @@ impl Rng {
 
     /// An independent generator for the `index`-th thing of its kind; does not advance `self`.
     #[must_use]
-    pub const fn nth(&self, index: u64) -> Self {
+    pub fn substream(&self, index: u64) -> Self {
         Self::new(mix(self.seed.wrapping_add(mix(index))))
     }
 
     /// The next 32 random bits.
     pub fn next_u32(&mut self) -> u32 {
-        let old = self.state;
-        self.state = old.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(self.increment);
-        #[expect(clippy::cast_possible_truncation, reason = "the generator is defined on the low 32 bits")]
-        let xorshifted = (((old >> 18) ^ old) >> 27) as u32;
-        xorshifted.rotate_right((old >> 59) as u32)
+        let Ok(bits) = self.core.try_next_u32();
+        bits
     }
 
     /// A number in `[0, 1)`, a multiple of 2⁻²⁴.
@@ -82,24 +87,56 @@ impl Rng {
     }
 }
 
+impl TryRng for Rng {
+    type Error = Infallible;
+
+    fn try_next_u32(&mut self) -> Result<u32, Infallible> {
+        self.core.try_next_u32()
+    }
+
+    fn try_next_u64(&mut self) -> Result<u64, Infallible> {
+        self.core.try_next_u64()
+    }
+
+    fn try_fill_bytes(&mut self, bytes: &mut [u8]) -> Result<(), Infallible> {
+        self.core.try_fill_bytes(bytes)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    #[test]
-    fn stream_is_frozen() {
-        let mut rng = Rng::new(42).stream("markers");
-        let drawn: Vec<u32> = (0..4).map(|_| rng.next_u32()).collect();
-        // A change here changes every pattern of every user.
-        assert_eq!(drawn, Rng::new(42).stream("markers").take4());
-        assert_ne!(drawn, Rng::new(43).stream("markers").take4());
-        assert_ne!(drawn, Rng::new(42).stream("starts").take4());
+    fn draw<const N: usize>(mut rng: Rng) -> [u32; N] {
+        std::array::from_fn(|_| rng.next_u32())
     }
 
-    impl Rng {
-        fn take4(mut self) -> Vec<u32> {
-            (0..4).map(|_| self.next_u32()).collect()
+    /// The numbers of O'Neill's `pcg32-demo`.
+    #[test]
+    fn the_core_is_pcg32() {
+        let rng = Rng { seed: 0, core: Pcg32::new(42, 54) };
+        assert_eq!(draw(rng), [0xA15C_02B7, 0x7B47_F409, 0xBA1D_3330, 0x83D2_F293, 0xBFA4_784B, 0xCBED_606E]);
+    }
+
+    #[test]
+    fn streams_are_frozen() {
+        // A change here changes every pattern of every user.
+        assert_eq!(draw(Rng::new(0)), [0x0AD8_3C82, 0xEE30_42B1, 0xDB3D_FD95, 0x0861_8827]);
+        assert_eq!(draw(Rng::new(42).stream("markers")), [0x4972_FDDB, 0xC6E5_92D5, 0x42B6_3009, 0xB9AE_2B4E]);
+        assert_eq!(draw(Rng::new(42).substream(7)), [0x7A04_C449, 0xAE25_B8E2, 0x7BF1_7BA1, 0xDFE4_8612]);
+        assert_ne!(draw::<4>(Rng::new(42).stream("markers")), draw(Rng::new(43).stream("markers")));
+        assert_ne!(draw::<4>(Rng::new(42).stream("markers")), draw(Rng::new(42).stream("starts")));
+    }
+
+    /// Generic code draws the same numbers.
+    #[test]
+    fn it_is_a_generator_of_rand() {
+        fn long(rng: &mut impl rand_core::Rng) -> (u32, u64) {
+            (rng.next_u32(), rng.next_u64())
         }
+        let mut rng = Rng::new(7);
+        let [first, low, high] = draw(rng.clone());
+        assert_eq!(long(&mut rng), (first, u64::from(high) << 32 | u64::from(low)));
     }
 
     #[test]

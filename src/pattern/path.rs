@@ -132,7 +132,7 @@ pub(super) fn rough_path(
     if roughness <= 0.0 || levels == 0 {
         return path;
     }
-    let mut rng = Rng::new(seed).nth(salt);
+    let mut rng = Rng::new(seed).substream(salt);
     let n = 1usize << levels;
     path.points[n] = path.points[1];
     path.len = n + 1;

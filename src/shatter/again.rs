@@ -100,7 +100,7 @@ impl Shards {
             drawing.line(closed.map(|&corner| self.positions()[corner as usize]));
         }
         drawing.make_planar();
-        let mut rng = Rng::new(seed).stream("break again").nth(u64::from(shard));
+        let mut rng = Rng::new(seed).stream("break again").substream(u64::from(shard));
         let mut round = 0;
         loop {
             let mut faces = Faces::trace(&mut drawing);
@@ -124,7 +124,7 @@ impl Shards {
                 let askew = 0.4 * rng.signed();
                 let across = pieces.axis(piece) + std::f32::consts::FRAC_PI_2 + askew;
                 let own = u64::from(rng.next_u32());
-                drawing.cut_across(from, ops::unit(across), rng.nth(own));
+                drawing.cut_across(from, ops::unit(across), rng.substream(own));
             }
             drawing.make_planar();
             round += 1;

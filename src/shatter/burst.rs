@@ -209,7 +209,7 @@ impl Burst {
         let BurstParams { speed, falloff, along, scatter, .. } = self.params;
         let away = shard.centroid - self.from;
         let distance = away.length();
-        let mut rng = Rng::new(self.seed).stream("burst").nth(u64::from(number));
+        let mut rng = Rng::new(self.seed).stream("burst").substream(u64::from(number));
         let mut noise = || Vec3::new(rng.signed(), rng.signed(), rng.signed());
         // Away from the hit; right behind it, only along its direction.
         let out = Vec3::new(away.x, -away.y, 0.0) / (distance * distance + 0.1 * falloff * falloff).sqrt();
@@ -223,7 +223,7 @@ impl Burst {
     /// The flight of a piece that merely falls.
     #[must_use]
     pub fn fall(&self, number: u32, shard: &Shard) -> Flight {
-        let mut rng = Rng::new(self.seed).stream("fall").nth(u64::from(number));
+        let mut rng = Rng::new(self.seed).stream("fall").substream(u64::from(number));
         let velocity = Vec3::new(rng.signed(), 0.0, rng.signed()) * (0.04 * self.params.scatter);
         let mut flight = self.released(shard, velocity, shard.centroid.distance(self.from), rng);
         flight.spin *= 0.25;

@@ -229,7 +229,7 @@ impl Drawing {
                 }
             }
             let ends = [tip, hit].map(|v| self.lattice.pos(self.places[v as usize]));
-            let line = self.rough_line(ends, rng.nth(u64::from(tip)));
+            let line = self.rough_line(ends, rng.substream(u64::from(tip)));
             self.line(line.iter().copied());
             grid.add_new(self);
             lines.push(line);

@@ -123,7 +123,7 @@ impl Shards {
         if shift == 0.0 {
             return Vec2::ZERO;
         }
-        let mut rng = Rng::new(seed).stream("shift").nth(u64::from(shard));
+        let mut rng = Rng::new(seed).stream("shift").substream(u64::from(shard));
         let way = Vec2::new(rng.signed(), rng.signed()).normalize_or(Vec2::X) * shift;
         let places = self.outline(shard).iter().map(|&corner| self.positions()[corner as usize]);
         let (low, high) =
