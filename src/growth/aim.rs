@@ -2,6 +2,7 @@
 
 use super::{
     changes::Kin,
+    draws,
     impact::Impact,
     masonry::{Masonry, Way},
     params::{PROGRESS, StartLayout},
@@ -68,10 +69,10 @@ impl CrackGrowth {
     /// The direction of a crack that is on its way in `course` at `pos`: straight within a grain, another one in the next.
     fn strayed(&self, course: Vec2, pos: Vec2, child: u64, generation: u32) -> Vec2 {
         // A draw per child, frozen by its index.
-        let mut stray = 2.0 * hash_unit(self.seed ^ 0x57A6, child) - 1.0;
+        let mut stray = 2.0 * hash_unit(self.seed ^ draws::STRAY, child) - 1.0;
         if self.params.grain > 0.0 {
             let cell = (pos / self.params.grain).as_uvec2();
-            let draw = hash_unit(self.seed ^ 0x6A41, u64::from(cell.y) << 32 | u64::from(cell.x));
+            let draw = hash_unit(self.seed ^ draws::GRAIN, u64::from(cell.y) << 32 | u64::from(cell.x));
             stray = WITHIN_GRAIN * stray + 2.0 * draw - 1.0;
             // What runs along the border kinks away from it.
             let (extent, near) = (self.network.extent(), 2.0 * self.params.arrest);
@@ -181,7 +182,7 @@ impl CrackGrowth {
                 direction = turned_at_most(heading, direction);
             }
             let fork = if self.is_fork(pull.node) {
-                let draw = hash_unit(self.seed ^ 0xF02E, u64::from(pull.node));
+                let draw = hash_unit(self.seed ^ draws::FORK_ANGLE, u64::from(pull.node));
                 self.params.fork_angle * (0.75 + 0.5 * draw)
             } else {
                 0.0
@@ -207,7 +208,7 @@ impl CrackGrowth {
         });
         for pull in &mut self.pulls {
             let side = match pull.has_markers {
-                [true, true] => hash_unit(self.seed ^ 0xF05, u64::from(pull.node)) < 0.5,
+                [true, true] => hash_unit(self.seed ^ draws::FORK_SIDE, u64::from(pull.node)) < 0.5,
                 [left, _] => left,
             };
             if pull.has_markers != [false; 2] {
@@ -267,7 +268,8 @@ impl CrackGrowth {
             .map(|(way, far)| {
                 let is_level = way.x != 0.0;
                 let too_far = is_level && run > LONGEST_RUN * masonry.brick();
-                let liking = way.dot(course) + 0.55 * draw(if is_level { 0xB2 } else { 0xB3 });
+                let liking =
+                    way.dot(course) + 0.55 * draw(if is_level { draws::LEVEL_JOINT } else { draws::HEAD_JOINT });
                 // A staircase goes on up or down as before.
                 let stairs = STAIRS * rise * way.y;
                 // Out to the side, rather than up and down beside the border.
@@ -290,9 +292,9 @@ impl CrackGrowth {
         let is_level = best.0.x != 0.0 && heading.x != 0.0;
         let side = if ways.len() > 1 && ways[1].0 > -0.3 && (is_near_hit && heading.y != 0.0 || self.is_fork(node)) {
             Some(masonry.end(pos, ways[1].1, length))
-        } else if ways.len() == 1 && is_level && self.child_of(parent) == node && draw(0xB4) < SPLIT {
+        } else if ways.len() == 1 && is_level && self.child_of(parent) == node && draw(draws::SPLIT) < SPLIT {
             // Through the brick above or below.
-            let up = if course.y.abs() > 0.3 { course.y.signum() } else { (draw(0xB5) - 0.5).signum() };
+            let up = if course.y.abs() > 0.3 { course.y.signum() } else { (draw(draws::SPLIT_SIDE) - 0.5).signum() };
             masonry.across(pos, up)
         } else {
             None
@@ -318,7 +320,7 @@ impl CrackGrowth {
             && parent != NO_PARENT
             && self.child_of(parent) == node
             && self.changes.kin[node as usize].sibling == NO_PARENT
-            && hash_unit(mix(self.seed ^ 0xF0), u64::from(node)) < chance
+            && hash_unit(mix(self.seed ^ draws::FORK), u64::from(node)) < chance
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::{
     division::{Division, rim_towards, towards_rim},
+    draws,
     pull::NO_PULL,
     rays::NO_RAY,
     state::CrackGrowth,
@@ -25,10 +26,10 @@ impl CrackGrowth {
     pub(super) fn bear_thin(&mut self, pos: Vec2, parent: u32, generation: u32, impact: u32, bend: f32) {
         let node = self.network.nodes.len() as u64;
         let wider = self.impacts.get(impact as usize).map_or(1.0, |impact| impact.widening);
-        let (mixed, draw) = (self.params.mixed, hash_unit(self.seed ^ 0xA5, node));
+        let (mixed, draw) = (self.params.mixed, hash_unit(self.seed ^ draws::MIXED_WIDTH, node));
         let share = |division: &mut Division| division.bear(node as u32, parent, 1.0 - mixed * draw);
         let wider = self.division.as_mut().map_or(1.0, share) * wider * self.thinned(pos, impact);
-        let width = self.widths.tip(parent, || hash_unit(self.seed ^ 0x1D, node), wider);
+        let width = self.widths.tip(parent, || hash_unit(self.seed ^ draws::UNEVEN_WIDTH, node), wider);
         if let Some(arrest) = &mut self.arrest {
             arrest.push_node(false);
         }

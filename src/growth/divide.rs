@@ -10,6 +10,7 @@ use super::{
     arrest::{Advance, Arrest},
     division::Tip,
     domain::Across,
+    draws,
     params::{PROGRESS, StartLayout},
     state::CrackGrowth,
     steer::steer,
@@ -228,7 +229,7 @@ impl CrackGrowth {
     /// The first segments of a crack, either way across its domain, or three ways.
     fn run_out_of(&mut self, node: u32, Across { way, longer, .. }: Across) {
         let pos = self.network.nodes[node as usize].pos;
-        let draw = hash_unit(self.seed ^ 0xA4, u64::from(node));
+        let draw = hash_unit(self.seed ^ draws::STAR, u64::from(node));
         let is_star = self.params.stars > 0.0 && longer < ROUND && draw < self.params.stars;
         let third = Vec2::new(-0.5, 0.866_025_4);
         let ways = [way, if is_star { third.rotate(way) } else { -way }, Vec2::new(-0.5, -0.866_025_4).rotate(way)];
@@ -293,7 +294,7 @@ impl CrackGrowth {
 
     /// How much a crack strays at a node, -1..=1: where there are grains, from one to the next.
     fn stray(&self, before: Vec2, pos: Vec2, child: u32) -> f32 {
-        let stray = 2.0 * hash_unit(self.seed ^ 0x57A6, u64::from(child)) - 1.0;
+        let stray = 2.0 * hash_unit(self.seed ^ draws::STRAY, u64::from(child)) - 1.0;
         if self.params.grain <= 0.0 {
             return stray;
         }

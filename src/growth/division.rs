@@ -1,6 +1,9 @@
 //! What a growth that divides domains knows: its tips, the generations of its cracks, and what its hits have loaded.
 
-use super::params::{GrowthParams, Venation};
+use super::{
+    draws,
+    params::{GrowthParams, Venation},
+};
 use crate::{
     math::{hash_unit, ops},
     pattern::NO_PARENT,
@@ -164,8 +167,8 @@ impl GrowthParams {
         }
         // Waves of a few kill distances, in all directions.
         let wave = |k: u64| {
-            let way = ops::unit(2.0 * PI * hash_unit(seed ^ 0xA6, k)) * (PATCHES / (1.0 + 0.35 * k as f32));
-            ops::unit(way.dot(pos) / self.kill_distance + 2.0 * PI * hash_unit(seed ^ 0xA7, k)).x
+            let way = ops::unit(2.0 * PI * hash_unit(seed ^ draws::PATCH_WAY, k)) * (PATCHES / (1.0 + 0.35 * k as f32));
+            ops::unit(way.dot(pos) / self.kill_distance + 2.0 * PI * hash_unit(seed ^ draws::PATCH_PHASE, k)).x
         };
         let sum: f32 = (0..5).map(wave).sum();
         let share = (0.5 + 0.33 * sum).clamp(0.0, 1.0);
@@ -195,7 +198,7 @@ pub(super) fn rim_towards(way: Vec2, reach: f32, seed: u64) -> f32 {
     let (mut power, mut sum) = (way, 0.0);
     for wave in 2..=5u64 {
         power = power.rotate(way);
-        sum += power.dot(ops::unit(2.0 * PI * hash_unit(seed ^ 0xA3, wave)));
+        sum += power.dot(ops::unit(2.0 * PI * hash_unit(seed ^ draws::UNEVEN_LOAD, wave)));
     }
     reach * (1.0 - UNEVEN * (0.5 + 0.25 * sum).clamp(0.0, 1.0))
 }

@@ -1,6 +1,6 @@
 //! How a crack would divide the domain around a place.
 
-use super::{division::rim_towards, state::CrackGrowth};
+use super::{division::rim_towards, draws, state::CrackGrowth};
 use crate::math::{hash_unit, ops};
 use glam::Vec2;
 use std::f32::consts::PI;
@@ -70,20 +70,20 @@ impl CrackGrowth {
     }
 
     /// How a crack would divide the domain around a place; none where it could not end at others.
-    pub(super) fn across(&self, pos: Vec2, impact: u32, draws: u32, clearance: f32) -> Option<Across> {
-        let across = self.across_from(pos, impact, draws, clearance)?;
+    pub(super) fn across(&self, pos: Vec2, impact: u32, name: u32, clearance: f32) -> Option<Across> {
+        let across = self.across_from(pos, impact, name, clearance)?;
         if self.params.steady <= 0.0 {
             return Some(across);
         }
         // From its middle the domain is seen better.
-        let again = self.across_from(across.middle, impact, draws, clearance);
+        let again = self.across_from(across.middle, impact, name, clearance);
         Some(again.map_or(across, |again| Across { middle: across.middle, ..again }))
     }
 
     /// The same as far as can be seen from that place.
-    fn across_from(&self, pos: Vec2, impact: u32, draws: u32, clearance: f32) -> Option<Across> {
-        let draw = |what: u64| hash_unit(self.seed ^ what, u64::from(draws));
-        let turn = PI * draw(0xA1);
+    fn across_from(&self, pos: Vec2, impact: u32, name: u32, clearance: f32) -> Option<Across> {
+        let draw = |what: u64| hash_unit(self.seed ^ what, u64::from(name));
+        let turn = PI * draw(draws::DOMAIN_AXES);
         let axes: [Vec2; AXES] = std::array::from_fn(|i| ops::unit(turn + PI * i as f32 / AXES as f32));
         let far = FAR * clearance;
         let sight = self.look_around(pos, &axes, far);
@@ -121,7 +121,8 @@ impl CrackGrowth {
         let is_out =
             |there: Vec2| (there - hit).length() > rim_towards(there - hit, reach, self.seed ^ u64::from(impact));
         let middle = if is_out(middle) { pos } else { middle };
-        let stray = 2.0 * self.params.wander * (1.0 - 0.7 * self.params.steady) * (2.0 * draw(0xA2) - 1.0);
+        let stray =
+            2.0 * self.params.wander * (1.0 - 0.7 * self.params.steady) * (2.0 * draw(draws::DOMAIN_STRAY) - 1.0);
         let way = (axes[best] + axes[best].perp() * stray).normalize_or(Vec2::X);
         let length = around(long);
         Some(Across { way, middle: middle.clamp(Vec2::ZERO, extent), length, longer: length / around(best).max(1e-6) })

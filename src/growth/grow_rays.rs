@@ -5,6 +5,7 @@
 //! to the other, a segment a step, and is joined to it (`draw_connections`).
 
 use super::{
+    draws,
     params::MAX_MARKERS,
     plan::{Blow, Plan},
     rays::{Corner, Fork, NO_NODE, NO_RAY, Walker, chord_steps},
@@ -153,7 +154,8 @@ impl CrackGrowth {
             return None;
         }
         // As many equal segments as it takes, each a little aside.
-        let stray = self.params.wander * (2.0 * hash_unit(self.seed ^ 0xC1, self.network.nodes.len() as u64) - 1.0);
+        let stray =
+            self.params.wander * (2.0 * hash_unit(self.seed ^ draws::CHORD, self.network.nodes.len() as u64) - 1.0);
         let way = (to - from) / segments;
         let child = self.extend(walker.tip, from + way + way.perp() * stray, true)?;
         self.put_on_ray(child, NO_RAY);

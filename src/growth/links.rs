@@ -1,6 +1,6 @@
 //! Segments across branches: the rings of glass (`draw_connections`) and the cells of clay (`draw_islands`).
 
-use super::{impact::Impact, nodes::NodeGrid, params::GrowthParams};
+use super::{draws, impact::Impact, nodes::NodeGrid, params::GrowthParams};
 use crate::{
     math::{hash_unit, ops},
     pattern::{Link, LinkKind, NO_PARENT, Network},
@@ -56,7 +56,7 @@ impl Linker {
                 // None spans a wide gap.
                 let radius = from.distance(impact.pos).max(params.step_length);
                 let apart = generation != network.nodes()[b as usize].generation || from.distance(beside) > radius;
-                let is_left_out = hash_unit(seed ^ 0xC0, u64::from(a)) < params.connection_gaps;
+                let is_left_out = hash_unit(seed ^ draws::CONNECTION_GAP, u64::from(a)) < params.connection_gaps;
                 if apart || is_left_out || !is_ring(generation, params.connection_every) {
                     continue;
                 }

@@ -1,5 +1,6 @@
 //! Courses of bricks, and the ways that their joints leave to cracks.
 
+use super::draws;
 use crate::{Grid, math::hash_unit};
 use glam::Vec2;
 
@@ -38,9 +39,9 @@ pub(super) type Way = (Vec2, f32);
 impl Masonry {
     /// A wall without a picture: courses of this height, each half a brick off the one below.
     pub(super) fn regular(extent: Vec2, course: f32, seed: u64) -> Self {
-        let uneven = |i: u64| 0.06 * (hash_unit(seed ^ 0xB1, i) - 0.5);
+        let uneven = |i: u64| 0.06 * (hash_unit(seed ^ draws::BRICK, i) - 0.5);
         let count = |length: f32, of: f32| ((length / of) as u32).clamp(1, 4096);
-        let first = course * (0.3 + 0.4 * hash_unit(seed ^ 0xB0, 0));
+        let first = course * (0.3 + 0.4 * hash_unit(seed ^ draws::WALL, 0));
         let beds: Vec<f32> = (0..count(extent.y - first, course))
             .map(|i| first + course * (i as f32 + uneven(u64::from(i))))
             .filter(|y| *y > SAME && *y < extent.y - SAME)
@@ -48,7 +49,7 @@ impl Masonry {
         let brick = BRICK * course;
         let heads = (0..=beds.len() as u64)
             .map(|i| {
-                let half = 0.5 * (i % 2) as f32 + hash_unit(seed ^ 0xB0, 1);
+                let half = 0.5 * (i % 2) as f32 + hash_unit(seed ^ draws::WALL, 1);
                 (0..=count(extent.x, brick))
                     .map(|k| brick * (k as f32 + half.fract() + uneven(i << 32 | u64::from(k))))
                     .filter(|x| *x > SAME && *x < extent.x - SAME)

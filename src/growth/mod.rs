@@ -42,6 +42,7 @@ mod cursor;
 mod divide;
 mod division;
 mod domain;
+mod draws;
 mod field;
 mod foreign;
 mod forget;

@@ -2,6 +2,7 @@
 
 use super::{
     division::{MUCH_WIDER, rim_towards},
+    draws,
     params::StartLayout,
     rays::NO_RAY,
     state::CrackGrowth,
@@ -93,7 +94,7 @@ impl CrackGrowth {
     pub(super) fn stays_open(&self, tip: u32) -> bool {
         self.params.open_ends > 0.0
             && self.network.nodes[tip as usize].parent != NO_PARENT
-            && hash_unit(self.seed ^ 0x15, u64::from(tip)) < self.params.open_ends
+            && hash_unit(self.seed ^ draws::OPEN_END, u64::from(tip)) < self.params.open_ends
     }
 
     /// Whether a node has left what its hit has loaded.

@@ -1,6 +1,9 @@
 //! Where the rays of a hit are to run: the markers of each, where it forks, and which rings there are between them.
 
-use super::params::{GrowthParams, MarkerLayout, StartLayout};
+use super::{
+    draws,
+    params::{GrowthParams, MarkerLayout, StartLayout},
+};
 use crate::math::{Rng, hash_unit, mix, ops};
 use glam::Vec2;
 use std::f32::consts::TAU;
@@ -327,7 +330,8 @@ const fn ring_generation(params: &GrowthParams, ring: u32) -> u32 {
 /// The generation at which a ring meets a ray: a little further in or out than the ring lies.
 fn corner(params: &GrowthParams, seed: u64, ray: usize, ring: u32, jitter: f32) -> u32 {
     let gap = params.connection_every as f32 * ring as f32;
-    let stray = 0.45 * jitter * gap * (2.0 * hash_unit(mix(seed ^ 0xC0), (ray as u64) << 8 | u64::from(ring)) - 1.0);
+    let stray =
+        0.45 * jitter * gap * (2.0 * hash_unit(mix(seed ^ draws::CORNER), (ray as u64) << 8 | u64::from(ring)) - 1.0);
     ring_generation(params, ring).saturating_add_signed(stray.round() as i32).max(1)
 }
 

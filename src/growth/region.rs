@@ -1,6 +1,9 @@
 //! The part of a surface that a hit populates, and its cells.
 
-use super::params::{GrowthParams, MarkerLayout};
+use super::{
+    draws,
+    params::{GrowthParams, MarkerLayout},
+};
 use crate::{
     Grid,
     math::{hash_unit, ops},
@@ -38,7 +41,7 @@ impl Region {
         let (mut power, mut sum) = (way, 0.0);
         for wave in 2..=5u64 {
             power = power.rotate(way);
-            sum += power.dot(ops::unit(TAU * hash_unit(seed ^ 0xA4, wave)));
+            sum += power.dot(ops::unit(TAU * hash_unit(seed ^ draws::UNEVEN_REACH, wave)));
         }
         1.0 - uneven * (0.5 + 0.35 * sum).clamp(0.0, 1.0)
     }

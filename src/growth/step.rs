@@ -2,6 +2,7 @@
 
 use super::{
     arrest::{Advance, Arrest},
+    draws,
     field::ANY_IMPACT,
     params::StartLayout,
     pull::{NO_PULL, Pull},
@@ -174,9 +175,10 @@ impl CrackGrowth {
             if self.nucleated as f32 >= due {
                 break;
             }
-            let draws = [0, 1, 2, 3, 4, 5].map(|i| mix(self.seed ^ 0x0C ^ u64::from(self.tried) << 8 ^ i << 48));
-            let draws = if is_blow { &draws[..] } else { &draws[..1] };
-            let Some((place, loyal)) = self.field.take_waiting(draws, center) else { break };
+            let of_try = self.seed ^ draws::NUCLEATION ^ u64::from(self.tried) << 8;
+            let drawn = [0, 1, 2, 3, 4, 5].map(|i| mix(of_try ^ i << 48));
+            let drawn = if is_blow { &drawn[..] } else { &drawn[..1] };
+            let Some((place, loyal)) = self.field.take_waiting(drawn, center) else { break };
             self.tried += 1;
             let impact = if loyal == ANY_IMPACT { self.impacts.len().saturating_sub(1) as u32 } else { loyal };
             let is_free = !self.nodes.any_within(place, 2.0 * self.params.step_length)

@@ -22,6 +22,14 @@ pub struct SegmentPath {
     len: usize,
 }
 
+/// What the draws of a swayed line are combined with: to the right, down and finer ones of both, and for its width. Frozen, like all that
+/// a seed gives.
+const SWAY_X: u64 = 0x51;
+const SWAY_Y: u64 = 0x52;
+const FINER: u64 = 0x50;
+const WIDTH_WIDE: u64 = 0x53;
+const WIDTH_FINE: u64 = 0x54;
+
 impl SegmentPath {
     /// A straight line.
     #[must_use]
@@ -55,11 +63,11 @@ impl SegmentPath {
             let room = point.pos.min(extent - point.pos).max(Vec2::ZERO);
             let way = |what: u64| {
                 let wide = smooth(seed ^ what, point.pos / (18.0 * by));
-                0.6 * wide + 0.4 * smooth(seed ^ what ^ 0x50, point.pos / (3.5 * by))
+                0.6 * wide + 0.4 * smooth(seed ^ what ^ FINER, point.pos / (3.5 * by))
             };
-            let off = Vec2::new(way(0x51), way(0x52)) * (room * 0.25).min(Vec2::splat(by));
+            let off = Vec2::new(way(SWAY_X), way(SWAY_Y)) * (room * 0.25).min(Vec2::splat(by));
             let [wide, fine] =
-                [(0x53, 4.0), (0x54, 1.3)].map(|(what, size)| smooth(seed ^ what, point.pos / (size * by)));
+                [(WIDTH_WIDE, 4.0), (WIDTH_FINE, 1.3)].map(|(what, size)| smooth(seed ^ what, point.pos / (size * by)));
             point.width *= (0.9 + 0.45 * wide + 0.35 * fine).clamp(0.2, 1.0);
             point.pos = (point.pos + off).clamp(Vec2::ZERO, extent);
         }

@@ -11,6 +11,9 @@ const LIGHT: Vec2 = Vec2::new(-std::f32::consts::FRAC_1_SQRT_2, -std::f32::const
 const SLOW: f32 = 9.0;
 const DIRECTIONS: f32 = 1.6;
 
+/// What its draws are combined with. Frozen, like all that a seed gives.
+const OF_CATCH: u64 = 0xCA7C;
+
 /// See [`LayerPlan::catch`](super::LayerPlan::catch).
 pub(super) struct Catch {
     share: f32,
@@ -19,7 +22,7 @@ pub(super) struct Catch {
 
 impl Catch {
     pub(super) fn new(share: f32, seed: u64) -> Self {
-        Self { share: share.clamp(0.0, 1.0), seed: mix(seed ^ 0xCA7C) as u32 }
+        Self { share: share.clamp(0.0, 1.0), seed: mix(seed ^ OF_CATCH) as u32 }
     }
 
     /// The share of its depth that a line has at `from`, and what it gains up to `to`.

@@ -3,6 +3,7 @@
 use super::{
     broken::{Broken, Chip, LONG_SHADOW, SHADOW},
     crushed::Crushed,
+    draws,
     noise::{draw, lattice, noise},
     outline::FAR_OUT,
     shape::{Place, Shape, TO_LIGHT},
@@ -41,7 +42,7 @@ impl Shape<'_> {
         }
         let (wide, fine) = ((3.5 * self.jag).max(3.0), (1.2 * self.jag).max(1.3));
         let noise = |k: u32, size: f32| 0.5 + 0.5 * noise(seed ^ k, at.x / size, at.y / size);
-        within - self.jag * (1.3 * noise(0x58, wide) + 0.7 * noise(0x59, fine))
+        within - self.jag * (1.3 * noise(draws::JAG_WIDE, wide) + 0.7 * noise(draws::JAG_FINE, fine))
     }
 
     /// What is there of something that breaks along chords.
@@ -111,7 +112,7 @@ impl Shape<'_> {
         let bump = |k: u32, size: f32| noise(seed ^ k, at.x / size, at.y / size);
         let share = if broken.basin.is_some() { SHELF } else { 1.0 };
         // Here and there a wall is a slope.
-        let slope = bump(0x5A, (0.35 * self.radius).max(4.0));
+        let slope = bump(draws::WALL_SLOPE, (0.35 * self.radius).max(4.0));
         let run = if crumbles { 0.8 + 2.6 * slope.max(0.0) } else { 1.0 };
         let wall = (within / (run * WALL * share * self.depth).max(1.0)).clamp(0.0, 1.0);
         let bowl = (within / (0.8 * self.radius).max(1.0)).clamp(0.0, 1.0);
@@ -123,7 +124,8 @@ impl Shape<'_> {
         let mut shadow = sink(self.within(broken, off + TO_LIGHT * length, at + TO_LIGHT * length, seed), soft);
         let mut sunk = 0.0;
         if let Some(basin) = &broken.basin {
-            let within = basin.within(off) - 2.0 * self.jag * (0.5 + 0.5 * bump(0x5B, (3.0 * self.jag).max(2.0)));
+            let within =
+                basin.within(off) - 2.0 * self.jag * (0.5 + 0.5 * bump(draws::BASIN_EDGE, (3.0 * self.jag).max(2.0)));
             sunk = (within / (1.5 * WALL * self.depth).max(1.0)).clamp(0.0, 1.0);
             down += (1.0 - SHELF) * sunk;
             if within > 0.0 {
@@ -136,16 +138,17 @@ impl Shape<'_> {
                 Vec2::new(noise(seed ^ k, at.x / size, at.y / size), noise(seed ^ k ^ 9, at.y / size, at.x / size));
             facets(seed ^ k, at / size + 0.45 * warp)
         };
-        let plate = fold(0x51, (0.42 * self.radius).max(2.0 * self.grain));
-        let small = fold(0x54, 1.7 * self.grain);
+        let plate = fold(draws::PLATES, (0.42 * self.radius).max(2.0 * self.grain));
+        let small = fold(draws::SMALL_PLATES, 1.7 * self.grain);
         let fade = (0.5 * within).clamp(0.0, 1.0);
         let mut bumps = self.rough * (plate + if crumbles { 0.2 } else { 0.4 } * small) * fade;
         let tone = if crumbles {
-            let coarse = bump(0x56, 2.2 * self.grain) + 0.7 * bump(0x5F, 0.3 * self.radius + 6.0 * self.grain);
-            let sand = lattice(seed ^ 0x57, at.x.floor() as i32, at.y.floor() as i32);
+            let coarse = bump(draws::COARSE_TONE, 2.2 * self.grain)
+                + 0.7 * bump(draws::BROAD_TONE, 0.3 * self.radius + 6.0 * self.grain);
+            let sand = lattice(seed ^ draws::SAND, at.x.floor() as i32, at.y.floor() as i32);
             // The lattices of noise are not to be seen.
             let turned = Vec2::new(0.8 * at.x - 0.6 * at.y, 0.6 * at.x + 0.8 * at.y);
-            let pit = noise(seed ^ 0x65, 0.42 * turned.x, 0.42 * turned.y);
+            let pit = noise(seed ^ draws::SAND_PITS, 0.42 * turned.x, 0.42 * turned.y);
             let sand = 0.3 * sand + 0.5 * pit - 0.9 * (-pit - 0.55).max(0.0);
             bumps += 0.6 * self.rough * pit * fade;
             // Next to the wall less of the sky is seen.
@@ -155,7 +158,7 @@ impl Shape<'_> {
                 - 0.6 * corner * wall
                 - 0.3 * sunk;
             if stones > 0.0
-                && let Some(stone) = Stone::find(seed ^ 0x5C, at, self.grain, stones)
+                && let Some(stone) = Stone::find(seed ^ draws::STONES, at, self.grain, stones)
             {
                 let shown = fade * wall;
                 tone += (1.8 * stone.tone - 0.7 * tone) * shown;
@@ -163,11 +166,11 @@ impl Shape<'_> {
             }
             tone
         } else {
-            let stone = Cell::find(seed ^ 0x52, at / self.grain);
+            let stone = Cell::find(seed ^ draws::GRAINS, at / self.grain);
             // Few stones are paler or darker than what they lie in.
             let is_stone = stone.draw.abs() > 0.7;
             let tone = if is_stone { 0.45 * stone.draw * (5.0 * stone.gap).min(1.0) } else { 0.10 * stone.draw };
-            tone + 0.1 * plate + 0.16 * noise(seed ^ 0x53, 0.9 * at.x, 0.9 * at.y)
+            tone + 0.1 * plate + 0.16 * noise(seed ^ draws::GRAIN_TONE, 0.9 * at.x, 0.9 * at.y)
         };
         place.height = -self.depth * down + bumps;
         // The wall is of what has come off, not of what lay under it.
@@ -186,7 +189,7 @@ impl Shape<'_> {
         let crumbles = self.jag > 0.0;
         let mut within = outline.within(off);
         if crumbles {
-            within -= 0.14 * size * (1.0 + noise(seed ^ 0x66, 2.2 * at.x / size, 2.2 * at.y / size));
+            within -= 0.14 * size * (1.0 + noise(seed ^ draws::CHIP_EDGE, 2.2 * at.x / size, 2.2 * at.y / size));
         }
         let inside = (within + 0.5).clamp(0.0, 1.0);
         if inside < 1.0 && *ink <= 0.0 {
@@ -195,7 +198,7 @@ impl Shape<'_> {
         }
         if inside > 0.0 {
             place.dark *= 1.0 - inside;
-            let face = if crumbles { 0.16 * noise(seed ^ 0x67, 0.5 * at.x, 0.5 * at.y) } else { 0.0 };
+            let face = if crumbles { 0.16 * noise(seed ^ draws::CHIP_FACE, 0.5 * at.x, 0.5 * at.y) } else { 0.0 };
             place.shade += (tone + face - place.shade) * inside;
             // It shows the surface's own face.
             let pale = if *ink > 0.0 { 1.0 } else { 0.3 * self.crushed.pale };
@@ -219,7 +222,7 @@ impl Shape<'_> {
         let side = (1.7 * self.grain).max(4.0);
         let cell = (at / side).floor();
         let (x, y) = (cell.x as i32, cell.y as i32);
-        let pick = |what: u32| draw(seed ^ (0x80 + what), x, y);
+        let pick = |what: u32| draw(seed ^ (draws::CRUMBS + what), x, y);
         if chance <= 0.0 || pick(0) >= chance {
             return;
         }

@@ -2,6 +2,7 @@
 
 use super::{
     crushed::Crushed,
+    draws,
     noise::draw,
     outline::{FAR_OUT, Outline},
 };
@@ -40,13 +41,13 @@ impl Broken {
         let Crushed { ragged, reach, fall, .. } = *crushed;
         // The root of the energy.
         let more = radius / (crushed.radius * unit).max(1.0e-3);
-        let pick = |k: u32, what: i32| draw(seed ^ 0x0B0E, k as i32, what);
+        let pick = |k: u32, what: i32| draw(seed ^ draws::PIECES, k as i32, what);
         let crumbles = crushed.jag > 0.0;
         // What is less ragged has longer chords.
         let levels = if crumbles && ragged < 0.65 { 1 } else { 2 };
         let shape = |outline: Outline, k: u32| if crumbles { outline.stretched(mix_in(seed, k)) } else { outline };
         let count = 6 + (3.0 * pick(0, 0)) as u32;
-        let mut off = vec![shape(Outline::new(Vec2::ZERO, radius, count, levels, ragged, seed ^ 0x60), 0x300)];
+        let mut off = vec![shape(Outline::new(Vec2::ZERO, radius, count, levels, ragged, seed ^ draws::CRATER), 0x300)];
         let flakes = (crushed.flakes as f32 * more).round().min(64.0) as u32;
         let one = radius / more.max(1.0) * more.max(1.0).sqrt();
         for k in 0..flakes {
@@ -65,7 +66,7 @@ impl Broken {
         }
         let basin = (crushed.basin > 0.0).then(|| {
             let centre = Vec2::new(pick(0, 4) - 0.5, pick(0, 5) - 0.3) * (0.3 * radius);
-            shape(Outline::new(centre, radius * crushed.basin, 7, 2, 0.8 * ragged, seed ^ 0x61), 0x301)
+            shape(Outline::new(centre, radius * crushed.basin, 7, 2, 0.8 * ragged, seed ^ draws::BASIN), 0x301)
         });
         let chips = (24.0 * crushed.chips * more).round().min(96.0) as u32;
         let is_drawn = crushed.outline > 0.0;
@@ -93,7 +94,7 @@ impl Broken {
             })
             .collect();
         let pit = (crushed.pit > 0.0).then(|| {
-            Outline::new(Vec2::ZERO, radius * crushed.pit, 5 + (2.6 * pick(0, 20)) as u32, 1, 0.55, seed ^ 0x62)
+            Outline::new(Vec2::ZERO, radius * crushed.pit, 5 + (2.6 * pick(0, 20)) as u32, 1, 0.55, seed ^ draws::PIT)
         });
         // Two behind each of the first chips.
         let ticks = (0..crushed.ticks)

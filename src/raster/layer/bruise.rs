@@ -1,6 +1,6 @@
 //! Bruises: a crushed zone that is made of short radial and ring cracks with angular flakes between them.
 
-use super::noise::hash;
+use super::{draws, noise::hash};
 use crate::math::ops;
 use glam::Vec2;
 use std::f32::consts::TAU;
@@ -67,7 +67,7 @@ pub(super) fn crazed(off: Vec2, radius: f32, left: f32, seed: u32) -> Bruise {
     let out = off.normalize_or_zero();
     for (sheet, size) in [0.54f32, 0.38, 0.25, 0.15].into_iter().enumerate() {
         let side = (size * radius).max(3.0);
-        let seed = seed ^ 0x77 ^ (sheet as u32).wrapping_mul(0x51ED_270B);
+        let seed = seed ^ draws::SHEETS ^ (sheet as u32).wrapping_mul(0x51ED_270B);
         let corner = (off / side).floor();
         for (dx, dy) in [(-1, -1), (0, -1), (1, -1), (-1, 0), (0, 0), (1, 0), (-1, 1), (0, 1), (1, 1)] {
             let (x, y) = ((corner.x as i32).wrapping_add(dx), (corner.y as i32).wrapping_add(dy));
@@ -110,7 +110,8 @@ pub(super) fn crazed(off: Vec2, radius: f32, left: f32, seed: u32) -> Bruise {
 
 /// So many bubbles around a hit of this radius, in strings and clusters: places from it, and radii. Texels.
 pub(super) fn bubbles(count: u32, radius: f32, reach: f32, grain: f32, seed: u32) -> Vec<(Vec2, f32)> {
-    let draw = |i: u32, k: u32| (hash(seed ^ 0xB0B ^ k, i as i32, 3) >> 8) as i32 as f32 * (1.0 / 16_777_216.0);
+    let draw =
+        |i: u32, k: u32| (hash(seed ^ draws::BUBBLES ^ k, i as i32, 3) >> 8) as i32 as f32 * (1.0 / 16_777_216.0);
     (0..count.min(64))
         .map(|i| {
             let (group, place) = (i / 6, (i % 6) as f32);

@@ -4,6 +4,7 @@ mod break_off;
 mod broken;
 mod bruise;
 mod crushed;
+mod draws;
 mod noise;
 mod outline;
 mod plates;

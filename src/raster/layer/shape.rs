@@ -4,6 +4,7 @@ use super::{
     broken::Broken,
     bruise::{self, Bruise},
     crushed::Crushed,
+    draws,
     noise::{hash, lattice, noise},
     outline::{Outline, WIDEST},
 };
@@ -59,8 +60,8 @@ impl<'a> Shape<'a> {
                 let around = (hole + (0.75 * crushed.edge * hole).max(1.5)).min(most);
                 let centre = Vec2::ZERO;
                 [
-                    Outline::new(centre, hole, 6 + (seed >> 3) % 3, 2, 0.62, seed ^ 0x71),
-                    Outline::new(centre, around, 8 + (seed >> 5) % 4, 1, 0.75, seed ^ 0x72),
+                    Outline::new(centre, hole, 6 + (seed >> 3) % 3, 2, 0.62, seed ^ draws::HOLE),
+                    Outline::new(centre, around, 8 + (seed >> 5) % 4, 1, 0.75, seed ^ draws::SHELL),
                 ]
             }),
             bubbles: bruise::bubbles(crushed.bubbles, radius, crushed.reach, grain, seed),

@@ -1,6 +1,9 @@
 //! Facets, grains and rounded stones on the floor of what has broken off.
 
-use super::noise::{draw, lattice};
+use super::{
+    draws,
+    noise::{draw, lattice},
+};
 use glam::Vec2;
 
 /// Flat facets in -1..=1, about one unit wide: heights at the corners of a lattice of triangles, linear between.
@@ -34,7 +37,7 @@ impl Cell {
         for dy in -1..=1 {
             for dx in -1..=1 {
                 let (x, y) = ((corner.x as i32).wrapping_add(dx), (corner.y as i32).wrapping_add(dy));
-                let site = Vec2::new(lattice(seed, x, y), lattice(seed ^ 0x77, x, y)) * 0.45;
+                let site = Vec2::new(lattice(seed, x, y), lattice(seed ^ draws::SITE_DOWN, x, y)) * 0.45;
                 let off = at - corner - Vec2::new(dx as f32 + 0.5, dy as f32 + 0.5) - site;
                 let distance = off.length();
                 if distance < nearest.0 {
@@ -46,7 +49,7 @@ impl Cell {
             }
         }
         let (distance, x, y) = nearest;
-        Self { draw: lattice(seed ^ 0x7A, x, y), gap: next - distance }
+        Self { draw: lattice(seed ^ draws::SITE_OWN, x, y), gap: next - distance }
     }
 }
 

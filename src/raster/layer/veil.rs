@@ -86,16 +86,20 @@ pub(crate) struct VeilField {
     floor: Option<f32>,
 }
 
+/// What the draws of veils are combined with: those of their way, and of their noise. Frozen, like all that a seed gives.
+const VEIL_WAY: u64 = 0x7E11;
+const VEIL_NOISE: u64 = 0x5EA1;
+
 impl VeilField {
     pub(super) fn new(veil: &Veil, frame: SurfaceFrame, seed: u64) -> Self {
         // Away from the light, about.
-        let turn = (mix(seed ^ 0x7E11) >> 40) as f32 * (1.0 / 16_777_216.0);
+        let turn = (mix(seed ^ VEIL_WAY) >> 40) as f32 * (1.0 / 16_777_216.0);
         let way = ops::unit(std::f32::consts::FRAC_PI_4 + 1.2 * (turn - 0.5));
         let hang = way * (veil.reach * frame.texels_per_unit());
         Self {
             veil: *veil,
             frame,
-            seed: mix(seed ^ 0x5EA1) as u32,
+            seed: mix(seed ^ VEIL_NOISE) as u32,
             hang,
             density: Grid::new(frame.size(), 0),
             floor: None,

@@ -16,6 +16,9 @@ use crate::{
 use glam::{UVec2, Vec2};
 use std::collections::VecDeque;
 
+/// What the draws of crushed zones are combined with. Frozen, like all that a seed gives.
+const OF_ZONES: u64 = 0xC4;
+
 /// One impact that has crushed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Zone {
@@ -92,7 +95,7 @@ impl CrushedField {
         Self {
             crushed: *crushed,
             frame,
-            seed: mix(seed ^ 0xC4) as u32,
+            seed: mix(seed ^ OF_ZONES) as u32,
             zones: Vec::new(),
             shown: 0,
             columns: count.x,

@@ -1,0 +1,60 @@
+//! What the draws of a growth are for: each is combined with the seed. Where two are the same number, what else goes in is not.
+//!
+//! These numbers are frozen, like all that a seed gives.
+
+/// How far a hit reaches in some directions.
+pub(super) const UNEVEN_REACH: u64 = 0xA4;
+
+/// How far it loads the surface in some directions.
+pub(super) const UNEVEN_LOAD: u64 = 0xA3;
+
+/// The way of a wave in which the size of domains changes, and its phase.
+pub(super) const PATCH_WAY: u64 = 0xA6;
+pub(super) const PATCH_PHASE: u64 = 0xA7;
+
+/// How the axes are turned along which a domain is measured, and how much the crack across it strays.
+pub(super) const DOMAIN_AXES: u64 = 0xA1;
+pub(super) const DOMAIN_STRAY: u64 = 0xA2;
+
+/// Whether a crack begins with three arms; by node, where [`UNEVEN_REACH`] is by wave.
+pub(super) const STAR: u64 = 0xA4;
+
+/// How much a crack strays from node to node, and from grain to grain.
+pub(super) const STRAY: u64 = 0x57A6;
+pub(super) const GRAIN: u64 = 0x6A41;
+
+/// Whether a tip stops short of other cracks.
+pub(super) const OPEN_END: u64 = 0x15;
+
+/// Whether a place of a ring is left out.
+pub(super) const CONNECTION_GAP: u64 = 0xC0;
+
+/// How much further in or out than its ring a ray is met; mixed before it is used, unlike [`CONNECTION_GAP`].
+pub(super) const CORNER: u64 = 0xC0;
+
+/// How much a line from ray to ray strays.
+pub(super) const CHORD: u64 = 0xC1;
+
+/// How courses of bricks lie, and how uneven they are.
+pub(super) const WALL: u64 = 0xB0;
+pub(super) const BRICK: u64 = 0xB1;
+
+/// How much a crack likes to follow a bed joint, and a head joint.
+pub(super) const LEVEL_JOINT: u64 = 0xB2;
+pub(super) const HEAD_JOINT: u64 = 0xB3;
+
+/// Whether a hairline splits a brick, and which one.
+pub(super) const SPLIT: u64 = 0xB4;
+pub(super) const SPLIT_SIDE: u64 = 0xB5;
+
+/// How much narrower than others a crack is, and how its width varies.
+pub(super) const MIXED_WIDTH: u64 = 0xA5;
+pub(super) const UNEVEN_WIDTH: u64 = 0x1D;
+
+/// Where cracks begin by themselves.
+pub(super) const NUCLEATION: u64 = 0x0C;
+
+/// Whether a tip forks, at which angle, and to which side.
+pub(super) const FORK: u64 = 0xF0;
+pub(super) const FORK_ANGLE: u64 = 0xF02E;
+pub(super) const FORK_SIDE: u64 = 0xF05;

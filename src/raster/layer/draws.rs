@@ -1,0 +1,57 @@
+//! What the draws of crushed zones are for: each is combined with the seed. Where two are the same number, what else goes in is not.
+//!
+//! These numbers are frozen, like all that a seed gives.
+
+/// How far the edge of what crumbles strays: in wide bumps and in fine ones.
+pub(super) const JAG_WIDE: u32 = 0x58;
+pub(super) const JAG_FINE: u32 = 0x59;
+
+/// Where its wall is a slope, and how the edge of the basin strays.
+pub(super) const WALL_SLOPE: u32 = 0x5A;
+pub(super) const BASIN_EDGE: u32 = 0x5B;
+
+/// Facets of the floor, large and small.
+pub(super) const PLATES: u32 = 0x51;
+pub(super) const SMALL_PLATES: u32 = 0x54;
+
+/// Tones of a floor that crumbles, from place to place and over all of it.
+pub(super) const COARSE_TONE: u32 = 0x56;
+pub(super) const BROAD_TONE: u32 = 0x5F;
+
+/// Its sand, and pits in it.
+pub(super) const SAND: u32 = 0x57;
+pub(super) const SAND_PITS: u32 = 0x65;
+
+/// Rounded stones in it.
+pub(super) const STONES: u32 = 0x5C;
+
+/// Grains of a clean floor, and tones between them.
+pub(super) const GRAINS: u32 = 0x52;
+pub(super) const GRAIN_TONE: u32 = 0x53;
+
+/// Edges and faces of chips.
+pub(super) const CHIP_EDGE: u32 = 0x66;
+pub(super) const CHIP_FACE: u32 = 0x67;
+
+/// Crumbs; the next numbers are those of one crumb.
+pub(super) const CRUMBS: u32 = 0x80;
+
+/// Sizes and places of all that breaks off.
+pub(super) const PIECES: u32 = 0x0B0E;
+
+/// Outlines: the crater, its basin, a drawn pit, and a hole with what has come off around it.
+pub(super) const CRATER: u32 = 0x60;
+pub(super) const BASIN: u32 = 0x61;
+pub(super) const PIT: u32 = 0x62;
+pub(super) const HOLE: u32 = 0x71;
+pub(super) const SHELL: u32 = 0x72;
+
+/// Scattered places: how far down each lies, and what is its own.
+pub(super) const SITE_DOWN: u32 = 0x77;
+pub(super) const SITE_OWN: u32 = 0x7A;
+
+/// Short cracks that cross each other.
+pub(super) const SHEETS: u32 = 0x77;
+
+/// Bubbles.
+pub(super) const BUBBLES: u32 = 0xB0B;
