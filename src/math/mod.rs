@@ -5,8 +5,9 @@
 
 pub mod ops;
 mod rng;
-mod widest;
+mod simd;
+pub(crate) mod whole;
 
 pub use rng::Rng;
 pub(crate) use rng::{hash_unit, mix};
-pub(crate) use widest::widest;
+pub(crate) use simd::vectorized;

@@ -14,7 +14,7 @@ use super::{
     rows::{Rgba, depth_row, flat_row, tilted_row},
 };
 use crate::{
-    math::widest,
+    math::vectorized,
     raster::{DepthField, TexelRect},
 };
 use glam::UVec2;
@@ -229,11 +229,11 @@ impl Job<'_> {
         rect: TexelRect,
     ) {
         match extras {
-            None => widest(
+            None => vectorized(
                 #[inline(always)]
                 || self.paint_texels(patch, None, rect),
             ),
-            Some(extras) => widest(
+            Some(extras) => vectorized(
                 #[inline(always)]
                 || {
                     extras.load(rect);

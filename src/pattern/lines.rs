@@ -2,7 +2,7 @@
 
 use crate::{
     Grid,
-    math::{ops, widest},
+    math::{ops, vectorized},
 };
 use glam::{IVec2, UVec2, Vec2};
 
@@ -39,7 +39,7 @@ pub(super) fn find(size: UVec2, lightness: impl Fn(usize) -> f32) -> Option<Grid
     let mut responses = [vec![0.0_f32; picture.texels()], vec![0.0; picture.texels()]];
     for width in WIDTHS {
         let blurred = picture.blurred(0.4 * width);
-        widest(
+        vectorized(
             #[inline(always)]
             || respond(&blurred, width, &mut responses),
         );

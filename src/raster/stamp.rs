@@ -26,7 +26,7 @@ use super::{
     section::{MAX_RADIUS, Section, at_door, clamp01, max, min},
 };
 use crate::{
-    math::widest,
+    math::vectorized,
     pattern::{PathPoint, SegmentPath, SurfaceFrame},
 };
 use glam::{DVec2, UVec2, Vec2, Vec4};
@@ -201,7 +201,7 @@ impl Capsule {
         if rect.is_empty() {
             return TexelRect::default();
         }
-        widest(
+        vectorized(
             #[inline(always)]
             || match (self.r_gain != 0.0, section.rim_depth > 0.0) {
                 (false, false) => self.stamp_rows::<TELL, false, false>(field, section, rect, changed),

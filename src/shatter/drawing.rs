@@ -1,7 +1,8 @@
 //! [`Drawing`]: lines on the lattice, made planar.
 
-use super::lattice::{Lattice, NONE, Place, PlaceMap, cross, distance_sq, dot, key, orient, vector};
+use super::lattice::{Lattice, NONE, Place, PlaceMap, distance_sq, key, orient};
 use crate::math::Rng;
+use crate::math::whole::{cross, dot, vector};
 use glam::Vec2;
 
 /// Lines as edges between places; once planar, the four sides of the surface among them.

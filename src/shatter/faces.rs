@@ -2,8 +2,9 @@
 
 use super::{
     drawing::{DEAD, Drawing},
-    lattice::{NONE, Place, cross, distance_sq, vector},
+    lattice::{NONE, Place, distance_sq},
 };
+use crate::math::whole::{cross, vector};
 use std::cmp::Reverse;
 
 /// The rings around each face. Half-edge `2 e` runs along edge `e`, `2 e + 1` against it; a face lies where x turns to

@@ -1,5 +1,6 @@
 //! Whole-number coordinates: every question about them has an exact answer.
 
+use crate::math::whole::{cross, dot, vector};
 use glam::Vec2;
 use std::hash::{BuildHasherDefault, Hasher};
 
@@ -65,18 +66,6 @@ impl Lattice {
         let (a, b) = (self.sides(a), self.sides(b));
         (0..4).find(|&side| a[side] && b[side])
     }
-}
-
-pub(super) fn vector(from: Place, to: Place) -> [i64; 2] {
-    [i64::from(to[0]) - i64::from(from[0]), i64::from(to[1]) - i64::from(from[1])]
-}
-
-pub(super) const fn cross(a: [i64; 2], b: [i64; 2]) -> i64 {
-    a[0] * b[1] - a[1] * b[0]
-}
-
-pub(super) const fn dot(a: [i64; 2], b: [i64; 2]) -> i64 {
-    a[0] * b[0] + a[1] * b[1]
 }
 
 /// Above zero if `c` lies on the side of the line from `a` to `b` to which x turns to reach y.

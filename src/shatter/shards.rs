@@ -3,9 +3,10 @@
 use super::{
     drawing::Drawing,
     faces::{Faces, origin},
-    lattice::{Lattice, Place, cross, distance_sq, ring_area},
+    lattice::{Lattice, Place, distance_sq, ring_area},
     triangulate::{Clipper, area_of, convex_pieces, simplify},
 };
+use crate::math::whole::cross;
 use glam::{DVec2, Vec2};
 use std::{ops::Range, sync::Arc};
 

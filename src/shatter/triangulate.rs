@@ -3,7 +3,8 @@
 //! No library, for two reasons: the usual ones drop places in the middle of a straight edge, which tears neighbours apart,
 //! and none of them promises to cover a ring exactly. With whole numbers clipping ears does (Meisters 1975).
 
-use super::lattice::{Place, cross, distance_sq, dot, orient, ring_area, vector};
+use super::lattice::{Place, distance_sq, orient, ring_area};
+use crate::math::whole::{cross, dot, vector};
 use std::collections::HashMap;
 
 /// A corner of the ring that is being clipped.

@@ -1,7 +1,7 @@
 //! The noise that makes cracks wander: [`Noise`].
 
 use crate::{
-    math::{hash_unit, widest},
+    math::{hash_unit, vectorized},
     pattern::SurfaceFrame,
 };
 
@@ -79,7 +79,7 @@ impl Noise {
 
     /// Writes row `y`, 0..=65535.
     pub(super) fn fill_row(&mut self, y: usize, out: &mut [u16]) {
-        widest(
+        vectorized(
             #[inline(always)]
             || {
                 self.sum.fill(0.0);

@@ -84,11 +84,3 @@ pub(super) struct Cause {
 /// An edge that would leave a vertex in the direction of another.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Overlap;
-
-pub(super) fn direction(from: [i32; 2], to: [i32; 2]) -> [i64; 2] {
-    [0, 1].map(|i| i64::from(to[i]) - i64::from(from[i]))
-}
-
-pub(super) fn cross(a: [i64; 2], b: [i64; 2]) -> i64 {
-    a[0] * b[1] - a[1] * b[0]
-}

@@ -2,8 +2,9 @@
 
 use super::{
     Cell, CellTracker,
-    half_edge::{Cause, Gap, Loop, NONE, Overlap, Side, Sums, Vertex, cross, direction},
+    half_edge::{Cause, Gap, Loop, NONE, Overlap, Side, Sums, Vertex},
 };
+use crate::math::whole::{cross, dot, vector};
 use glam::Vec2;
 
 impl CellTracker {
@@ -55,7 +56,7 @@ impl CellTracker {
         if vertex.first == NONE {
             return Ok(None);
         }
-        let new = direction(vertex.at, self.at(v));
+        let new = vector(vertex.at, self.at(v));
         // The first half-edge to the left of the new one comes out just before it in their loop's twin.
         let mut left = (vertex.first, self.turn(new, vertex, vertex.first)?);
         let mut half_edge = self.next[vertex.first as usize ^ 1];
@@ -73,10 +74,10 @@ impl CellTracker {
 
     /// Which half turn from `new` a half-edge lies in, and its direction.
     pub(super) fn turn(&self, new: [i64; 2], from: &Vertex, half_edge: u32) -> Result<(u8, [i64; 2]), Overlap> {
-        let way = direction(from.at, self.at(self.head(half_edge)));
+        let way = vector(from.at, self.at(self.head(half_edge)));
         match cross(new, way) {
             1.. => Ok((0, way)),
-            0 if new[0] * way[0] + new[1] * way[1] < 0 => Ok((1, way)),
+            0 if dot(new, way) < 0 => Ok((1, way)),
             0 => Err(Overlap),
             _ => Ok((2, way)),
         }

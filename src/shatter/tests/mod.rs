@@ -4,13 +4,16 @@ mod pieces;
 mod tiling;
 
 use super::{
-    lattice::{cross, orient, ring_area, vector},
+    lattice::{orient, ring_area},
     *,
 };
 use crate::{
     CrackPreset,
     growth::CrackGrowth,
-    math::Rng,
+    math::{
+        Rng,
+        whole::{cross, vector},
+    },
     pattern::{CellTracker, Network, random::planar_network},
 };
 use glam::{Vec2, Vec3};

@@ -9,7 +9,7 @@ use fearless_simd::{Level, Simd};
 /// The bits are the same either way: the same operations in the same order, each rounded as it stands, none fused with another.
 /// Only what is inlined into `work` gains, so its loops are `#[inline(always)]`, and so is the closure.
 #[inline(always)]
-pub(crate) fn widest<R>(work: impl FnOnce() -> R) -> R {
+pub(crate) fn vectorized<R>(work: impl FnOnce() -> R) -> R {
     #[cfg(test)]
     if tests::IS_PLAIN.get() {
         return work();
