@@ -21,6 +21,7 @@ mod guided;
 mod hits;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod images;
+mod imports;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod lifecycle;
 #[cfg(all(feature = "2d", feature = "3d"))]
