@@ -40,3 +40,15 @@ pub mod prelude {
 #[cfg(all(doctest, feature = "2d"))]
 #[doc = include_str!("../README.md")]
 pub struct ReadmeExamples;
+
+/// The examples of the pages in `docs`, compiled.
+#[cfg(all(doctest, feature = "2d", feature = "3d"))]
+#[doc = include_str!("../docs/determinism_and_networking.md")]
+#[doc = include_str!("../docs/guided_cracks.md")]
+#[doc = include_str!("../docs/performance_and_memory.md")]
+#[doc = include_str!("../docs/pitfalls.md")]
+#[doc = include_str!("../docs/presets.md")]
+#[doc = include_str!("../docs/shattering.md")]
+#[doc = include_str!("../docs/sprites.md")]
+#[doc = include_str!("../docs/walls_3d.md")]
+pub struct PageExamples;

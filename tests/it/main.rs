@@ -9,6 +9,7 @@ mod blink;
 mod cells;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod clock;
+mod docs;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod films;
 #[cfg(all(feature = "2d", feature = "3d"))]
