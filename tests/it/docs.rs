@@ -414,9 +414,9 @@ fn generated() -> Vec<(&'static str, String)> {
     let preset = CrackPreset::default();
     let top = |name: &str| ["steps_per_second", "follows_lines"].contains(&name);
     let whole = table(&source, "CrackPreset", "", &WithoutParts(&preset));
-    let whole = whole.lines().filter(|line| {
-        line.split('`').nth(1).is_none_or(|name| top(name)) || line.starts_with("| field") || line.starts_with("|-")
-    });
+    let whole = whole
+        .lines()
+        .filter(|line| line.split('`').nth(1).is_none_or(top) || line.starts_with("| field") || line.starts_with("|-"));
     vec![
         ("CrackPreset", whole.map(|line| format!("{line}\n")).collect()),
         ("GrowthParams", table(&source, "GrowthParams", "", &GrowthParams::DEFAULT)),
