@@ -2,19 +2,22 @@
 //!
 //! The tables of `docs/presets.md` are made from the code: `UPDATE_DOCS=1 cargo test -p bevy_crack docs` writes them anew, and still fails.
 
+mod source;
+
 use bevy_crack::{
     CrackPreset,
     growth::GrowthParams,
     paint::{Cel, ColorStop, Facets, Look},
     raster::{Crushed, Profile, Veil},
 };
+use source::{Source, default_of};
 use std::{
     collections::BTreeMap,
     fmt::{Debug, Write as _},
     fs,
     path::{Path, PathBuf},
 };
-use syn::{Attribute, Expr, ExprLit, Fields, Item, Lit, Meta, Type, punctuated::Punctuated, visit, visit::Visit};
+use syn::{Expr, Type};
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -123,152 +126,6 @@ fn nothing_lies_idle() {
         let name = entry.unwrap().file_name().into_string().unwrap();
         assert!(shown.iter().any(|target| target.ends_with(&name)), "no page shows {name}");
     }
-}
-
-/// The source of the crate: its types, and the ranges of numbers that are written in it.
-struct Source {
-    items: Vec<(PathBuf, Item)>,
-    /// By file and name.
-    ranges: BTreeMap<(PathBuf, String), String>,
-}
-
-impl Source {
-    fn read() -> Self {
-        let mut source = Self { items: Vec::new(), ranges: BTreeMap::new() };
-        for path in files(&root().join("src"), "rs") {
-            let parsed = syn::parse_file(&fs::read_to_string(&path).unwrap()).unwrap();
-            let mut ranges = Ranges::default();
-            ranges.visit_file(&parsed);
-            source.ranges.extend(ranges.0.into_iter().map(|(name, range)| ((path.clone(), name), range)));
-            source.items.extend(parsed.items.into_iter().map(|item| (path.clone(), item)));
-        }
-        source
-    }
-
-    /// The fields of a struct: name, type, documentation, and the file that it is in.
-    fn fields(&self, name: &str) -> (PathBuf, Vec<(String, Type, String)>) {
-        let (path, item) = self.find(|item| matches!(item, Item::Struct(item) if item.ident == name), name);
-        let Item::Struct(item) = item else { unreachable!() };
-        let fields = item
-            .fields
-            .iter()
-            .map(|field| (field.ident.as_ref().unwrap().to_string(), field.ty.clone(), documentation(&field.attrs)));
-        (path.clone(), fields.collect())
-    }
-
-    /// The variants of an enum: as they are written, and their documentation. Those of variants follow with a dot.
-    fn variants(&self, name: &str) -> Vec<(String, String)> {
-        let (_, item) = self.find(|item| matches!(item, Item::Enum(item) if item.ident == name), name);
-        let Item::Enum(item) = item else { unreachable!() };
-        let mut out = Vec::new();
-        for variant in &item.variants {
-            out.push((variant.ident.to_string(), documentation(&variant.attrs)));
-            if let Fields::Named(fields) = &variant.fields {
-                for field in &fields.named {
-                    let name = format!("{}.{}", variant.ident, field.ident.as_ref().unwrap());
-                    out.push((name, documentation(&field.attrs)));
-                }
-            }
-        }
-        out
-    }
-
-    fn find(&self, is: impl Fn(&Item) -> bool, name: &str) -> &(PathBuf, Item) {
-        self.items.iter().find(|(_, item)| is(item)).unwrap_or_else(|| panic!("there is no {name}"))
-    }
-
-    /// The range of a field, by its name in the file of its struct or by its full one in any.
-    fn range(&self, path: &Path, prefix: &str, name: &str) -> Option<&String> {
-        let own = self.ranges.get(&(path.to_owned(), name.to_owned()));
-        let full = format!("{prefix}{name}");
-        let by_name = || self.ranges.iter().find(|((_, other), _)| *other == full).map(|(_, range)| range);
-        if prefix.is_empty() { own.or_else(by_name) } else { by_name() }
-    }
-}
-
-/// Ranges by name: `("name", value, 0.0..=1.0)`, `("name", value, 0.0, 1.0)` and `name: f32 = 0.0, 1.0;`.
-#[derive(Default)]
-struct Ranges(BTreeMap<String, String>);
-
-fn number(expr: &Expr) -> Option<f64> {
-    match expr {
-        Expr::Lit(ExprLit { lit: Lit::Float(lit), .. }) => lit.base10_parse().ok(),
-        Expr::Lit(ExprLit { lit: Lit::Int(lit), .. }) => lit.base10_parse().ok(),
-        Expr::Unary(negative) => Some(-number(&negative.expr)?),
-        _ => None,
-    }
-}
-
-impl Ranges {
-    fn note<'a>(&mut self, parts: impl Iterator<Item = &'a Expr>) {
-        let parts: Vec<_> = parts.collect();
-        let Some(Expr::Lit(ExprLit { lit: Lit::Str(name), .. })) = parts.first() else { return };
-        let ends = parts.iter().find_map(|part| match part {
-            Expr::Range(range) => Some((number(range.start.as_deref()?)?, number(range.end.as_deref()?)?)),
-            _ => None,
-        });
-        let ends = ends.or_else(|| match parts[..] {
-            [.., min, max] => Some((number(min)?, number(max)?)),
-            _ => None,
-        });
-        if let Some((min, max)) = ends {
-            self.0.insert(name.value(), format!("{min}..={max}"));
-        }
-    }
-}
-
-impl<'ast> Visit<'ast> for Ranges {
-    fn visit_expr_tuple(&mut self, tuple: &'ast syn::ExprTuple) {
-        self.note(tuple.elems.iter());
-        visit::visit_expr_tuple(self, tuple);
-    }
-
-    fn visit_expr_call(&mut self, call: &'ast syn::ExprCall) {
-        self.note(call.args.iter());
-        visit::visit_expr_call(self, call);
-    }
-
-    fn visit_macro(&mut self, called: &'ast syn::Macro) {
-        if called.path.is_ident("fields") {
-            let text = called.tokens.to_string();
-            for line in text.split(';').filter(|line| line.contains('=')) {
-                let (name, ends) = line.split_once(':').unwrap();
-                let (min, max) = ends.split_once('=').unwrap().1.split_once(',').unwrap();
-                let [min, max] = [min, max].map(|end| end.replace([' ', '_'], "").parse::<f64>().unwrap());
-                self.0.insert(name.trim().into(), format!("{min}..={max}"));
-            }
-        }
-        let list = Punctuated::<Expr, syn::Token![,]>::parse_terminated;
-        for expr in called.parse_body_with(list).iter().flatten() {
-            self.visit_expr(expr);
-        }
-    }
-}
-
-/// Doc comments as one line, without the links of rustdoc.
-fn documentation(attributes: &[Attribute]) -> String {
-    let lines = attributes.iter().filter_map(|attribute| match &attribute.meta {
-        Meta::NameValue(doc) if doc.path.is_ident("doc") => match &doc.value {
-            Expr::Lit(ExprLit { lit: Lit::Str(text), .. }) => Some(text.value().trim().to_owned()),
-            _ => None,
-        },
-        _ => None,
-    });
-    let text = lines.filter(|line| !line.is_empty()).collect::<Vec<_>>().join(" ");
-    let mut out = String::new();
-    let mut rest = text.as_str();
-    while let Some((before, link)) = rest.split_once('[') {
-        out.push_str(before);
-        let Some((words, after)) = link.split_once(']') else { break };
-        // `[f32; 3]` is no link.
-        let is_link = after.starts_with('(') || words.starts_with('`');
-        out.push_str(&if is_link { words.to_owned() } else { format!("[{words}]") });
-        rest = match after.strip_prefix('(') {
-            Some(target) if is_link => target.split_once(')').map_or("", |(_, after)| after),
-            _ => after,
-        };
-    }
-    out + rest
 }
 
 /// The values of a struct's fields, as `Debug` writes them.
@@ -533,6 +390,41 @@ fn every_preset_and_every_error_has_its_row() {
                 listed(&pitfalls).contains(&variant.as_str()),
                 "docs/pitfalls.md has no row for {error}::{variant}"
             );
+        }
+    }
+}
+
+/// Tables that are written by hand, of types that need an engine or have more to tell: nothing is missing, and their numbers are right.
+#[test]
+fn tables_by_hand_are_right() {
+    let source = Source::read();
+    let mut compared = 0;
+    for (name, of, is_whole) in [
+        ("docs/performance_and_memory.md", "CrackBudget", true),
+        ("docs/shattering.md", "ShatterCracks", true),
+        ("docs/guided_cracks.md", "VoronoiParams", false),
+    ] {
+        let text = page(name);
+        for (field, ..) in source.fields(of).1 {
+            let row = text.lines().find(|line| line.starts_with(&format!("| `{field}`")));
+            assert!(row.is_some() || !is_whole, "{name} has no row for {of}::{field}");
+            let told = row.and_then(|row| row.split('|').nth(2)?.trim().parse::<f64>().ok());
+            if let (Some(told), Some(default)) = (told, default_of(&source, of, &field)) {
+                assert_eq!(told, default, "{of}::{field} in {name}");
+                compared += 1;
+            }
+        }
+    }
+    assert!(compared > 10, "{compared}");
+    for (name, of) in [
+        ("docs/guided_cracks.md", "GuideSource"),
+        ("docs/guided_cracks.md", "GuidedAppearance"),
+        ("docs/sprites.md", "CrackMaskSource"),
+    ] {
+        let text = page(name);
+        let rows: Vec<_> = listed(&text).into_iter().filter_map(|row| row.split(['(', ' ']).next()).collect();
+        for (variant, _) in source.variants(of).iter().filter(|(variant, _)| !variant.contains('.')) {
+            assert!(rows.contains(&variant.as_str()), "{name} has no row for {of}::{variant}");
         }
     }
 }
