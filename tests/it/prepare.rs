@@ -576,3 +576,35 @@ fn b4_small_surfaces_do_not_wait_for_large_ones() {
         wait_for(&mut app, "those that are wanted", |app| app.world().get::<CrackTextures>(entity).is_some());
     }
 }
+
+/// A large picture that changes under its cracks is read by a background task. What was there is shown until then.
+#[test]
+fn a_large_picture_that_changes_is_not_read_in_a_frame() {
+    let size = UVec2::new(1024, 700);
+    let end = |milliseconds: f32| {
+        let mut app = hasty();
+        let image = add(&mut app, picture(size));
+        let entity = app.world_mut().spawn((Sprite::from_image(image.clone()), surface())).id();
+        hit(&mut app, center(entity).with_energy(0.5));
+        wait_for(&mut app, "the cracks", |app| state(app, entity).status == CrackStatus::Done);
+        app.world_mut().resource_mut::<CrackBudget>().milliseconds = milliseconds;
+        steps(&mut app, 2);
+        let before = shown(&app, entity);
+        *app.world_mut().resource_mut::<Assets<Image>>().get_mut(&image).expect("it is there") =
+            solid(size, [90, 140, 40, 255]);
+        let mut frames = 0;
+        while shown(&app, entity) == before {
+            step(&mut app);
+            frames += 1;
+            assert!(frames < 100_000, "it never comes");
+        }
+        wait_for(&mut app, "the end", |app| state(app, entity).status == CrackStatus::Done);
+        steps(&mut app, 5);
+        (frames, shown(&app, entity))
+    };
+    let (at_once, same) = end(1e6);
+    let (later, read) = end(2.0);
+    // It is copied half a MiB a frame, and read in the ones after that.
+    assert!(at_once <= 2 && later > 5, "{at_once} and {later} frames");
+    assert!(read == same && read.as_chunks::<4>().0.iter().filter(|texel| texel[1] == 140).count() > 100_000);
+}

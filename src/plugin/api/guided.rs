@@ -1,10 +1,8 @@
 //! [`GuidedCracks`]: cracks that draw a picture, baked by a background task.
 
 use super::CrackError;
-use crate::{
-    Grid,
-    voronoi::{SiteLayout, VoronoiError, VoronoiParams},
-};
+use crate::Grid;
+use crate::voronoi::{SiteLayout, VoronoiError, VoronoiParams};
 use bevy::{prelude::*, reflect::serde::ReflectSerializeWithRegistry};
 use std::sync::Arc;
 
@@ -17,7 +15,7 @@ use std::sync::Arc;
 /// removing the component or the entity, or by healing.
 ///
 /// The cracks take the place of those of an earlier bake. To hits they are older cracks: new ones start from them and, where the preset has
-/// [`arrest`](crate::growth::GrowthParams::arrest), stop at them. Cracks that hits made before are grown anew around them, from the same places.
+/// [`arrest`](crate::growth::GrowthParams::arrest), stop at them. Cracks that hits made before are grown again around them, from the same places.
 /// The guide is a picture, dark strokes on light or the other way round: a word is one that your game draws or loads (the crate has no
 /// fonts; the example `writing_on_the_wall` draws its own).
 /// A [`CrackClock`](super::CrackClock) moves them as it moves all cracks. A changed picture keeps them, stretched if its
@@ -202,7 +200,7 @@ impl From<Arc<[u8]>> for GuideSource {
 /// How baked cracks come. Under a [`CrackClock`](super::CrackClock), which rules then, in the same order; on a surface that has been hit
 /// before, at once.
 ///
-/// A frame does not draw them: what the surface is to show is drawn and painted beside the frames, and a frame takes it up when it is
+/// A frame does not draw them: what the surface is to show is drawn and painted by a background task, and a frame applies it when it is
 /// ready, one later at the earliest. So what is shown lags a little behind; [`CrackState::time`](super::CrackState::time)
 /// is what it shows, and when time stands still, or has come to its end, that is exactly the picture of that time. While cracks move, this
 /// takes some 8 bytes a texel more. Where there are no threads it is done in slices inside the [`CrackBudget`](super::CrackBudget);

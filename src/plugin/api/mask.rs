@@ -15,7 +15,7 @@ pub enum CrackMaskSource {
     /// Everywhere alike.
     None,
     /// By the surface's own picture: cracks follow its lines (mortar, joints of tiles and planks, old cracks) and keep off
-    /// what is less than half opaque. It is read once for each picture, beside the frames; the first hit waits for that.
+    /// what is less than half opaque. It is read once for each picture, in the background; the first hit waits for that.
     FromPicture,
     /// By images over the shown part of the surface's picture, of any size: black = not at all, white = wholly (lightness as
     /// it is stored, times alpha). The first hit waits until they are loaded; later changes of theirs have no effect.

@@ -1,9 +1,7 @@
 //! [`ShatterCracks`]: how a surface shatters, and what becomes of it.
 
-use crate::{
-    paint::Look,
-    shatter::{Anchor, BreakAgain, BurstParams, ConvexPiece, RimLook, Shards, ShatterError, ShatterParams},
-};
+use crate::paint::Look;
+use crate::shatter::{Anchor, BreakAgain, BurstParams, ConvexPiece, RimLook, Shards, ShatterError, ShatterParams};
 use bevy::{prelude::*, reflect::serde::ReflectSerializeWithRegistry};
 use std::sync::Arc;
 
@@ -69,7 +67,7 @@ pub struct ShatterCracks {
     /// How thick shards of flat 3D surfaces are, pattern units, 0..=10; default 0.03. Those of a slab, a box at least four times as wide and
     /// high as thick, are as thick as it is.
     pub thickness: f32,
-    /// How their rims look; `None` (default) = as befits the preset: [`RimLook::GLASS`] where cracks are frosted,
+    /// How their rims look; `None` (default) = by the preset: [`RimLook::GLASS`] where cracks are frosted,
     /// [`RimLook::PLAIN`] where they are drawn as in a cartoon, else [`RimLook::STONE`].
     pub rim: Option<RimLook>,
     /// What the sides of 3D shards look like; `None` = the mean colour of the picture, darker, or like the edge of a pane where the rim

@@ -29,7 +29,7 @@ pub struct CrackSurface {
     pub preset: PresetSource,
     /// Seed of the pattern. A change takes effect after healing.
     pub seed: u64,
-    /// Size of the textures. A change takes effect when they are made anew: after healing, or with another picture.
+    /// Size of the textures. A change takes effect when they are made again: after healing, or with another picture.
     pub resolution: CrackResolution,
     /// Which maps are written. A change takes effect as one of `resolution`.
     pub write: CrackMaps,
@@ -93,7 +93,7 @@ impl Default for CrackSurface {
 /// Size of a surface's textures.
 #[derive(Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum CrackResolution {
-    /// As its picture; with more columns or rows where it is shown stretched by more than 1.4, so that the cracks are not, be it the sprite's
+    /// As its picture; with more columns or rows where it is shown stretched by more than 1.4, so that the cracks are not, by the sprite's
     /// `custom_size`, the mesh's texture coordinates or a scale that stretches it. That is seen to when the textures are made, as far as two
     /// million texels and the memory allow, and not for sprites with a `rect` or an atlas, nor for pictures whose sampler shows texels as
     /// squares. Where a sprite repeats its picture or shows it in nine parts, as many texels as it shows of it, up to two million. Without a picture,

@@ -1,15 +1,14 @@
 //! What a bake needs: it is looked for in the frames until all of it is there.
 
-use super::{
-    map_job::{MAX_SIDE, MapJob, Source, Surface},
-    work::{Bake, Work},
-};
-use crate::plugin::{
-    api::{CrackError, GuideSource, GuidedCracks},
-    jobs::{copy::PictureCopies, threads::Threads},
-    source::picture,
-    surface::{cracked::active, inputs::Copies, plan::Plan},
-};
+use super::map_job::{BakeSurface, MAX_SIDE, MapJob, Source};
+use super::work::{Bake, Work};
+use crate::plugin::api::{CrackError, GuideSource, GuidedCracks};
+use crate::plugin::jobs::copy::PictureCopies;
+use crate::plugin::jobs::threads::Threads;
+use crate::plugin::source::picture;
+use crate::plugin::surface::cracked::active;
+use crate::plugin::surface::inputs::Copies;
+use crate::plugin::surface::plan::Plan;
 use bevy::prelude::*;
 
 /// All that a bake needs; `None` if its pictures are not there yet.
@@ -19,7 +18,7 @@ pub(super) fn begin(world: &mut World, entity: Entity, bake: &mut Bake) -> Resul
     let mut copies = Copies::default();
     let known = active(world, entity).and_then(|active| {
         let rect = active.canvas.views.get(active.canvas.view)?.rect;
-        Some(Surface::Known(active.canvas.base.clone(), rect))
+        Some(BakeSurface::Known(active.canvas.base.clone(), rect))
     });
     let surface = match known {
         Some(surface) => surface,
@@ -28,7 +27,7 @@ pub(super) fn begin(world: &mut World, entity: Entity, bake: &mut Bake) -> Resul
             let Some(raw) = plan.raw(world, &mut copies)? else { return Ok(None) };
             plan.check_mesh(world, entity)?;
             bake.plan = Some(Box::new(plan));
-            Surface::Raw(Box::new(raw))
+            BakeSurface::Raw(Box::new(raw))
         }
     };
     let images = world.get_resource::<Assets<Image>>().ok_or(CrackError::NoImages)?;
@@ -54,8 +53,8 @@ pub(super) fn begin(world: &mut World, entity: Entity, bake: &mut Bake) -> Resul
         sources.push((source, guide.gamma));
     }
     let size = match &surface {
-        Surface::Known(_, rect) | Surface::Read(_, rect) => rect.size(),
-        Surface::Raw(raw) => raw.plan.rect.size(),
+        BakeSurface::Known(_, rect) | BakeSurface::Read(_, rect) => rect.size(),
+        BakeSurface::Raw(raw) => raw.plan.rect.size(),
     };
     let side = size.max_element();
     let scale = f64::from(guided.max_side.clamp(1, side.max(1))) / f64::from(side.max(1));

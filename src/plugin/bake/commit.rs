@@ -1,31 +1,25 @@
-//! What the frames do of a bake: they order a surface, and take up what was made.
+//! What the frames do of a bake: they order a surface, and apply what was made.
 
-use super::{
-    finish::{Finish, Finished, Next, Order},
-    map_job::Lines,
-    work::{Bake, Job, Work},
-};
-use crate::plugin::{
-    api::{CrackClock, CrackError, CrackStatus, CrackTextures, GuidedAppearance, GuidedCracks},
-    draw::async_playback::{self, AsyncPlayback},
-    gpu::uploads::Uploads,
-    jobs::background::drop_in_background,
-    shards::broken::drop_shards,
-    surface::{
-        active::Active,
-        cracked::{self, active, has_cracked, with_queues},
-        create::{install, make_ready_now, set_status},
-        inputs::Readings,
-        plan::Plan,
-        prepare::MAX_LANDING,
-        queues::Queues,
-        regrow::Past,
-        time::First,
-    },
-};
+use super::finish::{Finish, FinishInputs, FinishStep, Finished};
+use super::map_job::Lines;
+use super::work::{Bake, BakeJob, Work};
+use crate::plugin::api::{CrackClock, CrackError, CrackStatus, CrackTextures, GuidedAppearance, GuidedCracks};
+use crate::plugin::draw::async_playback::{self, AsyncPlayback};
+use crate::plugin::gpu::uploads::Uploads;
+use crate::plugin::jobs::background::drop_in_background;
+use crate::plugin::shards::broken::drop_shards;
+use crate::plugin::surface::active::Active;
+use crate::plugin::surface::cracked::{self, active, has_cracked, with_queues};
+use crate::plugin::surface::create::{install, make_ready_now, set_status};
+use crate::plugin::surface::inputs::BaseAndMask;
+use crate::plugin::surface::plan::Plan;
+use crate::plugin::surface::prepare::MAX_UPLOAD_FRAMES;
+use crate::plugin::surface::queues::Queues;
+use crate::plugin::surface::regrow::Past;
+use crate::plugin::surface::time::First;
 use bevy::{prelude::*, render::renderer::RenderDevice};
 
-/// So often the surface may change while its cracks are made beside the frames; then they are made between two of them.
+/// How often the surface may change while its cracks are made by background tasks; then they are made between two of them.
 const MAX_ROUNDS: u32 = 8;
 
 /// The seconds in which cracks appear; `None` = at once.
@@ -38,7 +32,7 @@ fn seconds(world: &World, entity: Entity) -> Option<f32> {
 }
 
 /// Has the surface made with these cracks, as it is now; from the start if it is another one.
-pub(super) fn order(world: &mut World, entity: Entity, bake: &mut Bake, lines: Lines) -> Result<(), CrackError> {
+pub(super) fn start_finish(world: &mut World, entity: Entity, bake: &mut Bake, lines: Lines) -> Result<(), CrackError> {
     let seconds = seconds(world, entity);
     let stager = world.resource::<Uploads>().stager(world.get_resource::<RenderDevice>());
     if !has_cracked(world, entity) {
@@ -48,7 +42,7 @@ pub(super) fn order(world: &mut World, entity: Entity, bake: &mut Bake, lines: L
         }
         if plan.has_room(world) {
             let clock = world.get::<CrackClock>(entity).copied();
-            let order = Order {
+            let order = FinishInputs {
                 surface: plan.surface.clone(),
                 preset: plan.preset.clone(),
                 base: ground.base.clone(),
@@ -63,9 +57,9 @@ pub(super) fn order(world: &mut World, entity: Entity, bake: &mut Bake, lines: L
                 stager,
             };
             if plan.textures.is_none() {
-                plan.make_room(world)?;
+                plan.allocate_textures(world)?;
             }
-            bake.work = Work::Ready(Job::Finish(Box::new(Finish::new(order, lines))));
+            bake.work = Work::Ready(BakeJob::Finish(Box::new(Finish::new(order, lines))));
             return Ok(());
         }
         // Coarser textures, or an error.
@@ -74,13 +68,13 @@ pub(super) fn order(world: &mut World, entity: Entity, bake: &mut Bake, lines: L
         }
     }
     let active = active(world, entity);
-    if let Some(order) = active.and_then(|active| Order::of(active, seconds, stager)) {
-        bake.work = Work::Ready(Job::Finish(Box::new(Finish::new(order, lines))));
+    if let Some(order) = active.and_then(|active| FinishInputs::of(active, seconds, stager)) {
+        bake.work = Work::Ready(BakeJob::Finish(Box::new(Finish::new(order, lines))));
     }
     Ok(())
 }
 
-/// Applies what was made; `None` if it has to wait for the renderer, or be made anew.
+/// Applies what was made; `None` if it has to wait for the renderer, or be made again.
 pub(super) fn commit(
     world: &mut World,
     entity: Entity,
@@ -108,10 +102,10 @@ pub(super) fn commit(
             if frames == 0 {
                 textures.fill(world, &mut finished.pictures);
             }
-            if frames < MAX_LANDING && textures.are_staged(world) {
+            if frames < MAX_UPLOAD_FRAMES && textures.are_staged(world) {
                 plan.textures = Some(textures);
                 bake.plan = Some(plan);
-                bake.work = Work::Landing(finished, frames + 1);
+                bake.work = Work::Uploading(finished, frames + 1);
                 return Ok(None);
             }
             settle(world, entity, *plan, textures, *finished);
@@ -123,23 +117,23 @@ pub(super) fn commit(
     Ok(None)
 }
 
-/// Has a surface made anew that has changed meanwhile.
+/// Has a surface made again that has changed meanwhile.
 fn again(world: &mut World, entity: Entity, bake: &mut Bake, finished: Finished) -> Result<(), CrackError> {
     let Finished { order: past, added, covered, growth, cells, field, pictures, replay, .. } = finished;
     drop_in_background((growth, cells, field, pictures, replay));
-    let ground = Readings { base: past.base, mask: past.mask };
+    let ground = BaseAndMask { base: past.base, mask: past.mask };
     let ground = past.is_new.then_some(ground);
-    order(world, entity, bake, Lines { network: added.network, opening: added.opening, covered, ground })?;
+    start_finish(world, entity, bake, Lines { network: added.network, opening: added.opening, covered, ground })?;
     bake.rounds += 1;
     if bake.rounds < MAX_ROUNDS {
         return Ok(());
     }
     match core::mem::replace(&mut bake.work, Work::Wanted) {
-        Work::Ready(Job::Finish(mut finish)) => loop {
+        Work::Ready(BakeJob::Finish(mut finish)) => loop {
             match finish.step()? {
-                Next::More(more) => finish = more,
-                Next::Done(finished) => {
-                    bake.work = Work::Landing(finished, 0);
+                FinishStep::More(more) => finish = more,
+                FinishStep::Done(finished) => {
+                    bake.work = Work::Uploading(finished, 0);
                     return Ok(());
                 }
             }
@@ -154,7 +148,7 @@ fn settle(world: &mut World, entity: Entity, plan: Plan, textures: CrackTextures
     let seconds = seconds(world, entity);
     let is_outdated = plan.is_outdated;
     let Finished { order, added, growth, cells, field, touched, look, replay, playback, .. } = finished;
-    let ground = plan.ground(world, Readings { base: order.base, mask: order.mask }, look, textures);
+    let ground = plan.ground(world, BaseAndMask { base: order.base, mask: order.mask }, look, textures);
     let mut active = Box::new(Active::new(ground, growth, field));
     (active.drawing.touched, active.cracks.cells, active.cracks.added, active.canvas.is_outdated) =
         (touched, cells, Some(added), is_outdated);

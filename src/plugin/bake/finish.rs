@@ -1,40 +1,30 @@
-//! From a network to a surface that shows it: growth, depth field and textures are made beside the frames, and a frame takes them up
+//! From a network to a surface that shows it: growth, depth field and textures are made by background tasks, and a frame applies them
 //! by handing them over.
 
 use super::map_job::{Lines, SLICE};
-use crate::{
-    CrackPreset,
-    growth::CrackGrowth,
-    paint::LookTable,
-    pattern::{CellTracker, CrackMask, Moment},
-    plugin::{
-        api::{
-            CrackError, CrackSurface,
-            textures::{MAPS, Maps},
-        },
-        draw::async_playback::AsyncPlayback,
-        gpu::{
-            buffer::Stager,
-            textures::{self, Picture},
-        },
-        source::picture::BasePicture,
-        surface::{
-            active::Active,
-            cracks::Added,
-            frame::{frame, look},
-            regrow::{Past, grown_anew},
-            stamp::stamp_all,
-            tile_set::Touched,
-            time::First,
-        },
-    },
-    raster::{DepthField, Redrawn, Replay, TexelRect},
-};
+use crate::CrackPreset;
+use crate::growth::CrackGrowth;
+use crate::paint::LookTable;
+use crate::pattern::{CellTracker, CrackMask, Moment};
+use crate::plugin::api::textures::{MAPS, Maps};
+use crate::plugin::api::{CrackError, CrackSurface};
+use crate::plugin::draw::async_playback::AsyncPlayback;
+use crate::plugin::gpu::buffer::Stager;
+use crate::plugin::gpu::textures::{self, Picture};
+use crate::plugin::source::picture::BasePicture;
+use crate::plugin::surface::active::Active;
+use crate::plugin::surface::cracks::Added;
+use crate::plugin::surface::frame::{frame, look};
+use crate::plugin::surface::regrow::{Past, grown_anew};
+use crate::plugin::surface::stamp::stamp_all;
+use crate::plugin::surface::tile_set::Touched;
+use crate::plugin::surface::time::First;
+use crate::raster::{DepthField, Redrawn, Replay, TexelRect};
 use bevy::prelude::*;
 use std::sync::Arc;
 
 /// All that the outcome depends on, beside the cracks.
-pub(super) struct Order {
+pub(super) struct FinishInputs {
     pub(super) surface: CrackSurface,
     pub(super) preset: CrackPreset,
     pub(super) base: Arc<BasePicture>,
@@ -50,7 +40,7 @@ pub(super) struct Order {
     pub(super) stager: Option<Stager>,
 }
 
-impl Order {
+impl FinishInputs {
     /// For a surface that has cracked.
     pub(super) fn of(active: &Active, seconds: Option<f32>, stager: Option<Stager>) -> Option<Self> {
         let past = Past::of(active);
@@ -89,7 +79,7 @@ impl Order {
 
 /// The way there, as a machine that is stepped.
 pub(super) struct Finish {
-    order: Order,
+    order: FinishInputs,
     added: Added,
     covered: Option<f32>,
     stage: Stage,
@@ -115,9 +105,9 @@ struct Drawn {
     replay: Option<(Replay, Moment)>,
 }
 
-/// What a frame takes up.
+/// What a frame applies.
 pub(super) struct Finished {
-    pub(super) order: Order,
+    pub(super) order: FinishInputs,
     pub(super) added: Added,
     pub(super) covered: Option<f32>,
     pub(super) growth: CrackGrowth,
@@ -133,19 +123,19 @@ pub(super) struct Finished {
 }
 
 /// A slice further.
-pub(super) enum Next {
+pub(super) enum FinishStep {
     More(Box<Finish>),
     Done(Box<Finished>),
 }
 
 impl Finish {
-    pub(super) fn new(order: Order, lines: Lines) -> Self {
+    pub(super) fn new(order: FinishInputs, lines: Lines) -> Self {
         let Lines { network, opening, covered, .. } = lines;
         Self { order, added: Added { network, opening, steps: 0 }, covered, stage: Stage::Grow }
     }
 
     /// A slice of the work.
-    pub(super) fn step(self: Box<Self>) -> Result<Next, CrackError> {
+    pub(super) fn step(self: Box<Self>) -> Result<FinishStep, CrackError> {
         let Self { order, mut added, covered, stage } = *self;
         let stage = match stage {
             Stage::Grow => order.grow(&mut added)?,
@@ -158,7 +148,7 @@ impl Finish {
                 let Drawn { field, touched, look, replay } = *drawn;
                 let playback = replay.is_some().then(|| AsyncPlayback::new(&growth, &texels));
                 let pictures = textures::stage(texels, order.base.size, order.stager.as_ref());
-                return Ok(Next::Done(Box::new(Finished {
+                return Ok(FinishStep::Done(Box::new(Finished {
                     order,
                     added,
                     covered,
@@ -173,11 +163,11 @@ impl Finish {
                 })));
             }
         };
-        Ok(Next::More(Box::new(Self { order, added, covered, stage })))
+        Ok(FinishStep::More(Box::new(Self { order, added, covered, stage })))
     }
 }
 
-impl Order {
+impl FinishInputs {
     fn grow(&self, added: &mut Added) -> Result<Stage, CrackError> {
         let extent = frame(self.rect)?.extent();
         let density = if self.surface.alpha_mask { self.base.density(self.rect) } else { None };

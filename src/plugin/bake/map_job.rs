@@ -1,19 +1,13 @@
 //! From guides to a network: what a bake does before it knows of its surface.
 
-use crate::{
-    Grid,
-    pattern::Network,
-    plugin::{
-        api::{CrackError, GuidedAppearance, GuidedCracks},
-        source::{
-            mask,
-            picture::{self, BasePicture, Space},
-        },
-        surface::inputs::{Readings, SurfaceInputs},
-    },
-    raster::TexelRect,
-    voronoi::{self, Guide, Seams, VoronoiBake},
-};
+use crate::Grid;
+use crate::pattern::Network;
+use crate::plugin::api::{CrackError, GuidedAppearance, GuidedCracks};
+use crate::plugin::source::mask;
+use crate::plugin::source::picture::{self, BasePicture, Space};
+use crate::plugin::surface::inputs::{BaseAndMask, SurfaceInputs};
+use crate::raster::TexelRect;
+use crate::voronoi::{self, Guide, Seams, VoronoiBake};
 use bevy::{
     asset::RenderAssetUsages,
     image::{CompressedImageFormats, ImageSampler, ImageType},
@@ -36,7 +30,7 @@ const FRONT_OPENING: u32 = 12;
 /// Steps in which cracks open that widen all at once.
 const WIDE_OPENING: u32 = 32;
 
-/// Shares of the whole that reading the guides and drawing the lines are told to be.
+/// Shares of the whole that reading the guides and drawing the lines count for in the progress.
 const READ: f32 = 0.1;
 
 pub(super) const MAPPED: f32 = 0.95;
@@ -47,7 +41,7 @@ pub(super) struct MapJob {
     pub(super) size: UVec2,
     /// Copies of the pictures of surface, mask and guides.
     pub(super) copies: Vec<Image>,
-    pub(super) surface: Surface,
+    pub(super) surface: BakeSurface,
     pub(super) sources: vec::IntoIter<(Source, f32)>,
     guides: Vec<Guide>,
     map: Option<VoronoiBake>,
@@ -55,12 +49,12 @@ pub(super) struct MapJob {
 }
 
 /// The surface that is to crack.
-pub(super) enum Surface {
+pub(super) enum BakeSurface {
     /// Its picture and the part that is shown.
     Known(Arc<BasePicture>, TexelRect),
     /// It has not cracked yet.
     Raw(Box<SurfaceInputs>),
-    Read(Readings, TexelRect),
+    Read(BaseAndMask, TexelRect),
 }
 
 /// A guide that is not read yet.
@@ -78,20 +72,20 @@ pub(super) struct Lines {
     pub(super) network: Network,
     pub(super) opening: u32,
     pub(super) covered: Option<f32>,
-    pub(super) ground: Option<Readings>,
+    pub(super) ground: Option<BaseAndMask>,
 }
 
 impl MapJob {
-    pub(super) fn new(guided: GuidedCracks, size: UVec2, surface: Surface, sources: Vec<(Source, f32)>) -> Self {
+    pub(super) fn new(guided: GuidedCracks, size: UVec2, surface: BakeSurface, sources: Vec<(Source, f32)>) -> Self {
         let (copies, guides) = (Vec::new(), Vec::with_capacity(sources.len()));
         Self { guided, size, copies, surface, sources: sources.into_iter(), guides, map: None, progress: 0.0 }
     }
 
     /// A slice of the work.
     pub(super) fn step(&mut self) -> Result<Option<Lines>, CrackError> {
-        if let Surface::Raw(raw) = &self.surface {
+        if let BakeSurface::Raw(raw) = &self.surface {
             let ground = raw.read(&self.copies)?;
-            self.surface = Surface::Read(ground, raw.plan.rect);
+            self.surface = BakeSurface::Read(ground, raw.plan.rect);
             return Ok(None);
         }
         if let Some((source, gamma)) = self.sources.next() {
@@ -115,7 +109,7 @@ impl MapJob {
         let covered = map.strokes().map(|strokes| strokes.covered);
         drop(map);
         let (network, opening) = lines(&seams, self.guided.appearance);
-        let ground = if let Surface::Read(ground, _) = &self.surface { Some(ground.clone()) } else { None };
+        let ground = if let BakeSurface::Read(ground, _) = &self.surface { Some(ground.clone()) } else { None };
         Ok(Some(Lines { network, opening, covered, ground }))
     }
 
@@ -125,8 +119,8 @@ impl MapJob {
             Source::Grid(grid) => return Ok(Arc::unwrap_or_clone(grid)),
             Source::Own => {
                 let (base, rect) = match &self.surface {
-                    Surface::Known(base, rect) | Surface::Read(Readings { base, .. }, rect) => (base, *rect),
-                    Surface::Raw(_) => return Err("it was not read".into()),
+                    BakeSurface::Known(base, rect) | BakeSurface::Read(BaseAndMask { base, .. }, rect) => (base, *rect),
+                    BakeSurface::Raw(_) => return Err("it was not read".into()),
                 };
                 let rgba = mask::part(&base.diffuse, base.size, rect);
                 let picture = voronoi::lightness(rect.size(), &rgba).ok_or("its size is wrong")?;

@@ -1,21 +1,16 @@
 //! Bakes: from guides to cracks on a surface, on tasks or in slices of frames. A frame only hands over what is ready.
 
-use super::{
-    begin::begin,
-    commit::{commit, order},
-    work::{Bake, Bakes, Job, Made, Outcome, Run, Step, Work},
-};
-use crate::plugin::{
-    api::{BakeProgress, CrackBaked, CrackBudget, CrackError, CrackFailed, error::EntityLabel},
-    jobs::{
-        background::guarded,
-        copy::{self, CopyProgress},
-        deferred::hold,
-        frame_time::FrameClock,
-        threads::Threads,
-    },
-    surface::queue::with_queue,
-};
+use super::begin::begin;
+use super::commit::{commit, start_finish};
+use super::work::{Bake, BakeJob, Bakes, Outcome, RunningTask, Step, StepResult, Work};
+use crate::plugin::api::error::EntityLabel;
+use crate::plugin::api::{BakeProgress, CrackBaked, CrackBudget, CrackError, CrackFailed};
+use crate::plugin::jobs::background::guarded;
+use crate::plugin::jobs::copy::{self, CopyProgress};
+use crate::plugin::jobs::deferred::hold;
+use crate::plugin::jobs::frame_time::FrameClock;
+use crate::plugin::jobs::threads::Threads;
+use crate::plugin::surface::queue::with_queue;
 use bevy::{ecs::entity::EntityHashSet, prelude::*, tasks::futures::check_ready};
 use std::sync::atomic::Ordering;
 
@@ -53,13 +48,13 @@ fn work_on_bakes(world: &mut World) -> Vec<(Entity, Result<Option<f32>, CrackErr
                 Work::Wanted => match begin(world, *entity, bake) {
                     Ok(Some(work)) => bake.work = work,
                     Ok(None) => {
-                        tell(world, *entity, 0.0);
+                        report(world, *entity, 0.0);
                         return true;
                     }
                     Err(error) => break Err(error),
                 },
                 Work::Reading(mut reading, mut job) => {
-                    tell(world, *entity, 0.0);
+                    report(world, *entity, 0.0);
                     let Some(images) = world.get_resource::<Assets<Image>>() else { break Err(CrackError::NoImages) };
                     match reading.step(images, &mut left) {
                         CopyProgress::More => {
@@ -70,25 +65,25 @@ fn work_on_bakes(world: &mut World) -> Vec<(Entity, Result<Option<f32>, CrackErr
                         CopyProgress::Changed => return true,
                         CopyProgress::Done => {
                             job.copies = reading.finish();
-                            bake.work = Work::Ready(Job::Map(job));
+                            bake.work = Work::Ready(BakeJob::Map(job));
                         }
                     }
                 }
                 Work::Ready(job) => {
-                    tell(world, *entity, job.progress());
+                    report(world, *entity, job.progress());
                     if room == 0 {
                         bake.work = Work::Ready(job);
                         return true;
                     }
                     room -= 1;
                     bake.work = match pool {
-                        Some(pool) => Work::Task(Run::start(pool, job)),
+                        Some(pool) => Work::Task(RunningTask::start(pool, job)),
                         None => Work::Slices(job),
                     };
                 }
                 Work::Task(mut run) => match check_ready(&mut run.task) {
                     None => {
-                        tell(world, *entity, f32::from_bits(run.line.progress.load(Ordering::Relaxed)));
+                        report(world, *entity, f32::from_bits(run.line.progress.load(Ordering::Relaxed)));
                         bake.work = Work::Task(run);
                         return true;
                     }
@@ -104,10 +99,10 @@ fn work_on_bakes(world: &mut World) -> Vec<(Entity, Result<Option<f32>, CrackErr
                 Work::Slices(job) => {
                     match guarded(|| job.step()) {
                         Ok(Step::More(job)) => {
-                            tell(world, *entity, job.progress());
+                            report(world, *entity, job.progress());
                             bake.work = Work::Slices(job);
                         }
-                        Ok(Step::Made(made)) => match go_on(world, *entity, bake, made) {
+                        Ok(Step::StepResult(made)) => match go_on(world, *entity, bake, made) {
                             Ok(()) => room += 1,
                             Err(error) => break Err(error),
                         },
@@ -117,9 +112,9 @@ fn work_on_bakes(world: &mut World) -> Vec<(Entity, Result<Option<f32>, CrackErr
                         return true;
                     }
                 }
-                Work::Landing(finished, frames) => match commit(world, *entity, bake, finished, frames) {
+                Work::Uploading(finished, frames) => match commit(world, *entity, bake, finished, frames) {
                     Ok(Some(covered)) => break Ok(covered),
-                    // It waits for the renderer, or has to be made anew.
+                    // It waits for the renderer, or has to be made again.
                     Ok(None) => {
                         if !matches!(bake.work, Work::Ready(_)) {
                             return true;
@@ -144,7 +139,7 @@ fn work_on_bakes(world: &mut World) -> Vec<(Entity, Result<Option<f32>, CrackErr
     ended
 }
 
-fn tell(world: &mut World, entity: Entity, progress: f32) {
+fn report(world: &mut World, entity: Entity, progress: f32) {
     if let Some(mut told) = world.get_mut::<BakeProgress>(entity) {
         told.set_if_neq(BakeProgress(progress));
     }
@@ -154,7 +149,7 @@ fn tell(world: &mut World, entity: Entity, progress: f32) {
 fn end(world: &mut World, entity: Entity, result: Result<Option<f32>, CrackError>) {
     match result {
         Ok(covered) => {
-            tell(world, entity, 1.0);
+            report(world, entity, 1.0);
             world.trigger(CrackBaked { entity, covered });
         }
         Err(error) => {
@@ -166,11 +161,11 @@ fn end(world: &mut World, entity: Entity, result: Result<Option<f32>, CrackError
 }
 
 /// The next part of a bake, from what has been made: work that is ready, or again from the start.
-fn go_on(world: &mut World, entity: Entity, bake: &mut Bake, made: Made) -> Result<(), CrackError> {
+fn go_on(world: &mut World, entity: Entity, bake: &mut Bake, made: StepResult) -> Result<(), CrackError> {
     match made {
-        Made::Lines(lines) => order(world, entity, bake, lines),
-        Made::Surface(finished) => {
-            bake.work = Work::Landing(finished, 0);
+        StepResult::Lines(lines) => start_finish(world, entity, bake, lines),
+        StepResult::Surface(finished) => {
+            bake.work = Work::Uploading(finished, 0);
             Ok(())
         }
     }
@@ -254,7 +249,7 @@ mod tests {
         assert!(cracked == same, "the same cracks");
     }
 
-    /// What a frame takes up is ready: all of it is stamped and painted when its end is told.
+    /// What a frame applies is ready: all of it is stamped and painted when its end is reported.
     #[cfg(feature = "2d")]
     #[test]
     fn no_frame_stamps_or_paints_what_was_baked() {

@@ -1,14 +1,11 @@
 //! A bake and its work.
 
-use super::{
-    finish::{Finish, Finished, Next},
-    map_job::{Lines, MAPPED, MapJob},
-};
-use crate::plugin::{
-    api::{BakeProgress, CrackError, CrackSurface, GuidedCracks},
-    jobs::{background::guarded, copy::PictureCopies},
-    surface::plan::Plan,
-};
+use super::finish::{Finish, FinishStep, Finished};
+use super::map_job::{Lines, MAPPED, MapJob};
+use crate::plugin::api::{BakeProgress, CrackError, CrackSurface, GuidedCracks};
+use crate::plugin::jobs::background::guarded;
+use crate::plugin::jobs::copy::PictureCopies;
+use crate::plugin::surface::plan::Plan;
 use bevy::{
     ecs::entity::EntityHashSet,
     prelude::*,
@@ -45,11 +42,11 @@ pub(super) enum Work {
     /// Pictures are copied.
     Reading(PictureCopies, Box<MapJob>),
     /// Others come first.
-    Ready(Job),
-    Task(Run),
-    Slices(Job),
-    /// Textures are on their way to the renderer, for so many frames.
-    Landing(Box<Finished>, u32),
+    Ready(BakeJob),
+    Task(RunningTask),
+    Slices(BakeJob),
+    /// Textures are on their way to the renderer, for this many frames.
+    Uploading(Box<Finished>, u32),
 }
 
 impl Work {
@@ -59,7 +56,7 @@ impl Work {
 }
 
 impl Bakes {
-    /// Begins a bake anew.
+    /// Begins a bake again.
     pub(crate) fn want(&mut self, entity: Entity) {
         self.cancel(entity);
         if let Some(cancelled) = &mut self.cancelled {
@@ -76,7 +73,7 @@ impl Bakes {
         }
     }
 
-    /// What was read of the picture before this frame is another one now.
+    /// What was read of the picture before this frame has changed.
     pub(crate) fn forget_picture(&mut self, picture: AssetId<Image>, frame: u64) {
         for (_, Bake { work, plan, .. }) in &mut self.list {
             let is_past = plan.as_mut().is_none_or(|plan| plan.forget_picture(picture, frame));
@@ -110,19 +107,19 @@ pub(crate) fn cancel(world: &mut World, entity: Entity) {
 }
 
 /// A task at work, which stops within a slice when this is dropped.
-pub(super) struct Run {
+pub(super) struct RunningTask {
     pub(super) task: Task<Outcome>,
-    pub(super) line: Arc<Line>,
+    pub(super) line: Arc<TaskLink>,
 }
 
 /// What a task and its surface tell one another.
-pub(super) struct Line {
+pub(super) struct TaskLink {
     cancelled: AtomicBool,
     /// The bits of the progress.
     pub(super) progress: AtomicU32,
 }
 
-impl Drop for Run {
+impl Drop for RunningTask {
     fn drop(&mut self) {
         self.line.cancelled.store(true, Ordering::Relaxed);
     }
@@ -131,21 +128,21 @@ impl Drop for Run {
 /// What comes back from a task.
 pub(super) enum Outcome {
     /// It runs where it was started, which would stand still meanwhile.
-    NoThread(Job),
-    Ended(Result<Made, CrackError>),
+    NoThread(BakeJob),
+    Ended(Result<StepResult, CrackError>),
 }
 
-impl Run {
-    pub(super) fn start(pool: &AsyncComputeTaskPool, job: Job) -> Self {
+impl RunningTask {
+    pub(super) fn start(pool: &AsyncComputeTaskPool, job: BakeJob) -> Self {
         let progress = AtomicU32::new(job.progress().to_bits());
-        let line = Arc::new(Line { cancelled: AtomicBool::new(false), progress });
+        let line = Arc::new(TaskLink { cancelled: AtomicBool::new(false), progress });
         let (lined, home) = (line.clone(), thread::current().id());
         Self { task: pool.spawn(async move { work(job, &lined, home) }), line }
     }
 }
 
 /// The work of a task.
-fn work(mut job: Job, line: &Line, home: ThreadId) -> Outcome {
+fn work(mut job: BakeJob, line: &TaskLink, home: ThreadId) -> Outcome {
     if thread::current().id() == home {
         return Outcome::NoThread(job);
     }
@@ -156,39 +153,39 @@ fn work(mut job: Job, line: &Line, home: ThreadId) -> Outcome {
         line.progress.store(job.progress().to_bits(), Ordering::Relaxed);
         job = match guarded(|| job.step()) {
             Ok(Step::More(job)) => job,
-            Ok(Step::Made(made)) => return Outcome::Ended(Ok(made)),
+            Ok(Step::StepResult(made)) => return Outcome::Ended(Ok(made)),
             Err(error) => return Outcome::Ended(Err(error)),
         };
     }
 }
 
 /// The two parts of a bake, machines that are stepped: between them it is seen what has become of the surface.
-pub(super) enum Job {
+pub(super) enum BakeJob {
     Map(Box<MapJob>),
     Finish(Box<Finish>),
 }
 
-pub(super) enum Made {
+pub(super) enum StepResult {
     Lines(Lines),
     Surface(Box<Finished>),
 }
 
 pub(super) enum Step {
-    More(Job),
-    Made(Made),
+    More(BakeJob),
+    StepResult(StepResult),
 }
 
-impl Job {
+impl BakeJob {
     /// A slice of the work.
     pub(super) fn step(self) -> Result<Step, CrackError> {
         Ok(match self {
             Self::Map(mut map) => match map.step()? {
-                Some(lines) => Step::Made(Made::Lines(lines)),
+                Some(lines) => Step::StepResult(StepResult::Lines(lines)),
                 None => Step::More(Self::Map(map)),
             },
             Self::Finish(finish) => match finish.step()? {
-                Next::More(finish) => Step::More(Self::Finish(finish)),
-                Next::Done(finished) => Step::Made(Made::Surface(finished)),
+                FinishStep::More(finish) => Step::More(Self::Finish(finish)),
+                FinishStep::Done(finished) => Step::StepResult(StepResult::Surface(finished)),
             },
         })
     }

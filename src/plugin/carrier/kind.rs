@@ -1,17 +1,12 @@
 //! [`Carrier`]: what shows a surface's pictures, and the trait of its kinds.
 
-use super::{plane::Plane, shard_visual::ShardVisuals};
-use crate::{
-    plugin::{
-        api::{
-            error::CrackError,
-            hit::HitPoint,
-            textures::{CrackTextures, Maps},
-        },
-        source::layout::Layout,
-    },
-    raster::TexelRect,
-};
+use super::plane::Plane;
+use super::shard_visual::ShardVisuals;
+use crate::plugin::api::error::CrackError;
+use crate::plugin::api::hit::HitPoint;
+use crate::plugin::api::textures::{CrackTextures, Maps};
+use crate::plugin::source::layout::Layout;
+use crate::raster::TexelRect;
 #[cfg(feature = "2d")]
 use bevy::sprite::SpriteImageMode;
 use bevy::{
@@ -194,7 +189,7 @@ impl Carrier {
         self.shown.pictures().map(Handle::id)
     }
 
-    /// Ids of the assets made for it, besides textures.
+    /// Ids of the assets made for it, unmeasured textures.
     pub(crate) fn owned(&self) -> impl Iterator<Item = UntypedAssetId> + '_ {
         self.own.iter().map(UntypedHandle::id).chain(self.mesh.iter().map(|(_, own)| own.id().untyped()))
     }

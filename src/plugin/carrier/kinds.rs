@@ -1,10 +1,11 @@
 //! All kinds of carriers.
 
 use super::kind::{CarrierKind, Found};
+#[cfg(feature = "2d")]
+use super::lit::CrackLitMaterial;
 #[cfg(any(feature = "2d", feature = "3d"))]
 use super::material::MaterialKind;
-#[cfg(feature = "2d")]
-use super::{lit::CrackLitMaterial, sprite::SpriteKind};
+use super::sprite::SpriteKind;
 use crate::plugin::api::error::CrackError;
 use bevy::prelude::*;
 #[cfg(feature = "2d")]

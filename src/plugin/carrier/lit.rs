@@ -1,9 +1,8 @@
 //! [`CrackLitMaterial`]: a 2D material that shows normals.
 
-use crate::plugin::{
-    api::{CrackSystems, CrackTextures, textures::Maps},
-    carrier::slot::{CrackMaterial, MaterialSlot},
-};
+use crate::plugin::api::textures::Maps;
+use crate::plugin::api::{CrackSystems, CrackTextures};
+use crate::plugin::carrier::slot::{CrackMaterial, MaterialSlot};
 use bevy::{
     asset::{AssetServer, embedded_asset},
     prelude::*,
@@ -187,9 +186,7 @@ fn shine(
         } else if !core::mem::replace(&mut *has_warned, true) {
             let light =
                 called.map_or_else(|| "a `CrackLight2d`".to_owned(), |name| format!("the `CrackLight2d` of {name}"));
-            warn!(
-                "{light} is dark: its colour, intensity, range, height or place is not finite (others will not be told)"
-            );
+            warn!("{light} is dark: its colour, intensity, range, height or place is not finite (this is said once)");
         }
     }
     let is_stale = |material: &CrackLitMaterial| material.lit.position != position || material.lit.color != color;

@@ -1,23 +1,17 @@
 //! Meshes with a material as carriers.
 
+use super::kind::{Carrier, CarrierKind, Found, NextLook, Shown};
+use super::mesh::{aspect_of, check_for_tangents, closest, is_flat, place_of, wrap};
+use super::pipelines::{self, Shape};
+use super::plane::Plane;
+use super::shard_visual::{MaterialVisuals, ShardVisuals};
+use super::slot::{CrackMaterial, MaterialSlot, mesh_of, to_picture, typed};
 #[cfg(feature = "3d")]
 use super::split;
-use super::{
-    kind::{Carrier, CarrierKind, Found, NextLook, Shown},
-    mesh::{aspect_of, check_for_tangents, closest, is_flat, place_of, wrap},
-    pipelines::{self, Shape},
-    plane::Plane,
-    shard_visual::{MaterialVisuals, ShardVisuals},
-    slot::{CrackMaterial, MaterialSlot, mesh_of, to_picture, typed},
-};
-use crate::{
-    plugin::api::{
-        error::{CrackError, EntityLabel},
-        hit::HitPoint,
-        textures::{CrackTextures, Maps},
-    },
-    raster::TexelRect,
-};
+use crate::plugin::api::error::{CrackError, EntityLabel};
+use crate::plugin::api::hit::HitPoint;
+use crate::plugin::api::textures::{CrackTextures, Maps};
+use crate::raster::TexelRect;
 use bevy::{
     asset::{LoadState, UntypedHandle},
     math::Mat3A,

@@ -1,6 +1,6 @@
 //! Warming up: a surface keeps its old look until the renderer has the pipelines for the new one.
 //!
-//! The engine makes pipelines beside the frames, and what it has none for yet it does not draw: a surface that is shown with another
+//! The engine makes pipelines in the background, and what it has none for yet it does not draw: a surface that is shown with another
 //! material or mesh would be gone for some frames. So what it is going to look like is *asked for* before: an entity with such a material
 //! and a mesh of that kind without any area is drawn in all views, until all pipelines are there that were asked for by then. That
 //! is done as soon as there is a `CrackSurface` or `ShatterCracks`, once for each kind of look, and again when the cameras have become
@@ -44,12 +44,12 @@ pub(crate) const PATIENCE: Duration = Duration::from_secs(5);
 
 /// What the renderer has made its pipelines for, and what it is making them for.
 #[derive(Resource, Default)]
-pub(crate) struct Warmth {
+pub(crate) struct PipelineRequests {
     /// All pipelines are there that were asked for up to this frame; `None` = there is no renderer.
-    pub(crate) told: Option<Arc<AtomicU64>>,
+    pub(crate) ready_up_to: Option<Arc<AtomicU64>>,
     /// Number of frames so far.
     pub(crate) frame: u64,
-    /// What all pipelines depend on besides looks.
+    /// What all pipelines depend on unmeasured looks.
     pub(crate) views: u64,
     /// By all that makes a look another one for the renderer.
     pub(crate) looks: BTreeMap<u64, Look>,
@@ -80,9 +80,14 @@ pub(crate) enum Shape {
 /// Connects the worlds, if there is a renderer.
 pub(crate) fn connect(app: &mut App) {
     let Some(render_app) = app.get_sub_app_mut(RenderApp) else { return };
-    let told = Arc::<AtomicU64>::default();
+    let ready_up_to = Arc::<AtomicU64>::default();
     render_app
-        .insert_resource(Pipelines { told: told.clone(), frame: 0, has_time: false, waiting: HashMap::default() })
+        .insert_resource(Pipelines {
+            ready_up_to: ready_up_to.clone(),
+            frame: 0,
+            has_time: false,
+            waiting: HashMap::default(),
+        })
         .add_systems(ExtractSchedule, take_frame)
         .add_systems(
             Render,
@@ -91,18 +96,18 @@ pub(crate) fn connect(app: &mut App) {
                 tell_of_pipelines.in_set(RenderSystems::Cleanup),
             ),
         );
-    app.world_mut().resource_mut::<Warmth>().told = Some(told);
+    app.world_mut().resource_mut::<PipelineRequests>().ready_up_to = Some(ready_up_to);
 }
 
 /// Whether there is a renderer.
-pub(crate) fn is_connected(warmth: Res<Warmth>) -> bool {
-    warmth.told.is_some()
+pub(crate) fn is_connected(warmth: Res<PipelineRequests>) -> bool {
+    warmth.ready_up_to.is_some()
 }
 
 /// The renderer's pipelines.
 #[derive(Resource)]
 struct Pipelines {
-    told: Arc<AtomicU64>,
+    ready_up_to: Arc<AtomicU64>,
     /// The frame that is drawn.
     frame: u64,
     /// Whether frames may take any time.
@@ -111,7 +116,11 @@ struct Pipelines {
     waiting: HashMap<usize, (u64, Instant)>,
 }
 
-fn take_frame(warmth: Extract<Res<Warmth>>, budget: Extract<Res<CrackBudget>>, mut pipelines: ResMut<Pipelines>) {
+fn take_frame(
+    warmth: Extract<Res<PipelineRequests>>,
+    budget: Extract<Res<CrackBudget>>,
+    mut pipelines: ResMut<Pipelines>,
+) {
     (pipelines.frame, pipelines.has_time) = (warmth.frame, budget.is_unlimited());
 }
 
@@ -130,7 +139,7 @@ fn wait_for_pipelines(pipelines: Res<Pipelines>, cache: Option<ResMut<PipelineCa
 /// Tells up to which frame all pipelines are there. Those that never come, for want of a shader, count for a while only.
 fn tell_of_pipelines(mut pipelines: ResMut<Pipelines>, cache: Option<Res<PipelineCache>>) {
     let Some(cache) = cache else { return };
-    let Pipelines { told, frame, waiting, .. } = &mut *pipelines;
+    let Pipelines { ready_up_to, frame, waiting, .. } = &mut *pipelines;
     let is_waiting = |id: &usize| {
         let state = cache.get_render_pipeline_state(CachedRenderPipelineId::new(*id));
         !matches!(state, CachedPipelineState::Ok(_))
@@ -142,12 +151,12 @@ fn tell_of_pipelines(mut pipelines: ResMut<Pipelines>, cache: Option<Res<Pipelin
     }
     let in_time = waiting.values().filter(|(_, since)| now.duration_since(*since) < PATIENCE);
     let all_up_to = in_time.map(|(first, _)| first.saturating_sub(1)).min().unwrap_or(*frame);
-    told.store(all_up_to, Ordering::Relaxed);
+    ready_up_to.store(all_up_to, Ordering::Relaxed);
 }
 
 /// Whether anything waits for the renderer. Where frames may take any time nothing is put off, and each is drawn when all is there.
 pub(crate) fn is_needed(world: &World) -> bool {
-    let has_renderer = world.get_resource::<Warmth>().is_some_and(|warmth| warmth.told.is_some());
+    let has_renderer = world.get_resource::<PipelineRequests>().is_some_and(|warmth| warmth.ready_up_to.is_some());
     has_renderer && !world.resource::<CrackBudget>().is_unlimited()
 }
 
@@ -174,7 +183,7 @@ pub(crate) fn can_draw<S: MaterialSlot>(
         Err(own) => own.id().hash(&mut hasher),
     }
     let key = hasher.finish();
-    if let Some(look) = world.resource::<Warmth>().looks.get(&key) {
+    if let Some(look) = world.resource::<PipelineRequests>().looks.get(&key) {
         return look.stand_in.is_none();
     }
     let Some(mut materials) = world.get_resource_mut::<Assets<S::Material>>() else { return true };
@@ -189,7 +198,7 @@ pub(crate) fn can_draw<S: MaterialSlot>(
         stand_in.insert(layers);
     }
     let stand_in = Some(stand_in.id());
-    let warmth = &mut *world.resource_mut::<Warmth>();
+    let warmth = &mut *world.resource_mut::<PipelineRequests>();
     warmth.looks.insert(key, Look { of: entity, stand_in, frame: warmth.frame, since: Instant::now() });
     false
 }

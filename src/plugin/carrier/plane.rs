@@ -1,9 +1,7 @@
 //! [`Plane`]: where a flat surface lies in its own space.
 
-use crate::{
-    plugin::carrier::space,
-    shatter::{Floor, Pose},
-};
+use crate::plugin::carrier::space;
+use crate::shatter::{Floor, Pose};
 use bevy::prelude::*;
 
 /// Where a flat surface lies in the entity's own space.

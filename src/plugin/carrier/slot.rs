@@ -52,7 +52,7 @@ pub(crate) fn typed<A: Asset>(handle: &UntypedHandle) -> Option<Handle<A>> {
     handle.clone().try_typed().ok()
 }
 
-/// BackgroundJob a surface whose material, this one, shows the upper half of its textures only.
+/// Beside a surface whose material, this one, shows the upper half of its textures only.
 #[derive(Component)]
 #[component(clone_behavior = Ignore)]
 pub(super) struct UpperHalf(pub(super) UntypedAssetId);

@@ -1,16 +1,14 @@
 //! The copy of a mesh whose faces share the picture: only one of them shows the half of the textures that cracks.
 
-use super::{
-    faces::Faces,
-    kind::Carrier,
-    mesh::closest,
-    slot::{CrackMaterial, MaterialSlot, UpperHalf, to_picture, typed},
-};
+use super::faces::Faces;
+use super::kind::Carrier;
+use super::mesh::closest;
+use super::slot::{CrackMaterial, MaterialSlot, UpperHalf, to_picture, typed};
 use crate::plugin::api::hit::HitPoint;
 use bevy::{math::Affine2, prelude::*};
 use std::sync::Arc;
 
-/// BackgroundJob a surface whose textures hold its picture twice.
+/// Beside a surface whose textures hold its picture twice.
 #[derive(Component)]
 #[component(clone_behavior = Ignore)]
 struct Twofold {

@@ -1,22 +1,14 @@
 //! Sprites as carriers.
 
-use super::{
-    kind::{Carrier, CarrierKind, Found, NextLook, Shown},
-    pipelines::{self, Shape},
-    plane::Plane,
-    shard_visual::{MaterialVisuals, ShardVisuals},
-    slot::typed,
-};
-use crate::{
-    plugin::{
-        api::{
-            error::CrackError,
-            textures::{CrackTextures, Maps},
-        },
-        source::layout::Layout,
-    },
-    raster::TexelRect,
-};
+use super::kind::{Carrier, CarrierKind, Found, NextLook, Shown};
+use super::pipelines::{self, Shape};
+use super::plane::Plane;
+use super::shard_visual::{MaterialVisuals, ShardVisuals};
+use super::slot::typed;
+use crate::plugin::api::error::CrackError;
+use crate::plugin::api::textures::{CrackTextures, Maps};
+use crate::plugin::source::layout::Layout;
+use crate::raster::TexelRect;
 use bevy::{
     asset::UntypedHandle,
     math::Mat3A,

@@ -1,29 +1,21 @@
 //! [`AsyncPlayback`]: background tasks draw and paint the times of baked cracks. They are too many for a frame, which only exchanges pictures.
 
-use super::{
-    frame_job::{Back, FrameJob, Stage, TimelineSnapshot, gather},
-    report::report_painted,
-};
-use crate::{
-    growth::CrackGrowth,
-    pattern::Moment,
-    plugin::{
-        api::{CrackBudget, CrackState, textures::MAPS},
-        gpu::{buffer::Stager, uploads::Uploads},
-        jobs::{
-            background::{BackgroundJob, drop_in_background, guarded},
-            frame_time::{FrameClock, Timer},
-            threads::Threads,
-        },
-        surface::{
-            active::Active,
-            cracked::{Cracked, active_mut},
-            queues::Queues,
-            tile_set::Touched,
-        },
-    },
-    raster::{DepthField, DirtyTiles, Redrawn, Replay},
-};
+use super::frame_job::{Back, FrameJob, Stage, TimelineSnapshot, gather};
+use super::report::report_painted;
+use crate::growth::CrackGrowth;
+use crate::pattern::Moment;
+use crate::plugin::api::textures::MAPS;
+use crate::plugin::api::{CrackBudget, CrackState};
+use crate::plugin::gpu::buffer::Stager;
+use crate::plugin::gpu::uploads::Uploads;
+use crate::plugin::jobs::background::{BackgroundJob, drop_in_background, guarded};
+use crate::plugin::jobs::frame_time::{FrameClock, Timer};
+use crate::plugin::jobs::threads::Threads;
+use crate::plugin::surface::active::Active;
+use crate::plugin::surface::cracked::{Cracked, active_mut};
+use crate::plugin::surface::queues::Queues;
+use crate::plugin::surface::tile_set::Touched;
+use crate::raster::{DepthField, DirtyTiles, Redrawn, Replay};
 use bevy::{
     ecs::{entity_disabling::Disabled, query::Allow},
     platform::time::Instant,
@@ -32,13 +24,13 @@ use bevy::{
 };
 use std::{sync::Arc, time::Duration};
 
-/// So long a task may wait for a thread before its work is done in slices of frames.
+/// How long a task may wait for a thread before its work is done in slices of frames.
 const PATIENCE: Duration = Duration::from_millis(50);
 
 /// Frames after which memory is given back if time stands still.
 const IDLE: u32 = 60;
 
-/// What shows the times of a surface with baked cracks. Gone when its end is shown for good.
+/// What shows the times of a surface with baked cracks. Removed when its end is shown and nothing can turn time back.
 ///
 /// While a job runs, the field, the touched tiles and the replay of the surface are with it, and the surface counts as dirty without being in
 /// the queue.
@@ -112,7 +104,7 @@ impl Running {
 }
 
 impl AsyncPlayback {
-    /// Of a growth all of whose times are to be shown, and of the texels that are shown first: beside the frames, as both are copied.
+    /// Of a growth all of whose times are to be shown, and of the texels that are shown first: in the background, as both are copied.
     pub(crate) fn new(growth: &CrackGrowth, texels: &[Option<Vec<u8>>; MAPS]) -> Self {
         let back = Back { texels: texels.clone(), behind: Vec::new() };
         Self { timeline: Some(TimelineSnapshot::of(growth)), back: Some(back), ..Self::default() }
@@ -196,7 +188,7 @@ fn can_be_async(active: &Active) -> bool {
     active.playhead.playback.is_some() && active.drawing.cutouts.is_none() && active.canvas.views.len() == 1
 }
 
-/// Draws all of a surface anew: what was drawn is lost.
+/// Draws all of a surface again: what was drawn is lost.
 fn start_over(active: &mut Active) {
     let frame = active.drawing.field.frame;
     active.drawing.field = DepthField::new(frame);

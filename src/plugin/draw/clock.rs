@@ -1,10 +1,9 @@
 //! Clocks that were set, changed or removed.
 
 use super::async_playback::AsyncPlayback;
-use crate::plugin::{
-    api::{CrackClock, CrackTextures},
-    surface::{cracked::Cracked, queues::Queues},
-};
+use crate::plugin::api::{CrackClock, CrackTextures};
+use crate::plugin::surface::cracked::Cracked;
+use crate::plugin::surface::queues::Queues;
 use bevy::{
     ecs::{entity_disabling::Disabled, query::Allow},
     prelude::*,

@@ -1,21 +1,15 @@
-//! One moment of a surface, drawn and painted beside the frames.
+//! One moment of a surface, drawn and painted by a background task.
 
-use crate::{
-    growth::CrackGrowth,
-    paint::LookTable,
-    pattern::{Moment, Network, Timeline},
-    plugin::{
-        api::textures::MAPS,
-        gpu::textures,
-        gpu::{
-            buffer::{Staged, Stager},
-            textures::TextureKind,
-        },
-        source::picture::BasePicture,
-        surface::tile_set::Touched,
-    },
-    raster::{DepthField, DirtyTiles, Redrawn, Replay, TexelRect},
-};
+use crate::growth::CrackGrowth;
+use crate::paint::LookTable;
+use crate::pattern::{Moment, Network, Timeline};
+use crate::plugin::api::textures::MAPS;
+use crate::plugin::gpu::buffer::{Staged, Stager};
+use crate::plugin::gpu::textures;
+use crate::plugin::gpu::textures::TextureKind;
+use crate::plugin::source::picture::BasePicture;
+use crate::plugin::surface::tile_set::Touched;
+use crate::raster::{DepthField, DirtyTiles, Redrawn, Replay, TexelRect};
 use bevy::prelude::*;
 use std::sync::Arc;
 

@@ -1,13 +1,9 @@
 //! Freezing: a surface that has all its nodes keeps the picture of its oldest cracks and forgets the rest of them.
 
-use crate::{
-    pattern::CellTracker,
-    plugin::surface::{
-        active::Active,
-        drawing::Frozen,
-        stamp::{Scratch, stamp},
-    },
-};
+use crate::pattern::CellTracker;
+use crate::plugin::surface::active::Active;
+use crate::plugin::surface::drawing::Frozen;
+use crate::plugin::surface::stamp::{Scratch, stamp};
 
 /// Makes room for a hit: with less than a quarter of its nodes left, a surface forgets all but the newest half of them. A surface
 /// whose time may be turned back needs all of its cracks.

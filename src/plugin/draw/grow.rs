@@ -1,20 +1,16 @@
 //! The growth systems: time to steps.
 
-use crate::plugin::{
-    api::CrackBudget,
-    jobs::frame_time::{FrameClock, par_for_each},
-    surface::{
-        active::Active,
-        cracked::{CrackedSurfaces, batch},
-        queues::Queues,
-    },
-};
+use crate::plugin::api::CrackBudget;
+use crate::plugin::jobs::frame_time::{FrameClock, par_for_each};
+use crate::plugin::surface::active::Active;
+use crate::plugin::surface::cracked::{CrackedSurfaces, batch};
+use crate::plugin::surface::queues::Queues;
 use bevy::{ecs::system::NonSendMarker, prelude::*};
 
 /// Share of the frame's budget after which no further step is made.
 const BUDGET_SHARE: f32 = 0.7;
 
-/// So many surfaces make their steps one after the other: fewer are not worth another thread.
+/// Surfaces whose steps one thread makes, one after the other: fewer are not worth another thread.
 const SHARE: usize = 16;
 
 /// Length of a frame where there is no clock, seconds.
@@ -27,7 +23,7 @@ pub(crate) struct CracksClosed {
 }
 
 /// A surface in turn.
-struct Job<'a> {
+struct GrowJob<'a> {
     entity: Entity,
     active: &'a mut Active,
     /// Whether it has grown; `None` = its turn has not come.
@@ -63,7 +59,7 @@ pub(crate) fn grow_surfaces(
     let (mut left, mut idle) = (Vec::new(), Vec::new());
     while left.is_empty() && !growing.is_empty() {
         let mut jobs = batch(&mut surfaces, growing, |entity, active| {
-            active.turn.is_growing.then_some(Job { entity, active, has_grown: None })
+            active.turn.is_growing.then_some(GrowJob { entity, active, has_grown: None })
         });
         par_for_each(jobs.chunks_mut(SHARE).enumerate(), |(i, jobs)| {
             for (k, job) in jobs.iter_mut().enumerate() {
@@ -74,7 +70,7 @@ pub(crate) fn grow_surfaces(
                 }
             }
         });
-        for Job { entity, active, has_grown } in jobs {
+        for GrowJob { entity, active, has_grown } in jobs {
             let Some(has_grown) = has_grown else {
                 left.push(entity);
                 continue;

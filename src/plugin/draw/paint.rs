@@ -1,38 +1,35 @@
 //! The painting system: networks to texels.
 
 use super::report::report_painted;
-use crate::{
-    pattern::Moment,
-    plugin::{
-        api::{CrackBudget, CrackState, CrackTextures, textures::MAPS},
-        gpu::{pack::Packer, textures, uploads::Uploads},
-        jobs::frame_time::{FrameClock, Timer, par_for_each},
-        surface::{
-            active::Active,
-            cracked::{CrackedSurfaces, batch},
-            queues::Queues,
-            stamp::{Scratch, stamp},
-        },
-    },
-    raster::TexelRect,
-};
+use crate::pattern::Moment;
+use crate::plugin::api::textures::MAPS;
+use crate::plugin::api::{CrackBudget, CrackState, CrackTextures};
+use crate::plugin::gpu::pack::Packer;
+use crate::plugin::gpu::textures;
+use crate::plugin::gpu::uploads::Uploads;
+use crate::plugin::jobs::frame_time::{FrameClock, Timer, par_for_each};
+use crate::plugin::surface::active::Active;
+use crate::plugin::surface::cracked::{CrackedSurfaces, batch};
+use crate::plugin::surface::queues::Queues;
+use crate::plugin::surface::stamp::{Scratch, stamp};
+use crate::raster::TexelRect;
 use bevy::{ecs::system::NonSendMarker, platform::time::Instant, prelude::*};
 use std::{
     sync::atomic::{AtomicU64, Ordering},
     time::Duration,
 };
 
-/// Share of the frame's budget after which nothing further is painted: the rest is for what is under way then, and for telling of it.
+/// Share of the frame's budget after which nothing more is painted: the rest is for what is under way then, and for reporting it.
 const BUDGET_SHARE: f32 = 0.9;
 
-/// So many of them are painted one after the other: fewer are not worth another thread.
+/// Surfaces that one thread paints, one after the other: fewer are not worth another thread.
 const SHARE: usize = 4;
 
 /// Tiles of what hits have crushed that a surface draws in a frame at the most, however much time there is.
 const CRUSHED: usize = 8;
 
 /// A surface that is being painted.
-struct Job<'a> {
+struct PaintJob<'a> {
     entity: Entity,
     active: &'a mut Active,
     texels: Texels,
@@ -65,12 +62,12 @@ pub(crate) fn paint_surfaces(
     let dirty = &mut queues.dirty;
     let (mut left, mut behind) = (Vec::new(), Vec::new());
     while left.is_empty() && !dirty.is_empty() {
-        let mut jobs: Vec<Job> =
-            batch(&mut surfaces, dirty, |entity, active| Some(Job::new(entity, active, &mut images)));
+        let mut jobs: Vec<PaintJob> =
+            batch(&mut surfaces, dirty, |entity, active| Some(PaintJob::new(entity, active, &mut images)));
         let shares = jobs.len().div_ceil(SHARE);
         let known = scratch.len().max(shares);
         scratch.resize_with(known, Scratch::default);
-        // What the last one took, whoever painted it, the next one will take, about.
+        // What the last one took, the next one will take, about.
         let last = AtomicU64::new(0);
         uploads.pack(shares, |packers| {
             let shares = jobs.chunks_mut(SHARE).zip(&mut *scratch).zip(packers).enumerate();
@@ -85,7 +82,7 @@ pub(crate) fn paint_surfaces(
                 }
             });
         });
-        for Job { entity, active, texels, before, is_painted } in jobs {
+        for PaintJob { entity, active, texels, before, is_painted } in jobs {
             texels.put_back(&active.canvas.textures, &mut images);
             if !is_painted {
                 left.push(entity);
@@ -113,7 +110,7 @@ pub(crate) fn paint_surfaces(
     clock.stop(&timer);
 }
 
-impl<'a> Job<'a> {
+impl<'a> PaintJob<'a> {
     fn new(entity: Entity, active: &'a mut Active, images: &mut Assets<Image>) -> Self {
         let before = active.playhead.playback.as_ref().map(|playback| playback.shown);
         let texels = Texels::take(&active.canvas.textures, images);

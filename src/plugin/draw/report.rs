@@ -1,12 +1,8 @@
 //! What is shown of a surface is reported: its state, its cells, its end.
 
-use crate::{
-    pattern::{Moment, NO_PARENT, SegmentId},
-    plugin::{
-        api::{CellClosed, CrackFinished, CrackState, CrackStatus, CrackTip},
-        surface::active::Active,
-    },
-};
+use crate::pattern::{Moment, NO_PARENT, SegmentId};
+use crate::plugin::api::{CellClosed, CrackFinished, CrackState, CrackStatus, CrackTip};
+use crate::plugin::surface::active::Active;
 use bevy::prelude::*;
 
 /// Reports what is shown of a surface that has been painted; `before` was shown before if it has a playback.

@@ -1,9 +1,7 @@
 //! Memory that the GPU reads.
 
-use crate::{
-    plugin::gpu::pack::{Memory, Place, ROW_ALIGNMENT, Source, Write},
-    raster::TexelRect,
-};
+use crate::plugin::gpu::pack::{Memory, Place, ROW_ALIGNMENT, Source, Write};
+use crate::raster::TexelRect;
 use bevy::{
     prelude::*,
     render::{
@@ -68,7 +66,7 @@ pub(crate) struct Packed {
 }
 
 impl Packed {
-    /// A buffer of so many bytes.
+    /// A buffer of this many bytes.
     pub(crate) fn open(size: u64, buffers: &Buffers, device: &RenderDevice) -> Self {
         Self::new(buffers.take(size, device), buffers.home())
     }
@@ -131,7 +129,7 @@ fn is_same(a: &RenderDevice, b: &RenderDevice) -> bool {
 }
 
 impl Stager {
-    /// BackgroundJob others, with memory of its own.
+    /// Beside others, with memory of its own.
     pub(crate) fn new(device: &RenderDevice) -> Self {
         Self { device: device.clone(), buffers: Buffers::default() }
     }

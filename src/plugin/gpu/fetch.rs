@@ -1,17 +1,11 @@
 //! The render world's side: rectangles to textures.
 
-use crate::{
-    plugin::{
-        api::budget::CrackUploadStats,
-        gpu::{
-            buffer::{Buffers, MAX_KEPT, Packed, Staged, writer},
-            pack::{Changed, Layout, PER_PACKER, Place, ROW_ALIGNMENT, Source},
-            uploads::Uploads,
-        },
-        jobs::background::BackgroundJob,
-    },
-    raster::TexelRect,
-};
+use crate::plugin::api::budget::CrackUploadStats;
+use crate::plugin::gpu::buffer::{Buffers, MAX_KEPT, Packed, Staged, writer};
+use crate::plugin::gpu::pack::{Changed, PER_PACKER, PackLayout, Place, ROW_ALIGNMENT, Source};
+use crate::plugin::gpu::uploads::Uploads;
+use crate::plugin::jobs::background::BackgroundJob;
+use crate::raster::TexelRect;
 use bevy::{
     prelude::*,
     render::{
@@ -318,7 +312,7 @@ fn pack_rest(
     device: &RenderDevice,
 ) -> Vec<Buffer> {
     let mut buffers: Vec<Buffer> = packed.into_iter().map(Packed::close).collect();
-    let mut layout = Layout::default();
+    let mut layout = PackLayout::default();
     let mut rest = Vec::new();
     for copy in copies.iter_mut().filter(|copy| copy.place.is_none()) {
         if let Some(source) = copy.source(images)

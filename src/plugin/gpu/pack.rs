@@ -60,7 +60,7 @@ pub(crate) struct Source<'a> {
 }
 
 impl<'a> Source<'a> {
-    /// The texels `rect` of an image so many texels wide.
+    /// The texels `rect` of an image that is `width` texels wide.
     pub(crate) fn new(data: &'a [u8], width: usize, texel: usize, rect: TexelRect) -> Self {
         let ([x, y], [row, height]) = (rect.min.as_usizevec2().to_array(), rect.size().as_usizevec2().to_array());
         Self { data, from: (y * width + x) * texel, stride: width * texel, row: row * texel, height }
@@ -117,15 +117,15 @@ impl Memory {
         let first = self.next.fetch_update(Ordering::Relaxed, Ordering::Relaxed, beyond).ok()?;
         let end = first + height;
         let write = (self.open)(first * PITCH..end * PITCH);
-        Some(Block { write, first, height, layout: Layout::default() })
+        Some(Block { write, first, height, layout: PackLayout::default() })
     }
 }
 
 /// Where texels lie in rows of [`PITCH`] bytes: how many of them are taken, of each lane.
 #[derive(Default)]
-pub(crate) struct Layout([usize; LANES]);
+pub(crate) struct PackLayout([usize; LANES]);
 
-impl Layout {
+impl PackLayout {
     /// Finds room for texels, as near the top as there is above row `end`.
     pub(crate) fn place(&mut self, source: Source, end: usize) -> Option<Place> {
         let lanes = source.row.div_ceil(COPY_ALIGNMENT).clamp(1, LANES);
@@ -148,7 +148,7 @@ struct Block {
     write: Write,
     first: usize,
     height: usize,
-    layout: Layout,
+    layout: PackLayout,
 }
 
 impl Block {

@@ -1,17 +1,11 @@
 //! The kinds of textures that a surface has, and their texels.
 
-use crate::{
-    paint::{LookTable, PaintTargets, paint_glow, paint_rects},
-    plugin::{
-        api::textures::{CrackTextures, MAPS, Maps},
-        gpu::{
-            buffer::{Staged, Stager},
-            uploads::Uploads,
-        },
-        source::picture::BasePicture,
-    },
-    raster::{DepthField, TexelRect},
-};
+use crate::paint::{LookTable, PaintTargets, paint_glow, paint_rects};
+use crate::plugin::api::textures::{CrackTextures, MAPS, Maps};
+use crate::plugin::gpu::buffer::{Staged, Stager};
+use crate::plugin::gpu::uploads::Uploads;
+use crate::plugin::source::picture::BasePicture;
+use crate::raster::{DepthField, TexelRect};
 use bevy::{
     asset::RenderAssetUsages,
     image::ImageSampler,
@@ -134,7 +128,7 @@ impl CrackTextures {
         });
     }
 
-    /// Whether the renderer has yet to take up what they were filled with.
+    /// Whether the renderer has yet to upload what they were filled with.
     pub(crate) fn are_staged(&self, world: &World) -> bool {
         let uploads = world.resource::<Uploads>();
         self.handles().any(|texture| uploads.is_staged(texture.id()))

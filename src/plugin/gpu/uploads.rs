@@ -6,10 +6,8 @@
 //! renderer's preparations. Whatever else makes the renderer prepare an image again uploads all of `data`,
 //! cracks included.
 
-use super::{
-    buffer::{Packed, Staged, Stager},
-    pack::{Changed, Memory, Packer},
-};
+use super::buffer::{Packed, Staged, Stager};
+use super::pack::{Changed, Memory, Packer};
 use crate::raster::TexelRect;
 use bevy::{platform::collections::HashMap, prelude::*, render::renderer::RenderDevice};
 use std::sync::Arc;

@@ -1,36 +1,29 @@
 //! From hits to cracks: a surface gets its growth and textures at its first hit.
 
-use crate::{
-    growth::HitOutcome,
-    plugin::{
-        api::{CrackBudget, CrackClock, CrackState, CrackStatus, HitPoint, error::EntityLabel},
-        carrier::{
-            kind::{CarrierKind, Found},
-            kinds,
-        },
-        draw::freeze::freeze_if_full,
-        jobs::frame_time::{FrameClock, Timer},
-        source::picture,
-        surface::{
-            cracked::{active, active_mut, has_cracked, with_queues},
-            cracks::LastHit,
-            create::set_status,
-            prepare::{self, fail},
-            queue::{HitQueue, QueuedHit, with_queue},
-            queues::Queues,
-            time,
-        },
-    },
-};
+use crate::growth::HitOutcome;
+use crate::plugin::api::error::EntityLabel;
+use crate::plugin::api::{CrackBudget, CrackClock, CrackState, CrackStatus, HitPoint};
+use crate::plugin::carrier::kind::{CarrierKind, Found};
+use crate::plugin::carrier::kinds;
+use crate::plugin::draw::freeze::freeze_if_full;
+use crate::plugin::jobs::frame_time::{FrameClock, Timer};
+use crate::plugin::source::picture;
+use crate::plugin::surface::cracked::{active, active_mut, has_cracked, with_queues};
+use crate::plugin::surface::cracks::LastHit;
+use crate::plugin::surface::create::set_status;
+use crate::plugin::surface::prepare::{self, fail};
+use crate::plugin::surface::queue::{HitQueue, QueuedHit, with_queue};
+use crate::plugin::surface::queues::Queues;
+use crate::plugin::surface::time;
 use bevy::prelude::*;
 
 /// Share of the frame's budget after which no further hit is applied.
 const SHARE: f32 = 0.4;
 
-/// So many surfaces in line are looked at that may be made beside the frames.
+/// Surfaces in line that are looked at for background tasks.
 const MAX_OTHERS: usize = 16;
 
-/// So many surfaces that are not ready are looked at when there is no time.
+/// Surfaces that are not ready and are looked at when there is no time.
 const MAX_LOOKS: usize = 64;
 
 /// Places for markers that a hit looks at between two looks at the clock.
@@ -118,7 +111,7 @@ fn lay_out(world: &mut World, timer: &Timer) -> bool {
     has_worked
 }
 
-/// Has surfaces made beside the frames for whose hits this one has no time.
+/// Has surfaces made by a background task for whose hits this one has no time.
 fn make_others(world: &mut World) {
     // The first of them comes in the next frame in any case.
     let others: Vec<Entity> = world.resource::<HitQueue>().turns().skip(1).take(MAX_OTHERS).collect();
@@ -145,7 +138,7 @@ fn apply_next(world: &mut World, entity: Entity, timer: &Timer) {
             Ok(HitOutcome::Merged(_)) => stats.merged += 1,
             Ok(HitOutcome::Nothing) => stats.ignored += 1,
             Ok(HitOutcome::Rejected(reason)) => {
-                queue.reject(&EntityLabel::of(world, entity), &reason.to_string(), stats)
+                queue.reject(&EntityLabel::of(world, entity), &reason.to_string(), stats);
             }
             Err(reason) => queue.reject(&EntityLabel::of(world, entity), reason, stats),
         });

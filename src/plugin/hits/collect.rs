@@ -1,11 +1,10 @@
 //! Hits of a frame are queued.
 
-use crate::plugin::{
-    api::{CrackBudget, CrackHit, CrackStats, CrackSurface, HitPoint, error::EntityLabel},
-    carrier::space,
-    jobs::frame_time::FrameClock,
-    surface::queue::{HitQueue, QueuedHit},
-};
+use crate::plugin::api::error::EntityLabel;
+use crate::plugin::api::{CrackBudget, CrackHit, CrackStats, CrackSurface, HitPoint};
+use crate::plugin::carrier::space;
+use crate::plugin::jobs::frame_time::FrameClock;
+use crate::plugin::surface::queue::{HitQueue, QueuedHit};
 use bevy::{ecs::query::QueryEntityError, prelude::*};
 
 /// Keeps a hit sent as an event for [`collect_hits`].

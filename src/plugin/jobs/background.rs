@@ -8,7 +8,7 @@ use std::{
     time::Duration,
 };
 
-/// So long work may wait for a thread to begin it, before a frame does it.
+/// How long work may wait for a thread to begin it, before a frame does it.
 pub(crate) const PATIENCE: Duration = Duration::from_millis(50);
 
 /// Work that a task does, unless its result is wanted before the task has begun.
@@ -68,6 +68,22 @@ pub(crate) fn drop_in_background(rubbish: impl Send + 'static) {
     }
 }
 
+/// A panic becomes an error: in a task it would end the app.
+pub(crate) fn guarded<T>(run: impl FnOnce() -> Result<T, CrackError>) -> Result<T, CrackError> {
+    guarded_as(|reason| CrackError::Bake { reason }, run)
+}
+
+/// The same, of another kind.
+pub(crate) fn guarded_as<T>(
+    error: impl FnOnce(String) -> CrackError,
+    run: impl FnOnce() -> Result<T, CrackError>,
+) -> Result<T, CrackError> {
+    catch_unwind(AssertUnwindSafe(run)).unwrap_or_else(|panic| {
+        let text = panic.downcast_ref::<&str>().copied().or(panic.downcast_ref::<String>().map(String::as_str));
+        Err(error(format!("it panicked: {}", text.unwrap_or("unknown"))))
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -124,20 +140,4 @@ mod tests {
         assert_eq!(beside.take_if_done(true), Some(8));
         assert_eq!(beside.take_if_done(true), None);
     }
-}
-
-/// A panic becomes an error: in a task it would end the app.
-pub(crate) fn guarded<T>(run: impl FnOnce() -> Result<T, CrackError>) -> Result<T, CrackError> {
-    guarded_as(|reason| CrackError::Bake { reason }, run)
-}
-
-/// The same, of another kind.
-pub(crate) fn guarded_as<T>(
-    error: impl FnOnce(String) -> CrackError,
-    run: impl FnOnce() -> Result<T, CrackError>,
-) -> Result<T, CrackError> {
-    catch_unwind(AssertUnwindSafe(run)).unwrap_or_else(|panic| {
-        let text = panic.downcast_ref::<&str>().copied().or(panic.downcast_ref::<String>().map(String::as_str));
-        Err(error(format!("it panicked: {}", text.unwrap_or("unknown"))))
-    })
 }

@@ -7,7 +7,7 @@ use bevy::{prelude::*, tasks::AsyncComputeTaskPool};
 /// Bytes that are copied without a look at the clock: by all bakes together no more in a frame.
 pub(crate) const MAX_BYTES: usize = 1 << 19;
 
-/// How often what changes while it is read is read anew: a picture that changes in every frame would never be there.
+/// How often what changes while it is read is read again: a picture that changes in every frame would never be there.
 pub(crate) const MAX_RESTARTS: u32 = 8;
 
 /// Pictures of which some is copied.
@@ -46,7 +46,7 @@ impl PictureCopies {
         // What is copied at a stroke is not worth a task.
         let is_much = lengths.iter().sum::<usize>() > MAX_BYTES;
         let has_task = has_threads && is_much && AsyncComputeTaskPool::try_get().is_some();
-        // Written once: the first write to memory is the dear one.
+        // Written once: the first write to memory page-faults.
         let get_ready = |lengths: Vec<usize>| lengths.into_iter().map(|length| vec![1; length]).collect();
         Some(Self { copies, has_task, memory: has_task.then(|| BackgroundJob::start(lengths, get_ready)) })
     }

@@ -1,19 +1,19 @@
-//! What is asked for while a system has surfaces in its hands is done when they are back in the world: nothing is skipped.
+//! What is asked for while a system has surfaces taken out is done when they are back in the world: nothing is skipped.
 
 use bevy::prelude::*;
 
 type Job = Box<dyn FnOnce(&mut World) + Send + Sync>;
 
-/// What waits. Observers and hooks of a game run while shards come and go, while textures are told and while bakes land, and may heal,
+/// What waits. Observers and hooks of a game run while shards come and go, while textures are reported and while bakes are committed, and may heal,
 /// despawn or shatter any surface then.
 #[derive(Resource, Default)]
 pub(crate) struct Later {
-    /// How many systems have surfaces in their hands.
+    /// How many systems have surfaces taken out.
     hands: u32,
     waiting: Vec<Job>,
 }
 
-/// Does `work`, which has surfaces in its hands while others may ask for something, and then what they have asked for.
+/// Does `work`, which has surfaces taken out while others may ask for something, and then what they have asked for.
 pub(crate) fn hold<T>(world: &mut World, work: impl FnOnce(&mut World) -> T) -> T {
     let Some(mut later) = world.get_resource_mut::<Later>() else { return work(world) };
     later.hands += 1;
@@ -28,7 +28,7 @@ pub(crate) fn hold<T>(world: &mut World, work: impl FnOnce(&mut World) -> T) -> 
     result
 }
 
-/// Does a job now, or as soon as nobody has surfaces in hand any more.
+/// Does a job now, or as soon as no system has surfaces taken out.
 pub(crate) fn when_free(world: &mut World, job: impl FnOnce(&mut World) + Send + Sync + 'static) {
     match world.get_resource_mut::<Later>() {
         Some(mut later) if later.hands > 0 => later.waiting.push(Box::new(job)),
@@ -56,7 +56,7 @@ mod tests {
         let result = hold(&mut world, |world| {
             when_free(world, |world| {
                 note(2)(world);
-                // Nobody has anything in hand now.
+                // Nothing is taken out now.
                 hold(world, |world| when_free(world, note(3)));
                 when_free(world, note(4));
             });

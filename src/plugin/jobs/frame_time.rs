@@ -12,13 +12,13 @@ pub(crate) struct FrameClock {
     start: Option<Instant>,
     /// What a busy frame takes between the first of this crate's systems and the last, beside what they measure: on average of the
     /// last ones. It counts as spent when a frame starts.
-    besides: Duration,
+    unmeasured: Duration,
 }
 
 /// Share of a frame's budget that counts as spent at the start at the most: what a game's own systems do in between is not ours.
 const MAX_BESIDES: f32 = 0.25;
 
-/// Share of it that must be spent for the frame to tell what others take besides.
+/// Share of it that must be spent for the frame to tell what others take unmeasured.
 const BUSY: f32 = 0.25;
 
 /// Weight of a frame in [`FrameClock::besides`].
@@ -34,8 +34,8 @@ pub(crate) struct Timer {
 impl FrameClock {
     /// Starts to measure a system that must end when `share` of the frame's budget is spent, of what is left beside others.
     pub(crate) fn start(&self, budget: &CrackBudget, share: f32) -> Timer {
-        let rest = budget.share(1.0).saturating_sub(self.besides);
-        Timer { start: Instant::now(), before: self.spent, limit: self.besides + rest.mul_f32(share) }
+        let rest = budget.share(1.0).saturating_sub(self.unmeasured);
+        Timer { start: Instant::now(), before: self.spent, limit: self.unmeasured + rest.mul_f32(share) }
     }
 
     /// Adds what the system has spent.
@@ -82,17 +82,17 @@ pub(crate) fn par_for_each<S: Send>(shares: impl ExactSizeIterator<Item = S> + S
 pub(crate) fn start_frame(mut clock: ResMut<FrameClock>, budget: Res<CrackBudget>) {
     clock.start = Some(Instant::now());
     // It may have been learned under a larger budget.
-    clock.besides = clock.besides.min(budget.share(MAX_BESIDES));
-    clock.spent = clock.besides;
+    clock.unmeasured = clock.unmeasured.min(budget.share(MAX_BESIDES));
+    clock.spent = clock.unmeasured;
 }
 
-/// Learns from a busy frame what it takes besides what is measured.
+/// Learns from a busy frame what it takes unmeasured what is measured.
 pub(crate) fn end_frame(mut clock: ResMut<FrameClock>, budget: Res<CrackBudget>) {
     let Some(start) = clock.start.take() else { return };
-    let measured = clock.spent.saturating_sub(clock.besides);
+    let measured = clock.spent.saturating_sub(clock.unmeasured);
     if measured >= budget.share(BUSY) {
         let now = start.elapsed().saturating_sub(measured).min(budget.share(MAX_BESIDES));
-        clock.besides = clock.besides.mul_f32(1.0 - WEIGHT) + now.mul_f32(WEIGHT);
+        clock.unmeasured = clock.unmeasured.mul_f32(1.0 - WEIGHT) + now.mul_f32(WEIGHT);
     }
 }
 
@@ -107,11 +107,11 @@ mod tests {
         let mut world = World::new();
         world.init_resource::<FrameClock>();
         let millisecond = Duration::from_millis(1);
-        let mut frame = |milliseconds: f32, busy: u32, besides: u32| {
+        let mut frame = |milliseconds: f32, busy: u32, unmeasured: u32| {
             let budget = CrackBudget { milliseconds, ..default() };
             world.insert_resource(budget.clone());
             let _ = world.run_system_once(start_frame);
-            sleep(besides * millisecond);
+            sleep(unmeasured * millisecond);
             let mut clock = world.remove_resource::<FrameClock>().unwrap_or_default();
             let timer = clock.start(&budget, 1.0);
             sleep(busy * millisecond);
@@ -119,7 +119,7 @@ mod tests {
             world.insert_resource(clock);
             let _ = world.run_system_once(end_frame);
             let clock = world.resource::<FrameClock>();
-            (clock.spent.as_secs_f32() * 1e3, clock.besides.as_secs_f32() * 1e3)
+            (clock.spent.as_secs_f32() * 1e3, clock.unmeasured.as_secs_f32() * 1e3)
         };
         assert_eq!(frame(4.0, 0, 2).1, 0.0, "an idle frame tells nothing");
         let (_, first) = frame(4.0, 2, 3);

@@ -1,34 +1,29 @@
 //! Changes are applied: other presets, other pictures, another frame of an animation.
 
-use crate::{
-    CrackPreset,
-    pattern::CellTracker,
-    plugin::{
-        api::{CrackError, CrackState, CrackStatus, CrackSurface, error::EntityLabel},
-        carrier::{
-            kind::{Carrier, CarrierKind, Found, Shown},
-            kinds,
-        },
-        draw::async_playback::recall,
-        gpu::memory::TextureMemory,
-        jobs::deferred::hold,
-        shards::broken::drop_shards,
-        source::{mask::MaskFrom, picture::FrameCount, preset},
-        surface::{
-            active::Active,
-            cracked::{self, active, with_queues},
-            create::{attach, make_textures, report_textures, set_status},
-            frame::{frame, look},
-            picture_plan::draft,
-            plan::resolve_mask,
-            prepare::fail,
-            queues::Queues,
-            regrow::regrow,
-            stamp::stamp_anew,
-        },
-    },
-    raster::DepthField,
-};
+use crate::CrackPreset;
+use crate::pattern::CellTracker;
+use crate::plugin::api::error::EntityLabel;
+use crate::plugin::api::{CrackError, CrackState, CrackStatus, CrackSurface};
+use crate::plugin::carrier::kind::{Carrier, CarrierKind, Found, Shown};
+use crate::plugin::carrier::kinds;
+use crate::plugin::draw::async_playback::recall;
+use crate::plugin::gpu::memory::TextureMemory;
+use crate::plugin::jobs::deferred::hold;
+use crate::plugin::shards::broken::drop_shards;
+use crate::plugin::source::mask::MaskFrom;
+use crate::plugin::source::picture::FrameCount;
+use crate::plugin::source::preset;
+use crate::plugin::surface::active::Active;
+use crate::plugin::surface::cracked::{self, active, with_queues};
+use crate::plugin::surface::create::{attach, make_textures, report_textures, set_status};
+use crate::plugin::surface::frame::{frame, look};
+use crate::plugin::surface::plan::resolve_mask;
+use crate::plugin::surface::prepare::fail;
+use crate::plugin::surface::queues::Queues;
+use crate::plugin::surface::regrow::regrow;
+use crate::plugin::surface::reread::draft;
+use crate::plugin::surface::stamp::stamp_anew;
+use crate::raster::DepthField;
 use bevy::prelude::*;
 use std::sync::Arc;
 
@@ -195,7 +190,7 @@ fn change_carrier(
     }
 }
 
-/// Reads the pictures anew and paints the cracks over them; `false` if they are not there yet. `other` is how to deal with them if somebody
+/// Reads the pictures again and paints the cracks over them; `false` if they are not there yet. `other` is how to deal with them if somebody
 /// gave them to it. Until they are accepted it is dealt with as before: its shards are of the kind that it was.
 fn update_picture(
     world: &mut World,
@@ -248,7 +243,7 @@ fn update_picture(
     active.show(draft.plan.rect);
     active.carrier.shown = shown;
     active.carrier.is_twofold = draft.plan.is_twofold;
-    // The material is made anew: one that exists keeps showing a texture of the old size.
+    // The material is made again: one that exists keeps showing a texture of the old size.
     attach(world, entity, active);
     Ok(true)
 }

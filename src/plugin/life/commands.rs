@@ -12,7 +12,7 @@ pub trait CrackCommandsExt {
     ///
     /// Without it the crack of a first hit shows in the frame of the hit with textures of up to 512 x 512 texels, unless many are hit for
     /// the first time at once or its lines are to be read (those of brick, see [`CrackMaskSource`](crate::plugin::CrackMaskSource)), and some frames
-    /// later on larger ones: they are made beside the frames. A surface that is prepared takes
+    /// later on larger ones: background tasks make them. A surface that is prepared takes
     /// the memory of one that has cracked, and shows its textures from the frame on in which [`CrackTextures`](crate::plugin::CrackTextures) is added. Surfaces that are
     /// hit come first. Does nothing on entities without a [`CrackSurface`](crate::plugin::CrackSurface), or with cracks; one that cannot crack says
     /// so with [`CrackFailed`](crate::plugin::CrackFailed). Healing takes it back.
@@ -32,11 +32,11 @@ pub trait CrackCommandsExt {
 
     /// Takes all cracks away, those of [`GuidedCracks`](crate::plugin::GuidedCracks) too, and all shards and holes: the surface shows its
     /// own pictures again, its textures and its growth are dropped. Hits that wait on it are refused, and so are those that were triggered
-    /// before it in the same frame; those written as messages are read at the end of the frame, and crack it anew. Does nothing on entities
+    /// before it in the same frame; those written as messages are read at the end of the frame, and crack it again. Does nothing on entities
     /// without cracks.
     fn heal_cracks(&mut self) -> &mut Self;
 
-    /// Closes all cracks within so many seconds: they run back the way they came, whatever a [`CrackClock`](crate::plugin::CrackClock)
+    /// Closes all cracks within this many seconds: they run back the way they came, whatever a [`CrackClock`](crate::plugin::CrackClock)
     /// says, and are healed as by [`heal_cracks`](Self::heal_cracks) then. Hits that wait on the surface are refused; one that comes
     /// while they close makes them grow on from where they are. Not a number, zero or below: at once; infinite: they stand still.
     fn close_cracks(&mut self, seconds: f32) -> &mut Self;

@@ -1,22 +1,18 @@
 //! Healing, and what happens when a surface goes.
 
-use crate::plugin::{
-    api::{CrackState, CrackStats, CrackSurface, CrackTextures},
-    bake::work,
-    carrier::{kind::Found, kinds},
-    draw::{
-        async_playback::{self, AsyncPlayback},
-        grow::CracksClosed,
-    },
-    jobs::deferred::when_free,
-    shards::{broken::drop_shards, request::cancel_requests},
-    surface::{
-        cracked::{self, active_mut, with_queues},
-        owners::Owners,
-        prepare,
-        queue::HitQueue,
-    },
-};
+use crate::plugin::api::{CrackState, CrackStats, CrackSurface, CrackTextures};
+use crate::plugin::bake::work;
+use crate::plugin::carrier::kind::Found;
+use crate::plugin::carrier::kinds;
+use crate::plugin::draw::async_playback::{self, AsyncPlayback};
+use crate::plugin::draw::grow::CracksClosed;
+use crate::plugin::jobs::deferred::when_free;
+use crate::plugin::shards::broken::drop_shards;
+use crate::plugin::shards::request::cancel_requests;
+use crate::plugin::surface::cracked::{self, active_mut, with_queues};
+use crate::plugin::surface::owners::Owners;
+use crate::plugin::surface::prepare;
+use crate::plugin::surface::queue::HitQueue;
 use bevy::prelude::*;
 
 pub(super) fn close(world: &mut World, entity: Entity, seconds: f32) {

@@ -1,17 +1,15 @@
 //! Changes from outside: other presets, other pictures, another frame of an animation.
 
-use crate::{
-    CrackPreset,
-    plugin::{
-        api::{CrackSurface, CrackTextures, PresetSource},
-        bake::work::Bakes,
-        source::{
-            mask::PictureMasks,
-            picture::{BasePictures, FrameCount},
-        },
-        surface::{cracked::CrackedSurfaces, owners::Owners, prepare::Preparations, queues::Queues},
-    },
-};
+use crate::CrackPreset;
+use crate::plugin::api::{CrackSurface, CrackTextures, PresetSource};
+use crate::plugin::bake::work::Bakes;
+use crate::plugin::source::mask::PictureMasks;
+use crate::plugin::source::picture::{BasePictures, FrameCount};
+use crate::plugin::surface::cracked::CrackedSurfaces;
+use crate::plugin::surface::owners::Owners;
+use crate::plugin::surface::prepare::Preparations;
+use crate::plugin::surface::queues::Queues;
+use crate::plugin::surface::reread::Rereadings;
 use bevy::prelude::*;
 
 /// Notes the cracked surfaces whose settings have changed.
@@ -42,6 +40,7 @@ pub(crate) fn watch_pictures(
     mut bases: ResMut<BasePictures>,
     mut bakes: ResMut<Bakes>,
     mut preparations: ResMut<Preparations>,
+    mut readings: ResMut<Rereadings>,
 ) {
     let frame = &mut frame.0;
     *frame += 1;
@@ -64,6 +63,7 @@ pub(crate) fn watch_pictures(
         bases.forget(*id);
         bakes.forget_picture(*id, before);
         preparations.forget_picture(*id, before);
+        readings.forget(*id);
         for &entity in owners.users(*id) {
             if let Ok((_, mut cracked)) = surfaces.get_mut(entity)
                 && let Some(active) = cracked.get_mut().filter(|active| active.canvas.read_at < before)

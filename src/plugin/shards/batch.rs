@@ -1,11 +1,9 @@
 //! [`Batch`]: pieces that leave a surface.
 
 use super::form::Form;
-use crate::{
-    plugin::surface::cutouts::Span,
-    raster::TexelRect,
-    shatter::{BreakAgain, Flight},
-};
+use crate::plugin::surface::cutouts::Span;
+use crate::raster::TexelRect;
+use crate::shatter::{BreakAgain, Flight};
 use bevy::prelude::*;
 
 /// Pieces that leave in one frame.

@@ -18,7 +18,7 @@ pub(super) struct Body {
     pub(super) origin: Origin,
 }
 
-/// So many bodies are kept for others while no shard is shown; else as many as are shown.
+/// Bodies that are kept for others while no shard is shown; else as many as are shown.
 const KEPT: usize = 256;
 
 /// No more go in a frame.
@@ -112,7 +112,7 @@ impl Body {
         }
         // Materials and their pictures are the surface's.
         carrier.kind.shards().detach(&mut entity);
-        // Who is told of that may take it away.
+        // An observer of that may take it away.
         let mut visibility = world.get_mut::<Visibility>(self.entity)?;
         *visibility = Visibility::Hidden;
         if let Some((sides, _)) = &self.sides

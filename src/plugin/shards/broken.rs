@@ -1,19 +1,15 @@
 //! [`Broken`]: a surface that has shattered.
 
-use super::{
-    batch::Batch,
-    body::{Body, LEVELS},
-    form::Shape,
-};
-use crate::{
-    plugin::{
-        api::{CrackShards, ShatterCracks},
-        carrier::{kind::Carrier, plane::Plane},
-        gpu::memory::TextureBytes,
-        surface::{active::Active, stamp::stamp_anew},
-    },
-    shatter::{BreakAgain, Flight, RimLook, Shards, Support},
-};
+use super::batch::Batch;
+use super::body::{Body, LEVELS};
+use super::form::Shape;
+use crate::plugin::api::{CrackShards, ShatterCracks};
+use crate::plugin::carrier::kind::Carrier;
+use crate::plugin::carrier::plane::Plane;
+use crate::plugin::gpu::memory::TextureBytes;
+use crate::plugin::surface::active::Active;
+use crate::plugin::surface::stamp::stamp_anew;
+use crate::shatter::{BreakAgain, Flight, RimLook, Shards, Support};
 use bevy::{asset::UntypedHandle, prelude::*};
 use std::{collections::VecDeque, sync::Arc};
 
@@ -218,7 +214,7 @@ impl Broken {
             self.support.put_back(piece.number);
             return;
         }
-        // The surface has been cut anew since: what lies in the piece is back.
+        // The surface has been cut again since: what lies in the piece is back.
         for shard in self.support.gone().collect::<Vec<u32>>() {
             let place = self.cut.inner_point(shard);
             if place.is_some_and(|place| piece.cut.distance(piece.number, place) == 0.0) {

@@ -1,22 +1,17 @@
 //! Cracks that were carried on when a surface was cut are drawn on it.
 
-use crate::{
-    paint::LookTable,
-    plugin::{
-        api::textures::MAPS,
-        gpu::{
-            textures::{self, TextureKind},
-            uploads::Uploads,
-        },
-        jobs::background::drop_in_background,
-        source::picture::BasePicture,
-        surface::{active::Active, stamp::stamp_hairlines},
-    },
-    raster::{DepthField, DirtyTiles, Profile, TexelRect},
-};
+use crate::paint::LookTable;
+use crate::plugin::api::textures::MAPS;
+use crate::plugin::gpu::textures::{self, TextureKind};
+use crate::plugin::gpu::uploads::Uploads;
+use crate::plugin::jobs::background::drop_in_background;
+use crate::plugin::source::picture::BasePicture;
+use crate::plugin::surface::active::Active;
+use crate::plugin::surface::stamp::stamp_hairlines;
+use crate::raster::{DepthField, DirtyTiles, Profile, TexelRect};
 use bevy::prelude::*;
 
-/// What lines are drawn with beside the frames.
+/// What lines are drawn with in the background.
 pub(super) struct Sketch {
     field: DepthField,
     profile: Profile,
@@ -61,7 +56,7 @@ impl Sketch {
     }
 }
 
-/// What was painted beside the frames.
+/// What was painted in the background.
 pub(super) struct Drawn {
     sketch: Sketch,
     /// Texels of the field that have changed.

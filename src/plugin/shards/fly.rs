@@ -1,24 +1,19 @@
 //! Shards in motion.
 
-use super::{
-    body::Spares,
-    broken::{self, Broken, Piece, drop_shards},
-    order::MOST_NEW,
-    release::{count_shown, make_room, with_active},
-    request::ShardQueue,
-    show::Shown,
-    spans::{bounds, spans_of},
-};
-use crate::{
-    math::mix,
-    plugin::{
-        api::{CrackBudget, Reassembled, ShatterCracks},
-        carrier::kind::Carrier,
-        jobs::deferred::hold,
-        surface::{active::Active, cracked::with_queues},
-    },
-    shatter::Pose,
-};
+use super::body::Spares;
+use super::broken::{self, Broken, Piece, drop_shards};
+use super::order::MOST_NEW;
+use super::release::{count_shown, evict_oldest, with_active};
+use super::request::ShardQueue;
+use super::show::ShownPiece;
+use super::spans::{bounds, spans_of};
+use crate::math::mix;
+use crate::plugin::api::{CrackBudget, Reassembled, ShatterCracks};
+use crate::plugin::carrier::kind::Carrier;
+use crate::plugin::jobs::deferred::hold;
+use crate::plugin::surface::active::Active;
+use crate::plugin::surface::cracked::with_queues;
+use crate::shatter::Pose;
 use bevy::prelude::*;
 use std::sync::Arc;
 
@@ -104,12 +99,12 @@ fn fly_all(world: &mut World, queue: &mut ShardQueue, seconds: f32, whole: &mut 
     });
     queue.broken = surfaces;
     queue.new = room.new;
-    // The oldest make room only for what is shown anew.
+    // The oldest make room only for what is shown again.
     for (entity, mut pieces) in fresh.into_iter().filter(|(_, pieces)| !pieces.is_empty()) {
         pieces.truncate(most);
         let show = |world: &mut World, active: &mut Active| {
             let mut broken = broken::take(world, entity)?;
-            make_room(world, queue, pieces.len(), (entity, active, &mut broken));
+            evict_oldest(world, queue, pieces.len(), (entity, active, &mut broken));
             let shards = broken.spawn(world, entity, &active.carrier, pieces);
             broken.report(world, entity);
             broken::put_back(world, entity, broken);
@@ -129,7 +124,7 @@ fn fly(
     mut broken: Box<Broken>,
     seconds: f32,
     room: &mut Room,
-) -> (Fate, Vec<Shown>) {
+) -> (Fate, Vec<ShownPiece>) {
     let (speed, seek, is_flying) = match world.get_mut::<ShatterCracks>(surface) {
         Some(mut settings) => (settings.speed, settings.bypass_change_detection().seek.take(), settings.fly),
         None => (1.0, None, true),
@@ -189,7 +184,7 @@ fn fly(
             broken.break_if_due(index, is_counted, room);
             if let Some(pose) = broken.show(world, surface, &active.carrier, index) {
                 if is_counted || room.new > 0 {
-                    fresh.push(Shown { index, pose, form: None });
+                    fresh.push(ShownPiece { index, pose, form: None });
                     room.take(usize::from(!is_counted), usize::from(!is_counted));
                 } else {
                     broken.is_behind = true;

@@ -1,9 +1,7 @@
 //! [`Form`]: the meshes of a shard, made on any thread.
 
-use crate::{
-    plugin::carrier::plane::Plane,
-    shatter::{MeshFrame, RimLook, ShardMesh, Shards},
-};
+use crate::plugin::carrier::plane::Plane;
+use crate::shatter::{MeshFrame, RimLook, ShardMesh, Shards};
 use bevy::{
     asset::RenderAssetUsages,
     mesh::{Indices, PrimitiveTopology},
@@ -13,7 +11,7 @@ use bevy::{
 use core::ops::Range;
 use std::sync::{Arc, Weak};
 
-/// So many shards are worth a task.
+/// Shards that are worth a task.
 const CHUNK: usize = 32;
 
 /// The meshes of a shard.

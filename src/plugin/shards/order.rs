@@ -1,28 +1,22 @@
-//! From a surface to its shards, beside the frames: nothing here touches the world but [`Order::of`], which looks at it.
+//! From a surface to its shards, in the background: nothing here touches the world but [`ShatterJob::of`], which looks at it.
 
-use super::{
-    batch::{Batch, Leaving},
-    broken::{Broken, broken},
-    drawn::{Drawn, Sketch},
-    form::Style,
-    spans::{Scan, join_spans},
-};
-use crate::{
-    Grid,
-    math::mix,
-    pattern::{Network, SurfaceFrame},
-    plugin::{
-        api::{CrackBudget, GravitySpace, ShardsError, ShatterCracks, ShatterRequest, shatter::rim_for},
-        carrier::{plane::Plane, space},
-        source::picture::BasePicture,
-        surface::{
-            active::Active,
-            cutouts::{Holes, Span},
-        },
-    },
-    raster::{DirtyTiles, TexelRect},
-    shatter::{Anchor, Burst, Cuts, RimLook, Shards, ShatterError, Support, shatter},
-};
+use super::batch::{Batch, Leaving};
+use super::broken::{Broken, broken};
+use super::drawn::{Drawn, Sketch};
+use super::form::Style;
+use super::spans::{Scan, join_spans};
+use crate::Grid;
+use crate::math::mix;
+use crate::pattern::{Network, SurfaceFrame};
+use crate::plugin::api::shatter::rim_for;
+use crate::plugin::api::{CrackBudget, GravitySpace, ShardsError, ShatterCracks, ShatterRequest};
+use crate::plugin::carrier::plane::Plane;
+use crate::plugin::carrier::space;
+use crate::plugin::source::picture::BasePicture;
+use crate::plugin::surface::active::Active;
+use crate::plugin::surface::cutouts::{Holes, Span};
+use crate::raster::{DirtyTiles, TexelRect};
+use crate::shatter::{Anchor, Burst, Cuts, RimLook, Shards, ShatterError, Support, shatter};
 use bevy::prelude::*;
 use std::{collections::VecDeque, sync::Arc};
 
@@ -34,7 +28,7 @@ pub(super) const MOST_NEW: usize = 256;
 const MOST_REACH: f32 = 64.0;
 
 /// What a surface is to lose, and all that was to be known of it when that was asked for.
-pub(super) struct Order {
+pub(super) struct ShatterJob {
     /// What the surface was then, see [`Active::revision`].
     revision: Arc<()>,
     settings: ShatterCracks,
@@ -52,7 +46,7 @@ pub(super) struct Order {
     /// Whether it is whole.
     is_first: bool,
     sketch: Option<Sketch>,
-    /// CutFrom that were released before.
+    /// Pieces that were released before.
     released: u32,
     /// The most that leave in one frame.
     batch: usize,
@@ -74,14 +68,14 @@ enum CutFrom {
 }
 
 /// What leaves a surface.
-pub(super) struct Made {
+pub(super) struct CutSurface {
     revision: Arc<()>,
     pub(super) settings: ShatterCracks,
     pub(super) rim: RimLook,
     pub(super) plane: Plane,
     pub(super) grown: (usize, usize),
     pub(super) cut: Arc<Shards>,
-    /// Whether it was cut anew.
+    /// Whether it was cut again.
     pub(super) is_new: bool,
     pub(super) support: Support,
     /// What leaves, frame by frame.
@@ -90,18 +84,18 @@ pub(super) struct Made {
     pub(super) drawn: Option<Drawn>,
     /// Where cracks may go when all have left.
     pub(super) density: Option<Grid<f32>>,
-    /// Memory for a copy of the picture, written once: the first write is the dear one.
+    /// Memory for a copy of the picture, written once: the first write page-faults.
     pub(super) room: Vec<u8>,
 }
 
-impl Made {
+impl CutSurface {
     /// Whether the surface is still what it was.
     pub(super) fn fits(&self, active: &Active) -> bool {
         Arc::ptr_eq(&self.revision, &active.revision)
     }
 }
 
-impl Order {
+impl ShatterJob {
     /// Looks at a surface.
     pub(super) fn of(
         world: &World,
@@ -203,7 +197,7 @@ impl Order {
     }
 
     /// Makes all that needs no world.
-    pub(super) fn make(self) -> Result<Made, ShardsError> {
+    pub(super) fn make(self) -> Result<CutSurface, ShardsError> {
         let is_new = matches!(self.pieces, CutFrom::Lines(..));
         let (cut, mut support) = match self.pieces {
             CutFrom::Cut(cut, support) => (cut, support),
@@ -274,7 +268,7 @@ impl Order {
             }
             _ => None,
         };
-        Ok(Made {
+        Ok(CutSurface {
             revision: self.revision,
             settings,
             rim: self.rim,

@@ -1,35 +1,23 @@
-//! From requests to shards: they are made beside the frames, and a frame takes them up.
+//! From requests to shards: background tasks make them, and a frame applies them.
 
-use super::{
-    batch::{Batch, Leaving},
-    body::Spares,
-    broken::{self, Broken, Piece, Pieces},
-    order::{MOST_NEW, Made, Order},
-    request::{FRAMES, Request, ShardQueue, frames},
-    show::Shown,
-};
-use crate::{
-    plugin::{
-        api::{CrackBudget, Shard, ShardsError, ShatterCracks, ShatterFailed, Shattered, error::EntityLabel},
-        draw::paint::paint_now,
-        gpu::{
-            memory::{TextureBytes, TextureMemory},
-            textures,
-            uploads::Uploads,
-        },
-        jobs::{
-            background::{BackgroundJob, PATIENCE},
-            deferred::hold,
-        },
-        surface::{
-            active::Active,
-            cracked,
-            cutouts::{Holes, Span, cut_span},
-            warm,
-        },
-    },
-    raster::TexelRect,
-};
+use super::batch::{Batch, Leaving};
+use super::body::Spares;
+use super::broken::{self, Broken, Piece, Pieces};
+use super::order::{CutSurface, MOST_NEW, ShatterJob};
+use super::request::{FRAMES, Request, ShardQueue, frames};
+use super::show::ShownPiece;
+use crate::plugin::api::error::EntityLabel;
+use crate::plugin::api::{CrackBudget, Shard, ShardsError, ShatterCracks, ShatterFailed, Shattered};
+use crate::plugin::draw::paint::paint_now;
+use crate::plugin::gpu::memory::{TextureBytes, TextureMemory};
+use crate::plugin::gpu::textures;
+use crate::plugin::gpu::uploads::Uploads;
+use crate::plugin::jobs::background::{BackgroundJob, PATIENCE};
+use crate::plugin::jobs::deferred::hold;
+use crate::plugin::surface::active::Active;
+use crate::plugin::surface::cutouts::{Holes, Span, cut_span};
+use crate::plugin::surface::{cracked, warm};
+use crate::raster::TexelRect;
 use bevy::{asset::UntypedHandle, platform::time::Instant, prelude::*};
 
 /// Shatters the surfaces that are to, one request after the other.
@@ -98,7 +86,7 @@ fn attend(
             queue.requests.push(request);
             return Ok(None);
         }
-        Ok(Progress::Made(made)) => release(world, entity, active, *made),
+        Ok(Progress::CutSurface(made)) => release(world, entity, active, *made),
         Err(error) => Err(error),
     };
     active.turn.is_to_shatter = false;
@@ -111,15 +99,15 @@ fn attend(
 
 enum Progress {
     Wait(Request),
-    Made(Box<Made>),
+    CutSurface(Box<CutSurface>),
 }
 
 /// Begins to make what was asked for, waits for it, or has it. It is not to be had before `is_warm`.
 fn proceed(world: &World, active: &Active, mut request: Request, is_warm: bool) -> Result<Progress, ShardsError> {
-    let order = |request: &Request| Order::of(world, request.entity, active, &request.request);
+    let order = |request: &Request| ShatterJob::of(world, request.entity, active, &request.request);
     let made = match request.work.take() {
         None => {
-            request.work = Some((BackgroundJob::start(order(&request)?, Order::make), 1));
+            request.work = Some((BackgroundJob::start(order(&request)?, ShatterJob::make), 1));
             (request.frames, request.since) = (frames(world, active), Instant::now());
             return Ok(Progress::Wait(request));
         }
@@ -147,7 +135,7 @@ fn proceed(world: &World, active: &Active, mut request: Request, is_warm: bool) 
     };
     // It has become another surface: in this frame, or it would never be done where that happens often.
     let made = made.unwrap_or_else(|| order(&request)?.make())?;
-    Ok(Progress::Made(Box::new(made)))
+    Ok(Progress::CutSurface(Box::new(made)))
 }
 
 /// Counts the shards that are shown.
@@ -159,8 +147,13 @@ pub(super) fn count_shown(world: &World, queue: &mut ShardQueue) -> usize {
     queue.shown.len()
 }
 
-/// The oldest shards go if there are too many with so many more. `own` is the surface that is in hand, with its state and its pieces.
-pub(super) fn make_room(world: &mut World, queue: &mut ShardQueue, more: usize, own: (Entity, &Active, &mut Broken)) {
+/// The oldest shards go if there are too many with so many more. `own` is the surface that is taken out, with its state and its pieces.
+pub(super) fn evict_oldest(
+    world: &mut World,
+    queue: &mut ShardQueue,
+    more: usize,
+    own: (Entity, &Active, &mut Broken),
+) {
     let shown = count_shown(world, queue);
     let excess = (shown + more).saturating_sub(world.resource::<CrackBudget>().max_shards).min(shown);
     let (in_hand, own_active, own_broken) = own;
@@ -193,13 +186,13 @@ pub(super) fn make_room(world: &mut World, queue: &mut ShardQueue, more: usize, 
 }
 
 /// Cuts out of a surface what is to leave it.
-fn release(world: &mut World, entity: Entity, active: &mut Active, made: Made) -> Result<(), ShardsError> {
+fn release(world: &mut World, entity: Entity, active: &mut Active, made: CutSurface) -> Result<(), ShardsError> {
     if made.batches.is_empty() {
         return Ok(());
     }
     let before = broken::take(world, entity);
     let is_first = before.is_none();
-    let Made { settings, rim, plane, grown, cut, is_new, support, batches, drawn, density, room, .. } = made;
+    let CutSurface { settings, rim, plane, grown, cut, is_new, support, batches, drawn, density, room, .. } = made;
     if is_first {
         can_copy_picture(world, active)?;
     }
@@ -247,7 +240,7 @@ fn let_go(world: &mut World, entity: Entity, active: &mut Active, queue: &mut Sh
     }
     queue.new = queue.new.saturating_sub(new);
     let mut broken = broken::take(world, entity)?;
-    make_room(world, queue, new, (entity, active, &mut broken));
+    evict_oldest(world, queue, new, (entity, active, &mut broken));
     if !core::mem::replace(&mut broken.has_begun, true) {
         broken.since = broken.time;
     }
@@ -288,7 +281,7 @@ fn depart(
         let is_spent = form.is_none() || shown.len() >= most;
         let pose = flight.pose((broken.time - broken.since) as f32);
         if !is_spent && pose.opacity > 0.0 {
-            shown.push(Shown { index: broken.pieces.len(), pose, form });
+            shown.push(ShownPiece { index: broken.pieces.len(), pose, form });
         }
         broken.pieces.push(Piece {
             cut: broken.cut.clone(),

@@ -1,17 +1,13 @@
 //! Requests for shards, and the order in which they are dealt with.
 
-use super::{
-    broken::Pieces,
-    order::{Made, Order},
+use super::broken::Pieces;
+use super::order::{CutSurface, ShatterJob};
+use crate::plugin::api::{
+    CrackBudget, CrackState, CrackStatus, ShardsError, ShatterCracks, ShatterRequest, ShatterWhen,
 };
-use crate::plugin::{
-    api::{CrackBudget, CrackState, CrackStatus, ShardsError, ShatterCracks, ShatterRequest, ShatterWhen},
-    jobs::background::BackgroundJob,
-    surface::{
-        active::Active,
-        cracked::{CrackedSurfaces, active_mut},
-    },
-};
+use crate::plugin::jobs::background::BackgroundJob;
+use crate::plugin::surface::active::Active;
+use crate::plugin::surface::cracked::{CrackedSurfaces, active_mut};
 use bevy::{
     ecs::{entity_disabling::Disabled, query::Allow},
     platform::time::Instant,
@@ -57,7 +53,7 @@ pub(crate) struct Request {
     pub(super) entity: Entity,
     pub(super) request: ShatterRequest,
     /// Once its shards are being made, and how many frames ago that was begun.
-    pub(super) work: Option<(BackgroundJob<Order, Result<Made, ShardsError>>, u32)>,
+    pub(super) work: Option<(BackgroundJob<ShatterJob, Result<CutSurface, ShardsError>>, u32)>,
     /// How many of them it takes.
     pub(super) frames: u32,
     /// When it was begun.

@@ -1,25 +1,20 @@
 //! Pieces are shown: entities, meshes and materials for them.
 
-use super::{
-    body::{Body, LEVELS, Spares},
-    broken::{Broken, Piece},
-    form::{Form, Origin, Shape, Style},
-};
-use crate::{
-    plugin::{
-        api::Shard,
-        carrier::{kind::Carrier, shard_visual::ShardVisual},
-        jobs::background::drop_in_background,
-    },
-    shatter::Pose,
-};
+use super::body::{Body, LEVELS, Spares};
+use super::broken::{Broken, Piece};
+use super::form::{Form, Origin, Shape, Style};
+use crate::plugin::api::Shard;
+use crate::plugin::carrier::kind::Carrier;
+use crate::plugin::carrier::shard_visual::ShardVisual;
+use crate::plugin::jobs::background::drop_in_background;
+use crate::shatter::Pose;
 use bevy::{asset::UntypedHandle, prelude::*};
 
 /// How far 2D shards lie in front of their surface, in the entity's units: they are drawn after it.
 const IN_FRONT: f32 = 1e-3;
 
 /// A piece that is to be shown.
-pub(super) struct Shown {
+pub(super) struct ShownPiece {
     pub(super) index: usize,
     pub(super) pose: Pose,
     /// Its form, if that has been made.
@@ -60,7 +55,7 @@ impl Broken {
         world: &mut World,
         surface: Entity,
         carrier: &Carrier,
-        shown: Vec<Shown>,
+        shown: Vec<ShownPiece>,
     ) -> Vec<(Entity, [u32; 2])> {
         let (is_solid, inside) = (carrier.kind.is_solid(), self.inside.clone());
         if shown.is_empty() || !world.contains_resource::<Assets<Mesh>>() {
@@ -71,12 +66,12 @@ impl Broken {
         // Its own first, so that none is taken by another.
         let own: Vec<Option<Body>> = shown
             .iter()
-            .map(|Shown { index, .. }| {
+            .map(|ShownPiece { index, .. }| {
                 let piece = self.pieces.get_mut(*index)?;
                 Spares::take_back(world, is_solid, piece.spare.take()?, &origin(piece))
             })
             .collect();
-        let is_formless = |(shown, own): &(&Shown, &Option<Body>)| shown.form.is_none() && own.is_none();
+        let is_formless = |(shown, own): &(&ShownPiece, &Option<Body>)| shown.form.is_none() && own.is_none();
         let formless = shown.iter().zip(&own).filter(is_formless);
         let formless: Vec<Shape<'_>> =
             formless.filter_map(|(shown, _)| Some(self.pieces.get(shown.index)?.shape())).collect();
@@ -85,9 +80,9 @@ impl Broken {
         // Which pieces are new entities, and the meshes of their sides.
         let (mut new, mut sides, mut visuals) = (Vec::new(), Vec::new(), Vec::new());
         let mut all = Vec::with_capacity(shown.len());
-        for (Shown { index, pose, form }, own) in shown.into_iter().zip(own) {
+        for (ShownPiece { index, pose, form }, own) in shown.into_iter().zip(own) {
             let form = if own.is_none() { form.map(|form| *form).or_else(|| forms.next()) } else { None };
-            // Who was told of the shards before has taken it away: this one comes in the next frame.
+            // An observer of the shards before has taken it away: this one comes in the next frame.
             if own.as_ref().is_some_and(|body| !body.is_there(world)) {
                 continue;
             }

@@ -1,6 +1,9 @@
 //! The texels of shards.
 
-use crate::{pattern::SurfaceFrame, plugin::surface::cutouts::Span, raster::TexelRect, shatter::Shards};
+use crate::pattern::SurfaceFrame;
+use crate::plugin::surface::cutouts::Span;
+use crate::raster::TexelRect;
+use crate::shatter::Shards;
 use bevy::prelude::*;
 
 /// Finds the texels of shards. Each lies in exactly one of the shards that tile a surface.

@@ -110,7 +110,7 @@ impl Fitted {
         }
     }
 
-    /// The place in the picture along one axis, and whether it is in a border, for each of so many texels.
+    /// The place in the picture along one axis, and whether it is in a border, for each texel.
     fn along(&self, axis: usize, texels: u32, tile: Option<f32>) -> Vec<(f32, bool)> {
         let (picture, size, scale) = (self.picture[axis], self.size[axis], self.scale);
         let (low, high) = (self.layout.low[axis], self.layout.high[axis]);

@@ -1,21 +1,13 @@
 //! Masks of pictures.
 
-use super::{
-    layout::Layout,
-    picture::{self, BasePicture, Space},
-};
-use crate::{
-    CrackPreset, Grid,
-    pattern::{CrackMask, MaskError},
-    plugin::{
-        api::{CrackError, CrackMaskSource},
-        jobs::{
-            background::{BackgroundJob, PATIENCE},
-            copy::MAX_RESTARTS,
-        },
-    },
-    raster::TexelRect,
-};
+use super::layout::Layout;
+use super::picture::{self, BasePicture, Space};
+use crate::pattern::{CrackMask, MaskError};
+use crate::plugin::api::{CrackError, CrackMaskSource};
+use crate::plugin::jobs::background::{BackgroundJob, PATIENCE};
+use crate::plugin::jobs::copy::MAX_RESTARTS;
+use crate::raster::TexelRect;
+use crate::{CrackPreset, Grid};
 use bevy::{platform::time::Instant, prelude::*, tasks::AsyncComputeTaskPool};
 use std::{
     sync::{Arc, Weak},
@@ -65,10 +57,10 @@ impl<'a> MaskFrom<'a> {
     }
 }
 
-/// So long a mask is kept for those who have asked for it and do not come for it.
+/// How long a mask is kept for surfaces that have asked for it and do not come for it.
 const KEPT: Duration = Duration::from_secs(5);
 
-/// The masks of pictures. Made beside the frames: reading a picture takes longer than a frame may.
+/// The masks of pictures. Made in the background: reading a picture takes longer than a frame may.
 #[derive(Resource, Default)]
 pub(crate) struct PictureMasks {
     /// Those that a surface uses, for others with the same picture.
@@ -125,7 +117,7 @@ impl PictureMasks {
         self.made.push((key, Arc::downgrade(mask)));
     }
 
-    /// The picture is another one now.
+    /// The picture has changed.
     pub(crate) fn forget(&mut self, picture: AssetId<Image>) {
         self.made.retain(|(key, _)| key.picture != picture);
         for work in self.in_work.iter_mut().filter(|work| work.key.picture == picture) {

@@ -1,11 +1,10 @@
 //! Reading pictures: [`BasePicture`].
 
-use crate::{
-    Grid,
-    paint::BaseTexels,
-    plugin::{api::error::CrackError, source::layout::Layout},
-    raster::TexelRect,
-};
+use crate::Grid;
+use crate::paint::BaseTexels;
+use crate::plugin::api::error::CrackError;
+use crate::plugin::source::layout::Layout;
+use crate::raster::TexelRect;
 use bevy::{
     asset::{AssetServer, LoadState},
     image::{ImageAddressMode, ImageFilterMode, ImageSampler, ImageSamplerDescriptor},
@@ -101,7 +100,7 @@ impl BasePictures {
         self.0.insert(key, Arc::downgrade(base));
     }
 
-    /// The picture is another one now.
+    /// The picture has changed.
     pub(crate) fn forget(&mut self, picture: AssetId<Image>) {
         self.0.retain(|key, _| !key.pictures.contains(&Some(picture)));
     }

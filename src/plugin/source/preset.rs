@@ -1,9 +1,8 @@
 //! Presets from components and files.
 
-use crate::{
-    plugin::api::{error::CrackError, preset::PresetSource},
-    preset::{CrackPreset, PresetError},
-};
+use crate::plugin::api::error::CrackError;
+use crate::plugin::api::preset::PresetSource;
+use crate::preset::{CrackPreset, PresetError};
 use bevy::{
     asset::{AssetLoader, AssetPath, AsyncReadExt, LoadContext, LoadState, io::Reader},
     platform::{collections::HashMap, time::Instant},
@@ -56,7 +55,7 @@ struct PresetFile {
     refused: Option<(Vec<u8>, Instant)>,
 }
 
-/// So long after a file was refused a second try is one of the engine's own.
+/// How long after a file was refused a second try is one of the engine's own.
 const AGAIN: Duration = Duration::from_secs(1);
 
 impl PresetFiles {
@@ -72,7 +71,7 @@ impl PresetFiles {
 }
 
 impl PresetFile {
-    /// Takes up what was read of it. Where a file cannot be loaded anew the engine tries once more at once, and would say the same once
+    /// Takes up what was read of it. Where a file cannot be loaded again the engine tries once more at once, and would say the same once
     /// more; it is given what was there before then, which stays.
     fn take(&mut self, bytes: Vec<u8>, read: Result<CrackPreset, LoadError>) -> Result<CrackPreset, LoadError> {
         let error = match read {

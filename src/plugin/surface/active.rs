@@ -1,18 +1,18 @@
 //! [`Active`]: a surface that has been hit.
 
-use super::{canvas::Canvas, cracks::Cracks, drawing::Drawing, playhead::Playhead};
-use crate::{
-    CrackPreset, Grid,
-    growth::CrackGrowth,
-    paint::LookTable,
-    plugin::{
-        api::{surface::CrackSurface, textures::CrackTextures},
-        carrier::kind::Carrier,
-        gpu::memory::TextureBytes,
-        source::picture::BasePicture,
-    },
-    raster::{DepthField, TexelRect},
-};
+use super::canvas::Canvas;
+use super::cracks::Cracks;
+use super::drawing::Drawing;
+use super::playhead::Playhead;
+use crate::growth::CrackGrowth;
+use crate::paint::LookTable;
+use crate::plugin::api::surface::CrackSurface;
+use crate::plugin::api::textures::CrackTextures;
+use crate::plugin::carrier::kind::Carrier;
+use crate::plugin::gpu::memory::TextureBytes;
+use crate::plugin::source::picture::BasePicture;
+use crate::raster::{DepthField, TexelRect};
+use crate::{CrackPreset, Grid};
 use bevy::{asset::UntypedAssetId, prelude::*};
 use std::sync::Arc;
 
@@ -54,7 +54,7 @@ pub(crate) struct Turn {
 }
 
 /// What a surface is made of before it cracks.
-pub(crate) struct Ground {
+pub(crate) struct SurfaceParts {
     pub(crate) surface: CrackSurface,
     pub(crate) preset: CrackPreset,
     pub(crate) look: LookTable,
@@ -69,8 +69,8 @@ pub(crate) struct Ground {
 
 impl Active {
     /// A surface whose textures show what is in the field.
-    pub(crate) fn new(ground: Ground, growth: CrackGrowth, field: DepthField) -> Self {
-        let Ground { surface, preset, look, base, textures, carrier, bytes, rect, unstretched, read_at } = ground;
+    pub(crate) fn new(ground: SurfaceParts, growth: CrackGrowth, field: DepthField) -> Self {
+        let SurfaceParts { surface, preset, look, base, textures, carrier, bytes, rect, unstretched, read_at } = ground;
         let mut canvas = Canvas {
             look,
             base,

@@ -1,14 +1,13 @@
 //! [`Canvas`]: what cracks are painted on.
 
-use crate::{
-    paint::LookTable,
-    plugin::{api::textures::CrackTextures, source::picture::BasePicture},
-    raster::{DirtyTiles, TexelRect},
-};
+use crate::paint::LookTable;
+use crate::plugin::api::textures::CrackTextures;
+use crate::plugin::source::picture::BasePicture;
+use crate::raster::{DirtyTiles, TexelRect};
 use bevy::prelude::*;
 use std::sync::Arc;
 
-/// The most parts of an image that are remembered; one that is forgotten is painted anew when it is shown again.
+/// The most parts of an image that are remembered; one that is forgotten is painted again when it is shown again.
 const MAX_VIEWS: usize = 256;
 
 /// The textures of a surface, and what is painted into them.

@@ -1,10 +1,8 @@
 //! [`Cracked`]: the private component of a surface that has been hit.
 
-use super::{
-    active::{Active, Turn},
-    owners::Owners,
-    queues::Queues,
-};
+use super::active::{Active, Turn};
+use super::owners::Owners;
+use super::queues::Queues;
 use bevy::{
     ecs::{
         entity::EntityIndexSet, entity_disabling::Disabled, lifecycle::HookContext, query::Allow, world::DeferredWorld,

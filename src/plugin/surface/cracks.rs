@@ -1,9 +1,7 @@
 //! [`Cracks`]: the cracks of a surface.
 
-use crate::{
-    growth::CrackGrowth,
-    pattern::{CellTracker, Network},
-};
+use crate::growth::CrackGrowth;
+use crate::pattern::{CellTracker, Network};
 use bevy::prelude::*;
 
 /// The cracks of a surface, and what was reported of them.

@@ -1,20 +1,15 @@
 //! Surfaces are made, and given to their entities.
 
-use super::{
-    active::Active,
-    cracked::{self, active, has_cracked},
-    inputs::{Blank, Readings},
-    picture_plan::Draft,
-    plan::{Plan, resolve_mask},
-    queue::with_queue,
-};
-use crate::plugin::{
-    api::{CrackClock, CrackError, CrackFailed, CrackState, CrackStatus, CrackTextures, error::EntityLabel},
-    gpu::{
-        textures::{self, TextureKind},
-        uploads::Uploads,
-    },
-};
+use super::active::Active;
+use super::cracked::{self, active, has_cracked};
+use super::inputs::{BaseAndMask, BlankSurface};
+use super::picture_plan::ReadPictures;
+use super::plan::{Plan, resolve_mask};
+use super::queue::with_queue;
+use crate::plugin::api::error::EntityLabel;
+use crate::plugin::api::{CrackClock, CrackError, CrackFailed, CrackState, CrackStatus, CrackTextures};
+use crate::plugin::gpu::textures::{self, TextureKind};
+use crate::plugin::gpu::uploads::Uploads;
 use bevy::prelude::*;
 
 /// The largest depth of parallax that still looks like depth, in units of the texture.
@@ -53,8 +48,9 @@ pub(crate) fn make_now(world: &mut World, entity: Entity, plan: Plan) -> Result<
     plan.check_mesh(world, entity)?;
     let draft = plan.pictures.clone().draft(world, &plan.shown)?;
     let Some(mask) = resolve_mask(world, plan.mask(), &plan.shown, &draft)? else { return Ok(false) };
-    let read = Readings { base: draft.base.clone(), mask };
-    let Blank { growth, field, look } = Blank::new(&plan.surface, &plan.preset, &read, plan.pictures.rect)?;
+    let read = BaseAndMask { base: draft.base.clone(), mask };
+    let BlankSurface { growth, field, look } =
+        BlankSurface::new(&plan.surface, &plan.preset, &read, plan.pictures.rect)?;
     let textures = make_textures(world, &draft, None)?;
     let ground = plan.ground(world, read, look, textures);
     install(world, entity, Box::new(Active::new(ground, growth, field)));
@@ -88,12 +84,12 @@ pub(crate) fn report_textures(world: &mut World, entity: Entity) {
 /// Makes the textures of a surface, into the images of `reuse` if given.
 pub(crate) fn make_textures(
     world: &mut World,
-    draft: &Draft,
+    draft: &ReadPictures,
     reuse: Option<&CrackTextures>,
 ) -> Result<CrackTextures, CrackError> {
     world.resource_mut::<Uploads>().expect_whole();
     let mut images = world.get_resource_mut::<Assets<Image>>().ok_or(CrackError::NoImages)?;
-    let Draft { base, plan } = draft;
+    let ReadPictures { base, plan } = draft;
     let mut add = |kind: &TextureKind, old: Option<&Option<Handle<Image>>>| -> Result<_, CrackError> {
         if !(kind.is_wanted)(plan.maps) {
             return Ok(None);

@@ -1,10 +1,8 @@
 //! [`Holes`]: the texels that have left a surface.
 
-use crate::{
-    Grid,
-    plugin::source::picture::{BasePicture, density},
-    raster::TexelRect,
-};
+use crate::Grid;
+use crate::plugin::source::picture::{BasePicture, density};
+use crate::raster::TexelRect;
 use bevy::prelude::*;
 use core::ops::Range;
 

@@ -1,10 +1,9 @@
 //! [`Drawing`]: what is drawn of the cracks of a surface, before it is painted.
 
-use super::{cutouts::Holes, tile_set::Touched};
-use crate::{
-    Grid,
-    raster::{DepthField, Profile},
-};
+use super::cutouts::Holes;
+use super::tile_set::Touched;
+use crate::Grid;
+use crate::raster::{DepthField, Profile};
 use bevy::prelude::*;
 use std::sync::Arc;
 

@@ -1,6 +1,10 @@
 //! Where cracks lie and how they look on a surface.
 
-use crate::{CrackPreset, paint::LookTable, pattern::SurfaceFrame, plugin::api::error::CrackError, raster::TexelRect};
+use crate::CrackPreset;
+use crate::paint::LookTable;
+use crate::pattern::SurfaceFrame;
+use crate::plugin::api::error::CrackError;
+use crate::raster::TexelRect;
 
 /// Where the cracks of a surface lie that shows `rect`.
 pub(crate) fn frame(rect: TexelRect) -> Result<SurfaceFrame, CrackError> {

@@ -1,23 +1,15 @@
 //! [`SurfaceInputs`]: what a surface is read from, by any thread.
 
-use super::{
-    frame::{frame, look},
-    picture_plan::PicturePlan,
-};
-use crate::{
-    CrackPreset,
-    growth::CrackGrowth,
-    paint::LookTable,
-    pattern::CrackMask,
-    plugin::{
-        api::{CrackError, CrackSurface},
-        source::{
-            mask::{self, MaskKey},
-            picture::BasePicture,
-        },
-    },
-    raster::{DepthField, TexelRect},
-};
+use super::frame::{frame, look};
+use super::picture_plan::PicturePlan;
+use crate::CrackPreset;
+use crate::growth::CrackGrowth;
+use crate::paint::LookTable;
+use crate::pattern::CrackMask;
+use crate::plugin::api::{CrackError, CrackSurface};
+use crate::plugin::source::mask::{self, MaskKey};
+use crate::plugin::source::picture::BasePicture;
+use crate::raster::{DepthField, TexelRect};
 use bevy::prelude::*;
 use std::sync::Arc;
 
@@ -56,13 +48,13 @@ pub(super) enum RawMask {
 
 /// What was read of a surface.
 #[derive(Clone)]
-pub(crate) struct Readings {
+pub(crate) struct BaseAndMask {
     pub(crate) base: Arc<BasePicture>,
     pub(crate) mask: Arc<CrackMask>,
 }
 
 impl SurfaceInputs {
-    pub(crate) fn read(&self, copies: &[Image]) -> Result<Readings, CrackError> {
+    pub(crate) fn read(&self, copies: &[Image]) -> Result<BaseAndMask, CrackError> {
         let copy = |index: Option<usize>| index.and_then(|index| copies.get(index));
         let base = match &self.base {
             RawBase::Read(base) => base.clone(),
@@ -76,22 +68,22 @@ impl SurfaceInputs {
                 Arc::new(CrackMask { weak: weak?, strong: strong?, forbidden: forbidden? })
             }
         };
-        Ok(Readings { base, mask })
+        Ok(BaseAndMask { base, mask })
     }
 }
 
 /// What cracks grow and are drawn in, before the first.
-pub(crate) struct Blank {
+pub(crate) struct BlankSurface {
     pub(crate) growth: CrackGrowth,
     pub(crate) field: DepthField,
     pub(crate) look: LookTable,
 }
 
-impl Blank {
+impl BlankSurface {
     pub(crate) fn new(
         surface: &CrackSurface,
         preset: &CrackPreset,
-        Readings { base, mask }: &Readings,
+        BaseAndMask { base, mask }: &BaseAndMask,
         rect: TexelRect,
     ) -> Result<Self, CrackError> {
         let frame = frame(rect)?;

@@ -17,6 +17,7 @@ pub(crate) mod prepare;
 pub(crate) mod queue;
 pub(crate) mod queues;
 pub(crate) mod regrow;
+pub(crate) mod reread;
 pub(crate) mod stamp;
 pub(crate) mod tile_set;
 pub(crate) mod time;

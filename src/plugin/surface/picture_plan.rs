@@ -1,19 +1,13 @@
 //! [`PicturePlan`]: what the pictures of a surface will be.
 
-use super::active::Active;
-use crate::{
-    plugin::{
-        api::{CrackBudget, CrackError, CrackResolution, CrackSurface, textures::Maps},
-        carrier::kind::{CarrierKind, Shown},
-        gpu::memory::TextureMemory,
-        source::{
-            layout::{Layout, MOST_TEXELS},
-            mask::{MaskKey, PicturePart},
-            picture::{self, BaseKey, BasePicture, BasePictures, Space},
-        },
-    },
-    raster::TexelRect,
-};
+use crate::plugin::api::textures::Maps;
+use crate::plugin::api::{CrackBudget, CrackError, CrackResolution, CrackSurface};
+use crate::plugin::carrier::kind::Shown;
+use crate::plugin::gpu::memory::TextureMemory;
+use crate::plugin::source::layout::{Layout, MOST_TEXELS};
+use crate::plugin::source::mask::{MaskKey, PicturePart};
+use crate::plugin::source::picture::{self, BaseKey, BasePicture, BasePictures, Space};
+use crate::raster::TexelRect;
 use bevy::{image::ImageSampler, prelude::*, render::renderer::RenderDevice};
 use std::sync::Arc;
 
@@ -69,13 +63,13 @@ impl PicturePlan {
     }
 
     /// Reads the pictures, unless somebody else has.
-    pub(crate) fn draft(self, world: &mut World, shown: &Shown) -> Result<Draft, CrackError> {
+    pub(crate) fn draft(self, world: &mut World, shown: &Shown) -> Result<ReadPictures, CrackError> {
         let base = world.resource_scope(|world, mut bases: Mut<BasePictures>| {
             let images = world.get_resource::<Assets<Image>>().ok_or(CrackError::NoImages)?;
             let picture = |map: Option<&Handle<Image>>| map.and_then(|picture| images.get(picture));
             bases.get(self.key(shown), || self.read(self.needed(shown).map(picture)))
         })?;
-        Ok(Draft { base, plan: self })
+        Ok(ReadPictures { base, plan: self })
     }
 
     /// The pictures, read.
@@ -95,7 +89,7 @@ impl PicturePlan {
 }
 
 /// The pictures of a surface, ready to be cracked.
-pub(crate) struct Draft {
+pub(crate) struct ReadPictures {
     pub(crate) base: Arc<BasePicture>,
     pub(crate) plan: PicturePlan,
 }
@@ -111,7 +105,7 @@ pub(crate) struct Stretch<'a> {
     pub(crate) is_twofold: bool,
 }
 
-/// Plans the pictures of a surface of which these maps are wanted; `None` if they are not there yet. BackgroundJob depths, a field takes `layer` bytes a texel; `owned` bytes of the
+/// Plans the pictures of a surface of which these maps are wanted; `None` if they are not there yet. Beside depths, a field takes `layer` bytes a texel; `owned` bytes of the
 /// budget are its own already.
 pub(super) fn plan_pictures(
     world: &World,
@@ -140,27 +134,6 @@ pub(super) fn plan_pictures(
     let sampler = image.map_or(ImageSampler::Default, |image| image.sampler.clone());
     let (bytes, layout) = (bytes(size, (maps, layer)), shown.layout.clone());
     Ok(Some(PicturePlan { size, rect, bytes, sampler, maps, unstretched, layout, is_nearest, is_twofold }))
-}
-
-/// Reads the pictures of a cracked surface anew; `None` if they are not there yet. `other` is how to deal with them if they are not those
-/// that it was made from.
-pub(crate) fn draft(
-    world: &mut World,
-    entity: Entity,
-    active: &Active,
-    other: Option<&dyn CarrierKind>,
-    shown: &Shown,
-) -> Result<Option<Draft>, CrackError> {
-    let kind = other.unwrap_or(active.carrier.kind);
-    let aspect = |picture| kind.aspect(world, entity, picture, active.carrier.size);
-    let same = active.canvas.unstretched.filter(|_| other.is_none());
-    let kept = same.map(|unstretched| (unstretched, active.carrier.whole(active.canvas.base.size).size()));
-    let stretch = Stretch { aspect: &aspect, kept, is_twofold: kind.is_twofold(world, entity) };
-    let layer = active.preset.look.layer(0).bytes_per_texel();
-    let emissive = active.canvas.textures.emissive.is_some();
-    let wanted = Maps { emissive, ..Maps::wanted(active.surface.write, &active.preset.look) };
-    let plan = plan_pictures(world, (&active.surface, wanted), shown, &stretch, layer, active.bytes.get())?;
-    plan.map(|plan| plan.draft(world, shown)).transpose()
 }
 
 /// Bytes of the textures on the CPU and the GPU, the base picture, as if no other surface had the same, and the depth field with what it

@@ -1,31 +1,20 @@
 //! [`Plan`]: what a surface will be, before anything of it is made.
 
-use super::{
-    active::Ground,
-    inputs::{Copies, RawBase, RawMask, Readings, SurfaceInputs},
-    picture_plan::{Draft, PicturePlan, Stretch, plan_pictures},
-};
-use crate::{
-    CrackPreset,
-    paint::LookTable,
-    pattern::CrackMask,
-    plugin::{
-        api::{CrackBudget, CrackError, CrackSurface, CrackTextures, textures::Maps},
-        carrier::{
-            kind::{Carrier, CarrierKind, Found, Shown},
-            kinds,
-        },
-        gpu::{
-            memory::TextureMemory,
-            textures::{self, TextureKind},
-        },
-        source::{
-            mask::{MaskFrom, PictureMasks, layer},
-            picture::{self, BaseKey, BasePictures, FrameCount},
-            preset,
-        },
-    },
-};
+use super::active::SurfaceParts;
+use super::inputs::{BaseAndMask, Copies, RawBase, RawMask, SurfaceInputs};
+use super::picture_plan::{PicturePlan, ReadPictures, Stretch, plan_pictures};
+use crate::CrackPreset;
+use crate::paint::LookTable;
+use crate::pattern::CrackMask;
+use crate::plugin::api::textures::Maps;
+use crate::plugin::api::{CrackBudget, CrackError, CrackSurface, CrackTextures};
+use crate::plugin::carrier::kind::{Carrier, CarrierKind, Found, Shown};
+use crate::plugin::carrier::kinds;
+use crate::plugin::gpu::memory::TextureMemory;
+use crate::plugin::gpu::textures::{self, TextureKind};
+use crate::plugin::source::mask::{MaskFrom, PictureMasks, layer};
+use crate::plugin::source::picture::{self, BaseKey, BasePictures, FrameCount};
+use crate::plugin::source::preset;
 use bevy::prelude::*;
 use std::sync::Arc;
 
@@ -110,7 +99,7 @@ impl Plan {
         self.pictures.key(&self.shown)
     }
 
-    /// What was read of the picture before this frame is another one now; whether some of it may have been read.
+    /// What was read of the picture before this frame has changed; whether some of it may have been read.
     pub(crate) fn forget_picture(&mut self, picture: AssetId<Image>, frame: u64) -> bool {
         let is_past = self.read_at < frame;
         self.is_outdated |= is_past && self.shown.pictures().any(|image| image.id() == picture);
@@ -132,7 +121,7 @@ impl Plan {
     }
 
     /// Makes its textures, without texels, so that the renderer has room for them when they come.
-    pub(crate) fn make_room(&mut self, world: &mut World) -> Result<(), CrackError> {
+    pub(crate) fn allocate_textures(&mut self, world: &mut World) -> Result<(), CrackError> {
         let mut images = world.get_resource_mut::<Assets<Image>>().ok_or(CrackError::NoImages)?;
         let PicturePlan { size, maps, sampler, .. } = &self.pictures;
         let mut add = |kind: &TextureKind| -> Result<Option<Handle<Image>>, CrackError> {
@@ -176,10 +165,16 @@ impl Plan {
     }
 
     /// Takes up what was read for it: others who show the same need not read it again.
-    pub(crate) fn ground(self, world: &mut World, read: Readings, look: LookTable, textures: CrackTextures) -> Ground {
+    pub(crate) fn ground(
+        self,
+        world: &mut World,
+        read: BaseAndMask,
+        look: LookTable,
+        textures: CrackTextures,
+    ) -> SurfaceParts {
         let key = self.key();
         let Self { surface, preset, kind, shown, pictures, read_at, is_outdated, .. } = self;
-        let Readings { base, mask } = read;
+        let BaseAndMask { base, mask } = read;
         if !is_outdated {
             world.resource_mut::<BasePictures>().remember(key, &base);
             if let (MaskFrom::Picture(part), Some(picture)) = (MaskFrom::new(&surface.mask, &preset), &shown.diffuse) {
@@ -189,7 +184,7 @@ impl Plan {
         let PicturePlan { bytes, rect, unstretched, is_twofold, .. } = pictures;
         let carrier = Carrier { is_twofold, ..Carrier::new(kind, shown) };
         let bytes = world.resource::<TextureMemory>().count(bytes);
-        Ground { surface, preset, look, base, textures, carrier, bytes, rect, unstretched, read_at }
+        SurfaceParts { surface, preset, look, base, textures, carrier, bytes, rect, unstretched, read_at }
     }
 }
 
@@ -198,7 +193,7 @@ pub(crate) fn resolve_mask(
     world: &mut World,
     from: MaskFrom<'_>,
     shown: &Shown,
-    draft: &Draft,
+    draft: &ReadPictures,
 ) -> Result<Option<Arc<CrackMask>>, CrackError> {
     for image in from.images() {
         if !picture::is_loaded(world, image)? {

@@ -1,10 +1,8 @@
 //! [`Playhead`]: the time of a surface.
 
-use crate::{
-    pattern::{Moment, SurfaceFrame},
-    plugin::api::clock::CrackClock,
-    raster::{Profile, Replay},
-};
+use crate::pattern::{Moment, SurfaceFrame};
+use crate::plugin::api::clock::CrackClock;
+use crate::raster::{Profile, Replay};
 
 /// Where a surface is in time, and what lets its time pass.
 pub(crate) struct Playhead {
@@ -38,7 +36,7 @@ pub(crate) struct Playback {
 }
 
 impl Playback {
-    /// Draws the field anew, from nothing.
+    /// Draws the field again, from nothing.
     pub(crate) fn start_over(&mut self, frame: SurfaceFrame, profile: Profile) {
         self.replay = Replay::new(frame.size(), profile);
     }

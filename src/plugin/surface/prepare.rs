@@ -1,33 +1,24 @@
-//! Surfaces that are made beside the frames: what the first hit on a large picture needs takes longer than a frame may.
+//! Surfaces that are made by background tasks: what the first hit on a large picture needs takes longer than a frame may.
 
-use super::{
-    active::Active,
-    cracked::has_cracked,
-    create::{install, make_now, report_failure},
-    inputs::{Blank, Copies, Readings, SurfaceInputs},
-    plan::Plan,
-    queues::Queues,
-    warm,
-};
-use crate::{
-    CrackPreset,
-    plugin::{
-        api::{CrackBudget, CrackError, CrackSurface, textures::MAPS},
-        gpu::{
-            buffer::Stager,
-            textures::{self, Picture},
-            uploads::Uploads,
-        },
-        jobs::{
-            background::{BackgroundJob, PATIENCE, drop_in_background, guarded_as},
-            copy::{CopyProgress, MAX_BYTES, PictureCopies},
-            frame_time::{FrameClock, Timer},
-            threads::Threads,
-        },
-        source::picture::{BaseKey, BasePictures},
-    },
-    raster::TexelRect,
-};
+use super::active::Active;
+use super::cracked::has_cracked;
+use super::create::{install, make_now, report_failure};
+use super::inputs::{BaseAndMask, BlankSurface, Copies, SurfaceInputs};
+use super::plan::Plan;
+use super::queues::Queues;
+use super::warm;
+use crate::CrackPreset;
+use crate::plugin::api::textures::MAPS;
+use crate::plugin::api::{CrackBudget, CrackError, CrackSurface};
+use crate::plugin::gpu::buffer::Stager;
+use crate::plugin::gpu::textures::{self, Picture};
+use crate::plugin::gpu::uploads::Uploads;
+use crate::plugin::jobs::background::{BackgroundJob, PATIENCE, drop_in_background, guarded_as};
+use crate::plugin::jobs::copy::{CopyProgress, MAX_BYTES, PictureCopies};
+use crate::plugin::jobs::frame_time::{FrameClock, Timer};
+use crate::plugin::jobs::threads::Threads;
+use crate::plugin::source::picture::{BaseKey, BasePictures};
+use crate::raster::TexelRect;
 use bevy::{ecs::entity::EntityHashMap, platform::time::Instant, prelude::*, render::renderer::RenderDevice};
 use std::collections::VecDeque;
 
@@ -37,23 +28,23 @@ const MAX_AT_ONCE: u64 = 512 * 512;
 /// Share of the frame's budget after which no more is copied.
 const SHARE: f32 = 0.3;
 
-/// Texels up to which a surface is never made beside the frames: a task would cost more.
+/// Texels up to which a surface is never made by a background task: a task would cost more.
 const MIN_BESIDE: u64 = 128 * 128;
 
 /// Texels of the larger ones that are on their way at once for each thread, if there is more than one.
 const PER_THREAD: u64 = 4 << 20;
 
-/// So many others are on their way at once for each thread: some wait for frames.
+/// Other surfaces that are on their way at once for each thread: some wait for frames.
 const SMALL_PER_THREAD: u64 = 16;
 
-/// So often a surface may change while it is made beside the frames; then a frame makes it.
+/// How often a surface may change while it is made by a background task; then a frame makes it.
 const MAX_ROUNDS: u32 = 3;
 
-/// So many of those that are wanted are looked at in a frame.
+/// Wanted surfaces that are looked at in a frame.
 const MAX_WANTED: usize = 16;
 
 /// Frames that a picture on its way to the renderer is waited for: it may have stopped to draw.
-pub(crate) const MAX_LANDING: u32 = 16;
+pub(crate) const MAX_UPLOAD_FRAMES: u32 = 16;
 
 /// Surfaces that are being made.
 #[derive(Resource, Default)]
@@ -63,7 +54,7 @@ pub(crate) struct Preparations {
     wanted: VecDeque<Entity>,
     /// When a task was last done.
     moved: Option<Instant>,
-    /// How often a surface had to begin anew.
+    /// How often a surface had to begin again.
     rounds: EntityHashMap<u32>,
 }
 
@@ -73,7 +64,7 @@ impl Preparations {
         self.wanted.push_back(entity);
     }
 
-    /// What was read of the picture before this frame is another one now.
+    /// What was read of the picture before this frame has changed.
     pub(crate) fn forget_picture(&mut self, picture: AssetId<Image>, frame: u64) {
         for (_, Preparation { plan, stage, .. }) in &mut self.list {
             if plan.forget_picture(picture, frame)
@@ -101,7 +92,7 @@ impl Preparations {
         }
     }
 
-    /// Whether small surfaces are made beside the frames.
+    /// Whether small surfaces are made by background tasks.
     fn has_small(&self) -> bool {
         self.list.iter().any(|(_, other)| !other.is_wanted && is_small(&other.plan))
     }
@@ -156,9 +147,9 @@ struct Preparation {
 enum Stage {
     /// Pictures are copied.
     Reading(PictureCopies, Box<SurfaceInputs>),
-    Making(BackgroundJob<Work, Result<Box<Made>, CrackError>>),
-    /// Its textures are on their way to the renderer, for so many frames.
-    Landing(Box<Made>, u32),
+    Making(BackgroundJob<Work, Result<Box<PreparedSurface>, CrackError>>),
+    /// Its textures are on their way to the renderer, for this many frames.
+    Uploading(Box<PreparedSurface>, u32),
 }
 
 /// What a task makes a surface from.
@@ -170,24 +161,24 @@ struct Work {
     stager: Option<Stager>,
 }
 
-struct Made {
-    read: Readings,
-    blank: Blank,
+struct PreparedSurface {
+    read: BaseAndMask,
+    blank: BlankSurface,
     /// The texels of each texture.
     pictures: [Option<Picture>; MAPS],
 }
 
 impl Work {
-    fn make(self) -> Result<Box<Made>, CrackError> {
+    fn make(self) -> Result<Box<PreparedSurface>, CrackError> {
         guarded_as(
             |reason| CrackError::Textures { reason },
             || {
                 let Self { raw, copies, surface, preset, stager } = self;
                 let read = raw.read(&copies)?;
-                let blank = Blank::new(&surface, &preset, &read, raw.plan.rect)?;
+                let blank = BlankSurface::new(&surface, &preset, &read, raw.plan.rect)?;
                 let texels = textures::texels(raw.plan.maps, &read.base);
                 let pictures = textures::stage(texels, read.base.size, stager.as_ref());
-                Ok(Box::new(Made { read, blank, pictures }))
+                Ok(Box::new(PreparedSurface { read, blank, pictures }))
             },
         )
     }
@@ -224,7 +215,7 @@ fn ready(world: &mut World, entity: Entity, is_wanted: bool) -> Result<bool, Cra
     }
 }
 
-/// Has a surface made beside the frames that is worth it; `false` if nothing was begun.
+/// Has a surface made by a background task that is worth it; `false` if nothing was begun.
 pub(crate) fn make_beside(world: &mut World, entity: Entity) -> Result<bool, CrackError> {
     let preparations = world.resource::<Preparations>();
     let is_known = preparations.is_making(entity) || preparations.has_changed_often(entity);
@@ -250,7 +241,7 @@ fn is_tiny(plan: &Plan) -> bool {
     texels(plan) <= MIN_BESIDE
 }
 
-/// How many threads there are beside the frames; `None` if frames may take any time, or all threads would stop them.
+/// How many threads there are for background tasks; `None` if frames may take any time, or all threads would stop them.
 fn threads(world: &World) -> Option<u64> {
     let has_time = world.resource::<CrackBudget>().is_unlimited();
     let pool = world.resource::<Threads>().pool().filter(|_| !has_time && !cfg!(target_arch = "wasm32"));
@@ -273,12 +264,12 @@ fn begin(world: &mut World, entity: Entity, mut plan: Plan, is_wanted: bool, thr
     plan.check_mesh(world, entity)?;
     let images = world.get_resource::<Assets<Image>>().ok_or(CrackError::NoImages)?;
     let Some(reading) = PictureCopies::new(copies.0, images, true) else { return Ok(false) };
-    plan.make_room(world)?;
+    plan.allocate_textures(world)?;
     let stage = Stage::Reading(reading, Box::new(raw));
     let plan = Box::new(plan);
     let preparation = Preparation { plan, key, stage, since: Instant::now(), is_wanted };
     let turn = &mut Turn { timer: None, must_copy: false, may_make: false };
-    if let Next::On(preparation) = preparation.step(world, entity, turn)? {
+    if let Progress::Working(preparation) = preparation.step(world, entity, turn)? {
         world.resource_mut::<Preparations>().list.push((entity, *preparation));
     }
     Ok(true)
@@ -295,9 +286,9 @@ pub(crate) fn prepare_surfaces(world: &mut World) {
         let outcome = preparation.step(world, entity, turn);
         let mut preparations = world.resource_mut::<Preparations>();
         match outcome {
-            Ok(Next::On(preparation)) => preparations.list.push((entity, *preparation)),
-            Ok(Next::Again) => *preparations.rounds.entry(entity).or_default() += 1,
-            Ok(Next::Over) => _ = preparations.rounds.remove(&entity),
+            Ok(Progress::Working(preparation)) => preparations.list.push((entity, *preparation)),
+            Ok(Progress::Again) => *preparations.rounds.entry(entity).or_default() += 1,
+            Ok(Progress::Done) => _ = preparations.rounds.remove(&entity),
             Err(error) => fail(world, entity, error),
         }
     }
@@ -319,20 +310,20 @@ pub(crate) fn prepare_surfaces(world: &mut World) {
 }
 
 /// What has become of a surface on its way.
-enum Next {
-    On(Box<Preparation>),
-    /// It is another one now.
+enum Progress {
+    Working(Box<Preparation>),
+    /// The surface has changed.
     Again,
-    Over,
+    Done,
 }
 
 impl Preparation {
     /// Goes on.
-    fn step(self, world: &mut World, entity: Entity, turn: &mut Turn) -> Result<Next, CrackError> {
+    fn step(self, world: &mut World, entity: Entity, turn: &mut Turn) -> Result<Progress, CrackError> {
         if has_cracked(world, entity) {
             // A bake has made it.
             drop_in_background(self);
-            return Ok(Next::Over);
+            return Ok(Progress::Done);
         }
         let Self { plan, key, mut stage, since, is_wanted } = self;
         let moved = world.resource::<Preparations>().moved.map_or(since, |moved| moved.max(since));
@@ -347,9 +338,9 @@ impl Preparation {
                     match turn.copy(&mut reading, images) {
                         CopyProgress::More => {
                             let stage = Stage::Reading(reading, raw);
-                            return Ok(Next::On(Box::new(Self { plan, key, stage, since, is_wanted })));
+                            return Ok(Progress::Working(Box::new(Self { plan, key, stage, since, is_wanted })));
                         }
-                        CopyProgress::Changed => return Ok(Next::Again),
+                        CopyProgress::Changed => return Ok(Progress::Again),
                         CopyProgress::Done => {
                             let since = Instant::now();
                             if reading.has_task {
@@ -359,7 +350,7 @@ impl Preparation {
                             let (surface, preset) = (plan.surface.clone(), plan.preset.clone());
                             let work = Work { raw, copies: reading.finish(), surface, preset, stager };
                             let stage = Stage::Making(BackgroundJob::start(work, Work::make));
-                            return Ok(Next::On(Box::new(Self { plan, key, stage, since, is_wanted })));
+                            return Ok(Progress::Working(Box::new(Self { plan, key, stage, since, is_wanted })));
                         }
                     }
                 }
@@ -368,9 +359,9 @@ impl Preparation {
                     match making.take_if_done(is_late && turn.may_make) {
                         None => {
                             let stage = Stage::Making(making);
-                            return Ok(Next::On(Box::new(Self { plan, key, stage, since, is_wanted })));
+                            return Ok(Progress::Working(Box::new(Self { plan, key, stage, since, is_wanted })));
                         }
-                        Some(Err(_)) if !plan.is_current(world, entity) => return Ok(Next::Again),
+                        Some(Err(_)) if !plan.is_current(world, entity) => return Ok(Progress::Again),
                         Some(made) => {
                             if is_done {
                                 world.resource_mut::<Preparations>().moved = Some(Instant::now());
@@ -381,22 +372,22 @@ impl Preparation {
                             if let Some(textures) = &plan.textures {
                                 textures.fill(world, &mut made.pictures);
                             }
-                            Stage::Landing(made, 0)
+                            Stage::Uploading(made, 0)
                         }
                     }
                 }
-                Stage::Landing(made, frames) => {
+                Stage::Uploading(made, frames) => {
                     if !plan.is_current(world, entity) || !plan.has_room(world) {
                         drop_in_background((made, plan));
-                        return Ok(Next::Again);
+                        return Ok(Progress::Again);
                     }
                     let is_staged = plan.textures.as_ref().is_some_and(|textures| textures.are_staged(world));
-                    if is_staged && frames < MAX_LANDING {
-                        let stage = Stage::Landing(made, frames + 1);
-                        return Ok(Next::On(Box::new(Self { plan, key, stage, since, is_wanted })));
+                    if is_staged && frames < MAX_UPLOAD_FRAMES {
+                        let stage = Stage::Uploading(made, frames + 1);
+                        return Ok(Progress::Working(Box::new(Self { plan, key, stage, since, is_wanted })));
                     }
-                    settle(world, entity, *plan, *made);
-                    return Ok(Next::Over);
+                    finish(world, entity, *plan, *made);
+                    return Ok(Progress::Done);
                 }
             };
         }
@@ -430,9 +421,9 @@ impl Turn<'_> {
 }
 
 /// Makes a surface of what is ready.
-fn settle(world: &mut World, entity: Entity, mut plan: Plan, made: Made) {
+fn finish(world: &mut World, entity: Entity, mut plan: Plan, made: PreparedSurface) {
     let (textures, is_outdated) = (plan.textures.take().unwrap_or_default(), plan.is_outdated);
-    let Made { read, blank: Blank { growth, field, look }, .. } = made;
+    let PreparedSurface { read, blank: BlankSurface { growth, field, look }, .. } = made;
     let ground = plan.ground(world, read, look, textures);
     let mut active = Box::new(Active::new(ground, growth, field));
     active.canvas.is_outdated = is_outdated;

@@ -1,12 +1,11 @@
-//! Cracks grown anew on another picture.
+//! Cracks grown again on another picture.
 
-use super::{active::Active, cracks::Added};
-use crate::{
-    CrackPreset, Grid,
-    growth::CrackGrowth,
-    pattern::{CrackMask, SurfaceFrame},
-    plugin::api::CrackError,
-};
+use super::active::Active;
+use super::cracks::Added;
+use crate::growth::CrackGrowth;
+use crate::pattern::{CrackMask, SurfaceFrame};
+use crate::plugin::api::CrackError;
+use crate::{CrackPreset, Grid};
 use bevy::prelude::*;
 use std::sync::Arc;
 

@@ -1,11 +1,10 @@
 //! From networks to depths: what is stamped into the field of a surface.
 
-use super::{active::Active, tile_set::Touched};
-use crate::{
-    growth::CrackGrowth,
-    pattern::{Moment, PathPoint, SegmentId, SegmentPath},
-    raster::{DOT_DEPTH, DepthField, Profile, Redrawn, TexelRect, stamp_dot, stamp_path, stamp_path_with},
-};
+use super::active::Active;
+use super::tile_set::Touched;
+use crate::growth::CrackGrowth;
+use crate::pattern::{Moment, PathPoint, SegmentId, SegmentPath};
+use crate::raster::{DOT_DEPTH, DepthField, Profile, Redrawn, TexelRect, stamp_dot, stamp_path, stamp_path_with};
 use bevy::prelude::*;
 
 /// Buffers kept from frame to frame.
@@ -60,7 +59,7 @@ impl Active {
     }
 }
 
-/// Clears the field and stamps the whole network anew; at another time than the end that is left to the next
+/// Clears the field and stamps the whole network again; at another time than the end that is left to the next
 /// painting.
 pub(crate) fn stamp_anew(active: &mut Active) {
     let frame = active.drawing.field.frame;
@@ -109,7 +108,7 @@ impl Active {
         HAIR * self.cracks.growth.params().line_width
     }
 
-    /// Draws the cracks that were carried on once more: the field has been drawn anew.
+    /// Draws the cracks that were carried on once more: the field has been drawn again.
     fn stamp_carried(&mut self) {
         for lines in self.drawing.carried.clone() {
             self.stamp_lines(&lines);

@@ -32,7 +32,7 @@ impl Touched {
         }
     }
 
-    /// Takes up what has been drawn anew.
+    /// Takes up what has been drawn again.
     pub(crate) fn follow(&mut self, redrawn: &Redrawn) {
         redrawn.cleared.iter().for_each(|tile| self.unmark(*tile));
         redrawn.stamped.iter().for_each(|rect| self.mark(*rect));

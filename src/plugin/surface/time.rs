@@ -1,11 +1,11 @@
 //! How time passes for the cracks of a surface.
 
-use super::{active::Active, playhead::Playback, stamp::stamp_anew};
-use crate::{
-    pattern::Moment,
-    plugin::api::{CrackClock, CrackDrive},
-    raster::Replay,
-};
+use super::active::Active;
+use super::playhead::Playback;
+use super::stamp::stamp_anew;
+use crate::pattern::Moment;
+use crate::plugin::api::{CrackClock, CrackDrive};
+use crate::raster::Replay;
 
 /// The most steps that can be due: after a long pause a surface does not make up for all of it.
 const MAX_DUE: f64 = 64.0;
@@ -14,7 +14,7 @@ const MAX_DUE: f64 = 64.0;
 /// paint many steps at once costs half as much as to paint each, but is seen to jump.
 const MAX_LATE: f64 = 4.0;
 
-/// Markers that are taken up between two looks at the frame's clock.
+/// Markers that are settled between two looks at the frame's clock.
 pub(crate) const SLICE: u32 = 8192;
 
 /// The most steps a second that baked cracks appear in.
@@ -117,7 +117,7 @@ impl Active {
         is_due && self.cracks.growth.is_growing() && !self.cracks.growth.is_laying_out()
     }
 
-    /// Makes a step of growth if one is due and the markers of the last hits have been taken up, which may need more than one turn.
+    /// Makes a step of growth if one is due and the markers of the last hits have been settled, which may need more than one turn.
     pub(crate) fn step_if_due(&mut self) -> bool {
         if !self.is_due() || !self.cracks.growth.prepare_step(SLICE) {
             return false;
@@ -217,7 +217,7 @@ impl Active {
         First::of(self.playhead.clock, self.playhead.playback.as_ref().map_or(0.0, |playback| playback.want), seconds)
     }
 
-    /// A hit: time runs forwards again. Returns the clock that it goes by if that is another one now.
+    /// A hit: time runs forwards again. Returns the clock that it goes by if that has changed.
     pub(crate) fn turn_forwards(&mut self) -> Option<CrackClock> {
         self.playhead.closing = None;
         let clock = self.playhead.clock.as_mut()?;
@@ -247,7 +247,7 @@ impl Active {
     }
 }
 
-/// What a network shows first that is made beside the frames.
+/// What a network shows first that is made by a background task.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum First {
     /// All of it, for good.

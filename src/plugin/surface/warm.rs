@@ -1,15 +1,14 @@
 //! What surfaces are going to look like is asked of the renderer before it is shown.
 
-use super::{active::Active, cracked::active};
-use crate::plugin::{
-    api::{CrackSurface, ShatterCracks, shatter::rim_for, textures::Maps},
-    carrier::{
-        kind::{Found, NextLook},
-        kinds,
-        pipelines::{LEAD, PATIENCE, Warmth, is_needed},
-    },
-    source::preset,
-};
+use super::active::Active;
+use super::cracked::active;
+use crate::plugin::api::shatter::rim_for;
+use crate::plugin::api::textures::Maps;
+use crate::plugin::api::{CrackSurface, ShatterCracks};
+use crate::plugin::carrier::kind::{Found, NextLook};
+use crate::plugin::carrier::kinds;
+use crate::plugin::carrier::pipelines::{LEAD, PATIENCE, PipelineRequests, is_needed};
+use crate::plugin::source::preset;
 use bevy::{asset::UntypedHandle, ecs::archetype::Archetype, prelude::*, render::view::Msaa};
 use core::{
     hash::{Hash, Hasher},
@@ -17,21 +16,21 @@ use core::{
 };
 use std::collections::hash_map::DefaultHasher;
 
-/// So many new surfaces are looked at in a frame.
+/// New surfaces that are looked at in a frame.
 const MAX_FRESH: usize = 32;
 
 /// Notes surfaces that are new, and those that are to shatter from now on.
 pub(crate) fn note_fresh(
     fresh: Query<Entity, (With<CrackSurface>, Or<(Added<CrackSurface>, Added<ShatterCracks>)>)>,
-    mut warmth: ResMut<Warmth>,
+    mut warmth: ResMut<PipelineRequests>,
 ) {
     warmth.fresh.extend(&fresh);
 }
 
-/// Asks for everything anew when cameras have become others.
+/// Asks for everything again when cameras have become others.
 pub(crate) fn watch_views(
     cameras: Query<(Entity, &Archetype, Option<&Msaa>), With<Camera>>,
-    mut warmth: ResMut<Warmth>,
+    mut warmth: ResMut<PipelineRequests>,
     mut commands: Commands,
 ) {
     // In any order.
@@ -55,11 +54,11 @@ pub(crate) fn watch_views(
 /// Asks for the looks of new surfaces, and takes away what was drawn for those that are there.
 pub(crate) fn warm_up(world: &mut World) {
     let is_needed = is_needed(world);
-    let warmth = &mut *world.resource_mut::<Warmth>();
-    let told = warmth.told.as_ref().map_or(0, |told| told.load(Ordering::Relaxed));
+    let warmth = &mut *world.resource_mut::<PipelineRequests>();
+    let ready_up_to = warmth.ready_up_to.as_ref().map_or(0, |ready| ready.load(Ordering::Relaxed));
     let mut done = Vec::new();
     for look in warmth.looks.values_mut() {
-        if told >= look.frame + LEAD || look.since.elapsed() >= PATIENCE {
+        if ready_up_to >= look.frame + LEAD || look.since.elapsed() >= PATIENCE {
             done.extend(look.stand_in.take());
         }
     }
@@ -70,7 +69,7 @@ pub(crate) fn warm_up(world: &mut World) {
     }
     for entity in fresh {
         if !look_ahead(world, entity) {
-            world.resource_mut::<Warmth>().fresh.push_back(entity);
+            world.resource_mut::<PipelineRequests>().fresh.push_back(entity);
         }
     }
 }
