@@ -72,6 +72,12 @@ impl Support {
         Self { anchored: anchored.collect(), gone: vec![false; shards.len()] }
     }
 
+    /// Holds those shards as well of which a corner or the centre lies where `held` says so (pattern units).
+    pub fn hold(&mut self, shards: &Shards, held: impl FnMut(Vec2) -> bool) {
+        let more = Self::from_mask(shards, held);
+        self.anchored.iter_mut().zip(more.anchored).for_each(|(anchored, more)| *anchored |= more);
+    }
+
     /// The same shards in their places, held by something else.
     #[must_use]
     pub fn held_by(&self, shards: &Shards, anchor: Anchor) -> Self {

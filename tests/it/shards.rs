@@ -595,3 +595,38 @@ fn shards_in_their_places_look_as_the_surface_did() {
     let dark = without.as_chunks::<4>().0.iter().filter(|texel| texel[..3] == [0, 0, 0]).count();
     assert!(dark > 300, "one sees through the holes: {dark}");
 }
+
+/// What an image holds stays, and what it no longer holds falls.
+#[test]
+fn an_anchor_mask_holds_a_side() {
+    let mut app = app();
+    listen::<ShatterFailed>(&mut app);
+    let mut mask = solid(UVec2::new(10, 1), [0, 0, 0, 255]);
+    mask.data.iter_mut().flatten().take(4).for_each(|byte| *byte = 255);
+    let mask = add(&mut app, mask);
+    let mut fallen = |anchor_mask: Option<Handle<Image>>| {
+        let entity = cracked(&mut app, UVec2::splat(96), ShatterCracks { anchor_mask, ..loose() });
+        // A gap from the top to the bottom: the right half hangs on nothing but the left one.
+        for row in 0..12 {
+            let at = Vec2::new(0.5, (row as f32 + 0.5) / 12.0);
+            shatter(&mut app, entity, ShatterRequest::around(at, 0.12));
+        }
+        let report: CrackShards = get(&app, entity);
+        let gone: Vec<u32> = shards(&mut app).into_iter().map(|shard| get::<Shard>(&app, shard).number).collect();
+        let at = |x: f32| report.pieces.iter().enumerate().filter(move |(_, shard)| (shard.centroid.x - x).abs() < 0.1);
+        let is_gone = |x: f32| at(x).filter(|(number, _)| gone.contains(&(*number as u32))).count();
+        let counts = (is_gone(0.1), is_gone(0.9), at(0.1).count(), at(0.9).count());
+        app.world_mut().despawn(entity);
+        steps(&mut app, 2);
+        counts
+    };
+    let (left, right, all_left, all_right) = fallen(None);
+    assert!(left == 0 && right == 0 && all_left > 0 && all_right > 0, "nothing holds it, nothing falls by itself");
+    let (left, right, _, all_right) = fallen(Some(mask));
+    assert_eq!((left, right), (0, all_right), "what is held at the left");
+    let never = app.world().resource::<Assets<Image>>().reserve_handle();
+    let entity = cracked(&mut app, UVec2::splat(32), ShatterCracks { anchor_mask: Some(never), ..loose() });
+    shatter(&mut app, entity, ShatterRequest::ALL);
+    let failed = heard::<ShatterFailed>(&mut app);
+    assert!(matches!(&failed[..], [ShatterFailed { error: ShardsError::AnchorMask { .. }, .. }]), "{failed:?}");
+}

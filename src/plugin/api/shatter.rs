@@ -44,6 +44,9 @@ pub struct ShatterCracks {
     pub cut: ShatterParams,
     /// What holds the surface: shards along it stay unless they are hit themselves. Default: the border, as a pane in its frame.
     pub anchor: Anchor,
+    /// What holds the surface besides: where this image is lighter than half, stretched over the shown part of the surface's picture, lightness
+    /// as it is stored, times alpha. `None` (default) = nothing. It must be loaded, and readable on the CPU, when the surface shatters.
+    pub anchor_mask: Option<Handle<Image>>,
     /// How shards fly.
     pub burst: BurstParams,
     /// Whose down they fall. Default: the world's.
@@ -83,6 +86,7 @@ impl Default for ShatterCracks {
             reach: 64.0,
             cut: ShatterParams::DEFAULT,
             anchor: Anchor::Border,
+            anchor_mask: None,
             burst: BurstParams::DEFAULT,
             gravity: GravitySpace::World,
             floor: None,
@@ -302,6 +306,12 @@ pub enum ShardsError {
     NotFlat {
         /// What is wrong with it.
         reason: &'static str,
+    },
+    /// [`ShatterCracks::anchor_mask`] cannot be used.
+    #[error("its anchor mask cannot be used: {reason}")]
+    AnchorMask {
+        /// Why.
+        reason: String,
     },
     /// Something that shards are made of is missing.
     #[error("there are no assets of {name}: add the plugin that brings them")]

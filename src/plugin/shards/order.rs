@@ -12,6 +12,7 @@ use crate::plugin::api::shatter::rim_for;
 use crate::plugin::api::{CrackBudget, GravitySpace, ShardsError, ShatterCracks, ShatterRequest};
 use crate::plugin::carrier::plane::Plane;
 use crate::plugin::carrier::space;
+use crate::plugin::source::mask;
 use crate::plugin::source::picture::BasePicture;
 use crate::plugin::surface::active::Active;
 use crate::plugin::surface::cutouts::{Holes, Span};
@@ -32,6 +33,8 @@ pub(super) struct ShatterJob {
     /// What the surface was then, see [`Active::revision`].
     revision: Arc<()>,
     settings: ShatterCracks,
+    /// What holds the surface besides: lighter than half.
+    held: Option<Grid<f32>>,
     rim: RimLook,
     plane: Plane,
     is_solid: bool,
@@ -95,6 +98,14 @@ impl CutSurface {
     }
 }
 
+/// Where an image holds a surface.
+fn anchor_mask(world: &World, mask: &Handle<Image>) -> Result<Grid<f32>, ShardsError> {
+    let refused = |reason: String| ShardsError::AnchorMask { reason };
+    let image = world.get_resource::<Assets<Image>>().and_then(|images| images.get(mask));
+    let image = image.ok_or_else(|| refused("it is not loaded".to_owned()))?;
+    mask::layer(image).map_err(|error| refused(error.to_string()))
+}
+
 impl ShatterJob {
     /// Looks at a surface.
     pub(super) fn of(
@@ -108,7 +119,7 @@ impl ShatterJob {
         let is_everything = request.reach == f32::INFINITY;
         if is_everything {
             settings.cut.carry_on = true;
-            settings.anchor = Anchor::Nothing;
+            (settings.anchor, settings.anchor_mask) = (Anchor::Nothing, None);
         }
         // Fewer and larger ones, rather than some that nobody sees.
         settings.cut.max_shards =
@@ -124,6 +135,7 @@ impl ShatterJob {
         if let Some(again) = settings.again {
             again.validate()?;
         }
+        let held = settings.anchor_mask.as_ref().map(|mask| anchor_mask(world, mask)).transpose()?;
         let network = active.cracks.growth.network();
         let extent = network.extent();
         let (pos, energy, direction) =
@@ -157,7 +169,11 @@ impl ShatterJob {
         let grown = (network.nodes().len(), network.links().len());
         let same = |broken: &Broken| broken.grown == grown && broken.settings.cut == settings.cut;
         let pieces = match broken {
-            Some(broken) if same(broken) && broken.settings.anchor == settings.anchor => {
+            Some(broken)
+                if same(broken)
+                    && (broken.settings.anchor, &broken.settings.anchor_mask)
+                        == (settings.anchor, &settings.anchor_mask) =>
+            {
                 CutFrom::Cut(broken.cut.clone(), broken.support.clone())
             }
             Some(broken) if same(broken) => CutFrom::Held(broken.cut.clone(), broken.support.clone()),
@@ -192,6 +208,7 @@ impl ShatterJob {
                 .get(active.canvas.view)
                 .map_or(TexelRect::whole(active.canvas.base.size), |view| view.rect),
             alpha_mask: active.surface.alpha_mask,
+            held,
             settings,
         })
     }
@@ -199,6 +216,7 @@ impl ShatterJob {
     /// Makes all that needs no world.
     pub(super) fn make(self) -> Result<CutSurface, ShardsError> {
         let is_new = matches!(self.pieces, CutFrom::Lines(..));
+        let is_kept = matches!(self.pieces, CutFrom::Cut(..));
         let (cut, mut support) = match self.pieces {
             CutFrom::Cut(cut, support) => (cut, support),
             CutFrom::Held(cut, support) => {
@@ -218,6 +236,13 @@ impl ShatterJob {
                 (cut, support)
             }
         };
+        if let Some(held) = self.held.filter(|_| !is_kept) {
+            let (extent, size) = (cut.extent(), held.size().as_vec2());
+            support.hold(&cut, |pos| {
+                let texel = (pos / extent * size).max(Vec2::ZERO).as_uvec2().min(held.size() - 1);
+                held.get(texel.x, texel.y).is_some_and(|value| value > 0.5)
+            });
+        }
         let fallen = support.hit(&cut, self.from, self.reach)?;
         let (frame, settings) = (self.frame, self.settings);
         let size = self.base.size.as_vec2();

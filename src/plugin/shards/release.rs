@@ -75,6 +75,7 @@ fn attend(
     let entity = request.entity;
     let is_first = queue.requests.iter().all(|other| other.entity != entity);
     let is_shattering = world.get::<Pieces>(entity).is_some_and(Pieces::is_waiting);
+    active.turn.is_to_shatter = true;
     // The shards are to show what the surface will.
     if active.turn.is_dirty || is_shattering || !is_first {
         queue.requests.push(request);

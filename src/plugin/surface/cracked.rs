@@ -47,13 +47,13 @@ pub(crate) fn has_cracked(world: &World, entity: Entity) -> bool {
     active(world, entity).is_some()
 }
 
-/// Gives an entity its state.
+/// Gives an entity its state, and the component that names its textures. Observers and commands that wait run then, and may heal the
+/// surface.
 pub(crate) fn insert(world: &mut World, entity: Entity, active: Box<Active>) {
-    world.resource_mut::<Owners>().add(entity, &active);
-    match world.get_entity_mut(entity) {
-        Ok(mut entity) => _ = entity.insert(Cracked(Some(active))),
-        Err(_) => world.resource_mut::<Owners>().remove(entity, &active),
-    }
+    let Ok(mut to) = world.get_entity_mut(entity) else { return };
+    let textures = active.canvas.textures.clone();
+    to.resource_mut::<Owners>().add(entity, &active);
+    to.insert((Cracked(Some(active)), textures));
 }
 
 /// Takes the state of a surface out, for [`put_back`].

@@ -64,7 +64,6 @@ pub(crate) fn install(world: &mut World, entity: Entity, mut active: Box<Active>
     }
     attach(world, entity, &mut active);
     cracked::insert(world, entity, active);
-    report_textures(world, entity);
 }
 
 /// Makes the entity show the surface's textures.
