@@ -83,7 +83,8 @@ impl CrackGrowth {
     /// Whether no marker may be here.
     fn is_barren(&self, pos: Vec2) -> bool {
         let extent = self.network.extent();
-        density_at(self.density.as_ref(), pos, extent) <= 0.0 || self.mask.is_forbidden(pos / extent)
+        let density = density_at(self.density.as_ref(), pos, extent) * self.mask.density_at(pos / extent);
+        density <= 0.0 || self.mask.is_forbidden(pos / extent)
     }
 
     /// What the nodes from `first` on bring about: forks, and lines of rings; and a step of those that are on their way.

@@ -37,7 +37,8 @@ pub(super) fn lay_out(
             let (place, liking) = to_weak_place(pos, apart, mask, region.extent, seed);
             (pos, thinned) = (place, thinned * liking);
         }
-        (chance < probability * thinned * density_at(density, pos, region.extent)).then_some(pos)
+        let density = density_at(density, pos, region.extent) * mask.density_at(pos / region.extent);
+        (chance < probability * thinned * density).then_some(pos)
     };
     // A closer one dies at once.
     let counts = |pos: Vec2| u32::from(pos.distance(region.center) > 1.5 * params.kill_distance);
@@ -105,7 +106,8 @@ pub(super) fn lay_out(
             let pos = region.center + ops::unit(angle) * arm;
             let inside = pos.cmpge(Vec2::ZERO).all() && pos.cmple(region.extent).all();
             let pos = if inside { pos } else { towards_room(region, arm) };
-            if density_at(density, pos, region.extent) > 0.0 && !mask.is_forbidden(pos / region.extent) {
+            let density = density_at(density, pos, region.extent) * mask.density_at(pos / region.extent);
+            if density > 0.0 && !mask.is_forbidden(pos / region.extent) {
                 keeper.keep(pos);
             }
         }

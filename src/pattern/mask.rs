@@ -16,7 +16,7 @@ use glam::{UVec2, Vec2};
 /// let mask = CrackMask {
 ///     weak: Some(CrackMask::layer([1, 2].into(), &[255, 0])?),
 ///     forbidden: Some(CrackMask::layer([1, 2].into(), &[0, 255])?),
-///     strong: None,
+///     ..CrackMask::default()
 /// };
 /// assert_eq!(mask.weak_at([0.5, 0.25].into()), 1.0);
 /// assert_eq!(mask.weak_at([0.5, 0.5].into()), 0.5);
@@ -33,6 +33,9 @@ pub struct CrackMask {
     pub strong: Option<Grid<f32>>,
     /// Where no crack ever runs: frames, transparent texels. Read texel by texel (nearest); above 0.5 is forbidden.
     pub forbidden: Option<Grid<f32>>,
+    /// How densely cracks grow: the share of the markers that are kept, 0..=1, a layer that is not there counting as 1. Read texel by texel
+    /// (nearest). Cracks that have begun may run on into places without markers.
+    pub density: Option<Grid<f32>>,
 }
 
 /// Texels that make no layer of a mask.
@@ -73,6 +76,7 @@ impl CrackMask {
             weak: Self::weak_from_picture(size, rgba)?,
             strong: None,
             forbidden: Self::forbidden_from_alpha(size, rgba)?,
+            density: None,
         })
     }
 
@@ -104,7 +108,16 @@ impl CrackMask {
         grid(size, values, rgba).map(Some)
     }
 
-    /// Whether no layer is there.
+    /// How densely cracks grow at texture coordinates, 0..=1.
+    #[must_use]
+    pub fn density_at(&self, uv: Vec2) -> f32 {
+        let Some(density) = &self.density else { return 1.0 };
+        let size = density.size();
+        let texel = (uv * size.as_vec2()).max(Vec2::ZERO).as_uvec2().min(size.saturating_sub(UVec2::ONE));
+        density.get(texel.x, texel.y).map_or(1.0, |value| value.clamp(0.0, 1.0))
+    }
+
+    /// Whether no layer is there that says where cracks run; [`density`](Self::density) is none.
     #[must_use]
     pub const fn is_empty(&self) -> bool {
         self.weak.is_none() && self.strong.is_none() && self.forbidden.is_none()

@@ -258,7 +258,7 @@ fn values_between_texels_are_bilinear() {
                 sum += weight * f64::from(layer.get(x, y).unwrap());
             }
         }
-        let mask = CrackMask { weak: Some(layer.clone()), strong: Some(layer), forbidden: None };
+        let mask = CrackMask { weak: Some(layer.clone()), strong: Some(layer), ..CrackMask::default() };
         assert!((f64::from(mask.weak_at(uv)) - sum).abs() < 1.0e-5, "{uv}");
         assert_eq!(mask.weak_at(uv), mask.strong_at(uv));
     }
@@ -274,7 +274,12 @@ fn odd_layers_are_refused_or_harmless() {
     let strange = Grid::from_vec(UVec2::new(4, 1), vec![f32::NAN, f32::INFINITY, -3.0, 7.0]).unwrap();
     let none = Grid::new(UVec2::ZERO, 1.0);
     for layer in [strange, none] {
-        let mask = CrackMask { weak: Some(layer.clone()), strong: Some(layer.clone()), forbidden: Some(layer) };
+        let mask = CrackMask {
+            weak: Some(layer.clone()),
+            strong: Some(layer.clone()),
+            forbidden: Some(layer),
+            ..CrackMask::default()
+        };
         for u in [-1.0e30, -1.0, 0.0, 0.1, 0.4, 0.6, 0.9, 1.0, 1.0e30, f32::NAN, f32::INFINITY] {
             let uv = Vec2::new(u, 0.5);
             assert!((0.0..=1.0).contains(&mask.weak_at(uv)) && (0.0..=1.0).contains(&mask.strong_at(uv)), "{u}");

@@ -608,3 +608,31 @@ fn a_large_picture_that_changes_is_not_read_in_a_frame() {
     assert!(at_once <= 2 && later > 5, "{at_once} and {later} frames");
     assert!(read == same && read.as_chunks::<4>().0.iter().filter(|texel| texel[1] == 140).count() > 100_000);
 }
+
+/// Where the image of densities is black there are no markers, in the frame of the hit and by a task.
+#[test]
+fn an_image_says_how_densely_cracks_grow() {
+    for size in [UVec2::new(200, 200), UVec2::new(700, 700)] {
+        let nodes = |density: Option<Image>| {
+            let mut app = hasty();
+            let mut surface = CrackSurface::new(CrackPreset::MUD).with_seed(3);
+            surface.density = density.map(|image| add(&mut app, image));
+            let image = add(&mut app, solid(size, [180, 170, 160, 255]));
+            let entity = app.world_mut().spawn((Sprite::from_image(image), surface)).id();
+            hit(&mut app, CrackHit::uv(entity, Vec2::new(0.25, 0.5)).with_energy(2.0));
+            wait_for(&mut app, "the cracks", |app| state(app, entity).status == CrackStatus::Done);
+            let (shown, mut halves) = (shown(&app, entity), [0, 0]);
+            for (i, texel) in shown.as_chunks::<4>().0.iter().enumerate() {
+                let half = usize::from(i as u32 % size.x > size.x * 6 / 10);
+                halves[half] += u32::from(texel[0] < 120);
+            }
+            halves
+        };
+        let mut half = solid(UVec2::new(2, 1), [255; 4]);
+        half.data.iter_mut().flatten().skip(4).take(3).for_each(|byte| *byte = 0);
+        let [left, right] = nodes(None);
+        assert!(left > 200 && right > 200, "{size}: {left} {right}");
+        let [left, right] = nodes(Some(half));
+        assert!(left > 200 && right < left / 10, "{size}: {left} {right}");
+    }
+}

@@ -46,6 +46,7 @@ fn a_surface_with_handles_is_written_and_read() {
     let inline = CrackPreset { steps_per_second: 3.0, ..CrackPreset::GLASS };
     let mut surfaces = vec![CrackSurface::default(), CrackSurface::new(inline).with_mask(CrackMaskSource::None)];
     surfaces.push(CrackSurface::new(file.clone()).with_seed(u64::MAX).with_mask(images));
+    surfaces.push(CrackSurface::default().with_density(server.load("masks/dense.png")));
     let fixed = CrackResolution::Fixed(UVec2::new(7, 9));
     surfaces.push(CrackSurface::new(file).with_resolution(fixed).with_mask(CrackMaskSource::FromPicture));
     surfaces.push(CrackSurface::new(Handle::from(Uuid::from_u128(7))));

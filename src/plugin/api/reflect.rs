@@ -100,4 +100,4 @@ macro_rules! written {
     };
 }
 
-written!(super::PresetSource, super::CrackMaskSource, super::GuideSource, super::ShatterCracks);
+written!(super::CrackSurface, super::PresetSource, super::CrackMaskSource, super::GuideSource, super::ShatterCracks);

@@ -1,7 +1,7 @@
 //! [`CrackSurface`]: this sprite or mesh can crack.
 
 use super::{CrackMaskSource, CrackState, PresetSource};
-use bevy::prelude::*;
+use bevy::{prelude::*, reflect::serde::ReflectSerializeWithRegistry};
 
 /// This sprite, 2D mesh or 3D mesh can crack.
 ///
@@ -21,7 +21,7 @@ use bevy::prelude::*;
 /// and is hit from all sides. Where a face shows a part of the picture twice itself, where the picture repeats, faces share vertices, or there
 /// are more than 65,536 triangles, the mesh stays as it is, and cracks show wherever their place of the picture does.
 #[derive(Component, Reflect, Clone, Debug, PartialEq)]
-#[reflect(Component, Default)]
+#[reflect(Component, Default, SerializeWithRegistry)]
 #[require(CrackState)]
 pub struct CrackSurface {
     /// How cracks grow and look, here or in a file. A changed look and profile show on all cracks at once, changed growth on what
@@ -38,6 +38,10 @@ pub struct CrackSurface {
     /// Where cracks like to run and where they never go; by default as the preset has it. A change takes effect as one of `resolution`, and so
     /// does one of what the preset has.
     pub mask: CrackMaskSource,
+    /// How densely cracks grow: this image over the shown part of the surface's picture, of any size. White = as everywhere, black = no markers
+    /// there (lightness as it is stored, times alpha). `None` (default) = everywhere alike. The first hit waits until it is loaded. A change takes
+    /// effect as one of `resolution`.
+    pub density: Option<Handle<Image>>,
 }
 
 impl CrackSurface {
@@ -52,6 +56,7 @@ impl CrackSurface {
             write: CrackMaps { diffuse: true, normal: true, depth: true },
             alpha_mask: true,
             mask: CrackMaskSource::Auto,
+            density: None,
         }
     }
 
@@ -73,6 +78,13 @@ impl CrackSurface {
     #[must_use]
     pub fn with_maps(mut self, maps: CrackMaps) -> Self {
         self.write = maps;
+        self
+    }
+
+    /// The same with an image of how densely cracks grow.
+    #[must_use]
+    pub fn with_density(mut self, density: Handle<Image>) -> Self {
+        self.density = Some(density);
         self
     }
 

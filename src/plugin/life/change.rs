@@ -10,7 +10,6 @@ use crate::plugin::draw::async_playback::recall;
 use crate::plugin::gpu::memory::TextureMemory;
 use crate::plugin::jobs::deferred::hold;
 use crate::plugin::shards::broken::drop_shards;
-use crate::plugin::source::mask::MaskFrom;
 use crate::plugin::source::picture::FrameCount;
 use crate::plugin::source::preset;
 use crate::plugin::surface::active::Active;
@@ -202,8 +201,7 @@ fn update_picture(
     active.canvas.is_outdated = true;
     active.canvas.offered = if other.is_some() { shown.pictures().map(Handle::id).collect() } else { Vec::new() };
     let Some(draft) = draft(world, entity, active, other, &shown)? else { return Ok(false) };
-    let from = MaskFrom::new(&active.surface.mask, &active.preset);
-    let Some(mask) = resolve_mask(world, from, &shown, &draft)? else { return Ok(false) };
+    let Some(mask) = resolve_mask(world, &active.surface, &active.preset, &shown, &draft)? else { return Ok(false) };
     let frame = frame(draft.plan.rect)?;
     let look = look(&active.preset, frame)?;
     recall(world, entity, active);

@@ -47,7 +47,7 @@ pub(crate) fn make_ready_now(world: &mut World, entity: Entity) -> Result<bool, 
 pub(crate) fn make_now(world: &mut World, entity: Entity, plan: Plan) -> Result<bool, CrackError> {
     plan.check_mesh(world, entity)?;
     let draft = plan.pictures.clone().draft(world, &plan.shown)?;
-    let Some(mask) = resolve_mask(world, plan.mask(), &plan.shown, &draft)? else { return Ok(false) };
+    let Some(mask) = resolve_mask(world, &plan.surface, &plan.preset, &plan.shown, &draft)? else { return Ok(false) };
     let read = BaseAndMask { base: draft.base.clone(), mask };
     let BlankSurface { growth, field, look } =
         BlankSurface::new(&plan.surface, &plan.preset, &read, plan.pictures.rect)?;

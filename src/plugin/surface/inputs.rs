@@ -31,6 +31,8 @@ pub(crate) struct SurfaceInputs {
     pub(crate) plan: PicturePlan,
     pub(super) base: RawBase,
     pub(super) mask: RawMask,
+    /// Index of the copy of the image of densities.
+    pub(super) density: Option<usize>,
 }
 
 pub(super) enum RawBase {
@@ -65,11 +67,18 @@ impl SurfaceInputs {
             RawMask::FromPicture(key) => key.make(&base.diffuse),
             RawMask::Images(layers) => {
                 let [weak, strong, forbidden] = layers.map(|index| copy(index).map(mask::layer).transpose());
-                Arc::new(CrackMask { weak: weak?, strong: strong?, forbidden: forbidden? })
+                Arc::new(CrackMask { weak: weak?, strong: strong?, forbidden: forbidden?, density: None })
             }
         };
+        let mask = with_density(mask, copy(self.density))?;
         Ok(BaseAndMask { base, mask })
     }
+}
+
+/// A mask with the densities of an image.
+pub(super) fn with_density(mask: Arc<CrackMask>, image: Option<&Image>) -> Result<Arc<CrackMask>, CrackError> {
+    let Some(image) = image else { return Ok(mask) };
+    Ok(Arc::new(CrackMask { density: Some(mask::layer(image)?), ..CrackMask::clone(&mask) }))
 }
 
 /// What cracks grow and are drawn in, before the first.

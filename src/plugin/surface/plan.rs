@@ -1,7 +1,7 @@
 //! [`Plan`]: what a surface will be, before anything of it is made.
 
 use super::active::SurfaceParts;
-use super::inputs::{BaseAndMask, Copies, RawBase, RawMask, SurfaceInputs};
+use super::inputs::{BaseAndMask, Copies, RawBase, RawMask, SurfaceInputs, with_density};
 use super::picture_plan::{PicturePlan, ReadPictures, Stretch, plan_pictures};
 use crate::CrackPreset;
 use crate::paint::LookTable;
@@ -140,7 +140,7 @@ impl Plan {
 
     /// What has to be read for it, which can be read; `None` if its masks are not there yet.
     pub(crate) fn raw(&self, world: &World, copies: &mut Copies) -> Result<Option<SurfaceInputs>, CrackError> {
-        for image in self.mask().images() {
+        for image in self.mask().images().chain(&self.surface.density) {
             if !picture::is_loaded(world, image)? {
                 return Ok(None);
             }
@@ -157,11 +157,12 @@ impl Plan {
             (MaskFrom::Nothing | MaskFrom::Picture(_), _) => RawMask::Made(Arc::default()),
             (MaskFrom::Images(layers), _) => RawMask::Images(layers.map(|image| image.map(|image| copies.add(image)))),
         };
+        let density = self.surface.density.as_ref().map(|image| copies.add(image));
         let images = world.get_resource::<Assets<Image>>().ok_or(CrackError::NoImages)?;
         for image in copies.0.iter().filter_map(|image| images.get(image)) {
             picture::readable_size(image)?;
         }
-        Ok(Some(SurfaceInputs { plan: self.pictures.clone(), base, mask }))
+        Ok(Some(SurfaceInputs { plan: self.pictures.clone(), base, mask, density }))
     }
 
     /// Takes up what was read for it: others who show the same need not read it again.
@@ -177,7 +178,10 @@ impl Plan {
         let BaseAndMask { base, mask } = read;
         if !is_outdated {
             world.resource_mut::<BasePictures>().remember(key, &base);
-            if let (MaskFrom::Picture(part), Some(picture)) = (MaskFrom::new(&surface.mask, &preset), &shown.diffuse) {
+            if let (MaskFrom::Picture(part), Some(picture)) = (MaskFrom::new(&surface.mask, &preset), &shown.diffuse)
+                // Others have other densities.
+                && surface.density.is_none()
+            {
                 world.resource_mut::<PictureMasks>().remember(pictures.mask_key(picture, part), &mask);
             }
         }
@@ -191,29 +195,34 @@ impl Plan {
 /// The mask of a surface; `None` if it is not there yet.
 pub(crate) fn resolve_mask(
     world: &mut World,
-    from: MaskFrom<'_>,
+    surface: &CrackSurface,
+    preset: &CrackPreset,
     shown: &Shown,
     draft: &ReadPictures,
 ) -> Result<Option<Arc<CrackMask>>, CrackError> {
-    for image in from.images() {
+    let from = MaskFrom::new(&surface.mask, preset);
+    for image in from.images().chain(&surface.density) {
         if !picture::is_loaded(world, image)? {
             return Ok(None);
         }
     }
-    match (from, &shown.diffuse) {
+    let mask = match (from, &shown.diffuse) {
         (MaskFrom::Picture(part), Some(picture)) => {
             let has_time = world.resource::<CrackBudget>().is_unlimited();
             let key = draft.plan.mask_key(picture, part);
-            Ok(world.resource_mut::<PictureMasks>().get(key, &draft.base, has_time))
+            world.resource_mut::<PictureMasks>().get(key, &draft.base, has_time)
         }
         // Without a picture there is nothing to go by.
-        (MaskFrom::Nothing | MaskFrom::Picture(_), _) => Ok(Some(Arc::default())),
+        (MaskFrom::Nothing | MaskFrom::Picture(_), _) => Some(Arc::default()),
         (MaskFrom::Images(layers), _) => {
             let images = world.get_resource::<Assets<Image>>().ok_or(CrackError::NoImages)?;
             let layer =
                 |image: Option<&Handle<Image>>| image.and_then(|image| images.get(image)).map(layer).transpose();
             let [weak, strong, forbidden] = layers.map(layer);
-            Ok(Some(Arc::new(CrackMask { weak: weak?, strong: strong?, forbidden: forbidden? })))
+            Some(Arc::new(CrackMask { weak: weak?, strong: strong?, forbidden: forbidden?, density: None }))
         }
-    }
+    };
+    let images = world.get_resource::<Assets<Image>>().ok_or(CrackError::NoImages)?;
+    let density = surface.density.as_ref().and_then(|image| images.get(image));
+    mask.map(|mask| with_density(mask, density)).transpose()
 }
