@@ -1,18 +1,33 @@
-// Whether a surface may go from thread to thread depends on what a buffer of the renderer is made of, which goes deep.
+// The check that a surface is `Send` goes through the nested types of a renderer buffer, which exceed the default
+// limit.
 #![recursion_limit = "256"]
 #![cfg_attr(docsrs, feature(doc_cfg))]
 //! Cracks that grow over sprites and walls, frame by frame, from the points where they are hit.
 //!
-//! The rooms, in reading order:
+//! The modules, in reading order (each imports only those above it):
 //!
-//! - [`math`], [`grid`](Grid): portable arithmetic, seeded random streams, the one 2D buffer.
-//! - [`pattern`]: networks and frames, the words everything else speaks.
+//! - [`math`] and [`Grid`]: portable arithmetic, seeded random streams, the one 2D buffer.
+//! - [`pattern`]: networks of cracks, surface frames, masks and timelines: the types that the other modules share.
 //! - [`growth`]: cracks by space colonization, step by step.
-//! - [`raster`]: networks to a depth field.
+//! - [`raster`]: draws networks into a depth field.
 //! - [`voronoi`]: cracks that draw a picture, all at once.
-//! - [`paint`]: a base picture and a depth field to diffuse, normal and depth textures.
+//! - [`paint`]: turns a base picture and a depth field into diffuse, normal and depth textures.
+//! - [`preset`]: materials: how cracks grow, their cross-section and their look.
 //! - [`shatter`]: the pieces into which cracks cut a surface, and how they fall.
-//! - `plugin` (feature `bevy`): components, hits, systems, upload.
+//! - `plugin` (feature `bevy`): components, hits, systems, upload to the GPU.
+//!
+//! Without the feature `bevy` everything but `plugin` builds, with no engine.
+//!
+//! ```
+//! use bevy_crack::{CrackPreset, growth::CrackGrowth};
+//!
+//! // A square pane, hit in the middle, grown to the end.
+//! let mut growth = CrackGrowth::new(CrackPreset::GLASS.growth, [1.0, 1.0].into(), 7)?;
+//! growth.hit([0.5, 0.5].into(), 1.0);
+//! while growth.step().grew() {}
+//! assert!(growth.network().nodes().len() > 100);
+//! # Ok::<(), bevy_crack::growth::ParamError>(())
+//! ```
 
 mod grid;
 pub mod growth;
@@ -30,7 +45,7 @@ pub mod plugin;
 pub use grid::Grid;
 pub use preset::CrackPreset;
 
-/// What a game needs.
+/// The items that most games need.
 pub mod prelude {
     #[cfg(feature = "bevy")]
     pub use crate::plugin::prelude::*;

@@ -1,4 +1,4 @@
-//! [`CrackPreset`]: everything that makes glass glass.
+//! [`CrackPreset`]: the settings of a material.
 
 mod check;
 #[cfg(feature = "serde")]
@@ -12,7 +12,8 @@ use crate::{
     raster::Profile,
 };
 
-/// Everything that makes glass glass: how cracks grow, their cross-section, their look.
+/// The settings of a material, such as glass: how its cracks grow, their cross-section and their look.
+///
 ///
 /// ```
 /// use bevy_crack::CrackPreset;
@@ -27,14 +28,14 @@ use crate::{
 pub struct CrackPreset {
     /// How cracks grow.
     pub growth: GrowthParams,
-    /// Their cross-section.
+    /// The cross-section of cracks.
     pub profile: Profile,
-    /// What they do to the picture.
+    /// How cracks change the picture.
     pub look: Look,
     /// Steps of growth a second, 0..=10000.
     pub steps_per_second: f32,
-    /// Whether cracks follow the lines of the picture (mortar, joints) and keep off what is transparent: a surface without a mask of
-    /// its own gets the one [from its picture](crate::pattern::CrackMask::from_picture).
+    /// Whether cracks follow the lines of the picture (mortar, joints) and avoid its transparent parts. A surface
+    /// without a mask gets the one [from its picture](crate::pattern::CrackMask::from_picture).
     #[cfg_attr(feature = "serde", serde(default))]
     pub follows_lines: bool,
 }
@@ -137,7 +138,7 @@ impl CrackPreset {
         follows_lines: false,
     };
 
-    /// Brick: wide cracks, one or two, that keep to the mortar of the picture.
+    /// Brick: one or two wide cracks that follow the mortar of the picture.
     pub const BRICK: Self = Self {
         growth: GrowthParams {
             kill_distance: 0.02,
@@ -222,7 +223,7 @@ impl CrackPreset {
         follows_lines: false,
     };
 
-    /// Tempered glass: the whole pane goes to small dice, from the hit outward.
+    /// Tempered glass: the whole pane breaks into small dice, from the hit outward.
     pub const TEMPERED_GLASS: Self = Self {
         growth: GrowthParams {
             kill_distance: 0.0094,
@@ -264,7 +265,7 @@ impl CrackPreset {
         follows_lines: false,
     };
 
-    /// Laminated glass: a dense web of radials and rings around the hit, which holds together.
+    /// Laminated glass: a dense web of radial cracks and rings around the hit; the pane stays in one piece.
     pub const LAMINATED_GLASS: Self = Self {
         growth: GrowthParams {
             kill_distance: 0.02,
@@ -305,7 +306,8 @@ impl CrackPreset {
         follows_lines: false,
     };
 
-    /// Dry clay: a dense net of fine cracks, long ones first, shorter ones between them, which end at them.
+    /// Dry clay: a dense net of fine cracks; first long ones, then shorter ones between them, which end at the long
+    /// ones.
     ///
     /// Couto et al. use `kill_distance` 0.08, `D` 0.8, `num_iterations` 100, `crack_radius` 0.4, a grid of 20 x 20,
     /// `line_growth` 0.5 and `draw_islands`, in a unit that they do not give.
@@ -356,7 +358,8 @@ impl CrackPreset {
         follows_lines: false,
     };
 
-    /// Mud: wide, deep cracks around large plates of four to six sides with curled rims, narrower ones in them.
+    /// Mud: wide, deep cracks around large plates of four to six sides with curled rims; narrower cracks inside the
+    /// plates.
     pub const MUD: Self = Self {
         growth: GrowthParams {
             kill_distance: 0.056,
@@ -450,7 +453,8 @@ impl CrackPreset {
         follows_lines: false,
     };
 
-    /// Ice: a crushed white spot, long straight bright cracks that run far and meet at clear angles, fine ones between them.
+    /// Ice: a crushed white spot, long straight bright cracks that run far and meet at clear angles, fine cracks
+    /// between them.
     pub const ICE: Self = Self {
         growth: GrowthParams {
             kill_distance: 0.024,
@@ -489,7 +493,7 @@ impl CrackPreset {
         follows_lines: false,
     };
 
-    /// Cartoon: a ragged star at the hit, bold zigzag arms that end in needles.
+    /// Cartoon: a ragged star at the hit, and bold zigzag arms that end in points.
     pub const TOON: Self = Self {
         growth: GrowthParams {
             kill_distance: 0.05,
@@ -524,11 +528,12 @@ impl CrackPreset {
         follows_lines: false,
     };
 
-    /// The same material seen from nearer (`by` above 1) or further away: every length times `by`, as
+    /// The same material at another scale: every length times `by` (above 1 = seen from nearer), as in
     /// [`GrowthParams::scaled`].
     ///
-    /// Lengths are shares of the surface's shorter side, so on a wall that is four times as large as another, both ways, the same preset looks four times as
-    /// coarse: `CrackPreset::MUD.scaled(0.25)` there.
+    /// Lengths are shares of the surface's shorter side. So the same preset looks four times as coarse on a wall that
+    /// is four times as large in both directions as another one: use `CrackPreset::MUD.scaled(0.25)` there.
+    ///
     ///
     /// ```
     /// use bevy_crack::CrackPreset;
@@ -557,7 +562,7 @@ impl CrackPreset {
         Self { growth, profile, look, ..self.clone() }
     }
 
-    /// The preset of this name (lower case), see [`NAMES`](Self::NAMES).
+    /// The preset with this name (lower case), see [`NAMES`](Self::NAMES); `None` if there is none.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         match name {

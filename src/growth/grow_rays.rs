@@ -30,7 +30,7 @@ impl CrackGrowth {
     /// Begins the rays of a plan: the rim from `first` on, of which `born` tells the places that are there, and the markers.
     pub(super) fn begin_rays(&mut self, plan: &Plan, impact: u32, born: &[(usize, u32)]) -> u32 {
         let is_over = !self.is_growing();
-        let first = self.rays.take_up(plan, impact, is_over);
+        let first = self.rays.add_plan(plan, impact, is_over);
         if born.is_empty() {
             // The hit is on a crack, from which it has sprouted: each sprout is on the ray that is nearest to its direction.
             let center = self.impacts[impact as usize].pos;

@@ -1,4 +1,4 @@
-//! Hits: where cracks begin, and what a hit on older cracks does.
+//! Hits: where cracks start, and what a hit on older cracks does.
 
 use super::{
     field::ANY_IMPACT,
@@ -14,25 +14,29 @@ use crate::{
 };
 use glam::Vec2;
 
-/// Half the width of the widest crack in which a hit is looked for, pattern units.
+/// Half the width of the widest crack that is searched for under a hit, pattern units.
 const WIDE: f32 = 0.1;
 
-/// How much further a hit reaches, as a share, where it has next to no room.
+/// How much larger the reach of a hit becomes, as a share, where it has next to no room.
 const MORE_REACH: f32 = 1.6;
 
 impl CrackGrowth {
     /// Hits the surface at `pos` (pattern units) with `energy` (1 = an ordinary hit; 4 reaches twice as far).
     ///
-    /// Lays out starts and markers; growth happens in [`step`](Self::step). A hit as good as on top of an earlier one adds
-    /// its energy to that one, so hammering on one spot costs no more than one hard hit.
+    /// Creates starts and markers; cracks grow in [`step`](Self::step). A hit near an earlier one adds its energy to
+    /// that
+    /// impact, so many hits on one spot cost no more than one hard hit. Near means: closer than `step_length` or
+    /// `kill_distance`, whichever is longer, but at most 0.05 pattern units. A hit that cannot be used is
+    /// that cannot be used is reported as [`HitOutcome::Rejected`].
     pub fn hit(&mut self, pos: Vec2, energy: f32) -> HitOutcome {
         let outcome = self.begin_hit(pos, energy);
         self.finish_layout();
         outcome
     }
 
-    /// As [`hit`](Self::hit), but its markers are left to [`lay_out`](Self::lay_out), so that a hit that makes many of them can take several
-    /// frames. The cracks are the same.
+    /// Like [`hit`](Self::hit), but leaves the markers to [`lay_out`](Self::lay_out), so that a hit with many markers
+    /// can be spread over several frames. The resulting cracks are the same.
+    ///
     ///
     /// ```
     /// use bevy_crack::{CrackPreset, growth::CrackGrowth};
@@ -96,7 +100,7 @@ impl CrackGrowth {
         }
         let index = self.impacts.len() as u32;
         let energy = energy.min(MAX_ENERGY);
-        // In masonry a hit crushes where its cracks begin.
+        // In masonry the crushed zone is centred where the cracks begin: in the nearest joint.
         let crushes = self.masonry.as_ref().and_then(|masonry| masonry.nearest(pos)).unwrap_or(pos);
         self.impacts.push(Impact { pos, energy, first_energy: energy, widening: widening(energy) });
         self.timeline.strike(index, crushes, 0.0, energy);
@@ -146,26 +150,26 @@ impl CrackGrowth {
         HitOutcome::Started(index)
     }
 
-    /// How far the first hit of an impact reached.
+    /// The reach of the first hit of an impact.
     #[cfg(test)]
     pub(super) fn reach_of(&self, impact: u32) -> f32 {
         let Impact { pos, first_energy, .. } = self.impacts[impact as usize];
         self.reach(pos, first_energy)
     }
 
-    /// How far a hit reaches: further where the border leaves it less room.
+    /// The reach of a hit. It is larger where the border leaves less room.
     fn reach(&self, pos: Vec2, energy: f32) -> f32 {
         let room = starts::room(pos, self.params.reach, self.network.extent());
         self.params.reach * energy.sqrt() * (1.0 + MORE_REACH * (1.0 - room))
     }
 
-    /// The first segment of each arm of a hit. What else is around the hit is left to them.
+    /// Grows the first segment of each arm of a hit. The markers around the hit are left to the arms.
     fn branch_out(&mut self, start: u32, directions: Vec<Vec2>) {
         let pos = self.network.nodes[start as usize].pos;
         let born = self.network.nodes.len();
         if let Some(masonry) = self.masonry.clone() {
             let ways = masonry.ways(pos);
-            // Up or down; the arms to the left and the right go the other way round the bricks.
+            // The sum is up, down or zero; the arms to the left and the right go around the bricks the other way.
             let upright: Vec2 = ways.iter().map(|(way, _)| *way * Vec2::Y).sum();
             for way in ways {
                 let child = self.extend(start, masonry.end(pos, way, self.params.step_length), false);
@@ -176,7 +180,7 @@ impl CrackGrowth {
             return;
         }
         for direction in directions {
-            // Where another is too near, a little further on.
+            // If another crack is too near, try directions next to it.
             for turn in [0.0f32, 0.15, -0.15, 0.3, -0.3, 0.5, -0.5, 0.8, -0.8] {
                 let direction = direction + direction.perp() * turn;
                 let to = pos + self.params.direct(direction).normalize_or(direction) * self.params.step_length;
@@ -202,16 +206,16 @@ impl CrackGrowth {
 
     fn populate(&mut self, impact: u32, center: Vec2, inner: f32, outer: f32) {
         let extent = self.network.extent();
-        // In masonry cracks begin in a joint.
+        // In masonry the centre is in the nearest joint.
         let center = self.masonry.as_ref().and_then(|masonry| masonry.nearest(center)).unwrap_or(center);
         let region = Region { center, inner, outer, extent };
         let seed = mix(self.seed ^ mix(u64::from(impact) | 1 << 40));
-        // The rays of a hit are its own: older cracks do not sprout towards them.
+        // The rays of a hit have their own markers: older cracks do not grow towards them.
         let loyal = if self.params.keeps_apart() { impact } else { ANY_IMPACT };
         self.begin_layout(region, (impact, loyal), seed);
     }
 
-    /// A hit from which nothing could grow, so narrow is its place, leaves a short crack all the same.
+    /// Gives each hit from which nothing could grow, because the place is too narrow, a short crack.
     pub(super) fn show_hits(&mut self) {
         while let Some(start) = self.unshown.pop() {
             let born = self.network.nodes.len();
@@ -220,7 +224,7 @@ impl CrackGrowth {
             if self.network.nodes[start as usize..].iter().any(of_hit) {
                 continue;
             }
-            // It takes a step of its own.
+            // The crack gets its own step.
             self.steps = self.steps.saturating_add(1);
             self.timeline.begin(self.steps);
             let length = self.params.step_length;
@@ -234,7 +238,7 @@ impl CrackGrowth {
         }
     }
 
-    /// Whether a place lies on a crack, or as good as: at its line, or within the width of one of another impact.
+    /// Whether a place lies on a crack: near its line, or within the width of a crack of another impact.
     fn is_on_crack(&self, place: Vec2, impact: u32) -> bool {
         let Some(arrest) = self.arrest.as_ref().filter(|_| self.params.keeps_apart()) else { return false };
         arrest.walls.any_within(place, 0.3 * self.params.step_length) || self.is_in_wide_crack(place, impact)
@@ -249,14 +253,14 @@ impl CrackGrowth {
         is_in
     }
 
-    /// Joins the nodes of a rim, from `first` on, to each other.
+    /// Joins the nodes of a rim, from `first` on, to a ring.
     fn crush(&mut self, first: u32) {
         let last = self.network.nodes.len() as u32;
         let extent = self.network.extent();
         for node in first..last {
             let next = if node + 1 == last { first } else { node + 1 };
             let at = |node: u32| self.network.nodes[node as usize].pos;
-            // Not along the border, and two are joined once.
+            // No links along the border, and only one link between two nodes.
             let is_along = |border: Vec2| (at(node).cmpeq(border) & at(next).cmpeq(border)).any();
             let is_joined = next == node || (next == first && last - first == 2);
             if !(is_joined || is_along(Vec2::ZERO) || is_along(extent)) {
@@ -267,11 +271,11 @@ impl CrackGrowth {
         }
     }
 
-    /// Widens the cracks of an impact that was hit again, as if all had come at once.
+    /// Widens the cracks of an impact that was hit again, to the width of one hit with the total energy.
     fn widen(&mut self, impact: u32) {
         let Impact { energy, widening, .. } = self.impacts[impact as usize];
         let wider = self::widening(energy);
-        // In steps that can be seen, so that a thousand little hits do not repaint it all a thousand times.
+        // Only by visible amounts, so that a thousand small hits do not repaint all cracks a thousand times.
         if wider < 1.05 * widening {
             return;
         }
@@ -288,7 +292,8 @@ impl CrackGrowth {
         }
     }
 
-    /// A hit on a crack: new cracks start from it to either side; where there is no room, from the nearest place where there is.
+    /// Handles a hit on a crack: new cracks start from it to both sides, or from the nearest place where there is
+    /// room.
     fn sprout(&mut self, pos: Vec2, impact: u32) {
         let length = self.params.step_length;
         let mut near = Vec::new();
@@ -300,7 +305,7 @@ impl CrackGrowth {
             let node = nodes[index as usize];
             let beside = nodes.get(node.parent as usize).or_else(|| nodes.get(self.child_of(index) as usize));
             let across = beside.map_or(Vec2::X, |other| (node.pos - other.pos).perp().normalize_or(Vec2::X));
-            // Out of the crack, however wide it is.
+            // Far enough to leave the crack, however wide it is.
             let way_out = length.max(0.5 * (node.width + length));
             for way in [across, -across] {
                 self.extend_of(impact, index, node.pos + way * way_out, false);

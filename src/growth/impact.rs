@@ -1,25 +1,26 @@
-//! Impacts, and what becomes of hits.
+//! Impacts, and the outcome of a hit.
 
 use glam::Vec2;
 
-/// The most energy that an impact gathers.
+/// The largest energy that an impact accumulates.
 pub const MAX_ENERGY: f32 = 16.0;
 
-/// How many times wider the cracks of an impact are than those of one of energy 1.
+/// How many times wider the cracks of an impact with this energy are than those of an impact of energy 1.
 pub(super) fn widening(energy: f32) -> f32 {
     energy.sqrt().sqrt().clamp(0.25, 2.0)
 }
 
-/// One impact on a growth.
+/// One impact on a surface, with all hits that were merged into it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Impact {
-    /// Where, pattern units.
+    /// Position, pattern units.
     pub pos: Vec2,
     /// Sum of the energies of all hits merged into it, at most [`MAX_ENERGY`].
     pub energy: f32,
-    /// Energy of the first of them.
+    /// Energy of the first hit.
     pub first_energy: f32,
-    /// How many times wider its cracks are than those of an impact of energy 1: the fourth root of its energy.
+    /// How many times wider its cracks are than those of an impact of energy 1: the fourth root of its energy, within
+    /// 0.25..=2.
     pub widening: f32,
 }
 
@@ -33,26 +34,26 @@ pub enum Rejected {
     /// The energy is negative.
     #[error("the energy is negative")]
     NegativeEnergy,
-    /// It lies off the surface.
+    /// The position is outside the surface.
     #[error("it lies off the surface")]
     OffSurface,
-    /// Cracks are forbidden there.
+    /// The mask forbids cracks there.
     #[error("cracks are forbidden there")]
     Forbidden,
-    /// The surface has all the nodes it may have.
+    /// The surface already has [`max_nodes`](super::GrowthParams::max_nodes) nodes.
     #[error("the surface has all the nodes it may have")]
     Full,
 }
 
-/// What became of a hit.
+/// The outcome of a hit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HitOutcome {
-    /// It became the impact with this index.
+    /// It started a new impact with this index.
     Started(u32),
-    /// It fell on the impact with this index and added its energy to it.
+    /// It was close to the impact with this index and added its energy to it.
     Merged(u32),
-    /// Its energy is zero: nothing happens.
+    /// Its energy is zero: nothing happened.
     Nothing,
-    /// It was refused.
+    /// It was rejected; nothing changed.
     Rejected(Rejected),
 }

@@ -1,12 +1,14 @@
 //! Cracks that grow by space colonization, step by step.
 //!
-//! The method is that of Runions et al. 2005 (leaf venation), as Couto et al. turned it to cracks: *markers* are laid out
-//! around a hit; at each step every marker attracts its nearest crack node within the *crack radius*, and every node that
-//! is attracted grows a segment of length `D` in the mean direction of its markers (Couto et al., eq. 2); markers
-//! within the *kill distance* of a node die. Growth ends when no marker attracts a node any more.
+//! The method is that of Runions et al. 2005 (leaf venation), as adapted to cracks by Couto et al.: *markers* are
+//! laid out around a hit. At each step every marker attracts its nearest crack node within the *crack radius*. Every
+//! attracted node grows a segment of length `D` in the mean direction of its markers (Couto et al., eq. 2). Markers
+//! within the *kill distance* of a node are removed. Growth ends when no marker attracts a node.
 //!
-//! [`GrowthParams`] is what is asked, [`CrackGrowth`] what runs; [`CrackGrowth::step`] tells where it differs from the
-//! paper. All lengths are in pattern units: the surface's shorter side is 1.
+//! [`GrowthParams`] holds the settings, [`CrackGrowth`] the running growth. The documentation of
+//! [`CrackGrowth::step`] lists the differences from the paper. All lengths are in pattern units: the surface's
+//! shorter side is 1.
+//!
 //!
 //! ```
 //! use bevy_crack::growth::{CrackGrowth, GrowthParams, MarkerLayout};

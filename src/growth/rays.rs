@@ -65,7 +65,7 @@ impl Rays {
     }
 
     /// Takes up the plan of an impact; returns the name of its first ray.
-    pub(super) fn take_up(&mut self, plan: &Plan, impact: u32, is_over: bool) -> u32 {
+    pub(super) fn add_plan(&mut self, plan: &Plan, impact: u32, is_over: bool) -> u32 {
         if is_over {
             // What was to come of older hits does not come any more.
             self.forks.clear();

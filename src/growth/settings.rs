@@ -1,4 +1,4 @@
-//! What may be changed while a pattern grows: its parameters, and where its cracks may run.
+//! Changing a running growth: its parameters, marker density and mask.
 
 use super::{
     division::Division,
@@ -9,17 +9,19 @@ use crate::{Grid, pattern::CrackMask};
 use std::sync::Arc;
 
 impl CrackGrowth {
-    /// Where markers of later hits may be: a probability 0..=1 over the whole surface, at any resolution, sampled at the
-    /// nearest cell; `None` = everywhere. Values that are not finite count as 0.
+    /// Sets where the markers of later hits may be: a probability 0..=1 over the whole surface, at any resolution,
+    /// sampled at the nearest cell. `None` = everywhere. Values that are not finite count as 0.
     pub fn set_density(&mut self, density: Option<Grid<f32>>) {
         self.finish_layout();
         self.density = density.filter(|grid| grid.size().min_element() > 0);
     }
 
-    /// Where cracks of later hits and steps like to run, avoid to, and never go; an empty mask = everywhere alike.
+    /// Sets where the cracks of later hits and steps prefer to run, avoid to run, and never run. An empty mask treats
+    /// the whole surface alike.
     ///
-    /// Markers move to the weakest place near them, cracks steer along what is weak and around what is strong, and no line
-    /// enters a forbidden texel. A hit on one is [rejected](super::Rejected::Forbidden). What is grown stays.
+    /// Markers move to the weakest place near them, cracks steer along weak areas and around strong ones, and no line
+    /// enters a forbidden texel. A hit on a forbidden texel is [rejected](super::Rejected::Forbidden). Existing
+    /// cracks stay as they are.
     pub fn set_mask(&mut self, mask: impl Into<Arc<CrackMask>>) {
         self.finish_layout();
         self.mask = mask.into();
@@ -27,10 +29,10 @@ impl CrackGrowth {
         self.lay_bricks();
     }
 
-    /// Takes up other parameters; what is grown stays, `roughness` and `sway` included.
+    /// Replaces the parameters for later hits and steps. Existing cracks stay, and so do `roughness` and `sway`.
     ///
     /// # Errors
-    /// If a parameter is out of its range; nothing changes then.
+    /// [`ParamError::OutOfRange`] if a parameter is out of its range; nothing changes then.
     pub fn set_params(&mut self, params: GrowthParams) -> Result<(), ParamError> {
         params.validate()?;
         self.finish_layout();

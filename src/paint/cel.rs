@@ -3,29 +3,30 @@
 use super::range::{LookError, within};
 use crate::raster::{PIT_STEPS, noise as smooth_noise};
 
-/// Cracks as they are drawn in a cartoon: flat colours with hard edges, in place of the [`ramp`](super::Look::ramp).
+/// Cracks drawn as in a cartoon: flat colours with hard edges, instead of the [`ramp`](super::Look::ramp).
 ///
-/// Inside the edge runs a line of ink; where a crack is too narrow for more there is nothing else, so it ends in a needle of ink. Further inside is
-/// the fill, and on the wall that faces the light (from the upper left) a band of a lighter colour.
-/// Made for a profile with [even walls](crate::raster::Profile::even_walls).
+/// A line of ink runs along the inside of the edge. Where a crack is too narrow for more than ink it is all ink, so
+/// it ends in a point of ink. Further inside is the fill colour, and on the wall that faces the light (from the upper
+/// left) a band of a lighter colour. It is made for a profile with [even walls](crate::raster::Profile::even_walls).
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct Cel {
-    /// How far inside the edge depth 1 is: half of the profile's [`full_width`](crate::raster::Profile::full_width).
-    /// Pattern units, 0.0001..=0.5; default 0.04.
+    /// Distance from the edge at which the depth is 1: half of the profile's
+    /// [`full_width`](crate::raster::Profile::full_width). Pattern units, 0.0001..=0.5; default 0.04.
     pub wide: f32,
-    /// Width of the line of ink along the edge, pattern units, 0..=0.1; default 0.0035.
+    /// Width of the ink line along the edge, pattern units, 0..=0.1; default 0.0035.
     pub outline: f32,
-    /// How far inside the edge the lit wall ends, pattern units, 0..=0.5; default 0.012.
+    /// Distance from the edge at which the lit wall ends, pattern units, 0..=0.5; default 0.012.
     pub wall: f32,
-    /// How far the floor of a crack is moved towards the light, as a share of its half width, up to [`wall`](Self::wall): the lit wall is what the
-    /// floor leaves open, so it runs out in a point where the crack turns, and each straight side has a tone of its own. 0..=1; default 0 = a band as
-    /// wide as the wall along all that faces the light. A look with a [veil](super::Look::veil) has the band.
+    /// How far the floor of a crack is moved towards the light, as a share of its half width, up to
+    /// [`wall`](Self::wall). The lit wall is the part that the floor does not cover: it ends in a point where the
+    /// crack turns, and each straight side has one tone. 0..=1; default 0 = a band as wide as the wall along every
+    /// edge that faces the light. A look with a [veil](super::Look::veil) always has the band.
     pub slant: f32,
-    /// Colour of the line, sRGB 0..=1; default a warm black.
+    /// Colour of the ink line, sRGB 0..=1; default a warm black.
     pub ink: [f32; 3],
-    /// Colour inside, sRGB 0..=1; default a dark brown.
+    /// Colour of the inside, sRGB 0..=1; default a dark brown.
     pub fill: [f32; 3],
     /// Colour of the lit wall, sRGB 0..=1; default a lighter brown.
     pub lit: [f32; 3],
@@ -43,7 +44,7 @@ impl Cel {
         lit: [0.46, 0.31, 0.24],
     };
 
-    /// The same seen from nearer or further away.
+    /// The same drawing at another scale: every length times `by`.
     pub(crate) fn scaled(&self, by: f32) -> Self {
         let scaled = |length: f32, low: f32, high: f32| (length * by).clamp(low, high);
         Self {
@@ -74,28 +75,28 @@ impl Default for Cel {
     }
 }
 
-/// A [`Cel`] in texels, colours 0..=255.
+/// A [`Cel`] with lengths in texels and colours in 0..=255.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Strokes {
-    /// Texels inside the edge, a step of depth.
+    /// Distance from the edge for one step of depth, texels.
     step: f32,
     outline: f32,
     wall: f32,
-    /// Whether what is lit is what the floor leaves open.
+    /// Whether the lit wall is the part that the floor does not cover.
     pub(super) has_floor: bool,
-    /// Bumps of its outline, a texel.
+    /// Bumps of the outline per texel.
     wobble: f32,
     ink: [f32; 3],
     fill: [f32; 3],
     lit: [f32; 3],
 }
 
-/// Bumps of the width of an outline, a pattern unit, and how much it varies.
+/// Bumps of an outline's width per pattern unit, and how much the width varies.
 const WOBBLES: f32 = 13.0;
 
 const WOBBLE: f32 = 0.35;
 
-/// A wall is lit that faces the light by more than this (a cosine).
+/// A wall is lit if the cosine of its angle to the light is above this.
 const LIT: f32 = 0.2;
 
 impl Strokes {
@@ -113,11 +114,11 @@ impl Strokes {
         }
     }
 
-    /// What lies over the picture at a depth where the surface leans this way: three colours times cover, and cover.
+    /// The colour over the picture at a depth and slope: three channels times cover, and the cover.
     #[inline(always)]
     pub(super) fn layer(&self, depth: u16, [x, y]: [f32; 2]) -> [f32; 4] {
         let share = |value: f32| value.clamp(0.0, 1.0);
-        // All edges are one texel soft.
+        // All edges are one texel wide.
         let inside = f32::from(depth) * self.step;
         let cover = share(inside);
         let open = share(inside - self.outline);
@@ -133,7 +134,7 @@ impl Strokes {
 }
 
 impl Strokes {
-    /// The same at a place with a floor, which covers so much of it, and a pit.
+    /// Like [`layer`](Self::layer), at a texel with a floor of the given cover and a pit.
     #[inline(always)]
     pub(super) fn layer_over(&self, depth: u16, [x, y]: [f32; 2], floor: u8, pit: [u8; 3], at: [f32; 2]) -> [f32; 4] {
         let share = |value: f32| value.clamp(0.0, 1.0);
@@ -146,7 +147,7 @@ impl Strokes {
         let facing = if steep > 1.0e-6 { -std::f32::consts::FRAC_1_SQRT_2 * (x + y) / steep } else { 0.0 };
         let facing = if hollow > crack { f32::from(pit[2]) * (2.0 / 255.0) - 1.0 } else { facing };
         let floor = f32::from(floor.max(pit[1])) * (1.0 / 255.0);
-        // Flat tones: one for each straight side.
+        // Flat tones: one per straight side.
         let least = if hollow > crack { 0.15 } else { 0.0 };
         let lit = (0.22 + 0.9 * facing).clamp(least, 1.0) * (1.0 - floor);
         let color = |c: usize| {

@@ -1,4 +1,4 @@
-//! What depths and slopes make of the colours of a picture, block by block.
+//! Colours of the painted picture from depths and slopes, block by block.
 
 use super::{
     LookTable,
@@ -9,12 +9,12 @@ use super::{
 use crate::raster::{TexelRect, noise as smooth_noise};
 use glam::{Mat4, UVec2};
 
-/// How much brighter a wall gets at the most that faces the light squarely: a highlight of the crack's own for a gloss of 1, sRGB
-/// levels, and a share of what is there. Found by eye on glass (the first) and concrete (the second).
+/// Largest brightening of a wall that faces the light: the highlight for a gloss of 1, in sRGB levels, and a share of
+/// the colour below. Found by eye on glass (the first) and concrete (the second).
 const HIGHLIGHT: f32 = 110.0;
 const SHADING: f32 = 0.75;
 
-/// How much of the picture is seen in a hole.
+/// How much of the picture is visible in a hole.
 const HOLE: f32 = 0.10;
 
 /// The part of the base picture that belongs to the field.
@@ -26,7 +26,7 @@ pub(super) struct Frame<'a> {
 }
 
 impl Frame<'_> {
-    /// Where texel `(x, y)` of the field lies in the slices.
+    /// Index of texel `(x, y)` of the field in the slices.
     #[inline(always)]
     pub(super) fn index(&self, x: u32, y: u32) -> usize {
         (self.origin.y + y) as usize * self.stride + (self.origin.x + x) as usize
@@ -37,7 +37,7 @@ impl Frame<'_> {
         self.base[self.index(x, y)]
     }
 
-    /// The texel so many columns and rows away, or the nearest one.
+    /// The texel at this offset in columns and rows, or the nearest one.
     #[inline(always)]
     fn moved(&self, at: UVec2, [x, y]: [i32; 2]) -> Rgba {
         let place = |at: u32, by: i32, size: u32| at.saturating_add_signed(by).min(size - 1);
@@ -45,7 +45,7 @@ impl Frame<'_> {
     }
 
     /// The colour at texel `at` + `offset`, bilinear, weighted by alpha so that the hidden colour of transparent
-    /// texels does not show; `None` where all is transparent.
+    /// texels does not show; `None` where everything is transparent.
     #[inline(always)]
     fn shifted(&self, at: UVec2, offset: [f32; 2]) -> Option<[f32; 3]> {
         let place = |at: u32, offset: f32, size: u32| {
@@ -73,7 +73,8 @@ impl Frame<'_> {
     }
 }
 
-/// 0..1, different for every texel: for those from `(x, y)` on. One operation after the other on all of them: so they are vectors.
+/// A random value 0..1 for each texel from `(x, y)` on. Each operation is applied to all texels before the next one,
+/// so that the loops are vectorized.
 #[inline(always)]
 fn noise(x: u32, y: u32) -> [f32; BLOCK] {
     const X: u32 = 0x9E37_79B1;
@@ -89,16 +90,17 @@ fn noise(x: u32, y: u32) -> [f32; BLOCK] {
         *h = (*h ^ (*h >> 12)).wrapping_mul(0x297A_2D39);
     }
     for i in 0..BLOCK {
-        // Through i32, for which the conversion is one instruction on every machine.
+        // Through i32, because its conversion is one instruction on every machine.
         out[i] = ((hash[i] ^ (hash[i] >> 15)) >> 8) as i32 as f32 * (1.0 / 16_777_216.0);
     }
     out
 }
 
-/// Colours of a patch that lies at `rect` of the field.
+/// Paints the colours of a patch that lies at `rect` of the field.
 ///
-/// First all are those of the picture, and blocks that are touched go on a list; then those are painted. To find and paint them
-/// one by one takes longer: a processor that guesses wrong which one is touched cannot begin it while it is at the one before.
+/// First all texels are copied from the picture and touched blocks are put on a list; then those are painted. Finding
+/// and painting them one by one takes longer, because mispredicted branches keep the processor from starting the next
+/// block early.
 #[inline(always)]
 pub(super) fn diffuse_patch<const ROOM: usize, const RICH: bool>(
     out: &mut [Rgba],
@@ -118,9 +120,9 @@ pub(super) fn diffuse_patch<const ROOM: usize, const RICH: bool>(
         let first = frame.index(rect.min.x, y);
         let (out, base) = (&mut out[first..first + width], &frame.base[first..first + width]);
         for from in (0..width).step_by(BLOCK) {
-            // The last one begins early enough to be whole: texels that are painted twice are the same twice.
+            // The last block starts early enough to be whole: texels that are painted twice get the same value twice.
             let from = from.min(width - BLOCK);
-            // A copy of fixed length is a few moves in place of a call.
+            // A copy of fixed length compiles to a few moves instead of a call.
             if let (Some(out), Some(base)) = (out[from..].first_chunk_mut::<BLOCK>(), base[from..].first_chunk()) {
                 *out = *base;
             }
@@ -139,7 +141,7 @@ pub(super) fn diffuse_patch<const ROOM: usize, const RICH: bool>(
     }
 }
 
-/// The same of one that is narrower than a block.
+/// Like [`diffuse_patch`] for a patch that is narrower than a block.
 #[inline(always)]
 fn narrow_patch<const ROOM: usize, const RICH: bool>(
     out: &mut [Rgba],
@@ -164,7 +166,7 @@ fn narrow_patch<const ROOM: usize, const RICH: bool>(
     }
 }
 
-/// What the colours of a block are made of. What lies beyond the end of a row is of no use.
+/// The inputs of the colours of a block. Values beyond the end of a row are not used.
 struct Block<'a> {
     base: [u32; BLOCK],
     depth: &'a [u16; BLOCK],
@@ -174,7 +176,7 @@ struct Block<'a> {
 }
 
 impl<'a> Block<'a> {
-    /// The block at `place` of a patch, if that is so long.
+    /// The block at `place` of a patch; `None` if the patch ends before it.
     #[inline(always)]
     fn load<const ROOM: usize>(base: &[Rgba], patch: &'a Patch<ROOM>, place: usize) -> Option<Self> {
         let mut bytes = [[0; 4]; BLOCK];
@@ -239,7 +241,8 @@ impl Block<'_> {
         for i in 0..BLOCK {
             let cover = over[3][i];
             if OPAQUE {
-                // An opaque crack lies over the picture as another pane would; else it is as translucent as the picture.
+                // An opaque crack adds its cover to the alpha, like a second pane; else the alpha is that of the
+                // picture.
                 let alpha = channel(self.base[i], 3) * (1.0 / 255.0);
                 let pane = 1.0 - (1.0 - alpha);
                 let pane_out = pane * (1.0 - cover) + cover;
@@ -250,7 +253,7 @@ impl Block<'_> {
                 under_share[i] = 1.0 - cover;
                 painted[i] = self.base[i] & 0xFF00_0000;
             }
-            // Light from the upper left, on a normal whose y runs down. Steep walls are not much brighter than others.
+            // Light from the upper left, on a normal whose y points down. The response flattens out on steep walls.
             let light = (self.x[i] + self.y[i]) * self.inv_len[i] * (-std::f32::consts::FRAC_1_SQRT_2 * look.glint);
             facing[i] = light / (1.0 + light.abs());
             // Nothing is lit in a hole.
@@ -279,7 +282,8 @@ impl Block<'_> {
         painted
     }
 
-    /// What lies over the picture: three colours times cover, and cover. Texel by texel, the four of each at once, then turned.
+    /// The colours over the picture: three channels times cover, and cover. They are computed texel by texel, four
+    /// values at once, and then transposed.
     #[inline(always)]
     fn over<const ROOM: usize, const RICH: bool>(
         &self,
@@ -342,7 +346,7 @@ impl Block<'_> {
         over
     }
 
-    /// The colours of the picture, shifted where the surface is tilted.
+    /// The colours of the picture, displaced where the surface is tilted.
     #[inline(always)]
     fn picture(&self, frame: &Frame<'_>, look: &LookTable, at: UVec2) -> [[f32; BLOCK]; 3] {
         let mut under = [[0.0; BLOCK]; 3];
@@ -367,7 +371,7 @@ impl Block<'_> {
         under
     }
 
-    /// Shows each plate's own part of the picture in its own tone; returns the cover of its sheen.
+    /// Displaces the picture behind each plate and applies the plate's tone; returns the cover of its reflection.
     #[inline(always)]
     fn plates<const ROOM: usize>(
         &self,
@@ -385,7 +389,7 @@ impl Block<'_> {
             }
             let facet = extras.facet(id);
             let x = at.x + i as u32;
-            // Where cracks bend the picture as well, they have the last word.
+            // Where cracks displace the picture too, their displacement is used.
             if facet.shift != [0; 2] && self.x[i] == 0.0 && self.y[i] == 0.0 {
                 let moved = frame.moved(UVec2::new(x, at.y), facet.shift);
                 if moved[3] == (self.base[i] >> 24) as u8 {
@@ -400,7 +404,7 @@ impl Block<'_> {
     }
 }
 
-/// Lays the sheen of plates and what is crushed under the cracks, and holes over them; returns how dark those are.
+/// Puts reflections and crushed material under the cracks, and holes over them; returns how dark the holes are.
 #[inline(always)]
 fn compose<const ROOM: usize>(
     (extras, place, at): (&Extras<'_, ROOM>, usize, UVec2),
@@ -415,16 +419,17 @@ fn compose<const ROOM: usize>(
         let pale = f32::from(spot.pale) * (1.0 / 255.0);
         let mut dark = f32::from(spot.dark) * (1.0 / 255.0);
         if extras.are_gone {
-            // Small plates are gone as a whole, or not at all.
+            // Small plates are missing or present as a whole.
             match extras.facet(extras.plate(place + i)).is_gone {
-                // What is larger than the hole stands.
+                // Plates larger than the hole stay.
                 None if look.thick > 0.0 && extras.plate(place + i) != 0 => dark = 0.0,
                 None => {}
                 Some(is_gone) => {
                     dark = if is_gone { 1.0 } else { 0.0 };
                     if is_gone && look.thick > 0.0 {
                         let side = extras.side(at.x + i as u32, at.y, look.thick);
-                        // The line at its edge stays, and what is seen of the sides of those beside it.
+                        // The line at the edge of the hole stays, and so do the visible sides of the plates beside
+                        // it.
                         dark -= side.line * over[3][i].clamp(0.0, 1.0);
                         for c in 0..3 {
                             let face = HOLE * under[c][i] * (1.0 - side.face) + look.side[c] * side.face * side.tone;
@@ -437,7 +442,7 @@ fn compose<const ROOM: usize>(
                 }
             }
         }
-        // Shadows lie under the cracks, a hole has none.
+        // Shadows lie under the cracks; a hole has no shadow.
         let (shade, hole) = if extras.shades { (dark, 0.0) } else { (0.0, dark) };
         let tone = 1.0 + f32::from(spot.shade) * (1.0 / 128.0);
         let veil = f32::from(extras.veil(place + i)) * look.veil_cover;
@@ -464,7 +469,7 @@ fn compose<const ROOM: usize>(
             }
             over[c][i] = crack * (1.0 - hole) + void * hole;
         }
-        // What lies over or under a crack covers as much.
+        // The total cover of all layers.
         let cover = over[3][i] + left * (1.0 - (1.0 - sheen) * (1.0 - veil) * (1.0 - pale) * (1.0 - shade));
         over[3][i] = cover * (1.0 - hole) + hole;
         holes[i] = hole;

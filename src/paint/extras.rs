@@ -1,4 +1,4 @@
-//! What a field holds beside depths, in a patch.
+//! The layers of a field other than depth, in a patch.
 
 use super::{Facets, LookTable, patch::Patch, rows::round};
 use crate::{
@@ -8,33 +8,33 @@ use crate::{
 use glam::Vec2;
 use std::cell::Cell;
 
-/// Plates and crushed zones of a patch; places as in [`Patch`].
+/// Plates and crushed zones of a patch; indices as in [`Patch`].
 pub(super) struct Extras<'a, const ROOM: usize> {
     facets: Option<&'a Facets>,
     ids: Option<&'a Grid<u16>>,
     plates: &'a [Plate],
     crushed: Option<&'a CrushedField>,
-    /// Whether plates are gone in holes.
+    /// Whether plates are missing in holes.
     pub(super) are_gone: bool,
-    /// Colour of what is crushed, 0..=255, by its share.
+    /// Colour of crushed material, 0..=255, weighted by its share.
     pub(super) color: [f32; 3],
-    /// Share that the picture's own has in it.
+    /// Share of the picture's colour in it.
     pub(super) tint: f32,
-    /// Whether what is dark in it is a shadow, not a hole.
+    /// Whether dark texels are shadows instead of holes.
     pub(super) shades: bool,
-    /// How much of cracks is gone where it has come off.
+    /// How much of the cracks is hidden where material has broken off.
     bare: f32,
-    /// Whether it is drawn, chips over cracks.
+    /// Whether the zone is drawn, with chips over the cracks.
     pub(super) is_drawn: bool,
-    /// Whether what is pale in a hole is its wall.
+    /// Whether pale texels in a hole are its wall.
     pub(super) has_walls: bool,
-    /// What a step of its depth is in the depth map.
+    /// One step of the zone's depth, in units of the depth map.
     deep: f32,
     veils: Option<&'a Grid<u8>>,
     room: Box<Room<ROOM>>,
-    /// The plate that was looked at last: most texels beside it are its own.
+    /// The plate that was looked up last: most neighbouring texels belong to the same plate.
     last: Cell<(u16, Facet)>,
-    /// Width of a row of the patch with the texels around.
+    /// Width of a row of the patch, with one texel more on either side.
     stride: usize,
     height: usize,
     min: Vec2,
@@ -47,7 +47,7 @@ struct Room<const ROOM: usize> {
 }
 
 impl<'a, const ROOM: usize> Extras<'a, ROOM> {
-    /// `None` if there is nothing that the look shows.
+    /// The layers that the look shows; `None` if there are none.
     pub(super) fn of(field: &'a DepthField, look: &'a LookTable) -> Option<Self> {
         let layer = field.layer();
         let plates = layer.plates().filter(|_| look.facets.is_some());
@@ -76,7 +76,7 @@ impl<'a, const ROOM: usize> Extras<'a, ROOM> {
         })
     }
 
-    /// Whether anything is in a rectangle.
+    /// Whether there is anything to paint in a rectangle.
     pub(super) fn touches(&self, rect: TexelRect) -> bool {
         let columns = rect.min.x as usize..rect.max.x as usize;
         let rows = || rect.min.y as usize..rect.max.y as usize;
@@ -85,7 +85,7 @@ impl<'a, const ROOM: usize> Extras<'a, ROOM> {
             || self.veils.is_some_and(|veils| rows().any(|y| veils.row(y)[columns.clone()].iter().any(|&v| v != 0)))
     }
 
-    /// Reads what is there.
+    /// Reads the layers of a rectangle.
     #[inline(always)]
     pub(super) fn load(&mut self, rect: TexelRect) {
         let size = rect.size().as_usizevec2();
@@ -108,7 +108,7 @@ impl<'a, const ROOM: usize> Extras<'a, ROOM> {
         }
     }
 
-    /// Marks in the patch what is touched, and adds the slopes of what is crushed.
+    /// Marks touched texels in the patch, and adds the slopes of crushed material.
     #[inline(always)]
     pub(super) fn mark(&self, patch: &mut Patch<ROOM>) {
         let n = patch.len();
@@ -147,7 +147,7 @@ impl<'a, const ROOM: usize> Extras<'a, ROOM> {
         }
     }
 
-    /// How a plate looks.
+    /// The appearance of a plate.
     #[inline(always)]
     pub(super) fn facet(&self, id: u16) -> Facet {
         let (last, facet) = self.last.get();
@@ -168,7 +168,7 @@ impl<'a, const ROOM: usize> Extras<'a, ROOM> {
         facet
     }
 
-    /// What is seen of the sides of plates from a texel whose own is gone.
+    /// The visible sides of neighbouring plates at a texel whose own plate is missing.
     pub(super) fn side(&self, x: u32, y: u32, thick: f32) -> Side {
         let mut side = Side { line: 0.0, face: 0.0, tone: 1.0 };
         let Some(ids) = self.ids else { return side };
@@ -182,10 +182,10 @@ impl<'a, const ROOM: usize> Extras<'a, ROOM> {
             let facet = self.facet(id);
             (facet.is_gone != Some(true)).then_some(facet.tone)
         };
-        // Lines at the edge of the hole, not those that were in it.
+        // Lines at the edge of the hole, not those inside it.
         let near = [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0), (2.0, 0.0), (-2.0, 0.0), (0.0, 2.0), (0.0, -2.0)];
         side.line = if near.iter().any(|&(x, y)| stands(Vec2::new(x, y)).is_some()) { 1.0 } else { 0.0 };
-        // The side that faces the light is seen at the lower right, the others less of.
+        // The side that faces the light is visible at the lower right; less of the others is visible.
         for (way, reach, bright) in [
             (Vec2::new(0.6, 0.8), 1.0, 1.0),
             (Vec2::new(0.9, 0.45), 0.85, 0.85),
@@ -223,7 +223,7 @@ impl<'a, const ROOM: usize> Extras<'a, ROOM> {
         self.room.veil[place]
     }
 
-    /// Lays the depth of what is crushed over a row of the depth map: the deeper of both.
+    /// Adds the depth of crushed material to a row of the depth map: the deeper value of both.
     #[inline(always)]
     pub(super) fn deepen(&self, out: &mut [u8], row: usize) {
         if self.crushed.is_none() || self.deep == 0.0 {
@@ -235,13 +235,13 @@ impl<'a, const ROOM: usize> Extras<'a, ROOM> {
         }
     }
 
-    /// Whether cracks are less where something has come off.
+    /// Whether cracks are fainter where material has broken off.
     #[inline(always)]
     pub(super) const fn is_bare(&self) -> bool {
         self.bare > 0.0
     }
 
-    /// Share of a crack that is left on the floor of what has come off.
+    /// Share of a crack that is visible on the floor where material has broken off.
     #[inline(always)]
     pub(super) fn left(&self, place: usize) -> f32 {
         let deep = (f32::from(self.room.spot[place].deep) * (1.0 / 64.0)).min(1.0);
@@ -254,30 +254,31 @@ impl<'a, const ROOM: usize> Extras<'a, ROOM> {
     }
 }
 
-/// What is seen of the sides of plates in a hole.
+/// The visible sides of plates in a hole.
 pub(super) struct Side {
-    /// How much of cracks is seen: those at the edge of the hole.
+    /// How visible cracks are: those at the edge of the hole.
     pub(super) line: f32,
-    /// How bright the side is, and the tone of the plate that it belongs to.
+    /// Brightness of the side, and the tone of its plate.
     pub(super) face: f32,
     pub(super) tone: f32,
 }
 
-/// A plate as it looks.
+/// The appearance of a plate.
 #[derive(Clone, Copy)]
 pub(super) struct Facet {
-    /// What the picture is multiplied by in its middle.
+    /// Factor for the picture in the middle of the plate.
     tone: f32,
-    /// How much it is dished, its middle, and one over the side of a square of its size.
+    /// Strength of the dish, its centre, and the inverse of the side of a square of the same area.
     dish: f32,
     centre: Vec2,
     inv_side: f32,
-    /// Whether it is gone in a hole, or whole beside one.
+    /// Whether it is missing in a hole (`true`) or whole beside one (`false`).
     pub(super) is_gone: Option<bool>,
-    /// Where it is taken from, texels away.
+    /// Offset of the picture that it shows, texels.
     pub(super) shift: [i32; 2],
     pub(super) tilt: [f32; 2],
-    /// Cover of the sheen at the centre of the field, and what it gains a texel to the right and down, before it is cut to `low..=high`.
+    /// Cover of the reflection at the centre of the field, and its increase per texel to the right and down, before
+    /// it is clamped to `low..=high`.
     sheen: f32,
     gain: Vec2,
     low: f32,
@@ -299,13 +300,14 @@ impl Facet {
         high: 0.0,
     };
 
-    /// The way from its middle to a place, at most 1 about.
+    /// Offset of a texel from the middle of the plate, about 1 at its rim.
     #[inline(always)]
     fn off_middle(&self, at: Vec2) -> Vec2 {
         ((at - self.centre) * (2.0 * self.inv_side)).clamp(Vec2::NEG_ONE, Vec2::ONE)
     }
 
-    /// What the picture is multiplied by at a texel: a dish is brighter where it faces the light from the upper left, and at its rim.
+    /// Factor for the picture at a texel: a dish is brighter where it faces the light from the upper left, and at its
+    /// rim.
     #[inline(always)]
     pub(super) fn tone(&self, x: u32, y: u32) -> f32 {
         if self.dish <= 0.0 {
@@ -315,7 +317,7 @@ impl Facet {
         self.tone + self.dish * (0.5 * (way.x + way.y) + 0.5 * way.length_squared() - 0.25)
     }
 
-    /// Cover of the sheen at a texel.
+    /// Cover of the reflection at a texel.
     #[inline(always)]
     pub(super) fn sheen(&self, x: u32, y: u32) -> f32 {
         let sheen = self.sheen + x as f32 * self.gain.x + y as f32 * self.gain.y;
@@ -330,7 +332,7 @@ impl Facet {
 }
 
 impl Facets {
-    /// How a plate looks.
+    /// The appearance of a plate.
     pub(super) fn of(&self, plate: &Plate) -> Facet {
         let [a, b, c, d, e, f] = plate.draws;
         let [together, right, down] = plate.common.map(|common| self.bundle * common);
@@ -340,9 +342,9 @@ impl Facets {
         let weight = (1.0 - self.near + self.near * plate.near) * (share * share * (3.0 - 2.0 * share));
         let lean = Vec2::new(b, c);
         let shift = (self.shift * weight * lean).round().as_ivec2().to_array();
-        // A few flash; of the others those that lean to the light shine a little.
+        // A few plates flash. Of the others, those that lean towards the light shine a little.
         let strength = if d > 1.0 - 2.0 * self.flash { 0.45 + 0.55 * e.abs() } else { 0.25 * f.max(0.0) };
-        // In patches: the nearer to their middle the brighter, each a little different.
+        // In patches: brighter towards the middle of a patch, with small random differences.
         let glow = (1.15 * plate.common[0] + 0.34 * d + 0.35 * plate.common[2]).clamp(0.0, 1.0);
         let strength = strength + self.sweep * (glow * (0.55 + 0.45 * e.abs()) - strength);
         let high = self.gleam * strength * weight.sqrt();

@@ -1,41 +1,47 @@
-//! How plates differ from each other: [`Facets`].
+//! How plates differ in tone, tilt and reflection: [`Facets`].
 
-/// Closed cells as plates of their own: each a little darker or brighter, tilted, and reflecting in its own way.
+/// Closed cells as separate plates: each is a little darker or brighter, is tilted, and has its own reflection.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct Facets {
-    /// How much darker or brighter plates are, at the most, as a share of the picture. 0..=1; default 0.1.
+    /// Largest difference in brightness between a plate and the picture, as a share of the picture. 0..=1; default
+    /// 0.1.
     pub tone: f32,
-    /// Slope of the most tilted plates, in the normal map. 0..=1; default 0.1.
+    /// Slope of the most tilted plates in the normal map. 0..=1; default 0.1.
     pub tilt: f32,
-    /// How far the picture behind a plate is moved, texels at the most. 0..=16; default 0.
+    /// Displacement of the picture behind a plate, texels at the most. 0..=16; default 0.
     pub shift: f32,
-    /// How much the brightest plates reflect: cover of [`sheen`](Self::sheen), which falls off across each. 0..=1; default 0.
+    /// Cover of the reflection ([`sheen`](Self::sheen)) on the brightest plates; it falls off across each plate.
+    /// 0..=1; default 0.
     pub gleam: f32,
-    /// Share of plates that flash; the others reflect a quarter of it at the most. 0..=1; default 0.1.
+    /// Share of plates with a strong reflection; the others reflect at most a quarter of [`gleam`](Self::gleam).
+    /// 0..=1; default 0.1.
     pub flash: f32,
-    /// Colour of what plates reflect, sRGB 0..=1; default that of a bright sky.
+    /// Colour of reflections, sRGB 0..=1; default the colour of a bright sky.
     pub sheen: [f32; 3],
-    /// How much all of that is for plates near the hit: 0 = everywhere the same, 1 = next to nothing far away. Default 0.
+    /// How much tone, tilt, shift and reflections fall off with the distance from the hit: 0 = the same everywhere, 1
+    /// = next to nothing far away. Default 0.
     pub near: f32,
-    /// How much plates are dished, with rims that curl up: darker by up to this share on the side of the light, and brighter on the other.
-    /// 0..=1; default 0.
+    /// How much plates are dished, with rims that curl up: they are darker by up to this share on the side towards
+    /// the light, and brighter on the other. 0..=1; default 0.
     pub dish: f32,
-    /// How far from a hit of energy 1 plates fade out, so that what it has loaded ends nowhere; with the root of the energy. Pattern units, 0..=16;
-    /// default 0 = they do not.
+    /// Distance from a hit of energy 1 at which plates fade out, so that the loaded area has no visible edge. It is
+    /// proportional to the root of the energy. Pattern units, 0..=16; default 0 = plates do not fade out.
     pub fade: f32,
-    /// How much neighbours have in common, so that tones and tilts come in bundles: 0 = nothing, 1 = all. 0..=1; default 0.
-    pub bundle: f32,
-    /// Whether plates smaller than the hole of a [crushed](super::Look::crushed) zone are gone as a whole if their middle lies in it, and else not at
-    /// all; default no.
-    pub gone: bool,
-    /// How much of what they [reflect](Self::gleam) comes in broad patches of neighbours, the brightest in the middle, in place of here and there.
+    /// How similar neighbouring plates are, so that tones and tilts come in groups: 0 = independent, 1 = the same.
     /// 0..=1; default 0.
+    pub bundle: f32,
+    /// Whether a plate smaller than the hole of a [crushed](super::Look::crushed) zone is missing as a whole if its
+    /// middle lies in the hole, and whole if not; default no.
+    pub gone: bool,
+    /// How much of the [reflections](Self::gleam) comes in broad patches of neighbouring plates, the brightest in the
+    /// middle, instead of on single plates. 0..=1; default 0.
     pub sweep: f32,
-    /// How thick plates are whose neighbours are [gone](Self::gone): their broken sides are seen in the hole. Pattern units, 0..=0.02; default 0.
+    /// Thickness of plates beside [missing](Self::gone) ones: their broken sides are visible in the hole. Pattern
+    /// units, 0..=0.02; default 0.
     pub thick: f32,
-    /// Colour of those sides, sRGB 0..=1; default that of the edge of a pane.
+    /// Colour of the broken sides, sRGB 0..=1; default the colour of the edge of a glass pane.
     pub side: [f32; 3],
 }
 

@@ -1,4 +1,4 @@
-//! The light that cracks give off.
+//! The light that cracks emit.
 
 use super::{
     LookTable,
@@ -7,10 +7,11 @@ use super::{
 use crate::raster::{DepthField, TexelRect};
 use glam::UVec2;
 
-/// Writes the light that cracks give off to the texels `rects` of an emissive map of `size` texels (RGBA8, sRGB, row-major): what `base` has
-/// there (nothing without one), and the light of the look's [`glow`](super::Look::glow) added to it.
+/// Paints an emissive map: the texels `rects` get the value of `base` (black without one) plus the light of the
+/// look's [`glow`](super::Look::glow). The map has `size` texels (RGBA8, sRGB, row-major).
 ///
-/// Rectangles and `origin` as in [`paint_rects`](super::paint_rects). Slices shorter than `size` says are left alone.
+/// `rects` and `origin` are those of [`paint_rects`](super::paint_rects). Slices that are shorter than `size`
+/// requires are left unchanged.
 pub fn paint_glow(
     base: Option<&[u8]>,
     size: UVec2,

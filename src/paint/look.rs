@@ -1,4 +1,4 @@
-//! [`Look`]: what a crack does to the picture, as data.
+//! [`Look`]: how cracks change the picture, as data.
 
 use super::{
     cel::Cel,
@@ -13,61 +13,78 @@ use std::borrow::Cow;
 #[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct ColorStop {
-    /// Depth at which it holds, 0..=1.
+    /// Depth of the crack at this stop, 0..=1.
     pub depth: f32,
     /// Colour, sRGB 0..=1.
     pub color: [f32; 3],
-    /// How much it covers the picture, 0..=1.
+    /// How much the colour covers the picture, 0..=1.
     pub cover: f32,
 }
 
-/// What a crack does to the picture.
+/// How cracks change the picture.
+///
+/// ```
+/// use bevy_crack::paint::Look;
+///
+/// let shiny = Look { glint: 2.0, ..Look::GROOVE };
+/// assert_eq!(shiny.validate(), Ok(()));
+/// assert_eq!(Look::named("groove"), Some(Look::GROOVE));
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct Look {
-    /// Colour over depth, in order of depth, at most 16 stops; linear between, nothing at depth 0.
+    /// Colour of a crack by its depth: at most 16 stops, sorted by depth, linear between them, nothing at depth 0.
     ///
-    /// Below the first stop its cover falls to zero; beyond the last one nothing changes.
+    /// Below the first stop its cover falls to zero. Beyond the last stop colour and cover stay the same.
     pub ramp: Cow<'static, [ColorStop]>,
-    /// How far colours of the ramp are shares of the picture's own: 0 = they are what they say, 1 = each is multiplied by the picture.
-    /// Default 1: a crack in brown clay is brown.
+    /// How far the colours of the ramp are multiplied by the picture: 0 = the colours are used as they are, 1 = each
+    /// is multiplied by the picture's colour. Default 1: a crack in brown clay is brown.
     pub tint: f32,
-    /// How much walls that face the light (from the upper left) brighten and the others darken, by their slope. 0..=4.
+    /// How much walls that face the light (from the upper left) brighten and walls that face away darken, by their
+    /// slope. 0..=4.
     pub glint: f32,
-    /// How much of that is a highlight of the crack's own, not a share of the colour that is there (glass). 0..=4; default 0.
+    /// How much of the light on walls is an added highlight instead of a share of the colour below it (glass). 0..=4;
+    /// default 0.
     pub gloss: f32,
-    /// How much the cover swells and fades along the way (glass, ice): up to this share of it is taken away. 0..=1; default 0.
+    /// How much the cover varies along a crack (glass, ice): up to this share of it is removed. 0..=1; default 0.
     pub sparkle: f32,
-    /// How much less is seen of cracks that do not catch the light, by the direction in which they run and slowly along each (glass): up to this
-    /// share of their depth is left out. 0..=1; default 0.
+    /// How much fainter cracks are that do not catch the light, depending on their direction and slowly varying along
+    /// each crack (glass): up to this share of their depth is removed. 0..=1; default 0.
     pub catch: f32,
-    /// How uneven the cover is from texel to texel (frosted glass): up to this share of it is taken away. 0..=1.
+    /// How much the cover varies from texel to texel (frosted glass): up to this share of it is removed. 0..=1.
     pub grain: f32,
-    /// Shift of the picture where the surface is tilted by the crack (refraction), texels at the steepest. 0..=16.
+    /// Displacement of the picture where the crack tilts the surface (refraction), texels at the steepest slope.
+    /// 0..=16.
     pub shift: f32,
     /// Height of the walls: depth 1 is this many pattern units deep. 0..=1.
     ///
-    /// Makes the slopes of the normal map, and those that [`glint`](Self::glint) and [`shift`](Self::shift) go by.
+    /// It sets the slopes of the normal map, and the slopes that [`glint`](Self::glint) and [`shift`](Self::shift)
+    /// use.
     pub relief: f32,
-    /// How far the rims of cracks curl up, as a share of [`relief`](Self::relief): the surface is highest at depth
-    /// [`curl_depth`](Self::curl_depth), and level with its surroundings at depth 0 and at twice that depth. 0..=1; default 0.
+    /// How far the rims of cracks curl up, as a share of [`relief`](Self::relief). The surface is highest at depth
+    /// [`curl_depth`](Self::curl_depth), and level with its surroundings at depth 0 and at twice that depth. 0..=1;
+    /// default 0.
     pub curl: f32,
-    /// See [`curl`](Self::curl); the profile's [`rim_depth`](crate::raster::Profile::rim_depth) as a rule. 0.001..=0.5; default 0.12.
+    /// Depth at which a curled rim is highest, see [`curl`](Self::curl); usually the profile's
+    /// [`rim_depth`](crate::raster::Profile::rim_depth). 0.001..=0.5; default 0.12.
     pub curl_depth: f32,
-    /// Cracks drawn with flat colours; default none, the ramp holds.
+    /// Draws cracks with flat colours instead of the ramp; default none.
     pub cel: Option<Cel>,
-    /// Width of a crack from which on its rim is whole, pattern units; narrower ones have less of one. 0..=1; default 0 = all alike.
+    /// Width from which a crack has its whole rim, pattern units; narrower cracks have a fainter rim. 0..=1; default
+    /// 0 = all cracks have the same rim.
     pub full_rim: f32,
-    /// Closed cells as plates of their own; default none.
+    /// Draws closed cells as separate plates; default none.
     pub facets: Option<Facets>,
-    /// What a hit crushes around it; default nothing.
+    /// The crushed zone around a hit; default none.
     pub crushed: Option<Crushed>,
-    /// Translucent sheets along cracks, to one side; default none.
+    /// Translucent sheets to one side of cracks; default none.
     pub veil: Option<Veil>,
-    /// Light that cracks give off, over depth, as [`ramp`](Self::ramp): what is written to the emissive map. Default nothing.
+    /// Light that cracks emit by their depth, in the format of [`ramp`](Self::ramp). It is written to the emissive
+    /// map. Default nothing.
     pub glow: Cow<'static, [ColorStop]>,
-    /// Whether cracks make a translucent picture opaque by their cover (glass panes). Fully transparent texels stay so.
+    /// Whether the cover of cracks makes a translucent picture opaque (glass panes). Fully transparent texels stay
+    /// transparent.
     pub opaque: bool,
 }
 
@@ -91,7 +108,7 @@ impl Look {
         "glowing",
     ];
 
-    /// The look of this name (lower case), see [`NAMES`](Self::NAMES).
+    /// The look with this name (lower case), see [`NAMES`](Self::NAMES); `None` if there is none.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         match name {
@@ -114,7 +131,7 @@ impl Look {
         }
     }
 
-    /// A groove whose walls are lit, filled with the dark of the surface's own colour: concrete, clay, plaster.
+    /// A groove with lit walls, filled with a dark shade of the surface's own colour: concrete, clay, plaster.
     pub const GROOVE: Self = Self {
         ramp: Cow::Borrowed(&[
             stop(0.15, [0.62, 0.59, 0.56], 0.10),
@@ -141,8 +158,8 @@ impl Look {
         opaque: false,
     };
 
-    /// Cracked glass, ice: a bright hairline with a dark companion on the side that is turned away, and the picture behind shifted by the
-    /// walls.
+    /// Cracked glass, ice: a bright hairline with a dark line on the side away from the light. The walls displace the
+    /// picture behind them.
     pub const FROSTED: Self = Self {
         ramp: Cow::Borrowed(&[
             stop(0.10, [0.86, 0.91, 0.92], 0.06),
@@ -161,7 +178,9 @@ impl Look {
         ..Self::GROOVE
     };
 
-    /// What a field is to hold beside depths so that this look can show it. `seed` fixes what is random in it.
+    /// The layers that a depth field needs in addition to depths so that this look can be painted. `seed` fixes their
+    /// random details.
+    ///
     ///
     /// ```
     /// use bevy_crack::{
@@ -208,7 +227,7 @@ impl Look {
     /// Checks every field.
     ///
     /// # Errors
-    /// The first field that is out of its range or not finite.
+    /// [`LookError::OutOfRange`] for the first field that is out of its range or not finite.
     pub fn validate(&self) -> Result<(), LookError> {
         let unit = "0..=1";
         let ramp = ["ramp.len()", "ramp.depth", "ramp.color", "ramp.cover"];
@@ -265,7 +284,7 @@ impl Look {
     }
 }
 
-/// Shortens tables.
+/// Keeps tables short.
 pub(super) const fn stop(depth: f32, color: [f32; 3], cover: f32) -> ColorStop {
     ColorStop { depth, color, cover }
 }
@@ -276,5 +295,5 @@ impl Default for Look {
     }
 }
 
-/// The most stops that a [`Look::ramp`] has.
+/// The largest number of stops of a [`Look::ramp`].
 const MAX_STOPS: usize = 16;

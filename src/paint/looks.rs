@@ -5,7 +5,8 @@ use crate::raster::{Crushed, Veil};
 use std::borrow::Cow;
 
 impl Look {
-    /// Window glass: bright hairlines, plates that reflect and shift what is behind them, a white crushed ring around a hole.
+    /// Window glass: bright hairlines, plates that reflect and displace what is behind them, and a white crushed ring
+    /// around a hole.
     pub const GLASS: Self = Self {
         ramp: Cow::Borrowed(&[
             stop(0.05, [0.84, 0.90, 0.91], 0.14),
@@ -45,7 +46,7 @@ impl Look {
         ..Self::FROSTED
     };
 
-    /// Tempered glass: dice, each with its own tone and glitter.
+    /// Tempered glass: dice with different tones and reflections.
     pub const TEMPERED_GLASS: Self = Self {
         ramp: Cow::Borrowed(&[
             stop(0.10, [0.84, 0.90, 0.90], 0.05),
@@ -87,7 +88,7 @@ impl Look {
         ..Self::FROSTED
     };
 
-    /// Laminated glass: a milky disc, lines that fade and shine along their way, plates that hold together.
+    /// Laminated glass: a milky disc, lines whose brightness varies along them, plates that stay in place.
     pub const LAMINATED_GLASS: Self = Self {
         sparkle: 0.5,
         catch: 0.8,
@@ -119,7 +120,7 @@ impl Look {
         ..Self::FROSTED
     };
 
-    /// Ice: bright lines, a white bruise with bubbles.
+    /// Ice: bright lines, and a white spot with bubbles around the hit.
     pub const ICE: Self = Self {
         ramp: Cow::Borrowed(&[
             stop(0.06, [0.34, 0.41, 0.46], 0.0),
@@ -171,7 +172,7 @@ impl Look {
         ..Self::FROSTED
     };
 
-    /// Concrete: grey-brown cracks, a spalled crater with paler aggregate, crumbs and dust.
+    /// Concrete: grey-brown cracks, and a spalled crater with paler aggregate, crumbs and dust.
     pub const CONCRETE: Self = Self {
         ramp: Cow::Borrowed(&[
             stop(0.08, [0.60, 0.57, 0.54], 0.0),
@@ -206,7 +207,7 @@ impl Look {
         ..Self::GROOVE
     };
 
-    /// Plaster: thin cracks, and flakes that have come off where it was hit: the darker coat under it shows.
+    /// Plaster: thin cracks, and flakes that have come off around the hit and show the darker coat below.
     pub const PLASTER: Self = Self {
         ramp: Cow::Borrowed(&[
             stop(0.12, [0.60, 0.56, 0.52], 0.05),
@@ -241,7 +242,7 @@ impl Look {
         ..Self::GROOVE
     };
 
-    /// Brick: mortar that is gone, and a corner chipped off where it was hit.
+    /// Brick: cracks where the mortar is missing, and a corner chipped off at the hit.
     pub const BRICK: Self = Self {
         ramp: Cow::Borrowed(&[
             stop(0.10, [0.55, 0.50, 0.46], 0.0),
@@ -275,7 +276,7 @@ impl Look {
         ..Self::GROOVE
     };
 
-    /// A drawn crack: a line of ink that ends in needles, flat dark inside, one lit wall; loose chips around the hit.
+    /// A drawn crack: an ink line that ends in points, flat dark inside, one lit wall; loose chips around the hit.
     pub const TOON: Self = Self {
         tint: 0.0,
         glint: 0.0,
@@ -313,7 +314,8 @@ impl Look {
         ..Self::GROOVE
     };
 
-    /// Clay: flat plates of slightly different tone, brown hairlines and cracks between them, a pale dent where it was hit.
+    /// Clay: flat plates of slightly different tones, brown hairlines and cracks between them, a pale dent at the
+    /// hit.
     pub const CLAY: Self = Self {
         ramp: Cow::Borrowed(&[
             stop(0.085, [1.0, 0.97, 0.92], 0.03),
@@ -350,7 +352,8 @@ impl Look {
         ..Self::GROOVE
     };
 
-    /// Mud: dished plates of different tone with curled rims, deep brown gaps with a lit wall and one in the dark, a dark dent where it was hit.
+    /// Mud: dished plates of different tones with curled rims, deep brown gaps with one wall lit and one in shadow, a
+    /// dark dent at the hit.
     pub const MUD: Self = Self {
         ramp: Cow::Borrowed(&[
             stop(0.085, [0.85, 0.79, 0.72], 0.02),
@@ -389,7 +392,7 @@ impl Look {
         ..Self::GROOVE
     };
 
-    /// The glaze of pottery: ink that has gone into hairlines, darker the wider they are, without relief.
+    /// The glaze of pottery: hairlines stained with ink, darker the wider they are, without relief.
     pub const STAIN: Self = Self {
         ramp: Cow::Borrowed(&[
             stop(0.20, [0.30, 0.24, 0.20], 0.30),
@@ -423,7 +426,7 @@ impl Look {
         ..Self::GROOVE
     };
 
-    /// A mirror: each piece reflects something else.
+    /// A mirror: each piece reflects something different.
     pub const MIRROR: Self = Self {
         facets: Some(Facets {
             tone: 0.20,
@@ -438,7 +441,7 @@ impl Look {
         ..Self::GLASS
     };
 
-    /// Light through the cracks: lava, magic. The emissive map has it too.
+    /// Light that shines out of the cracks: lava, magic. It is in the emissive map too.
     pub const GLOWING: Self = Self {
         ramp: Cow::Borrowed(&[
             stop(0.10, [0.30, 0.10, 0.05], 0.20),

@@ -1,9 +1,35 @@
-//! A base picture and a depth field to diffuse, normal and depth texels.
+//! Paints diffuse, normal and depth texels from a base picture and a depth field.
 //!
-//! Every painted texel is a function of the base picture, of the depth field in the 3 x 3 texels around it, and of what the
-//! field holds beside depths at the texel itself (the closed cell it lies in, what a hit has crushed, veils), so a
-//! dirty rectangle painted alone equals the whole painted anew, bit for bit. Where the field is untouched, the
-//! painted texel is the base texel.
+//! Every painted texel depends only on the base picture, the depth field in the 3 x 3 texels around it, and the other
+//! layers of the field at the texel itself (the closed cell it lies in, crushed zones, veils). So a dirty rectangle
+//! painted alone equals the same part of a full repaint, bit for bit. Where the field is untouched, the painted texel
+//! is the base texel.
+//!
+//! ```
+//! use bevy_crack::{
+//!     paint::{BaseTexels, Look, LookTable, PaintTargets, paint_into},
+//!     pattern::{PathPoint, SegmentPath, SurfaceFrame},
+//!     raster::{DepthField, Profile, TexelRect, stamp_path},
+//! };
+//! use glam::UVec2;
+//!
+//! // A grey picture with a crack across its middle.
+//! let size = UVec2::new(64, 32);
+//! let mut field = DepthField::new(SurfaceFrame::new(size)?);
+//! let [from, to] = [0.0, 2.0].map(|x| PathPoint { pos: [x, 0.5].into(), width: 0.1 });
+//! stamp_path(&mut field, &Profile::DEFAULT, &SegmentPath::straight(from, to));
+//!
+//! let picture = [128, 128, 128, 255].repeat(64 * 32);
+//! let mut painted = picture.clone();
+//! let base = BaseTexels { size, diffuse: &picture, normal: None, depth: None };
+//! let look = LookTable::new(&Look::GROOVE, field.frame.texels_per_unit())?;
+//! let mut targets = PaintTargets { diffuse: Some(&mut painted), normal: None, depth: None };
+//! paint_into(base, &field, &look, TexelRect::whole(size), UVec2::ZERO, &mut targets);
+//! assert_eq!(painted[..4], picture[..4], "away from the crack nothing changes");
+//! let middle = 4 * (16 * 64 + 32);
+//! assert!(painted[middle] < picture[middle], "the crack is darker");
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod cel;
 mod diffuse;

@@ -1,4 +1,4 @@
-//! Rendering by modulation: [`modulate`].
+//! Rendering by modulation (Mould 2005, section 5.2): [`modulate`].
 
 use super::LookError;
 use crate::{
@@ -12,15 +12,29 @@ use crate::{
 /// I_out = tone + (I_in - tone) * (1 - exp(-d / τ))
 /// ```
 ///
-/// with `d` the distance to the nearest crack. A black tone gives the paper's equation; any other one gives what it cannot do:
-/// bright cracks, as in ice or mirrors. (The paper prints `exp(τ d)`, which rises with the distance only for a negative `τ`.)
+/// `d` is the distance to the nearest crack. A black tone gives the paper's equation. Another tone gives bright
+/// cracks, as in ice or mirrors, which the paper's equation cannot. Differs from the paper: it prints `exp(τ d)`,
+/// which falls with the distance only for a negative `τ`.
+///
+/// ```
+/// use bevy_crack::{paint::{Modulation, modulate}, pattern::SurfaceFrame, raster::DepthField};
+///
+/// let mut field = DepthField::new(SurfaceFrame::new([5, 5].into())?);
+/// field.depth.row_mut(2)[2] = 65535;
+/// let mut picture = vec![200; 5 * 5 * 4];
+/// modulate(&mut picture, &field, &Modulation { fade: 0.2, ..Modulation::DARK })?;
+/// let crack = 4 * (2 * 5 + 2);
+/// assert_eq!(picture[crack..crack + 4], [0, 0, 0, 200]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Modulation {
-    /// `τ`, pattern units, 0.0001..=0.2: after so much the crack's influence has fallen to a third. Default 0.005.
+    /// `τ`, pattern units, 0.0001..=0.2: the distance at which the influence of a crack has fallen to about a third.
+    /// Default 0.005.
     pub fade: f32,
     /// Colour of the crack itself, sRGB 0..=1; default black.
     pub tone: [f32; 3],
-    /// Depth from which a texel is crack, 0..=1; default 0.08: thin cracks are not torn.
+    /// Depth from which a texel counts as crack, 0..=1; default 0.08, so that thin cracks have no gaps.
     pub depth: f32,
 }
 
@@ -38,15 +52,16 @@ impl Default for Modulation {
     }
 }
 
-/// Influence that no longer changes a byte.
+/// Influence that is too small to change a byte.
 const NOTHING: f32 = 1.0 / 512.0;
 
 /// Modulates `picture` (RGBA8 of the size of the field, row-major) by the distance to the cracks of `field`.
 ///
-/// Texels out of reach of a crack are not touched, nor is alpha; a slice shorter than the field is left alone.
+/// Texels out of reach of a crack do not change, nor does alpha. A slice that is shorter than the field is left
+/// unchanged.
 ///
 /// # Errors
-/// If a number is out of its range or not finite.
+/// [`LookError::OutOfRange`] if a number is out of its range or not finite.
 pub fn modulate(picture: &mut [u8], field: &DepthField, modulation: &Modulation) -> Result<(), LookError> {
     let Modulation { fade, tone, depth } = *modulation;
     super::range::within("fade", fade, 0.0001..=0.2, "0.0001..=0.2")?;
@@ -59,7 +74,7 @@ pub fn modulate(picture: &mut [u8], field: &DepthField, modulation: &Modulation)
         return Ok(());
     }
     let fade = fade * field.frame.texels_per_unit();
-    // Squares of distances are whole numbers: influence by square, until there is none.
+    // Squared distances are whole numbers: a table of influence by squared distance, up to where it ends.
     let influence = |square: usize| ops::exp(-(square as f32).sqrt() / fade);
     let farthest = usize::from(MAX_DISTANCE);
     let reach = (0..farthest).find(|&d| influence((d + 1) * (d + 1)) < NOTHING).unwrap_or(farthest);

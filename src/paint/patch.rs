@@ -1,4 +1,4 @@
-//! The depths of some texels, and their slopes.
+//! The depths of a patch of texels, and their slopes.
 
 use crate::{Grid, raster::TexelRect};
 use glam::UVec2;
@@ -7,7 +7,7 @@ use std::ops::Range;
 /// Texels whose colours are computed at once, or copied if all are untouched.
 pub(super) const BLOCK: usize = 8;
 
-/// What depths stand for where rims curl up: how far down the surface is, at depths 0, 256, .. 65536, linear between.
+/// The height of the surface where rims curl up: how far down it is at depths 0, 256, .. 65536, linear between.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Curve(pub(super) [i32; 257]);
 
@@ -44,16 +44,16 @@ fn slopes<T: Copy>(
     }
 }
 
-/// The depths of a patch and of the texels around it, and what is made of them.
+/// The depths of a patch and of the texels around it, and values derived from them.
 ///
-/// All texels lie in one line, row after row, so that the loops over them are long whatever the shape: the texel in column
-/// `x` of row `y` is at `y * stride + x`, and what is computed for the two last places of a row is of no use.
+/// All texels are in one line, row after row, so that the loops over them are long for every shape. The texel in
+/// column `x` of row `y` is at `y * stride + x`. The values computed for the last two entries of a row are not used.
 pub(super) struct Patch<const ROOM: usize> {
     /// Width of the patch.
     width: usize,
-    /// Width with the texels around.
+    /// Width with one texel more on either side.
     pub(super) stride: usize,
-    /// Places in all rows of the patch.
+    /// Entries in all rows of the patch.
     len: usize,
     /// The depth of the texel above and to the left, repeated at the border of the field.
     pub(super) depth: [u16; ROOM],
@@ -65,7 +65,7 @@ pub(super) struct Patch<const ROOM: usize> {
     pub(super) y: [f32; ROOM],
     /// One over the length of `(x, y, 1)`.
     pub(super) inv_len: [f32; ROOM],
-    /// Blocks that are touched, each with its place here and in the field.
+    /// Touched blocks, each with its index here and its texel in the field.
     pub(super) blocks: [(u16, UVec2); ROOM],
 }
 
@@ -82,7 +82,7 @@ impl<const ROOM: usize> Patch<ROOM> {
         blocks: [(0, UVec2::ZERO); ROOM],
     };
 
-    /// Reads the depths; false if they are all zero.
+    /// Reads the depths; returns `false` if all are zero.
     pub(super) fn load(&mut self, depth: &Grid<u16>, rect: TexelRect) -> bool {
         let (min, max) = (rect.min.as_usizevec2(), rect.max.as_usizevec2());
         self.width = max.x - min.x;
@@ -101,7 +101,7 @@ impl<const ROOM: usize> Patch<ROOM> {
         touched
     }
 
-    /// Finds what is touched, and the slopes by Sobel's operator; a wall that goes down to the right leans to the right.
+    /// Finds touched texels and the slopes by Sobel's operator. A wall that descends to the right leans to the right.
     #[inline(always)]
     pub(super) fn measure(&mut self, scale: f32, curve: Option<&Curve>) {
         let n = self.len;
@@ -126,7 +126,7 @@ impl<const ROOM: usize> Patch<ROOM> {
         }
     }
 
-    /// Adds other slopes to those of the cracks.
+    /// Adds other slopes to the slopes of the cracks.
     #[inline(always)]
     pub(super) fn tilt(&mut self, mut slope: impl FnMut(usize) -> [f32; 2]) {
         let n = self.len;
@@ -139,7 +139,7 @@ impl<const ROOM: usize> Patch<ROOM> {
         }
     }
 
-    /// Leaves only a share of the slopes of the cracks; what is added later is whole.
+    /// Scales the slopes of the cracks by a share; slopes that are added later are not scaled.
     #[inline(always)]
     pub(super) fn level(&mut self, mut share: impl FnMut(usize) -> f32) {
         let n = self.len;
@@ -151,18 +151,18 @@ impl<const ROOM: usize> Patch<ROOM> {
         }
     }
 
-    /// Places in all rows.
+    /// Number of entries in all rows.
     pub(super) const fn len(&self) -> usize {
         self.len
     }
 
-    /// Whether a texel of the block at a place is touched, or one beside it.
+    /// Whether a texel of the block at an index, or one beside it, is touched.
     #[inline(always)]
     pub(super) fn is_touched(&self, place: usize) -> bool {
         self.touch[place..].first_chunk::<BLOCK>().is_some_and(|touch| *touch != [0; BLOCK])
     }
 
-    /// The places of a row.
+    /// The entries of a row.
     #[inline(always)]
     pub(super) fn row(&self, row: usize) -> Range<usize> {
         let first = row * self.stride;

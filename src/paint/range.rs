@@ -1,19 +1,19 @@
-//! Values of looks out of their range.
+//! [`LookError`]: a field of a look that is out of its range.
 
 use std::ops::RangeInclusive;
 
-/// A field of a [`Look`](super::Look) out of its range.
+/// A field of a [`Look`](super::Look) that is out of its range.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LookError {
-    /// A number outside its range.
+    /// A number is outside its range, or not finite.
     #[error("look field `{field}` is {value}, must lie in {range}")]
     OutOfRange {
         /// Name of the field.
         field: &'static str,
         /// Its value.
         value: f32,
-        /// What is allowed.
+        /// The allowed range.
         range: &'static str,
     },
 }

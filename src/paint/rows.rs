@@ -1,11 +1,11 @@
-//! What depths and slopes make of a row of normals or depths, and the arithmetic of bytes.
+//! Rows of normals and depths, and arithmetic of bytes.
 
 use super::patch::Patch;
 
 /// A texel of four bytes.
 pub(super) type Rgba = [u8; 4];
 
-/// Rounds a value of 0..=255 (plus less than a half on either side); see the stamps for why not by a cast.
+/// Rounds a value of 0..=255 (plus less than a half on either side); `raster/stamp.rs` says why this is not a cast.
 #[inline(always)]
 pub(super) fn round(value: f32) -> u32 {
     (value + 8_388_608.0).to_bits() & 255
@@ -17,7 +17,7 @@ fn normal_bytes(x: f32, y: f32, z: f32, alpha: u32) -> u32 {
     byte(x) | byte(y) << 8 | byte(z) << 16 | alpha << 24
 }
 
-/// Normals over an even base.
+/// Normals over a flat base.
 #[inline(always)]
 pub(super) fn flat_row<const ROOM: usize>(out: &mut [Rgba], patch: &Patch<ROOM>, row: usize) {
     let (x, y, inv_len) = (&patch.x[patch.row(row)], &patch.y[patch.row(row)], &patch.inv_len[patch.row(row)]);
@@ -34,7 +34,7 @@ pub(super) fn tilted_row<const ROOM: usize>(out: &mut [Rgba], base: &[Rgba], pat
         let bytes = u32::from_le_bytes(base);
         let part = |c: u32| (channel(bytes, c) - 127.5) * (1.0 / 127.5);
         let (base_x, base_y, base_z) = (part(0), part(1), part(2));
-        // A normal that points into the surface is no normal; it counts as nearly level.
+        // A normal that points into the surface is invalid; it counts as nearly flat.
         let z = if base_z > 0.05 { base_z } else { 0.05 };
         let (sum_x, sum_y) = (base_x + x * z, base_y - y * z);
         let inv_len = 1.0 / (sum_x * sum_x + sum_y * sum_y + z * z).sqrt();

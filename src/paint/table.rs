@@ -1,4 +1,4 @@
-//! [`LookTable`]: a look made ready to paint with.
+//! [`LookTable`]: a look prepared for painting.
 
 use super::{
     cel::Strokes,
@@ -11,27 +11,27 @@ use crate::pattern::MAX_SIDE;
 use glam::Vec4;
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
-/// Bumps of what swells and fades along cracks, a pattern unit.
+/// Bumps per pattern unit of the noise that varies the cover along cracks.
 const SPARKLES: f32 = 28.0;
 
-/// Steps of the baked ramp: one for each value of the high byte of a depth.
+/// Steps of the precomputed ramp: one for each value of the high byte of a depth.
 const STEPS: usize = 256;
 
-/// What a depth puts over the picture: colour times cover in 0..=255 (sRGB), and cover 0..=1.
+/// The colour over the picture at a depth: colour times cover in 0..=255 (sRGB), and cover 0..=1.
 pub(super) type Layer = Vec4;
 
-/// Nothing, then the ramp at depths 0, 256, .. 65280, each with what is gained up to the next: linear between, so that slow
-/// gradients have no steps.
+/// One entry for depth 0, then the ramp at depths 0, 256, .. 65280, each with the difference to the next entry.
+/// Values between are interpolated linearly, so that slow gradients have no steps.
 type Ramp = [[Layer; 2]; STEPS + 1];
 
-/// Ramps in use, with the stops that they are made from. Surfaces with the same stops share one: so the processor's caches hold one
-/// while many surfaces are painted, and not each surface's own.
+/// Ramps in use, with the stops from which they were made. Surfaces with the same stops share one ramp, so that it
+/// stays in the processor's caches while many surfaces are painted.
 static RAMPS: Mutex<Vec<(Vec<ColorStop>, Weak<Ramp>)>> = Mutex::new(Vec::new());
 
-/// No more than so many are shared.
+/// The largest number of shared ramps.
 const MAX_SHARED: usize = 64;
 
-/// A [`Look`] made ready to paint with.
+/// A [`Look`] prepared for painting: lengths in texels, ramps as tables.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LookTable {
     ramp: Arc<Ramp>,
@@ -40,23 +40,23 @@ pub struct LookTable {
     pub(super) glint: f32,
     pub(super) gloss: f32,
     pub(super) sparkle: f32,
-    /// Bumps of it a texel.
+    /// Bumps of the sparkle noise per texel.
     pub(super) sparkle_scale: f32,
-    /// Where rims curl up.
+    /// The height of curled rims by depth.
     pub(super) curve: Option<Box<Curve>>,
     pub(super) cel: Option<Strokes>,
     pub(super) facets: Option<Facets>,
-    /// Colour that plates reflect, 0..=255.
+    /// Colour of the reflections of plates, 0..=255.
     pub(super) sheen: [f32; 3],
-    /// Colour of their sides, 0..=255, and how thick they are, texels.
+    /// Colour of the sides of plates, 0..=255, and their thickness, texels.
     pub(super) side: [f32; 3],
     pub(super) thick: f32,
-    /// Colour of veils, 0..=255, and what a step of their density covers; nothing if there are none.
+    /// Colour of veils, 0..=255, and the cover of one step of their density; zero if there are none.
     pub(super) veil: [f32; 3],
     pub(super) veil_cover: f32,
     pub(super) grain: f32,
     pub(super) shift: f32,
-    /// Share of a depth map's range that a pattern unit of depth is.
+    /// Share of a depth map's range for one pattern unit of depth.
     pub(super) deep: f32,
     /// From the Sobel sum of `u16` depths to the slope of the surface.
     pub(super) slope: f32,
@@ -64,7 +64,7 @@ pub struct LookTable {
 }
 
 impl Look {
-    /// How far down the surface is at each depth, 65536 = at the bottom.
+    /// The height of the surface at each depth; 65536 = at the bottom.
     fn curve(&self) -> Option<Box<Curve>> {
         (self.curl > 0.0).then(|| {
             Box::new(Curve(std::array::from_fn(|step| {
@@ -76,7 +76,8 @@ impl Look {
     }
 }
 
-/// Colour and cover at `depth` (0..=1); before the first stop the cover rises from zero, after the last nothing changes.
+/// Colour and cover at `depth` (0..=1). Before the first stop the cover rises from zero; after the last nothing
+/// changes.
 fn at(stops: &[ColorStop], depth: f32) -> ([f32; 3], f32) {
     let Some(first) = stops.first() else { return ([0.0; 3], 0.0) };
     let mut low =
@@ -120,10 +121,10 @@ fn shared_ramp(wanted: &[ColorStop]) -> Arc<Ramp> {
 }
 
 impl LookTable {
-    /// Tables for `look`; `texels_per_unit` as in [`SurfaceFrame`](crate::pattern::SurfaceFrame).
+    /// Prepares `look` for painting; `texels_per_unit` is that of the [`SurfaceFrame`](crate::pattern::SurfaceFrame).
     ///
     /// # Errors
-    /// If a field is out of its range or not finite.
+    /// [`LookError::OutOfRange`] if a field or `texels_per_unit` is out of its range or not finite.
     pub fn new(look: &Look, texels_per_unit: f32) -> Result<Self, LookError> {
         look.validate()?;
         within("texels_per_unit", texels_per_unit, f32::MIN_POSITIVE..=MAX_SIDE as f32, "above 0, up to 16384")?;
@@ -156,12 +157,12 @@ impl LookTable {
         })
     }
 
-    /// Whether cracks give off light.
+    /// Whether cracks emit light.
     pub(super) const fn glows(&self) -> bool {
         self.glow.is_some()
     }
 
-    /// The light at a depth: three colours, 0..=255.
+    /// The emitted light at a depth: three channels, 0..=255.
     pub(super) fn light(&self, depth: u16) -> [f32; 3] {
         let Some(glow) = &self.glow else { return [0.0; 3] };
         let [low, gain] = glow[usize::from(depth >> 8) + usize::from(depth != 0)];
@@ -169,15 +170,15 @@ impl LookTable {
         [r, g, b]
     }
 
-    /// What the ramp puts over the picture at `depth`, which lies so far [between](Self::between) two steps.
+    /// The colour of the ramp at `depth`; `between` is [`Self::between`] of that depth.
     #[inline(always)]
     pub(super) fn layer(&self, depth: u16, between: f32) -> Layer {
-        // Depth zero lies at the first entry, without a branch.
+        // Depth zero selects the first entry, without a branch.
         let [low, gain] = self.ramp[usize::from(depth >> 8) + usize::from(depth != 0)];
         low + gain * between
     }
 
-    /// How far `depth` is from the step before it to the one after, 0..1.
+    /// Position of `depth` between the step before it and the step after it, 0..1.
     #[inline(always)]
     pub(super) fn between(depth: u16) -> f32 {
         f32::from(depth & 255) * (1.0 / 256.0)

@@ -1,9 +1,9 @@
-//! The texel loops.
+//! The loops over texels.
 //!
-//! A rectangle is painted in patches. A patch looks at the depth field; if that is untouched, the base is copied. Else the
-//! slopes of the whole patch are computed at once and used by diffuse and normal, the former in blocks, of which the
-//! untouched ones are copied. Patches and blocks are a matter of speed alone: every texel depends on its own 3 x 3 depths
-//! and on the base. Sums of whole numbers that cannot overflow are written as wrapping ones, as a check for each texel
+//! A rectangle is painted in patches. If the depth field is untouched in a patch, the base is copied. Else the slopes
+//! of the whole patch are computed at once and used for diffuse and normal. Diffuse is painted in blocks, and
+//! untouched blocks are copied. Patches and blocks affect only the speed: every texel depends on its own 3 x 3 depths
+//! and on the base. Sums of integers that cannot overflow use wrapping addition, because an overflow check per texel
 //! would cost more than the sum.
 
 use super::{
@@ -20,7 +20,7 @@ use crate::{
 use glam::UVec2;
 use std::ops::Range;
 
-/// The untouched picture. All slices are row-major over the whole image of `size` texels.
+/// The untouched picture. All slices are row-major and cover the whole image of `size` texels.
 #[derive(Clone, Copy, Debug)]
 pub struct BaseTexels<'a> {
     /// Size of the image.
@@ -33,7 +33,7 @@ pub struct BaseTexels<'a> {
     pub depth: Option<&'a [u8]>,
 }
 
-/// Where to paint. Slices as in [`BaseTexels`], same size; `None` = not wanted.
+/// The images to paint. Slices are like those of [`BaseTexels`], of the same size; `None` = not painted.
 #[derive(Debug)]
 pub struct PaintTargets<'a> {
     /// RGBA8, sRGB.
@@ -44,27 +44,28 @@ pub struct PaintTargets<'a> {
     pub depth: Option<&'a mut [u8]>,
 }
 
-/// The normal of an even surface.
+/// The normal of a flat surface.
 pub(super) const FLAT: Rgba = [128, 128, 255, 255];
 
-/// The widest patch.
+/// Width of the widest patch.
 const WIDE: usize = 64;
 
-/// Room for the depths of a patch and of the texels around it, and for what a last block may read beyond: for most dirty
-/// rectangles, and for larger ones.
+/// Buffer sizes for the depths of a patch, of the texels around it, and of those that the last block may read beyond:
+/// one for most dirty rectangles, one for larger ones.
 const LITTLE: usize = 360;
 const MUCH: usize = 800;
 
-/// Texels that come from memory at once, or fewer.
+/// Texels in a cache line.
 const CACHE_LINE: usize = 64 / size_of::<Rgba>();
 
-/// Up to so many texels are fetched before they are painted: they stay in the cache until then.
+/// The largest number of texels that are prefetched before painting: they stay in the cache until then.
 const MAX_FETCHED: u64 = 1 << 13;
 
-/// Paints the texels `rect` of `field`, whose top left lies at `origin` in the image (an atlas frame; else zero).
+/// Paints the texels `rect` of `field`. `origin` is the top left of the field in the image (of an atlas frame; else
+/// zero).
 ///
-/// `rect` is in texels of the field and is clipped to it; texels of the field outside the image are left out.
-/// Slices shorter than `size` says are left alone, and so is a target whose base slice is too short.
+/// `rect` is in texels of the field and is clipped to it; texels of the field outside the image are skipped. Target
+/// slices that are shorter than `size` requires are left unchanged, and so is a target whose base slice is too short.
 pub fn paint_into(
     base: BaseTexels<'_>,
     field: &DepthField,
@@ -76,7 +77,8 @@ pub fn paint_into(
     paint_rects(base, field, look, &[rect], origin, targets);
 }
 
-/// As [`paint_into`] for each of some rectangles, in less time where they are small and the memory is cold.
+/// Like [`paint_into`] for several rectangles. It takes less time where they are small and the memory is not in the
+/// cache.
 pub fn paint_rects(
     base: BaseTexels<'_>,
     field: &DepthField,
@@ -176,7 +178,7 @@ impl Job<'_> {
         first..first + rect.size().x as usize
     }
 
-    /// Gives the base back to texels that are untouched.
+    /// Copies the base to texels that are untouched.
     fn restore(&mut self, rect: TexelRect) {
         for y in rect.min.y..rect.max.y {
             let range = self.range(rect, y);
@@ -198,8 +200,8 @@ impl Job<'_> {
         }
     }
 
-    /// Reads what is read and painted over, a texel of each line of the cache: independent reads, so that cold memory is
-    /// waited for once and not texel by texel. The tighter the loop, the more of them are under way.
+    /// Reads one texel of each cache line that will be read or written: independent reads, so that the latency of
+    /// cold memory overlaps instead of adding up texel by texel. The tighter the loop, the more reads are in flight.
     fn fetch(&self, rects: impl Iterator<Item = TexelRect>) {
         let (diffuse, normal) = (self.diffuse_out.as_deref(), self.normal_out.as_deref());
         let picture = diffuse.map(|_| self.frame.base);

@@ -1,14 +1,15 @@
-//! [`SurfaceFrame`]: from pattern space to texels and back.
+//! [`SurfaceFrame`]: conversion between pattern space and texels.
 
 use glam::{UVec2, Vec2};
 
-/// The longest side of a surface in texels.
+/// The largest side of a surface in texels.
 pub const MAX_SIDE: u32 = 16_384;
 
-/// The largest ratio of the sides that keeps the shorter side as the unit; beyond it the unit is the longer side / 64.
+/// The largest ratio of the sides at which the shorter side is the unit; beyond it the unit is the longer side / 64.
 pub const MAX_ASPECT: f32 = 64.0;
 
-/// Where a surface of `size` texels lies in pattern space.
+/// The position of a surface of `size` texels in pattern space.
+///
 ///
 /// ```
 /// use bevy_crack::pattern::SurfaceFrame;
@@ -25,7 +26,7 @@ pub struct SurfaceFrame {
     texels_per_unit: f32,
 }
 
-/// A size that no surface can have.
+/// A size that a surface cannot have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("a surface of {width} x {height} texels: both sides must lie in 1..={MAX_SIDE}")]
 pub struct FrameError {
@@ -39,7 +40,7 @@ impl SurfaceFrame {
     /// The frame of a surface of `size` texels.
     ///
     /// # Errors
-    /// If a side is zero or above [`MAX_SIDE`].
+    /// [`FrameError`] if a side is zero or above [`MAX_SIDE`].
     pub fn new(size: UVec2) -> Result<Self, FrameError> {
         if size.min_element() == 0 || size.max_element() > MAX_SIDE {
             return Err(FrameError { width: size.x, height: size.y });
@@ -66,25 +67,25 @@ impl SurfaceFrame {
         self.size.as_vec2() / self.texels_per_unit
     }
 
-    /// Pattern space to continuous texel coordinates (texel centres lie at half-integers).
+    /// Converts pattern space to continuous texel coordinates (texel centres are at half-integers).
     #[must_use]
     pub fn to_texel(&self, pos: Vec2) -> Vec2 {
         pos * self.texels_per_unit
     }
 
-    /// Continuous texel coordinates to pattern space.
+    /// Converts continuous texel coordinates to pattern space.
     #[must_use]
     pub fn to_pos(&self, texel: Vec2) -> Vec2 {
         texel / self.texels_per_unit
     }
 
-    /// Texture coordinates (0..1, v down) to pattern space.
+    /// Converts texture coordinates (0..1, v down) to pattern space.
     #[must_use]
     pub fn uv_to_pos(&self, uv: Vec2) -> Vec2 {
         uv * self.extent()
     }
 
-    /// Pattern space to texture coordinates (0..1, v down).
+    /// Converts pattern space to texture coordinates (0..1, v down).
     #[must_use]
     pub fn pos_to_uv(&self, pos: Vec2) -> Vec2 {
         pos / self.extent()

@@ -1,13 +1,14 @@
-//! [`CrackMask`]: where cracks like to run, where they do not, and where they never go.
+//! [`CrackMask`]: where cracks prefer to run, avoid to run, and never run.
 
 use super::lines;
 use crate::Grid;
 use glam::{UVec2, Vec2};
 
-/// Where cracks like to run, where they do not, and where they never go; each as values of 0..=1 over the whole surface.
+/// Where cracks prefer to run, avoid to run, and never run; each as values of 0..=1 over the whole surface.
 ///
-/// The layers may have any size, and each its own: they are asked by texture coordinates (0..1, v down). A layer that is
-/// not there counts as 0 everywhere; so do values that are not numbers.
+/// The layers may have any size, each its own: they are sampled by texture coordinates (0..1, v down). A missing
+/// layer counts as 0 everywhere; NaN counts as 0 too.
+///
 ///
 /// ```
 /// use bevy_crack::pattern::CrackMask;
@@ -27,11 +28,12 @@ use glam::{UVec2, Vec2};
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CrackMask {
-    /// Where cracks like to run: mortar, painted lines. Read between texels (bilinear).
+    /// Where cracks prefer to run: mortar, painted lines. Sampled between texels (bilinear).
     pub weak: Option<Grid<f32>>,
-    /// What cracks avoid. Read between texels (bilinear).
+    /// What cracks avoid. Sampled between texels (bilinear).
     pub strong: Option<Grid<f32>>,
-    /// Where no crack ever runs: frames, transparent texels. Read texel by texel (nearest); above 0.5 is forbidden.
+    /// Where no crack ever runs: frames, transparent texels. Sampled texel by texel (nearest); above 0.5 is
+    /// forbidden.
     pub forbidden: Option<Grid<f32>>,
     /// How densely cracks grow: the share of the markers that are kept, 0..=1, a layer that is not there counting as 1. Read texel by texel
     /// (nearest). Cracks that have begun may run on into places without markers.
@@ -43,6 +45,7 @@ pub struct CrackMask {
 #[error(
     "mask of {width} x {height} texels, {length} bytes: sides must lie in 1..=16384, with one or four bytes a texel"
 )]
+/// Texels that do not form a layer of a mask.
 pub struct MaskError {
     /// Width given, in texels.
     pub width: u32,
@@ -53,11 +56,12 @@ pub struct MaskError {
 }
 
 impl CrackMask {
-    /// A layer from 8-bit texels, row after row: one byte each (0 = 0, 255 = 1), or four (sRGB and alpha: lightness as it
-    /// is stored, times alpha).
+    /// A layer from 8-bit texels, row after row: one byte each (0 = 0, 255 = 1), or four (sRGB and alpha: lightness
+    /// as stored, times alpha).
     ///
     /// # Errors
-    /// If the number of bytes does not fit the size, or a side is 0 or above [`MAX_SIDE`](super::MAX_SIDE).
+    /// [`MaskError`] if the number of bytes does not match the size, or a side is 0 or above
+    /// [`MAX_SIDE`](super::MAX_SIDE).
     pub fn layer(size: UVec2, texels: &[u8]) -> Result<Grid<f32>, MaskError> {
         let values = match bytes_per_texel(size, texels)? {
             1 => texels.iter().map(|&texel| f32::from(texel) / 255.0).collect(),
@@ -70,7 +74,7 @@ impl CrackMask {
     /// [`forbidden_from_alpha`](Self::forbidden_from_alpha).
     ///
     /// # Errors
-    /// If there are not four bytes for each texel, or a side is 0 or above [`MAX_SIDE`](super::MAX_SIDE).
+    /// [`MaskError`] if there are not four bytes per texel, or a side is 0 or above [`MAX_SIDE`](super::MAX_SIDE).
     pub fn from_picture(size: UVec2, rgba: &[u8]) -> Result<Self, MaskError> {
         Ok(Self {
             weak: Self::weak_from_picture(size, rgba)?,
@@ -80,25 +84,25 @@ impl CrackMask {
         })
     }
 
-    /// The picture's own lines: mortar, joints of tiles and planks, painted lines, old cracks.
+    /// The lines of a picture: mortar, joints of tiles and planks, painted lines, old cracks.
     ///
-    /// A line is what is lighter (or darker) than what lies on *both* its sides, over a length; a mere edge is none. Each
-    /// picture has lines of one kind: whichever of light and dark ones stand out more. Texture without joints has as many light
-    /// ones as dark ones, so lines are what the stronger kind has above the weaker kind's strongest few; where nothing long
-    /// is left, the answer is `None`. Looked for at a shorter side of 256 texels, at widths of 1 to 8 of them; takes about
-    /// 30 ms.
+    /// A line is lighter (or darker) than the picture on *both* its sides, over a length; an edge alone is not a
+    /// line. Each picture has lines of one kind: light or dark ones, whichever stand out more. A texture without
+    /// joints has as many light lines as dark ones. So only responses of the stronger kind count that exceed the
+    /// strongest few of the weaker kind. The result is `None` if no long line is left. Lines are searched for at a
+    /// shorter side of 256 texels, at widths of 1 to 8 of them; this takes about 30 ms.
     ///
     /// # Errors
-    /// If there are not four bytes for each texel, or a side is 0 or above [`MAX_SIDE`](super::MAX_SIDE).
+    /// [`MaskError`] if there are not four bytes per texel, or a side is 0 or above [`MAX_SIDE`](super::MAX_SIDE).
     pub fn weak_from_picture(size: UVec2, rgba: &[u8]) -> Result<Option<Grid<f32>>, MaskError> {
         four_bytes_per_texel(size, rgba)?;
         Ok(lines::find(size, |index| lightness(&rgba[4 * index..])))
     }
 
-    /// Forbidden where the picture is less than half opaque; `None` if it is so nowhere.
+    /// A layer that forbids the texels that are less than half opaque; `None` if there are none.
     ///
     /// # Errors
-    /// If there are not four bytes for each texel, or a side is 0 or above [`MAX_SIDE`](super::MAX_SIDE).
+    /// [`MaskError`] if there are not four bytes per texel, or a side is 0 or above [`MAX_SIDE`](super::MAX_SIDE).
     pub fn forbidden_from_alpha(size: UVec2, rgba: &[u8]) -> Result<Option<Grid<f32>>, MaskError> {
         four_bytes_per_texel(size, rgba)?;
         let values: Vec<f32> = rgba.as_chunks::<4>().0.iter().map(|texel| 1.0 - f32::from(texel[3]) / 255.0).collect();
@@ -117,25 +121,25 @@ impl CrackMask {
         density.get(texel.x, texel.y).map_or(1.0, |value| value.clamp(0.0, 1.0))
     }
 
-    /// Whether no layer is there that says where cracks run; [`density`](Self::density) is none.
+    /// Whether the mask has no layer that says where cracks run. [`density`](Self::density) does not count.
     #[must_use]
     pub const fn is_empty(&self) -> bool {
         self.weak.is_none() && self.strong.is_none() && self.forbidden.is_none()
     }
 
-    /// How much cracks like to run at `uv`, 0..=1.
+    /// How strongly cracks prefer `uv`, 0..=1.
     #[must_use]
     pub fn weak_at(&self, uv: Vec2) -> f32 {
         self.weak.as_ref().map_or(0.0, |layer| bilinear(layer, uv))
     }
 
-    /// How much cracks avoid `uv`, 0..=1.
+    /// How strongly cracks avoid `uv`, 0..=1.
     #[must_use]
     pub fn strong_at(&self, uv: Vec2) -> f32 {
         self.strong.as_ref().map_or(0.0, |layer| bilinear(layer, uv))
     }
 
-    /// Whether no crack may be at `uv`. Beyond the border as at the nearest texel; never where `uv` is not finite.
+    /// Whether no crack may be at `uv`. Beyond the border the nearest texel counts; `false` if `uv` is not finite.
     #[must_use]
     pub fn is_forbidden(&self, uv: Vec2) -> bool {
         self.forbidden.as_ref().is_some_and(|layer| {
@@ -144,20 +148,21 @@ impl CrackMask {
         })
     }
 
-    /// Whether the straight line from `from` to `to` (both uv) meets a forbidden texel, however small the part is that it
-    /// cuts off. Every texel on the way is looked at. Not finite: never.
+    /// Whether the straight line from `from` to `to` (both uv) meets a forbidden texel, however short the part inside
+    /// it is. Every texel on the line is checked. `false` if a coordinate is not finite.
     #[must_use]
     pub fn blocks(&self, from: Vec2, to: Vec2) -> bool {
         let Some(layer) = &self.forbidden else { return false };
         if !(from.is_finite() && to.is_finite()) {
             return false;
         }
-        // Points beyond the border count as on it, so that the walk is no longer than the layer's sides.
+        // Points beyond the border are clamped to it, so that the walk is no longer than the layer's sides.
         let size = layer.size().as_vec2();
         let (from, to) = (from.clamp(Vec2::ZERO, Vec2::ONE) * size, to.clamp(Vec2::ZERO, Vec2::ONE) * size);
         let way = to - from;
         let (mut texel, last) = (from.floor(), to.floor());
-        // Shares of the way at which the next column and the next row begin, and from one to the next after it.
+        // Fractions of the line at which the next column and the next row begin, and the increments from one to the
+        // next.
         let forward = Vec2::new(if way.x < 0.0 { 0.0 } else { 1.0 }, if way.y < 0.0 { 0.0 } else { 1.0 });
         let step = forward * 2.0 - 1.0;
         let pace = way.abs().recip();
@@ -167,7 +172,7 @@ impl CrackMask {
             if forbids(layer, texel.x, texel.y) {
                 return true;
             }
-            // A column left to the last one stays where it is, whatever rounding says.
+            // Once the last column is reached the column no longer changes, even if rounding errors say so.
             let is_column = if texel.x == last.x {
                 false
             } else if texel.y == last.y {
@@ -190,11 +195,11 @@ impl CrackMask {
 /// Whether the texel, or the one nearest to it on the surface, is forbidden.
 fn forbids(layer: &Grid<f32>, x: f32, y: f32) -> bool {
     let last = layer.size().saturating_sub(UVec2::ONE);
-    // The cast takes what is below zero to zero.
+    // The cast maps negative values to zero.
     x.is_finite() && y.is_finite() && layer.get((x as u32).min(last.x), (y as u32).min(last.y)).is_some_and(|v| v > 0.5)
 }
 
-/// Between the centres of the four texels around `uv`; beyond the outermost centres nothing changes.
+/// Interpolates between the centres of the four texels around `uv`; constant beyond the outermost centres.
 fn bilinear(layer: &Grid<f32>, uv: Vec2) -> f32 {
     let last = layer.size().saturating_sub(UVec2::ONE);
     let at = (uv * layer.size().as_vec2() - 0.5).clamp(Vec2::ZERO, last.as_vec2());
@@ -213,7 +218,7 @@ fn bilinear(layer: &Grid<f32>, uv: Vec2) -> f32 {
     mix(top, bottom, share.y)
 }
 
-/// Lightness of a texel as it is stored, 0..=1.
+/// Lightness of a texel as stored, 0..=1.
 fn lightness(texel: &[u8]) -> f32 {
     let [r, g, b, ..] = texel else { return 0.0 };
     f32::from(u16::from(*r) + 2 * u16::from(*g) + u16::from(*b)) / (4.0 * 255.0)

@@ -1,8 +1,17 @@
-//! The words that generators and painters share.
+//! The types that generators and painters share.
 //!
-//! *Pattern space*: positions and lengths are in units of the surface's shorter side; (0, 0) is the top left, x runs
-//! right, y runs down. Texels exist only in [`raster`](crate::raster) and [`paint`](crate::paint); [`SurfaceFrame`]
-//! converts.
+//! *Pattern space*: positions and lengths are in units of the surface's shorter side; (0, 0) is the top left, x
+//! points right, y points down. Texels exist only in [`raster`](crate::raster) and [`paint`](crate::paint);
+//! [`SurfaceFrame`] converts.
+//!
+//! ```
+//! use bevy_crack::pattern::SurfaceFrame;
+//!
+//! // A surface twice as wide as high: the shorter side is 1.
+//! let frame = SurfaceFrame::new([512, 256].into())?;
+//! assert_eq!(frame.extent(), [2.0, 1.0].into());
+//! # Ok::<(), bevy_crack::pattern::FrameError>(())
+//! ```
 
 mod cells;
 mod frame;

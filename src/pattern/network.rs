@@ -6,7 +6,7 @@ use glam::Vec2;
 /// The [`Node::parent`] of a node at which a crack starts.
 pub const NO_PARENT: u32 = u32::MAX;
 
-/// The [`Node::impact`] of a node that no impact has brought forth.
+/// The [`Node::impact`] of a node that does not belong to an impact.
 pub const NO_IMPACT: u32 = u32::MAX;
 
 /// A point of a crack.

@@ -1,4 +1,4 @@
-//! [`PresetError`], and what a preset's fields may be.
+//! [`PresetError`], and the allowed values of a preset's fields.
 
 use super::CrackPreset;
 use crate::{growth::ParamError, paint::LookError};
@@ -7,21 +7,21 @@ use std::ops::RangeInclusive;
 /// The largest preset file, bytes.
 pub(super) const MAX_FILE: usize = 1 << 20;
 
-/// What is wrong with a preset or its file.
+/// An error in a preset or its file.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PresetError {
-    /// A number outside its range, or not finite.
+    /// A number is outside its range, or not finite.
     #[error("`{field}` is {}, must lie in {range}", plain(*value))]
     OutOfRange {
         /// Full name of the field, as in `growth.kill_distance`.
         field: String,
         /// Its value.
         value: f64,
-        /// What is allowed.
+        /// The allowed range.
         range: String,
     },
-    /// A field that cannot be what it is.
+    /// A part of the preset has a value that it cannot have.
     #[error("`{section}`: {reason}")]
     Field {
         /// The part of the preset, as in `growth`.
@@ -29,7 +29,7 @@ pub enum PresetError {
         /// Which field, and why.
         reason: String,
     },
-    /// The file is not what a preset file looks like.
+    /// The file is not valid RON, or not a preset.
     #[error("line {line}, column {column}: {reason}")]
     Unreadable {
         /// Line, from 1.
@@ -39,13 +39,13 @@ pub enum PresetError {
         /// What was found there.
         reason: String,
     },
-    /// The file's `base` is no preset.
+    /// The file's `base` is not the name of a preset.
     #[error("`base`: there is no preset `{name}`; there are {}", CrackPreset::NAMES.join(", "))]
     UnknownBase {
         /// The name asked for.
         name: String,
     },
-    /// The file is larger than any preset.
+    /// The file is larger than [`CrackPreset::MAX_FILE`].
     #[error("a preset of {bytes} bytes or more: the most is {}", MAX_FILE)]
     TooLarge {
         /// Bytes read.
@@ -53,7 +53,7 @@ pub enum PresetError {
     },
 }
 
-/// The number as somebody would write it: most of them come from single precision.
+/// Formats a number as it was written: most come from single precision.
 fn plain(value: f64) -> String {
     let single = value as f32;
     if f64::from(single) == value { single.to_string() } else { value.to_string() }
@@ -72,7 +72,7 @@ impl CrackPreset {
     /// ```
     ///
     /// # Errors
-    /// Names the first field that is out of its range or not finite.
+    /// [`PresetError::OutOfRange`] for the first field that is out of its range or not finite.
     pub fn validate(&self) -> Result<(), PresetError> {
         self.growth.validate().map_err(growth_error)?;
         let profile = &self.profile;
@@ -95,8 +95,8 @@ impl CrackPreset {
     }
 }
 
-/// Fields of the layouts are checked under the names by which [`GrowthParams::set`](crate::growth::GrowthParams::set) knows
-/// them; in a preset they have longer ones.
+/// Converts an error of the growth parameters. They use the names of
+/// [`GrowthParams::set`](crate::growth::GrowthParams::set) for the fields of layouts; a preset uses longer names.
 fn growth_error(error: ParamError) -> PresetError {
     match error {
         ParamError::OutOfRange { name, value, min, max } => {

@@ -1,4 +1,4 @@
-//! Presets as files, `*.crack.ron`.
+//! Preset files, `*.crack.ron`.
 
 use super::{CrackPreset, PresetError};
 use crate::{growth::GrowthParams, paint::Look, raster::Profile};
@@ -9,7 +9,8 @@ use serde::{
 };
 use std::{collections::BTreeMap, fmt};
 
-/// A preset file, read strictly: for its errors, with the places where they are. What is left out is not filled in here.
+/// A preset file with its strict structure. It is read only for its errors and their positions; missing fields are
+/// not taken from the base here.
 #[derive(Deserialize)]
 #[serde(rename = "CrackPreset", deny_unknown_fields, default)]
 struct Form {
@@ -28,10 +29,10 @@ impl Default for Form {
     }
 }
 
-/// The preset on which files stand that name none.
+/// The base of files that do not name one.
 const DEFAULT_BASE: &str = "concrete";
 
-/// The same file: what it holds and what it leaves to its base.
+/// The same file: the fields that it has, without those that it leaves to its base.
 #[derive(Deserialize)]
 #[serde(default)]
 struct Patch {
@@ -50,7 +51,7 @@ impl Default for Patch {
     }
 }
 
-/// The fields of a struct, not read yet.
+/// The fields of a struct as text.
 #[derive(Default)]
 struct Fields(BTreeMap<String, Box<RawValue>>);
 
@@ -65,7 +66,7 @@ impl<'de> Deserialize<'de> for Fields {
                 f.write_str("fields in parentheses")
             }
 
-            /// `()` is no struct to a reader that does not expect one.
+            /// Called for `()`, which is a unit unless a struct is expected.
             fn visit_unit<E>(self) -> Result<Fields, E> {
                 Ok(Fields::default())
             }
@@ -84,14 +85,14 @@ impl<'de> Deserialize<'de> for Fields {
 }
 
 impl CrackPreset {
-    /// What the names of preset files end in, without the first dot.
+    /// The extension of preset files, without the first dot.
     pub const EXTENSION: &str = "crack.ron";
 
     /// The largest preset file, bytes.
     pub const MAX_FILE: usize = super::check::MAX_FILE;
 
-    /// Reads a preset file: [RON](https://docs.rs/ron), every field of which may be left out. What is left out is as in the
-    /// preset that `base` names, or as in concrete.
+    /// Reads a preset file in the format [RON](https://docs.rs/ron). Every field can be left out; missing fields are
+    /// those of the preset that `base` names, or of concrete.
     ///
     /// ```
     /// use bevy_crack::CrackPreset;
@@ -111,8 +112,10 @@ impl CrackPreset {
     /// ```
     ///
     /// # Errors
-    /// If the text is longer than [`MAX_FILE`](Self::MAX_FILE), is not RON, has a field that no preset has, names a base that
-    /// is none, or a field is out of its range.
+    /// - [`PresetError::TooLarge`] if the text is longer than [`MAX_FILE`](Self::MAX_FILE);
+    /// - [`PresetError::Unreadable`] if it is not RON, or has a field that a preset does not have;
+    /// - [`PresetError::UnknownBase`] if `base` is not the name of a preset;
+    /// - [`PresetError::OutOfRange`] if a field is out of its range.
     pub fn from_ron(text: &str) -> Result<Self, PresetError> {
         if text.len() > Self::MAX_FILE {
             return Err(PresetError::TooLarge { bytes: text.len() });
@@ -132,10 +135,10 @@ impl CrackPreset {
         Ok(preset)
     }
 
-    /// The preset as a file, with every field.
+    /// Writes the preset as a file with every field.
     ///
     /// # Errors
-    /// If the preset could not be read again: it does not [`validate`](Self::validate).
+    /// If the preset does not [`validate`](Self::validate), and so could not be read again.
     pub fn to_ron(&self) -> Result<String, PresetError> {
         self.validate()?;
         let style = PrettyConfig::new().struct_names(false).new_line("\n");
@@ -143,7 +146,7 @@ impl CrackPreset {
     }
 }
 
-/// `base` with `fields` in the place of its own.
+/// `base` with its fields replaced by `fields`.
 fn patched<T: Serialize + DeserializeOwned>(base: &T, fields: Fields) -> Result<T, PresetError> {
     let options = options();
     let text = options.to_string(base).map_err(unwritable)?;
@@ -158,7 +161,7 @@ fn options() -> Options {
 }
 
 fn unreadable(error: SpannedError) -> PresetError {
-    // Where the reader stopped: its spans begin at the struct.
+    // The end is where the reader stopped; the start is that of the struct.
     let end = error.span.end;
     PresetError::Unreadable { line: end.line, column: end.col, reason: error.code.to_string() }
 }

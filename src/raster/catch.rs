@@ -1,4 +1,5 @@
-//! How much light a crack catches by where it runs: that of glass and ice flares here and is hardly seen there.
+//! How much light a crack catches, by its direction and place: cracks in glass and ice flare in some places and are
+//! hardly visible in others.
 
 use super::layer::noise;
 use crate::math::mix;
@@ -7,11 +8,11 @@ use glam::Vec2;
 /// The light comes from the upper left.
 const LIGHT: Vec2 = Vec2::new(-std::f32::consts::FRAC_1_SQRT_2, -std::f32::consts::FRAC_1_SQRT_2);
 
-/// Bumps of what swells and fades along cracks, a pattern unit, and of what differs from one direction to the next.
+/// Bumps per pattern unit of the noise along cracks, and of the noise over directions.
 const SLOW: f32 = 9.0;
 const DIRECTIONS: f32 = 1.6;
 
-/// What its draws are combined with. Frozen, like all that a seed gives.
+/// Salt of its random draws. Frozen: a seed must give the same result in every version.
 const OF_CATCH: u64 = 0xCA7C;
 
 /// See [`LayerPlan::catch`](super::LayerPlan::catch).
@@ -25,11 +26,11 @@ impl Catch {
         Self { share: share.clamp(0.0, 1.0), seed: mix(seed ^ OF_CATCH) as u32 }
     }
 
-    /// The share of its depth that a line has at `from`, and what it gains up to `to`.
+    /// The share of its depth that a line has at `from`, and its increase up to `to`.
     pub(super) fn of(&self, from: Vec2, to: Vec2) -> (f32, f32) {
         let way = (to - from).normalize_or_zero();
         let facing = way.perp_dot(LIGHT);
-        // Twice the angle: the same both ways.
+        // Twice the angle: a line and its reverse give the same value.
         let twice = DIRECTIONS * way.rotate(way);
         let turned = noise(self.seed, twice.x, twice.y);
         let at = |pos: Vec2| {

@@ -6,23 +6,25 @@ use glam::UVec2;
 /// Bits of a word of the tile set.
 const WORD: usize = u64::BITS as usize;
 
-/// What one rectangle costs beside its texels, in tiles: a copy in a batch is about as dear as 256 texels.
+/// Cost of one rectangle in addition to its texels, in tiles: a copy in a batch costs about as much as 256 texels.
 const CALL: u64 = 4;
 
-/// Below this depth of the splitting tree the best line is cut, further down the one in the middle, so that no set of
-/// tiles makes the tree deep.
+/// Up to this depth of the splitting tree the best line is cut, below it the middle one, so that no set of tiles
+/// makes the tree deep.
 const MAX_BEST_SPLITS: u32 = 16;
 
-/// Above this many marks they are no longer kept one by one: rectangles are of whole tiles then.
+/// With more marks than this they are no longer kept one by one: rectangles consist of whole tiles then.
 const MAX_MARKS: usize = 256;
 
-/// Room for so many marks and tiles, so that most surfaces ask for memory once.
+/// Initial capacity for marks and tiles, so that most surfaces allocate once.
 const FEW: usize = 64;
 
 /// The changed parts of a surface, in tiles of [`DirtyTiles::TILE`] texels.
 ///
-/// Asking an empty set costs nothing, and it owns no memory before the first mark; all else costs in proportion to the marked tiles.
-/// A few marks are kept as they are, too, so that rectangles hold no more of their tiles than was marked.
+/// Querying an empty set costs nothing, and the set allocates no memory before the first mark. Everything else costs
+/// in proportion to the marked tiles. The first few hundred marks are kept exactly, so that rectangles are no larger
+/// than what was marked.
+///
 ///
 /// ```
 /// use bevy_crack::raster::{DirtyTiles, TexelRect};
@@ -39,9 +41,9 @@ pub struct DirtyTiles {
     size: UVec2,
     /// One bit per tile; a row of tiles is `words_per_row` words. Empty before the first mark.
     tiles: Vec<u64>,
-    /// One bit per row of tiles that has a marked one.
+    /// One bit per row of tiles: whether it has a marked tile.
     rows: Vec<u64>,
-    /// What was marked, up to one more than [`MAX_MARKS`].
+    /// The marked rectangles, up to one more than [`MAX_MARKS`].
     marks: Vec<TexelRect>,
     marked: bool,
 }
@@ -53,7 +55,7 @@ impl DirtyTiles {
     /// Side of a tile, texels.
     pub const TILE: u32 = 8;
 
-    /// Nothing changed on a surface of `size` texels.
+    /// An empty set for a surface of `size` texels.
     #[must_use]
     pub fn new(size: UVec2) -> Self {
         Self { size, ..Self::default() }
@@ -104,11 +106,11 @@ impl DirtyTiles {
         self.marks.clear();
     }
 
-    /// Unmarks everything and appends rectangles that cover all that was marked: disjoint, few, not empty, in an order that depends on
-    /// the marked tiles alone. Each is the least one around what was marked within some tiles; after more than a few hundred marks,
-    /// those tiles as a whole.
+    /// Unmarks everything and appends rectangles that cover everything that was marked. They are few, disjoint and
+    /// not empty, and their order depends only on the marked tiles. Each is the smallest rectangle around the marks
+    /// within some tiles; after more than 256 marks it consists of whole tiles.
     ///
-    /// An unmarked tile is covered only where a rectangle more would cost more than the tile.
+    /// An unmarked tile is covered only where an additional rectangle would cost more than the tile.
     pub fn take_rects(&mut self, rects: &mut Vec<TexelRect>) {
         if self.is_empty() {
             return;
@@ -167,8 +169,9 @@ fn bounds(tiles: &[UVec2]) -> TileRect {
     rect
 }
 
-/// Appends disjoint rectangles that cover `tiles`: cuts their bounds in two, covers both sides, and takes one
-/// rectangle for both where that is not dearer. Sides of a cut never overlap, so neither do the rectangles.
+/// Appends disjoint rectangles that cover `tiles`: cuts their bounds in two, covers both sides, and uses one
+/// rectangle for both where that is not more expensive. The sides of a cut never overlap, so the rectangles do not
+/// either.
 fn cover(tiles: &mut [UVec2], level: u32, out: &mut Vec<TileRect>) {
     let whole = bounds(tiles);
     // A second rectangle can save at most the unmarked tiles.
@@ -198,15 +201,15 @@ fn cover(tiles: &mut [UVec2], level: u32, out: &mut Vec<TileRect>) {
     }
 }
 
-/// Halves the longer side.
+/// Cuts the longer side in the middle.
 fn middle_cut(whole: TileRect) -> (usize, u32) {
     let size = whole.size();
     let axis = usize::from(size.y > size.x);
     (axis, whole.min[axis] + size[axis] / 2)
 }
 
-/// The axis and line that leave the smallest bounds on both sides; of equals one across the longer side, then the one
-/// nearest the middle, then the first.
+/// The axis and line that leave the smallest bounds on both sides. Ties go to a cut across the longer side, then to
+/// the one nearest the middle, then to the first.
 fn best_cut(tiles: &[UVec2], whole: TileRect) -> (usize, u32) {
     let size = whole.size();
     let mut best = ((u64::MAX, true, u32::MAX), middle_cut(whole));

@@ -1,12 +1,13 @@
 //! Distance to the nearest crack, exact within reach.
 //!
-//! Columns first: how far up or down the nearest crack is, in two sweeps of whole rows. Then along each row the least of
-//! `dx² + dy²` over the texels within reach, 16 bits each: that has no branches, and blocks without a crack in reach are left out.
+//! Columns first: the distance up or down to the nearest crack, in two sweeps over whole rows. Then along each row
+//! the smallest `dx² + dy²` over the texels within reach, in 16 bits: this loop has no branches, and blocks without a
+//! crack in reach are skipped.
 
 use super::DepthField;
 use crate::Grid;
 
-/// The farthest reach of [`crack_distance`], texels: squares stay below 2¹⁵.
+/// The largest reach of [`crack_distance`], texels: squares stay below 2¹⁵.
 pub const MAX_DISTANCE: u8 = 127;
 
 /// Texels whose distances are computed at once.
@@ -14,7 +15,8 @@ const BLOCK: usize = 32;
 
 /// Distance from each texel's centre to that of the nearest texel at least `depth` deep, texels.
 ///
-/// Exact up to `reach` (cut to [`MAX_DISTANCE`]); `f32::INFINITY` beyond.
+/// Exact up to `reach` (clamped to [`MAX_DISTANCE`]); `f32::INFINITY` beyond.
+///
 ///
 /// ```
 /// use bevy_crack::{pattern::SurfaceFrame, raster::{DepthField, crack_distance}};
@@ -58,7 +60,7 @@ pub fn crack_distance(field: &DepthField, depth: u16, reach: u8) -> Grid<f32> {
 }
 
 /// 0 where a texel is at least `depth` deep, `far` elsewhere.
-// Where it is inlined the compiler forgets that its slices do not overlap, and takes texel by texel.
+// If it is inlined the compiler no longer knows that the slices do not overlap, and does not vectorize.
 #[inline(never)]
 fn begin(out: &mut [u8], row: &[u16], depth: u16, far: u8) {
     for (out, &texel) in out.iter_mut().zip(row) {
@@ -66,7 +68,7 @@ fn begin(out: &mut [u8], row: &[u16], depth: u16, far: u8) {
     }
 }
 
-/// One row further: a step more, or what is nearer in this row.
+/// The next row: one step further, or a nearer crack in this row.
 #[inline(never)]
 fn carry_on(columns: &mut [u8], row: &[u8]) {
     for (column, &here) in columns.iter_mut().zip(row) {
@@ -79,7 +81,7 @@ fn far_square(reach: u8) -> i16 {
     (i16::from(reach) + 1) * (i16::from(reach) + 1)
 }
 
-/// Steps to the side between two looks at how far it is worth going.
+/// Steps to the side between two checks of how far the search must go.
 const STRIDE: usize = 4;
 
 /// The least of `squares + dx²` over all `dx` within reach, as distances, for the texels between two margins of `reach`.

@@ -1,9 +1,31 @@
-//! Networks to a depth field, anti-aliased, combined by max.
+//! Draws networks into a depth field, anti-aliased and combined by max.
 //!
-//! Depth is 16 bits a texel: 0 = untouched, 65535 = the deepest. Because stamps combine by max, painting is order-free
-//! and a segment can be stamped again, wider, without its neighbours.
+//! Depth is 16 bits a texel: 0 = untouched, 65535 = the deepest. Stamps are combined by max, so their order does not
+//! matter and a segment can be stamped again with a larger width without its neighbours.
 //!
-//! Beside depths a field may hold what some looks show ([`LayerPlan`]): plates, crushed zones and veils.
+//! In addition to depths a field can hold the layers that some looks show ([`LayerPlan`]): plates, crushed zones and
+//! veils.
+//!
+//! ```
+//! use bevy_crack::{
+//!     growth::{CrackGrowth, GrowthParams},
+//!     pattern::SurfaceFrame,
+//!     raster::{DepthField, Profile, stamp_path},
+//! };
+//!
+//! let frame = SurfaceFrame::new([64, 64].into())?;
+//! let mut growth = CrackGrowth::new(GrowthParams::DEFAULT, frame.extent(), 7)?;
+//! growth.hit([0.5, 0.5].into(), 1.0);
+//! while growth.step().grew() {}
+//!
+//! let mut field = DepthField::new(frame);
+//! let network = growth.network();
+//! for path in network.segments().filter_map(|segment| network.path(segment)) {
+//!     stamp_path(&mut field, &Profile::DEFAULT, &path);
+//! }
+//! assert!(field.depth.as_slice().iter().any(|&depth| depth > 0));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod catch;
 mod dirty;
@@ -31,11 +53,11 @@ use glam::UVec2;
 /// How deep the crack is at each texel: 0 = untouched, 65535 = the deepest; row-major from the top left.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DepthField {
-    /// Where the field lies in pattern space.
+    /// The position of the field in pattern space.
     pub frame: SurfaceFrame,
     /// One value per texel of the frame.
     pub depth: Grid<u16>,
-    /// Texels that stay untouched.
+    /// Texels that always stay untouched.
     forbidden: Option<Grid<bool>>,
     layer: Layer,
 }
@@ -44,13 +66,14 @@ impl DepthField {
     /// An untouched field.
     #[must_use]
     pub fn new(frame: SurfaceFrame) -> Self {
-        // Written twice: new memory is dear at the first write of each page, which else comes when cracks grow.
+        // Written twice: the first write to each page of new memory is slow (a page fault), and it should not happen
+        // while cracks grow.
         let mut depth = Grid::new(frame.size(), u16::MAX);
         std::hint::black_box(&mut depth).as_mut_slice().fill(0);
         Self { frame, depth, forbidden: None, layer: Layer::default() }
     }
 
-    /// Takes the depths out, and leaves a field without texels in the same place, on which nothing is drawn.
+    /// Moves the field out and leaves one without texels, on which nothing is drawn.
     #[cfg(feature = "bevy")]
     pub(crate) fn take(&mut self) -> Self {
         let empty =
@@ -58,33 +81,35 @@ impl DepthField {
         std::mem::replace(self, empty)
     }
 
-    /// Makes all of it untouched. What is forbidden stays so.
+    /// Makes all texels untouched. Forbidden texels stay forbidden.
     pub fn clear(&mut self) {
         self.depth.as_mut_slice().fill(0);
         self.layer.clear(self.frame);
     }
 
-    /// Lets it hold what `plan` says beside depths, of which nothing is there at first.
+    /// Sets the layers that the field holds in addition to depths, all empty.
     pub fn lay(&mut self, plan: LayerPlan) {
         self.layer = Layer::new(plan, self.frame);
     }
 
-    /// What it holds beside depths.
+    /// The layers that the field holds in addition to depths.
     #[must_use]
     pub const fn plan(&self) -> &LayerPlan {
         self.layer.plan()
     }
 
-    /// Makes what it holds beside depths that of `network` at `moment`; appends the rectangles of the texels that may be others now.
+    /// Updates the layers to those of `network` at `moment`, and appends the rectangles of the texels that may have
+    /// changed.
     ///
-    /// Network and timeline must be those of one growth, which may have grown since the last time. What it holds depends on the moment
-    /// alone. A cell that closes costs its own area once, a hit its crushed zone. [`Replay::show`] does it by itself.
+    /// `network` and `timeline` must belong to one growth, which may have grown since the last call. The result
+    /// depends only on the moment. A cell that closes costs its own area once, a hit its crushed zone.
+    /// [`Replay::show`] calls this itself.
     pub fn show_layer(&mut self, network: &Network, timeline: &Timeline, moment: Moment, changed: &mut Vec<TexelRect>) {
         self.begin_layer(network, timeline, moment, changed);
         self.crush(usize::MAX, changed);
     }
 
-    /// The same, but for what hits have crushed: that is drawn by [`crush`](Self::crush).
+    /// Like [`show_layer`](Self::show_layer) without the crushed zones, which [`crush`](Self::crush) draws.
     pub(crate) fn begin_layer(
         &mut self,
         network: &Network,
@@ -96,26 +121,28 @@ impl DepthField {
         changed.retain(|rect| !rect.is_empty());
     }
 
-    /// Takes up the hits until then, so that what they have crushed can be drawn; [`begin_layer`](Self::begin_layer) does it by itself.
+    /// Registers the hits up to `moment`, so that their crushed zones can be drawn;
+    /// [`begin_layer`](Self::begin_layer) does the same.
     #[cfg_attr(not(feature = "bevy"), expect(dead_code, reason = "surfaces of the plugin are hit"))]
     pub(crate) fn follow_hits(&mut self, timeline: &Timeline, moment: Moment) {
         self.layer.follow(timeline, moment);
     }
 
-    /// Draws what hits have crushed, at most so many tiles of 32 x 32 texels, from each hit outward. Returns whether any are left.
+    /// Draws at most `tiles` tiles of 32 x 32 texels of the crushed zones, from each hit outward. Returns whether any
+    /// are left.
     pub(crate) fn crush(&mut self, tiles: usize, changed: &mut Vec<TexelRect>) -> bool {
         let is_left = self.layer.crush(tiles, self.forbidden.as_ref(), changed);
         changed.retain(|rect| !rect.is_empty());
         is_left
     }
 
-    /// Whether any are left.
+    /// Whether tiles of crushed zones are left to draw.
     #[cfg_attr(not(feature = "bevy"), expect(dead_code, reason = "surfaces of the plugin are hit"))]
     pub(crate) fn is_behind(&self) -> bool {
         self.layer.is_behind()
     }
 
-    /// Goes on with a network whose oldest part was forgotten: what is shown stays.
+    /// Continues with a network whose oldest part was removed: what is shown stays.
     #[cfg_attr(not(feature = "bevy"), expect(dead_code, reason = "surfaces of the plugin forget"))]
     pub(crate) fn freeze_layer(&mut self, network: &Network, timeline: &Timeline) {
         self.layer.freeze(network, timeline);
@@ -125,9 +152,9 @@ impl DepthField {
         &self.layer
     }
 
-    /// Keeps every texel whose centre `mask` forbids untouched from now on, and gives back those that are not.
+    /// Keeps every texel whose centre `mask` forbids untouched from now on, and clears those that were drawn on.
     ///
-    /// Growth keeps its lines out of them; this keeps the width of the lines out as well.
+    /// Growth keeps the centre lines out of these texels; this keeps the width of the lines out as well.
     pub fn forbid(&mut self, mask: &CrackMask) {
         let size = self.frame.size();
         self.forbidden = mask.forbidden.as_ref().map(|_| {
@@ -143,7 +170,7 @@ impl DepthField {
         self.spare(TexelRect::whole(size));
     }
 
-    /// Takes back what was stamped on forbidden texels in `rect`.
+    /// Clears the forbidden texels in `rect`.
     fn spare(&mut self, rect: TexelRect) {
         let Some(forbidden) = &self.forbidden else { return };
         for y in rect.min.y..rect.max.y {
@@ -173,21 +200,23 @@ impl DepthField {
 pub struct Profile {
     /// Depth in the middle of a crack of [`full_width`](Self::full_width) or more. Range 0..=1; default 1.
     pub depth: f32,
-    /// Width at which a crack reaches full depth; thinner ones are shallower, down to 40 %. Pattern units, > 0; default 0.02.
+    /// Width at which a crack reaches full depth; thinner cracks are shallower, down to 40 %. Pattern units, > 0;
+    /// default 0.02.
     pub full_width: f32,
-    /// How much of the half width is wall: 0 = a slot with upright walls, 1 = a V. Range 0..=1; default 0.6.
+    /// Share of the half width that is wall: 0 = a slot with upright walls, 1 = a V. Range 0..=1; default 0.6.
     pub wall: f32,
     /// Width of the chipped rim on either side. Pattern units, 0..=0.2; default 0.
     pub rim_width: f32,
-    /// Depth of the rim where it meets the crack, falling to 0 outward. Range 0..=1; default 0.
+    /// Depth of the rim where it meets the crack; it falls to 0 outward. Range 0..=1; default 0.
     pub rim_depth: f32,
-    /// How slowly lines thinner than a texel fade: they are full down to a width of `1 - faintest` texels, and fade by their width
-    /// from there: 0 = they cover as much as they are wide. Range 0..=1; default 0.
+    /// How slowly lines thinner than a texel fade. They are fully visible down to a width of `1 - faintest` texels,
+    /// and fade in proportion to their width below: 0 = they cover as much as they are wide. Range 0..=1; default 0.
     ///
-    /// Keeps fine cracks visible on small pictures; the ends of needles fade all the same.
+    /// Larger values keep fine cracks visible on small pictures. Pointed ends fade all the same.
     pub faintest: f32,
-    /// Whether walls are equally steep whatever the width: depth then tells how far the edge is, and is 1 half a
-    /// [`full_width`](Self::full_width) away from it. [`wall`](Self::wall) does not count then. For [drawn](crate::paint::Cel) cracks; default false.
+    /// Whether walls are equally steep at every width. Depth then measures the distance from the edge, and is 1 half
+    /// a [`full_width`](Self::full_width) away from it; [`wall`](Self::wall) has no effect. For
+    /// [drawn](crate::paint::Cel) cracks; default false.
     pub even_walls: bool,
 }
 

@@ -1,4 +1,4 @@
-//! [`TexelRect`].
+//! [`TexelRect`]: a rectangle of texels.
 
 use glam::UVec2;
 
@@ -47,14 +47,14 @@ impl TexelRect {
         }
     }
 
-    /// The texels in both; the default if there are none, so that no rectangle ends before it begins.
+    /// The texels in both; the default (empty) if there are none, so that `min` never exceeds `max`.
     #[must_use]
     pub fn intersect(self, other: Self) -> Self {
         let both = Self { min: self.min.max(other.min), max: self.max.min(other.max) };
         if both.is_empty() { Self::default() } else { both }
     }
 
-    /// Grown by `by` texels on every side, within a surface of `size`.
+    /// Grown by `by` texels on every side, clipped to a surface of `size`.
     #[must_use]
     pub fn grow(self, by: u32, size: UVec2) -> Self {
         if self.is_empty() {

@@ -7,10 +7,10 @@ use crate::{
 };
 use glam::{UVec2, Vec2};
 
-/// Depth of the discs that stand for markers.
+/// Depth of the discs that represent markers.
 pub const DOT_DEPTH: f32 = 0.5;
 
-/// Side of a tile, texels: what changes is cleared and drawn again by tiles.
+/// Side of a tile, texels: changes are cleared and drawn again in whole tiles.
 const TILE: u32 = 8;
 
 /// Side of a cell of the index, tiles.
@@ -20,9 +20,11 @@ const NONE: u32 = u32::MAX;
 
 /// Shows a network in a [`DepthField`] as it was at any [`Moment`].
 ///
-/// The field depends on the moment alone, bit for bit, not on the moments shown before: tiles under what has changed are
-/// cleared, and whatever touches them is stamped again. At the end of the timeline the field is that of stamping every segment
-/// once. A move costs as much as what changes between the two moments, not as the network.
+/// The field depends only on the moment, bit for bit, and not on the moments shown before: tiles under a change are
+/// cleared, and everything that touches them is stamped again. At the end of the timeline the field equals the result
+/// of stamping every segment once. A move costs in proportion to the changes between the two moments, not to the
+/// network.
+///
 ///
 /// ```
 /// use bevy_crack::{
@@ -56,9 +58,9 @@ pub struct Replay {
     size: UVec2,
     profile: Profile,
     at: Moment,
-    /// Whether the field may hold anything.
+    /// Whether the field may have any content and must be redrawn.
     is_stale: bool,
-    /// What of the timeline is in the index.
+    /// The entries of the timeline that are in the index.
     seen: Entries,
     parts: Vec<Part>,
     /// Part, first child and next sibling of each node.
@@ -68,16 +70,16 @@ pub struct Replay {
     dots: Vec<u32>,
     cells: Vec<Vec<u32>>,
     tiles: UVec2,
-    /// Per tile and cell: the last move that has marked it.
+    /// Per tile and cell: the last move that marked it.
     tile_marks: Vec<u32>,
     cell_marks: Vec<u32>,
     /// Number of the move.
     turn: u32,
-    /// Marked tiles, how many of them have been seen to, and their texels before the move.
+    /// Marked tiles, how many of them are done, and their texels before the move.
     marked: Vec<u32>,
     drawn: usize,
     before: Vec<[u16; (TILE * TILE) as usize]>,
-    /// The same of veils, if there are any.
+    /// The veil texels of those tiles before the move, if there are veils.
     veils_before: Vec<[u8; (TILE * TILE) as usize]>,
 }
 
@@ -92,9 +94,9 @@ struct Kin {
 #[derive(Clone, Copy, Debug)]
 struct Part {
     what: What,
-    /// Holds everything that it has ever stamped.
+    /// Contains all texels that it has ever stamped.
     rect: TexelRect,
-    /// The last move that has changed it, and the last that has looked at it.
+    /// The last move that changed it, and the last that visited it.
     changed: u32,
     visited: u32,
 }
@@ -105,15 +107,15 @@ enum What {
     Dot(u32),
 }
 
-/// What a move of a [`Replay`] has done.
+/// The result of a move of a [`Replay`].
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Redrawn {
-    /// Tiles that were cleared and drawn again, disjoint.
+    /// Tiles that were cleared and drawn again; disjoint.
     pub cleared: Vec<TexelRect>,
-    /// The texels of each segment that was stamped.
+    /// The rectangle of each segment that was stamped.
     pub stamped: Vec<TexelRect>,
-    /// What is not as before: of depths, disjoint rectangles that each lie within a tile, then those of cells that have closed or opened and
-    /// of hits.
+    /// The texels that differ from before: first those of depths, as disjoint rectangles that each lie within a tile,
+    /// then those of cells that have closed or opened, and of hits.
     pub changed: Vec<TexelRect>,
 }
 
@@ -126,7 +128,7 @@ impl Redrawn {
 }
 
 impl Replay {
-    /// For an untouched field of `size` texels; cracks have the cross-section `profile`.
+    /// A replay for an untouched field of `size` texels; cracks have the cross-section `profile`.
     #[must_use]
     pub fn new(size: UVec2, profile: Profile) -> Self {
         let tiles = UVec2::new(size.x.div_ceil(TILE), size.y.div_ceil(TILE));
@@ -154,7 +156,7 @@ impl Replay {
         }
     }
 
-    /// For a field that holds anything: the first move draws all of it anew.
+    /// A replay for a field with any content: the first move redraws all of it.
     #[must_use]
     pub fn over(size: UVec2, profile: Profile) -> Self {
         Self { is_stale: true, ..Self::new(size, profile) }
@@ -166,16 +168,16 @@ impl Replay {
         self.at
     }
 
-    /// Whether the next move draws all of the field anew.
+    /// Whether the next move redraws the whole field.
     #[cfg(feature = "bevy")]
     pub(crate) const fn is_stale(&self) -> bool {
         self.is_stale
     }
 
-    /// Makes `field` show `network` at the moment `to`, and tells in `redrawn` what has changed.
+    /// Makes `field` show `network` at the moment `to`, and writes the changes to `redrawn`.
     ///
-    /// `field` must be the one of the moves before, unchanged (one of another size is drawn anew), and `network` and `timeline`
-    /// those of one growth, which may have grown since.
+    /// `field` must be the field of the moves before, unchanged (a field of another size is redrawn completely).
+    /// `network` and `timeline` must belong to one growth, which may have grown since.
     pub fn show(
         &mut self,
         field: &mut DepthField,
@@ -188,7 +190,7 @@ impl Replay {
         field.crush(usize::MAX, &mut redrawn.changed);
     }
 
-    /// The same, but for what hits have [crushed](DepthField::crush).
+    /// Like [`show`](Self::show) without the [crushed](DepthField::crush) zones.
     pub(crate) fn show_lines(
         &mut self,
         field: &mut DepthField,
@@ -202,7 +204,7 @@ impl Replay {
         self.end(field, network, timeline, redrawn);
     }
 
-    /// The first part of [`show`](Self::show): clears what will be drawn anew.
+    /// The first part of [`show`](Self::show): clears the tiles that will be redrawn.
     pub(crate) fn begin(
         &mut self,
         field: &mut DepthField,
@@ -216,7 +218,7 @@ impl Replay {
         }
         redrawn.clear();
         self.turn += 1;
-        let seen = self.take_up(field, network, timeline);
+        let seen = self.index_new(field, network, timeline);
         if std::mem::take(&mut self.is_stale) {
             for tile in 0..self.tiles.x * self.tiles.y {
                 self.mark_tile(tile);
@@ -229,10 +231,12 @@ impl Replay {
         self.clear_marked(field, redrawn);
     }
 
-    /// Marks the tiles under all that is not at the moment `to` as it is shown. Of the timeline, `seen` is shown.
+    /// Marks the tiles under everything that differs between the shown moment and `to`. The entries `seen` of the
+    /// timeline are shown.
     fn mark_changes(&mut self, timeline: &Timeline, seen: Entries, to: Moment) {
         let (early, late) = (self.at.min(to), self.at.max(to));
-        // Steps that have begun at one moment and are not over at the other, and steps written since, if they have begun.
+        // Steps that have begun at one moment and are not over at the other, and steps added since, if they have
+        // begun.
         let (over, begun, new) =
             (timeline.entries(early.whole()), timeline.entries(late.begun()), timeline.entries(to.begun()));
         let range = |count: fn(&Entries) -> usize| {
@@ -261,7 +265,7 @@ impl Replay {
         }
     }
 
-    /// Marks what changes with the width of a node: a branch tapers between two widths.
+    /// Marks the segments that change with the width of a node: a branch tapers between two widths.
     fn mark_width(&mut self, timeline: &Timeline, node: usize, late: Moment) {
         let Kin { part, mut child, .. } = self.nodes[node];
         self.mark_part(part);
@@ -298,7 +302,7 @@ impl Replay {
         TexelRect { min, max: (min + TILE).min(self.size) }
     }
 
-    /// Clears the marked tiles, keeping what was there.
+    /// Clears the marked tiles and keeps a copy of their texels.
     fn clear_marked(&mut self, field: &mut DepthField, redrawn: &mut Redrawn) {
         self.before.clear();
         for &tile in &self.marked {
@@ -326,8 +330,9 @@ impl Replay {
         }
     }
 
-    /// The second part: stamps what touches a marked tile, all of it: beside the marked tiles it changes nothing, for it is there
-    /// already. Looks at no more than about `most` segments; says whether it is done.
+    /// The second part: stamps every segment that touches a marked tile. Outside the marked tiles this changes
+    /// nothing, because the segment is already there. Visits no more than about `most` segments; returns whether it
+    /// is done.
     pub(crate) fn draw(
         &mut self,
         field: &mut DepthField,
@@ -372,8 +377,8 @@ impl Replay {
         self.drawn == self.marked.len()
     }
 
-    /// The last part but one: notes the texels of the marked tiles that differ from before, and makes all else that the field holds follow,
-    /// but for what hits have [crushed](DepthField::crush).
+    /// The third part: records the texels of the marked tiles that differ from before, and updates all other layers
+    /// of the field except the [crushed](DepthField::crush) zones.
     pub(crate) fn end(
         &mut self,
         field: &mut DepthField,
@@ -400,8 +405,8 @@ impl Replay {
         field.begin_layer(network, timeline, self.at, &mut redrawn.changed);
     }
 
-    /// Puts into the index what was written since the last time; returns how much was in it before.
-    fn take_up(&mut self, field: &DepthField, network: &Network, timeline: &Timeline) -> Entries {
+    /// Adds new entries of the timeline to the index; returns the entries that were in it before.
+    fn index_new(&mut self, field: &DepthField, network: &Network, timeline: &Timeline) -> Entries {
         let (seen, all) = (self.seen, timeline.entries(u32::MAX));
         if seen == all {
             return seen;
@@ -445,7 +450,7 @@ impl Replay {
         self.parts.len() as u32 - 1
     }
 
-    /// Finds the texels of a part, and enters it in the cells that it touches now and has not before.
+    /// Computes the rectangle of a part, and adds the part to the cells that it newly touches.
     fn measure(&mut self, index: u32, field: &DepthField, network: &Network, timeline: &Timeline) {
         let Some(part) = self.parts.get_mut(index as usize) else { return };
         let (low, high, radius) = match part.what {
@@ -461,7 +466,7 @@ impl Replay {
                 (dot.pos, dot.pos, dot.radius)
             }
         };
-        // The edge of a stamp is a texel soft; one more for rounding.
+        // The edge of a stamp is one texel wide; one more for rounding.
         let reach = (radius + self.profile.rim_width.max(0.0)) * field.frame.texels_per_unit() + 2.5;
         let hang = match (part.what, &field.layer.veil) {
             (What::Segment(_), Some(veil)) => veil.hang(),
@@ -490,7 +495,7 @@ impl Replay {
     }
 }
 
-/// The texels of a tile at `rect` that are not as before.
+/// The texels of a tile at `rect` that differ from before.
 fn differing<T: Copy + PartialEq>(now: &Grid<T>, before: &[T; (TILE * TILE) as usize], rect: TexelRect) -> TexelRect {
     let mut changed = TexelRect::default();
     for (y, kept) in (rect.min.y..rect.max.y).zip(before.chunks_exact(TILE as usize)) {

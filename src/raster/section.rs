@@ -1,17 +1,17 @@
-//! The cross-section of a crack in texels: what the stamps compute with, the formula being theirs.
+//! The cross-section of a crack in texels, for the stamps; `raster/stamp.rs` has the formula.
 
 use super::Profile;
 
-/// Half widths are cut to this many texels, far above the diagonal of the largest surface.
+/// Half widths are clamped to this many texels, far above the diagonal of the largest surface.
 pub(super) const MAX_RADIUS: f32 = 1.0e6;
 
-/// The larger one; unlike `f32::max` without regard to NaN, so that it is one instruction on every machine.
+/// The larger one. It ignores NaN handling, unlike `f32::max`, so that it is one instruction on every machine.
 #[inline(always)]
 pub(super) fn max(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
-/// The smaller one; as [`max`].
+/// The smaller one; see [`max`].
 #[inline(always)]
 pub(super) fn min(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
@@ -22,9 +22,9 @@ pub(super) fn clamp01(x: f32) -> f32 {
     min(max(x, 0.0), 1.0)
 }
 
-/// `x` within `0..=top`, zero if not a number.
+/// `x` clamped to `0..=top`; zero if it is NaN.
 #[inline]
-pub(super) fn at_door(x: f32, top: f32) -> f32 {
+pub(super) fn clamped(x: f32, top: f32) -> f32 {
     clamp01(x / top) * top
 }
 
@@ -32,22 +32,22 @@ pub(super) fn at_door(x: f32, top: f32) -> f32 {
 #[derive(Clone, Copy)]
 pub(super) struct Section {
     depth: f32,
-    /// Share of depth that the thinnest cracks have.
+    /// Share of the depth of the thinnest cracks.
     least: f32,
-    /// What a texel of half width adds to it.
+    /// Increase of that share per texel of half width.
     gain: f32,
     wall: f32,
     rim: f32,
     pub(super) rim_depth: f32,
     pub(super) inv_rim: f32,
-    /// What a texel of half width adds to the share of its rim that a crack has, and the share without any.
+    /// Increase of the rim's share per texel of half width, and the share at width 0.
     rim_gain: f32,
     rim_least: f32,
-    /// What a texel of half width adds to the share of its depth that a thin line has.
+    /// Increase of a thin line's share of depth per texel of half width.
     strength: f32,
 }
 
-/// The cross-section where the half width is known.
+/// The cross-section at a known half width.
 #[derive(Clone, Copy)]
 pub(super) struct Cut {
     pub(super) peak: f32,
@@ -63,23 +63,23 @@ pub(super) struct Cut {
 
 impl Section {
     pub(super) fn new(profile: &Profile, texels_per_unit: f32) -> Self {
-        let full_width = max(at_door(profile.full_width * texels_per_unit, MAX_RADIUS), 1.0e-6);
-        let rim = at_door(profile.rim_width * texels_per_unit, MAX_RADIUS);
+        let full_width = max(clamped(profile.full_width * texels_per_unit, MAX_RADIUS), 1.0e-6);
+        let rim = clamped(profile.rim_width * texels_per_unit, MAX_RADIUS);
         Self {
-            depth: at_door(profile.depth, 1.0),
+            depth: clamped(profile.depth, 1.0),
             least: if profile.even_walls { 2.0 / full_width } else { 0.4 },
             gain: if profile.even_walls { 2.0 } else { 1.2 } / full_width,
-            wall: if profile.even_walls { 1.0 } else { at_door(profile.wall, 1.0) },
+            wall: if profile.even_walls { 1.0 } else { clamped(profile.wall, 1.0) },
             rim,
-            rim_depth: if rim > 0.0 { at_door(profile.rim_depth, 1.0) } else { 0.0 },
+            rim_depth: if rim > 0.0 { clamped(profile.rim_depth, 1.0) } else { 0.0 },
             inv_rim: 1.0 / max(rim, 1.0),
-            strength: 2.0 / max(1.0 - at_door(profile.faintest, 1.0), 1.0e-3),
+            strength: 2.0 / max(1.0 - clamped(profile.faintest, 1.0), 1.0e-3),
             rim_gain: 0.0,
             rim_least: 1.0,
         }
     }
 
-    /// The same with whole rims from a width of `full` pattern units on only, if that is not zero.
+    /// The same with whole rims only from a width of `full` pattern units on, if that is not zero.
     pub(super) fn with_rims(mut self, full: f32, texels_per_unit: f32) -> Self {
         if full > 0.0 {
             (self.rim_gain, self.rim_least) = (2.0 / max(full * texels_per_unit, 1.0e-3), 0.0);
@@ -89,7 +89,7 @@ impl Section {
 
     pub(super) fn upright(depth: f32) -> Self {
         Self {
-            depth: at_door(depth, 1.0),
+            depth: clamped(depth, 1.0),
             least: 0.4,
             gain: MAX_RADIUS,
             wall: 0.0,
@@ -102,7 +102,7 @@ impl Section {
         }
     }
 
-    /// The cut at half width `r`. Each of the stamping loops calls it, so that both give the same bits.
+    /// The cross-section at half width `r`. All stamping loops call this, so that they give the same bits.
     #[inline(always)]
     pub(super) fn cut(&self, r: f32) -> Cut {
         let core = max(r, 0.5);
@@ -116,7 +116,7 @@ impl Section {
         }
     }
 
-    /// Distance from the centre line at which nothing is left.
+    /// Distance from the centre line beyond which nothing is drawn.
     pub(super) fn reach(&self, r: f32) -> f32 {
         let rim = if self.rim_depth > 0.0 { r + self.rim } else { 0.0 };
         max(max(r, 0.5) + 0.5, rim)

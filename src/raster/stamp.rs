@@ -1,7 +1,7 @@
 //! Anti-aliased stamps: tapered capsules and discs, combined by max.
 //!
-//! One kernel does it all. The distance `d` of a texel centre to the centre line and the half width `r` at the nearest
-//! point of that line give the depth (both in texels):
+//! One kernel draws all of them. The distance `d` of a texel centre to the centre line and the half width `r` at the
+//! nearest point of that line give the depth (both in texels):
 //!
 //! ```text
 //! core = peak(r) * clamp((r + 1/2 - d) / (1 + wall * r), 0, 1)
@@ -9,21 +9,23 @@
 //! depth = max(core, rim) * min(2 r / (1 - faintest), 1)
 //! ```
 //!
-//! `peak(r)` is 40 % of the depth and more with `r`, up to all of it at the full width; with even walls it is `(1 + r) / full` and `wall` 1, so that
-//! depth counts the texels to the edge.
+//! `peak(r)` rises with `r` from 40 % of the depth to all of it at the full width. With even walls it is `(1 + r) /
+//! full` and `wall` is 1, so that depth measures the distance to the edge in texels.
 //!
-//! The core is a slot whose edge is one texel soft (`wall` 0) up to a V (`wall` 1). Lines thinner than a texel keep the
-//! cross-section of one texel (`r` = 1/2 in `core`) and only get fainter, by the last factor: a line 0.3 texels wide
-//! covers 0.3 texels of area (`faintest` 0) wherever it lies between the texel centres, and is never dotted. A needle fades out.
+//! The core is a slot with an edge one texel wide (`wall` 0) up to a V (`wall` 1). Lines thinner than a texel keep
+//! the cross-section of one texel (`r` = 1/2 in `core`) and only get fainter, by the last factor: a line 0.3 texels
+//! wide covers 0.3 texels of area (`faintest` 0) wherever it lies between the texel centres, and is never dotted. A
+//! pointed end fades out.
 //!
-//! Where a [plan](super::LayerPlan) says so, a line has only a share of that, by the light that it catches, and narrow ones less of a rim.
+//! If a [plan](super::LayerPlan) says so, a line has only a share of that depth, by the light that it catches, and
+//! narrow lines have a fainter rim.
 //!
-//! The value depends on the texel and the capsule alone, and grows with `r`: stamps may come in any order.
+//! The value depends only on the texel and the capsule, and grows with `r`: stamps can be drawn in any order.
 
 use super::{
     DepthField, DirtyTiles, Profile, TexelRect,
     catch::Catch,
-    section::{MAX_RADIUS, Section, at_door, clamp01, max, min},
+    section::{MAX_RADIUS, Section, clamp01, clamped, max, min},
 };
 use crate::{
     math::vectorized,
@@ -34,36 +36,36 @@ use glam::{DVec2, UVec2, Vec2, Vec4};
 /// Texels computed at once. Eight `f32` are one AVX register or two of SSE; 16 spill there, 4 leave half of the latency of `sqrt` unused.
 const LANES: usize = 8;
 
-/// So many blocks in a row are few.
+/// Up to this many blocks in a row use the loop for few blocks.
 const FEW_BLOCKS: usize = 3;
 
 /// Centres of the texels of one block, from its left edge.
 const CENTRES: [f32; LANES] = [0.5, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5, 7.5];
 
-/// Changes are told for so many rows at once: those of a row of dirty tiles.
+/// Changes are reported for this many rows at once: those of a row of dirty tiles.
 const BAND: u32 = DirtyTiles::TILE;
 
-/// Texels that come from memory at once, or fewer.
+/// Texels in a cache line.
 const CACHE_LINE: usize = 64 / size_of::<u16>();
 
 /// How far outside the reach of a capsule a rounding error can still leave a trace, texels.
 const MARGIN: f32 = 0.0625;
 
 /// Lines flatter than this (texels along per texel down) are not narrowed row by row: it would gain little, and the
-/// rounding error of a row's middle grows with it.
+/// rounding error of a row's middle grows with the flatness.
 const FLATTEST: f32 = 64.0;
 
 /// Stamps the rough line of one segment into `field`; returns the texels that it may have changed.
 ///
-/// Half widths are linear between the points of the path. Points that are not finite are skipped with the pieces
-/// beside them; widths below zero or not a number count as zero.
+/// Half widths are linear between the points of the path. Points that are not finite are skipped, with the pieces
+/// beside them. Widths below zero and NaN count as zero.
 pub fn stamp_path(field: &mut DepthField, profile: &Profile, path: &SegmentPath) -> TexelRect {
     stamp_pieces::<false>(field, profile, path, &mut |_| {})
 }
 
-/// As [`stamp_path`]; calls `changed` with small rectangles that together hold every texel that is not as before.
+/// Like [`stamp_path`], and calls `changed` with small rectangles that together contain every changed texel.
 ///
-/// They hold far fewer texels than the rectangle that is returned where a line is slanted, or lies over deeper ones.
+/// They contain far fewer texels than the returned rectangle where a line is slanted, or lies over deeper lines.
 pub fn stamp_path_with(
     field: &mut DepthField,
     profile: &Profile,
@@ -73,8 +75,8 @@ pub fn stamp_path_with(
     stamp_pieces::<true>(field, profile, path, changed)
 }
 
-/// Stamps a path; calls `changed` if `TELL`.
-fn stamp_pieces<const TELL: bool>(
+/// Stamps a path; calls `changed` if `REPORT`.
+fn stamp_pieces<const REPORT: bool>(
     field: &mut DepthField,
     profile: &Profile,
     path: &SegmentPath,
@@ -90,12 +92,12 @@ fn stamp_pieces<const TELL: bool>(
             if let Some(catch) = &catch {
                 (capsule.catch_from, capsule.catch_gain) = catch.of(pair[0].pos, pair[1].pos);
             }
-            bounds = bounds.union(capsule.stamp::<TELL>(field, &section, changed));
+            bounds = bounds.union(capsule.stamp::<REPORT>(field, &section, changed));
         }
     }
     if let Some(veil) = &mut field.layer.veil {
         let rect = veil.stamp(path);
-        if TELL && !rect.is_empty() {
+        if REPORT && !rect.is_empty() {
             changed(rect);
         }
         bounds = bounds.union(rect);
@@ -129,9 +131,9 @@ struct Capsule {
     inv_len_sq: f32,
     r_from: f32,
     r_gain: f32,
-    /// Beyond this distance from the centre line nothing is stamped.
+    /// Beyond this distance from the centre line nothing is drawn.
     reach: f32,
-    /// Share of its depth that it has by the light that it catches: 1 if there is no such thing.
+    /// Share of its depth by the light that it catches: 1 if the field has no such effect.
     catch_from: f32,
     catch_gain: f32,
 }
@@ -142,7 +144,7 @@ impl Capsule {
         if !from.pos.is_finite() || !to.pos.is_finite() {
             return None;
         }
-        let radius = |point: PathPoint| at_door(0.5 * point.width * frame.texels_per_unit(), MAX_RADIUS);
+        let radius = |point: PathPoint| clamped(0.5 * point.width * frame.texels_per_unit(), MAX_RADIUS);
         let (mut r_from, mut r_to) = (radius(from), radius(to));
         let reach = section.reach(max(r_from, r_to)) + MARGIN;
         if max(r_from, r_to) == 0.0 {
@@ -152,7 +154,7 @@ impl Capsule {
         let (low, high) = (Vec2::splat(-reach - 1.0), size.as_vec2() + (reach + 1.0));
         let inside = |p: Vec2| p.cmpge(low).all() && p.cmple(high).all();
         if !(inside(a) && inside(b)) {
-            // In f64, so that a far end does not move the near one.
+            // In f64, so that the rounding of a distant end does not move the near one.
             let scale = f64::from(frame.texels_per_unit());
             let (start, end) = (from.pos.as_dvec2() * scale, to.pos.as_dvec2() * scale);
             let (t0, t1) = clip(start, end, low.as_dvec2(), high.as_dvec2())?;
@@ -191,7 +193,7 @@ impl Capsule {
         TexelRect { min: low.as_uvec2(), max: high.as_uvec2() }
     }
 
-    fn stamp<const TELL: bool>(
+    fn stamp<const REPORT: bool>(
         &self,
         field: &mut DepthField,
         section: &Section,
@@ -204,32 +206,32 @@ impl Capsule {
         vectorized(
             #[inline(always)]
             || match (self.r_gain != 0.0, section.rim_depth > 0.0) {
-                (false, false) => self.stamp_rows::<TELL, false, false>(field, section, rect, changed),
-                (false, true) => self.stamp_rows::<TELL, false, true>(field, section, rect, changed),
-                (true, false) => self.stamp_rows::<TELL, true, false>(field, section, rect, changed),
-                (true, true) => self.stamp_rows::<TELL, true, true>(field, section, rect, changed),
+                (false, false) => self.stamp_rows::<REPORT, false, false>(field, section, rect, changed),
+                (false, true) => self.stamp_rows::<REPORT, false, true>(field, section, rect, changed),
+                (true, false) => self.stamp_rows::<REPORT, true, false>(field, section, rect, changed),
+                (true, true) => self.stamp_rows::<REPORT, true, true>(field, section, rect, changed),
             },
         );
         rect
     }
 
-    /// Blocks of [`LANES`] texels and at most one of half as many, row by row. A block may stick out of `rect`: the values there are
-    /// zero.
+    /// Stamps row by row: blocks of [`LANES`] texels and at most one of half as many. A block may exceed `rect`: the
+    /// values there are zero.
     #[inline(always)]
-    fn stamp_rows<const TELL: bool, const TAPER: bool, const RIM: bool>(
+    fn stamp_rows<const REPORT: bool, const TAPER: bool, const RIM: bool>(
         &self,
         field: &mut DepthField,
         section: &Section,
         rect: TexelRect,
         changed: &mut dyn FnMut(TexelRect),
     ) {
-        if TELL {
+        if REPORT {
             fetch(field, rect);
         }
         let width = field.depth.width();
         let blocks = (rect.size().x as usize).div_ceil(LANES);
         if blocks <= FEW_BLOCKS && blocks * LANES <= width {
-            self.stamp_blocks::<TELL, TAPER, RIM>(field, section, rect, blocks, changed);
+            self.stamp_blocks::<REPORT, TAPER, RIM>(field, section, rect, blocks, changed);
             return;
         }
         let mut band = TexelRect::default();
@@ -255,7 +257,7 @@ impl Capsule {
             // The columns that have changed, and those between them.
             let mut span = end..x0;
             let mut add = |x0: usize, change: u32| {
-                if TELL && change != 0 {
+                if REPORT && change != 0 {
                     span.start = span.start.min(x0 + change.trailing_zeros() as usize);
                     span.end = end.min(x0 + change.ilog2() as usize + 1);
                 }
@@ -273,7 +275,7 @@ impl Capsule {
                 add(x0, self.stamp_block::<LANES, TAPER, RIM>(&mut block, section, x0 as f32, dy));
                 rest.copy_from_slice(&block[..rest.len()]);
             }
-            if TELL && span.start < span.end {
+            if REPORT && span.start < span.end {
                 if !band.is_empty() && y >= band.max.y.next_multiple_of(BAND) {
                     changed(std::mem::take(&mut band));
                 }
@@ -286,9 +288,9 @@ impl Capsule {
         }
     }
 
-    /// As many blocks in every row: where they are few, the processor guesses right how it goes on.
+    /// The same number of blocks in every row: for few blocks the branches are predictable then.
     #[inline(always)]
-    fn stamp_blocks<const TELL: bool, const TAPER: bool, const RIM: bool>(
+    fn stamp_blocks<const REPORT: bool, const TAPER: bool, const RIM: bool>(
         &self,
         field: &mut DepthField,
         section: &Section,
@@ -313,7 +315,7 @@ impl Capsule {
                 columns |= change;
                 rows |= u32::from(change != 0) << i;
             }
-            if TELL && columns != 0 {
+            if REPORT && columns != 0 {
                 let min = UVec2::new(x0 as u32 + columns.trailing_zeros(), top + rows.trailing_zeros());
                 let max = UVec2::new(x0 as u32 + columns.ilog2() + 1, top + rows.ilog2() + 1);
                 changed(TexelRect { min, max });
@@ -322,7 +324,7 @@ impl Capsule {
         }
     }
 
-    /// Returns which texels have changed, a bit each.
+    /// Returns the changed texels, one bit each.
     #[inline(always)]
     fn stamp_block<const N: usize, const TAPER: bool, const RIM: bool>(
         &self,
@@ -363,7 +365,8 @@ impl Capsule {
     }
 }
 
-/// Reads a texel of each line of the cache, so that cold memory is waited for once and not block by block.
+/// Reads one texel of each cache line, so that the latency of cold memory overlaps instead of adding up block by
+/// block.
 fn fetch(field: &DepthField, rect: TexelRect) {
     let mut sum = 0;
     for y in rect.min.y..rect.max.y {
@@ -375,11 +378,12 @@ fn fetch(field: &DepthField, rect: TexelRect) {
     std::hint::black_box(sum);
 }
 
-/// Added to a value of 0..=65535, it rounds it and leaves the whole number in the low bits of the float: unlike a cast, which
-/// has to look after NaN, this is one addition on every machine.
+/// Added to a value of 0..=65535, this rounds it and leaves the integer in the low bits of the float. Unlike a cast,
+/// which
+/// has to handle NaN, this is one addition on every machine.
 const WHOLE: f32 = 8_388_608.0;
 
-/// [`WHOLE`] and a whole number.
+/// [`WHOLE`] plus an integer.
 #[inline(always)]
 fn whole(depth: u16) -> f32 {
     f32::from_bits(WHOLE.to_bits() | u32::from(depth))

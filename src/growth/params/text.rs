@@ -1,10 +1,10 @@
-//! The ranges of parameters, and parameters from text.
+//! The ranges of parameters, and setting parameters from text.
 
 use super::{GrowthParams, MarkerLayout, ParamError, StartLayout, Venation};
 
 macro_rules! fields {
     ($($name:ident: $kind:ty = $min:expr, $max:expr;)*) => {
-        /// Every plain number of the parameters with its range.
+        /// All plain numbers of the parameters with their ranges.
         fn ranges(&self) -> impl Iterator<Item = (&'static str, f64, f64, f64)> {
             [$((stringify!($name), f64::from(self.$name), $min, $max)),*].into_iter()
         }
@@ -69,8 +69,15 @@ impl GrowthParams {
 
     /// Checks every parameter against its range.
     ///
+    /// ```
+    /// use bevy_crack::growth::GrowthParams;
+    ///
+    /// let error = GrowthParams { wander: 2.0, ..GrowthParams::DEFAULT }.validate().unwrap_err();
+    /// assert_eq!(error.to_string(), "parameter `wander` is 2, must lie in 0..=1");
+    /// ```
+    ///
     /// # Errors
-    /// Names the first parameter that is out of its range or not finite.
+    /// [`ParamError::OutOfRange`] for the first parameter that is out of its range or not finite.
     pub fn validate(&self) -> Result<(), ParamError> {
         let markers: &[_] = match self.markers {
             MarkerLayout::PseudoGrid { occupancy, jitter } => {
@@ -101,7 +108,7 @@ impl GrowthParams {
         ];
         let all = self.ranges().chain(markers.iter().copied()).chain(starts.iter().copied()).chain(related);
         for (name, value, min, max) in all {
-            // In single precision, where 0.01 is a little below 0.01.
+            // Compared in single precision: `0.01_f32` is a little less than `0.01_f64`.
             if !(min as f32..=max as f32).contains(&(value as f32)) {
                 return Err(ParamError::OutOfRange { name, value, min, max });
             }
@@ -109,10 +116,11 @@ impl GrowthParams {
         Ok(())
     }
 
-    /// Sets one parameter from text, by the name of its field or by the paper's own (`D`).
+    /// Sets one parameter from text, by the name of its field or by the name in the paper (`D`).
     ///
-    /// Besides the fields: `markers` (`grid`, `darts`, `rays`), `occupancy`, `jitter`, `spacing`, `sectors`, `through` of the
-    /// present layout; `venation` (`open`, `closed`, `dividing`), `starts` (`point`, `points`, `arms`, `ring`, `crushed`, `disc`), `start_count`, `start_radius`.
+    /// These names are accepted in addition to the fields: `markers` (`grid`, `darts`, `rays`); `occupancy`,
+    /// `jitter`, `spacing`, `sectors`, `through` of the current layout; `venation` (`open`, `closed`, `dividing`);
+    /// `starts` (`point`, `points`, `arms`, `ring`, `crushed`, `disc`); `start_count`, `start_radius`.
     ///
     /// ```
     /// use bevy_crack::growth::GrowthParams;
@@ -125,7 +133,8 @@ impl GrowthParams {
     /// ```
     ///
     /// # Errors
-    /// If there is no such parameter or the text is no value of it. Ranges are checked by [`validate`](Self::validate).
+    /// [`ParamError::Unknown`] if there is no such parameter, [`ParamError::Unreadable`] if the text is not a value
+    /// of it. Ranges are not checked here but by [`validate`](Self::validate).
     pub fn set(&mut self, name: &str, text: &str) -> Result<(), ParamError> {
         let unreadable = || ParamError::Unreadable { name: name.to_owned(), text: text.to_owned() };
         if let Some(done) = self.set_number(name, text) {

@@ -1,12 +1,13 @@
-//! Parameters of the same material at another scale, and of another piece of it.
+//! Parameters of the same material at another scale, and with the variety of a seed.
 
 use super::{GrowthParams, MarkerLayout, StartLayout};
 use crate::math::{Rng, ops};
 use std::f32::consts::FRAC_PI_2;
 
 impl GrowthParams {
-    /// The same material seen from nearer (`by` above 1) or further away: every length times `by`. Lengths stay within their
-    /// ranges; a `by` that is not within 0.01..=100 counts as the nearest that is, not a number as 1.
+    /// The same material at another scale: every length times `by` (above 1 = seen from nearer). Lengths are clamped
+    /// to their ranges. `by` is clamped to 0.01..=100; NaN counts as 1.
+    ///
     ///
     /// ```
     /// use bevy_crack::growth::GrowthParams;
@@ -33,7 +34,7 @@ impl GrowthParams {
         length(&mut scaled.courses, 0.0, 1.0);
         length(&mut scaled.sway, 0.0, 0.05);
         length(&mut scaled.front, 0.0, 1.0);
-        // So many on the same surface.
+        // Number of grid lines on the same surface.
         let count = |count: u32| ((count as f32 / by).round() as u32).clamp(1, 512);
         match &mut scaled.markers {
             MarkerLayout::PseudoGrid { .. } => {
@@ -53,7 +54,8 @@ impl GrowthParams {
         scaled
     }
 
-    /// The parameters of the surface with this seed: what [`variety`](Self::variety) makes of them. Valid if these are.
+    /// The parameters of the surface with this seed, changed at random by [`variety`](Self::variety). The result is
+    /// valid if `self` is.
     #[must_use]
     pub fn varied(&self, seed: u64) -> Self {
         let mut varied = self.clone();
@@ -77,7 +79,7 @@ impl GrowthParams {
             }
             MarkerLayout::DartThrowing { spacing: apart } => {
                 *apart = (*apart * spacing).clamp(0.002, 1.0);
-                // Markers further apart must be seen from further away.
+                // Markers that are further apart must attract from further away.
                 let furthest = (256.0 * self.step_length).min(32.0);
                 varied.crack_radius = (self.crack_radius * spacing.max(1.0)).min(furthest).max(self.crack_radius);
             }

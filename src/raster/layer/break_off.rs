@@ -1,4 +1,4 @@
-//! What a hit breaks off along chords: outlines, facets, chips and their shadows.
+//! Material that breaks off along chords: outlines, facets, chips and their shadows.
 
 use super::{
     broken::{Broken, Chip, LONG_SHADOW, SHADOW},
@@ -12,20 +12,20 @@ use super::{
 };
 use glam::Vec2;
 
-/// Share of the depth that is outside the basin.
+/// Share of the depth that lies outside the basin.
 const SHELF: f32 = 0.5;
 
-/// Share of that which is gained on the way to the middle.
+/// Share of that depth which is gained on the way to the middle.
 const BOWL: f32 = 0.4;
 
-/// Run of a wall, in its height.
+/// Horizontal extent of a wall, in units of its height.
 const WALL: f32 = 0.45;
 
 const SHADE: f32 = 0.5;
 
 const DEEP_SHADE: f32 = 0.62;
 
-/// How much shadow there is where the edge that throws it is so far away.
+/// Strength of the shadow at this distance from the edge that casts it.
 fn sink(within: f32, soft: f32) -> f32 {
     (0.5 - within / soft).clamp(0.0, 1.0)
 }
@@ -34,7 +34,7 @@ fn sink(within: f32, soft: f32) -> f32 {
 const HARD: f32 = 1.0 / 0.6;
 
 impl Shape<'_> {
-    /// How far inside the edge of what has come off a place is, crumbs and all.
+    /// Distance of a place from the edge of the broken-off area, crumbling included; positive inside.
     fn within(&self, broken: &Broken, off: Vec2, at: Vec2, seed: u32) -> f32 {
         let within = broken.within(off);
         if self.jag <= 0.0 || within < -1.0 {
@@ -45,7 +45,7 @@ impl Shape<'_> {
         within - self.jag * (1.3 * noise(draws::JAG_WIDE, wide) + 0.7 * noise(draws::JAG_FINE, fine))
     }
 
-    /// What is there of something that breaks along chords.
+    /// Adds what is at a place in material that breaks along chords.
     pub(super) fn break_off(&self, place: &mut Place, broken: &Broken, off: Vec2, at: Vec2, seed: u32) {
         let Crushed { dust, chips, reach, fall, .. } = *self.crushed;
         let within = self.within(broken, off, at, seed);
@@ -60,7 +60,7 @@ impl Shape<'_> {
             if dust > 0.0 {
                 let mut cloud = 0.6 + 0.4 * noise(seed ^ 6, 0.7 * at.x, 0.7 * at.y);
                 if self.jag > 0.0 && fall > 0.0 {
-                    // It runs down in streaks.
+                    // Dust runs down in streaks.
                     let wide = 1.5 * self.grain;
                     cloud *= 1.0 - fall * (0.4 - 0.4 * noise(seed ^ 8, at.x / wide, at.y / (7.0 * wide)));
                 }
@@ -73,7 +73,7 @@ impl Shape<'_> {
             }
         }
         for [from, to] in &broken.ticks {
-            // It begins blunt and ends in a point.
+            // The stroke begins blunt and ends in a point.
             let (along, off) = (*to - *from, off - *from);
             let t = (off.dot(along) / along.length_squared().max(1.0e-6)).clamp(0.0, 1.0);
             let inside = broken.thick * (1.0 - t * t) + 0.5 - (off - along * t).length();
@@ -85,7 +85,7 @@ impl Shape<'_> {
         if let Some(pit) = &broken.pit {
             let (within, inward) = pit.side(off);
             if within > -0.5 {
-                // Its floor is smaller, and lies to the side of the light.
+                // The floor is smaller, and moved towards the light.
                 let floor = pit.within((off - TO_LIGHT * (0.2 * pit.reach)) * 1.35);
                 let byte = |value: f32| (value.clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
                 place.pit = [
@@ -97,7 +97,7 @@ impl Shape<'_> {
         }
     }
 
-    /// Where it has come off: a steep wall, and a floor in the shadow of the edge.
+    /// The area that has broken off: a steep wall, and a floor in the shadow of the edge.
     fn add_floor(
         &self,
         place: &mut Place,
@@ -111,7 +111,7 @@ impl Shape<'_> {
         let crumbles = self.jag > 0.0;
         let bump = |k: u32, size: f32| noise(seed ^ k, at.x / size, at.y / size);
         let share = if broken.basin.is_some() { SHELF } else { 1.0 };
-        // Here and there a wall is a slope.
+        // In some places a wall is a slope.
         let slope = bump(draws::WALL_SLOPE, (0.35 * self.radius).max(4.0));
         let run = if crumbles { 0.8 + 2.6 * slope.max(0.0) } else { 1.0 };
         let wall = (within / (run * WALL * share * self.depth).max(1.0)).clamp(0.0, 1.0);
@@ -119,7 +119,7 @@ impl Shape<'_> {
         let mut down = share * (wall + BOWL * (bowl - wall));
         let (long, shade) = if crumbles { (LONG_SHADOW, DEEP_SHADE) } else { (SHADOW, SHADE) };
         let length = long * share * self.depth;
-        // Where its edge is far away a shadow is soft.
+        // A shadow is soft where the edge that casts it is far away.
         let soft = if crumbles { (0.7 * length).max(HARD) } else { HARD };
         let mut shadow = sink(self.within(broken, off + TO_LIGHT * length, at + TO_LIGHT * length, seed), soft);
         let mut sunk = 0.0;
@@ -146,12 +146,12 @@ impl Shape<'_> {
             let coarse = bump(draws::COARSE_TONE, 2.2 * self.grain)
                 + 0.7 * bump(draws::BROAD_TONE, 0.3 * self.radius + 6.0 * self.grain);
             let sand = lattice(seed ^ draws::SAND, at.x.floor() as i32, at.y.floor() as i32);
-            // The lattices of noise are not to be seen.
+            // Rotated, so that the lattice of the noise does not show.
             let turned = Vec2::new(0.8 * at.x - 0.6 * at.y, 0.6 * at.x + 0.8 * at.y);
             let pit = noise(seed ^ draws::SAND_PITS, 0.42 * turned.x, 0.42 * turned.y);
             let sand = 0.3 * sand + 0.5 * pit - 0.9 * (-pit - 0.55).max(0.0);
             bumps += 0.6 * self.rough * pit * fade;
-            // Next to the wall less of the sky is seen.
+            // Less of the sky lights the floor next to the wall.
             let corner = (1.0 - within / (1.3 * self.depth).max(1.0)).clamp(0.0, 1.0);
             let mut tone = 0.30 * coarse + 0.16 * plate + (0.5 - 0.2 * stones) * sand
                 - 0.14 * stones
@@ -167,19 +167,19 @@ impl Shape<'_> {
             tone
         } else {
             let stone = Cell::find(seed ^ draws::GRAINS, at / self.grain);
-            // Few stones are paler or darker than what they lie in.
+            // Only few stones are paler or darker than the material around them.
             let is_stone = stone.draw.abs() > 0.7;
             let tone = if is_stone { 0.45 * stone.draw * (5.0 * stone.gap).min(1.0) } else { 0.10 * stone.draw };
             tone + 0.1 * plate + 0.16 * noise(seed ^ draws::GRAIN_TONE, 0.9 * at.x, 0.9 * at.y)
         };
         place.height = -self.depth * down + bumps;
-        // The wall is of what has come off, not of what lay under it.
+        // The wall has the colour of the material that came off, not of what lay under it.
         place.pale = pale * inside * if crumbles { 0.15 + 0.85 * wall } else { 1.0 };
         place.shade = speckle * tone * inside;
         place.dark = shade * shadow * inside * (SHADOW * self.depth).min(1.0);
     }
 
-    /// A chip that lies there, or its shadow.
+    /// A chip that lies on the surface, or its shadow.
     fn add_chip(&self, place: &mut Place, chip: &Chip, off: Vec2, at: Vec2, seed: u32) {
         let Chip { outline, tone, ink, .. } = chip;
         let size = outline.reach;
@@ -200,11 +200,11 @@ impl Shape<'_> {
             place.dark *= 1.0 - inside;
             let face = if crumbles { 0.16 * noise(seed ^ draws::CHIP_FACE, 0.5 * at.x, 0.5 * at.y) } else { 0.0 };
             place.shade += (tone + face - place.shade) * inside;
-            // It shows the surface's own face.
+            // Its face is the surface itself.
             let pale = if *ink > 0.0 { 1.0 } else { 0.3 * self.crushed.pale };
             place.pale += (pale - place.pale) * inside;
             if *ink > 0.0 {
-                // On the side that is turned away it is wider.
+                // The line is wider on the side away from the light.
                 let turned = 0.5 - 0.5 * (off - outline.centre).normalize_or_zero().dot(TO_LIGHT);
                 let edge = (ink * (0.8 + 0.7 * turned) - within + 0.5).clamp(0.0, 1.0);
                 place.dark = place.dark.max(edge * inside);
@@ -217,7 +217,7 @@ impl Shape<'_> {
         }
     }
 
-    /// Angular grit in some of the squares of a lattice: much that is small, little that is large.
+    /// Angular grit in some of the squares of a lattice: many small pieces, few large ones.
     fn add_crumbs(&self, place: &mut Place, at: Vec2, chance: f32, inside: f32, seed: u32) {
         let side = (1.7 * self.grain).max(4.0);
         let cell = (at / side).floor();

@@ -1,4 +1,4 @@
-//! What a hit breaks off along chords: its outlines, and the chips that lie around it.
+//! The outlines of material that a hit breaks off, and the chips around it.
 
 use super::{
     crushed::Crushed,
@@ -9,28 +9,28 @@ use super::{
 use crate::math::{mix, ops};
 use glam::Vec2;
 
-/// Length of shadows, in the height of what throws them, and how dark they are.
+/// Length of shadows, in units of the height of the caster, and how dark they are.
 pub(super) const SHADOW: f32 = 0.75;
 
-/// The same within what crumbles.
+/// The same inside crumbling material.
 pub(super) const LONG_SHADOW: f32 = 1.1;
 
-/// A chip that lies beside.
+/// A chip that lies beside the zone.
 pub(super) struct Chip {
     pub(super) outline: Outline,
-    /// How much darker or brighter it is.
+    /// Its difference in brightness.
     pub(super) tone: f32,
     /// Width of the line around it, texels.
     pub(super) ink: f32,
 }
 
-/// What has broken off, and where it lies; places from the hit, texels.
+/// Broken-off pieces and where they lie; positions relative to the hit, texels.
 pub(super) struct Broken {
     /// The crater and the flakes around it.
     pub(super) off: Vec<Outline>,
     pub(super) basin: Option<Outline>,
     pub(super) chips: Vec<Chip>,
-    /// Strokes from one place to another, as wide at the first.
+    /// Strokes between two places; the first end is the wide one.
     pub(super) ticks: Vec<[Vec2; 2]>,
     pub(super) thick: f32,
     pub(super) pit: Option<Outline>,
@@ -43,7 +43,7 @@ impl Broken {
         let more = radius / (crushed.radius * unit).max(1.0e-3);
         let pick = |k: u32, what: i32| draw(seed ^ draws::PIECES, k as i32, what);
         let crumbles = crushed.jag > 0.0;
-        // What is less ragged has longer chords.
+        // Less ragged zones have longer chords.
         let levels = if crumbles && ragged < 0.65 { 1 } else { 2 };
         let shape = |outline: Outline, k: u32| if crumbles { outline.stretched(mix_in(seed, k)) } else { outline };
         let count = 6 + (3.0 * pick(0, 0)) as u32;
@@ -51,7 +51,7 @@ impl Broken {
         let flakes = (crushed.flakes as f32 * more).round().min(64.0) as u32;
         let one = radius / more.max(1.0) * more.max(1.0).sqrt();
         for k in 0..flakes {
-            // A few large ones beside the hit, small ones further out.
+            // A few large flakes beside the hit, small ones further out.
             let is_beside = k % 3 == 0;
             let size = one * if is_beside { 0.5 + 0.3 * pick(k, 1) } else { 0.22 + 0.4 * pick(k, 1) * pick(k, 14) };
             let far = if is_beside {
@@ -73,7 +73,7 @@ impl Broken {
         let chips: Vec<Chip> = (0..chips)
             .map(|k| {
                 let size = if crumbles {
-                    // Many small ones, few large ones.
+                    // Many small chips, few large ones.
                     grain * (0.3 + 0.13 * (1.0 / (0.12 + pick(k, 6)) - 0.9))
                 } else {
                     grain * (0.4 + pick(k, 6) * pick(k, 7))
@@ -96,7 +96,7 @@ impl Broken {
         let pit = (crushed.pit > 0.0).then(|| {
             Outline::new(Vec2::ZERO, radius * crushed.pit, 5 + (2.6 * pick(0, 20)) as u32, 1, 0.55, seed ^ draws::PIT)
         });
-        // Two behind each of the first chips.
+        // Two strokes behind each of the first chips.
         let ticks = (0..crushed.ticks)
             .zip(chips.iter().flat_map(|chip: &Chip| [chip, chip]))
             .map(|(k, Chip { outline, .. })| {
@@ -109,7 +109,7 @@ impl Broken {
         Self { off, basin, chips, ticks, thick: 0.8 * crushed.outline * unit, pit }
     }
 
-    /// Forgets what does not reach into a rectangle, texels from the hit.
+    /// Drops the pieces that do not reach into a rectangle, texels from the hit.
     pub(super) fn keep_near(&mut self, min: Vec2, max: Vec2, depth: f32) {
         let is_near = |outline: &Outline, beyond: f32| {
             let nearest = outline.centre.clamp(min - 1.0, max + 1.0);
@@ -119,13 +119,13 @@ impl Broken {
         self.chips.retain(|chip| is_near(&chip.outline, 2.0 + chip.outline.reach));
     }
 
-    /// How far inside the edge of what has come off a place is.
+    /// Distance of a place from the edge of the broken-off area; positive inside.
     pub(super) fn within(&self, at: Vec2) -> f32 {
         self.off.iter().map(|outline| outline.within(at)).fold(-FAR_OUT, f32::max)
     }
 }
 
-/// Another seed for each.
+/// A different seed for each `k`.
 fn mix_in(seed: u32, k: u32) -> u32 {
     mix(u64::from(seed) << 32 | u64::from(k)) as u32
 }

@@ -1,17 +1,17 @@
-//! Bruises: a crushed zone that is made of short radial and ring cracks with angular flakes between them.
+//! Bruises: crushed zones of short radial and ring cracks with angular flakes between them.
 
 use super::{draws, noise::hash};
 use crate::math::ops;
 use glam::Vec2;
 use std::f32::consts::TAU;
 
-/// Sheets of cracks that lie over one another.
+/// Layers of cracks on top of each other.
 const SHEETS: u32 = 3;
 
-/// Rings of a sheet within the square root of a radius.
+/// Rings of a layer within the square root of a radius.
 const RINGS: f32 = 4.2;
 
-/// Directions of the innermost ring, and how many more each further one has.
+/// Directions of the innermost ring, and the increase with each further ring.
 const INNER: u32 = 8;
 const MORE: u32 = 5;
 
@@ -22,8 +22,9 @@ pub(super) struct Bruise {
     pub(super) flake: f32,
 }
 
-/// The bruise around a hit: `off` is the way from it in texels, `q` the same in radii of the bruise, `turn` its direction as a share of a
-/// full one. `dense` is how many of its cracks are there, 0..=1, `fine` how many more of them than one that is small has.
+/// The bruise around a hit. `off` is the offset from the hit in texels, `q` the distance in radii of the bruise.
+/// `dense` is the share of its cracks that are there, 0..=1; `fine` is how many more cracks it has than a small
+/// bruise.
 pub(super) fn bruise(off: Vec2, q: f32, dense: f32, fine: f32, seed: u32) -> Bruise {
     let (distance, mut found) = (off.length(), Bruise::default());
     let turn = ops::atan2(off.y, off.x) * (1.0 / TAU) + 0.5;
@@ -60,8 +61,8 @@ pub(super) fn bruise(off: Vec2, q: f32, dense: f32, fine: f32, seed: u32) -> Bru
     found
 }
 
-/// A cloud of short cracks that cross each other, each with a sheet to one side that fades: `off` is the way from the hit in texels, `left` how
-/// much of the cloud is left there, 0..=1.
+/// A cloud of short cracks that cross each other, each with a sheet to one side that fades. `off` is the offset from
+/// the hit in texels, `left` how much of the cloud is left there, 0..=1.
 pub(super) fn crazed(off: Vec2, radius: f32, left: f32, seed: u32) -> Bruise {
     let mut found = Bruise::default();
     let out = off.normalize_or_zero();
@@ -73,7 +74,7 @@ pub(super) fn crazed(off: Vec2, radius: f32, left: f32, seed: u32) -> Bruise {
             let (x, y) = ((corner.x as i32).wrapping_add(dx), (corner.y as i32).wrapping_add(dy));
             let draw = |k: u32| (hash(seed ^ k, x, y) >> 8) as i32 as f32 * (1.0 / 16_777_216.0);
             let middle = Vec2::new(x as f32 + draw(1), y as f32 + draw(2)) * side;
-            // Fewer outward: by where the middle is.
+            // Fewer outward, by the position of the middle.
             let near = 1.2 - (0.46 + 0.16 * draw(11)) * middle.length() / radius;
             let near = near.clamp(0.0, 1.0) * (0.35 + 0.65 * left);
             if draw(3) >= 0.9 * near {
@@ -95,7 +96,7 @@ pub(super) fn crazed(off: Vec2, radius: f32, left: f32, seed: u32) -> Bruise {
             let strength = (0.2 + 0.8 * draw(7)) * (0.3 + 0.7 * near);
             found.crack =
                 found.crack.max(strength * taper.sqrt() * (0.75 - 0.9 * (across.abs() - 0.35).max(0.0)).max(0.0));
-            // Its sheet, to one side, with a slanting end.
+            // The sheet to one side, with a slanting end.
             let deep = side * (0.12 + 0.5 * draw(8)) * (1.0 - along * (0.8 * draw(9) - 0.4)) * taper.sqrt();
             let inside = (across + 0.5).clamp(0.0, 1.0) * (deep - across + 0.5).clamp(0.0, 1.0);
             if inside > 0.0 {
@@ -108,7 +109,8 @@ pub(super) fn crazed(off: Vec2, radius: f32, left: f32, seed: u32) -> Bruise {
     found
 }
 
-/// So many bubbles around a hit of this radius, in strings and clusters: places from it, and radii. Texels.
+/// `count` bubbles around a hit of this radius, in strings and clusters: positions relative to the hit, and radii.
+/// Texels.
 pub(super) fn bubbles(count: u32, radius: f32, reach: f32, grain: f32, seed: u32) -> Vec<(Vec2, f32)> {
     let draw =
         |i: u32, k: u32| (hash(seed ^ draws::BUBBLES ^ k, i as i32, 3) >> 8) as i32 as f32 * (1.0 / 16_777_216.0);

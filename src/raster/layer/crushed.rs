@@ -1,75 +1,86 @@
-//! What a hit crushes: [`Crushed`].
+//! The crushed zone around a hit: [`Crushed`].
 
-/// What a hit crushes: a spot around it, by its energy. All of it is made from the seed and the place, at any resolution.
+/// The crushed zone around a hit. Its size depends on the energy of the hit. All details are computed from the seed
+/// and the position, at any resolution.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct Crushed {
-    /// Radius at energy 1; it grows with the square root of the energy. Pattern units, 0..=0.5; default 0.03.
+    /// Radius at energy 1; it is proportional to the square root of the energy. Pattern units, 0..=0.5; default 0.03.
     pub radius: f32,
-    /// How far the outline strays from a circle, as a share of the radius. 0..=1; default 0.4.
+    /// How far the outline deviates from a circle, as a share of the radius. 0..=1; default 0.4.
     pub ragged: f32,
-    /// How softly it ends: 0 = with a broken edge, 1 = it fades from the middle on. Default 0.
+    /// How softly the zone ends: 0 = with a broken edge, 1 = it fades from the middle on. Default 0.
     pub soft: f32,
     /// Radius of the dark hole in the middle, as a share of the radius. 0..=1; default 0.
     pub hole: f32,
     /// Depth of the crater, pattern units, 0..=0.2; default 0.008.
     pub depth: f32,
-    /// Height of the bumps on its floor, pattern units, 0..=0.05; default 0.002.
+    /// Height of the bumps on the floor, pattern units, 0..=0.05; default 0.002.
     pub rough: f32,
     /// Size of grains and crumbs, pattern units, 0.0005..=0.1; default 0.006.
     pub grain: f32,
-    /// Colour of what is crushed, of dust and of crumbs, sRGB 0..=1; default a light grey.
+    /// Colour of crushed material, dust and crumbs, sRGB 0..=1; default a light grey.
     pub color: [f32; 3],
     /// How much that colour covers the picture. 0..=1; default 0.5.
     pub pale: f32,
-    /// How uneven that is from grain to grain. 0..=1; default 0.4.
+    /// How much the colour varies from grain to grain. 0..=1; default 0.4.
     pub speckle: f32,
-    /// How far a flat flake with arcs reaches to one side (conchoidal fracture), radii. 0..=8; default 0 = none.
+    /// Distance to which a flat flake with arcs extends on one side (conchoidal fracture), radii. 0..=8; default 0 =
+    /// none.
     pub flake: f32,
-    /// How much dust covers the surface around it, falling to nothing at [`reach`](Self::reach). 0..=1; default 0.2.
+    /// How much dust covers the surroundings; it falls to nothing at [`reach`](Self::reach). 0..=1; default 0.2.
     pub dust: f32,
-    /// How many crumbs lie around it, up to [`reach`](Self::reach); 0..=1; default 0.3.
+    /// How many crumbs lie around the zone, up to [`reach`](Self::reach); 0..=1; default 0.3.
     pub chips: f32,
-    /// How far dust and crumbs reach, radii. 1..=8; default 2.5.
+    /// Distance to which dust and crumbs extend, radii. 1..=8; default 2.5.
     pub reach: f32,
-    /// Whether it is broken along straight chords into plates, with angular chips that throw shadows; else its outline and floor are as of
-    /// something crushed to powder. [`soft`](Self::soft), [`hole`](Self::hole) and [`flake`](Self::flake) do not count then. Default false.
+    /// Whether the zone is broken along straight chords into plates, with angular chips that cast shadows. Else its
+    /// outline and floor look crushed to powder. If `true`, [`soft`](Self::soft), [`hole`](Self::hole) and
+    /// [`flake`](Self::flake) have no effect. Default false.
     pub broken: bool,
-    /// Radius of the deeper hollow in the middle of what is broken, as a share of the radius; it has more than half of the depth. 0..=1; default
-    /// 0 = a flat floor.
+    /// Radius of the deeper hollow in the middle of a [`broken`](Self::broken) zone, as a share of the radius; it has
+    /// more than half of the depth. 0..=1; default 0 = a flat floor.
     pub basin: f32,
-    /// How many smaller flakes have come off further out, where it is [`broken`](Self::broken): at energy 1, more with its root. 0..=16; default 0.
+    /// Number of smaller flakes that have come off further out, for a [`broken`](Self::broken) zone: at energy 1, in
+    /// proportion to its root. 0..=16; default 0.
     pub flakes: u32,
-    /// Share that the picture's own colour has in [`color`](Self::color), so that what is crushed has the tone of what it was. 0..=1; default 0.
+    /// Share of the picture's own colour in [`color`](Self::color), so that crushed material has the tone of the
+    /// surface. 0..=1; default 0.
     pub tint: f32,
-    /// How far chips and dust of what is [`broken`](Self::broken) lie below it (a wall): 0 = all around, 1 = nearly all below. 0..=1; default 0.
+    /// How far the chips and dust of a [`broken`](Self::broken) zone lie below it (a wall): 0 = all around, 1 =
+    /// nearly all below. 0..=1; default 0.
     pub fall: f32,
-    /// Width of a dark line around chips of what is [`broken`](Self::broken) (a drawing), pattern units, 0..=0.05; default 0 = none.
+    /// Width of a dark line around the chips of a [`broken`](Self::broken) zone (a drawing), pattern units, 0..=0.05;
+    /// default 0 = none.
     pub outline: f32,
-    /// Radius of a drawn pit with straight sides in the middle of what is [`broken`](Self::broken), as a share of the radius: it is shown as part of
-    /// [drawn](crate::paint::Cel) cracks with a [`slant`](crate::paint::Cel::slant). 0..=2; default 0 = none.
+    /// Radius of a drawn pit with straight sides in the middle of a [`broken`](Self::broken) zone, as a share of the
+    /// radius. It is shown as part of [drawn](crate::paint::Cel) cracks with a [`slant`](crate::paint::Cel::slant).
+    /// 0..=2; default 0 = none.
     pub pit: f32,
-    /// How many strokes of ink follow the chips of what is [`broken`](Self::broken), two each (a drawing). 0..=16; default 0.
+    /// Number of chips of a [`broken`](Self::broken) zone that have ink strokes behind them, two strokes each (a
+    /// drawing). 0..=16; default 0.
     pub ticks: u32,
-    /// How much of it is short radial and ring cracks with flakes between them, fewer and fewer up to [`reach`](Self::reach), in place of powder
-    /// with an outline (laminated glass, ice). 0..=1; default 0.
+    /// How much of the zone consists of short radial and ring cracks with flakes between them, which thin out up to
+    /// [`reach`](Self::reach), instead of powder with an outline (laminated glass, ice). 0..=1; default 0.
     pub needles: f32,
-    /// How much of that is a cloud of short cracks that cross each other, each with a small sheet to one side (ice), in place of radial ones. 0..=1;
-    /// default 0.
+    /// How much of [`needles`](Self::needles) is a cloud of short cracks that cross each other, each with a small
+    /// sheet to one side (ice), instead of radial ones. 0..=1; default 0.
     pub crazing: f32,
-    /// How many bubbles lie around it, in strings and clusters. 0..=64; default 0.
+    /// Number of bubbles around the hit, in strings and clusters. 0..=64; default 0.
     pub bubbles: u32,
-    /// Width of the broken edge around the hole, which then has straight sides and is less dark towards it, as a share of the hole. 0..=4; default
-    /// 0 = none.
+    /// Width of the broken edge around the hole, as a share of the hole. The hole has straight sides then and is less
+    /// dark towards the edge. 0..=4; default 0 = none.
     pub edge: f32,
-    /// How much less is seen of cracks on the floor of what is [`broken`](Self::broken) off: what they ran through is gone. 0..=1; default 0.
+    /// How much cracks are hidden on the floor of a [`broken`](Self::broken) zone: the material that they ran through
+    /// is gone. 0..=1; default 0.
     pub bare: f32,
-    /// How far the edge of what is [`broken`](Self::broken) off strays from its chords, as material that crumbles: its wall is of uneven slope
-    /// then, and pieces are longer one way. Pattern units, 0..=0.05; default 0 = clean chords.
+    /// How far the edge of a [`broken`](Self::broken) zone deviates from its chords, as in crumbling material. With
+    /// it the wall has an uneven slope, and pieces are longer one way. Pattern units, 0..=0.05; default 0 = clean
+    /// chords.
     pub jag: f32,
-    /// Share of the floor of what is [`broken`](Self::broken) off that is rounded stones of several sizes in something finer (the aggregate of
-    /// concrete); else it is of one grain. 0..=1; default 0.
+    /// Share of the floor of a [`broken`](Self::broken) zone that consists of rounded stones of several sizes in
+    /// finer material (the aggregate of concrete); else it has one grain size. 0..=1; default 0.
     pub stones: f32,
 }
 
@@ -145,7 +156,7 @@ impl Crushed {
         fields.into_iter().find(is_bad).map(|(name, value, _, range)| (name, value, range))
     }
 
-    /// The same seen from nearer or further away.
+    /// The same zone at another scale: every length times `by`.
     pub(crate) fn scaled(&self, by: f32) -> Self {
         let scaled = |length: f32, low: f32, high: f32| (length * by).clamp(low, high);
         Self {

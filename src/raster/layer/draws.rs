@@ -1,6 +1,7 @@
-//! What the draws of crushed zones are for: each is combined with the seed. Where two are the same number, what else goes in is not.
+//! Salts of the random draws of crushed zones, combined with the seed. Where two are the same number, their other
+//! inputs differ.
 //!
-//! These numbers are frozen, like all that a seed gives.
+//! These numbers are frozen: a seed must give the same result in every version.
 
 /// How far the edge of what crumbles strays: in wide bumps and in fine ones.
 pub(super) const JAG_WIDE: u32 = 0x58;

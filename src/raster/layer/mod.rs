@@ -1,4 +1,4 @@
-//! [`Layer`]: what a field holds beside depths, for looks that show it: plates, crushed zones and veils.
+//! [`Layer`]: what a field holds in addition to depths, for the looks that show it: plates, crushed zones and veils.
 
 mod break_off;
 mod broken;
@@ -29,39 +29,42 @@ use crate::{
 };
 use plates::PlateField;
 
-/// What a [`DepthField`](super::DepthField) is to hold beside depths. A look [says](crate::paint::Look::layer) what it shows.
+/// The layers that a [`DepthField`](super::DepthField) holds in addition to depths.
+/// [`Look::layer`](crate::paint::Look::layer) returns the plan that a look needs.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LayerPlan {
-    /// Whether it is to know which closed cell each texel lies in; default no.
+    /// Whether to record which closed cell each texel lies in; default no.
     pub plates: bool,
-    /// How thick plates are beside those that are gone in a hole, pattern units, 0..=0.02; default 0.
+    /// Thickness of plates beside those that are missing in a hole, pattern units, 0..=0.02; default 0.
     pub thick: f32,
-    /// Crushed zones at the hits; default none.
+    /// Crushed zones around hits; default none.
     pub crushed: Option<Crushed>,
     /// Sheets along cracks; default none.
     pub veil: Option<Veil>,
-    /// How far the floor of a crack is moved to the upper left, and what of the crack it covers is kept: as a share of its half width, and pattern
-    /// units at the most. Not with a veil. 0..=1 and 0..=0.5; default 0 = no floor.
+    /// How far the floor of a crack is moved to the upper left, and how much of the crack it leaves open: as a share
+    /// of the crack's half width, and in pattern units at the most. Not used with a veil. 0..=1 and 0..=0.5; default
+    /// 0 = no floor.
     pub floor: [f32; 2],
-    /// How much of its depth a line has only where it catches the light: less of it is stamped of lines that run towards the light, and here
-    /// and there along each. 0..=1; default 0 = all lines are as deep as their profile says.
+    /// How much of its depth a line has only where it catches the light: lines that run towards the light are stamped
+    /// less deep, and so are some places along each line. 0..=1; default 0 = all lines are as deep as their profile
+    /// says.
     pub catch: f32,
-    /// Width of a crack from which on it has the whole rim of its profile; narrower ones have less. Pattern units, 0..=1; default 0 =
-    /// all have it.
+    /// Width from which a crack has the whole rim of its profile; narrower cracks have a fainter rim. Pattern units,
+    /// 0..=1; default 0 = all cracks have the whole rim.
     pub full_rim: f32,
-    /// Fixes all that is random in it; default 0.
+    /// Seed of the random details; default 0.
     pub seed: u64,
 }
 
 impl LayerPlan {
-    /// Bytes that it takes for each texel of the field, about; crushed zones take theirs where they are.
+    /// Approximate memory per texel of the field, bytes. Crushed zones take additional memory where they are.
     #[must_use]
     pub const fn bytes_per_texel(&self) -> u64 {
         (if self.plates { 2 } else { 0 }) + (if self.veil.is_some() || self.floor[0] > 0.0 { 1 } else { 0 })
     }
 }
 
-/// See [`LayerPlan`]. It follows a network and its timeline: what it holds depends on the moment alone, bit for bit.
+/// See [`LayerPlan`]. It follows a network and its timeline; its content depends only on the moment, bit for bit.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Layer {
     plan: LayerPlan,
@@ -84,12 +87,12 @@ impl Layer {
         Self { plan, plates, crushed, veil }
     }
 
-    /// As it was made.
+    /// Resets it to its state after [`new`](Self::new).
     pub(super) fn clear(&mut self, frame: SurfaceFrame) {
         *self = Self::new(std::mem::take(&mut self.plan), frame);
     }
 
-    /// Shows it, but for what hits have crushed, which is left to [`crush`](Self::crush).
+    /// Shows everything except the crushed zones, which [`crush`](Self::crush) draws.
     pub(super) fn show(
         &mut self,
         network: &Network,
@@ -104,7 +107,7 @@ impl Layer {
         self.follow(timeline, moment);
     }
 
-    /// Takes up the hits until then.
+    /// Registers the hits up to `moment`.
     pub(super) fn follow(&mut self, timeline: &Timeline, moment: Moment) {
         if let Some(crushed) = &mut self.crushed {
             let count = timeline.entries(moment.begun()).strikes;
@@ -112,17 +115,17 @@ impl Layer {
         }
     }
 
-    /// Draws at most so many tiles of what hits have crushed. Returns whether any are left.
+    /// Draws at most `tiles` tiles of the crushed zones. Returns whether any are left.
     pub(super) fn crush(&mut self, tiles: usize, forbidden: Option<&Grid<bool>>, changed: &mut Vec<TexelRect>) -> bool {
         self.crushed.as_mut().is_some_and(|crushed| crushed.draw_some(tiles, forbidden, changed))
     }
 
-    /// Whether any are left.
+    /// Whether tiles are left to draw.
     pub(super) fn is_behind(&self) -> bool {
         self.crushed.as_ref().is_some_and(|crushed| crushed.is_behind())
     }
 
-    /// Goes on with a network whose oldest part was forgotten.
+    /// Continues with a network whose oldest part was removed.
     pub(super) fn freeze(&mut self, network: &Network, timeline: &Timeline) {
         if let Some(plates) = &mut self.plates {
             plates.freeze(network, timeline);

@@ -15,7 +15,7 @@ pub(super) fn hash(seed: u32, x: i32, y: i32) -> u32 {
     h ^ (h >> 15)
 }
 
-/// Smooth noise in `-1..=1`, whose bumps are about one unit wide.
+/// Smooth noise in `-1..=1` with bumps about one unit wide.
 #[inline(always)]
 pub(crate) fn noise(seed: u32, x: f32, y: f32) -> f32 {
     let (fx, fy) = (x.floor(), y.floor());
@@ -28,7 +28,7 @@ pub(crate) fn noise(seed: u32, x: f32, y: f32) -> f32 {
     top + (low - top) * ty
 }
 
-/// A number in 0..1 for a pair of numbers.
+/// A random number in 0..1 for a pair of integers.
 pub(super) fn draw(seed: u32, x: i32, y: i32) -> f32 {
     (hash(seed, x, y) >> 8) as i32 as f32 * (1.0 / 16_777_216.0)
 }

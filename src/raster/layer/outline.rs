@@ -4,21 +4,21 @@ use super::noise::draw;
 use crate::math::ops;
 use glam::Vec2;
 
-/// How far an outline strays at the most, for a raggedness of 1.
+/// Largest deviation of an outline at a raggedness of 1.
 pub(super) const WIDEST: f32 = 1.1;
 
 /// A polygon around a place, texels.
 pub(super) struct Outline {
     pub(super) centre: Vec2,
-    /// How far its corners are away at the most.
+    /// Largest distance of its corners.
     pub(super) reach: f32,
-    /// From the centre, in order of their [`turn`].
+    /// Corners relative to the centre, sorted by their [`turn`].
     pub(super) corners: Vec<(f32, Vec2)>,
-    /// Whether narrow tips are as near to their edge as they are wide.
+    /// Whether the distance to the edge accounts for both sides of narrow tips.
     pub(super) is_worn: bool,
 }
 
-/// A direction as a number in 0..4 that grows with its angle.
+/// A direction as a number in 0..4 that increases with its angle.
 fn turn(way: Vec2) -> f32 {
     let share = way.y / (way.x.abs() + way.y.abs()).max(1.0e-6);
     if way.x < 0.0 {
@@ -31,7 +31,7 @@ fn turn(way: Vec2) -> f32 {
 }
 
 impl Outline {
-    /// About so many corners, between which sides are broken `levels` times.
+    /// A polygon with about `count` corners, between which sides are broken `levels` times.
     pub(super) fn new(centre: Vec2, radius: f32, count: u32, levels: u32, ragged: f32, seed: u32) -> Self {
         let most = radius * (1.0 + WIDEST * ragged);
         let phase = draw(seed, -1, 0);
@@ -63,7 +63,7 @@ impl Outline {
         Self { centre, reach, corners, is_worn: false }
     }
 
-    /// The same, longer one way and shorter across it.
+    /// The same polygon, longer in one direction and shorter across it.
     pub(super) fn stretched(mut self, seed: u32) -> Self {
         self.is_worn = true;
         let way = ops::unit(std::f32::consts::PI * draw(seed, -2, 0));
@@ -77,12 +77,12 @@ impl Outline {
         self
     }
 
-    /// How far inside its edge a place is, texels; below zero outside.
+    /// Distance of a place from the edge, texels: positive inside, negative outside.
     pub(super) fn within(&self, at: Vec2) -> f32 {
         self.side(at).0
     }
 
-    /// The same, and the way inward from the side that is there.
+    /// The same, and the direction inward from the nearest side.
     pub(super) fn side(&self, at: Vec2) -> (f32, Vec2) {
         let off = at - self.centre;
         if off.length_squared() > (self.reach + 1.0) * (self.reach + 1.0) {
@@ -101,7 +101,7 @@ impl Outline {
         if !self.is_worn {
             return (within, inward);
         }
-        // The sides of its sector and of those beside it.
+        // The sides of its sector and of the neighbouring ones.
         let mut nearest = f32::MAX;
         for k in 0..=2 * BESIDE {
             let (Some(from), Some(to)) = (corner(next + n + k - BESIDE - 1), corner(next + n + k - BESIDE)) else {
@@ -115,10 +115,10 @@ impl Outline {
     }
 }
 
-/// So many sides on either side of a sector count for how near an edge is.
+/// Number of neighbouring sectors on either side that are searched for the nearest edge.
 const BESIDE: usize = 3;
 
-/// What is so many texels outside counts as far away.
+/// From this distance outside, in texels, a place counts as far away.
 pub(super) const FAR_OUT: f32 = 1.0e3;
 
 #[cfg(test)]

@@ -9,32 +9,32 @@ use crate::{
 };
 use glam::{UVec2, Vec2};
 
-/// More cells than that are not told apart.
+/// At most this many cells are told apart.
 const MAX_PLATES: usize = u16::MAX as usize;
 
-/// What is known of a closed cell.
+/// The properties of a closed cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Plate {
     /// Centre, texels.
     pub(crate) centre: Vec2,
-    /// One over the side of a square of its size, one over texels.
+    /// Inverse of the side of a square of the same area, 1 / texels.
     pub(crate) inv_side: f32,
-    /// How near it is to the hit that it comes from: 1 at the hit, towards 0 far away.
+    /// Closeness to the hit that caused it: 1 at the hit, towards 0 far away.
     pub(crate) near: f32,
-    /// How far away that hit is, pattern units, over the root of its energy.
+    /// Distance of that hit, pattern units, divided by the root of its energy.
     pub(crate) away: f32,
-    /// How far from the centre its outline reaches, texels.
+    /// Largest distance of its outline from the centre, texels.
     pub(crate) extent: f32,
     /// Random numbers, -1..=1.
     pub(crate) draws: [f32; 6],
-    /// The same, but smooth from plate to plate.
+    /// Random numbers that vary smoothly from plate to plate.
     pub(crate) common: [f32; 3],
 }
 
-/// Bumps of what plates have in common, a pattern unit.
+/// Bumps per pattern unit of the noise that neighbouring plates share.
 const BUNDLES: f32 = 7.0;
 
-/// Cells, as they close.
+/// The plates of a field, added as cells close.
 #[derive(Clone, Debug)]
 pub(crate) struct PlateField {
     frame: SurfaceFrame,
@@ -42,22 +42,22 @@ pub(crate) struct PlateField {
     cells: CellTracker,
     /// Per texel the number of the plate that it belongs to, 0 = none.
     ids: Grid<u16>,
-    /// Those that are shown; the first stands for none.
+    /// The plates that are shown; entry 0 means no plate.
     plates: Vec<Plate>,
-    /// Plates of what was forgotten, and cells that were closed by then.
+    /// Number of plates of the removed part, and of cells that were closed by then.
     frozen: usize,
     skipped: usize,
     crossings: Vec<(u32, f32)>,
-    /// Where each impact is, and the energy with which it began, from so many hits.
+    /// Position of each impact and the energy of its first hit, from this many hits.
     hits: Vec<(Vec2, f32)>,
     strikes: usize,
     /// Texels that were written.
     written: u64,
-    /// How far away from a plate what is shown of it is seen, texels.
+    /// Distance from a plate at which its side is visible, texels.
     beyond: u32,
 }
 
-/// How far the side of a plate is seen beside it, texels.
+/// Distance from a plate at which its side is visible, texels.
 pub(crate) fn beyond(thick: f32, frame: SurfaceFrame) -> u32 {
     if thick > 0.0 { (thick.min(0.02) * frame.texels_per_unit()).ceil() as u32 + 2 } else { 0 }
 }
@@ -113,7 +113,7 @@ impl PlateField {
         self.written
     }
 
-    /// Shows the cells that have closed by the end of the last step that is over at `moment`.
+    /// Shows the cells that have closed by the end of the last whole step at `moment`.
     pub(super) fn show(
         &mut self,
         network: &Network,
@@ -151,12 +151,12 @@ impl PlateField {
         self.cells = cells;
     }
 
-    /// Plates that are shown of those that have not been forgotten.
+    /// Number of shown plates that do not belong to a removed part.
     fn shown(&self) -> usize {
         self.plates.len() - 1 - self.frozen
     }
 
-    /// The plate that a cell was cut off.
+    /// The plate from which a cell was cut off.
     fn host(&self, closing: &Closing) -> u16 {
         match (closing.host as usize).checked_sub(self.skipped) {
             None | Some(0) => 0,
@@ -164,7 +164,7 @@ impl PlateField {
         }
     }
 
-    /// Keeps what is shown as it is, and goes on with what is left of the network.
+    /// Keeps what is shown and continues with the remaining network.
     pub(super) fn freeze(&mut self, network: &Network, timeline: &Timeline) {
         self.cells = CellTracker::recording(self.frame.extent());
         self.cells.follow(network, timeline);
@@ -192,7 +192,8 @@ impl PlateField {
         Plate { centre, inv_side: 1.0 / side, near, away, extent: extent * unit, draws, common }
     }
 
-    /// Writes `to` on the texels with their centre inside an outline (even-odd) that belong to `from`; returns where.
+    /// Writes `to` on the texels of the plate `from` whose centre is inside an outline (even-odd); returns their
+    /// rectangle.
     fn fill(
         &mut self,
         outline: &[Vec2],
@@ -206,7 +207,7 @@ impl PlateField {
         for (i, &a) in outline.iter().enumerate() {
             let b = outline[(i + 1) % outline.len()];
             let (a, b) = (self.frame.to_texel(a), self.frame.to_texel(b));
-            // The same numbers whichever way an edge runs: neighbours share every texel's side.
+            // The same numbers in both directions of an edge, so that neighbours agree on the side of every texel.
             let (a, b) = if (a.y, a.x) <= (b.y, b.x) { (a, b) } else { (b, a) };
             let (top, bottom) = ((a.y + 0.5).floor().clamp(0.0, last), (b.y + 0.5).floor().clamp(0.0, last));
             for y in top as u32..bottom as u32 {

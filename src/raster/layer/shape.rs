@@ -1,4 +1,4 @@
-//! A crushed zone in texels: what is there at a place.
+//! The content of a crushed zone at a place, in texels.
 
 use super::{
     broken::Broken,
@@ -10,7 +10,7 @@ use super::{
 };
 use glam::Vec2;
 
-/// Way to the light: from the upper left.
+/// Direction to the light: the upper left.
 pub(super) const TO_LIGHT: Vec2 = Vec2::new(-std::f32::consts::FRAC_1_SQRT_2, -std::f32::consts::FRAC_1_SQRT_2);
 
 /// A crushed zone in texels.
@@ -22,13 +22,13 @@ pub(super) struct Shape<'a> {
     pub(super) grain: f32,
     pub(super) jag: f32,
     pub(super) broken: Option<Broken>,
-    /// A hole with a broken edge, and how far that reaches.
+    /// A hole with a broken edge, and the outer outline of that edge.
     pub(super) hole: Option<[Outline; 2]>,
-    /// From the hit, and their radii, texels.
+    /// Positions relative to the hit, and radii, texels.
     pub(super) bubbles: Vec<(Vec2, f32)>,
 }
 
-/// What there is at a place.
+/// The content of a place.
 #[derive(Clone, Copy)]
 pub(super) struct Place {
     pub(super) height: f32,
@@ -55,7 +55,7 @@ impl<'a> Shape<'a> {
             broken: crushed.broken.then(|| Broken::new(crushed, unit, radius, grain, seed)),
             hole: (crushed.hole > 0.0 && crushed.edge > 0.0).then(|| {
                 let hole = crushed.hole * radius;
-                // Within what other outlines reach.
+                // Within the extent of other outlines.
                 let most = radius * crushed.reach.max(1.0 + WIDEST * crushed.ragged) / (1.0 + 0.75 * WIDEST);
                 let around = (hole + (0.75 * crushed.edge * hole).max(1.5)).min(most);
                 let centre = Vec2::ZERO;
@@ -68,13 +68,13 @@ impl<'a> Shape<'a> {
         }
     }
 
-    /// Short cracks and flakes, fewer and fewer outward.
+    /// Short cracks and flakes that thin out outward.
     pub(super) fn add_bruise(&self, place: &mut Place, off: Vec2, radii: f32, at: Vec2, seed: u32) {
         let Crushed { ragged, pale, speckle, reach, needles, .. } = self.crushed;
         let way = off.normalize_or_zero();
         let round = |k: u32, times: f32| noise(seed ^ k, way.x * times + 17.0, way.y * times + 31.0);
         let cloud = noise(seed ^ 10, at.x / (3.0 * self.grain), at.y / (3.0 * self.grain));
-        // No outline: what is near is dense, and what is far is not there in more and more places.
+        // No outline: the cracks are dense near the hit, and further out there are more and more gaps.
         let stray = 1.0 + ragged * (0.45 * round(2, 1.3) + 0.4 * round(3, 3.7)) + 0.25 * ragged * cloud;
         let q = radii / stray.max(0.3);
         let left = (1.0 - q / reach).min(2.0 * (1.0 - radii / reach)).clamp(0.0, 1.0);
@@ -90,7 +90,7 @@ impl<'a> Shape<'a> {
             let crazed = bruise::crazed(off, self.radius, left, seed);
             bruise.crack = bruise.crack * (1.0 - crazing) + crazed.crack * crazing;
             bruise.flake = bruise.flake * (1.0 - crazing) + crazed.flake * crazing;
-            // No even milk.
+            // The haze is not uniform.
             haze *= 1.0 - crazing * (0.12 - 0.35 * cloud - 0.3 * crazed.flake);
             place.shade += crazing * needles * (0.5 * crazed.flake - 0.22) * left;
         }
@@ -101,7 +101,8 @@ impl<'a> Shape<'a> {
         place.height += self.rough * bruise.flake * left * left - self.rough * bruise.crack * left;
     }
 
-    /// A hole with straight sides: its broken wall is seen within, chips with sharp sides have come off around it.
+    /// A hole with straight sides: its broken wall is visible inside, and chips with sharp sides have come off around
+    /// it.
     pub(super) fn add_hole(&self, place: &mut Place, [hole, shell]: &[Outline; 2], off: Vec2) {
         let pale = self.crushed.pale;
         let (within, inward) = hole.side(off);
@@ -123,7 +124,7 @@ impl<'a> Shape<'a> {
             }
         }
         if inside > 0.0 {
-            // Glass is thick: more is seen of its far wall, which is lit.
+            // Glass is thick: more of the far wall is visible, which is lit.
             let void = (hole.within((off - TO_LIGHT * (0.16 * hole.reach)) * 1.2) + 0.5).clamp(0.0, 1.0);
             let facing = inward.dot(TO_LIGHT);
             let bright =
@@ -145,7 +146,7 @@ impl<'a> Shape<'a> {
             return;
         }
         let share = ((q - 1.0) / (reach - 1.0).max(0.05)).clamp(0.0, 1.0);
-        // Arcs, wider apart outward; each a steep step and a gentle way back.
+        // Arcs, wider apart outward: each is a steep step and a gentle slope back.
         let arcs = 5.0 * share.sqrt() + 0.4 * noise(seed ^ 9, way.x * 2.0, way.y * 2.0);
         let saw = arcs - arcs.floor();
         let strength = inside * (1.0 - 0.6 * share);

@@ -24,9 +24,9 @@ pub(super) fn facets(seed: u32, at: Vec2) -> f32 {
 
 /// The nearest of some scattered places, as of a stone.
 pub(super) struct Cell {
-    /// A number of its own, -1..=1.
+    /// Its random number, -1..=1.
     pub(super) draw: f32,
-    /// How much further it is to the next one.
+    /// How much further the second nearest is.
     pub(super) gap: f32,
 }
 
@@ -57,19 +57,19 @@ impl Cell {
 pub(super) struct Stone {
     /// Its height there, texels; below zero where it has fallen out.
     pub(super) height: f32,
-    /// How much darker or brighter it is than what it lies in.
+    /// Its difference in brightness from the material around it.
     pub(super) tone: f32,
 }
 
 impl Stone {
-    /// Sides of the squares in which there is one at the most, in grains, and with which chance.
+    /// For each size: the side of the squares that hold at most one stone, in grains, and the probability of one.
     const SIZES: [(f32, f32); 4] = [(3.0, 0.5), (2.0, 0.65), (1.25, 0.7), (0.75, 0.6)];
 
-    /// The largest one at a place, if there is any; `share` is how many there are.
+    /// The largest stone at a place, if there is one; `share` sets how many there are.
     pub(super) fn find(seed: u32, at: Vec2, grain: f32, share: f32) -> Option<Self> {
         let mut turned = at;
         for ((size, chance), k) in Self::SIZES.into_iter().zip(0u32..) {
-            // Each size has squares of its own, turned against the others.
+            // Each size has its own squares, rotated against the others.
             turned = Vec2::new(0.8 * turned.x - 0.6 * turned.y, 0.6 * turned.x + 0.8 * turned.y);
             let side = (size * grain).max(2.0);
             let cell = (turned / side).floor();

@@ -1,4 +1,4 @@
-//! Veils: translucent sheets that hang from cracks to one side, as in clear ice.
+//! Veils: translucent sheets to one side of cracks, as in clear ice.
 
 use super::noise::noise;
 use crate::{
@@ -9,23 +9,24 @@ use crate::{
 };
 use glam::{UVec2, Vec2};
 
-/// A translucent sheet along each crack, to one side of it: the wall of a crack that is seen through the surface (ice).
+/// A translucent sheet to one side of each crack: the wall of a crack that is visible through the surface (ice).
 ///
-/// All sheets of a surface hang to the same side, as they are seen from one place. Wider cracks have denser ones.
+/// All sheets of a surface are on the same side, because they are seen from one place. Wider cracks have denser
+/// sheets.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct Veil {
-    /// How far it reaches from the crack, pattern units. 0..=0.5; default 0.06.
+    /// Distance to which a sheet extends from the crack, pattern units. 0..=0.5; default 0.06.
     pub reach: f32,
-    /// Width of a crack from which on it is as dense as it gets, pattern units. 0.0001..=1; default 0.005.
+    /// Width from which a crack has the densest sheet, pattern units. 0.0001..=1; default 0.005.
     pub full_width: f32,
-    /// How much it covers at the crack; it falls off from there. 0..=1; default 0.5.
+    /// Cover of the sheet at the crack; it decreases with the distance. 0..=1; default 0.5.
     pub cover: f32,
     /// Colour, sRGB 0..=1; default a bluish white.
     pub color: [f32; 3],
-    /// How much sheets differ from each other and along each: in width, strength and fall-off, with ragged far edges and fine arcs, some to the
-    /// other side. 0..=1; default 0 = all are alike.
+    /// How much sheets differ from each other and along each crack: in width, strength and fall-off, with ragged far
+    /// edges and fine arcs; some are on the other side. 0..=1; default 0 = all are alike.
     pub uneven: f32,
     /// How many bubbles lie along cracks, in strings. 0..=1; default 0 = none.
     pub bubbles: f32,
@@ -50,7 +51,7 @@ impl Veil {
         found.map(|(name, value, _, range)| (name, value, range))
     }
 
-    /// The same seen from nearer or further away.
+    /// The same sheets at another scale: every length times `by`.
     pub(crate) fn scaled(&self, by: f32) -> Self {
         Self {
             reach: (self.reach * by).clamp(0.0, 0.5),

@@ -16,10 +16,10 @@ use crate::{
 use glam::{UVec2, Vec2};
 use std::collections::VecDeque;
 
-/// What the draws of crushed zones are combined with. Frozen, like all that a seed gives.
+/// Salt of the random draws of crushed zones. Frozen: a seed must give the same result in every version.
 const OF_ZONES: u64 = 0xC4;
 
-/// One impact that has crushed.
+/// The crushed zone of one impact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Zone {
     /// Texels.
@@ -28,10 +28,11 @@ struct Zone {
     bounds: TexelRect,
 }
 
-/// What more impacts than so many crush on one tile does not show: there is nothing left to crush. The first ones count.
+/// At most this many zones are drawn on one tile, the first ones: more make no visible difference.
 const MOST: usize = 8;
 
-/// Energies at which a zone gets larger, from 1 to 2, and so on: a thousand little hits on one place do not draw it a thousand times.
+/// Energies at which a zone is enlarged, from 1 to 2 and repeated for each doubling, so that a thousand small hits on
+/// one place do not redraw it a thousand times.
 const LEVELS: [f32; 4] = [1.0, 1.189_207_1, std::f32::consts::SQRT_2, 1.681_792_8];
 
 /// The highest level that is not above an energy.
@@ -53,7 +54,7 @@ fn tiles_of(rect: &TexelRect) -> impl Iterator<Item = UVec2> + use<> {
     (min.y..max.y).flat_map(move |y| columns.clone().map(move |x| UVec2::new(x, y)))
 }
 
-/// Crushed zones of all impacts, in tiles that are only there where they are.
+/// The crushed zones of all impacts, in tiles that exist only where there are zones.
 #[derive(Clone, Debug)]
 pub(crate) struct CrushedField {
     crushed: Crushed,
@@ -61,16 +62,16 @@ pub(crate) struct CrushedField {
     seed: u32,
     /// By impact.
     zones: Vec<Option<Zone>>,
-    /// Hits that are taken up.
+    /// Number of registered hits.
     shown: usize,
     columns: u32,
     tiles: Vec<Option<Box<Tile>>>,
     used: usize,
-    /// What is still to be drawn, in this order.
+    /// Tiles that are still to be drawn, in this order.
     waiting: VecDeque<Waiting>,
-    /// Which tiles are to be drawn anew.
+    /// Which tiles are to be redrawn completely.
     is_anew: Vec<bool>,
-    /// How far beside a plate its side is seen, texels.
+    /// Distance beside a plate at which its side is visible, texels.
     beyond: u32,
 }
 
@@ -78,11 +79,11 @@ pub(crate) struct CrushedField {
 #[derive(Clone, Copy, Debug)]
 struct Waiting {
     tile: UVec2,
-    /// The impact that has crushed it since; `None` = all of the tile is to be drawn anew.
+    /// The impact that is to be added to it; `None` = the whole tile is to be redrawn.
     impact: Option<u32>,
 }
 
-/// What is shown, not the way there.
+/// Compares what is shown, not the state of the work.
 impl PartialEq for CrushedField {
     fn eq(&self, other: &Self) -> bool {
         self.crushed == other.crushed && self.frame == other.frame && self.tiles == other.tiles
@@ -107,7 +108,7 @@ impl CrushedField {
         }
     }
 
-    /// The same beside plates of this thickness.
+    /// The same, beside plates of this thickness.
     pub(super) fn with_sides(self, thick: f32) -> Self {
         Self { beyond: super::plates::beyond(thick, self.frame), ..self }
     }
@@ -120,12 +121,13 @@ impl CrushedField {
         &self.crushed
     }
 
-    /// Takes up the first hits of `all`, those in `strikes`: from then on it [has to be drawn](Self::draw_some) as they have left it.
+    /// Registers the first hits of `all`, those in `strikes`. Their zones are then [drawn in
+    /// slices](Self::draw_some).
     pub(super) fn follow(&mut self, strikes: &[Strike], all: &[Strike]) {
         if self.shown == strikes.len() || self.crushed.radius <= 0.0 {
             return;
         }
-        // Tiles of impacts that have changed are drawn anew; what is new is laid over them.
+        // Tiles of impacts that have changed are redrawn; new impacts are added to what is there.
         let (mut anew, mut new) = (Vec::new(), Vec::new());
         while self.shown > strikes.len() {
             self.shown -= 1;
@@ -164,14 +166,15 @@ impl CrushedField {
         }
     }
 
-    /// Whether tiles are still to be drawn.
+    /// Whether tiles are left to draw.
     pub(super) fn is_behind(&self) -> bool {
         !self.waiting.is_empty()
     }
 
-    /// Draws at most so many tiles; appends the rectangles of the texels that may be others now. Returns whether any are left.
+    /// Draws at most `tiles` tiles; appends the rectangles of the texels that may have changed. Returns whether any
+    /// are left.
     ///
-    /// What it shows when none is left depends on the hits alone, not on the slices.
+    /// When none is left the result depends only on the hits, not on the slices.
     pub(super) fn draw_some(
         &mut self,
         most: usize,
@@ -210,12 +213,12 @@ impl CrushedField {
         (0..).zip(&self.zones).filter(move |(_, zone)| touches(zone)).map(|(index, _)| index)
     }
 
-    /// Whether an impact is among the first on a tile, if its zone touches it.
+    /// Whether an impact whose zone touches a tile is among the first ones on it.
     fn counts(&self, index: u32, tile: UVec2) -> bool {
         self.on(tile).take(MOST).take_while(|other| *other < index).count() < MOST
     }
 
-    /// Gives the impact of a hit this energy; adds the tiles that may be others now.
+    /// Sets the energy of the impact of a hit; adds the tiles that may have changed.
     fn set(&mut self, strike: &Strike, energy: f32, others: &mut Vec<UVec2>) {
         let (index, energy) = (strike.impact as usize, level(energy));
         if self.zones.len() <= index {
@@ -242,7 +245,7 @@ impl CrushedField {
         self.crushed.radius * self.frame.texels_per_unit() * energy.sqrt()
     }
 
-    /// Lays what an impact has crushed over a tile, if it touches it.
+    /// Draws the zone of an impact over a tile, if it touches it.
     fn draw(&mut self, index: u32, tile: UVec2, forbidden: Option<&Grid<bool>>) {
         let Some(Some(zone)) = self.zones.get(index as usize).copied() else { return };
         let corner = tile * TILE;
@@ -275,8 +278,9 @@ impl CrushedField {
         }
     }
 
-    /// Whether a plate whose middle is at a place, and all of it within `extent` of it, is gone in a hole, or whole beside one; `None` if no hole
-    /// is there, or the plate is as large as that. Only holes of impacts that show all of the plate anew when they are shown. Texels.
+    /// Whether a plate with its middle at `at` and its outline within `extent` of it is missing in a hole (`true`) or
+    /// whole beside one (`false`). `None` if there is no hole, or the plate is as large as the hole. Only holes of
+    /// impacts that redraw the whole plate when they are shown count. Texels.
     pub(crate) fn is_gone(&self, at: Vec2, extent: f32) -> Option<bool> {
         let around = extent + 2.0 + self.beyond as f32;
         let (min, max) = ((at - around).max(Vec2::ZERO), (at + around).min(self.frame.size().as_vec2()));
@@ -291,13 +295,13 @@ impl CrushedField {
         near.max()
     }
 
-    /// Whether anything may be crushed in a rectangle.
+    /// Whether there may be crushed texels in a rectangle.
     pub(crate) fn touches(&self, rect: TexelRect) -> bool {
         let (min, max) = (rect.min / TILE, rect.max.map(|end| end.div_ceil(TILE)));
         (min.y..max.y).any(|y| (min.x..max.x).any(|x| self.tiles[(y * self.columns + x) as usize].is_some()))
     }
 
-    /// The texels of row `y` from column `x` on.
+    /// Reads the texels of row `y` from column `x` on.
     pub(crate) fn read(&self, x: u32, y: u32, to: &mut [Spot]) {
         let mut rest = to;
         let mut x = x;
@@ -318,7 +322,7 @@ impl CrushedField {
 }
 
 impl Shape<'_> {
-    /// Lays it over the texels `rect` of a tile whose first texel is at `corner`.
+    /// Draws it over the texels `rect` of a tile whose first texel is at `corner`.
     fn draw(&self, texels: &mut Tile, centre: Vec2, seed: u32, rect: TexelRect, corner: UVec2) {
         const WIDE: usize = TILE as usize + 2;
         // Heights around each texel are needed for its slope.
@@ -361,7 +365,7 @@ impl Shape<'_> {
         let mut place = Place::NONE;
         let distance = off.length();
         let radii = distance / self.radius.max(0.5);
-        // No outline strays further than that.
+        // No outline extends further.
         let widest = 1.0 + WIDEST * ragged;
         if radii > reach.max(flake).max(widest) + 0.1 {
             return place;
@@ -381,13 +385,13 @@ impl Shape<'_> {
             let fine = grain(1, self.grain);
             let edge = 1.0 + ragged * (0.55 * round(2, 1.3) + 0.35 * round(3, 3.7) + 0.2 * fine);
             let outline = (self.radius * edge).max(0.5);
-            // One texel of soft edge.
+            // An edge one texel wide.
             inside = (outline - distance + 0.5).clamp(0.0, 1.0);
             if inside > 0.0 {
                 let coarse = grain(4, 2.3 * self.grain);
                 let rest = (1.0 - distance / outline).clamp(0.0, 1.0);
                 let fade = inside + soft * ((1.5 * rest).min(1.0) - inside);
-                // A broken edge is steep, a soft one has none.
+                // A broken edge is steep; a soft one has no wall.
                 let bowl = rest.sqrt() + soft * (rest * rest - rest.sqrt());
                 place.height += -self.depth * bowl + fade * self.rough * (0.6 * coarse + 0.4 * fine);
                 let grains = 1.0 - speckle * (0.5 + 0.5 * grain(5, 0.6 * self.grain)).clamp(0.0, 1.0);
