@@ -27,7 +27,7 @@ pub struct Grid<T> {
     data: Vec<T>,
 }
 
-/// Size and values have to fit.
+/// Fails if the number of values does not match the size.
 #[cfg(feature = "serde")]
 impl<'de, T: Copy + serde::Deserialize<'de>> serde::Deserialize<'de> for Grid<T> {
     fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
@@ -45,13 +45,13 @@ impl<'de, T: Copy + serde::Deserialize<'de>> serde::Deserialize<'de> for Grid<T>
 }
 
 impl<T: Copy> Grid<T> {
-    /// A grid with `fill` everywhere.
+    /// A grid with the value `fill` everywhere.
     #[must_use]
     pub fn new(size: UVec2, fill: T) -> Self {
         Self { size, data: vec![fill; size.x as usize * size.y as usize] }
     }
 
-    /// A grid over existing rows; `None` if `data` has not exactly `size.x * size.y` values.
+    /// A grid over existing rows; `None` if `data` does not have exactly `size.x * size.y` values.
     #[must_use]
     pub fn from_vec(size: UVec2, data: Vec<T>) -> Option<Self> {
         (data.len() == size.x as usize * size.y as usize).then_some(Self { size, data })
@@ -91,7 +91,7 @@ impl<T: Copy> Grid<T> {
         &self.data[y * w..(y + 1) * w]
     }
 
-    /// Row `y`, to write.
+    /// Row `y`, mutable.
     ///
     /// # Panics
     /// If `y` is not below the height.
@@ -107,7 +107,7 @@ impl<T: Copy> Grid<T> {
         &self.data
     }
 
-    /// All values, row after row, to write.
+    /// All values, row after row, mutable.
     #[must_use]
     pub fn as_mut_slice(&mut self) -> &mut [T] {
         &mut self.data

@@ -1,6 +1,6 @@
 //! Portable arithmetic: the same values give the same bits on every machine.
 //!
-//! `sqrt` and the four operations are exact everywhere; everything else that a pattern needs goes through [`ops`].
+//! `sqrt` and the four operations are exact everywhere; all other functions that a pattern needs are in [`ops`].
 //! Random numbers come from [`Rng`], whose stream never changes between versions.
 
 pub mod ops;

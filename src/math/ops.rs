@@ -1,6 +1,13 @@
-//! Transcendental functions with the same bits on every platform (by the `libm` crate).
+//! Transcendental functions with the same bits on every platform (from the `libm` crate).
 //!
-//! The standard library leaves `sin`, `exp` and their kin to the platform, whose last bits differ.
+//! The standard library uses the platform's `sin`, `exp` and similar functions, whose last bits differ.
+//!
+//! ```
+//! use bevy_crack::math::ops;
+//!
+//! assert_eq!(ops::unit(0.0), [1.0, 0.0].into());
+//! assert_eq!(ops::atan2(0.0, 1.0), 0.0);
+//! ```
 
 use glam::Vec2;
 

@@ -6,8 +6,9 @@ use rand_pcg::Pcg32;
 /// PCG-XSH-RR 64/32 (O'Neill 2014), seeded through `SplitMix64`.
 ///
 /// The stream is part of the crate's contract: a seed gives the same numbers in every version and on every machine.
-/// Each consumer draws from a stream of its own, so that a new consumer does not shift the others. It is a generator of
-/// [`rand_core`], so that distributions of `rand` can draw from it.
+/// Each consumer draws from its own named stream, so that a new consumer does not shift the others. The generator
+/// implements the traits of [`rand_core`], so the distributions of `rand` can draw from it.
+///
 ///
 /// ```
 /// use bevy_crack::math::Rng;
@@ -23,7 +24,7 @@ pub struct Rng {
     core: Pcg32,
 }
 
-/// The inverse of the factor by which the state of a [`Pcg32`] goes on, modulo 2⁶⁴.
+/// The inverse of the multiplier of a [`Pcg32`], modulo 2⁶⁴.
 const BACK: u64 = 0xC097_EF87_329E_28A5;
 
 /// One round of `SplitMix64`: a good 64-bit hash of `x`.
@@ -42,16 +43,17 @@ pub(crate) fn hash_unit(seed: u64, index: u64) -> f32 {
 }
 
 impl Rng {
-    /// A generator for `seed`. Every seed is good, zero included.
+    /// A generator for `seed`. All seeds are equally good, zero included.
     #[must_use]
     pub fn new(seed: u64) -> Self {
         let increment = mix(seed ^ 0xDA3E_39CB_94B9_5BDB) | 1;
-        // `Pcg32` goes on by one state before the first number; here the first one is that of `mix(seed) + increment`.
+        // `Pcg32` advances its state once before the first number; here the first state is to be `mix(seed) +
+        // increment`.
         let state = mix(seed).wrapping_mul(BACK).wrapping_sub(increment);
         Self { seed, core: Pcg32::new(state, increment >> 1) }
     }
 
-    /// An independent generator for the consumer called `name`; does not advance `self`.
+    /// An independent generator for the consumer `name`; does not advance `self`.
     #[must_use]
     pub fn stream(&self, name: &str) -> Self {
         // FNV-1a of the name, mixed into the seed.
@@ -59,7 +61,7 @@ impl Rng {
         Self::new(mix(self.seed) ^ hash)
     }
 
-    /// An independent generator for the `index`-th thing of its kind; does not advance `self`.
+    /// An independent generator for the element `index`; does not advance `self`.
     #[must_use]
     pub fn substream(&self, index: u64) -> Self {
         Self::new(mix(self.seed.wrapping_add(mix(index))))

@@ -1,13 +1,13 @@
-//! Loops for the widest vectors of the processor at hand.
+//! Loops compiled for the widest vectors of the processor.
 
 #[cfg(target_arch = "x86_64")]
 use fearless_simd::{Level, Simd};
 
-/// Runs `work` as it is compiled for the widest vectors that the processor at hand has: AVX2 on x86-64, if it is there; elsewhere as the build
-/// assumes.
+/// Runs `work`, compiled for the widest vectors that the processor has: AVX2 on x86-64 if available; elsewhere what
+/// the build assumes.
 ///
-/// The bits are the same either way: the same operations in the same order, each rounded as it stands, none fused with another.
-/// Only what is inlined into `work` gains, so its loops are `#[inline(always)]`, and so is the closure.
+/// The bits are the same either way: the same operations in the same order, each rounded on its own, none fused. Only
+/// code that is inlined into `work` gains, so its loops are `#[inline(always)]`, and so is the closure.
 #[inline(always)]
 pub(crate) fn vectorized<R>(work: impl FnOnce() -> R) -> R {
     #[cfg(test)]

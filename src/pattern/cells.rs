@@ -25,40 +25,42 @@ use std::{
     ops::Range,
 };
 
-/// The surface's corners in a [`CellTracker::outline`]: this plus 0, 1, 2, 3 from the top left, right, down, left, up.
+/// Index of the surface's corners in a [`CellTracker::outline`]: this plus 0, 1, 2, 3 for top left, top right, bottom
+/// right, bottom left.
 pub const CORNERS: u32 = u32::MAX - 4;
 
-/// Coordinates are whole numbers up to this.
+/// Coordinates are integers up to this.
 const RANGE: f64 = (1u32 << 30) as f64;
 
-/// Room for so many nodes from the start, so that most surfaces ask for memory once.
+/// Initial capacity for nodes, so that most surfaces allocate once.
 const FEW: usize = 64;
 
-/// A part of the surface that cracks and border enclose.
+/// A part of the surface that is enclosed by cracks and the border.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cell {
     /// Area inside the straight outline, without the holes, pattern units squared.
     pub area: f32,
     /// Centre of that area, pattern units.
     pub centroid: Vec2,
-    /// Step at which the segment was born that closed it.
+    /// Step of the segment that closed it.
     pub birth: u32,
     /// The later of the impacts of that segment's ends; [`NO_IMPACT`](super::NO_IMPACT) if one has none.
     pub impact: u32,
     /// A half-edge of its outer loop.
     start: u32,
-    /// Any half-edge of each loop that runs around something inside it that hangs on nothing.
+    /// Any half-edge of each loop around something disconnected inside it.
     holes: Vec<u32>,
 }
 
-/// The closed cells of a network that grows, with the surface's border.
+/// The closed cells of a growing network, together with the surface's border.
 ///
-/// Cell 0 is there from the start: what no crack has cut off yet. When a crack cuts through a cell, the larger part keeps
-/// its number and the smaller one is a new cell: so a cell's number never changes, cells are never removed, and their
-/// areas always add up to the surface.
+/// Cell 0 exists from the start: the area that no crack has cut off yet. When a crack cuts through a cell, the larger
+/// part keeps its number and the smaller one is a new cell. So a cell's number never changes, cells are never
+/// removed, and their areas always add up to the surface.
 ///
-/// Nodes closer than about 2⁻³⁰ of the surface's longer side count as one. A segment that runs along another or along the
-/// border, or crosses from one cell into another, closes nothing and is left out.
+/// Nodes closer than about 2⁻³⁰ of the surface's longer side count as one. A segment that runs along another or along
+/// the border, or crosses from one cell into another, closes nothing and is ignored.
+///
 ///
 /// ```
 /// use bevy_crack::{CrackPreset, growth::CrackGrowth, pattern::CellTracker};
@@ -78,7 +80,7 @@ pub struct Cell {
 #[derive(Clone, Debug)]
 pub struct CellTracker {
     extent: Vec2,
-    /// Whole numbers per pattern unit; 0 for an extent that no surface can have.
+    /// Integer units per pattern unit; 0 for an extent that a surface cannot have.
     scale: f64,
     corner: [i32; 2],
     vertices: Vec<Vertex>,
@@ -86,7 +88,7 @@ pub struct CellTracker {
     /// Per node: its vertex, or [`NONE`].
     vertex_of: Vec<u32>,
     links: usize,
-    /// Way along the border from the top left, and the half-edge along it that begins there.
+    /// Distance along the border from the top left, and the half-edge along it that begins there.
     border: BTreeMap<i64, u32>,
     /// Per half-edge: where it begins, the next of its loop, and a loop whose root is its own. `h ^ 1` runs the other way.
     origin: Vec<u32>,
@@ -96,14 +98,15 @@ pub struct CellTracker {
     cells: Vec<Cell>,
     /// Cells whose area has to be computed again.
     touched: Vec<u32>,
-    /// Each cell as it was when it closed, if that is wanted.
+    /// Each cell as it was when it closed, if recorded.
     closings: Option<Closings>,
 }
 
 impl CellTracker {
-    /// The tracker of a surface of `extent` pattern units, see [`Network::extent`]: one cell, the whole.
+    /// A tracker for a surface of `extent` pattern units, see [`Network::extent`]: it starts with one cell, the whole
+    /// surface.
     ///
-    /// With an extent that is not finite and above zero there are no cells.
+    /// If the extent is not finite and above zero there are no cells.
     #[must_use]
     pub fn new(extent: Vec2) -> Self {
         let valid = extent.is_finite() && extent.min_element() > 0.0;
@@ -132,7 +135,7 @@ impl CellTracker {
         tracker
     }
 
-    /// The same, which keeps of each cell what it was when it closed.
+    /// The same, which also records each cell as it was when it closed.
     pub(crate) fn recording(extent: Vec2) -> Self {
         Self { closings: Some(Closings::default()), ..Self::new(extent) }
     }
@@ -160,18 +163,19 @@ impl CellTracker {
         self.measure(0);
     }
 
-    /// Takes in what `network` has gained since the last call, and returns the numbers of the cells that closed thereby.
+    /// Adds the new nodes and links of `network` since the last call, and returns the numbers of the cells that they
+    /// closed.
     ///
-    /// Must be given the same network every time, which may only gain nodes and links. Costs as much as what was gained,
-    /// and the shorter outline of each cell that closes; a few times the whole network for each unconnected part that
-    /// closes its first cell.
+    /// It must be called with the same network every time, which may only gain nodes and links. The cost is
+    /// proportional to what was added, and to the shorter outline of each cell that closes; for each disconnected
+    /// part that closes its first cell it is a few times the whole network.
     pub fn update(&mut self, network: &Network) -> Range<u32> {
         let first = self.cells.len() as u32;
         if self.cells.is_empty() {
             return 0..0;
         }
         let (nodes, links) = (network.nodes(), network.links());
-        // In order of birth, so that it does not matter how often this is called.
+        // In the order in which they were added, so that it does not matter how often this is called.
         while self.vertex_of.len() < nodes.len() || self.links < links.len() {
             let i = self.vertex_of.len();
             if let Some(link) = links.get(self.links)
@@ -208,7 +212,7 @@ impl CellTracker {
         self.touched.clear();
     }
 
-    /// Takes in the next link.
+    /// Adds the next link.
     fn add_link(&mut self, network: &Network, birth: u32) {
         let Some(link) = network.links().get(self.links) else { return };
         self.links += 1;
@@ -221,7 +225,7 @@ impl CellTracker {
         }
     }
 
-    /// Takes in the next node, with the branch that leads to it.
+    /// Adds the next node, with the branch that leads to it.
     fn add_node(&mut self, network: &Network, birth: u32) {
         let i = self.vertex_of.len();
         let Some(node) = network.nodes().get(i) else { return };
@@ -235,27 +239,28 @@ impl CellTracker {
         }
     }
 
-    /// All cells by their number; the first is what no crack has cut off yet.
+    /// All cells by number; the first is the area that no crack has cut off yet.
     #[must_use]
     pub fn cells(&self) -> &[Cell] {
         &self.cells
     }
 
-    /// How many cells the cracks have cut off.
+    /// Number of cells that cracks have cut off.
     #[must_use]
     pub fn closed(&self) -> u32 {
         (self.cells.len() as u32).saturating_sub(1)
     }
 
-    /// The outline of a cell: indices of nodes and [`CORNERS`], x turning to y, without cracks that end inside it.
+    /// The outline of a cell, turning from x to y: indices of nodes and [`CORNERS`], without cracks that end inside
+    /// it.
     ///
-    /// Empty if there is no such cell. A place is passed more than once where the cell touches itself.
+    /// Empty if there is no such cell. A place appears more than once where the cell touches itself.
     #[must_use]
     pub fn outline(&self, cell: u32) -> Vec<u32> {
         self.cells.get(cell as usize).map_or_else(Vec::new, |cell| self.trace(cell.start))
     }
 
-    /// The outlines of what lies inside a cell without being joined to its outline, the other way round.
+    /// The outlines of the parts inside a cell that are not connected to its outline, in the opposite direction.
     pub fn holes(&self, cell: u32) -> impl Iterator<Item = Vec<u32>> + '_ {
         self.cells.get(cell as usize).into_iter().flat_map(|cell| &cell.holes).map(|&hole| self.trace(hole))
     }

@@ -1,4 +1,4 @@
-//! The lines of a picture: what is lighter (or darker) than both its sides, over a length.
+//! Finds the lines of a picture: areas that are lighter (or darker) than both their sides, over a length.
 
 use crate::{
     Grid,
@@ -6,34 +6,36 @@ use crate::{
 };
 use glam::{IVec2, UVec2, Vec2};
 
-/// The shorter side at which lines are looked for, texels.
+/// The shorter side of the picture in which lines are searched for, texels.
 const SIDE: u32 = 256;
 
-/// Widths of the lines that are looked for, texels: lines between two of them answer to both.
+/// Widths of the filters, texels: lines between two of these widths respond to both.
 const WIDTHS: [f32; 3] = [1.0, 2.0, 4.0];
 
-/// Directions of the lines that are looked for, over half a turn.
+/// Directions of the filters, over half a turn.
 const DIRECTIONS: u32 = 12;
 
-/// Texels around the picture, mirrored: the reach of the widest line's filter and a little more.
+/// Texels around the picture, mirrored: the extent of the widest filter and a little more.
 const MARGIN: usize = 24;
 
-/// Contrasts within which a texel adds to a line: a gap counts against it a little, a highlight not without end.
+/// Range to which the contrast of a texel is clamped: a gap counts against a line only a little, and a highlight
+/// counts for it only to a limit.
 const CONTRAST: (f32, f32) = (-0.05, 0.25);
 
-/// Share of texels that stand out in a picture without lines.
+/// Share of texels that respond in a picture without lines.
 const NOISE: f32 = 0.02;
 
-/// The least response of a line: below it nobody sees one.
+/// The smallest response of a line: fainter lines are not visible.
 const FAINTEST: f32 = 0.02;
 
-/// A line has somewhere this many times the response of noise.
+/// A line must reach this many times the response of noise somewhere.
 const CLEAR: f32 = 1.7;
 
 /// Length of the shortest line that counts, as a share of the shorter side.
 const LENGTH: f32 = 0.25;
 
-/// The lines of a picture of `size` texels as values of 0..=1, coarser than the picture if that is large; `None` if it has none.
+/// The lines of a picture of `size` texels as values of 0..=1, at a lower resolution if the picture is large; `None`
+/// if it has none.
 pub(super) fn find(size: UVec2, lightness: impl Fn(usize) -> f32) -> Option<Grid<f32>> {
     let picture = Padded::new(size, lightness);
     let mut responses = [vec![0.0_f32; picture.texels()], vec![0.0; picture.texels()]];
@@ -44,12 +46,12 @@ pub(super) fn find(size: UVec2, lightness: impl Fn(usize) -> f32) -> Option<Grid
             || respond(&blurred, width, &mut responses),
         );
     }
-    // A texture without lines has as many light ones as dark ones. So the weaker kind tells what is noise.
+    // A texture without lines has as many light responses as dark ones. So the weaker kind gives the level of noise.
     let [light, dark] = &responses;
     let (lines, noise) = if top(light, 0.01) >= top(dark, 0.01) { (light, dark) } else { (dark, light) };
     let low = top(noise, NOISE).max(FAINTEST);
     let kept = long_ones(picture.size, lines, low, CLEAR * low);
-    // As wide as the lines themselves: the filter answers beside them too, but less.
+    // As wide as the lines themselves: the filter responds beside them too, but less.
     let mut inside: Vec<f32> = kept.iter().zip(lines).filter_map(|(&kept, &line)| kept.then_some(line)).collect();
     if inside.is_empty() {
         return None;
@@ -109,7 +111,7 @@ impl Padded {
         self.size.x as usize * self.size.y as usize
     }
 
-    /// Under a Gaussian of `sigma` texels. The outermost texels of the margin lose a little of their weight.
+    /// Blurred with a Gaussian of `sigma` texels. The outermost texels of the margin lose a little of their weight.
     fn blurred(&self, sigma: f32) -> Self {
         let reach = (3.0 * sigma).ceil() as i32;
         let weights: Vec<f32> = (-reach..=reach).map(|i| ops::exp(-0.5 * (i as f32 / sigma).powi(2))).collect();
@@ -128,7 +130,7 @@ impl Padded {
     }
 }
 
-/// Index of the texel that stands at `i` of a row with margins.
+/// Index of the texel at position `i` of a row with margins.
 fn mirrored(i: usize, side: usize) -> usize {
     let i = (i + 2 * MARGIN * side - MARGIN) % (2 * side);
     i.min(2 * side - 1 - i)
@@ -140,7 +142,7 @@ fn shifted<'a>(from: &'a [f32], to: &'a mut [f32], by: i32) -> (&'a [f32], &'a m
     if by >= 0 { (&from[by_abs..], &mut to[..n - by_abs]) } else { (&from[..n - by_abs], &mut to[by_abs..]) }
 }
 
-/// Raises `responses` (light, dark) to those of lines `width` texels wide, of the best direction at each texel.
+/// Raises `responses` (light, dark) to those of lines `width` texels wide, in the best direction at each texel.
 #[inline(always)]
 fn respond(picture: &Padded, width: f32, responses: &mut [Vec<f32>; 2]) {
     let (columns, stride) = (picture.size.x as usize, picture.stride);
@@ -151,7 +153,7 @@ fn respond(picture: &Padded, width: f32, responses: &mut [Vec<f32>; 2]) {
         let along = ops::unit(core::f32::consts::PI * direction as f32 / DIRECTIONS as f32);
         let side = along.perp() * (1.25 * width + 0.5);
         let (left, right) = (Tap::new(side, stride), Tap::new(-side, stride));
-        // What the taps reach from here is inside.
+        // Within these bounds the taps stay inside the buffer.
         let edge = (MARGIN - reach as usize - 1) * (stride + 1);
         let [light, dark] = &mut contrast;
         for i in edge..picture.values.len() - edge {
@@ -183,7 +185,7 @@ fn offset(by: Vec2, stride: usize) -> isize {
     by.y as isize * stride as isize + by.x as isize
 }
 
-/// The value at a fixed place beside a texel, between four others.
+/// The value at a fixed offset from a texel, interpolated between four others.
 struct Tap {
     offset: isize,
     below: usize,
@@ -215,7 +217,7 @@ fn nth(values: &mut [f32], share: f32) -> f32 {
     *values.select_nth_unstable_by(index.min(values.len() - 1), f32::total_cmp).1
 }
 
-/// The connected parts (8 neighbours) above `low` that reach `high` somewhere and are long.
+/// The connected parts (8 neighbours) above `low` that exceed `high` somewhere and are long.
 fn long_ones(size: UVec2, values: &[f32], low: f32, high: f32) -> Vec<bool> {
     let length = LENGTH * size.min_element() as f32;
     let (mut kept, mut seen) = (vec![false; values.len()], vec![false; values.len()]);
@@ -236,7 +238,7 @@ fn long_ones(size: UVec2, values: &[f32], low: f32, high: f32) -> Vec<bool> {
             (least, most) = (least.min(at), most.max(at));
             for (dx, dy) in [(-1, -1), (0, -1), (1, -1), (-1, 0), (1, 0), (-1, 1), (0, 1), (1, 1)] {
                 let near = (at + IVec2::new(dx, dy)).as_uvec2();
-                // What is left of or above the picture has become large.
+                // Negative coordinates have wrapped around to large values.
                 if near.x >= size.x || near.y >= size.y {
                     continue;
                 }

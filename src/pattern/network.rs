@@ -14,28 +14,28 @@ pub const NO_IMPACT: u32 = u32::MAX;
 pub struct Node {
     /// Position, pattern units.
     pub pos: Vec2,
-    /// Width of the crack here, pattern units. Only ever grows.
+    /// Width of the crack here, pattern units. It never decreases.
     pub width: f32,
-    /// Index of the node it grew from, always below its own, or [`NO_PARENT`].
+    /// Index of the node from which it grew, always below its own, or [`NO_PARENT`].
     pub parent: u32,
     /// Number of segments between it and its start.
     pub generation: u32,
-    /// Step at which it was born.
+    /// Step in which it was added.
     pub birth: u32,
     /// Index of the impact it belongs to, or [`NO_IMPACT`].
     pub impact: u32,
-    /// How much of the network's roughness the line from its parent has, 0 (straight) to 1.
+    /// Share of the network's roughness of the line from its parent, 0 (straight) to 1.
     pub bend: f32,
 }
 
-/// What a [`Link`] stands for.
+/// What a [`Link`] represents.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LinkKind {
-    /// Between nodes born of the same parent generation: `draw_connections` of Couto et al., the rings of glass.
+    /// Between nodes whose parents have the same generation: `draw_connections` of Couto et al., the rings of glass.
     Connection,
     /// Between close nodes of different branches: `draw_islands` of Couto et al., the cells of clay.
     Island,
-    /// Where cracks come together in a marker: closed venation of Runions et al. 2005.
+    /// Where cracks join at a marker: closed venation of Runions et al. 2005.
     Meeting,
     /// From the end of a crack to the older crack that stops it.
     Junction,
@@ -48,17 +48,17 @@ pub struct Link {
     pub a: u32,
     /// Index of the other end.
     pub b: u32,
-    /// Width, pattern units. Only ever grows.
+    /// Width, pattern units. It never decreases.
     pub width: f32,
-    /// Step at which it was born.
+    /// Step in which it was added.
     pub birth: u32,
-    /// Why it is there.
+    /// What it represents.
     pub kind: LinkKind,
-    /// How much of the network's roughness its line has, 0 (straight) to 1.
+    /// Share of the network's roughness of its line, 0 (straight) to 1.
     pub bend: f32,
 }
 
-/// Names one segment of a [`Network`].
+/// Identifies one segment of a [`Network`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum SegmentId {
     /// From the parent of this node to this node.
@@ -67,10 +67,24 @@ pub enum SegmentId {
     Link(u32),
 }
 
-/// Nodes and segments of a crack pattern, in order of birth.
+/// Nodes and segments of a crack pattern, in the order in which they were added.
 ///
-/// Invariants: a parent's index is below its child's; every position lies in `0..=extent`; widths are finite and above
-/// zero.
+/// Invariants: a parent's index is below its child's; every position lies in `0..=extent`; widths are finite and
+/// above zero.
+///
+/// ```
+/// use bevy_crack::growth::{CrackGrowth, GrowthParams};
+///
+/// let mut growth = CrackGrowth::new(GrowthParams::DEFAULT, [1.0, 1.0].into(), 7)?;
+/// growth.hit([0.5, 0.5].into(), 1.0);
+/// while growth.step().grew() {}
+/// let network = growth.network();
+/// for segment in network.segments() {
+///     let points = network.path(segment).expect("the segment exists").points().len();
+///     assert!(points >= 2);
+/// }
+/// # Ok::<(), bevy_crack::growth::ParamError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Network {
     extent: Vec2,
@@ -79,9 +93,9 @@ pub struct Network {
     seed: u64,
     pub(crate) nodes: Vec<Node>,
     pub(crate) links: Vec<Link>,
-    /// Nodes and links that came before those that are left: lines go by the numbers that segments had at first.
+    /// Number of nodes and links that were removed: the random line of a segment depends on its original number.
     forgotten: (u64, u64),
-    /// First numbers of the links that were there when others were forgotten.
+    /// Original numbers of the links that remained when others were removed.
     numbers: Vec<u64>,
 }
 
@@ -104,7 +118,7 @@ impl Network {
         }
     }
 
-    /// The same with lines that sway off their way by up to so much, pattern units.
+    /// The same network with lines that are displaced by up to `sway` pattern units.
     pub(crate) fn with_sway(mut self, sway: f32) -> Self {
         self.sway = sway;
         self
@@ -116,19 +130,19 @@ impl Network {
         self.extent
     }
 
-    /// All nodes, in order of birth.
+    /// All nodes, in the order in which they were added.
     #[must_use]
     pub fn nodes(&self) -> &[Node] {
         &self.nodes
     }
 
-    /// All links, in order of birth.
+    /// All links, in the order in which they were added.
     #[must_use]
     pub fn links(&self) -> &[Link] {
         &self.links
     }
 
-    /// All segments: branches in order of birth, then links.
+    /// All segments: first branches, then links, each in the order in which they were added.
     pub fn segments(&self) -> impl Iterator<Item = SegmentId> + '_ {
         let branches = (0u32..).zip(&self.nodes).filter(|(_, node)| node.parent != NO_PARENT);
         let links = (0u32..).zip(&self.links);
@@ -147,9 +161,9 @@ impl Network {
         }
     }
 
-    /// The rough line that stands for a segment, with its width at each point; `None` if there is no such segment.
+    /// The rough line of a segment, with its width at each point; `None` if there is no such segment.
     ///
-    /// Frozen at birth: the points of a segment never move, only its widths grow.
+    /// The points of a segment never move after it was added; only its widths grow.
     #[must_use]
     pub fn path(&self, segment: SegmentId) -> Option<SegmentPath> {
         let (a, b) = self.ends(segment)?;
@@ -160,7 +174,7 @@ impl Network {
         self.path_with(segment, widths)
     }
 
-    /// The line of a segment with other widths at its ends: what it was when it was thinner.
+    /// The line of a segment with other widths at its ends: as it was when it was thinner.
     pub(super) fn path_with(&self, segment: SegmentId, widths: (f32, f32)) -> Option<SegmentPath> {
         let (a, b) = self.ends(segment)?;
         let ends = (self.nodes[a as usize].pos, self.nodes[b as usize].pos);
@@ -181,12 +195,13 @@ impl Network {
         if self.sway > 0.0 { path.swayed(self.sway, self.extent, self.seed) } else { path }
     }
 
-    /// The number that a link had at first.
+    /// The original number of a link.
     fn number(&self, link: u32) -> u64 {
         self.numbers.get(link as usize).copied().unwrap_or(u64::from(link) + self.forgotten.1)
     }
 
-    /// Takes the first nodes out, with all segments that have an end among them. Returns the numbers that the links that are left had.
+    /// Removes the first nodes, with all segments that have an end among them. Returns the former numbers of the
+    /// remaining links.
     pub(crate) fn forget(&mut self, first: u32) -> Vec<u32> {
         let left: Vec<u32> = (0u32..)
             .zip(&self.links)
@@ -198,7 +213,7 @@ impl Network {
             (self.forgotten.0 + u64::from(first), self.forgotten.1 + (self.links.len() - left.len()) as u64);
         self.nodes.drain(..first as usize);
         for node in &mut self.nodes {
-            // Of a branch whose start is gone the rest stays.
+            // The rest of a branch whose start was removed stays.
             node.parent = node.parent.checked_sub(first).filter(|_| node.parent != NO_PARENT).unwrap_or(NO_PARENT);
         }
         self.links.retain_mut(|link| {

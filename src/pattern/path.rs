@@ -3,7 +3,7 @@
 use crate::math::{Rng, hash_unit};
 use glam::Vec2;
 
-/// The most points that a [`SegmentPath`] has.
+/// The largest number of points of a [`SegmentPath`].
 pub const MAX_PATH_POINTS: usize = 17;
 
 /// A point of a rough line.
@@ -15,15 +15,16 @@ pub struct PathPoint {
     pub width: f32,
 }
 
-/// The line that stands for one segment of a network: 2 to [`MAX_PATH_POINTS`] points, the first and last being its nodes.
+/// The line of one segment of a network: 2 to [`MAX_PATH_POINTS`] points, of which the first and the last are its
+/// nodes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SegmentPath {
     points: [PathPoint; MAX_PATH_POINTS],
     len: usize,
 }
 
-/// What the draws of a swayed line are combined with: to the right, down and finer ones of both, and for its width. Frozen, like all that
-/// a seed gives.
+/// Salts of the draws of a swayed line: horizontal, vertical, the finer ones of both, and for the width. Frozen: a
+/// seed must give the same result in every version.
 const SWAY_X: u64 = 0x51;
 const SWAY_Y: u64 = 0x52;
 const FINER: u64 = 0x50;
@@ -46,7 +47,7 @@ impl SegmentPath {
         &self.points[..self.len]
     }
 
-    /// The same line, `by` further on (pattern units); widths stay.
+    /// The same line, displaced by `by` (pattern units); widths stay.
     #[must_use]
     pub fn moved(mut self, by: Vec2) -> Self {
         for point in &mut self.points[..self.len] {
@@ -55,8 +56,8 @@ impl SegmentPath {
         self
     }
 
-    /// The same line, each point moved by up to `by` (pattern units) as places beside it are: lines that meet still do. Here and there it is
-    /// narrower. What lies on the border of `0..=extent` stays there.
+    /// The same line, displaced by smooth noise of up to `by` (pattern units): lines that meet still meet. Its width
+    /// varies too. Points on the border of `0..=extent` stay there.
     #[must_use]
     pub(super) fn swayed(mut self, by: f32, extent: Vec2, seed: u64) -> Self {
         for point in &mut self.points[..self.len] {
@@ -74,7 +75,7 @@ impl SegmentPath {
         self
     }
 
-    /// The line up to a share of its points, 0..=1, the last one between two of them.
+    /// The start of the line, up to a share of its points, 0..=1; the last point lies between two of them.
     #[must_use]
     pub(super) fn up_to(mut self, share: f32) -> Self {
         let last_point = self.len - 1;
@@ -83,7 +84,7 @@ impl SegmentPath {
         let part = reach - whole as f32;
         if whole < last_point && (part > 0.0 || whole == 0) {
             let (from, to) = (self.points[whole], self.points[whole + 1]);
-            // No wider than the line will be further on, so that a line that gets longer only ever adds to its stamp.
+            // No wider than the line is further on, so that a growing line only ever adds to its stamp.
             let width = (from.width + (to.width - from.width) * part).min(to.width);
             self.points[whole + 1] = PathPoint { pos: from.pos + (to.pos - from.pos) * part, width };
             self.len = whole + 2;
@@ -94,7 +95,7 @@ impl SegmentPath {
     }
 }
 
-/// Smooth noise in `-1..=1`, whose bumps are about one unit wide.
+/// Smooth noise in `-1..=1` with bumps about one unit wide.
 fn smooth(seed: u64, at: Vec2) -> f32 {
     let corner = at.floor();
     let t = at - corner;
@@ -109,20 +110,21 @@ fn smooth(seed: u64, at: Vec2) -> f32 {
     top + (row(1) - top) * t.y
 }
 
-/// Pieces of a rough line are about this long (pattern units): 4 texels of a 512-texel surface, half the length at which
-/// the roughness of real cracks is measured.
+/// Length of the pieces of a rough line, about (pattern units): 4 texels of a 512-texel surface, half the length at
+/// which the roughness of real cracks is measured.
 const PIECE: f32 = 1.0 / 120.0;
 
-/// How far from the middle of a piece its kink may lie, as a share of its length.
+/// Largest distance of a kink from the middle of its piece, as a share of the piece's length.
 const OFF_MIDDLE: f32 = 0.18;
 
-/// The sharpest kink moves a point across its piece by so many times the roughness.
+/// The sharpest kink moves a point across its piece by this many times the roughness.
 const SHARPEST: f32 = 1.7;
 
-/// A line from one point to the other by displacement of points near the middle, kept inside `0..=extent`.
+/// A line between two points by midpoint displacement, kept inside `0..=extent`.
 ///
-/// Each level cuts the pieces in two and moves the new points across the line, mostly by a little, at times by up to `1.7 roughness` of
-/// the piece's length: straight runs with sharp kinks. Widths go evenly from one end to the other.
+/// Each level cuts the pieces in two and moves the new points across the line: mostly by a little, sometimes by up to
+/// `1.7 roughness` of the piece's length. The result is straight runs with sharp kinks. Widths are linear between the
+/// ends.
 pub(super) fn rough_path(
     (from, to): (Vec2, Vec2),
     (w0, w1): (f32, f32),

@@ -1,10 +1,11 @@
-//! [`Timeline`]: which part of a network came when, and what it looked like at any time.
+//! [`Timeline`]: when each part of a network was added, and what the network looked like at any time.
 
 use super::{Network, SegmentId, path::SegmentPath};
 use glam::Vec2;
 use std::ops::Range;
 
-/// A time of a [`Timeline`]: steps of growth, with a fraction of 1/256.
+/// A time of a [`Timeline`]: steps of growth, with a resolution of 1/256.
+///
 ///
 /// ```
 /// use bevy_crack::pattern::Moment;
@@ -17,31 +18,31 @@ use std::ops::Range;
 pub struct Moment(u32);
 
 impl Moment {
-    /// Before the first step: nothing is there.
+    /// Before the first step: there are no cracks.
     pub const START: Self = Self(0);
 
-    /// Moments of a step.
+    /// Moments per step.
     const PARTS: u32 = 256;
 
-    /// The end of step number `steps`, the first being 1.
+    /// The end of step number `steps`; the first step is 1.
     #[must_use]
     pub const fn after(steps: u32) -> Self {
         Self(steps.saturating_mul(Self::PARTS))
     }
 
-    /// The moment nearest to a number of steps; below zero and not a number: the start.
+    /// The moment nearest to a number of steps. Values below zero and NaN give the start.
     #[must_use]
     pub fn nearest(steps: f64) -> Self {
         Self((steps * f64::from(Self::PARTS) + 0.5) as u32)
     }
 
-    /// Number of steps, with their fraction.
+    /// Number of steps, with the fraction.
     #[must_use]
     pub fn steps(self) -> f64 {
         f64::from(self.0) / f64::from(Self::PARTS)
     }
 
-    /// Number of steps that are over.
+    /// Number of steps that have ended.
     #[must_use]
     pub const fn whole(self) -> u32 {
         self.0 / Self::PARTS
@@ -53,7 +54,7 @@ impl Moment {
         self.0.div_ceil(Self::PARTS)
     }
 
-    /// How much of what comes in a step is there, 0..=1.
+    /// How much of the changes of a step is visible, 0..=1.
     fn share(self, step: u32) -> f32 {
         let start = u64::from(step.saturating_sub(1)) * u64::from(Self::PARTS);
         let passed = u64::from(self.0).saturating_sub(start).min(u64::from(Self::PARTS));
@@ -61,23 +62,25 @@ impl Moment {
     }
 }
 
-/// A disc that stands for a marker.
+/// A disc that represents a marker.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Dot {
     /// Position, pattern units.
     pub pos: Vec2,
-    /// Pattern units.
+    /// Radius, pattern units.
     pub radius: f32,
 }
 
-/// Which part of a network came in which step, and when it became how wide.
+/// Records in which step each part of a network was added, and when it reached which width.
 ///
-/// What comes in step `s` grows from nothing at moment `s - 1` to its whole at moment `s`: a segment by its length, a
-/// width from what it was to what it becomes, a dot by its radius. What a hit makes comes in the step after it. So at
-/// [`Moment::START`] nothing is there, and at the [`end`](Self::end) the network is as it is. Cracks that were
-/// [added](crate::growth::CrackGrowth::add_cracks) may open on for some steps, all the way evenly.
+/// A change in step `s` grows from nothing at moment `s - 1` to its full size at moment `s`: a segment by its length,
+/// a width from its old to its new value, a dot by its radius. The nodes that a hit creates belong to the step after
+/// it. So at [`Moment::START`] there is nothing, and at the [`end`](Self::end) the network is in its current state.
+/// Cracks that were [added](crate::growth::CrackGrowth::add_cracks) can continue to open for some steps, evenly along
+/// their whole length.
 ///
-/// Entries are only ever added, in order of their steps.
+/// Entries are only ever appended, in order of their steps.
+///
 ///
 /// ```
 /// use bevy_crack::{growth::{CrackGrowth, GrowthParams}, pattern::{Moment, SegmentId}};
@@ -96,23 +99,23 @@ pub struct Dot {
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Timeline {
-    /// The step that entries belong to.
+    /// The step of the next entries.
     now: u32,
     nodes: Vec<Birth>,
     links: Vec<LinkBirth>,
     widenings: Vec<Widening>,
     dots: Vec<(u32, Dot)>,
     strikes: Vec<Strike>,
-    /// The longest opening, and the step after which all that open are open.
+    /// The longest opening, and the step after which everything is fully open.
     longest: u32,
     open: u32,
 }
 
-/// A hit that began an impact or added to one.
+/// A hit that started an impact or added energy to one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Strike {
     step: u32,
-    /// The impact, where it is in pattern units, and its energy before and after.
+    /// The impact, its position in pattern units, and its energy before and after.
     pub(crate) impact: u32,
     pub(crate) pos: Vec2,
     pub(crate) before: f32,
@@ -123,23 +126,24 @@ pub(crate) struct Strike {
 struct Birth {
     step: u32,
     width: f32,
-    /// Steps after that of its birth in which it opens to that width.
+    /// Steps after its own step in which it opens to that width.
     opening: u32,
-    /// The latest of its widenings, or [`NONE`].
+    /// Its latest widening, or [`NONE`].
     latest: u32,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct LinkBirth {
     step: u32,
-    /// As of a node.
+    /// As for a node.
     opening: u32,
-    /// Nodes that came before it.
+    /// Number of nodes that were added before it.
     after: u32,
 }
 
-/// Width at `moment` of what comes in a step and opens to `width` in so many further ones, evenly from nothing at the start of the
-/// first; in that one it has the width of its end.
+/// The width at `moment` of a part that is added in `step` and opens to `width` over `opening` further steps. The
+/// width increases evenly from zero at the start of `step`; during `step` itself it is the width at the end of that
+/// step.
 fn opened(width: f32, step: u32, opening: u32, moment: Moment) -> f32 {
     let start = u64::from(step.saturating_sub(1)) * u64::from(Moment::PARTS);
     let all = (u64::from(opening) + 1) * u64::from(Moment::PARTS);
@@ -152,7 +156,7 @@ struct Widening {
     step: u32,
     node: u32,
     width: f32,
-    /// The one before of the same node, or [`NONE`].
+    /// The previous widening of the same node, or [`NONE`].
     before: u32,
 }
 
@@ -169,7 +173,7 @@ pub(crate) struct Entries {
 }
 
 impl Timeline {
-    /// Step that the entries to come belong to, at least 1 and never lower than before.
+    /// Sets the step of the next entries, at least 1 and never lower than before.
     pub(crate) fn begin(&mut self, step: u32) {
         self.now = self.now.max(step);
     }
@@ -179,23 +183,23 @@ impl Timeline {
         self.widenings.reserve(2 * nodes);
     }
 
-    /// The next node comes, of this width.
+    /// Adds the next node, with this width.
     pub(crate) fn add_node(&mut self, width: f32) {
         self.add_opening_node(width, 0);
     }
 
-    /// The next node comes, and opens to this width in so many further steps.
+    /// Adds the next node, which opens to this width over `opening` further steps.
     pub(crate) fn add_opening_node(&mut self, width: f32, opening: u32) {
         self.nodes.push(Birth { step: self.now, width, opening, latest: NONE });
         self.opens(opening);
     }
 
-    /// The next link comes.
+    /// Adds the next link.
     pub(crate) fn add_link(&mut self) {
         self.add_opening_link(0);
     }
 
-    /// The next link comes, and opens to its width in so many further steps.
+    /// Adds the next link, which opens to its width over `opening` further steps.
     pub(crate) fn add_opening_link(&mut self, opening: u32) {
         self.links.push(LinkBirth { step: self.now, opening, after: self.nodes.len() as u32 });
         self.opens(opening);
@@ -206,7 +210,7 @@ impl Timeline {
         self.open = self.open.max(self.now.saturating_add(opening));
     }
 
-    /// A node becomes wider.
+    /// Records that a node becomes wider.
     pub(crate) fn widen(&mut self, node: u32, width: f32) {
         let next = self.widenings.len() as u32;
         if let Some(birth) = self.nodes.get_mut(node as usize) {
@@ -219,17 +223,17 @@ impl Timeline {
         self.dots.push((self.now, dot));
     }
 
-    /// An impact at `pos` comes, or has more energy than `before`.
+    /// Records an impact at `pos` that is new, or has more energy than `before`.
     pub(crate) fn strike(&mut self, impact: u32, pos: Vec2, before: f32, energy: f32) {
         self.strikes.push(Strike { step: self.now, impact, pos, before, energy });
     }
 
-    /// All hits, in order; those in [`entries`](Self::entries) have come.
+    /// All hits, in order; [`entries`](Self::entries) gives the number of those up to a step.
     pub(crate) fn strikes(&self) -> &[Strike] {
         &self.strikes
     }
 
-    /// Forgets the first nodes, and all links but those with the numbers `left`.
+    /// Removes the first nodes, and all links except those with the numbers `left`.
     pub(crate) fn forget(&mut self, first: u32, left: &[u32]) {
         self.nodes.drain(..first as usize);
         self.links = left.iter().filter_map(|&link| self.links.get(link as usize).copied()).collect();
@@ -248,7 +252,7 @@ impl Timeline {
         }
     }
 
-    /// The step after which all is there, 0 if there is nothing.
+    /// The step after which nothing changes any more; 0 if there is nothing.
     #[must_use]
     pub fn end(&self) -> u32 {
         let last = [
@@ -262,7 +266,7 @@ impl Timeline {
         last.into_iter().flatten().max().unwrap_or(0).max(if is_empty { 0 } else { self.open })
     }
 
-    /// The line of a segment at `moment`; `None` if it is not there (yet).
+    /// The line of a segment at `moment`; `None` if it does not exist (yet).
     ///
     /// `network` must be the one whose growth wrote the timeline.
     #[must_use]
@@ -284,7 +288,8 @@ impl Timeline {
         Some(if share < 1.0 { path.up_to(share) } else { path })
     }
 
-    /// Width of a node at `moment`, pattern units; before its birth that of its birth. `None` if there is no such node.
+    /// Width of a node at `moment`, pattern units; before the node is added, its initial width. `None` if there is no
+    /// such node.
     #[must_use]
     pub fn width_at(&self, node: u32, moment: Moment) -> Option<f32> {
         let birth = self.nodes.get(node as usize)?;
@@ -298,7 +303,7 @@ impl Timeline {
         Some(if goal == base { to } else { from + (to - from) * moment.share(moment.begun()) })
     }
 
-    /// The latest widening up to `step`, from `from` back.
+    /// The latest widening up to `step`, searched backwards from `from`.
     fn version(&self, from: u32, step: u32) -> u32 {
         let mut version = from;
         while let Some(widening) = self.widenings.get(version as usize).filter(|widening| widening.step > step) {
@@ -307,7 +312,7 @@ impl Timeline {
         version
     }
 
-    /// The disc number `index` at `moment`; `None` if it is not there (yet).
+    /// Disc number `index` at `moment`; `None` if it does not exist (yet).
     #[must_use]
     pub fn dot_at(&self, index: u32, moment: Moment) -> Option<Dot> {
         let &(step, dot) = self.dots.get(index as usize)?;
@@ -315,14 +320,14 @@ impl Timeline {
         (share > 0.0).then_some(Dot { radius: dot.radius * share, ..dot })
     }
 
-    /// The nodes that are born in steps after `from` up to `to`.
+    /// The nodes that were added in the steps after `from` up to `to`.
     #[must_use]
     pub fn born(&self, from: u32, to: u32) -> Range<u32> {
         let up_to = |step: u32| self.nodes.partition_point(|birth| birth.step <= step) as u32;
         up_to(from)..up_to(to.max(from))
     }
 
-    /// The step in which a segment comes.
+    /// The step in which a segment was added.
     pub(crate) fn step_of(&self, segment: SegmentId) -> Option<u32> {
         match segment {
             SegmentId::Branch(node) => self.nodes.get(node as usize).map(|birth| birth.step),
@@ -330,14 +335,14 @@ impl Timeline {
         }
     }
 
-    /// How many nodes came before a link.
+    /// Number of nodes that were added before a link.
     pub(crate) fn nodes_before(&self, link: u32) -> Option<u32> {
         self.links.get(link as usize).map(|link| link.after)
     }
 
-    /// The nodes and the links that have come by the end of step `step` and open on after it.
+    /// The nodes and the links that were added by the end of step `step` and are still opening after it.
     pub(crate) fn opening(&self, step: u32) -> (impl Iterator<Item = usize>, impl Iterator<Item = usize>) {
-        // Those before have opened for as long as any do.
+        // Earlier ones have opened for the longest possible time.
         let over = step.saturating_sub(self.longest);
         let (first, last) = (self.entries(over), self.entries(step));
         let is_open = move |birth: u32, opening: u32| birth.saturating_add(opening) <= step;
@@ -347,17 +352,17 @@ impl Timeline {
         )
     }
 
-    /// The node that a widening is of.
+    /// The node of a widening.
     pub(crate) fn widened(&self, widening: usize) -> Option<u32> {
         self.widenings.get(widening).map(|widening| widening.node)
     }
 
-    /// The disc number `index` when it is whole.
+    /// Disc number `index` at its full size.
     pub(crate) fn dot(&self, index: usize) -> Option<Dot> {
         self.dots.get(index).map(|&(_, dot)| dot)
     }
 
-    /// Numbers of entries of the steps up to `step`.
+    /// Number of entries of each kind up to step `step`.
     pub(crate) fn entries(&self, step: u32) -> Entries {
         Entries {
             nodes: self.nodes.partition_point(|birth| birth.step <= step),

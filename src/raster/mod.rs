@@ -203,7 +203,7 @@ pub struct Profile {
     /// Width at which a crack reaches full depth; thinner cracks are shallower, down to 40 %. Pattern units, > 0;
     /// default 0.02.
     pub full_width: f32,
-    /// Share of the half width that is wall: 0 = a slot with upright walls, 1 = a V. Range 0..=1; default 0.6.
+    /// How much of the half width is wall: 0 = a slot with upright walls, 1 = a V. Range 0..=1; default 0.6.
     pub wall: f32,
     /// Width of the chipped rim on either side. Pattern units, 0..=0.2; default 0.
     pub rim_width: f32,

@@ -1,28 +1,29 @@
-//! Pieces that break again.
+//! Pieces that break again while they fly.
 
 use super::{Shards, ShatterError, cuts::in_range, drawing::Drawing, faces::Faces};
 use crate::math::{Rng, ops};
 
-/// Sizes of pieces: at an impact a piece breaks into pieces of the next smaller class.
+/// Size classes of pieces: at an impact a piece breaks into pieces of the next smaller class.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct SizeClasses {
-    /// The largest area of each class, the smallest class first; pattern units squared. A piece above the last is of one class more.
+    /// The largest area of each class, the smallest class first; pattern units squared. A piece above the last value
+    /// belongs to one more class.
     pub largest: [f32; 3],
 }
 
 impl SizeClasses {
-    /// Splinters to a thousandth of the shorter side squared, pieces to 6 thousandths, plates to 36.
+    /// Splinters up to 0.001 of the shorter side squared, pieces up to 0.006, plates up to 0.036.
     pub const DEFAULT: Self = Self { largest: [0.001, 0.006, 0.036] };
 
-    /// The class of a piece of this area: 0 does not break any more.
+    /// The class of a piece of this area; class 0 does not break again.
     #[must_use]
     pub fn class(&self, area: f32) -> u8 {
         self.largest.iter().filter(|&&largest| area > largest).count() as u8
     }
 
-    /// The area that no piece exceeds when a piece of this area breaks; `None` if it does not.
+    /// The largest area of the pieces into which a piece of this area breaks; `None` if it does not break.
     #[must_use]
     pub fn next(&self, area: f32) -> Option<f32> {
         self.class(area).checked_sub(1).map(|class| self.largest[class as usize])
@@ -36,15 +37,24 @@ impl Default for SizeClasses {
 }
 
 /// How pieces break again in the air.
+///
+/// ```
+/// use bevy_crack::shatter::BreakAgain;
+///
+/// let again = BreakAgain::DEFAULT;
+/// assert_eq!(again.classes.next(0.1), Some(0.036));
+/// assert_eq!(again.due(0.0005, 7), None, "splinters do not break");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct BreakAgain {
     /// Which pieces break, and how small.
     pub classes: SizeClasses,
-    /// How long after it was released, or has itself broken off, a piece breaks, seconds, give or take a third. 0.01..=600; default: 0.35.
+    /// Time after its release, or after it broke off itself, at which a piece breaks, seconds, plus or minus a third.
+    /// 0.01..=600; default: 0.35.
     pub after: f32,
-    /// How fast the fragments part, pattern units a second, 0..=100. Default: 0.15.
+    /// Speed at which the fragments separate, pattern units a second, 0..=100. Default: 0.15.
     pub apart: f32,
 }
 
@@ -52,10 +62,10 @@ impl BreakAgain {
     /// The default.
     pub const DEFAULT: Self = Self { classes: SizeClasses::DEFAULT, after: 0.35, apart: 0.15 };
 
-    /// `Ok` if every field lies in its range.
+    /// Checks every field against its range.
     ///
     /// # Errors
-    /// [`ShatterError::OutOfRange`] for the first that does not.
+    /// [`ShatterError::OutOfRange`] for the first field that is out of its range.
     pub fn validate(&self) -> Result<(), ShatterError> {
         for largest in self.classes.largest {
             in_range("classes", largest, 1e-6, 4096.0)?;
@@ -64,7 +74,7 @@ impl BreakAgain {
         in_range("apart", self.apart, 0.0, 100.0)
     }
 
-    /// Seconds from a piece's release to its breaking; `None` if a piece of this area does not break.
+    /// Seconds from a piece's release until it breaks; `None` if a piece of this area does not break.
     #[must_use]
     pub fn due(&self, area: f32, seed: u64) -> Option<f32> {
         let uneven = || 1.0 + Rng::new(seed).stream("due").signed() / 3.0;
@@ -78,17 +88,18 @@ impl Default for BreakAgain {
     }
 }
 
-/// A piece is halved at most so often.
+/// A piece is halved at most this many times.
 const ROUNDS: u32 = 12;
 
 impl Shards {
     /// Breaks a shard into pieces of at most `largest_area` (pattern units squared), which fill it.
     ///
-    /// A piece is cut across its length, a little askew, until it is small enough. Positions stay those of the surface, so that
-    /// texture coordinates do.
+    /// A piece is cut across its length, at a slightly random angle, until it is small enough. Positions remain those
+    /// of the surface, and so do texture coordinates.
     ///
     /// # Errors
-    /// If there is no such shard, or the area does not lie in 1e-6..=4096.
+    /// [`ShatterError::NoShard`] if there is no such shard, [`ShatterError::OutOfRange`] if the area is not within
+    /// 1e-6..=4096.
     pub fn break_again(&self, shard: u32, largest_area: f32, seed: u64) -> Result<Self, ShatterError> {
         in_range("largest_area", largest_area, 1e-6, 4096.0)?;
         if self.get(shard).is_none() {
@@ -136,7 +147,7 @@ impl Shards {
         inner.map(|place| place.is_some_and(|place| self.contains_place(shard, place))).collect()
     }
 
-    /// The angle of a shard's length: the axis of its corners.
+    /// The direction of a shard's length, radians: the main axis of its corners.
     fn axis(&self, shard: u32) -> f32 {
         let Some(centroid) = self.get(shard).map(|shard| shard.centroid) else { return 0.0 };
         let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);

@@ -1,38 +1,38 @@
-//! [`Burst`]: how pieces fly, as a function of time.
+//! [`Burst`]: the flight of pieces as a function of time.
 
 use super::{Floor, Shard, ShatterError, cuts::in_range, floor::Landing};
 use crate::math::{Rng, ops};
 use glam::{Quat, Vec2, Vec3};
 
-/// How a burst looks. Lengths are pattern units, times seconds.
+/// How a burst looks. Lengths are pattern units, times are seconds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct BurstParams {
-    /// How long the cracked surface stands before it bursts, 0..=60. Default: 0.15.
+    /// Time before the cracked surface bursts, 0..=60. Default: 0.15.
     pub hold: f32,
-    /// How fast the release runs outward from the hit, 0.01..=1000. Default: 8.
+    /// Speed at which the release runs outward from the hit, 0.01..=1000. Default: 8.
     pub front: f32,
-    /// Speed of pieces at a hit of energy 1, 0..=100; grows with the root of the energy. Default: 0.9.
+    /// Speed of pieces at a hit of energy 1, 0..=100; it is proportional to the root of the energy. Default: 0.9.
     pub speed: f32,
-    /// Distance at which a piece gets half of it, 0.001..=64. Default: 0.5.
+    /// Distance from the hit at which a piece gets half the speed, 0.001..=64. Default: 0.5.
     pub falloff: f32,
-    /// Share of the speed that goes along the direction of the hit instead of away from it, 0..=1. Default: 0.5.
+    /// Share of the speed in the direction of the hit instead of away from it, 0..=1. Default: 0.5.
     pub along: f32,
-    /// How uneven speeds and directions are, 0..=1. Default: 0.35.
+    /// Randomness of speeds and directions, 0..=1. Default: 0.35.
     pub scatter: f32,
-    /// Turns of a piece of 0.01 area, radians a second, 0..=100; smaller pieces turn faster. Default: 4.
+    /// Angular speed of a piece of area 0.01, radians a second, 0..=100; smaller pieces turn faster. Default: 4.
     pub spin: f32,
-    /// Whether pieces turn about any axis; else about the one through the picture. Default: `true`.
+    /// Whether pieces turn about any axis; else about the axis through the picture. Default: `true`.
     pub tumble: bool,
-    /// Acceleration, x right, y up; each component -100..=100. Default: 2.2 down. In the surface's own axes here; the plugin turns it
-    /// so that y is up in the world, unless its `GravitySpace` says otherwise.
+    /// Acceleration, x right, y up; each component -100..=100. Default: 2.2 down. Here it is in the surface's own
+    /// axes. The plugin turns it so that y is up in the world, unless its `GravitySpace` says otherwise.
     pub gravity: Vec2,
-    /// Share of the speed that air takes a second, 0..=100. Default: 0.4.
+    /// Share of the speed that is lost to air in a second, 0..=100. Default: 0.4.
     pub drag: f32,
-    /// When a piece begins to fade, after its release, 0..=600. Default: 1.6.
+    /// Time after its release at which a piece starts to fade, 0..=600. Default: 1.6.
     pub fade_after: f32,
-    /// How long that takes, 0..=600. Default: 0.6.
+    /// Duration of the fading, 0..=600. Default: 0.6.
     pub fade: f32,
 }
 
@@ -104,41 +104,42 @@ pub struct Burst {
     seed: u64,
 }
 
-/// The way of one piece.
+/// The flight of one piece.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Flight {
     /// Seconds until it leaves its place.
     pub delay: f32,
-    /// Velocity as it leaves, pattern units a second; x right, y up, z towards the viewer. For a physics engine, too.
+    /// Velocity when it leaves, pattern units a second; x right, y up, z towards the viewer. It can also be given to
+    /// a physics engine.
     pub velocity: Vec3,
-    /// Axis of its turning, a unit vector.
+    /// Axis of its rotation, a unit vector.
     pub axis: Vec3,
-    /// Radians a second about it.
+    /// Angular speed about [`axis`](Self::axis), radians a second.
     pub spin: f32,
     gravity: Vec3,
     drag: f32,
     fade_after: f32,
     fade: f32,
-    /// Where it begins: a fragment that has parted from its piece in the air does not begin in its place.
+    /// Where it starts: a fragment that broke off in the air does not start in its place in the surface.
     offset: Vec3,
     rotation: Quat,
-    /// Where it may come to rest, and where it does.
+    /// The floor, and where the piece lands on it.
     floor: Option<Floor>,
     landing: Option<Landing>,
 }
 
-/// Where a piece is.
+/// Position, rotation and opacity of a piece.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
-    /// From its place in the surface, pattern units; x right, y up, z towards the viewer.
+    /// Offset from its place in the surface, pattern units; x right, y up, z towards the viewer.
     pub offset: Vec3,
-    /// About its centroid.
+    /// Rotation about its centroid.
     pub rotation: Quat,
-    /// 1 = there, 0 = faded and to be forgotten.
+    /// Opacity: 1 = fully visible, 0 = faded; the piece can be removed then.
     pub opacity: f32,
 }
 
-/// A piece on its way.
+/// The motion of a piece.
 #[derive(Clone, Copy)]
 struct Moving {
     offset: Vec3,
@@ -149,7 +150,7 @@ struct Moving {
 }
 
 impl Pose {
-    /// In its place.
+    /// The pose in the surface.
     pub const AT_REST: Self = Self { offset: Vec3::ZERO, rotation: Quat::IDENTITY, opacity: 1.0 };
 }
 
@@ -157,10 +158,12 @@ impl Pose {
 const USUAL_AREA: f32 = 0.01;
 
 impl Burst {
-    /// A burst from `from` (pattern units, y down), hit in `direction` (y up, z towards the viewer; of any length, zero = head on).
+    /// A burst from `from` (pattern units, y down) after a hit in `direction` (y up, z towards the viewer; of any
+    /// length, zero = head on).
     ///
     /// # Errors
-    /// If a parameter lies outside its range, the energy outside 0..=1000, or a coordinate is not finite.
+    /// [`ShatterError::OutOfRange`] if a parameter is out of its range or the energy is outside 0..=1000,
+    /// [`ShatterError::NotFinite`] if a coordinate is not finite.
     pub fn new(params: BurstParams, from: Vec2, direction: Vec3, energy: f32, seed: u64) -> Result<Self, ShatterError> {
         params.validate()?;
         in_range("energy", energy, 0.0, 1000.0)?;
@@ -171,15 +174,17 @@ impl Burst {
         Ok(Self { gravity: params.gravity.extend(0.0), floor: None, params, from, direction, energy, seed })
     }
 
-    /// The same with another acceleration (pattern units a second squared; x right, y up, z towards the viewer): pieces of a surface
-    /// that is turned in the world do not fall along its own y. What is not finite counts as none.
+    /// The same burst with another acceleration (pattern units a second squared; x right, y up, z towards the
+    /// viewer). The pieces of a surface that is rotated in the world do not fall along its own y axis. A value that
+    /// is not finite counts as zero.
     #[must_use]
     pub fn with_gravity(mut self, gravity: Vec3) -> Self {
         self.gravity = if gravity.is_finite() { gravity } else { Vec3::ZERO };
         self
     }
 
-    /// The same with a floor on which pieces come to rest.
+    /// The same burst with a floor on which pieces come to rest.
+    ///
     ///
     /// ```
     /// use bevy_crack::shatter::{Burst, BurstParams, Cuts, Floor, ShatterParams, shatter};
@@ -196,14 +201,15 @@ impl Burst {
     /// ```
     ///
     /// # Errors
-    /// If a number of the floor is not finite or outside its range, or its normal is zero.
+    /// [`ShatterError::OutOfRange`] if a number of the floor is not finite or outside its range, or its normal is
+    /// zero.
     pub fn with_floor(mut self, floor: Floor) -> Result<Self, ShatterError> {
         floor.validate()?;
         self.floor = Some(floor);
         Ok(self)
     }
 
-    /// The flight of a piece that the burst knocks out; `number` tells pieces apart.
+    /// The flight of a piece that the burst knocks out; `number` distinguishes the random draws of pieces.
     #[must_use]
     pub fn flight(&self, number: u32, shard: &Shard) -> Flight {
         let BurstParams { speed, falloff, along, scatter, .. } = self.params;
@@ -211,7 +217,7 @@ impl Burst {
         let distance = away.length();
         let mut rng = Rng::new(self.seed).stream("burst").substream(u64::from(number));
         let mut noise = || Vec3::new(rng.signed(), rng.signed(), rng.signed());
-        // Away from the hit; right behind it, only along its direction.
+        // Away from the hit; a piece right at the hit moves only along its direction.
         let out = Vec3::new(away.x, -away.y, 0.0) / (distance * distance + 0.1 * falloff * falloff).sqrt();
         let direction = out * (1.0 - along) + self.direction * along + noise() * (0.5 * scatter);
         let unevenness = 1.0 + scatter * rng.signed();
@@ -220,7 +226,7 @@ impl Burst {
         self.released(shard, velocity, distance, rng)
     }
 
-    /// The flight of a piece that merely falls.
+    /// The flight of a piece that only falls.
     #[must_use]
     pub fn fall(&self, number: u32, shard: &Shard) -> Flight {
         let mut rng = Rng::new(self.seed).stream("fall").substream(u64::from(number));
@@ -255,13 +261,13 @@ impl Burst {
     }
 }
 
-/// How much faster a piece moves than one of the usual area: by the fourth root of the ratio, up to twice.
+/// How much faster a piece moves than one of the usual area: the fourth root of the ratio, within 0.5..=2.
 fn lightness(area: f32) -> f32 {
     (USUAL_AREA / area.max(1e-9)).sqrt().sqrt().clamp(0.5, 2.0)
 }
 
 impl Flight {
-    /// Where the piece is `seconds` after the hit: the same for the same time, however it came to it.
+    /// The pose `seconds` after the hit. It depends only on the time.
     #[must_use]
     pub fn pose(&self, seconds: f32) -> Pose {
         let time = seconds - self.delay;
@@ -277,7 +283,7 @@ impl Flight {
         Pose { offset, rotation, opacity: 1.0 - faded }
     }
 
-    /// Finds where the piece comes to rest, if there is a floor; it `must` if it is part of one that does.
+    /// Computes where the piece comes to rest if there is a floor. `must` is set for parts of a piece that lands.
     fn land(&mut self, shard: &Shard, must: bool) {
         let start = Vec3::new(shard.centroid.x, -shard.centroid.y, 0.0) + self.offset;
         let size = shard.area.max(0.0).sqrt();
@@ -289,7 +295,7 @@ impl Flight {
         });
     }
 
-    /// How the piece moves, seconds after its release.
+    /// The motion of the piece, seconds after its release.
     fn moving(&self, time: f32) -> Moving {
         let Some(landing) = self.landing.filter(|landing| time > landing.time) else { return self.in_air(time) };
         let (since, landed) = (time - landing.time, self.in_air(landing.time));
@@ -323,9 +329,9 @@ impl Flight {
         }
     }
 
-    /// The flight of a fragment that parts from this piece `seconds` after the hit, on its way: from where it is then, and as fast as
-    /// that part of the turning piece moves, it goes on by itself, `apart` (pattern units a second) faster away from the middle.
-    /// It fades when the piece would have. `seed` fixes how it tumbles.
+    /// The flight of a fragment that breaks off this piece `seconds` after the hit, in the air. It starts where it is
+    /// then, with the velocity of that part of the rotating piece, plus `apart` (pattern units a second) away from
+    /// the middle. It fades when the piece would have. `seed` fixes how it tumbles.
     #[must_use]
     pub fn fragment(&self, seconds: f32, piece: &Shard, fragment: &Shard, apart: f32, seed: u64) -> Self {
         let time = (seconds - self.delay).max(0.0);
@@ -353,7 +359,7 @@ impl Flight {
         flight
     }
 
-    /// Seconds after the hit at which the piece has faded.
+    /// Time at which the piece has faded, seconds after the hit.
     #[must_use]
     pub fn end(&self) -> f32 {
         self.delay + self.fade_after + self.fade

@@ -1,10 +1,10 @@
-//! [`Cuts`], and [`shatter`] from them to [`Shards`].
+//! [`Cuts`], and [`shatter`], which makes [`Shards`] from them.
 
 use super::{Shards, drawing::Drawing, faces::Faces, lattice::Lattice};
 use crate::pattern::Network;
 use glam::Vec2;
 
-/// What cannot be shattered.
+/// An error of shattering.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ShatterError {
@@ -12,6 +12,7 @@ pub enum ShatterError {
     #[error(
         "a surface of {width} x {height} pattern units: both must be finite, above zero, and not 2^24 times the other"
     )]
+    /// The surface has no valid size.
     Extent {
         /// Width given.
         width: f32,
@@ -21,25 +22,25 @@ pub enum ShatterError {
     /// A point of a line is NaN or infinite.
     #[error("point {index} of a line is not finite")]
     NotFinite {
-        /// Which point.
+        /// Index of the point.
         index: usize,
     },
-    /// A parameter outside its range, or not finite.
+    /// A parameter is outside its range, or not finite.
     #[error("parameter `{name}` is {value}, must lie in {min}..={max}")]
     OutOfRange {
         /// Name of the field.
         name: &'static str,
         /// Its value.
         value: f64,
-        /// Least value allowed.
+        /// Smallest value allowed.
         min: f64,
-        /// Greatest value allowed.
+        /// Largest value allowed.
         max: f64,
     },
     /// There is no such shard.
     #[error("there is no shard {shard}")]
     NoShard {
-        /// The number asked for.
+        /// The number that was given.
         shard: u32,
     },
 }
@@ -50,10 +51,11 @@ pub(super) fn in_range(name: &'static str, value: f32, min: f64, max: f64) -> Re
     if (min..=max).contains(&value) { Ok(()) } else { Err(ShatterError::OutOfRange { name, value, min, max }) }
 }
 
-/// The lines along which a surface is to be cut.
+/// The lines along which a surface is cut.
 ///
-/// They may cross, touch, lie on each other and end anywhere. Points move by up to half a place of the lattice, that is
-/// by up to 2⁻²⁴ of the longer side, and those off the surface to its border.
+/// Lines may cross, touch, overlap and end anywhere. Points are moved by up to half a unit of the lattice, which is
+/// up to 2⁻²⁴ of the longer side, and points off the surface are moved to its border.
+///
 ///
 /// ```
 /// use bevy_crack::{CrackPreset, growth::CrackGrowth, shatter::{Cuts, ShatterParams, shatter}};
@@ -73,19 +75,21 @@ pub struct Cuts {
 }
 
 impl Cuts {
-    /// No cuts in a surface of `extent` pattern units.
+    /// A surface of `extent` pattern units without cuts.
     ///
     /// # Errors
-    /// If the extent is not finite, not above zero, or one side is more than 2²⁴ times the other.
+    /// [`ShatterError::Extent`] if the extent is not finite, not above zero, or one side is more than 2²⁴ times the
+    /// other.
     pub fn new(extent: Vec2) -> Result<Self, ShatterError> {
         let lattice = Lattice::new(extent).ok_or(ShatterError::Extent { width: extent.x, height: extent.y })?;
         Ok(Self { drawing: Drawing::new(lattice) })
     }
 
-    /// The drawn lines of a network.
+    /// The rough lines of a network.
     ///
     /// # Errors
-    /// As [`new`](Self::new), for the extent of the network; and if one of its nodes is not finite.
+    /// As for [`new`](Self::new), with the extent of the network; [`ShatterError::NotFinite`] if one of its nodes is
+    /// not finite.
     pub fn from_network(network: &Network) -> Result<Self, ShatterError> {
         let mut cuts = Self::new(network.extent())?;
         cuts.drawing.reserve(2 * network.nodes().len());
@@ -104,7 +108,7 @@ impl Cuts {
     /// Adds a line through points in pattern units.
     ///
     /// # Errors
-    /// If a point is NaN or infinite; then nothing is added.
+    /// [`ShatterError::NotFinite`] if a point is NaN or infinite; nothing is added then.
     pub fn add_line(&mut self, points: &[Vec2]) -> Result<(), ShatterError> {
         if let Some(index) = points.iter().position(|point| !point.is_finite()) {
             return Err(ShatterError::NotFinite { index });
@@ -119,14 +123,14 @@ impl Cuts {
 #[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct ShatterParams {
-    /// Whether cracks that end inside a piece are carried on to the next crack or the border. Default: `false`.
+    /// Whether cracks that end inside a piece are extended to the next crack or the border. Default: `false`.
     pub carry_on: bool,
-    /// Pieces below this area join the neighbour with which they share most. Pattern units squared, 0..=1; default: 2e-5, five
-    /// texels of a surface of 512. 0 keeps every splinter.
+    /// Pieces below this area are merged into the neighbour with which they share most of their outline. Pattern
+    /// units squared, 0..=1; default: 2e-5, five texels of a surface of 512. 0 keeps every splinter.
     pub min_area: f32,
-    /// The most shards, 1..=1000000; the smallest join their neighbours. Default: 10,000.
+    /// Largest number of shards, 1..=1000000; the smallest are merged into their neighbours. Default: 10,000.
     pub max_shards: u32,
-    /// Fixes the lines that are carried on.
+    /// Seed of the extended lines.
     pub seed: u64,
 }
 
@@ -141,12 +145,12 @@ impl Default for ShatterParams {
     }
 }
 
-/// Cuts a surface along lines: the faces that they and the border enclose.
+/// Cuts a surface along lines into the faces that the lines and the border enclose.
 ///
-/// Lines that enclose nothing cut nothing; without any there is one shard, the surface.
+/// Lines that enclose nothing cut nothing; without lines there is one shard, the whole surface.
 ///
 /// # Errors
-/// If a parameter lies outside its range.
+/// [`ShatterError::OutOfRange`] if a parameter is out of its range.
 pub fn shatter(cuts: Cuts, params: &ShatterParams) -> Result<Shards, ShatterError> {
     in_range("min_area", params.min_area, 0.0, 1.0)?;
     in_range("max_shards", params.max_shards as f32, 1.0, 1e6)?;

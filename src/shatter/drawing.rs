@@ -5,7 +5,7 @@ use crate::math::Rng;
 use crate::math::whole::{cross, dot, vector};
 use glam::Vec2;
 
-/// Lines as edges between places; once planar, the four sides of the surface among them.
+/// Lines as edges between vertices; once planar it includes the four sides of the surface.
 #[derive(Clone, Debug)]
 pub(super) struct Drawing {
     pub(super) lattice: Lattice,
@@ -15,21 +15,21 @@ pub(super) struct Drawing {
     pub(super) edges: Vec<[u32; 2]>,
 }
 
-/// Crossings are cut at the nearest place, which moves lines a little and may make them cross again: after so many rounds
-/// the younger of two crossing lines gives way. Three are enough for all but made-up cases.
+/// Crossings are cut at the nearest lattice point, which moves lines a little and may create new crossings. After
+/// this many rounds the newer of two crossing lines is removed. Three rounds are enough except for constructed cases.
 const ROUNDS: u32 = 8;
 
-/// No line: both ends the same.
+/// A removed edge: both ends are the same.
 pub(super) const DEAD: [u32; 2] = [u32::MAX; 2];
 
-/// Pieces of a line that is carried on are about this long, pattern units; as the pieces of a crack.
+/// Length of the pieces of an extended line, about, pattern units; as for the pieces of a crack.
 const PIECE: f32 = 1.0 / 72.0;
 
-/// How far a line that is carried on strays, as a share of its length.
+/// How far an extended line deviates from a straight one, as a share of its length.
 const ROUGHNESS: f32 = 0.12;
 
 impl Drawing {
-    /// The bare surface.
+    /// The surface without lines.
     pub(super) fn new(lattice: Lattice) -> Self {
         let mut drawing = Self { lattice, places: Vec::new(), vertex_at: PlaceMap::default(), edges: Vec::new() };
         let [w, h] = lattice.corner;
@@ -39,7 +39,7 @@ impl Drawing {
         drawing
     }
 
-    /// Makes room for so many more points.
+    /// Reserves memory for more points.
     pub(super) fn reserve(&mut self, points: usize) {
         self.places.reserve(points);
         self.vertex_at.reserve(points);
@@ -69,12 +69,12 @@ impl Drawing {
         self.edges[edge as usize].map(|vertex| self.places[vertex as usize])
     }
 
-    /// Cuts lines where they meet, until they share nothing but ends, and drops what is there twice.
+    /// Cuts lines where they meet, until they share only ends, and removes duplicates.
     pub(super) fn make_planar(&mut self) {
         self.make_planar_from(0);
     }
 
-    /// [`make_planar`](Self::make_planar) where the edges before `new` share nothing but ends.
+    /// [`make_planar`](Self::make_planar) if the edges before `new` share only ends already.
     fn make_planar_from(&mut self, new: usize) {
         // After the first round, only pairs with a new edge can meet.
         let (mut round, mut new, mut cuts) = (0, self.lay_border(new), Vec::new());
@@ -90,7 +90,8 @@ impl Drawing {
         }
     }
 
-    /// Lays the border anew, from each place on it to the next. Returns how many of the first `old` edges are left.
+    /// Replaces the border edges: from each vertex on the border to the next. Returns how many of the first `old`
+    /// edges are left.
     fn lay_border(&mut self, old: usize) -> u32 {
         let is_inside = |&[a, b]: &[u32; 2]| {
             let sides = [a, b].map(|vertex| self.places[vertex as usize]);
@@ -107,14 +108,14 @@ impl Drawing {
             }
         }
         for mut vertices in on_side {
-            // One coordinate is the same for all.
+            // One coordinate is the same for all of them.
             vertices.sort_unstable_by_key(|&vertex| self.places[vertex as usize]);
             self.edges.extend(vertices.windows(2).map(|pair| [pair[0], pair[1]]));
         }
         left
     }
 
-    /// Notes where two edges must be cut so that they share nothing but ends. `false` if they need not be.
+    /// Records where two edges must be cut so that they share only ends. Returns `false` if they need no cut.
     fn separate(&mut self, e: u32, f: u32, may_cross: bool, cuts: &mut Vec<(u32, u32)>) -> bool {
         let ([a, b], [c, d]) = (self.edges[e as usize], self.edges[f as usize]);
         if [a, b] == DEAD || [c, d] == DEAD {
@@ -171,7 +172,7 @@ impl Drawing {
         cuts.len() > before
     }
 
-    /// Replaces edges by the pieces between the vertices at which they are cut. Returns the first of them.
+    /// Replaces edges by the pieces between the vertices at which they are cut. Returns the first of the pieces.
     fn apply(&mut self, cuts: &mut Vec<(u32, u32)>) -> u32 {
         let old = self.edges.len();
         cuts.sort_by_key(|&(edge, vertex)| {
@@ -199,13 +200,13 @@ impl Drawing {
         first
     }
 
-    /// Carries every open end on, in the direction in which it came, to the next line, in a drawing that is planar. Returns the new lines.
+    /// Extends every open end in its direction to the next line. The drawing must be planar. Returns the new lines.
     pub(super) fn carry_on(&mut self, seed: u64) -> Vec<Vec<Vec2>> {
         let mut at: Vec<(u32, u32)> = vec![(0, u32::MAX); self.places.len()];
         for (edge, ends) in (0u32..).zip(&self.edges) {
             for &end in ends {
                 at[end as usize].0 += 1;
-                // Any edge but the last does not matter: ends have one, the way back from them two.
+                // Only the last edge matters: an open end has one edge, the vertices on the way back have two.
                 at[end as usize].1 ^= edge;
             }
         }
@@ -256,7 +257,7 @@ impl Drawing {
         }
     }
 
-    /// Where the way from a place meets the border.
+    /// Where the ray from a place meets the border.
     fn border_ahead(&self, start: Place, way: [f64; 2]) -> Option<Place> {
         let to_side = |i: usize| {
             let room = if way[i] > 0.0 { self.lattice.corner[i] - start[i] } else { -start[i] };
@@ -267,7 +268,8 @@ impl Drawing {
         share.is_finite().then(|| [at(0), at(1)])
     }
 
-    /// The first edge on the way from a place, other than those that begin there, and the vertex at which the way meets it.
+    /// The first edge on the ray from a place, except those that start there, and the vertex at which the ray meets
+    /// it.
     fn first_hit(&mut self, start: Place, way: [f64; 2], grid: &EdgeGrid) -> Option<(u32, u32)> {
         let end = self.border_ahead(start, way)?;
         let run = vector(start, end);
@@ -285,7 +287,7 @@ impl Drawing {
                     best = Some((along, edge));
                 }
             }
-            // All further squares lie further on; a place more, for rounding.
+            // All later squares are further away; one lattice unit more, for rounding.
             let is_before = |i: usize, along: f64| {
                 let left = f64::from(far[i] - start[i]) - run[i] as f64 * along;
                 left * run[i].signum() as f64 > 1.0 || run[i] == 0
@@ -316,7 +318,7 @@ impl Drawing {
         Some(pieces)
     }
 
-    /// Adds a rough line through a point, both ways to the next line.
+    /// Adds a rough line through a point, in both directions to the next line.
     pub(super) fn cut_across(&mut self, from: Vec2, way: Vec2, rng: Rng) {
         let start = self.lattice.snap(from);
         let way = way.as_dvec2().to_array();
@@ -333,7 +335,7 @@ impl Drawing {
         self.edges.retain(|&edge| edge != DEAD);
     }
 
-    /// Midpoint displacement between two points.
+    /// A rough line between two points, by midpoint displacement.
     fn rough_line(&self, [from, to]: [Vec2; 2], mut rng: Rng) -> Vec<Vec2> {
         let mut line = vec![from, to];
         while line.len() < 64 && line[0].distance(line[1]) > PIECE {
@@ -349,7 +351,7 @@ impl Drawing {
     }
 }
 
-/// The place nearest to where two lines cross.
+/// The lattice point nearest to where two lines cross.
 fn crossing([a, b]: [Place; 2], [c, d]: [Place; 2]) -> Place {
     let (run, side) = (vector(a, b), vector(c, d));
     let (above, below) = (i128::from(cross(vector(a, c), side)), i128::from(cross(run, side)));
@@ -360,17 +362,17 @@ fn crossing([a, b]: [Place; 2], [c, d]: [Place; 2]) -> Place {
     })
 }
 
-/// Which edges pass through which square.
+/// An index of edges by the squares through which they pass.
 struct EdgeGrid {
     /// Squares are `1 << shift` wide.
     shift: u32,
     columns: usize,
-    /// Per square: where its edges begin in `edges`; one more at the end.
+    /// Per square: the start of its edges in `edges`; one more entry at the end.
     starts: Vec<u32>,
     edges: Vec<u32>,
-    /// How many edges of the drawing are in it.
+    /// Number of edges of the drawing that are in the index.
     known: usize,
-    /// Edges that came later, each with the one before it in its square, or [`NONE`].
+    /// Edges that were added later, each with the previous one in its square, or [`NONE`].
     newer: Vec<[u32; 2]>,
     /// Per square: the last of them; empty as long as there are none.
     newest: Vec<u32>,
@@ -414,7 +416,7 @@ impl EdgeGrid {
         grid
     }
 
-    /// Takes in the edges that have been added to the drawing.
+    /// Adds the new edges of the drawing.
     fn add_new(&mut self, drawing: &Drawing) {
         let (mut newer, mut newest) = (std::mem::take(&mut self.newer), std::mem::take(&mut self.newest));
         newest.resize(self.starts.len() - 1, NONE);
@@ -433,8 +435,8 @@ impl EdgeGrid {
         (row * self.columns + column) as u32
     }
 
-    /// Every square that the line between two places touches, in the order of its way: row by row, and within a row one after the
-    /// other. Ends when `visit` returns `true`.
+    /// Visits every square that the line between two places touches, in the order of the line: row by row, and within
+    /// a row one after the other. Stops when `visit` returns `true`.
     fn squares(&self, a: Place, b: Place, mut visit: impl FnMut([usize; 2]) -> bool) {
         let index = |x: i32| (x >> self.shift) as usize;
         let (low, high) = (a[0].min(b[0]), a[0].max(b[0]));
@@ -447,7 +449,7 @@ impl EdgeGrid {
             let (from, to) = if is_narrow {
                 (low, high)
             } else {
-                // A little wider on either side, for rounding.
+                // A little wider on both sides, for rounding.
                 let ends = [row, row + 1].map(|row| x_at((row << self.shift) as i64));
                 let from = (ends[0].min(ends[1]) as i32).saturating_sub(2);
                 (low.max(from), high.min((ends[0].max(ends[1]) as i32).saturating_add(2)))
@@ -465,8 +467,8 @@ impl EdgeGrid {
         &self.edges[self.starts[square as usize] as usize..self.starts[square as usize + 1] as usize]
     }
 
-    /// The edges in every square on the way from a place to another, and the corner at which the way leaves the square at the
-    /// latest, until `visit` returns `true`.
+    /// Visits the edges in every square on the line from a place to another, and the last corner at which the line
+    /// can leave the square, until `visit` returns `true`.
     fn along(&self, a: Place, b: Place, mut visit: impl FnMut(&mut dyn Iterator<Item = u32>, Place) -> bool) {
         self.squares(a, b, |[column, row]| {
             let square = self.square(column, row);
@@ -481,7 +483,8 @@ impl EdgeGrid {
         });
     }
 
-    /// Every pair of edges that share a square of which one is not older than `new`, the older first; some more than once.
+    /// Visits every pair of edges that share a square if at least one is not older than `new`, the older first; some
+    /// pairs more than once.
     fn pairs(&self, new: u32, mut visit: impl FnMut(u32, u32)) {
         for square in 0..self.starts.len() as u32 - 1 {
             let edges = self.in_square(square);

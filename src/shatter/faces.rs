@@ -1,4 +1,4 @@
-//! [`Faces`]: what the edges of a planar drawing enclose.
+//! [`Faces`]: the areas that the edges of a planar drawing enclose.
 
 use super::{
     drawing::{DEAD, Drawing},
@@ -7,11 +7,11 @@ use super::{
 use crate::math::whole::{cross, vector};
 use std::cmp::Reverse;
 
-/// The rings around each face. Half-edge `2 e` runs along edge `e`, `2 e + 1` against it; a face lies where x turns to
-/// reach y, that is inside its outer ring.
+/// The rings around each face. Half-edge `2 e` runs along edge `e`, `2 e + 1` against it. A face lies on the side to
+/// which x turns to reach y, that is inside its outer ring.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Faces {
-    /// Per half-edge: its face, or [`NONE`] beyond the border.
+    /// Per half-edge: its face, or [`NONE`] outside the border.
     pub(super) face_of: Vec<u32>,
     /// One half-edge and twice the area of each ring: first the outer ring of each face, by number, then all holes.
     rings: Vec<(u32, i64)>,
@@ -23,13 +23,13 @@ pub(super) struct Faces {
 }
 
 impl Faces {
-    /// The faces of `drawing`, from which all edges go that enclose nothing. It must be planar.
+    /// The faces of `drawing`, which must be planar. Edges that enclose nothing are removed from it.
     pub(super) fn trace(drawing: &mut Drawing) -> Self {
         drop_loose_ends(drawing);
         loop {
             let mut faces = Self { next: successors(drawing), ..Self::default() };
             faces.find_rings(drawing);
-            // What is the same ring on both sides joins two rings.
+            // An edge with the same ring on both sides is a bridge between two rings.
             let mut bridges = false;
             for (edge, sides) in drawing.edges.iter_mut().zip(faces.face_of.as_chunks::<2>().0) {
                 if sides[0] == sides[1] {
@@ -65,7 +65,7 @@ impl Faces {
         }
     }
 
-    /// Turns numbers of rings into numbers of faces.
+    /// Converts numbers of rings into numbers of faces.
     fn sort_rings(&mut self, drawing: &Drawing) {
         let beyond = self.rings.iter().map(|ring| ring.1).min().unwrap_or(0);
         let beyond = self.rings.iter().position(|ring| ring.1 == beyond);
@@ -83,7 +83,8 @@ impl Faces {
         let holes: Vec<usize> = (0..rings.len()).filter(|&i| rings[i].1 <= 0 && Some(i) != beyond).collect();
         if !holes.is_empty() {
             let rows = Rows::new(drawing);
-            // From left to right: what lies to the left of a hole's leftmost place is known, be it a hole itself.
+            // From left to right: the ring to the left of a hole's leftmost vertex is already known, even if it is a
+            // hole itself.
             let mut leftmost: Vec<(Place, usize)> =
                 holes.iter().map(|&hole| (self.leftmost(drawing, rings[hole].0), hole)).collect();
             leftmost.sort_unstable();
@@ -121,7 +122,7 @@ impl Faces {
         self.areas.len()
     }
 
-    /// The rings of each face in turn, the outer one first: face and half-edges.
+    /// The rings of each face, the outer one first: face and half-edges.
     pub(super) fn rings(&self) -> impl Iterator<Item = (u32, impl Iterator<Item = u32> + '_)> {
         let mut holes: Vec<u32> = (0..self.hosts.len() as u32).collect();
         holes.sort_by_key(|&hole| self.hosts[hole as usize]);
@@ -144,9 +145,9 @@ impl Faces {
         })
     }
 
-    /// Drops edges until no face is smaller than `least` (twice the area) and there are at most `most` faces: the smallest
-    /// joins the neighbour with which it shares most, and so on, but only one of its own `group`. `false` if there was nothing
-    /// to drop.
+    /// Removes edges until no face is smaller than `least` (twice the area) and there are at most `most` faces. The
+    /// smallest face is merged into the neighbour of its own `group` with which it shares most, and so on. Returns
+    /// `false` if there was nothing to remove.
     pub(super) fn join_small<G: PartialEq>(
         &self,
         drawing: &mut Drawing,
@@ -162,14 +163,15 @@ impl Faces {
         let edges = EdgesOf::new(self);
         let (mut areas, mut joined) = (self.areas.clone(), Joined::new(self.len()));
         let (mut order, mut shares): (Vec<u32>, Vec<(u32, f64)>) = (Vec::new(), Vec::new());
-        // Small ones that have joined may be more than enough, and too many: until none has a neighbour to join.
+        // Merged small faces may become large enough, or there may still be too many: repeat until no face has a
+        // neighbour to merge with.
         let mut any = true;
         while std::mem::take(&mut any) {
             order.clear();
             order.extend((0..areas.len() as u32).filter(|&face| joined.root(face) == face));
             let mut least = least;
             if order.len() > most.max(1) {
-                // Those above the first that is too many may stay.
+                // Faces above the first surplus one may stay.
                 let (_, &mut first, _) =
                     order.select_nth_unstable_by_key(most.max(1), |&face| Reverse(areas[face as usize]));
                 least = least.max(areas[first as usize] + 1);
@@ -223,7 +225,7 @@ impl Faces {
 
 /// The edges around each face.
 struct EdgesOf {
-    /// Per face: where its edges begin in `edges`; one more at the end.
+    /// Per face: the start of its edges in `edges`; one more entry at the end.
     starts: Vec<u32>,
     edges: Vec<u32>,
 }
@@ -251,12 +253,12 @@ impl EdgesOf {
     }
 }
 
-/// Which faces have become one.
+/// Which faces have been merged (union-find).
 struct Joined {
     above: Vec<u32>,
-    /// Per face: the next one of the same, from the root on.
+    /// Per face: the next one of the same set, starting at the root.
     following: Vec<u32>,
-    /// Per root: the last one of the same.
+    /// Per root: the last face of its set.
     last: Vec<u32>,
 }
 
@@ -275,7 +277,7 @@ impl Joined {
         face
     }
 
-    /// Makes one root part of another.
+    /// Merges one root into another.
     fn join(&mut self, root: u32, other: u32) {
         self.above[root as usize] = other;
         self.following[self.last[other as usize] as usize] = root;
@@ -283,20 +285,20 @@ impl Joined {
     }
 }
 
-/// Where a half-edge begins.
+/// The vertex position at which a half-edge starts.
 fn place(drawing: &Drawing, half_edge: u32) -> Place {
     drawing.places[origin(drawing, half_edge) as usize]
 }
 
-/// The vertex at which a half-edge begins.
+/// The vertex at which a half-edge starts.
 pub(super) fn origin(drawing: &Drawing, half_edge: u32) -> u32 {
     drawing.edges[half_edge as usize / 2][half_edge as usize % 2]
 }
 
-/// Drops the edges of branches that end nowhere.
+/// Removes the edges of branches with open ends.
 fn drop_loose_ends(drawing: &mut Drawing) {
     let mut degree = vec![0u32; drawing.places.len()];
-    // Of the edges at a vertex: at one with a single edge, that edge.
+    // Per vertex the XOR of its edges: for a vertex with a single edge, that edge.
     let mut edges = vec![0u32; drawing.places.len()];
     for (edge, ends) in (0u32..).zip(&drawing.edges) {
         for &end in ends {
@@ -347,7 +349,7 @@ fn successors(drawing: &Drawing) -> Vec<u32> {
             let way = |half_edge: u32| vector(centre, place(drawing, half_edge ^ 1));
             around.sort_unstable_by(|&a, &b| {
                 let (a, b) = (way(a), way(b));
-                // The half turn from x through y first; within a half turn, by the sign of the cross product.
+                // First the half turn from x through y; within a half turn, by the sign of the cross product.
                 is_back(a).cmp(&is_back(b)).then(0.cmp(&cross(a, b)))
             });
         }
@@ -364,7 +366,7 @@ const fn is_back([x, y]: [i64; 2]) -> bool {
     y < 0 || (y == 0 && x < 0)
 }
 
-/// Edges by the bands that they pass through.
+/// An index of edges by the bands through which they pass.
 struct Rows {
     shift: u32,
     rows: Vec<Vec<u32>>,
@@ -387,19 +389,19 @@ impl Rows {
         Self { shift, rows }
     }
 
-    /// The half-edge that has `at`, the leftmost place of its ring, on its inner side, and is the next to the left.
+    /// The nearest half-edge to the left of `at`, the leftmost vertex of a ring, with `at` on its inner side.
     fn left_of(&self, drawing: &Drawing, at: Place) -> Option<u32> {
         let mut best: Option<(f64, f64, u32)> = None;
         for &edge in self.rows.get((at[1] >> self.shift) as usize)? {
             let [a, b] = drawing.edges[edge as usize].map(|vertex| drawing.places[vertex as usize]);
-            // As if the place were a little further down.
+            // As if the vertex were a little further down.
             if a == at || b == at || (a[1] <= at[1]) == (b[1] <= at[1]) {
                 continue;
             }
             let slope = f64::from(b[0] - a[0]) / f64::from(b[1] - a[1]);
             let x = f64::from(a[0]) + slope * f64::from(at[1] - a[1]);
             let half_edge = 2 * edge + u32::from(a[1] < b[1]);
-            // Of lines that part in one point, the one that runs further right.
+            // If lines start at the same point, the one that runs further right.
             if x < f64::from(at[0]) && best.is_none_or(|best| (x, slope) > (best.0, best.1)) {
                 best = Some((x, slope, half_edge));
             }

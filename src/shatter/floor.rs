@@ -1,37 +1,39 @@
-//! [`Floor`]: where flying pieces come to rest.
+//! [`Floor`]: a plane on which flying pieces come to rest.
 
 use super::{ShatterError, cuts::in_range};
 use crate::math::ops;
 use glam::{Quat, Vec3};
 
-/// A plane on which pieces land, bounce a little, skid, and come to rest. Where and when a piece lands is known as it leaves, so that it is in the
-/// same place at the same time, forwards and backwards.
+/// A plane on which pieces land, bounce a little, slide, and come to rest. Place and time of the landing are computed
+/// when a piece leaves, so that a piece is at the same place at the same time, forwards and backwards.
 ///
-/// Coordinates are those of flights: pattern units, x right, y up, z towards the viewer, from the top left of the picture.
+/// Coordinates are those of flights: pattern units, x right, y up, z towards the viewer, relative to the top left of
+/// the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Floor {
-    /// Its normal, away from what it holds; of any length but zero.
+    /// Normal of the plane, away from the solid side; of any length except zero.
     pub up: Vec3,
-    /// What `up · point` is for its points.
+    /// The value of `up · point` for points of the plane.
     pub height: f32,
-    /// How far above it the middle of a piece lies that rests there, pattern units, 0..=10: half its thickness. Pieces that stand upright are
-    /// as high as they are large.
+    /// Distance from the plane to the middle of a resting piece, pattern units, 0..=10: half its thickness. Pieces
+    /// that stand upright are as high as they are large.
     pub clearance: f32,
-    /// Whether pieces come to lie flat on it; else they turn their faces to the viewer, as in a game that is seen from the side.
+    /// Whether pieces come to lie flat on it; else they turn their faces to the viewer, as in a game with a side
+    /// view.
     pub lies_flat: bool,
 }
 
-/// Share of the speed that a piece keeps where it bounces.
+/// Share of the speed that a piece keeps when it bounces.
 const BOUNCE: f32 = 0.28;
 
-/// So often it bounces.
+/// Number of bounces.
 const BOUNCES: u32 = 3;
 
-/// How fast it comes to a stop, and to lie: shares a second.
+/// How fast a piece stops sliding, and how fast it turns to its resting position: shares a second.
 const FRICTION: f32 = 4.5;
 const SETTLING: f32 = 5.0;
 
-/// No piece flies longer, seconds.
+/// The longest flight, seconds.
 const LONGEST: f32 = 600.0;
 
 impl Floor {
@@ -43,8 +45,9 @@ impl Floor {
         in_range("floor.clearance", self.clearance, 0.0, 10.0)
     }
 
-    /// Where a piece of this size lands that begins at `start`; `motion` is its offset and velocity so many seconds later. `None` if it never
-    /// comes there, or begins below the floor, unless it `must` land: parts of a piece that does land as well, however they reach into the floor.
+    /// Where a piece of this size that starts at `start` lands; `motion` gives its offset and velocity after some
+    /// seconds. `None` if it never reaches the floor, or starts below it. A piece that `must` land always does: parts
+    /// of a piece that lands are such pieces, however far they reach into the floor.
     pub(super) fn landing(
         &self,
         start: Vec3,
@@ -61,7 +64,7 @@ impl Floor {
         if (above(0.0) < -clearance - 1e-4 && !must) || pull <= 1e-4 || pull.is_nan() {
             return None;
         }
-        // It rises, if at all, before it falls: one crossing only.
+        // It can only rise before it falls, so there is one crossing.
         let mut late = 0.05;
         while above(late) > 0.0 {
             late *= 2.0;
@@ -89,11 +92,11 @@ pub(super) struct Landing {
     /// Where.
     offset: Vec3,
     up: Vec3,
-    /// How far it reached into the floor when it left its place, and comes up.
+    /// How far it was below the floor when it left its place; it rises by that.
     sunk: f32,
-    /// How fast it came down.
+    /// Speed at which it hit the floor.
     fall: f32,
-    /// How fast it is drawn down.
+    /// Acceleration towards the floor.
     pull: f32,
     /// Its velocity along the floor.
     skid: Vec3,
@@ -101,7 +104,7 @@ pub(super) struct Landing {
 }
 
 impl Landing {
-    /// Offset and velocity so many seconds after it has landed.
+    /// Offset and velocity `seconds` after it has landed.
     pub(super) fn motion(&self, seconds: f32) -> (Vec3, Vec3) {
         let left = ops::exp(-FRICTION * seconds);
         let (mut rise, mut speed) = (0.0, 0.0);
@@ -120,7 +123,7 @@ impl Landing {
         (offset, self.skid * left + self.up * speed)
     }
 
-    /// How it is turned so many seconds after it has landed, when it was turned by `landed`.
+    /// Its rotation `seconds` after it has landed with the rotation `landed`.
     pub(super) fn rotation(&self, landed: Quat, seconds: f32) -> Quat {
         let face = landed * Vec3::Z;
         let lie = if self.lies_flat { self.up } else { Vec3::Z };

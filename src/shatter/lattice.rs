@@ -1,30 +1,30 @@
-//! Whole-number coordinates: every question about them has an exact answer.
+//! Integer coordinates: every geometric test has an exact answer.
 
 use crate::math::whole::{cross, dot, vector};
 use glam::Vec2;
 use std::hash::{BuildHasherDefault, Hasher};
 
-/// No number of a thing.
+/// No number: an index that does not exist.
 pub(super) const NONE: u32 = u32::MAX;
 
-/// A place on the lattice.
+/// A point of the lattice.
 pub(super) type Place = [i32; 2];
 
 /// Coordinates are below this, so that they fit a 32-bit float and products of differences fit 64 bits.
 const RANGE: f64 = (1u32 << 24) as f64;
 
-/// Between pattern space and the lattice.
+/// The conversion between pattern space and the lattice.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Lattice {
     pub(super) extent: Vec2,
-    /// Places per pattern unit, a power of two.
+    /// Lattice units per pattern unit, a power of two.
     pub(super) scale: f64,
     /// The corner opposite to (0, 0).
     pub(super) corner: Place,
 }
 
 impl Lattice {
-    /// Of a surface of 1 x 1.
+    /// The lattice of a surface of 1 x 1.
     pub(super) const ONE: Self = Self { extent: Vec2::ONE, scale: RANGE, corner: [1 << 24; 2] };
 
     pub(super) fn new(extent: Vec2) -> Option<Self> {
@@ -43,14 +43,14 @@ impl Lattice {
         (corner[0] > 0 && corner[1] > 0).then_some(Self { extent, scale, corner })
     }
 
-    /// The place nearest to a point; points off the surface go to the border.
+    /// The lattice point nearest to a position; positions off the surface are moved to the border.
     pub(super) fn snap(&self, pos: Vec2) -> Place {
-        // Rounds: below zero, where adding a half does not, the border is nearest anyway.
+        // Rounds to the nearest; below zero it does not, but there the border is nearest anyway.
         let coordinate = |x: f32, most: i32| ((f64::from(x) * self.scale + 0.5) as i32).clamp(0, most);
         [coordinate(pos.x, self.corner[0]), coordinate(pos.y, self.corner[1])]
     }
 
-    /// Exact, as the scale is a power of two.
+    /// Exact, because the scale is a power of two.
     pub(super) fn pos(&self, [x, y]: Place) -> Vec2 {
         let coordinate = |x: i32, most: i32, end: f32| if x == most { end } else { (f64::from(x) / self.scale) as f32 };
         Vec2::new(coordinate(x, self.corner[0], self.extent.x), coordinate(y, self.corner[1], self.extent.y))
@@ -61,7 +61,7 @@ impl Lattice {
         [x == 0, x == self.corner[0], y == 0, y == self.corner[1]]
     }
 
-    /// The side in which the line between two places lies.
+    /// The side of the border on which the line between two places lies.
     pub(super) fn side_of(&self, a: Place, b: Place) -> Option<usize> {
         let (a, b) = (self.sides(a), self.sides(b));
         (0..4).find(|&side| a[side] && b[side])
@@ -84,11 +84,11 @@ pub(super) fn ring_area(ring: impl Iterator<Item = Place> + Clone) -> i64 {
     ring.zip(following).map(|(a, b)| cross(a.map(i64::from), b.map(i64::from))).sum()
 }
 
-/// A quick hash for places, which are no secret.
+/// A fast hash for places; it need not resist attacks.
 #[derive(Clone, Copy, Default)]
 pub(super) struct PlaceHasher(u64);
 
-/// Where each place is kept.
+/// Index of each place.
 pub(super) type PlaceMap = std::collections::HashMap<u64, u32, BuildHasherDefault<PlaceHasher>>;
 
 /// A place as one number.

@@ -1,51 +1,63 @@
-//! Shards as meshes: plain arrays.
+//! Meshes of shards, as plain arrays.
 
 use super::{RimLook, Shards, rim::Bevel};
 use glam::{Vec2, Vec3};
 
-/// How a surface becomes meshes.
+/// How the shards of a surface become meshes.
+///
+/// ```
+/// use bevy_crack::shatter::{Cuts, MeshFrame, ShatterParams, shatter};
+///
+/// let shards = shatter(Cuts::new([1.0, 1.0].into())?, &ShatterParams::DEFAULT)?;
+/// let mesh = shards.flat_mesh(0, &MeshFrame::new([200.0, 200.0].into()));
+/// assert_eq!(mesh.positions.len(), 4);
+/// assert_eq!(mesh.indices.len(), 6);
+/// # Ok::<(), bevy_crack::shatter::ShatterError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MeshFrame {
     /// Size of the whole surface in the mesh's units.
     pub size: Vec2,
-    /// The texture coordinates of the surface's top left and bottom right corner: those of its region in an atlas, else 0 and 1.
+    /// Texture coordinates of the surface's top left and bottom right corner: those of its region in an atlas, else 0
+    /// and 1.
     pub uv: [Vec2; 2],
-    /// Whether positions are relative to the shard's centroid; else to the middle of the surface.
+    /// Whether positions are relative to the shard's centroid; else they are relative to the middle of the surface.
     pub centred: bool,
     /// How rims look.
     pub rim: RimLook,
-    /// Fixes which way the picture is shifted in each shard, if it is.
+    /// Seed of the direction in which the picture is displaced in each shard, if [`rim`](Self::rim) displaces it.
     pub seed: u64,
 }
 
 impl MeshFrame {
-    /// A surface of `size` that shows a whole texture, for shards that move one by one.
+    /// A surface of `size` that shows a whole texture, for shards that move independently.
     #[must_use]
     pub const fn new(size: Vec2) -> Self {
         Self { size, uv: [Vec2::ZERO, Vec2::ONE], centred: true, rim: RimLook::PLAIN, seed: 0 }
     }
 }
 
-/// A triangle list. x runs right, y up, z towards the viewer; triangles are counter-clockwise from outside.
+/// A triangle list. x points right, y up, z towards the viewer; triangles are counter-clockwise as seen from outside.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ShardMesh {
-    /// Places of the vertices.
+    /// Positions of the vertices.
     pub positions: Vec<[f32; 3]>,
     /// Unit vectors.
     pub normals: Vec<[f32; 3]>,
     /// Texture coordinates, v down.
     pub uvs: Vec<[f32; 2]>,
-    /// What the picture's colour is multiplied by (red, green, blue, opacity), for the vertices that show it; empty where there
-    /// is no rim.
+    /// Factors for the picture's colour (red, green, blue, opacity) at the vertices that show it; empty without a
+    /// rim.
     pub colors: Vec<[f32; 4]>,
-    /// Three a triangle.
+    /// Indices of vertices, three per triangle.
     pub indices: Vec<u32>,
-    /// Where in `indices` the side faces begin: what comes before carries the picture, what follows the inside.
+    /// Index in `indices` at which the side faces start: the triangles before it show the picture, the others the
+    /// inside.
     pub sides: usize,
 }
 
 impl ShardMesh {
-    /// Takes everything out and keeps the memory.
+    /// Removes all content and keeps the allocated memory.
     pub fn clear(&mut self) {
         self.positions.clear();
         self.normals.clear();
@@ -57,8 +69,8 @@ impl ShardMesh {
 }
 
 impl Shards {
-    /// A shard as a flat mesh at z = 0 that faces +z, as for a sprite. Its places are the [`corners`](Self::corners), in order, and
-    /// then, where there is a rim, where that ends inside.
+    /// A shard as a flat mesh at z = 0 that faces +z, as for a sprite. Its vertices are the
+    /// [`corners`](Self::corners), in order; with a rim they are followed by the inner vertices of the rim.
     #[must_use]
     pub fn flat_mesh(&self, shard: u32, frame: &MeshFrame) -> ShardMesh {
         let mut mesh = ShardMesh::default();
@@ -66,16 +78,18 @@ impl Shards {
         mesh
     }
 
-    /// [`flat_mesh`](Self::flat_mesh), added to a mesh: to use memory again, or for many shards in one mesh.
+    /// Like [`flat_mesh`](Self::flat_mesh), appended to a mesh: to reuse memory, or to put many shards into one mesh.
     pub fn flat_mesh_into(&self, shard: u32, frame: &MeshFrame, mesh: &mut ShardMesh) {
         self.cap(shard, frame, [0.0; 2], &self.bevels_for(shard, frame), mesh);
         mesh.sides = mesh.indices.len();
     }
 
-    /// A shard with `thickness`, half of it on either side of z = 0: front, back, and a side face for every edge. Rims slope.
+    /// A shard with `thickness`, half of it on either side of z = 0: front, back, and a side face for every edge.
+    /// Rims slope.
     ///
-    /// The back shows the picture as seen through the shard. Texture coordinates of the sides are lengths in the mesh's units:
-    /// along the outline, and from the front. The mesh is closed: every edge has a triangle on either side.
+    /// The back shows the picture as seen through the shard. Texture coordinates of the sides are lengths in the
+    /// mesh's units: along the outline, and from the front. The mesh is closed: every edge has a triangle on either
+    /// side.
     #[must_use]
     pub fn solid_mesh(&self, shard: u32, frame: &MeshFrame, thickness: f32) -> ShardMesh {
         let mut mesh = ShardMesh::default();
@@ -83,7 +97,7 @@ impl Shards {
         mesh
     }
 
-    /// [`solid_mesh`](Self::solid_mesh) in the memory of a mesh, of which nothing is kept.
+    /// Like [`solid_mesh`](Self::solid_mesh), in the memory of a mesh whose content is replaced.
     pub fn solid_mesh_into(&self, shard: u32, frame: &MeshFrame, thickness: f32, mesh: &mut ShardMesh) {
         mesh.clear();
         let half = 0.5 * thickness;
@@ -132,8 +146,8 @@ impl Shards {
         bevels
     }
 
-    /// The picture's side of a shard: its outline at the height `edge`, what lies within the bevel at `z`; seen from below if they are
-    /// negative.
+    /// The face of a shard that shows the picture: its outline at the height `edge`, the area inside the bevel at
+    /// `z`. It is seen from below if they are negative.
     fn cap(&self, shard: u32, frame: &MeshFrame, [edge, z]: [f32; 2], bevels: &[Bevel], mesh: &mut ShardMesh) {
         let Some(centroid) = self.get(shard).map(|shard| shard.centroid) else { return };
         let middle = if frame.centred { centroid } else { 0.5 * self.extent() };
@@ -152,7 +166,7 @@ impl Shards {
         mesh.positions.extend(places.clone().map(|pos| to_mesh(pos, edge)));
         mesh.uvs.extend(places.map(to_uv));
         let up = if z < 0.0 { -1.0 } else { 1.0 };
-        // From x to y is clockwise when y is up.
+        // Turning from x to y is clockwise when y is up.
         let order = if z < 0.0 { [0, 1, 2] } else { [0, 2, 1] };
         let triangles = self.triangles(shard).iter();
         mesh.indices.reserve(3 * triangles.len() + 6 * bevels.len());
@@ -165,7 +179,8 @@ impl Shards {
         mesh.positions.extend(bevels.iter().map(|bevel| to_mesh(bevel.inner.as_vec2(), z)));
         mesh.uvs.extend(bevels.iter().map(|bevel| to_uv(bevel.inner.as_vec2())));
         let tilted = bevels.iter().map(|bevel| {
-            // As all normals do, it looks inward where the picture is mirrored, and with it the order of corners.
+            // Like all normals it points inward where the picture is mirrored, and the order of corners is reversed
+            // too.
             let out = bevel.outward / scale * (scale.x * scale.y).signum();
             Vec3::new(out.x, -out.y, 0.0).normalize_or_zero() + up * Vec3::Z
         });

@@ -1,13 +1,14 @@
 //! Shards: the pieces into which cracks and border cut a surface.
 //!
-//! [`Cuts`] takes lines: the drawn, rough lines of a network, seams of a Voronoi diagram, lines of one's own. [`shatter`] puts
-//! them on a lattice of whole numbers (at least 2²³ places along the longer side), where they are made planar: crossings become
-//! common places, what is there twice goes, what encloses nothing goes. Its faces are the [`Shards`]: they tile the surface
-//! exactly, and neighbours share every place of their common edge.
+//! [`Cuts`] takes lines: the rough lines of a network, seams of a Voronoi diagram, or your own. [`shatter`] puts them
+//! on an integer lattice (at least 2²³ units along the longer side) and makes them planar: crossings become shared
+//! vertices, duplicates are removed, and so are edges that enclose nothing. The faces are the [`Shards`]: they tile
+//! the surface exactly, and neighbours share every vertex of their common edge.
 //!
-//! What a shard then needs is beside it: triangles, [meshes](Shards::flat_mesh), [convex pieces](Shards::convex_pieces) for
-//! colliders, neighbours; [`Support`] tells what falls, [`Shards::break_again`] cuts a piece further, and [`Burst`] moves the
-//! pieces as a function of time, so that it can be shown at any speed, and backwards.
+//! Shards have triangles, [meshes](Shards::flat_mesh), [convex pieces](Shards::convex_pieces) for colliders, and
+//! neighbours. [`Support`] computes what falls, [`Shards::break_again`] cuts a piece further, and [`Burst`] moves the
+//! pieces as a function of time, so that they can be shown at any speed, and backwards.
+//!
 //!
 //! ```
 //! use bevy_crack::shatter::{Cuts, ShatterParams, shatter};

@@ -1,4 +1,4 @@
-//! [`Shards`]: the pieces, and what is to be known of each.
+//! [`Shards`]: the pieces and their properties.
 
 use super::{
     drawing::Drawing,
@@ -17,26 +17,26 @@ pub struct Shard {
     pub area: f32,
     /// Centre of the area, pattern units.
     pub centroid: Vec2,
-    /// Integral of the squared distance from the centroid over the area (polar second moment), pattern units to the fourth:
-    /// times the mass per area it is the moment of inertia.
+    /// Integral of the squared distance from the centroid over the area (polar second moment), pattern units to the
+    /// fourth. Times the mass per area it is the moment of inertia.
     pub second_moment: f32,
-    /// How much of its outline lies in each side of the surface: left, right, top, bottom; pattern units.
+    /// Length of its outline on each side of the surface: left, right, top, bottom; pattern units.
     pub border: [f32; 4],
     pub(super) rings: Range<u32>,
     pub(super) triangles: Range<u32>,
     pub(super) neighbours: Range<u32>,
 }
 
-/// A shard beside another.
+/// A shard that shares edges with another one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Neighbour {
-    /// Its number.
+    /// Number of the neighbour.
     pub shard: u32,
     /// Length of the common edges, pattern units.
     pub length: f32,
 }
 
-/// Corners of a convex polygon in pattern units, from x to y.
+/// Corners of a convex polygon in pattern units, turning from x to y.
 pub type ConvexPiece = Vec<Vec2>;
 
 /// The pieces of a surface, by number. They tile it.
@@ -45,9 +45,9 @@ pub struct Shards {
     pub(super) lattice: Lattice,
     pub(super) places: Vec<Place>,
     positions: Vec<Vec2>,
-    /// Indices of places, ring after ring.
+    /// Indices of positions, ring after ring.
     outlines: Vec<u32>,
-    /// Where each ring begins; one more at the end.
+    /// Start of each ring; one more entry at the end.
     rings: Vec<u32>,
     triangles: Vec<[u32; 3]>,
     neighbours: Vec<Neighbour>,
@@ -55,7 +55,7 @@ pub struct Shards {
     carried: Arc<[Vec<Vec2>]>,
 }
 
-/// No pieces of a surface of 1 x 1.
+/// A surface of 1 x 1 without pieces.
 impl Default for Shards {
     fn default() -> Self {
         Self {
@@ -108,7 +108,7 @@ impl Shards {
         self.shards.len()
     }
 
-    /// Whether there are none.
+    /// Whether there are no shards.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.shards.is_empty()
@@ -125,25 +125,26 @@ impl Shards {
         self.shards.iter()
     }
 
-    /// The shard with this number.
+    /// The shard with this number; `None` if there is none.
     #[must_use]
     pub fn get(&self, shard: u32) -> Option<&Shard> {
         self.shards.get(shard as usize)
     }
 
-    /// Places in pattern units that outlines and triangles name by index.
+    /// Positions in pattern units, to which outlines and triangles refer by index.
     #[must_use]
     pub fn positions(&self) -> &[Vec2] {
         &self.positions
     }
 
-    /// The outline of a shard, from x to y: indices of [`positions`](Self::positions). Neighbours share every place between them.
+    /// The outline of a shard, turning from x to y: indices of [`positions`](Self::positions). Neighbours share every
+    /// vertex between them.
     #[must_use]
     pub fn outline(&self, shard: u32) -> &[u32] {
         self.rings_of(shard).next().unwrap_or(&[])
     }
 
-    /// The outlines of what lies inside a shard without being part of it, the other way round.
+    /// The outlines of holes in a shard, in the opposite direction.
     pub fn holes(&self, shard: u32) -> impl Iterator<Item = &[u32]> {
         self.rings_of(shard).skip(1)
     }
@@ -153,29 +154,29 @@ impl Shards {
         rings.map(|ring| &self.outlines[self.rings[ring as usize] as usize..self.rings[ring as usize + 1] as usize])
     }
 
-    /// The outline of a shard and then its holes, one after the other: indices of [`positions`](Self::positions).
+    /// The outline of a shard followed by its holes: indices of [`positions`](Self::positions).
     #[must_use]
     pub fn corners(&self, shard: u32) -> &[u32] {
         let rings = self.get(shard).map_or(0..0, |shard| shard.rings.clone());
         &self.outlines[self.rings[rings.start as usize] as usize..self.rings[rings.end as usize] as usize]
     }
 
-    /// Triangles that fill a shard, from x to y: indices of its [`corners`](Self::corners). Their edges on the outline are exactly
-    /// its edges.
+    /// Triangles that fill a shard, turning from x to y: indices of its [`corners`](Self::corners). Their edges on
+    /// the outline are exactly the shard's edges.
     #[must_use]
     pub fn triangles(&self, shard: u32) -> &[[u32; 3]] {
         let range = self.get(shard).map_or(0..0, |shard| shard.triangles.clone());
         &self.triangles[range.start as usize..range.end as usize]
     }
 
-    /// The shards beside a shard, by number.
+    /// The neighbours of a shard, by number.
     #[must_use]
     pub fn neighbours(&self, shard: u32) -> &[Neighbour] {
         let range = self.get(shard).map_or(0..0, |shard| shard.neighbours.clone());
         &self.neighbours[range.start as usize..range.end as usize]
     }
 
-    /// The lines that were added where cracks have been carried on, pattern units. They are cracks, and want to be drawn.
+    /// The lines by which cracks were extended, pattern units. They are cracks too and should be drawn.
     #[must_use]
     pub fn carried(&self) -> &[Vec<Vec2>] {
         &self.carried
@@ -187,16 +188,16 @@ impl Shards {
         self.carried.clone()
     }
 
-    /// The shard at a place in pattern units; costs as much as all outlines are long.
+    /// The shard at a position in pattern units; the cost is proportional to the length of all outlines.
     #[must_use]
     pub fn at(&self, pos: Vec2) -> Option<u32> {
         let inside = pos.cmpge(Vec2::ZERO).all() && pos.cmple(self.extent()).all();
         (0..self.len() as u32).find(|&shard| inside && self.contains(shard, pos))
     }
 
-    /// Whether a place in pattern units lies in a shard. On an edge, it lies in one of the two.
+    /// Whether a position in pattern units lies in a shard. A position on an edge lies in one of the two.
     pub(super) fn contains(&self, shard: u32, pos: Vec2) -> bool {
-        // The surface's own lower and right sides belong to it.
+        // The lower and right sides of the surface belong to the shards there.
         let end = DVec2::from(self.lattice.corner.map(|side| f64::from(side) - 1e-3));
         self.contains_place(shard, (pos.as_dvec2() * self.lattice.scale).min(end))
     }
@@ -219,7 +220,7 @@ impl Shards {
         inside
     }
 
-    /// The distance from a place to a shard, zero inside; pattern units.
+    /// Distance from a position to a shard, zero inside; pattern units.
     #[must_use]
     pub fn distance(&self, shard: u32, pos: Vec2) -> f32 {
         if self.contains(shard, pos) {
@@ -233,10 +234,12 @@ impl Shards {
         self.rings_of(shard).map(to_ring).fold(f32::INFINITY, f32::min)
     }
 
-    /// Convex polygons that make up a shard, for colliders. Corners are in pattern units, relative to the shard's centroid.
+    /// Convex polygons that form a shard, for colliders. Corners are in pattern units, relative to the shard's
+    /// centroid.
     ///
-    /// With a `tolerance` of 0 they fill the shard exactly; with more (pattern units), edges may stray by that much, and rough
-    /// outlines need far fewer pieces. A tolerance that would make the outline cross itself is not used.
+    /// With a `tolerance` of 0 they fill the shard exactly. With a larger one (pattern units) edges may deviate by
+    /// that much, and rough outlines need far fewer pieces. A tolerance that would make the outline cross itself is
+    /// not used.
     #[must_use]
     pub fn convex_pieces(&self, shard: u32, tolerance: f32) -> Vec<ConvexPiece> {
         let Some(centroid) = self.get(shard).map(|shard| shard.centroid) else { return Vec::new() };
@@ -270,7 +273,7 @@ impl Shards {
         (whole > 0 && right).then_some((corners, triangles))
     }
 
-    /// Keeps some shards, and numbers them anew.
+    /// Keeps some shards, and renumbers them.
     pub(super) fn retain(&mut self, keep: &[bool]) {
         let mut new_number = vec![u32::MAX; self.len()];
         let kept = new_number.iter_mut().zip(keep).filter(|(_, keep)| **keep);
@@ -290,7 +293,7 @@ impl Shards {
         }
     }
 
-    /// A place well inside a shard, pattern units.
+    /// A position well inside a shard, pattern units.
     #[must_use]
     pub fn inner_point(&self, shard: u32) -> Option<Vec2> {
         self.inner_place(shard).map(|place| (place / self.lattice.scale).as_vec2())
@@ -310,11 +313,11 @@ fn named(corners: &[u32], triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
     triangles.iter().map(|triangle| triangle.map(|corner| corners[corner as usize])).collect()
 }
 
-/// Puts shards together, ring by ring.
+/// Assembles shards, ring by ring.
 struct Builder<'a> {
     shards: &'a mut Shards,
     clipper: Clipper,
-    /// Length of the edges shared with each neighbour, places.
+    /// Length of the edges shared with each neighbour, lattice units.
     shared: Vec<(u32, f64)>,
     border: [f64; 4],
 }
@@ -372,7 +375,7 @@ impl Builder<'_> {
     }
 }
 
-/// Integrals over a polygon, in places.
+/// Integrals over a polygon, in lattice units.
 struct Moments {
     area: f64,
     centroid: [f64; 2],
@@ -383,7 +386,7 @@ fn moments<'a>(places: &[Place], rings: impl Iterator<Item = &'a [u32]>) -> Mome
     let (mut origin, mut twice, mut first, mut second) = (None, 0i64, [0.0; 2], 0.0);
     for ring in rings {
         let Some(&last) = ring.last() else { continue };
-        // Relative to a place of the polygon, to lose no digits.
+        // Relative to a vertex of the polygon, to keep precision.
         let origin = *origin.get_or_insert(places[last as usize]);
         let relative = |vertex: u32| [0, 1].map(|i| i64::from(places[vertex as usize][i]) - i64::from(origin[i]));
         let mut a = relative(last);

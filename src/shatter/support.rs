@@ -1,4 +1,4 @@
-//! [`Support`]: what holds, and what falls.
+//! [`Support`]: which shards are held, and which fall.
 
 use super::{Shards, ShatterError, cuts::in_range};
 use glam::Vec2;
@@ -8,7 +8,7 @@ use glam::Vec2;
 #[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Anchor {
-    /// Nothing: pieces stay where they are until they are hit.
+    /// Nothing: pieces stay in their places until they are hit.
     Nothing,
     /// The whole border, as a pane in its frame.
     #[default]
@@ -19,7 +19,8 @@ pub enum Anchor {
 
 /// Which shards are still in their places, and which of them are held.
 ///
-/// A held shard holds its neighbours, and so on; what is not held any more falls.
+/// A held shard holds its neighbours, and so on; shards that are no longer held fall.
+///
 ///
 /// ```
 /// use bevy_crack::shatter::{Anchor, Cuts, ShatterParams, Support, shatter};
@@ -41,17 +42,17 @@ pub struct Support {
     gone: Vec<bool>,
 }
 
-/// What a hit has released.
+/// The shards that a hit has released.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Fallen {
-    /// Shards that it knocked out, by number.
+    /// Shards that the hit knocked out, by number.
     pub hit: Vec<u32>,
-    /// Shards that nothing holds any more, by number.
+    /// Shards that are no longer held, by number.
     pub loose: Vec<u32>,
 }
 
 impl Support {
-    /// All shards in their places; those are held that lie along the anchor.
+    /// All shards in their places; those along the anchor are held.
     #[must_use]
     pub fn new(shards: &Shards, anchor: Anchor) -> Self {
         let sides = match anchor {
@@ -63,7 +64,8 @@ impl Support {
         Self { anchored, gone: vec![false; shards.len()] }
     }
 
-    /// All shards in their places; those are held of which a corner or the centre lies where `held` says so (pattern units).
+    /// All shards in their places; a shard is held if `held` is `true` for one of its corners or its centre (pattern
+    /// units).
     #[must_use]
     pub fn from_mask(shards: &Shards, mut held: impl FnMut(Vec2) -> bool) -> Self {
         let anchored = (0u32..).zip(shards.iter()).map(|(i, shard)| {
@@ -78,13 +80,14 @@ impl Support {
         self.anchored.iter_mut().zip(more.anchored).for_each(|(anchored, more)| *anchored |= more);
     }
 
-    /// The same shards in their places, held by something else.
+    /// The same shards in their places, with another anchor.
     #[must_use]
     pub fn held_by(&self, shards: &Shards, anchor: Anchor) -> Self {
         Self { gone: self.gone.clone(), ..Self::new(shards, anchor) }
     }
 
-    /// The support of a surface that has been cracked further: what lies where a shard had gone is gone.
+    /// The support of a surface that has been cracked further: shards that lie where an old shard was missing are
+    /// missing too.
     #[must_use]
     pub fn renewed(&self, old: &Shards, new: &Shards, anchor: Anchor) -> Self {
         let mut support = Self::new(new, anchor);
@@ -105,7 +108,7 @@ impl Support {
         self.gone.get(shard as usize).is_some_and(|gone| !gone)
     }
 
-    /// Shards that are not in their places any more, by number.
+    /// Shards that are no longer in their places, by number.
     pub fn gone(&self) -> impl Iterator<Item = u32> + '_ {
         (0u32..).zip(&self.gone).filter(|(_, gone)| **gone).map(|(shard, _)| shard)
     }
@@ -122,7 +125,7 @@ impl Support {
         }
     }
 
-    /// Takes one shard out, and returns what nothing holds any more.
+    /// Removes one shard, and returns the shards that are no longer held.
     pub fn take(&mut self, shards: &Shards, shard: u32) -> Vec<u32> {
         if let Some(gone) = self.gone.get_mut(shard as usize) {
             *gone = true;
@@ -130,12 +133,14 @@ impl Support {
         self.drop_loose(shards)
     }
 
-    /// Knocks out what lies within `reach` of a place (pattern units), and drops what nothing holds any more.
+    /// Knocks out the shards within `reach` of a position (pattern units), and drops the shards that are no longer
+    /// held.
     ///
-    /// A shard along the anchor stays in its frame unless it is itself hit.
+    /// A shard along the anchor stays in its frame unless it is hit itself.
     ///
     /// # Errors
-    /// If the place is not finite or `reach` does not lie in 0..=64.
+    /// [`ShatterError::NotFinite`] if the position is not finite, [`ShatterError::OutOfRange`] if `reach` is not
+    /// within 0..=64.
     pub fn hit(&mut self, shards: &Shards, at: Vec2, reach: f32) -> Result<Fallen, ShatterError> {
         in_range("reach", reach, 0.0, 64.0)?;
         if !at.is_finite() {
@@ -152,7 +157,8 @@ impl Support {
         Ok(Fallen { hit, loose: self.drop_loose(shards) })
     }
 
-    /// Takes out what no anchored shard holds, by number. Where nothing is anchored, nothing falls by itself.
+    /// Removes the shards that no anchored shard holds, and returns them by number. Without anchored shards nothing
+    /// falls by itself.
     pub fn drop_loose(&mut self, shards: &Shards) -> Vec<u32> {
         if !self.anchored.contains(&true) {
             return Vec::new();

@@ -1,7 +1,8 @@
-//! Rings to triangles and to convex pieces, by exact ear clipping.
+//! Triangles and convex pieces of rings, by exact ear clipping.
 //!
-//! No library, for two reasons: the usual ones drop places in the middle of a straight edge, which tears neighbours apart,
-//! and none of them promises to cover a ring exactly. With whole numbers clipping ears does (Meisters 1975).
+//! Own code instead of a library, for two reasons: the usual ones drop vertices in the middle of a straight edge,
+//! which tears neighbours apart, and none of them guarantees to cover a ring exactly. Ear clipping with integers does
+//! (Meisters 1975).
 
 use super::lattice::{Place, distance_sq, orient, ring_area};
 use crate::math::whole::{cross, dot, vector};
@@ -10,7 +11,7 @@ use std::collections::HashMap;
 /// A corner of the ring that is being clipped.
 #[derive(Clone, Copy, Debug)]
 struct Corner {
-    /// Its number among the places of all rings.
+    /// Its index among the places of all rings.
     place: u32,
     at: Place,
     before: u32,
@@ -20,7 +21,7 @@ struct Corner {
     clipped: bool,
 }
 
-/// Clips ears; kept for the memory it has.
+/// Clips ears; it is kept to reuse its memory.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Clipper {
     corners: Vec<Corner>,
@@ -33,14 +34,15 @@ pub(super) struct Clipper {
     rows: i32,
 }
 
-/// Up to so many blockers are looked at one by one.
+/// Up to this many blockers are checked one by one.
 const FEW: usize = 48;
 
 impl Clipper {
-    /// Cuts a ring with holes into triangles, `n - 2` for a ring of `n` places and two more than its places for each hole.
+    /// Cuts a ring with holes into triangles: `n - 2` for a ring of `n` vertices, and two more than its vertices for
+    /// each hole.
     ///
-    /// The outer ring comes first and runs from x to y, the holes the other way. Rings may touch but not cross. Triangles name
-    /// places by their number among those of all rings.
+    /// The outer ring comes first and turns from x to y, the holes the other way. Rings may touch but not cross.
+    /// Triangles refer to vertices by their index among those of all rings.
     pub(super) fn triangulate(&mut self, places: &[Place], rings: &[&[u32]], triangles: &mut Vec<[u32; 3]>) {
         let [outer, holes @ ..] = rings else { return };
         let at = |i: usize| places[outer[i % outer.len()] as usize];
@@ -80,7 +82,7 @@ impl Clipper {
         orient(self.at(corner.before), corner.at, self.at(corner.after))
     }
 
-    /// Joins each hole to the ring by a way there and back, the leftmost hole first.
+    /// Connects each hole to the ring by an edge in both directions, the leftmost hole first.
     fn bridge_holes(&mut self, places: &[Place], holes: &[&[u32]], start: u32) {
         let mut ends: Vec<u32> = Vec::new();
         for hole in holes {
@@ -97,7 +99,7 @@ impl Clipper {
                 next = self.corner(next).after;
             }
             ring.sort_by_key(|&i| (distance_sq(self.at(i), self.at(end)), i));
-            // The leftmost corner of a hole sees a corner of the ring, possibly one at its own place.
+            // The leftmost corner of a hole sees a corner of the ring, possibly one at its own position.
             let Some(from) = ring.into_iter().find(|&i| self.sees(i, end)) else { continue };
             let copies = [self.corners.len() as u32, self.corners.len() as u32 + 1];
             self.corners.extend([*self.corner(from), *self.corner(end)]);
@@ -115,7 +117,7 @@ impl Clipper {
         self.corners[b as usize].before = a;
     }
 
-    /// Whether the line between two corners runs inside, free of all edges and corners.
+    /// Whether the line between two corners runs inside, without touching any edge or corner.
     fn sees(&self, i: u32, j: u32) -> bool {
         let (a, b) = (self.at(i), self.at(j));
         if a == b {
@@ -136,7 +138,7 @@ impl Clipper {
             })
     }
 
-    /// Whether the way from a corner to a place begins on the inside.
+    /// Whether the line from a corner to a place starts on the inside.
     fn opens_to(&self, i: u32, to: Place) -> bool {
         let corner = self.corner(i);
         let [on, back, way] = [self.at(corner.after), self.at(corner.before), to].map(|to| vector(corner.at, to));
@@ -168,7 +170,8 @@ impl Clipper {
         let (mut i, mut tried) = (start, 0);
         while left > 2 {
             let Corner { before, after, place, .. } = *self.corner(i);
-            // After a round without an ear, which no ring that was traced in a planar drawing has, take what turns right.
+            // After a round without an ear (impossible for a ring traced in a planar drawing) any corner that turns
+            // right is taken.
             let is_ear = self.turn(i) > 0 && (tried > left || !self.is_blocked(before, i, after));
             if !is_ear && tried <= 2 * left {
                 (i, tried) = (after, tried + 1);
@@ -184,12 +187,12 @@ impl Clipper {
             }
             left -= 1;
             tried = 0;
-            // Not the neighbour, which would make a fan of slivers.
+            // Skips the neighbour, which would make a fan of slivers.
             i = self.corner(after).after;
         }
     }
 
-    /// Whether another corner lies in the triangle or on its rim.
+    /// Whether another corner lies in the triangle or on its edge.
     fn is_blocked(&mut self, before: u32, i: u32, after: u32) -> bool {
         let triangle = [self.at(before), self.at(i), self.at(after)];
         if self.squares.is_empty() {
@@ -249,7 +252,7 @@ fn blocks([a, b, c]: [Place; 3], p: Place) -> bool {
     orient(a, b, p) >= 0 && orient(b, c, p) >= 0 && orient(c, a, p) >= 0 && p != a && p != b && p != c
 }
 
-/// Joins triangles to convex pieces (Hertel and Mehlhorn 1983): at most four times as many as need be.
+/// Merges triangles into convex pieces (Hertel and Mehlhorn 1983): at most four times as many as necessary.
 pub(super) fn convex_pieces(places: &[Place], triangles: &[[u32; 3]]) -> Vec<Vec<u32>> {
     let mut pieces: Vec<Vec<u32>> = triangles.iter().map(|triangle| triangle.to_vec()).collect();
     let mut piece_of: HashMap<[u32; 2], u32> = HashMap::with_capacity(3 * triangles.len());
@@ -262,7 +265,7 @@ pub(super) fn convex_pieces(places: &[Place], triangles: &[[u32; 3]]) -> Vec<Vec
             if p == q {
                 continue;
             }
-            // The first from b round to a, then the second from after a to before b.
+            // The first piece from b around to a, then the second from after a to before b.
             let mut joined = turned_to(&pieces[p as usize], b);
             joined.extend(turned_to(&pieces[q as usize], a).into_iter().skip(1).take_while(|&vertex| vertex != b));
             let n = joined.len();
@@ -289,7 +292,7 @@ fn turned_to(ring: &[u32], vertex: u32) -> Vec<u32> {
     ring[start..].iter().chain(&ring[..start]).copied().collect()
 }
 
-/// A ring with the corners left out that stray less than `tolerance` (Ramer 1972; Douglas and Peucker 1973).
+/// A ring without the corners that deviate less than `tolerance` (Ramer 1972; Douglas and Peucker 1973).
 pub(super) fn simplify(places: &[Place], ring: &[u32], tolerance: f64) -> Vec<u32> {
     let at = |i: usize| places[ring[i % ring.len()] as usize];
     let far = (0..ring.len()).max_by_key(|&i| distance_sq(at(0), at(i))).unwrap_or(0);

@@ -1,4 +1,4 @@
-//! A map in the making, and made: [`VoronoiBake`], [`VoronoiMap`].
+//! Computes a map step by step: [`VoronoiBake`], [`VoronoiMap`].
 
 use super::{
     Guide, SiteLayout, StrokeReport, VoronoiError, VoronoiParams,
@@ -17,40 +17,41 @@ use super::{
 use crate::{Grid, math::Rng, pattern::SurfaceFrame};
 use glam::UVec2;
 
-/// How far a bake is.
+/// The progress of a bake.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum BakeProgress {
-    /// There is more to do; 0..1, never falls.
+    /// There is more to do; the share that is done, 0..1, which never decreases.
     Working(f32),
-    /// The map is ready: [`VoronoiBake::finish`] does nothing more.
+    /// The map is complete: [`VoronoiBake::finish`] has nothing left to do.
     Done,
 }
 
 enum Stage {
-    /// Guides and noise are brought to the lattice, row by row.
+    /// Guides and noise are resampled to the lattice, row by row.
     Guides {
         y: usize,
     },
-    /// Edges get their costs, row by row.
+    /// The costs of edges are computed, row by row.
     Costs {
         y: usize,
     },
     /// Sites are laid out.
     Sites,
-    /// Sites are laid out astride, round by round.
+    /// Sites are laid out astride strokes, round by round.
     Astride(Box<Astride>),
     /// The regions of the level before become walls, row by row.
     Walls {
         y: usize,
     },
-    /// Paths of the last level.
+    /// Shortest paths of the last level.
     Search,
-    /// Boundaries are looked for, row by row.
+    /// Boundaries are searched for, row by row.
     Seams(Tracer),
     Done(Seams),
 }
 
-/// A map in the making: [`step`](Self::step) until it is done, or drop it.
+/// Computes a map: call [`step`](Self::step) until it is done, or drop it.
+///
 ///
 /// ```
 /// use bevy_crack::voronoi::{BakeProgress, VoronoiBake, VoronoiParams};
@@ -75,8 +76,8 @@ pub struct VoronoiBake {
 
 /// Regions and path costs of every texel (Mould 2005, section 3).
 ///
-/// Holds all that a further change needs, some 12 bytes a texel with one level and one guide, 8 more for each further
-/// level and 2 for each further guide.
+/// It keeps everything that a later change needs: about 12 bytes a texel with one level and one guide, 8 more for
+/// each further level and 2 for each further guide.
 #[derive(Clone, Debug)]
 pub struct VoronoiMap {
     params: VoronoiParams,
@@ -86,18 +87,18 @@ pub struct VoronoiMap {
     layers: Vec<Layer>,
     levels: Vec<Level>,
     lattices: Vec<Lattice>,
-    /// For each row and block whether a guide has anything there.
+    /// For each row and block: whether a guide is above zero there.
     guided: Vec<bool>,
     strokes: Option<StrokeReport>,
-    /// Path cost at which cracks reach full width, in β: that of the dearest ones when the map was made.
+    /// Path cost at which cracks have full width, in β: that of the most expensive ones when the map was made.
     full_cost: Option<f32>,
 }
 
 impl VoronoiBake {
-    /// Begins a map of `size` texels.
+    /// Starts a map of `size` texels.
     ///
     /// # Errors
-    /// If a parameter or the size is out of its range.
+    /// [`VoronoiError::OutOfRange`] if a parameter is out of its range, [`VoronoiError::Size`] if the size is.
     pub fn new(params: VoronoiParams, guides: Vec<Guide>, size: UVec2, seed: u64) -> Result<Self, VoronoiError> {
         params.validate(&guides)?;
         let frame = SurfaceFrame::new(size)?;
@@ -135,7 +136,7 @@ impl VoronoiBake {
         })
     }
 
-    /// Leaves the seams out.
+    /// Skips the seams.
     pub(super) fn regions_alone(self) -> Self {
         Self { with_seams: false, ..self }
     }
@@ -205,7 +206,7 @@ impl VoronoiBake {
         }
     }
 
-    /// The map and its seams, after whatever work is left.
+    /// The map and its seams, after completing the remaining work.
     #[must_use]
     pub fn finish(mut self) -> (VoronoiMap, Seams) {
         while let BakeProgress::Working(_) = self.step(1 << 20) {}
@@ -215,7 +216,7 @@ impl VoronoiBake {
         }
     }
 
-    /// How far the bake is, by what the stages cost.
+    /// The progress, weighted by the cost of the stages.
     fn share(&self) -> f32 {
         let rows = |y: usize| y as f32 / self.map.height() as f32;
         let levels = self.map.n_levels() as f32;
@@ -282,20 +283,20 @@ impl VoronoiMap {
         self.params.levels.clamp(1, MAX_LEVELS) as usize
     }
 
-    /// How many of the sites a level has.
+    /// Number of the sites that a level uses.
     fn sites_of(&self, level: usize) -> usize {
         let finer = self.n_levels() - 1 - level;
         (self.sites.len() >> (2 * finer)).max(1)
     }
 
-    /// Sweeps rows of the last level; says whether there is more to do.
+    /// Sweeps rows of the last level; returns whether there is more to do.
     fn search(&mut self, rows: usize) -> bool {
         let Some(level) = self.levels.last_mut() else { return false };
         let (lattice, n) = (&self.lattices[self.lattices.len() - 1], level.n_sites());
         level.advance(lattice, &self.sites[..n], rows)
     }
 
-    /// Puts walls between the regions of the last level into the last lattice.
+    /// Writes walls between the regions of the last level to the last lattice.
     fn set_walls(&mut self, rows: std::ops::Range<usize>) {
         let width = self.frame.size().x as usize;
         let (mut row, mut below) = (vec![0; width], vec![0; width]);
@@ -310,7 +311,7 @@ impl VoronoiMap {
         let width = self.frame.size().x as usize;
         let guides = &self.layers[1..];
         for x0 in (0..width).step_by(BLOCK) {
-            // With the texels to the right and below, whose edges to here belong to this block.
+            // Includes the texels to the right and below, whose edges to this block belong to it.
             let x1 = (x0 + BLOCK + 1).min(width);
             let rows = y..(y + 2).min(self.frame.size().y as usize);
             let any = guides
@@ -320,19 +321,19 @@ impl VoronoiMap {
         }
     }
 
-    /// Where the map lies in pattern space.
+    /// The position of the map in pattern space.
     #[must_use]
     pub const fn frame(&self) -> &SurfaceFrame {
         &self.frame
     }
 
-    /// What was asked.
+    /// The parameters of the map.
     #[must_use]
     pub const fn params(&self) -> &VoronoiParams {
         &self.params
     }
 
-    /// The texel of each site. Of several at one texel only the first has a region.
+    /// The texel of each site. If several are on one texel only the first has a region.
     #[must_use]
     pub fn sites(&self) -> &[UVec2] {
         &self.sites
@@ -362,7 +363,7 @@ impl VoronoiMap {
         Some(self.levels.last()?.units(self.index(x, y)?))
     }
 
-    /// Costs of the edges of a texel to its right and downwards in the finest level, in units of β / 256; `None` where
+    /// Costs of the edges from a texel to its right and down in the finest level, in units of β / 256; `None` where
     /// there is no edge.
     #[must_use]
     pub fn edges(&self, x: u32, y: u32) -> (Option<u16>, Option<u16>) {
@@ -371,7 +372,7 @@ impl VoronoiMap {
         edges.map_or((None, None), |(across, down)| (passable(across), passable(down)))
     }
 
-    /// Computes the paths of all levels anew, from the same sites and edges: the same map again. For measurements.
+    /// Computes the paths of all levels again, from the same sites and edges, with the same result. For measurements.
     pub fn search_again(&mut self) {
         (0..self.levels.len()).for_each(|i| self.search_level_again(i));
     }
@@ -406,7 +407,7 @@ impl VoronoiMap {
         tracer.finish(&self.levels, &self.params, &self.frame, &guides, self.full_cost)
     }
 
-    /// Makes the cracks that are now the dearest the widest, as they were when the map was made.
+    /// Makes the most expensive cracks of the current map the widest, as they were when the map was made.
     pub fn rescale_widths(&mut self) {
         self.full_cost = None;
         if let Some(level) = self.levels.last() {
@@ -418,7 +419,8 @@ impl VoronoiMap {
 
     /// The boundaries of the regions.
     ///
-    /// The cost that stands for full width stays that of the map when it was made, so that widths do not jump as weights change.
+    /// The cost that corresponds to full width stays that of the map when it was made, so that widths do not jump as
+    /// weights change.
     #[must_use]
     pub fn seams(&self) -> Seams {
         let mut tracer = Tracer::new(self.frame.size());
@@ -431,10 +433,11 @@ impl VoronoiMap {
         }
     }
 
-    /// Changes the weights of the guides, with sites and noise as they are (Mould 2005, section 6.1, and eq. 4).
+    /// Changes the weights of the guides and keeps sites and noise (Mould 2005, section 6.1, and eq. 4).
     ///
-    /// Computes only what can change: the texels whose path led over an edge that has become dearer, and those that
-    /// a cheaper edge brings closer. The result equals a new map's.
+    /// Only what can change is computed: the texels whose path used an edge that became more expensive, and those to
+    /// which a cheaper edge gives a shorter path. The result equals a new map.
+    ///
     ///
     /// ```
     /// use bevy_crack::{Grid, voronoi::{Guide, VoronoiBake, VoronoiParams}};
@@ -451,8 +454,9 @@ impl VoronoiMap {
     /// ```
     ///
     /// # Errors
-    /// If a weight is out of its range; the map is left as it is. Weights beyond the number of guides are not looked at,
-    /// guides beyond the number of weights keep theirs.
+    /// [`VoronoiError::OutOfRange`] if a weight is out of its range; the map does not change then. Weights beyond the
+    /// number of
+    /// guides are ignored; guides beyond the number of weights keep theirs.
     pub fn set_gammas(&mut self, gammas: &[f32]) -> Result<(), VoronoiError> {
         let guides: Vec<Guide> = gammas
             .iter()
@@ -478,7 +482,7 @@ impl VoronoiMap {
         Ok(())
     }
 
-    /// Brings the first lattice up to date where a guide has anything; says how many edges have changed.
+    /// Updates the first lattice where a guide is above zero; returns the number of changed edges.
     fn change_base(&mut self) -> usize {
         let (width, height) = (self.frame.size().x as usize, self.height());
         let blocks = width.div_ceil(BLOCK);
@@ -500,7 +504,7 @@ impl VoronoiMap {
         n_changed
     }
 
-    /// Brings the lattice of level `i` up to date after the level before has changed.
+    /// Updates the lattice of level `i` after the level before has changed.
     fn change_walls(&mut self, i: usize) -> usize {
         let width = self.frame.size().x as usize;
         let mut new = self.lattices[0].clone();
@@ -516,5 +520,5 @@ impl VoronoiMap {
     }
 }
 
-/// If more than this part of the edges has changed, a new search is faster.
+/// If more than one edge in this many has changed, a new search is faster.
 const MOST_CHANGES: usize = 8;

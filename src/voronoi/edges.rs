@@ -1,14 +1,16 @@
-//! A picture's own edges as a guide.
+//! The edges of a picture as a guide.
 
 use crate::Grid;
 
-/// Edges as strong as this share of the strongest one count in full.
+/// Edges with at least this share of the strongest slope have the value 1.
 const FULL: f32 = 0.4;
 
-/// The edges of a picture (lightness 0..=1, or the alpha of a sprite) as a guide: 1 on strong edges, 0 where it is even.
+/// The edges of a picture (lightness 0..=1, or the alpha of a sprite) as a guide: 1 on strong edges, 0 in uniform
+/// areas.
 ///
-/// The slope of the picture by Sobel's kernel. A picture without edges gives an empty guide; what is not a number counts
-/// as 0.
+/// The slope is computed with Sobel's kernel. A picture without edges gives a guide that is zero everywhere; NaN
+/// counts as 0.
+///
 ///
 /// ```
 /// use bevy_crack::{Grid, voronoi::edges};

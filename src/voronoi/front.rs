@@ -1,4 +1,4 @@
-//! Cracks that appear: the front that runs along the seams, widths over time, and the seams as a network.
+//! Cracks that appear over time: the front that runs along the seams, widths over time, and the seams as a network.
 
 use super::seams::{Seam, Seams};
 use crate::{
@@ -8,22 +8,22 @@ use crate::{
 use glam::Vec2;
 use std::{cmp::Reverse, collections::BinaryHeap};
 
-/// Behind its tip a running crack opens to full width over this length, pattern units.
+/// Distance behind its tip over which a running crack opens to full width, pattern units.
 const OPENING: f32 = 0.18;
 
-/// Length of crack between one step of birth and the next in [`Seams::network`], pattern units.
+/// Length of crack that is added per step in [`Seams::network`], pattern units.
 pub const FRONT_STEP: f32 = 0.01;
 
-/// No birth is later, however far away the front begins.
+/// The latest step, however far away the front starts.
 const LAST_BIRTH: f32 = 1_000_000.0;
 
-/// Thinner cracks are drawn so wide in a network, whose widths are above zero; pattern units.
+/// Smallest width in a network, whose widths must be above zero; pattern units.
 const LEAST_WIDTH: f32 = 1.0e-5;
 
-/// When each point of each seam is reached by a crack that starts at an impact and runs along the seams.
+/// When a crack that starts at an impact and runs along the seams reaches each point of each seam.
 ///
-/// The front runs from the vertex nearest to the impact, and in parts that have no connection to it from their own
-/// nearest vertex, as late as that is far away.
+/// The front starts at the vertex nearest to the impact. In parts that are not connected to it, it starts at their
+/// own nearest vertex, with a delay that corresponds to the distance.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Front {
     arrivals: Vec<Vec<f32>>,
@@ -46,7 +46,7 @@ impl Front {
         Self { arrivals: seams.seams.iter().enumerate().map(of_seam).collect(), reach }
     }
 
-    /// How far the front has to run until all cracks have their full width, pattern units.
+    /// The distance that the front has to run until all cracks have their full width, pattern units.
     #[must_use]
     pub fn reach(&self) -> f32 {
         self.reach + OPENING
@@ -59,7 +59,7 @@ impl Seams {
         self.stamp_share(field, profile, 1.0);
     }
 
-    /// Stamps all seams, `share` (0..=1) as wide as they are: `min(t / t_max, 1)` of Mould 2005, eq. 5.
+    /// Stamps all seams with `share` (0..=1) of their width: `min(t / t_max, 1)` of Mould 2005, eq. 5.
     pub fn stamp_share(&self, field: &mut DepthField, profile: &Profile, share: f32) {
         let share = share.clamp(0.0, 1.0);
         for seam in &self.seams {
@@ -70,10 +70,10 @@ impl Seams {
         }
     }
 
-    /// Stamps what a front has opened that has run `distance` pattern units: thin at its tips, and never narrower than at
-    /// a smaller distance.
+    /// Stamps what a front has opened after running `distance` pattern units. Cracks are thin at their tips, and
+    /// never narrower than at a smaller distance.
     ///
-    /// `front` must have been made from these seams; of others only what they have in common is stamped.
+    /// `front` must have been made from these seams; for other seams only the common part is stamped.
     pub fn stamp_front(&self, field: &mut DepthField, profile: &Profile, front: &Front, distance: f32) {
         for (seam, arrivals) in self.seams.iter().zip(&front.arrivals) {
             for (pair, arrivals) in seam.points.windows(2).zip(arrivals.windows(2)) {
@@ -88,7 +88,7 @@ impl Seams {
                     stamp(open(pair[0], run[0]), open(pair[1], run[1]));
                     continue;
                 }
-                // Part of the way, from either end.
+                // Part of the piece, from either end.
                 for (from, to, run) in [(pair[0], pair[1], run[0]), (pair[1], pair[0], run[1])] {
                     if run > 0.0 {
                         let tip = PathPoint { pos: from.pos.lerp(to.pos, run / length), width: 0.0 };
@@ -99,10 +99,10 @@ impl Seams {
         }
     }
 
-    /// The seams as a network that has grown from an impact at `from`, a step every [`FRONT_STEP`].
+    /// The seams as a network that has grown from an impact at `from`, with a step for every [`FRONT_STEP`].
     ///
-    /// Every point of a seam is a node; where two arms of the front meet there is a link. The lines are straight: they
-    /// are rough as they are.
+    /// Every point of a seam is a node; where two arms of the front meet there is a link. The lines are straight,
+    /// because seams are rough already.
     #[must_use]
     pub fn network(&self, from: Vec2) -> Network {
         let graph = Graph::new(self);
@@ -150,7 +150,7 @@ struct Graph {
     pieces: Vec<(u32, u32)>,
     /// The first inner point of each seam.
     first: Vec<usize>,
-    /// The pieces at each point: where the list of each begins, and the lists.
+    /// The pieces at each point: where each list begins, and the lists.
     begins: Vec<u32>,
     beside: Vec<u32>,
 }
@@ -246,7 +246,7 @@ impl Graph {
         starts
     }
 
-    /// Shortest ways along the seams; ties go to the lower number.
+    /// Shortest paths along the seams; ties go to the lower number.
     fn run(&self, from: Vec2) -> Vec<Arrival> {
         let from = if from.is_finite() { from } else { Vec2::ZERO };
         let mut arrivals = vec![Arrival { distance: f32::INFINITY, parent: None, rank: u32::MAX }; self.places.len()];
@@ -254,7 +254,7 @@ impl Graph {
         for id in self.starts(from) {
             let distance = self.places[id as usize].distance(from);
             arrivals[id as usize].distance = distance;
-            // The bits of floats that are not negative are in their order.
+            // The bits of non-negative floats have the order of the floats.
             heap.push(Reverse((distance.to_bits(), id)));
         }
         let mut rank = 0;

@@ -11,15 +11,18 @@ fn cover(texel: &[u8; 4]) -> f32 {
     f32::from(texel[3]) / 255.0
 }
 
-/// How light a picture (rows of RGBA) is, 0..=1, 0 where it is transparent; `None` if it has not exactly `size` texels.
+/// Lightness of a picture (rows of RGBA), 0..=1, 0 where it is transparent; `None` if it does not have exactly `size`
+/// texels.
 #[must_use]
 pub fn lightness(size: UVec2, rgba: &[u8]) -> Option<Grid<f32>> {
     let texels = rgba.as_chunks::<4>().0;
     Grid::from_vec(size, texels.iter().map(|texel| light(texel) * cover(texel)).collect())
 }
 
-/// The drawing in a picture (rows of RGBA) as a guide: 1 where it is dark, if most of it is light, else where it is light; 0 where
-/// it is transparent. What is drawn on nothing is drawing throughout. `None` if the picture has not exactly `size` texels.
+/// The drawing in a picture (rows of RGBA) as a guide: 1 where it is dark if most of it is light, else 1 where it is
+/// light; 0 where it is transparent. In a picture with a transparent background everything else counts as drawing.
+/// `None` if the picture does not have exactly `size` texels.
+///
 ///
 /// ```
 /// use bevy_crack::voronoi::ink;

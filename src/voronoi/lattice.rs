@@ -1,15 +1,15 @@
-//! What a step from texel to texel costs: [`Lattice`].
+//! The cost of a step from texel to texel: [`Lattice`].
 
 use crate::Grid;
 use glam::UVec2;
 
-/// Cost units of β: whole numbers, so that every machine gets the same map.
+/// Cost units per β: integers, so that every machine computes the same map.
 pub(super) const UNIT: u16 = 256;
 
 /// The cost of an edge that cannot be crossed.
 pub(super) const WALL: u16 = u16::MAX;
 
-/// What all weights of one edge may add up to, in β: below [`WALL`] in units.
+/// The largest sum of all weights of one edge, in β: below [`WALL`] in units.
 pub(super) const MAX_WEIGHT: f32 = 254.0;
 
 /// A picture that raises the cost of edges, with its weight.
@@ -105,7 +105,7 @@ impl Lattice {
     }
 }
 
-/// The edges to the right from the texels `x0..` of row `y`, as many as `out` is long; a wall at the border.
+/// The edges to the right from the texels `x0..` of row `y`, as many as `out` holds; a wall at the border.
 pub(super) fn edges_across(out: &mut [u16], layers: &[Layer], y: usize, x0: usize) {
     out.fill(UNIT);
     let x1 = x0 + out.len();

@@ -13,7 +13,7 @@ enum Paths {
     Wide(Search<i64>),
 }
 
-/// A search over the first of the sites, and its result.
+/// A search from the first sites, and its result.
 #[derive(Clone, Debug)]
 pub(super) struct Level {
     paths: Paths,
@@ -45,7 +45,7 @@ impl Level {
         level
     }
 
-    /// Further sites, after those that there are.
+    /// Adds sites after the existing ones.
     pub(super) fn add_sites(&mut self, sites: &[UVec2]) {
         for (i, &site) in (self.n_sites as u32..).zip(sites) {
             paths!(&mut self.paths, search => search.add_site(site, i));
@@ -61,7 +61,7 @@ impl Level {
         self.n_sites
     }
 
-    /// Sweeps up to `rows` rows; says whether there is more to do.
+    /// Sweeps up to `rows` rows; returns whether there is more to do.
     ///
     /// `sites` are those it was made with.
     pub(super) fn advance(&mut self, lattice: &Lattice, sites: &[UVec2], rows: usize) -> bool {
@@ -72,7 +72,7 @@ impl Level {
         if !self.at_rest() {
             return true;
         }
-        // A cost that does not fit: all over again with larger numbers.
+        // A cost did not fit: start again with larger numbers.
         if self.n_sites > 0
             && let Paths::Narrow(search) = &mut self.paths
             && search.overflows()
@@ -103,7 +103,7 @@ impl Level {
         paths!(&mut self.paths, search => search.reconsider(lattice));
     }
 
-    /// The region of a texel. Not to be asked before there are sites.
+    /// The region of a texel. There must be sites.
     #[inline(always)]
     pub(super) fn region(&self, texel: usize) -> u32 {
         paths!(&self.paths, search => search.field()[texel].index())

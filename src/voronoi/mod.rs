@@ -1,6 +1,23 @@
 //! Cracks that draw a picture, all at once: Voronoi diagrams of a weighted graph.
 //!
-//! The method of Mould 2005 ("Image-Guided Fracture"): every texel is joined to its four neighbours by edges that cost
+//! The method is that of Mould 2005 ("Image-Guided Fracture"). Every texel is joined to its four neighbours by edges
+//! with the cost
+//!
+//! ```text
+//! e_ij = α max(N_i, N_j) + β + Σ_k γ_k max(I^k_i, I^k_j)        (eq. 1, 2 and 4)
+//! ```
+//!
+//! `N` is noise and the `I^k` are guides. A texel belongs to the *site* with the cheapest path to it. There is a
+//! crack where two regions meet. Strokes of a guide are expensive to cross, so regions from both sides meet in their
+//! middle.
+//!
+//! [`VoronoiParams`] and [`Guide`] hold the settings, [`VoronoiBake`] computes the map row by row. [`VoronoiMap`]
+//! holds regions and costs of every texel, [`Seams`] the cracks as lines. Costs are integers (β is 256 units), so the
+//! map is the same on every machine; ties go to the lower site.
+//!
+//! Differs from the paper: a level of cracks divides the regions of the level before exactly, as if crossing an older
+//! crack were impossible; the paper only makes it more expensive.
+//!
 //!
 //! ```text
 //! e_ij = α max(N_i, N_j) + β + Σ_k γ_k max(I^k_i, I^k_j)        (eq. 1, 2 and 4)
@@ -60,15 +77,16 @@ pub use strokes::StrokeReport;
 use glam::UVec2;
 use std::ops::ControlFlow;
 
-/// Rows between two calls of a progress callback.
+/// Rows between two calls of the progress callback.
 const SLICE: usize = 64;
 
-/// Nearest site and path cost of every texel over the weighted lattice, in one go.
+/// Nearest site and path cost of every texel over the weighted lattice, in one call.
 ///
-/// `progress` is told the share that is done and stops the work with `Break`.
+/// `progress` is called with the share that is done, 0..1, and stops the work if it returns `Break`.
 ///
 /// # Errors
-/// If a parameter or the size is out of its range, or `progress` asked to stop.
+/// [`VoronoiError::OutOfRange`] or [`VoronoiError::Size`] if a parameter or the size is out of its range,
+/// [`VoronoiError::Cancelled`] if `progress` returned `Break`.
 pub fn voronoi_map(
     params: &VoronoiParams,
     guides: &[Guide],

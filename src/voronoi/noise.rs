@@ -1,17 +1,18 @@
-//! The noise that makes cracks wander: [`Noise`].
+//! The noise that makes cracks irregular: [`Noise`].
 
 use crate::{
     math::{hash_unit, vectorized},
     pattern::SurfaceFrame,
 };
 
-/// Octaves; the finest features are 1/32 of the largest.
+/// Number of octaves; the finest features are 1/32 of the largest.
 const OCTAVES: usize = 6;
 
-/// Amplitude of an octave in that of the one before. Below 0.6 cracks are smooth and keep to the axes of the lattice.
+/// Ratio of the amplitudes of successive octaves. Below 0.6 cracks are smooth and follow the axes of the lattice.
 const PERSISTENCE: f32 = 0.9;
 
-/// By how much the sum of the octaves is stretched about its middle: six octaves together rarely leave 0.25..0.75.
+/// Factor by which the sum of the octaves is stretched around its middle: six octaves together rarely leave
+/// 0.25..0.75.
 const CONTRAST: f32 = 2.6;
 
 /// Value noise of several octaves, in pattern space, row by row.
@@ -27,11 +28,11 @@ struct Octave {
     amplitude: f32,
     /// Cells per texel.
     frequency: f32,
-    /// For each texel of a row, how far it is through its cell, smoothed.
+    /// For each texel of a row: its position in its cell, smoothed.
     fade: Vec<f32>,
     /// Column of texels at which each cell begins, and the end of the last one.
     begins: Vec<usize>,
-    /// Values at the corners of the present row of cells: above, below, and which row that is.
+    /// Values at the corners of the current row of cells: above, below, and the number of that row.
     above: Vec<f32>,
     below: Vec<f32>,
     cell_row: Option<u32>,
@@ -56,7 +57,7 @@ impl Noise {
             let fade = places.clone().map(|place| smooth(place - place.floor())).collect();
             let mut begins = Vec::new();
             for (x, place) in places.enumerate() {
-                // Cells narrower than a texel begin and end with none in them.
+                // Cells narrower than a texel contain no texels.
                 while begins.len() <= place as usize {
                     begins.push(x);
                 }

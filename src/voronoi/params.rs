@@ -1,13 +1,13 @@
-//! What is asked: [`VoronoiParams`], [`Guide`], [`SiteLayout`].
+//! The settings of a map: [`VoronoiParams`], [`Guide`], [`SiteLayout`].
 
 use super::lattice::MAX_WEIGHT;
 use crate::{Grid, pattern::FrameError};
 use glam::Vec2;
 
-/// The most sites that a map has; more are cut to this number.
+/// The largest number of sites of a map; larger numbers are clamped.
 pub const MAX_SITES: u32 = 1 << 16;
 
-/// The most levels of cracks.
+/// The largest number of levels of cracks.
 pub const MAX_LEVELS: u32 = 5;
 
 /// How sites are laid out.
@@ -15,7 +15,7 @@ pub const MAX_LEVELS: u32 = 5;
 #[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]
 #[non_exhaustive]
 pub enum SiteLayout {
-    /// Anywhere, as in the paper: pavement.
+    /// Uniformly random, as in the paper: pavement.
     Uniform,
     /// Far from each other (blue noise): drying mud.
     Even,
@@ -23,32 +23,44 @@ pub enum SiteLayout {
     Impact {
         /// The point, pattern units.
         at: Vec2,
-        /// 1 = half of the sites in the inner half of the radius, 3 = in the inner eighth. 1..=8.
+        /// Concentration around the point: 1 = half of the sites in the inner half of the radius, 3 = half in the
+        /// inner eighth. 1..=8.
         focus: f32,
     },
-    /// By a density image, stretched over the surface; values that are negative or not finite count as zero.
+    /// By a density image, stretched over the surface. Values that are negative or not finite count as zero.
     ///
-    /// Where it is zero everywhere, sites are even.
+    /// If it is zero everywhere, sites are laid out as with `Even`.
     Density(Grid<f32>),
-    /// These points, pattern units; [`VoronoiParams::sites`] is not asked. Points that are not finite are left out.
+    /// These points, pattern units; [`VoronoiParams::sites`] is not used. Points that are not finite are ignored.
     Given(Vec<Vec2>),
-    /// In pairs on either side of the strokes of the guides, so that a seam must run down the middle of every stroke;
-    /// the rest evenly.
+    /// In pairs on both sides of the strokes of the guides, so that a seam must run along the middle of every stroke;
+    /// the remaining sites evenly.
     ///
-    /// Goes beyond the paper ("automatic mechanisms for placing Voronoi sites to produce images are not available",
-    /// section 4). Where no guide has strokes (nothing above a half, or hardly anything else), sites are even.
+    /// This goes beyond the paper ("automatic mechanisms for placing Voronoi sites to produce images are not
+    /// available", section 4). If no guide has strokes (no value above a half, or hardly any other value), sites are
+    /// laid out as with `Even`.
     Astride,
 }
 
-/// A picture that cracks shall follow.
+/// A picture that cracks are to follow.
+///
+/// ```
+/// use bevy_crack::{Grid, voronoi::Guide};
+///
+/// // A vertical line; cracks follow it.
+/// let mut line = Grid::new([9, 9].into(), 0.0);
+/// (0..9).for_each(|y| line.row_mut(y)[4] = 1.0);
+/// assert_eq!(Guide::new(line).gamma, 28.0);
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Guide {
     /// 0..=1, of any size: stretched over the surface (averaged when it shrinks, linear between its texels when it
-    /// grows). Values beyond are cut; what is not a number counts as 0.
+    /// grows). Values outside are clamped; NaN counts as 0.
     pub image: Grid<f32>,
     /// Weight `γ` of the picture in the cost of an edge. Same unit as [`VoronoiParams::alpha`]; 0 or more.
     ///
-    /// The paper uses 4 (α + β), see [`Guide::new`]; less draws the picture more faintly, more hardly changes it.
+    /// The paper uses 4 (α + β), see [`Guide::new`]. Smaller values draw the picture more faintly; larger values
+    /// change little.
     pub gamma: f32,
 }
 
@@ -60,38 +72,40 @@ impl Guide {
     }
 }
 
-/// Everything that a map of cracks is told, besides size, seed and guides.
+/// All settings of a map of cracks except size, seed and guides.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]
 pub struct VoronoiParams {
-    /// Weight `α` of the noise in the cost of an edge (Mould 2005, eq. 1). 0..=100 times [`beta`](Self::beta); default 6.
+    /// Weight `α` of the noise in the cost of an edge (Mould 2005, eq. 1). 0..=100 times [`beta`](Self::beta);
+    /// default 6.
     ///
     /// 0 = cracks are as straight as the lattice allows; larger = more random.
     pub alpha: f32,
-    /// Least cost `β` of an edge. 0.001..=1000; default 1. Only its ratio to the other weights matters.
+    /// Minimum cost `β` of an edge. 0.001..=1000; default 1. Only its ratio to the other weights matters.
     pub beta: f32,
-    /// How many sites, at most [`MAX_SITES`]; default 175.
+    /// Number of sites, at most [`MAX_SITES`]; default 175.
     pub sites: u32,
-    /// Where they lie; default [`SiteLayout::Uniform`].
+    /// How sites are laid out; default [`SiteLayout::Uniform`].
     pub layout: SiteLayout,
-    /// How many generations of cracks (Mould 2005, section 3.2 and fig. 3): each divides the regions of the one before,
-    /// with four times as many sites, and has thinner cracks. 1..=[`MAX_LEVELS`]; default 1.
+    /// Number of generations of cracks (Mould 2005, section 3.2 and fig. 3). Each divides the regions of the one
+    /// before, with four times as many sites and thinner cracks. 1..=[`MAX_LEVELS`]; default 1.
     pub levels: u32,
-    /// Size of the largest features of the noise, pattern units, 0.01..=1; default 0.12. Five more octaves follow.
+    /// Size of the largest features of the noise, pattern units, 0.01..=1; default 0.12. Five finer octaves are
+    /// added.
     pub noise_scale: f32,
-    /// Width of the widest cracks, pattern units, 0..=0.2; default 0.014. In broad strokes of guides they are wider, see
-    /// [`stroke_width`](Self::stroke_width).
+    /// Width of the widest cracks, pattern units, 0..=0.2; default 0.014. They are wider in broad strokes of guides,
+    /// see [`stroke_width`](Self::stroke_width).
     pub width: f32,
-    /// Width of the thinnest ones, pattern units, 0..=[`width`](Self::width); default 0.0015.
+    /// Width of the thinnest cracks, pattern units, 0..=[`width`](Self::width); default 0.0015.
     pub least_width: f32,
-    /// How cracks taper: their width grows with this power of the path cost from the sites (section 3.2), up to full
-    /// width where it is dearest. 0..=8; default 2. 0 makes all cracks equally wide.
+    /// How cracks taper: their width is proportional to this power of the path cost from the sites (section 3.2), up
+    /// to full width where the cost is highest. 0..=8; default 2. 0 makes all cracks equally wide.
     pub taper: f32,
-    /// How wide a crack down the middle of a guide's stroke is at least, as a share of the stroke's own width; 0..=1, default
-    /// 0.45; at most about twice [`width`](Self::width).
+    /// Minimum width of a crack along the middle of a guide's stroke, as a share of the stroke's own width; 0..=1,
+    /// default 0.45; at most about twice [`width`](Self::width).
     ///
-    /// So large letters have wide cracks, and thin parts of a letter are not lost. 0 = as the paper, all cracks by path
-    /// cost alone.
+    /// With it large letters have wide cracks, and thin parts of a letter do not disappear. 0 = as in the paper, the
+    /// width of all cracks depends only on the path cost.
     pub stroke_width: f32,
 }
 
@@ -113,12 +127,12 @@ impl VoronoiParams {
     /// Checks every parameter, and the weights of `guides`, against their ranges.
     ///
     /// # Errors
-    /// Names the first field that is out of its range or not finite.
+    /// [`VoronoiError::OutOfRange`] for the first field that is out of its range or not finite.
     pub fn validate(&self, guides: &[Guide]) -> Result<(), VoronoiError> {
         self.validate_with(guides.iter().map(|guide| guide.gamma))
     }
 
-    /// The same with the weights of guides that are not read yet.
+    /// Like [`validate`](Self::validate), for the weights of guides whose images are not loaded yet.
     pub(crate) fn validate_with(&self, gammas: impl Iterator<Item = f32>) -> Result<(), VoronoiError> {
         let focus = match self.layout {
             SiteLayout::Impact { focus, .. } => focus,
@@ -162,23 +176,23 @@ impl Default for VoronoiParams {
     }
 }
 
-/// Why there is no map.
+/// Why a map cannot be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum VoronoiError {
-    /// A number outside its range, or not finite.
+    /// A number is outside its range, or not finite.
     #[error("`{field}` is {value}, must lie in {min}..={max}")]
     OutOfRange {
         /// Name of the field.
         field: &'static str,
         /// Its value.
         value: f32,
-        /// Least value allowed.
+        /// Smallest value allowed.
         min: f32,
-        /// Greatest value allowed.
+        /// Largest value allowed.
         max: f32,
     },
-    /// A size that no surface can have.
+    /// A size that a surface cannot have.
     #[error(transparent)]
     Size(#[from] FrameError),
     /// The progress callback asked to stop.

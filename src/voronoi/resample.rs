@@ -1,16 +1,16 @@
-//! Guides of any size to the size of the surface.
+//! Resamples guides of any size to the size of the surface.
 
 use crate::Grid;
 use glam::UVec2;
 
-/// Which values of a source line make one value of the target line, and with which weights.
+/// The values of a source line that make one value of the target line, and their weights.
 #[derive(Clone, Debug)]
 struct Taps {
     first: usize,
     weights: Vec<f32>,
 }
 
-/// For each of `to` values the taps into `from`: means when it shrinks, linear when it grows.
+/// For each of `to` values the taps into `from`: averages when it shrinks, linear interpolation when it grows.
 fn taps(from: usize, to: usize) -> Vec<Taps> {
     let scale = from as f32 / to as f32;
     let reach = scale.max(1.0);
@@ -36,14 +36,14 @@ pub(super) struct Resampler {
 }
 
 impl Resampler {
-    /// From a picture with texels to `to`.
+    /// A resampler from pictures of `from` texels to `to`.
     pub(super) fn new(from: UVec2, to: UVec2) -> Self {
         Self { across: taps(from.x as usize, to.x as usize), down: taps(from.y as usize, to.y as usize) }
     }
 
     /// Writes row `y`, 0..=1 to 0..=65535.
     pub(super) fn fill_row(&self, picture: &Grid<f32>, y: usize, out: &mut [u16]) {
-        // What is not a number is not above zero either.
+        // NaN is not above zero.
         let cut = |value: f32| if value > 0.0 { value.min(1.0) } else { 0.0 };
         if picture.width() == out.len() && picture.height() == self.down.len() {
             for (out, &value) in out.iter_mut().zip(picture.row(y)) {

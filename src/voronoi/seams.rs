@@ -17,25 +17,34 @@ pub struct SeamVertex {
 pub struct Seam {
     /// Index of the vertex at which it begins.
     pub from: u32,
-    /// Index of the vertex at which it ends; the same as `from` for a region that lies within another one.
+    /// Index of the vertex at which it ends; equals `from` for a region that lies within another one.
     pub to: u32,
-    /// The region to the left as one goes from `from` to `to` (y is down: left of east is north).
+    /// The region to the left in the direction from `from` to `to` (y is down: left of east is north).
     pub left: u32,
     /// The region to the right.
     pub right: u32,
     /// The level at which the crack appeared, 0 = oldest.
     pub level: u32,
-    /// The line with its widths, pattern units; first and last are the vertices.
+    /// The points of the line with their widths, pattern units; the first and the last are the vertices.
     pub points: Vec<PathPoint>,
 }
 
-/// All boundaries of a map: a planar graph that meets only in its vertices.
+/// All boundaries of a map: a planar graph whose lines meet only in its vertices.
+///
+/// ```
+/// use bevy_crack::voronoi::{VoronoiBake, VoronoiParams};
+///
+/// let (_, seams) = VoronoiBake::new(VoronoiParams::DEFAULT, Vec::new(), [64, 64].into(), 7)?.finish();
+/// let first = &seams.seams[0];
+/// assert_eq!(first.points[0].pos, seams.vertices[first.from as usize].pos);
+/// # Ok::<(), bevy_crack::voronoi::VoronoiError>(())
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Seams {
     /// Size of the surface, pattern units.
     pub extent: Vec2,
     /// Where seams end.
     pub vertices: Vec<SeamVertex>,
-    /// The seams, in the order in which rows are read.
+    /// The seams, in scan order of the rows.
     pub seams: Vec<Seam>,
 }

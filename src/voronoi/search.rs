@@ -1,10 +1,10 @@
 //! Exact shortest paths from all sites at once: [`Search`].
 //!
-//! Cost and site of a texel are one number, the cost above the site, so that one `min` does it all and a tie goes to
-//! the lower site. Rows are swept down and up: each takes over what is cheaper by way of the row before, then passes it
-//! on along itself, right and left. That reaches the costs of Dijkstra's method, since a row is at rest only if no
-//! neighbour has a cheaper way into it; rows are cut into blocks with stamps of time, so that a block at rest beside
-//! blocks at rest is not looked at.
+//! Cost and site of a texel are packed into one number, with the cost in the high bits, so that one `min` compares
+//! both and a tie goes to the lower site. Rows are swept down and up: each row takes cheaper paths from the row
+//! before, then propagates them along itself, right and left. The result has the costs of Dijkstra's method, because
+//! a row is at rest only if no neighbour offers a cheaper path. Rows are divided into blocks with time stamps, so
+//! that a block at rest beside blocks at rest is skipped.
 
 use super::lattice::{Lattice, WALL};
 use glam::UVec2;
@@ -14,17 +14,17 @@ pub(super) const BLOCK: usize = 64;
 
 /// Cost and site of a texel in one number.
 pub(super) trait Packed: Copy + Ord {
-    /// Of a texel that no path has reached. Adding an edge does not overflow.
+    /// The value of a texel that no path has reached. Adding an edge does not overflow.
     const FAR: Self;
-    /// How many sites there can be.
+    /// The largest number of sites.
     const MAX_SITES: usize;
-    /// The site itself.
+    /// The value of the site itself.
     fn site(index: u32) -> Self;
-    /// One edge further.
+    /// The value one edge further.
     fn plus(self, edge: u16) -> Self;
-    /// Index of the site.
+    /// The index of the site.
     fn index(self) -> u32;
-    /// Cost in units.
+    /// The cost in units.
     fn cost(self) -> u64;
 }
 
@@ -76,7 +76,7 @@ impl Packed for i64 {
     }
 }
 
-/// One edge further, or nowhere through a wall.
+/// One edge further, or [`FAR`](Packed::FAR) through a wall.
 #[inline(always)]
 fn step<P: Packed, const WALLS: bool>(from: P, edge: u16) -> P {
     if WALLS && edge == WALL { P::FAR } else { from.plus(edge) }
@@ -87,23 +87,23 @@ fn min<P: Packed>(a: P, b: P) -> P {
     if a < b { a } else { b }
 }
 
-/// When a block of a row changed, and when it last took over from the rows above and below.
+/// When a block of a row changed, and when it last took paths from the rows above and below.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Stamps {
     changed: u32,
     looked: [u32; 2],
-    /// To be passed on along its row whatever the rows beside it say.
+    /// Whether it must be propagated along its row even if the rows beside it did not change.
     stirred: bool,
 }
 
-/// The state of a search, which can stand still between any two rows.
+/// The state of a search, which can pause between any two rows.
 #[derive(Clone, Debug)]
 pub(super) struct Search<P> {
     size: UVec2,
     field: Vec<P>,
     blocks: usize,
     stamps: Vec<Stamps>,
-    /// Whether a block of the present row is to be passed on.
+    /// Whether a block of the current row is to be propagated.
     active: Vec<bool>,
     clock: u32,
     /// The next row of the sweep.
@@ -114,9 +114,9 @@ pub(super) struct Search<P> {
     quiet: u32,
     /// Sweeps begun since the search was last at rest.
     sweeps: u32,
-    /// Texels whose path may have led over an edge that has become dearer.
+    /// Texels whose path may have used an edge that became more expensive.
     suspects: Vec<u32>,
-    /// The clock when costs were last looked at by [`overflows`](Self::overflows).
+    /// The clock when costs were last checked by [`overflows`](Self::overflows).
     checked: u32,
 }
 
@@ -145,21 +145,21 @@ impl<P: Packed> Search<P> {
         &self.field
     }
 
-    /// A source of paths; of two at one texel the lower index stays.
+    /// Adds a source of paths; of two on one texel the lower index stays.
     pub(super) fn add_site(&mut self, texel: UVec2, index: u32) {
         let i = texel.y as usize * self.size.x as usize + texel.x as usize;
         self.field[i] = min(self.field[i], P::site(index));
         self.stir(texel.x as usize, texel.y as usize);
     }
 
-    /// Has the block of a texel looked at again, and by its neighbours.
+    /// Marks the block of a texel so that it and its neighbours are visited again.
     fn stir(&mut self, x: usize, y: usize) {
         self.stamps[y * self.blocks + x / BLOCK] = Stamps { changed: self.clock, looked: [0; 2], stirred: true };
         self.quiet = 0;
     }
 
-    /// Overwrites the costs of edges of row `y`, which lead from its texels `x0..` to the right or `down`; says how many have
-    /// changed. [`reconsider`](Self::reconsider) has to follow.
+    /// Overwrites the costs of edges of row `y`, from its texels `x0..` to the right or `down`; returns the number of
+    /// changed edges. [`reconsider`](Self::reconsider) must follow.
     pub(super) fn take_over(&mut self, edges: &mut [u16], new: &[u16], x0: usize, y: usize, down: bool) -> usize {
         let w = self.size.x as usize;
         let mut n_changed = 0;
@@ -185,10 +185,10 @@ impl<P: Packed> Search<P> {
         n_changed
     }
 
-    /// After edges have changed: the search is at rest again, after further sweeps, where a new one would be.
+    /// Repairs the search after edges have changed: after further sweeps it is at rest where a new search would be.
     ///
-    /// A texel whose path led over a dearer edge is forgotten, and with it every texel that may have come by it; the
-    /// others stay. No texel holds itself up, since each step costs something.
+    /// A texel whose path used an edge that became more expensive is reset, and with it every texel whose path may
+    /// depend on it; the others stay. No texel can depend on itself, because each step has a cost above zero.
     pub(super) fn reconsider(&mut self, lattice: &Lattice) {
         let w = self.size.x as usize;
         while let Some(suspect) = self.suspects.pop() {
@@ -197,7 +197,7 @@ impl<P: Packed> Search<P> {
             if here >= P::FAR || here.cost() == 0 {
                 continue;
             }
-            // Beyond the border there are walls, also from the end of a row to the beginning of the next.
+            // There are walls beyond the border, also between the end of a row and the beginning of the next.
             let around = [
                 (i + 1, lattice.edges(i).0),
                 (i.wrapping_sub(1), if i > 0 { lattice.edges(i - 1).0 } else { WALL }),
@@ -214,12 +214,12 @@ impl<P: Packed> Search<P> {
                 }
             }
             self.field[i] = P::FAR;
-            // Divisions of 32 bits take a third of the time of those of 64.
+            // 32-bit divisions take a third of the time of 64-bit ones.
             self.stir((suspect % self.size.x) as usize, (suspect / self.size.x) as usize);
         }
     }
 
-    /// Whether there is a cost too large for `P`, or a texel that nothing reaches, since the last call.
+    /// Whether, since the last call, a cost became too large for `P`, or a texel cannot be reached.
     pub(super) fn overflows(&mut self) -> bool {
         let (w, blocks) = (self.size.x as usize, self.blocks);
         let since = std::mem::replace(&mut self.checked, self.clock);
@@ -236,7 +236,7 @@ impl<P: Packed> Search<P> {
         self.quiet >= 2
     }
 
-    /// How far the search is, 0..=1: a guess from the number of sweeps, of which three or four do most of the work.
+    /// The progress, 0..=1: estimated from the number of sweeps, of which three or four do most of the work.
     pub(super) fn progress(&self) -> f32 {
         if self.at_rest() {
             return 1.0;
@@ -280,7 +280,7 @@ impl<P: Packed> Search<P> {
         }
     }
 
-    /// Takes over what is cheaper from row `before` and passes it on along row `y`.
+    /// Takes cheaper paths from row `before` and propagates them along row `y`.
     fn visit<const WALLS: bool>(&mut self, lattice: &Lattice, y: usize, before: Option<usize>) {
         let (w, blocks, side) = (self.size.x as usize, self.blocks, usize::from(self.upwards));
         let mut any = false;
@@ -310,7 +310,7 @@ impl<P: Packed> Search<P> {
         }
     }
 
-    /// Along row `y`: within the active blocks, then from block to block as far as that is cheaper.
+    /// Propagates along row `y`: within the active blocks, then from block to block as long as that is cheaper.
     fn pass_on<const WALLS: bool>(&mut self, lattice: &Lattice, y: usize) {
         let w = self.size.x as usize;
         let row = &mut self.field[y * w..(y + 1) * w];
@@ -320,7 +320,7 @@ impl<P: Packed> Search<P> {
             let (x0, x1) = ends(b);
             both_ways::<P, WALLS>(&mut row[x0..x1], &edges[x0..x1]);
         }
-        // Every block is at rest in itself now, so that a path that comes in ends where it is not the cheaper one.
+        // Every block is at rest internally now, so that an incoming path ends where it is not the cheaper one.
         for b in 1..self.blocks {
             let (x0, x1) = ends(b);
             let mut from = step::<P, WALLS>(row[x0 - 1], edges[x0 - 1]);
@@ -353,10 +353,10 @@ impl<P: Packed> Search<P> {
     }
 }
 
-/// Brings the texels of a block to rest along their row; `edges` lead from each to the next.
+/// Propagates paths within a block along its row; `edges` lead from each texel to the next.
 ///
-/// No cheapest path turns round within a row, so neither way needs the other's result. Each is a chain of steps that wait for
-/// one another: both at once take hardly longer than one.
+/// No cheapest path turns around within a row, so neither direction needs the other's result. Each direction is a
+/// chain of dependent steps: running both at once takes hardly longer than one.
 fn both_ways<P: Packed, const WALLS: bool>(row: &mut [P], edges: &[u16]) {
     let n = row.len().min(edges.len());
     let (row, edges) = (&mut row[..n], &edges[..n]);
@@ -371,7 +371,7 @@ fn both_ways<P: Packed, const WALLS: bool>(row: &mut [P], edges: &[u16]) {
     }
 }
 
-/// Takes over what is cheaper by way of `from`; says whether anything was.
+/// Takes cheaper paths from `from`; returns whether there were any.
 fn pull<P: Packed, const WALLS: bool>(row: &mut [P], from: &[P], edges: &[u16]) -> bool {
     let mut any = 0u8;
     for ((texel, &from), &edge) in row.iter_mut().zip(from).zip(edges) {

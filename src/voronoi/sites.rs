@@ -1,4 +1,4 @@
-//! Where sites lie.
+//! Layouts of sites.
 
 use super::{SiteLayout, VoronoiParams, params::MAX_SITES};
 use crate::{
@@ -8,10 +8,10 @@ use crate::{
 };
 use glam::{UVec2, Vec2};
 
-/// Darts thrown in vain before sites may lie closer together.
+/// Failed darts before the minimum distance of sites is reduced.
 const TRIES: u32 = 30;
 
-/// By how much they then may.
+/// Factor by which the distance is reduced.
 const CLOSER: f32 = 0.93;
 
 /// The texel of a point, pattern units.
@@ -19,7 +19,7 @@ pub(super) fn texel(frame: &SurfaceFrame, pos: Vec2) -> UVec2 {
     frame.to_texel(pos).max(Vec2::ZERO).as_uvec2().min(frame.size() - 1)
 }
 
-/// The sites of every layout but [`SiteLayout::Astride`], in an order of which every beginning is such a layout too.
+/// The sites of every layout except [`SiteLayout::Astride`], ordered so that every prefix is such a layout too.
 pub(super) fn sites(params: &VoronoiParams, frame: &SurfaceFrame, seed: u64) -> Vec<UVec2> {
     let mut rng = Rng::new(seed).stream("sites");
     let n = params.sites.min(MAX_SITES) as usize;
@@ -103,7 +103,7 @@ fn by_density(n: usize, density: &Grid<f32>, extent: Vec2, rng: &mut Rng) -> Opt
     if most <= 0.0 {
         return None;
     }
-    // Whole numbers, so that the sum does not depend on the order.
+    // Integers, so that the sum does not depend on the order.
     let mut sum = 0u64;
     let weight = |value: f32| if value.is_finite() { (value.max(0.0) / most * 65536.0) as u64 } else { 0 };
     let sums: Vec<u64> = density

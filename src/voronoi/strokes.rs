@@ -1,4 +1,4 @@
-//! The strokes of the guides, and sites astride them.
+//! The strokes of the guides, and sites on both sides of them.
 
 use super::{
     lattice::{Lattice, Layer},
@@ -8,17 +8,17 @@ use super::{
 use crate::{Grid, math::Rng, pattern::SurfaceFrame};
 use glam::{IVec2, UVec2, Vec2};
 
-/// Strokes are looked at on a lattice of at most so many texels, its shorter side at most [`SHORT_SIDE`] long.
+/// Strokes are analysed on a lattice of at most this many texels, with a shorter side of at most [`SHORT_SIDE`].
 const MOST_TEXELS: f32 = 640_000.0;
 const SHORT_SIDE: f32 = 400.0;
 
-/// From this value on a guide is a stroke.
+/// From this value on a guide counts as stroke.
 const INK: u16 = 1 << 15;
 
-/// Strokes that cover more than this share of the surface are no drawing.
+/// Guides whose strokes cover more than this share of the surface do not count as drawings.
 const MOST_INK: f32 = 0.7;
 
-/// Share of the sites that is laid astride at once, and that may be after all gaps have been closed.
+/// Share of the sites that is laid astride strokes at first, and largest share after all gaps have been closed.
 const AT_ONCE: f32 = 0.2;
 const IN_ALL: f32 = 0.85;
 
@@ -37,12 +37,12 @@ pub struct StrokeReport {
     pub covered: f32,
 }
 
-/// Puts sites astride the strokes, round by round.
+/// Lays sites astride the strokes, round by round.
 pub(super) struct Astride {
     size: UVec2,
     scale: f32,
     ink: Vec<bool>,
-    /// Distance to the nearest texel without ink, or with ink where there is none; texels.
+    /// Distance to the nearest texel without ink; for texels without ink to the nearest one with ink; texels.
     inside: Vec<f32>,
     outside: Vec<f32>,
     middle: Vec<u32>,
@@ -104,7 +104,7 @@ impl Astride {
         })
     }
 
-    /// One round; says whether there is another.
+    /// Does one round; returns whether there is another.
     pub(super) fn advance(&mut self) -> bool {
         let before = self.sites.len();
         if self.round == 0 {
@@ -123,7 +123,7 @@ impl Astride {
             || self.round == 1 && !gaps.is_empty()
     }
 
-    /// All sites, pattern units: those astride first, then the rest of them evenly beside the strokes.
+    /// All sites, pattern units: first those astride strokes, then the remaining ones evenly beside the strokes.
     pub(super) fn finish(self, extent: Vec2, rng: &mut Rng) -> Vec<Vec2> {
         let points = self.sites.iter().map(|site| (site.as_vec2() + 0.5) / self.scale).collect();
         let beside = |point: Vec2| {
@@ -165,7 +165,7 @@ impl Astride {
         let order = ends.into_iter().chain(self.middle.clone());
         for i in order {
             let at = self.texel(i).as_vec2();
-            // Where three lines meet there is no across.
+            // Where three lines meet no direction is across.
             let crowded = self.links(&is_middle, i).count() > 2;
             if crowded || taken.iter().any(|other| other.distance_squared(at) < spacing * spacing) {
                 continue;
@@ -178,7 +178,7 @@ impl Astride {
         }
     }
 
-    /// The texels of the middle lines without a crack within their stroke.
+    /// The texels of the middle lines that have no crack within their stroke.
     fn gaps(&self) -> Vec<u32> {
         let w = self.size.x as usize;
         let (size, boundary) =
@@ -202,7 +202,7 @@ impl Astride {
         self.middle.iter().copied().filter(|&i| !covered(i)).collect()
     }
 
-    /// A pair in the middle of every run without a crack.
+    /// Lays a pair in the middle of every run without a crack.
     fn close_gaps(&mut self) {
         let gaps = self.gaps();
         let mut is_gap = vec![false; self.ink.len()];
@@ -213,7 +213,7 @@ impl Astride {
             if !is_gap[start as usize] {
                 continue;
             }
-            // The run, and its texel in the middle of the list: a flood from one end lists it from end to end.
+            // The run, and the texel in the middle of the list: a flood fill from one end lists it from end to end.
             let (mut run, mut next) = (vec![start], 0);
             is_gap[start as usize] = false;
             while next < run.len() {
@@ -231,7 +231,7 @@ impl Astride {
         }
     }
 
-    /// Sites on either side of a stroke, except where another one is as near as `merge` and in sight.
+    /// Lays sites on both sides of a stroke, except where another site is visible and within `merge`.
     fn lay_pair(&mut self, is_middle: &[bool], i: u32, merge: f32) {
         let at = self.texel(i);
         let along = self.direction(is_middle, i);
@@ -306,7 +306,7 @@ impl Astride {
     }
 }
 
-/// A layer on fewer texels: the largest value of each.
+/// A layer at a lower resolution: the largest value of each block.
 fn shrunk(layer: &Layer, size: UVec2) -> Layer {
     let from = layer.values.size();
     let mut values = Grid::new(size, 0u16);
@@ -363,7 +363,7 @@ fn distance(is_goal: &[bool], size: UVec2) -> Vec<f32> {
     far.into_iter().map(|far| far as f32 / 5.0).collect()
 }
 
-/// The middle lines of strokes, one texel thin (Zhang and Suen 1984), in the order in which rows are read.
+/// The middle lines of strokes, one texel wide (Zhang and Suen 1984), in scan order of the rows.
 fn thin(ink: &[bool], size: UVec2) -> Vec<u32> {
     // With a border, so that every texel has eight neighbours.
     let w = size.x as usize + 2;

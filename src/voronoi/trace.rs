@@ -1,10 +1,10 @@
-//! The boundaries of the regions are found, followed and smoothed.
+//! Finds, follows and smooths the boundaries of the regions.
 //!
 //! A boundary runs between two neighbouring texels of different regions. Its line crosses the straight connection of
-//! their centres, at first in the middle; the squares between four texel centres link the crossings to lines and hold
-//! the points where three or four lines meet. Then every crossing slides along its connection towards the middle of
-//! its neighbours, as if the line were a taut thread. Nothing ever leaves its connection or its square, so lines touch at
-//! their ends only.
+//! their centres, at first in the middle. The squares between four texel centres link the crossings to lines and
+//! contain the points where three or four lines meet. Then every crossing slides along its connection towards the
+//! middle of its neighbours, as if the line were a taut thread. No point ever leaves its connection or its square, so
+//! lines touch only at their ends.
 
 use super::{
     level::Level,
@@ -15,22 +15,23 @@ use super::{
 use crate::pattern::{PathPoint, SurfaceFrame};
 use glam::{IVec2, UVec2, Vec2};
 
-/// How often the threads are tautened. Once leaves stairs, twenty times rounds off what the noise has made.
+/// How often the threads are tightened. Once leaves stairs, twenty times smooths away what the noise has made.
 const ROUNDS: usize = 6;
 
-/// How close a crossing may come to a texel centre, texels.
+/// Smallest distance of a crossing from a texel centre, texels.
 const MARGIN: f32 = 0.12;
 
-/// How far points may lie off the line that replaces them, texels. Two lines keep `MARGIN * sqrt(2)` = 0.17 apart.
+/// Largest distance of points from the line that replaces them, texels. Two lines keep `MARGIN * sqrt(2)` = 0.17
+/// apart.
 const TOLERANCE: f32 = 0.08;
 
 /// The sides of a corner of four texels, in the order north, east, south, west.
 const SIDES: [IVec2; 4] = [IVec2::new(0, -1), IVec2::new(1, 0), IVec2::new(0, 1), IVec2::new(-1, 0)];
 
-/// What happens to a boundary at a corner.
+/// The continuation of a boundary at a corner.
 #[derive(Clone, Copy, PartialEq)]
 enum Corner {
-    /// It leaves by this side.
+    /// It continues through this side.
     Pass(usize),
     /// It ends.
     End,
@@ -41,7 +42,7 @@ const RIGHT: u8 = 1;
 
 const DOWN: u8 = 2;
 
-/// Set beside them when the edge has been followed.
+/// Set in addition when the edge has been followed.
 const SEEN: u8 = 4;
 
 /// Where a boundary crosses the connection of two texel centres.
@@ -68,7 +69,7 @@ struct Line {
     crossings: Vec<Crossing>,
 }
 
-/// A vertex in texels, kept within reach of its corner.
+/// A vertex in texels, kept within its square.
 struct Joint {
     corner: Vec2,
     pos: Vec2,
@@ -90,7 +91,7 @@ impl Tracer {
         Self { size, edges: vec![0; w * h], row: 0, regions: [vec![0; w], vec![0; w]] }
     }
 
-    /// Looks for boundaries in up to `rows` further rows; says whether there are more.
+    /// Searches up to `rows` further rows for boundaries; returns whether there are more.
     pub(super) fn scan(&mut self, level: &Level, rows: usize) -> bool {
         let (w, h) = (self.size.x as usize, self.size.y as usize);
         for _ in 0..rows {
@@ -126,7 +127,7 @@ impl Tracer {
         self.row as f32 / self.size.y.max(1) as f32
     }
 
-    /// Texel and bit of the edge that leaves `corner` on `side`, if it lies on the surface.
+    /// Texel and bit of the edge through `side` of `corner`, if it lies on the surface.
     fn edge(&self, corner: IVec2, side: usize) -> Option<(usize, u8)> {
         let (texel, bit) = match side {
             0 => (corner - IVec2::new(1, 1), RIGHT),
@@ -144,13 +145,13 @@ impl Tracer {
         self.edge(corner, side).is_some_and(|(texel, bit)| self.edges[texel] & bit != 0)
     }
 
-    /// What becomes of a boundary that reaches `corner` by `side`.
+    /// The continuation of a boundary that reaches `corner` through `side`.
     fn corner(&self, level: &Level, corner: IVec2, side: usize) -> Corner {
         let mut others = (0..4).filter(|&other| other != side && self.is_boundary(corner, other));
         match (others.next(), others.next(), others.next()) {
             (Some(other), None, None) => Corner::Pass(other),
             (Some(_), Some(_), Some(_)) => {
-                // Four boundaries are two that pass each other if two texels across are of one region.
+                // Four boundaries are two that pass each other if two diagonal texels belong to the same region.
                 let region = |dx: i32, dy: i32| {
                     let texel = corner + IVec2::new(dx, dy);
                     level.region(texel.y as usize * self.size.x as usize + texel.x as usize)
@@ -167,7 +168,7 @@ impl Tracer {
         }
     }
 
-    /// Follows a boundary from `corner` by `side` to its end.
+    /// Follows a boundary from `corner` through `side` to its end.
     fn follow(&mut self, level: &Level, mut corner: IVec2, mut side: usize) -> (Vec<Crossing>, IVec2) {
         let mut crossings = Vec::new();
         while let Some((texel, bit)) = self.edge(corner, side)
@@ -199,7 +200,7 @@ impl Tracer {
                 joints.len() - 1
             })
         };
-        // First from all corners where boundaries end, then what is left: rings.
+        // First from all corners where boundaries end; then the remaining ones are closed rings.
         for rings in [false, true] {
             for i in 0..self.edges.len() {
                 if self.edges[i] & (RIGHT | DOWN) == 0 {
@@ -227,8 +228,8 @@ impl Tracer {
         (joints, lines)
     }
 
-    /// The seams of the finest of `levels`, after the whole surface has been scanned, and the cost that has full width:
-    /// `full`, or that of the dearest ones.
+    /// The seams of the finest of `levels`, after the whole surface has been scanned, and the cost of full width:
+    /// `full`, or that of the most expensive crossings.
     pub(super) fn finish(
         mut self,
         levels: &[Level],
@@ -269,8 +270,8 @@ impl Tracer {
         let to_seam = |((line, way), birth): ((&Line, &Way), usize)| {
             let first = line.crossings.first()?;
             let point = |i: usize| PathPoint { pos: frame.to_pos(way.places[i]), width: way.widths[i] };
-            // On which side the first crossing has its texel as one leaves the first vertex; left is where y is less
-            // for x that grows.
+            // Which of the first crossing's texels is on the left as one leaves the first vertex; left is where y is
+            // smaller if x increases.
             let [a, b] = self.beside(first);
             let heading = first.pos() - joints[line.ends[0]].corner;
             let a_is_left = heading.perp_dot(first.from - first.pos()) < 0.0;
@@ -321,7 +322,7 @@ impl Tracer {
     }
 }
 
-/// Slides crossings and joints towards the middle of their neighbours.
+/// Moves crossings and joints towards the middle of their neighbours.
 fn tauten(joints: &mut [Joint], lines: &mut [Line]) {
     for _ in 0..ROUNDS {
         let mut sums = vec![(Vec2::ZERO, 0.0f32); joints.len()];
@@ -349,7 +350,7 @@ fn tauten(joints: &mut [Joint], lines: &mut [Line]) {
                 let reach = 0.5 - MARGIN;
                 joint.pos = middle.clamp(joint.corner - reach, joint.corner + reach);
             } else if (middle.x - joint.corner.x).abs() > (middle.y - joint.corner.y).abs() {
-                // The border is where the surface ends beside this corner: the line leaves it squarely.
+                // This corner is on the border: the line meets the border at a right angle.
                 joint.pos = Vec2::new(joint.corner.x, middle.y);
             } else {
                 joint.pos = Vec2::new(middle.x, joint.corner.y);
@@ -358,8 +359,8 @@ fn tauten(joints: &mut [Joint], lines: &mut [Line]) {
     }
 }
 
-/// Indices of the points that are enough for the line (Douglas and Peucker 1973); the pieces at either end stay, where
-/// lines come close to each other.
+/// Indices of the points that are needed for the line (Douglas and Peucker 1973). The pieces at both ends stay,
+/// because lines are close to each other there.
 fn simplify(points: &[Vec2]) -> Vec<usize> {
     let n = points.len();
     if n < 5 {

@@ -1,24 +1,24 @@
-//! How wide cracks are along the boundaries: by path costs and by the strokes that they follow.
+//! Widths of cracks along the boundaries: from path costs and from the strokes that they follow.
 
 use super::lattice::Layer;
 use crate::math::ops;
 use glam::Vec2;
 use std::collections::VecDeque;
 
-/// What the width of a crack follows at one of its crossings.
+/// The inputs of the width of a crack at one of its crossings.
 #[derive(Clone, Copy)]
 pub(super) struct Cost {
-    /// Path cost, in β; less beside the guides.
+    /// Path cost, in β; reduced away from the guides.
     pub(super) cost: f32,
-    /// Width of the stroke of which this is the middle, texels.
+    /// Width of the stroke whose middle line this is, texels.
     pub(super) stroke: f32,
-    /// How much wider the crack is here in a stroke.
+    /// Random factor of the width in a stroke.
     pub(super) uneven: f32,
 }
 
-/// What the widths of cracks have to know of the guides.
+/// The properties of the guides that widths depend on.
 pub(super) struct Guidance<'a> {
-    /// The most that an edge of bare ground costs, in β.
+    /// Largest cost of an edge without guides, in β.
     pub ground: f32,
     /// The weight of the heaviest guide, in β.
     pub weight: f32,
@@ -29,13 +29,13 @@ pub(super) struct Guidance<'a> {
 }
 
 impl Guidance<'_> {
-    /// How much of the cost of the dearest edge is the guides', 0..1.
+    /// The guides' share of the cost of the most expensive edge, 0..1.
     pub(super) fn share(&self) -> f32 {
         self.weight / (self.ground + self.weight)
     }
 
-    /// How many texels a path of this cost leads through a stroke, in β: what it costs on the way there counts as well, but
-    /// is little where there is a site beside the stroke.
+    /// The number of texels of stroke that a path of this cost crosses. The cost on the way to the stroke counts as
+    /// well, but is small if there is a site beside the stroke.
     pub(super) fn texels(&self, cost: f32) -> f32 {
         cost * self.share() / (self.ground + self.weight)
     }
@@ -45,25 +45,25 @@ impl Guidance<'_> {
         f32::from(self.noise.values.as_slice()[texel]) / 65535.0
     }
 
-    /// The largest value of a guide at a texel, 0..=1; guides count by their weight.
+    /// The largest value of a guide at a texel, 0..=1, weighted by the guides' weights.
     pub(super) fn at(&self, texel: usize) -> f32 {
         let value = |layer: &Layer| f32::from(layer.values.as_slice()[texel]) / 65535.0 * layer.weight_in_beta();
         self.layers.iter().map(value).fold(0.0, f32::max) / self.weight.max(1.0e-6)
     }
 }
 
-/// How much less cracks beside the guides count, at most. With 0 a crack far from all sites is as wide as those that
-/// draw the picture; with 1 the picture stands alone.
+/// Largest reduction of the cost of cracks away from the guides. With 0 a crack far from all sites is as wide as
+/// those that draw the picture; with 1 only the picture is visible.
 pub(super) const ASIDE: f32 = 0.55;
 
-/// Cracks along a stroke that are shorter than twice this part of half its width stay thin. With 1 those that come in from
-/// the side show as thorns on the letters; with 2 the cross-bars of small letters get lost.
+/// Cracks along a stroke that are shorter than twice this part of half its width stay thin. With 1 cracks that enter
+/// from the side look like thorns on the letters; with 2 the cross-bars of small letters disappear.
 const THORN: f32 = 1.6;
 
-/// Cuts off the rise of the costs where a crack comes into a stroke from the side, and where it runs out into the corners
-/// of a stroke's end; what runs along the middle of a stroke keeps its costs.
+/// Removes the rise of the costs where a crack enters a stroke from the side, and where it runs into the corners at
+/// the end of a stroke. Cracks along the middle of a stroke keep their costs.
 ///
-/// The opening of mathematical morphology: what is not at least so long as the stroke is broad goes.
+/// This is the opening of mathematical morphology: peaks shorter than the width of the stroke are removed.
 pub(super) fn without_thorns(costs: &[f32], guides: &Guidance<'_>) -> Vec<f32> {
     let most = costs.iter().copied().fold(0.0, f32::max);
     let reach = (THORN * guides.texels(most)) as usize;
@@ -71,9 +71,9 @@ pub(super) fn without_thorns(costs: &[f32], guides: &Guidance<'_>) -> Vec<f32> {
     negative(least_within(&negative(least_within(costs, reach)), reach))
 }
 
-/// The least value within `reach` of each.
+/// The minimum within `reach` of each value.
 fn least_within(values: &[f32], reach: usize) -> Vec<f32> {
-    // Those that no later one undercuts, in order.
+    // Values that no later one is below, in order.
     let mut ahead = VecDeque::new();
     let mut next = 0;
     let least = |i: usize| {
@@ -92,12 +92,12 @@ fn least_within(values: &[f32], reach: usize) -> Vec<f32> {
     (0..values.len()).map(least).collect()
 }
 
-/// By how much the noise widens and narrows cracks in strokes, as a share of their width. With 0 they look cut, with 0.7 small
-/// letters cannot be read.
+/// How much the noise varies the width of cracks in strokes, as a share of their width. With 0 they look cut, with
+/// 0.7 small letters are unreadable.
 pub(super) const UNEVEN: f32 = 0.3;
 
-/// By how much a crack in a stroke exceeds full width at most. With 1 short words, whose letters are large, are not read as well;
-/// without a limit the middles of broad surfaces gape.
+/// Largest width of a crack in a stroke, relative to full width. With 1 short words with large letters are less
+/// readable; without a limit the middles of broad areas are too wide.
 const MOST: f32 = 2.0;
 
 /// Path cost to width (Mould 2005, section 3.2: "the further the site, the wider").
@@ -121,14 +121,14 @@ impl Widths {
 /// A line with its widths.
 pub(super) struct Way {
     pub(super) ends: [usize; 2],
-    /// Texels.
+    /// Positions, texels.
     pub(super) places: Vec<Vec2>,
-    /// Pattern units.
+    /// Widths, pattern units.
     pub(super) widths: Vec<f32>,
 }
 
 impl Way {
-    /// Makes it nowhere widen by more than `slope` in a texel. Returns whether it has become thinner anywhere.
+    /// Limits the widening to `slope` per texel. Returns whether it has become thinner anywhere.
     fn run_out(&mut self, slope: f32) -> bool {
         let n = self.widths.len();
         let mut is_thinner = false;
@@ -145,15 +145,15 @@ impl Way {
     }
 }
 
-/// How much a crack widens at most along its way, where there are guides: strokes end in needles that run on as the thin cracks beyond.
-/// With more they look cut, with less short strokes get lost.
+/// Largest widening of a crack per texel, where there are guides: strokes end in points that continue as thin cracks.
+/// With more they look cut, with less short strokes disappear.
 pub(super) const RUN_OUT: f32 = 0.22;
 
-/// Lets wide cracks run out where they do not go on: none is wider at a vertex than the second widest there, and none widens by more than
-/// `slope` in a texel.
+/// Tapers wide cracks where they do not continue: none is wider at a vertex than the second widest there, and none
+/// widens by more than `slope` per texel.
 pub(super) fn run_out(ways: &mut [Way], on_border: &[bool], slope: f32) {
     let mut widest = vec![[0.0f32; 2]; on_border.len()];
-    // It is thinned out along a stroke from vertex to vertex; there are few in each.
+    // The taper propagates along a stroke from vertex to vertex; there are few in each.
     for _ in 0..16 {
         widest.fill([0.0; 2]);
         for way in &*ways {
@@ -186,17 +186,17 @@ pub(super) fn run_out(ways: &mut [Way], on_border: &[bool], slope: f32) {
     }
 }
 
-/// The share of crossings that are less dear than the full width.
+/// The share of crossings that cost less than full width.
 const USUAL: f32 = 0.97;
 
-/// Cost of the dearest crossings.
+/// Cost of the most expensive crossings.
 pub(super) fn dearest(costs: &[Vec<Cost>]) -> f32 {
     let mut all: Vec<f32> = costs.iter().flatten().map(|cost| cost.cost).collect();
     let n = ((all.len() as f32 * USUAL) as usize).min(all.len().saturating_sub(1));
     if all.is_empty() { 1.0 } else { all.select_nth_unstable_by(n, f32::total_cmp).1.max(1.0e-3) }
 }
 
-/// Runs of costs without the jumps from texel to texel.
+/// Smooths the differences of costs between neighbouring texels.
 pub(super) fn smooth(costs: &mut [f32]) {
     for _ in 0..4 {
         let mut before = costs.first().copied().unwrap_or_default();

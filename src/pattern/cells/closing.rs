@@ -3,22 +3,22 @@
 use super::half_edge::Cause;
 use glam::Vec2;
 
-/// The cells of a network, each as it was at the moment it closed: later ones have been cut off it since.
+/// The cells of a network, each as it was when it closed: later cells have been cut off from it since.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Closings {
     list: Vec<Closing>,
-    /// All outlines, one after the other.
+    /// All outlines, concatenated.
     points: Vec<Vec2>,
 }
 
-/// A cell at the moment it closed. The first in the list is cell 1.
+/// A cell at the moment when it closed. The first entry is cell 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Closing {
-    /// Step of the timeline in which the segment comes that closes it.
+    /// Step of the timeline of the segment that closes it.
     pub(crate) birth: u32,
     /// The impact of that segment.
     pub(crate) impact: u32,
-    /// The cell that it was a part of before.
+    /// The cell from which it was cut off.
     pub(crate) host: u32,
     /// Area inside the outline, pattern units squared, and its centre.
     pub(crate) area: f32,

@@ -1,4 +1,4 @@
-//! New edges: they join two loops, or cut one in two, and then a cell has closed.
+//! Adds edges: each joins two loops, or splits a loop in two and so closes a cell.
 
 use super::{
     Cell, CellTracker,
@@ -8,7 +8,7 @@ use crate::math::whole::{cross, dot, vector};
 use glam::Vec2;
 
 impl CellTracker {
-    /// The vertex at `pos`; where there is none, a new one, in the border if it lies on it.
+    /// The vertex at `pos`. If there is none a new one is added, in the border if it lies on it.
     pub(super) fn add_vertex(&mut self, name: u32, pos: Vec2) -> u32 {
         if !pos.is_finite() {
             return NONE;
@@ -29,11 +29,11 @@ impl CellTracker {
         vertex
     }
 
-    /// Puts `vertex` into the border's edge `inner`.
+    /// Inserts `vertex` into the border's edge `inner`.
     pub(super) fn split_border(&mut self, inner: u32, vertex: u32) {
         let outer = inner ^ 1;
         let end = self.origin[outer as usize];
-        // What comes before `outer` around its origin.
+        // The half-edge before `outer` around its origin.
         let mut before = inner;
         while self.next[before as usize] != outer {
             before = self.next[before as usize] ^ 1;
@@ -50,14 +50,15 @@ impl CellTracker {
         self.vertices[vertex as usize].part = 0;
     }
 
-    /// Where an edge from `u` towards `v` finds its place; `Err` if it would run along another, `Ok(None)` if it is the first.
+    /// Where an edge from `u` towards `v` is inserted at `u`; `Err` if it would run along another edge, `Ok(None)` if
+    /// it is the first.
     pub(super) fn gap(&self, u: u32, v: u32) -> Result<Option<Gap>, Overlap> {
         let vertex = &self.vertices[u as usize];
         if vertex.first == NONE {
             return Ok(None);
         }
         let new = vector(vertex.at, self.at(v));
-        // The first half-edge to the left of the new one comes out just before it in their loop's twin.
+        // The first half-edge to the left of the new one starts just before the new one in the twin's loop.
         let mut left = (vertex.first, self.turn(new, vertex, vertex.first)?);
         let mut half_edge = self.next[vertex.first as usize ^ 1];
         while half_edge != vertex.first {
@@ -72,7 +73,7 @@ impl CellTracker {
         Ok(Some(Gap { before, after: self.next[before as usize] }))
     }
 
-    /// Which half turn from `new` a half-edge lies in, and its direction.
+    /// The half turn from `new` in which a half-edge lies, and its direction.
     pub(super) fn turn(&self, new: [i64; 2], from: &Vertex, half_edge: u32) -> Result<(u8, [i64; 2]), Overlap> {
         let way = vector(from.at, self.at(self.head(half_edge)));
         match cross(new, way) {
@@ -93,7 +94,7 @@ impl CellTracker {
         let Some(side) = self.common_side(loops) else { return };
         let (part_u, part_v) = (self.part(u), self.part(v));
         let closes = part_u == part_v;
-        // In a planar drawing two places of one part that see each other are on one loop, and those of two parts are not.
+        // In a planar drawing two visible vertices of one part are on one loop, and those of two parts are not.
         if closes != (loops[0] == loops[1] && loops[0].is_some()) {
             return;
         }
@@ -131,13 +132,13 @@ impl CellTracker {
         self.loop_of.extend([merged; 2]);
     }
 
-    /// Whether the line between two vertices lies in the border.
+    /// Whether the line between two vertices lies on the border.
     pub(super) fn along_border(&self, u: u32, v: u32) -> bool {
         let (a, b) = (self.at(u), self.at(v));
         (0..2).any(|i| a[i] == b[i] && (a[i] == 0 || a[i] == self.corner[i]))
     }
 
-    /// What the loops at the ends of a new edge have on their left, if it can be the same.
+    /// The side to the left of the loops at the ends of a new edge, if both can be the same.
     pub(super) fn common_side(&self, loops: [Option<u32>; 2]) -> Option<Side> {
         let unknown = Side::Around { host: NONE };
         let [a, b] = loops.map(|root| root.map_or(unknown, |root| self.loops[root as usize].side));
@@ -152,14 +153,14 @@ impl CellTracker {
         }
     }
 
-    /// Makes one loop of two parts' loops.
+    /// Merges the loops of two parts into one.
     pub(super) fn merge(&mut self, a: u32, b: u32, side: Side) -> u32 {
         let hole_of = |root: u32| match self.loops[root as usize].side {
             Side::Around { host } if host != NONE => Some(host),
             _ => None,
         };
         let (hole_a, hole_b) = (hole_of(a), hole_of(b));
-        // A hole that has come to hang on the outline is none any more, and of two holes one remains.
+        // A hole that is now connected to the outline is no longer a hole; of two connected holes one remains.
         if matches!(side, Side::Cell(_)) {
             for (host, root) in [(hole_a, a), (hole_b, b)] {
                 host.into_iter().for_each(|host| self.remove_holes(host, &[root]));
@@ -175,14 +176,14 @@ impl CellTracker {
         a
     }
 
-    /// Strikes loops off a cell's list of holes.
+    /// Removes loops from a cell's list of holes.
     pub(super) fn remove_holes(&mut self, host: u32, roots: &[u32]) {
         let mut holes = std::mem::take(&mut self.cells[host as usize].holes);
         holes.retain(|&hole| !roots.contains(&self.loop_root(hole)));
         self.cells[host as usize].holes = holes;
     }
 
-    /// The edge `out` has just cut the loop `whole` in two: a cell has closed.
+    /// Handles the edge `out` that has just split the loop `whole`: a cell has closed.
     pub(super) fn close(&mut self, whole: u32, out: u32, Cause { birth, impact }: Cause) {
         let (mut one, mut other) = (self.next[out as usize], self.next[out as usize ^ 1]);
         while one != out && other != out ^ 1 {
@@ -201,7 +202,7 @@ impl CellTracker {
         self.loops[whole as usize].sums.subtract(sums);
         let rest = self.loops[whole as usize].sums;
 
-        // The smaller part of a cell is new; of a hole's loop, the part that runs the right way round.
+        // The smaller part of a cell is the new one; for a hole's loop it is the part with the right orientation.
         let short_is_new = match side {
             Side::Cell(_) => sums.area < rest.area || (sums.area == rest.area && short == out),
             _ => sums.area > rest.area,
@@ -237,7 +238,7 @@ impl CellTracker {
         self.touched.extend([host, id]);
     }
 
-    /// Gives those holes of a cell to another that lie in its loop.
+    /// Moves the holes of a cell that lie inside another cell's loop to that cell.
     pub(super) fn hand_over_holes(&mut self, from: u32, to: u32) {
         let start = self.cells[to as usize].start;
         let (inside, outside): (Vec<u32>, Vec<u32>) = std::mem::take(&mut self.cells[from as usize].holes)

@@ -1,4 +1,4 @@
-//! Loops of half-edges: what is along them, and inside of them.
+//! Loops of half-edges: their vertices and the area inside them.
 
 use super::{
     Cell, CellTracker,
@@ -15,7 +15,7 @@ impl CellTracker {
         self.vertices[vertex as usize].at
     }
 
-    /// The half-edges of a loop from one of them.
+    /// The half-edges of a loop, starting at one of them.
     pub(super) fn walk(&self, start: u32) -> impl Iterator<Item = u32> + '_ {
         let mut following = Some(start);
         std::iter::from_fn(move || {
@@ -25,7 +25,7 @@ impl CellTracker {
         })
     }
 
-    /// Names along a loop, without the ways to dead ends and back.
+    /// Names of the vertices along a loop, without detours into dead ends.
     pub(super) fn trace(&self, start: u32) -> Vec<u32> {
         self.corners(start).into_iter().map(|vertex| self.vertices[vertex as usize].name).collect()
     }
@@ -40,7 +40,7 @@ impl CellTracker {
                 line.push(half_edge);
             }
         }
-        // The walk may have begun on such a way.
+        // The walk may have started in a dead end.
         let mut ends = 0..line.len();
         while ends.len() > 1 && line[ends.start] == line[ends.end - 1] ^ 1 {
             ends = ends.start + 1..ends.end - 1;
@@ -73,7 +73,7 @@ impl CellTracker {
         root
     }
 
-    /// [`loop_root`](Self::loop_root), remembered.
+    /// [`loop_root`](Self::loop_root) with path compression.
     pub(super) fn find_loop(&mut self, half_edge: u32) -> u32 {
         let root = self.loop_root(half_edge);
         let mut way = std::mem::replace(&mut self.loop_of[half_edge as usize], root);
@@ -88,7 +88,7 @@ impl CellTracker {
         self.walk(start).filter(|&h| self.passes_right_of(h, at).is_some()).count() % 2 == 1
     }
 
-    /// Where the ray from just below a place to the right meets an edge.
+    /// Where the ray to the right from just below a place meets an edge.
     pub(super) fn passes_right_of(&self, half_edge: u32, at: [i32; 2]) -> Option<f64> {
         let (a, b) = (self.at(self.origin[half_edge as usize]), self.at(self.head(half_edge)));
         if (a[1] <= at[1]) == (b[1] <= at[1]) {
@@ -106,7 +106,7 @@ impl CellTracker {
         for h in (0..self.origin.len() as u32).step_by(2) {
             let Some(x) = self.passes_right_of(h, at).filter(|&x| x < found.0) else { continue };
             let goes_down = self.at(self.origin[h as usize])[1] < self.at(self.head(h))[1];
-            // What encloses nothing has the same on both sides.
+            // A loop that encloses nothing has the same cell on both sides.
             match self.loops[self.loop_root(if goes_down { h } else { h ^ 1 }) as usize].side {
                 Side::Cell(cell) | Side::Around { host: cell } if cell != NONE && Some(cell) != except => {
                     found = (x, cell);
@@ -117,7 +117,7 @@ impl CellTracker {
         found.1
     }
 
-    /// Area and centre from the loops.
+    /// Computes area and centre of a cell from its loops.
     pub(super) fn measure(&mut self, cell: u32) {
         let Cell { start, ref holes, .. } = self.cells[cell as usize];
         let mut sums = self.loops[self.loop_root(start) as usize].sums;
@@ -129,7 +129,7 @@ impl CellTracker {
         (cell.area, cell.centroid) = (area, centroid);
     }
 
-    /// Area and centre of what has these sums; that of nothing is where the half-edge `start` begins.
+    /// Area and centre for these sums; if the area is zero the centre is the start of the half-edge `start`.
     pub(super) fn area_and_centre(&self, sums: Sums, start: u32) -> (f32, Vec2) {
         let area = sums.area as f64;
         let centroid = if sums.area == 0 {
