@@ -194,10 +194,12 @@ fn t11_what_changes_meanwhile_is_what_cracks() {
             }
             change(&mut app, entity, &image);
             settle(&mut app, entity);
-            // Its last change is taken up in the frame after.
-            steps(&mut app, 3);
-            settle(&mut app, entity);
-            let is_same = textures(&app, entity) == expected;
+            // Its last change is applied some frames later: a large picture is read by a task.
+            let is_same = (0..300).any(|_| {
+                std::thread::sleep(FRAME / 8);
+                step(&mut app);
+                textures(&app, entity) == expected
+            });
             // A seed that changes when it has begun to crack has to wait for healing.
             assert!(is_same || (*name == "another seed" && frames > 1), "{name}, {frames} frames");
         }
@@ -468,8 +470,7 @@ fn t11_a_picture_that_comes_back_is_another_one() {
             images.remove(&image);
             images.insert(&image, solid(size, [10, 20, 250, 255])).expect("the handle is good");
             settle(&mut app, entity);
-            steps(&mut app, 3);
-            assert_eq!(shown(&app, entity)[..4], [10, 20, 250, 255], "{size}, {frames} frames");
+            wait_for(&mut app, "the other picture", |app| shown(app, entity)[..4] == [10, 20, 250, 255]);
             // It goes, and comes back in the frame in which another one is hit that shows it.
             app.world_mut().resource_mut::<Assets<Image>>().remove(&image);
             steps(&mut app, 3);
@@ -478,9 +479,8 @@ fn t11_a_picture_that_comes_back_is_another_one() {
             let other = app.world_mut().spawn((Sprite::from_image(image.clone()), surface())).id();
             hit(&mut app, center(other).with_energy(0.1));
             settle(&mut app, other);
-            steps(&mut app, 3);
             for entity in [entity, other] {
-                assert_eq!(shown(&app, entity)[..4], [80, 20, 30, 255], "{size}, {frames} frames");
+                wait_for(&mut app, "the third picture", |app| shown(app, entity)[..4] == [80, 20, 30, 255]);
             }
         }
     }
@@ -619,7 +619,7 @@ fn an_image_says_how_densely_cracks_grow() {
             surface.density = density.map(|image| add(&mut app, image));
             let image = add(&mut app, solid(size, [180, 170, 160, 255]));
             let entity = app.world_mut().spawn((Sprite::from_image(image), surface)).id();
-            hit(&mut app, CrackHit::uv(entity, Vec2::new(0.25, 0.5)).with_energy(2.0));
+            hit(&mut app, center(entity).with_energy(2.0));
             wait_for(&mut app, "the cracks", |app| state(app, entity).status == CrackStatus::Done);
             let (shown, mut halves) = (shown(&app, entity), [0, 0]);
             for (i, texel) in shown.as_chunks::<4>().0.iter().enumerate() {

@@ -6,10 +6,10 @@ use crate::plugin::api::textures::Maps;
 use crate::plugin::api::{CrackBudget, CrackError};
 use crate::plugin::carrier::kind::{CarrierKind, Shown};
 use crate::plugin::jobs::background::{BackgroundJob, PATIENCE, guarded_as};
-use crate::plugin::jobs::copy::{CopyProgress, MAX_BYTES, MAX_RESTARTS, PictureCopies};
+use crate::plugin::jobs::copy::{CopyProgress, MAX_BYTES, PictureCopies};
 use crate::plugin::jobs::threads::Threads;
 use crate::plugin::source::picture::{BaseKey, BasePicture, BasePictures, FrameCount};
-use bevy::{platform::time::Instant, prelude::*};
+use bevy::{ecs::entity::EntityHashMap, platform::time::Instant, prelude::*};
 use std::{sync::Arc, time::Duration};
 
 /// Texels up to which a picture is read in the frame.
@@ -24,7 +24,21 @@ pub(crate) struct Rereadings {
     list: Vec<Rereading>,
     /// The frame in which something was last copied, and how many bytes may still be copied in it.
     copied: (u64, usize),
+    /// Surfaces whose pictures are not there yet.
+    asked: EntityHashMap<Asked>,
 }
+
+/// What a surface waits for.
+struct Asked {
+    key: BaseKey,
+    restarts: u32,
+    /// How often it has changed before it was there.
+    changes: u32,
+    at: Instant,
+}
+
+/// A picture that has changed so often before it was read, as those of a film do, is read in the frame.
+const MAX_CHANGES: u32 = 3;
 
 struct Rereading {
     key: BaseKey,
@@ -62,14 +76,8 @@ impl Rereadings {
     /// The picture has changed.
     pub(crate) fn forget(&mut self, picture: AssetId<Image>) {
         for reading in self.list.iter_mut().filter(|reading| reading.key.pictures.contains(&Some(picture))) {
-            match &mut reading.stage {
-                Stage::Copying(copies, _) => copies.forget(picture),
-                stage if reading.restarts < MAX_RESTARTS => {
-                    *stage = Stage::Stale;
-                    reading.restarts += 1;
-                }
-                _ => {}
-            }
+            reading.stage = Stage::Stale;
+            reading.restarts += 1;
         }
     }
 }
@@ -93,7 +101,7 @@ pub(crate) fn draft(
     let wanted = Maps { emissive, ..Maps::wanted(active.surface.write, &active.preset.look) };
     let plan = plan_pictures(world, (&active.surface, wanted), shown, &stretch, layer, active.bytes.get())?;
     let Some(plan) = plan else { return Ok(None) };
-    Ok(base(world, &plan, shown)?.map(|base| ReadPictures { base, plan }))
+    Ok(base(world, entity, &plan, shown)?.map(|base| ReadPictures { base, plan }))
 }
 
 /// The pictures of a plan, read; `None` if that takes some frames more.
@@ -107,10 +115,26 @@ fn base(world: &mut World, plan: &PicturePlan, shown: &Shown) -> Result<Option<A
     if let Some(base) = world.resource::<BasePictures>().find(key) {
         return Ok(Some(base));
     }
+    if world.resource_mut::<Rereadings>().changes_often(entity, key) {
+        return plan.clone().draft(world, shown).map(|draft| Some(draft.base));
+    }
     world.resource_scope(|world, mut readings: Mut<Rereadings>| readings.step(world, plan, shown, key))
 }
 
 impl Rereadings {
+    /// Whether what a surface waits for changes before it is there, time and again.
+    fn changes_often(&mut self, entity: Entity, key: BaseKey) -> bool {
+        let now = Instant::now();
+        self.asked.retain(|_, asked| now - asked.at < KEPT);
+        let restarts = self.list.iter().find(|reading| reading.key == key).map_or(0, |reading| reading.restarts);
+        let asked = self.asked.entry(entity).or_insert(Asked { key, restarts, changes: 0, at: now });
+        if (asked.key, asked.restarts) != (key, restarts) {
+            (asked.key, asked.restarts, asked.at) = (key, restarts, now);
+            asked.changes = (asked.changes + 1).min(MAX_CHANGES);
+        }
+        asked.changes == MAX_CHANGES
+    }
+
     fn step(
         &mut self,
         world: &mut World,
