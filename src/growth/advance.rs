@@ -1,4 +1,4 @@
-//! Cracks that know older cracks: a tip that comes near one turns to meet it steeply and stops there.
+//! Growth that avoids crossings: a tip near an older crack turns to meet it at a steep angle and stops there.
 
 use super::{
     arrest::{AHEAD, Advance, Arrest, Goal, Runner, steps_for},
@@ -10,35 +10,36 @@ use super::{
 use crate::pattern::{Link, LinkKind, NO_PARENT, PathPoint, SegmentId, SegmentPath};
 use glam::Vec2;
 
-/// Shares of the roughness that a line is tried with, until it touches no other.
+/// Shares of the roughness that are tried for a line, until it touches no other.
 const BENDS: [f32; 3] = [1.0, 0.4, 0.0];
 
-/// Cosine and sine of the most that what divides a domain turns from its way to meet another crack: 50 degrees. It does not hook round.
+/// Cosine and sine of the largest turn of a dividing crack from its direction to meet another crack: 50 degrees. It
+/// does not hook.
 const STEADY: (f32, f32) = (0.642_787_6, 0.766_044_4);
 
 /// A crack this many segment lengths away is met by the next segment.
 const LAST: f32 = 1.35;
 
-/// How much less what divides a domain likes to turn than to meet others aslant, by one minus the cosine.
+/// How much more a dividing crack avoids turns than slanted meetings, per one minus the cosine.
 const HOOK: f32 = 4.0;
 
-/// How much less a steady crack likes to meet another where a third does, segment lengths.
+/// How much a steady crack avoids a place where a third crack meets another, segment lengths.
 const TAKEN: f32 = 2.0;
 
 /// Segment lengths that a tip needs to turn.
 const TURN: f32 = 2.5;
 
-/// The node of a crack that is met lies no more than so many segment lengths away.
+/// The node of the crack that is met is at most this many segment lengths away.
 const LAST_REACH: f32 = 1.5;
 
-/// A ray that would meet a crack within so many segment lengths ends at it at once.
+/// A ray that would meet a crack within this many segment lengths ends at it at once.
 const SOON: f32 = 1.6;
 
 /// A node this many segment lengths from another crack beside it would run along it.
 const BESIDE: f32 = 0.7;
 
 impl CrackGrowth {
-    /// Grows a segment from a node towards `to`, or what older cracks make of it.
+    /// Grows a segment from a node towards `to`, as far as older cracks allow.
     pub(super) fn advance(&mut self, from: u32, to: Vec2) -> Advance {
         let pos = self.network.nodes[from as usize].pos;
         let heading = (to - pos).normalize_or_zero();
@@ -54,7 +55,7 @@ impl CrackGrowth {
             self.seal(from);
             return Advance::Stopped(heading);
         }
-        // A ray turns to nothing: it runs straight on until it touches what is in its way.
+        // A ray does not turn: it runs straight until it touches what is in its way.
         let goal =
             if self.are_rays() || self.masonry.is_some() { None } else { self.goal_ahead(from, heading, reach, AHEAD) };
         // A crack that has turned already does not turn further.
@@ -83,7 +84,7 @@ impl CrackGrowth {
             }
         }
         let Some(node) = self.extend(from, to, false) else { return Advance::Stopped(heading) };
-        // It may have come to lie close beside a crack that was not ahead.
+        // It may be close beside a crack that was not ahead of it.
         if !self.are_rays()
             && self.masonry.is_none()
             && let Some((_, beside)) = self.foreign(node, None, BESIDE * length, AHEAD)
@@ -95,7 +96,8 @@ impl CrackGrowth {
         Advance::Grown
     }
 
-    /// Joins the tip of a ray to the crack that it would meet with the next segment or the one after, if there is one.
+    /// Joins the tip of a ray to a crack that it would meet within the next two segments; returns whether there is
+    /// one.
     pub(super) fn ends_soon(&mut self, from: u32, heading: Vec2) -> bool {
         let pos = self.network.nodes[from as usize].pos;
         let far = (pos + heading * (SOON * self.params.step_length)).clamp(Vec2::ZERO, self.network.extent());
@@ -106,7 +108,7 @@ impl CrackGrowth {
             && self.join_near(from, heading, SOON + 0.5)
     }
 
-    /// Sends a tip at rest on its way to the nearest crack ahead of it, if there is one within `distance`; says whether there is.
+    /// Sends a resting tip to the nearest crack ahead of it within `distance`; returns whether there is one.
     pub(super) fn run_on(&mut self, tip: u32, heading: Vec2, distance: f32, ahead: f32) -> bool {
         if self.is_sealed(tip) {
             return false;
@@ -130,7 +132,7 @@ impl CrackGrowth {
         self.arrest.as_ref().is_some_and(|arrest| arrest.is_sealed(node))
     }
 
-    /// One step of every tip that is on its way.
+    /// One step of every moving tip.
     pub(super) fn advance_runners(&mut self) {
         let Some(arrest) = &mut self.arrest else { return };
         let runners = std::mem::take(&mut arrest.runners);
@@ -152,7 +154,7 @@ impl CrackGrowth {
         let heading = self.heading_of(runner.tip);
         let length = self.params.step_length;
         let mut distance = self.place_of(runner.goal).distance(node.pos);
-        // A crack that has come nearer is met sooner.
+        // A crack that is nearer now is met first.
         if let Some((nearer, goal)) = self.goal_ahead(runner.tip, heading, distance, AHEAD) {
             (distance, runner.goal) = (nearer, goal);
         }
@@ -177,13 +179,13 @@ impl CrackGrowth {
     /// The direction from `pos` that turns from `heading` towards the goal.
     fn turned(&self, pos: Vec2, heading: Vec2, goal: Goal) -> Vec2 {
         let way = self.place_of(goal) - pos;
-        // What divides a domain keeps to its way until it is near.
+        // A dividing crack keeps its direction until it is near.
         let keep = if self.divides() { (0.4 * way.length() / self.params.step_length).clamp(0.5, 2.0) } else { 0.5 };
         let way = way.normalize_or_zero();
         (keep * heading + way).normalize_or(way)
     }
 
-    /// `way`, or as much of it as a crack that was on another when it set out may turn: what divides a domain does not hook round.
+    /// `way`, limited to the turn that a dividing crack may make from its course: it does not hook.
     fn kept_to(&self, course: Vec2, way: Vec2) -> Vec2 {
         if !self.divides() || course == Vec2::ZERO || course.dot(way) >= STEADY.0 {
             return way;
@@ -208,11 +210,12 @@ impl CrackGrowth {
         }
     }
 
-    /// Links a tip to the node of another crack that lies best: near, and so that the two meet steeply. Says whether it did.
+    /// Links a tip to the best node of another crack: near, and so that the two meet at a steep angle. Returns
+    /// whether there was one.
     pub(super) fn join_near(&mut self, tip: u32, heading: Vec2, reach: f32) -> bool {
         let (length, has_rays) = (self.params.step_length, self.has_rays());
         let mut nearby = Vec::new();
-        // In a joint, what lies in it; a ray hardly turns.
+        // In masonry only nodes along the joint; a ray hardly turns.
         let least = match has_rays {
             true => 0.5,
             false if self.masonry.is_some() => 0.97,
@@ -226,7 +229,7 @@ impl CrackGrowth {
                 let place = |node: u32| self.network.nodes.get(node as usize).map_or(end.pos, |node| node.pos);
                 let along = (place(self.child_of(node)) - place(end.parent)).normalize_or_zero();
                 let distance = distance_sq.sqrt();
-                // A ray goes straight on up to what it meets, others turn to meet it steeply.
+                // A ray runs straight up to the crack that it meets; other cracks turn to meet it at a steep angle.
                 let slant = if has_rays {
                     1.0 - way.dot(heading) / (distance * heading.length())
                 } else {
@@ -244,12 +247,12 @@ impl CrackGrowth {
         })
     }
 
-    /// Bears a node at `to` if its line touches no other; if it does, joins the crack that is in the way.
+    /// Adds a node at `to` if its line touches no other; else joins the crack that is in the way.
     pub(super) fn extend(&mut self, from: u32, to: Vec2, is_sealed: bool) -> Option<u32> {
         self.extend_of(self.network.nodes[from as usize].impact, from, to, is_sealed)
     }
 
-    /// The same for an impact of which the node that it grows from may not be.
+    /// The same for a node of `impact`, which may differ from the impact of the node from which it grows.
     pub(super) fn extend_of(&mut self, impact: u32, from: u32, to: Vec2, is_sealed: bool) -> Option<u32> {
         let node = self.network.nodes[from as usize];
         let child = self.network.nodes.len() as u32;
@@ -263,13 +266,13 @@ impl CrackGrowth {
         let (low, high) =
             (node.pos.cmpeq(Vec2::ZERO) & to.cmpeq(Vec2::ZERO), node.pos.cmpeq(extent) & to.cmpeq(extent));
         let to = Vec2::select(low, inward, Vec2::select(high, extent - inward, to));
-        // As good as on the border is on it.
+        // Very close to the border counts as on it.
         let to = Vec2::select(to.cmplt(Vec2::splat(1e-5)), Vec2::ZERO, to);
         let to = Vec2::select(to.cmpgt(extent - 1e-5), extent, to);
         match self.free_line(SegmentId::Branch(child), (from, u32::MAX), (node.pos, to)) {
             Ok((bend, path)) => {
                 let on_border = (to.cmpeq(Vec2::ZERO) | to.cmpeq(extent)).any();
-                self.bear(to, from, node.generation.saturating_add(1), impact, bend);
+                self.add_node(to, from, node.generation.saturating_add(1), impact, bend);
                 if let Some(arrest) = &mut self.arrest {
                     arrest.walls.add((from, child), &path);
                     arrest.sealed[child as usize] |= is_sealed || on_border;
@@ -281,7 +284,7 @@ impl CrackGrowth {
             }
             Err(()) if !self.params.keeps_apart() => None,
             Err(()) => {
-                // A ray comes nearer first, so that it need not turn to where it is joined.
+                // A ray first comes nearer, so that it need not turn to the node to which it is joined.
                 let nearer = 0.5 * (node.pos + to);
                 let tip = if self.has_rays() && to.distance(node.pos) > 0.6 * self.params.step_length {
                     self.extend(from, nearer, true)
@@ -319,19 +322,19 @@ impl CrackGrowth {
         Err(())
     }
 
-    /// Links a tip to a node of another crack, unless a third is in the way; says whether it did.
+    /// Links a tip to a node of another crack, unless a third crack is in the way; returns whether it did.
     pub(super) fn join(&mut self, node: u32, tip: u32, kind: LinkKind) -> bool {
         let link = Link { a: node, b: tip, width: 0.0, birth: self.steps, kind, bend: 1.0 };
         let joined = self.link(link);
         if joined {
             self.is_met(node);
             self.note_meeting(node, tip);
-            // What closes a cell at the rim gets thin.
+            // A crack that closes a cell at the rim becomes thin.
             if self.divides() && (self.has_left(tip) || self.has_left(node) || self.is_much_wider(tip, node)) {
                 self.thin_end(tip);
             } else {
                 self.widen_end(tip);
-                // Of two ends that meet neither is one any more.
+                // If two ends meet, neither is a free end any more.
                 let like = if self.params.steady > 0.0 { MUCH_WIDER } else { 1.0 };
                 let is_thinner = |division: &Division| division.share(node) <= like * division.share(tip);
                 let is_end = self.network.nodes[node as usize].parent != NO_PARENT && self.child_of(node) == NO_PARENT;
@@ -347,7 +350,7 @@ impl CrackGrowth {
         joined
     }
 
-    /// Adds a link, unless cracks must not cross and it would; says whether it did.
+    /// Adds a link, unless cracks must not cross and it would cross one; returns whether it did.
     pub(super) fn link(&mut self, mut link: Link) -> bool {
         let index = self.network.links.len() as u32;
         if self.arrest.is_some() {
@@ -366,7 +369,7 @@ impl CrackGrowth {
         true
     }
 
-    /// The nearest crack or border within `reach` and ahead of a node, and how far it is.
+    /// The nearest crack or border within `reach` and ahead of a node, and its distance.
     fn goal_ahead(&self, from: u32, heading: Vec2, reach: f32, ahead: f32) -> Option<(f32, Goal)> {
         let crack =
             self.foreign(from, Some(heading), reach, ahead).map(|(distance, node)| (distance, Goal::Node(node)));
@@ -393,10 +396,10 @@ impl CrackGrowth {
             .filter(|&(distance, out, _)| distance > 0.0 && distance <= reach && heading.dot(out) >= ahead)
             .min_by(|a, b| a.0.total_cmp(&b.0))
             .map(|(distance, out, foot)| {
-                // Half way between where it would get to and the nearest place: a crack does not hook round.
+                // Half way between the point straight ahead and the nearest one: a crack does not hook.
                 let straight = pos + heading * (distance / heading.dot(out));
                 let place = (0.5 * (foot + straight)).clamp(Vec2::ZERO, extent);
-                // Exactly on the border, whatever rounding has made of it.
+                // Exactly on the border, without rounding errors.
                 let place = Vec2::select(out.abs().cmpgt(Vec2::splat(0.5)), foot, place);
                 (distance, Goal::Border(place))
             })

@@ -1,7 +1,7 @@
-//! Where growth is pulled to: eq. 2 of Couto et al.
+//! The direction of growth: eq. 2 of Couto et al.
 
 use super::{
-    changes::Kin,
+    changes::TreeLinks,
     draws,
     impact::Impact,
     masonry::{Masonry, Way},
@@ -16,34 +16,36 @@ use crate::{
 };
 use glam::Vec2;
 
-/// Cosine of the angle to its way beyond which a marker does not draw a ray: 20 degrees.
+/// Cosine of the largest angle between a ray and a marker that attracts it: 20 degrees.
 const ASIDE: f32 = 0.94;
 
-/// The same for the arms of a hit and their side branches: cosine of 60 degrees to their way, and to what that was some segments before.
+/// The same for the arms of a hit and their side branches: cosine of 60 degrees to their direction, and to their
+/// direction some segments before.
 const IN_SIGHT: f32 = 0.5;
 
-/// So many segments before.
+/// Number of those segments.
 const BEFORE: u32 = 8;
 
-/// They may run aside of the hit's direction by the angle of a fork and so much more, or by so much at least; radians.
+/// Arms may deviate from the direction away from the hit by the fork angle plus the first value, and at least by the
+/// second; radians.
 const OFF_HIT: (f32, f32) = (0.4, 1.3);
 
-/// How far off the way of a fork a marker for it may lie, radians.
+/// Largest angle between a fork and a marker for it, radians.
 const FOR_FORK: f32 = 0.45;
 
-/// Within a grain a crack strays by this much of what it strays from grain to grain.
+/// Deviation of a crack within a grain, as a share of its deviation from grain to grain.
 const WITHIN_GRAIN: f32 = 0.3;
 
-/// A crack in masonry runs along a bed joint for so many bricks, and then takes the next head joint.
+/// A crack in masonry runs along a bed joint for this many bricks, and then takes the next head joint.
 const LONGEST_RUN: f32 = 0.9;
 
-/// How much a crack in masonry likes to go on upwards or downwards, as it last did.
+/// How strongly a crack in masonry prefers to go up or down as it last did.
 const STAIRS: f32 = 0.4;
 
-/// How much it likes to leave at a side of the wall that is near.
+/// How strongly it prefers to leave at a nearby side of the wall.
 const OUT: f32 = 5.0;
 
-/// What is near to a hit of energy 1, bricks; it goes with the fourth root of the energy.
+/// Distance that counts as near to a hit of energy 1, bricks; proportional to the fourth root of the energy.
 const NEAR_HIT: f32 = 0.7;
 
 /// Share of the nodes along a brick at which a hairline splits it.
@@ -52,8 +54,8 @@ const SPLIT: f32 = 0.06;
 const FIXED: f32 = 16_777_216.0;
 
 impl CrackGrowth {
-    /// How far aside a marker may lie that draws a crack, as cosines: of the angle to its way, to that from the hit, and to
-    /// its way some segments before.
+    /// How far to the side a marker that attracts a crack may lie, as cosines: of the angle to its direction, to the
+    /// direction from the hit, and to its direction some segments before.
     fn sight(&self) -> Option<[f32; 3]> {
         let are_arms = self.arrest.is_some()
             && self.params.inertia > 0.0
@@ -66,15 +68,16 @@ impl CrackGrowth {
         are_arms.then(|| [IN_SIGHT, ops::cos(off_hit), IN_SIGHT])
     }
 
-    /// The direction of a crack that is on its way in `course` at `pos`: straight within a grain, another one in the next.
+    /// The direction of a crack with the course `course` at `pos`, with its random deviation: straight within a
+    /// grain, another one in the next.
     fn strayed(&self, course: Vec2, pos: Vec2, child: u64, generation: u32) -> Vec2 {
-        // A draw per child, frozen by its index.
+        // One draw per child, which depends only on its index.
         let mut stray = 2.0 * hash_unit(self.seed ^ draws::STRAY, child) - 1.0;
         if self.params.grain > 0.0 {
             let cell = (pos / self.params.grain).as_uvec2();
             let draw = hash_unit(self.seed ^ draws::GRAIN, u64::from(cell.y) << 32 | u64::from(cell.x));
             stray = WITHIN_GRAIN * stray + 2.0 * draw - 1.0;
-            // What runs along the border kinks away from it.
+            // Cracks along the border kink away from it.
             let (extent, near) = (self.network.extent(), 2.0 * self.params.arrest);
             let sides =
                 [(pos.x, Vec2::NEG_X), (extent.x - pos.x, Vec2::X), (pos.y, Vec2::NEG_Y), (extent.y - pos.y, Vec2::Y)];
@@ -103,7 +106,7 @@ impl CrackGrowth {
             if *slot == NO_PULL {
                 *slot = pulls.len() as u32;
                 if sight.is_some() {
-                    ways.push(kept(&network.nodes, node, courses, &changes.kin, impacts));
+                    ways.push(kept(&network.nodes, node, courses, &changes.tree, impacts));
                 }
                 pulls.push(Pull {
                     node,
@@ -124,7 +127,7 @@ impl CrackGrowth {
             let (pull, ways) = (&mut pulls[*slot as usize], ways.get(*slot as usize));
             let marker = field.marker(index);
             let way = marker.pos - network.nodes[node as usize].pos;
-            // What lies aside of a ray is left to others.
+            // Markers to the side of a ray are left to other rays.
             let distance = distance_sq.sqrt();
             let is_seen = |ways: &[Vec2; 3]| {
                 let sight = sight.unwrap_or([-1.0; 3]);
@@ -144,19 +147,19 @@ impl CrackGrowth {
         self.order.sort_unstable();
     }
 
-    /// Finds the place of every child.
+    /// Computes the position of every child.
     pub(super) fn aim(&mut self) {
         let extent = self.network.extent();
         let (length, kill) = (self.params.step_length, self.params.kill_distance);
         let next = self.network.nodes.len() as u64;
-        // A crack does not turn on its heel: what it cannot serve on its way is left to others.
+        // A crack does not turn back: markers that it cannot serve in its direction are left to others.
         let keeps_on = self.arrest.is_some() && (self.params.inertia > 0.0 || self.has_rays() || !self.mask.is_empty());
         for (child, &(_, slot)) in (next..).zip(&self.order) {
             let pull = self.pulls[slot as usize];
             let from = self.network.nodes[pull.node as usize].pos;
             let before = self.courses[pull.node as usize];
             let mut course = Vec2::new(pull.sum[0] as f32, pull.sum[1] as f32).normalize_or_zero();
-            // A side branch has left that heading already, and in a joint the joint leads.
+            // A side branch has another heading already, and in a joint the crack follows the joint.
             if self.params.inertia > 0.0 && before.dot(course) > 0.0 {
                 let inertia = self.params.inertia * (1.0 - self.mask.weak_at(from / extent));
                 course = (course + before * inertia).normalize_or_zero();
@@ -172,7 +175,7 @@ impl CrackGrowth {
                 let (child, side) = self.way_in_joints(masonry, pull.node, course);
                 let pull = &mut self.pulls[slot as usize];
                 (pull.course, pull.child, pull.side) = (course, child, side);
-                // Joints lead round bricks; each is taken once, so that ends too.
+                // Joints lead around bricks; each is used once, so this ends too.
                 pull.serves = (child - from).dot(course) > -0.3 * from.distance(child);
                 continue;
             }
@@ -236,17 +239,17 @@ impl CrackGrowth {
 }
 
 impl CrackGrowth {
-    /// Where a crack in masonry runs on from a node, and where a side branch of it begins.
+    /// The direction in which a crack in masonry continues from a node, and that of a side branch.
     fn way_in_joints(&self, masonry: &Masonry, node: u32, course: Vec2) -> (Vec2, Option<Vec2>) {
         let Node { pos, parent, impact, .. } = self.network.nodes[node as usize];
         let (heading, length) = (self.heading_of(node), self.params.step_length);
-        // What has split a brick ends at the next joint.
+        // A crack that has split a brick ends at the next joint.
         let is_split = |node: &Node| !masonry.is_in_joint(0.5 * (node.pos + pos));
         if self.network.nodes.get(parent as usize).is_some_and(is_split) {
             return (pos, None);
         }
         let draw = |what: u64| hash_unit(self.seed ^ what, u64::from(node));
-        // How far it has run along a bed joint.
+        // Its length along the bed joint so far.
         let (mut run, mut at, mut rise) = (0.0, node, 0.0);
         while let Some(before) = self.network.nodes.get(self.network.nodes[at as usize].parent as usize) {
             let way = self.network.nodes[at as usize].pos - before.pos;
@@ -257,7 +260,7 @@ impl CrackGrowth {
             run += way.x.abs();
             at = self.network.nodes[at as usize].parent;
         }
-        // From a hit cracks run both ways.
+        // From a hit cracks run in both directions.
         if self.network.nodes[at as usize].parent == NO_PARENT {
             run *= 2.0;
         }
@@ -270,9 +273,9 @@ impl CrackGrowth {
                 let too_far = is_level && run > LONGEST_RUN * masonry.brick();
                 let liking =
                     way.dot(course) + 0.55 * draw(if is_level { draws::LEVEL_JOINT } else { draws::HEAD_JOINT });
-                // A staircase goes on up or down as before.
+                // A staircase continues up or down as before.
                 let stairs = STAIRS * rise * way.y;
-                // Out to the side, rather than up and down beside the border.
+                // It prefers to leave to the side instead of running up and down beside the border.
                 let to = pos.x + way.x * far;
                 let out = if is_level && (to <= 0.0 || to >= self.network.extent().x) { OUT } else { 0.0 };
                 (liking + stairs + out - if too_far { 4.0 } else { 0.0 }, (way, far))
@@ -280,11 +283,11 @@ impl CrackGrowth {
             .collect();
         ways.sort_by(|a, b| b.0.total_cmp(&a.0));
         let Some(&(_, best)) = ways.first() else { return (pos, None) };
-        // What else there is ahead is for the sides of its forks.
+        // The other directions are for the sides of its forks.
         if self.child_of(node) != NO_PARENT {
             return (pos, None);
         }
-        // Near the hit a crack takes both ways at the end of a head joint.
+        // Near the hit a crack takes both directions at the end of a head joint.
         let is_near_hit = self.impacts.get(impact as usize).is_some_and(|impact| {
             let near = NEAR_HIT * masonry.brick() * impact.energy.sqrt().sqrt();
             masonry.nearest(impact.pos).unwrap_or(impact.pos).distance(pos) < near
@@ -302,7 +305,8 @@ impl CrackGrowth {
         (masonry.end(pos, best, length), side)
     }
 
-    /// Whether a side branch may set out from a tip: some way from the last one, and more rarely further from the hit.
+    /// Whether a side branch may start at a tip: at some distance from the last one, and less often further from the
+    /// hit.
     fn is_fork(&self, node: u32) -> bool {
         let Node { parent, generation, pos, impact, .. } = self.network.nodes[node as usize];
         let mut chance = self.params.forks;
@@ -319,14 +323,14 @@ impl CrackGrowth {
             && self.child_of(node) == NO_PARENT
             && parent != NO_PARENT
             && self.child_of(parent) == node
-            && self.changes.kin[node as usize].sibling == NO_PARENT
+            && self.changes.tree[node as usize].sibling == NO_PARENT
             && hash_unit(mix(self.seed ^ draws::FORK), u64::from(node)) < chance
     }
 }
 
-/// What a crack must keep to: its way, that from the hit, and its way some segments before, or where its branch began; zero for a
-/// start, which may turn anywhere.
-fn kept(nodes: &[Node], node: u32, courses: &[Vec2], kin: &[Kin], impacts: &[Impact]) -> [Vec2; 3] {
+/// The directions to which a crack is bound: its own, that from the hit, and its direction some segments before, or
+/// where its branch started. Zero for a start, which may turn anywhere.
+fn kept(nodes: &[Node], node: u32, courses: &[Vec2], tree: &[TreeLinks], impacts: &[Impact]) -> [Vec2; 3] {
     let Node { pos, parent, impact, .. } = nodes[node as usize];
     let Some(before) = nodes.get(parent as usize) else { return [Vec2::ZERO; 3] };
     let heading = courses[node as usize];
@@ -334,7 +338,7 @@ fn kept(nodes: &[Node], node: u32, courses: &[Vec2], kin: &[Kin], impacts: &[Imp
     let mut earlier = node;
     for _ in 0..BEFORE {
         let Node { parent, .. } = nodes[earlier as usize];
-        let is_first_child = kin[earlier as usize].sibling == NO_PARENT;
+        let is_first_child = tree[earlier as usize].sibling == NO_PARENT;
         if !is_first_child || nodes.get(parent as usize).is_none_or(|before| before.parent == NO_PARENT) {
             break;
         }

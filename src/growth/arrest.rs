@@ -1,4 +1,4 @@
-//! What a growth with arrest knows: the lines of all cracks, and the tips that are on their way to one.
+//! The state of a growth with arrest: the lines of all cracks, and the tips that are moving to one.
 
 use super::walls::Walls;
 use crate::pattern::{Network, SegmentId};
@@ -7,7 +7,7 @@ use glam::Vec2;
 /// Cosine of the angle to the heading within which a crack is ahead of a tip: 60 degrees.
 pub(super) const AHEAD: f32 = 0.5;
 
-/// What a growth with arrest knows besides its network.
+/// The state of a growth with arrest, in addition to its network.
 #[derive(Clone, Debug)]
 pub(super) struct Arrest {
     pub(super) walls: Walls,
@@ -16,13 +16,13 @@ pub(super) struct Arrest {
     pub(super) runners: Vec<Runner>,
 }
 
-/// A tip on its way to a crack or to the border.
+/// A tip that is moving to a crack or to the border.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Runner {
     pub(super) tip: u32,
     pub(super) goal: Goal,
     pub(super) steps_left: u32,
-    /// Its way when it set out.
+    /// Its direction when it started.
     pub(super) course: Vec2,
 }
 
@@ -32,11 +32,11 @@ pub(super) enum Goal {
     Border(Vec2),
 }
 
-/// What became of the wish to grow from a node.
+/// The result of trying to grow from a node.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Advance {
     Grown,
-    /// Nothing grows from the node in this direction any more.
+    /// Nothing can grow from the node in this direction.
     Stopped(Vec2),
 }
 
@@ -48,7 +48,7 @@ impl Arrest {
         arrest
     }
 
-    /// The same without the first nodes; `network` is what is left.
+    /// The same without the first nodes; `network` is the remaining network.
     pub(super) fn after(before: Self, network: &Network, length: f32, first: u32) -> Self {
         let mut arrest = Self::new(network, length);
         for (sealed, was_sealed) in arrest.sealed.iter_mut().zip(before.sealed.iter().skip(first as usize)) {
@@ -91,7 +91,7 @@ impl Arrest {
         self.sealed[node as usize] = true;
     }
 
-    /// Tips on their way.
+    /// The tips that are moving.
     pub(super) fn running(&self) -> impl Iterator<Item = u32> + '_ {
         self.runners.iter().map(|runner| runner.tip)
     }
@@ -101,7 +101,7 @@ impl Arrest {
     }
 }
 
-/// Steps that a tip may take to a goal at `distance`.
+/// Largest number of steps that a tip takes to a goal at `distance`.
 pub(super) fn steps_for(distance: f32, length: f32) -> u32 {
     (1.5 * distance / length) as u32 + 2
 }

@@ -1,4 +1,4 @@
-//! Nodes are born, and make others wider.
+//! Adds nodes, and widens the nodes behind them.
 
 use super::{
     division::{Division, rim_towards, towards_rim},
@@ -15,19 +15,19 @@ use crate::{
 use glam::Vec2;
 
 impl CrackGrowth {
-    /// Adds a node; the caller lets it visit the markers.
-    pub(super) fn bear(&mut self, pos: Vec2, parent: u32, generation: u32, impact: u32, bend: f32) {
+    /// Adds a node and widens the nodes behind it; the caller shows it to the markers.
+    pub(super) fn add_node(&mut self, pos: Vec2, parent: u32, generation: u32, impact: u32, bend: f32) {
         let first = self.network.nodes.len() as u32;
-        self.bear_thin(pos, parent, generation, impact, bend);
+        self.add_thin_node(pos, parent, generation, impact, bend);
         self.widen_with(|widths, nodes, widened| widths.push(nodes, first, widened));
     }
 
-    /// Adds a node of which the others do not know yet.
-    pub(super) fn bear_thin(&mut self, pos: Vec2, parent: u32, generation: u32, impact: u32, bend: f32) {
+    /// Adds a node without widening the nodes behind it.
+    pub(super) fn add_thin_node(&mut self, pos: Vec2, parent: u32, generation: u32, impact: u32, bend: f32) {
         let node = self.network.nodes.len() as u64;
         let wider = self.impacts.get(impact as usize).map_or(1.0, |impact| impact.widening);
         let (mixed, draw) = (self.params.mixed, hash_unit(self.seed ^ draws::MIXED_WIDTH, node));
-        let share = |division: &mut Division| division.bear(node as u32, parent, 1.0 - mixed * draw);
+        let share = |division: &mut Division| division.add_node(node as u32, parent, 1.0 - mixed * draw);
         let wider = self.division.as_mut().map_or(1.0, share) * wider * self.thinned(pos, impact);
         let width = self.widths.tip(parent, || hash_unit(self.seed ^ draws::UNEVEN_WIDTH, node), wider);
         if let Some(arrest) = &mut self.arrest {
@@ -43,21 +43,21 @@ impl CrackGrowth {
         self.inherit_ray(node as u32, parent);
     }
 
-    /// A tip that has met a crack is as wide there as further back.
+    /// Widens a tip that has met a crack to the width of the crack further back.
     pub(super) fn widen_end(&mut self, tip: u32) {
         if self.params.tip_taper > 0.0 {
             self.widen_with(|widths, nodes, widened| widths.join(nodes, tip, widened));
         }
     }
 
-    /// A tip that has met a crack at the rim of what its hit has loaded narrows, but not to nothing.
+    /// Narrows a tip that has met a crack at the rim of the area that its hit has loaded, but not to zero.
     pub(super) fn thin_end(&mut self, tip: u32) {
         if self.params.tip_taper > 0.0 {
             self.widen_with(|widths, nodes, widened| widths.join_thinly(nodes, tip, widened));
         }
     }
 
-    /// Lets `act` widen nodes, and notes which became wider.
+    /// Lets `act` widen nodes, and records which nodes became wider.
     pub(super) fn widen_with(&mut self, act: impl FnOnce(&mut Widths, &mut [Node], &mut dyn FnMut(u32))) {
         let mut widened = std::mem::take(&mut self.widened);
         act(&mut self.widths, &mut self.network.nodes, &mut |node| widened.push(node));
@@ -69,7 +69,7 @@ impl CrackGrowth {
         self.widened = widened;
     }
 
-    /// How many times as wide as others a crack of an impact is at a place: less towards the rim.
+    /// The relative width of a crack of an impact at a place: smaller towards the rim.
     pub(super) fn thinned(&self, pos: Vec2, impact: u32) -> f32 {
         if self.params.thinning <= 0.0 {
             return 1.0;
@@ -81,7 +81,7 @@ impl CrackGrowth {
         1.0 - self.params.thinning * towards_rim(way.length(), rim)
     }
 
-    /// A node is on the ray of that from which it grew.
+    /// Puts a node on the ray of its parent.
     pub(super) fn inherit_ray(&mut self, node: u32, parent: u32) {
         if let Some(&ray) = self.field.ray_of.get(parent as usize)
             && ray != NO_RAY
@@ -90,7 +90,7 @@ impl CrackGrowth {
         }
     }
 
-    /// Says on which ray a node is.
+    /// Records the ray of a node.
     pub(super) fn put_on_ray(&mut self, node: u32, ray: u32) {
         let ray_of = &mut self.field.ray_of;
         if ray_of.len() <= node as usize {

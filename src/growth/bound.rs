@@ -1,4 +1,4 @@
-//! How large a growth can become.
+//! An upper bound for the size of a growth.
 
 use super::{
     arrest, closed, divide, field,
@@ -7,13 +7,14 @@ use super::{
 };
 
 impl GrowthParams {
-    /// The most nodes that `markers` markers and `starts` starts can make: growth ends by itself within as many steps.
+    /// The largest number of nodes that `markers` markers and `starts` starts can create: growth ends by itself
+    /// within as many steps.
     ///
-    /// Each new node either kills a marker or brings one closer by at least `D²/4` of squared distance, and no marker
-    /// begins further than [`crack_radius`](Self::crack_radius) from the node that it attracts. With closed venation a marker
-    /// attracts no more than six nodes at once, and for no longer than twice as many steps. With arrest a marker counts for each
-    /// time that it may be given up, every node may be a tip that runs on, and with nucleation every marker a start;
-    /// each node may fork.
+    /// Each new node either reaches a marker or brings one closer by at least `D²/4` of squared distance, and no
+    /// marker is further than [`crack_radius`](Self::crack_radius) from the node that it attracts. With closed
+    /// venation a marker attracts at most six nodes at once, for at most twice as many steps. With arrest a marker
+    /// counts for each time that it can be given up, and every node can be a tip that runs on. With nucleation every
+    /// marker can be a start. Each node can fork.
     #[must_use]
     pub fn most_nodes(&self, markers: u64, starts: u64) -> u64 {
         let approaches = ((self.crack_radius / self.step_length).powi(2) / PROGRESS).ceil() as u64;
@@ -22,7 +23,7 @@ impl GrowthParams {
             births = 6 * markers * u64::from(closed::patience(self));
         }
         if matches!(self.markers, MarkerLayout::Rays { .. }) {
-            // A first node, and a line from each ring.
+            // A first node, and one line for each ring.
             let chord = u64::from(rays::chord_steps(plan::LONGEST_CHORD, self.step_length));
             births += markers * (1 + u64::from(plan::MOST_RINGS) * chord);
         }

@@ -1,4 +1,4 @@
-//! [`Changes`]: which segments are to be drawn anew.
+//! [`Changes`]: the segments that must be redrawn.
 
 use crate::pattern::{NO_PARENT, Node, SegmentId};
 
@@ -6,13 +6,13 @@ use crate::pattern::{NO_PARENT, Node, SegmentId};
 #[derive(Clone, Debug, Default)]
 pub(super) struct Changes {
     pub(super) list: Vec<SegmentId>,
-    /// Of each node: a branch tapers between two widths, so it changes with either.
-    pub(super) kin: Vec<Kin>,
+    /// Per node: a branch tapers between two widths, so it changes with either.
+    pub(super) tree: Vec<TreeLinks>,
 }
 
-/// Where a node is in its family. [`NO_PARENT`] is nobody.
+/// The links of a node to its child and sibling. [`NO_PARENT`] = none.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Kin {
+pub(super) struct TreeLinks {
     /// The last child.
     pub(super) child: u32,
     /// The next of its parent's children.
@@ -24,17 +24,17 @@ pub(super) struct Kin {
 impl Changes {
     pub(super) fn reserve(&mut self, nodes: usize) {
         self.list.reserve(nodes);
-        self.kin.reserve(nodes);
+        self.tree.reserve(nodes);
     }
 
-    /// Forgets nodes and links; `nodes` are those that are left, `number` says what a segment is called now.
+    /// Removes nodes and links; `nodes` are the remaining ones, `number` gives the new number of a segment.
     pub(super) fn forget(&mut self, nodes: &[Node], number: impl Fn(SegmentId) -> Option<SegmentId>) {
         let before = std::mem::take(self);
         for node in nodes {
             self.push_node(node.parent);
         }
         self.list.clear();
-        self.kin.iter_mut().for_each(|kin| kin.is_listed = false);
+        self.tree.iter_mut().for_each(|node| node.is_listed = false);
         for segment in before.list.into_iter().filter_map(number) {
             match segment {
                 SegmentId::Branch(node) if nodes[node as usize].parent != NO_PARENT => self.list_branch(node),
@@ -45,19 +45,19 @@ impl Changes {
     }
 
     pub(super) fn push_node(&mut self, parent: u32) {
-        let node = self.kin.len() as u32;
-        let sibling = match self.kin.get_mut(parent as usize) {
+        let node = self.tree.len() as u32;
+        let sibling = match self.tree.get_mut(parent as usize) {
             Some(parent) => std::mem::replace(&mut parent.child, node),
             None => NO_PARENT,
         };
-        self.kin.push(Kin { child: NO_PARENT, sibling, is_listed: false });
+        self.tree.push(TreeLinks { child: NO_PARENT, sibling, is_listed: false });
         if parent != NO_PARENT {
             self.list_branch(node);
         }
     }
 
     pub(super) fn list_branch(&mut self, node: u32) {
-        if !std::mem::replace(&mut self.kin[node as usize].is_listed, true) {
+        if !std::mem::replace(&mut self.tree[node as usize].is_listed, true) {
             self.list.push(SegmentId::Branch(node));
         }
     }
@@ -66,10 +66,10 @@ impl Changes {
         if has_parent {
             self.list_branch(node);
         }
-        let mut child = self.kin[node as usize].child;
+        let mut child = self.tree[node as usize].child;
         while child != NO_PARENT {
             self.list_branch(child);
-            child = self.kin[child as usize].sibling;
+            child = self.tree[child as usize].sibling;
         }
     }
 }

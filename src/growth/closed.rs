@@ -1,24 +1,25 @@
-//! Closed venation (Runions et al. 2005): a marker attracts all its relative neighbours, so that cracks come together in it.
+//! Closed venation (Runions et al. 2005): a marker attracts all its relative neighbours, so that cracks meet in it.
 
 use super::{GrowthParams, nodes::NodeGrid, params::PROGRESS};
 use crate::pattern::Node;
 use glam::Vec2;
 
-/// What every marker attracts.
+/// The nodes that every marker attracts.
 ///
 /// A node `v` is a *relative neighbour* of a marker `s` if no node `u` is closer to both than they are to each other:
-/// `max(|us|, |uv|) < |vs|` holds for none. It is dropped when a child of it is closer to the marker by the progress that every
-/// birth must make, for the child carries on. When the first node is within the kill distance, the marker is *reached*:
-/// it attracts the neighbours that it has then, and those that carry on from them, until each is within the kill distance
-/// too or is dropped, and dies. Each that comes is joined to the first.
+/// there is no `u` with `max(|us|, |uv|) < |vs|`. A neighbour is dropped when one of its children is closer to the
+/// marker by the progress that every new node must make, because the child continues. When the first node is within
+/// the kill distance, the marker is *reached*. It then attracts the neighbours that it has at that time, and their
+/// continuations, until each is within the kill distance too or is dropped; then the marker is removed. Each node
+/// that arrives is linked to the first one.
 #[derive(Clone, Debug)]
 pub(super) struct Relations {
-    /// Least fall of squared distance that counts as carrying on.
+    /// Smallest decrease of squared distance that counts as a continuation.
     progress: f32,
     kill_sq: f32,
-    /// Steps that a marker may attract nodes for.
+    /// Largest number of steps for which a marker attracts nodes.
     patience: u32,
-    /// Per marker, in order of birth.
+    /// Per marker, in the order of creation.
     of: Vec<Relation>,
     /// Pairs of nodes that have come together in a marker.
     pub(super) met: Vec<(u32, u32)>,
@@ -29,15 +30,15 @@ struct Relation {
     neighbours: Vec<u32>,
     /// The node that reached the marker first.
     reached_by: Option<u32>,
-    /// Nodes that have been looked at.
+    /// Number of nodes that have been visited.
     seen: u32,
     age: u32,
 }
 
-/// What a marker is up to.
+/// The state of a marker.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Bond {
-    /// It attracts this node and maybe others.
+    /// It attracts this node and possibly others.
     Attracts(u32),
     Waits,
     Dead,
@@ -58,7 +59,7 @@ impl Relations {
         self.of.push(Relation::default());
     }
 
-    /// Forgets all but the first markers.
+    /// Removes all but the first markers.
     pub(super) fn keep(&mut self, markers: usize) {
         self.of.truncate(markers);
     }
@@ -68,7 +69,7 @@ impl Relations {
         &self.of[id as usize].neighbours
     }
 
-    /// Shows a marker at `pos` a node that is within the radius; `is_own` tells whether it may attract it.
+    /// Shows a marker at `pos` a node that is within the radius; `is_own` says whether it may attract it.
     pub(super) fn visit(
         &mut self,
         (id, pos): (u32, Vec2),
@@ -113,14 +114,14 @@ impl Relations {
         relation.bond()
     }
 
-    /// Makes a marker that attracts nodes one step older; one that has grown too old dies.
+    /// Ages a marker that attracts nodes by one step; it dies when it is too old.
     pub(super) fn grow_older(&mut self, id: u32) -> Bond {
         let relation = &mut self.of[id as usize];
         relation.age += 1;
         if relation.age > self.patience { Bond::Dead } else { relation.bond() }
     }
 
-    /// Takes a node from what a marker attracts.
+    /// Removes a node from those that a marker attracts.
     pub(super) fn give_up(&mut self, id: u32, node: u32) -> Bond {
         let relation = &mut self.of[id as usize];
         relation.neighbours.retain(|&neighbour| neighbour != node);
@@ -138,8 +139,7 @@ impl Relation {
     }
 }
 
-/// Steps after which a marker has attracted nodes for long enough, however slowly they came: twice as many as one of them needs at
-/// most.
+/// Steps after which a marker stops attracting nodes: twice the largest number that one of them needs.
 pub(super) fn patience(params: &GrowthParams) -> u32 {
     let approaches = (params.crack_radius / params.step_length).powi(2) / PROGRESS;
     2 * (approaches.ceil() as u32 + 2)

@@ -1,10 +1,12 @@
 //! Cracks that divide domains: the cells of mud, clay, glaze and tempered glass.
 //!
-//! What dries or cools cracks where it is stressed most, farthest from all older cracks; a crack runs both ways until it meets older ones,
-//! and so divides a domain in two, until all domains are small. Here the markers are the stress: each knows how far the nearest crack,
-//! the border or the rim of what its hit has loaded is. One that is within the kill distance of a crack dies. Where one is further
-//! away than its generation allows a crack begins, across the shorter way of the domain; its two tips follow their markers by
-//! eq. 2 of Couto et al., with inertia, and never branch; arrest lets them meet what is ahead steeply.
+//! Drying or cooling material cracks where the stress is largest, farthest from all older cracks. A crack runs both
+//! ways until it meets older cracks and so divides a domain in two, until all domains are small. Here the markers
+//! represent the stress: each knows its distance to the nearest crack, to the border and to the rim of the area that
+//! its hit has loaded. A marker within the kill distance of a crack is removed. Where a marker is further away than
+//! its generation allows, a crack starts across the shorter direction of the domain. Its two tips follow their
+//! markers by eq. 2 of Couto et al., with inertia, and never branch. Arrest lets them meet what is ahead at a steep
+//! angle.
 
 use super::{
     arrest::{Advance, Arrest},
@@ -21,43 +23,47 @@ use crate::{
 };
 use glam::Vec2;
 
-/// Steps that a tip runs straight on at most where nothing draws it any more.
+/// Largest number of steps that a tip runs straight without markers.
 pub(super) const STRAIGHT: u16 = 400;
 
-/// Cosine of the angle to its way beyond which a marker does not draw a tip: 20 degrees. Cracks run straight across their domains.
+/// Cosine of the largest angle between a tip and a marker that attracts it: 20 degrees. Cracks run straight across
+/// their domains.
 const AHEAD: f32 = 0.94;
 
-/// No crack begins within so many of its distances to other cracks from a tip that runs.
+/// No crack starts within this many times its distance to other cracks from a moving tip.
 const QUIET: f32 = 2.0;
 
-/// A domain whose middle is this share of what its generation allows away from cracks is divided if it is as much longer.
+/// A domain whose middle is only this share of the allowed distance away from cracks is divided if it is
+/// correspondingly longer.
 const NARROW: f32 = 0.6;
 
-/// How much larger than its generation allows a long domain must be, by the root of its halves' product.
+/// How much larger than its generation allows a long domain must be, as the root of the product of its half lengths.
 const LONG: f32 = 1.05;
 
-/// Kill distances within which a tip that has left the region of its hit closes a cell with what is there.
+/// Distance, in kill distances, within which a tip that has left the region of its hit closes a cell with an existing
+/// crack.
 const CLOSE: f32 = 2.5;
 
-/// Segment lengths within which an end that something was in the way of is joined to what is there.
+/// Distance, in segment lengths, within which a blocked end is joined to an existing crack.
 const STRANDED: f32 = 3.0;
 
-/// Cosine of the angle to its way up to which it looks for that.
+/// Cosine of the largest angle to its direction in which it searches for that crack.
 const ASIDE: f32 = 0.25;
 
-/// How much larger that is for a steady crack.
+/// The same for a steady crack.
 const STEADY_ASIDE: f32 = 0.35;
 
-/// A crack begins in this step if its marker is still so much of its distance away from those that have begun in it.
+/// A crack starts in a step only if its marker is still at least this share of its distance away from those that have
+/// started in it.
 const STILL: f32 = 0.8;
 
-/// A domain that is no more than so many times as long as wide may be divided in three.
+/// A domain may be divided in three if its length is at most this many times its width.
 const ROUND: f32 = 1.7;
 
-/// Within a grain a crack strays by this much of what it strays from grain to grain.
+/// Deviation of a crack within a grain, as a share of its deviation from grain to grain.
 const WITHIN_GRAIN: f32 = 0.3;
 
-/// A marker at which a crack may begin.
+/// A marker at which a crack may start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Candidate {
     pub(super) marker: u32,
@@ -109,7 +115,7 @@ impl CrackGrowth {
         }
         self.advance_runners();
         self.show_markers();
-        // The farthest from all cracks first, of those the nearest to the hit.
+        // The farthest from all cracks first; ties go to the one nearest to the hit.
         candidates.sort_unstable_by(|a, b| {
             b.near_sq.total_cmp(&a.near_sq).then(a.from_hit.total_cmp(&b.from_hit)).then(a.id.cmp(&b.id))
         });
@@ -125,7 +131,8 @@ impl CrackGrowth {
         self.join_newborn();
     }
 
-    /// Where cracks may begin in this step. If nothing else happens there are some as long as domains are too large.
+    /// The markers at which cracks may start in this step. If nothing else happens there are some as long as domains
+    /// are too large.
     fn candidates(&mut self, is_idle: bool) -> Vec<Candidate> {
         let mut found = Vec::new();
         loop {
@@ -154,11 +161,11 @@ impl CrackGrowth {
                 }
             });
             if is_idle && nearest > 0.0 {
-                // Nothing is left behind the front: it leaps.
+                // Nothing is left behind the front: it jumps ahead.
                 let leap = nearest + self.params.front;
                 found.retain(|candidate: &Candidate| candidate.from_hit - self.front(candidate.impact) <= leap);
             }
-            // The next generation waits until this one has come to rest.
+            // The next generation starts when this one no longer grows.
             if !is_idle || !found.is_empty() || is_last {
                 return found;
             }
@@ -168,7 +175,7 @@ impl CrackGrowth {
         }
     }
 
-    /// How far from its hit cracks of an impact may begin.
+    /// Largest distance from its hit at which cracks of an impact may start.
     fn front(&self, impact: u32) -> f32 {
         let begun = self.division.as_ref().and_then(|division| division.begun.get(impact as usize));
         match begun {
@@ -179,7 +186,7 @@ impl CrackGrowth {
         }
     }
 
-    /// Begins a crack at a marker that is still far enough from all others.
+    /// Starts a crack at a marker if it is still far enough from all others.
     fn begin_crack(&mut self, candidate: Candidate) {
         let near_sq = self.field.near_sq(candidate.marker);
         let Some(division) = &self.division else { return };
@@ -210,7 +217,7 @@ impl CrackGrowth {
         if near <= loaded {
             let is_long = near * 0.5 * length > (LONG * loaded) * (LONG * loaded);
             if !is_long {
-                // Nor will it ever be.
+                // It never will be.
                 self.field.take(candidate.marker);
                 return;
             }
@@ -221,12 +228,12 @@ impl CrackGrowth {
         }
         self.nucleated += 1;
         let node = self.network.nodes.len() as u32;
-        self.bear(middle, NO_PARENT, 0, candidate.impact, 1.0);
+        self.add_node(middle, NO_PARENT, 0, candidate.impact, 1.0);
         self.run_out_of(node, across);
         self.show_markers();
     }
 
-    /// The first segments of a crack, either way across its domain, or three ways.
+    /// The first segments of a crack: in both directions across its domain, or in three directions.
     fn run_out_of(&mut self, node: u32, Across { way, longer, .. }: Across) {
         let pos = self.network.nodes[node as usize].pos;
         let draw = hash_unit(self.seed ^ draws::STAR, u64::from(node));
@@ -244,7 +251,7 @@ impl CrackGrowth {
         }
     }
 
-    /// Remembers that a crack grows on from a node, if it may.
+    /// Records a growing tip, if the crack may continue there.
     fn keep_tip(&mut self, tip: Tip) {
         if (tip.node as usize) < self.network.nodes.len()
             && !self.arrest.as_ref().is_some_and(|arrest| arrest.is_sealed(tip.node))
@@ -254,7 +261,7 @@ impl CrackGrowth {
         }
     }
 
-    /// Grows a tip by a segment: after its markers, straight on where it has none.
+    /// Grows a tip by a segment: towards its markers, or straight if it has none.
     fn advance_tip(&mut self, tip: Tip) {
         let Tip { node, course, straight, runs_out } = tip;
         if self.is_over(node) {
@@ -292,7 +299,7 @@ impl CrackGrowth {
         }
     }
 
-    /// How much a crack strays at a node, -1..=1: where there are grains, from one to the next.
+    /// The random deviation of a crack at a node, -1..=1; with grains it changes from one to the next.
     fn stray(&self, before: Vec2, pos: Vec2, child: u32) -> f32 {
         let stray = 2.0 * hash_unit(self.seed ^ draws::STRAY, u64::from(child)) - 1.0;
         if self.params.grain <= 0.0 {
@@ -302,7 +309,7 @@ impl CrackGrowth {
         if cell(before) == cell(pos) { WITHIN_GRAIN * stray } else { 2.0 * stray }
     }
 
-    /// Where the markers of a tip that lie ahead draw it: eq. 2.
+    /// The direction in which the markers ahead attract a tip: eq. 2.
     fn drawn(&self, pos: Vec2, heading: Vec2) -> Option<Vec2> {
         let mut sum = [0i64; 2];
         self.field.each_own(pos, |marker, distance_sq| {
@@ -316,7 +323,7 @@ impl CrackGrowth {
         (sum != [0, 0]).then(|| Vec2::new(sum[0] as f32, sum[1] as f32).normalize_or(heading))
     }
 
-    /// Whether one of those markers is served by a segment from `pos` to `to`.
+    /// Whether a segment from `pos` to `to` serves one of those markers.
     fn serves(&self, pos: Vec2, heading: Vec2, to: Vec2) -> bool {
         let (kill, progress) =
             (self.params.kill_distance, PROGRESS * self.params.step_length * self.params.step_length);
@@ -329,7 +336,7 @@ impl CrackGrowth {
         serves
     }
 
-    /// Nothing has met the tips that wait: but for those that stay open they run on.
+    /// Lets the waiting tips continue that were not met, except those that stay open.
     fn run_out(&mut self) {
         let Some(division) = &mut self.division else { return };
         let resting = std::mem::take(&mut division.resting);
@@ -343,7 +350,7 @@ impl CrackGrowth {
         }
     }
 
-    /// Joins the tips that something was in the way of to what is near, if it lies well.
+    /// Joins blocked tips to a near crack, if the geometry allows it.
     fn join_stranded(&mut self) {
         let mut is_joined = vec![false; self.network.nodes.len()];
         for link in &self.network.links {
@@ -359,7 +366,7 @@ impl CrackGrowth {
             }
             let mut near = Vec::new();
             self.nodes.within(pos, STRANDED * self.params.step_length, |node, distance_sq| {
-                if distance_sq > 0.0 && !self.is_kin(tip, node) {
+                if distance_sq > 0.0 && !self.is_same_crack(tip, node) {
                     near.push((distance_sq, node));
                 }
             });
@@ -368,7 +375,7 @@ impl CrackGrowth {
         }
     }
 
-    /// Sends a tip to what it may close a cell with, aside or ahead.
+    /// Sends a tip to a crack with which it can close a cell, to the side or ahead.
     fn closes(&mut self, tip: u32) -> bool {
         let Node { pos, parent, .. } = self.network.nodes[tip as usize];
         let heading = self.network.nodes.get(parent as usize).map_or(Vec2::ZERO, |before| pos - before.pos);
@@ -383,7 +390,7 @@ impl CrackGrowth {
         }
     }
 
-    /// Shows the markers what has been born.
+    /// Shows new nodes to the markers.
     fn show_markers(&mut self) {
         let last = self.network.nodes.len() as u32;
         let Some(division) = &mut self.division else { return };

@@ -8,22 +8,23 @@ use std::f32::consts::PI;
 /// Axes along which the width of a domain is measured.
 pub(super) const AXES: usize = 8;
 
-/// How far the width of a domain is measured, in distances to its nearest crack.
+/// Distance to which the width of a domain is measured, in distances to its nearest crack.
 const FAR: f32 = 2.5;
 
-/// A side on which a domain is open counts as so many times as far as is looked.
+/// An open side of a domain counts as this many times the measured distance.
 const OPEN: f32 = 2.0;
 
-/// Beyond the rim within so many times as far as is looked, a domain is open.
+/// Beyond the rim by less than this many times the measured distance, a domain is open.
 const BEYOND: f32 = 1.5;
 
-/// How much less a crack likes to begin where it would meet others aslant.
+/// How much a crack avoids starting where it would meet others at a slant.
 const SLANT: f32 = 0.25;
 
-/// The same of a steady crack, besides.
+/// Additional weight of that for a steady crack.
 const STEEP: f32 = 0.75;
 
-/// Per axis: how far the nearest crack is one way, and how far from a right angle the axis meets it, 0..=1.
+/// Per axis: the distance of the nearest crack in one direction, and how much the angle there deviates from a right
+/// angle, 0..=1.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sight {
     pub(super) distance: [f32; AXES],
@@ -33,24 +34,24 @@ pub(super) struct Sight {
 /// How a crack would divide a domain.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Across {
-    /// Along the shorter way.
+    /// The shorter direction.
     pub(super) way: Vec2,
-    /// Where it would begin, in the middle of the longer way.
+    /// Where it would start, in the middle of the longer direction.
     pub(super) middle: Vec2,
-    /// The longer way, and how many times as long it is.
+    /// The length in the longer direction, and its ratio to the shorter one.
     pub(super) length: f32,
     pub(super) longer: f32,
 }
 
 impl CrackGrowth {
-    /// The nearest cracks within `far` of a place, ahead and back along each axis.
+    /// The nearest cracks within `far` of a place, forward and backward along each axis.
     pub(super) fn look_around(&self, pos: Vec2, axes: &[Vec2; AXES], far: f32) -> [Sight; 2] {
         let mut sight = [Sight { distance: [f32::INFINITY; AXES], slant: [0.0; AXES] }; 2];
         let Some(arrest) = &self.arrest else { return sight };
         arrest.walls.each_near(pos, far, |from, to| {
             let (from, way) = (from - pos, to - from);
             let length_sq = way.length_squared();
-            // For all axes alike, without a branch, so that they are taken at once.
+            // The same for all axes, without a branch, so that the loop is vectorized.
             for (i, axis) in axes.iter().enumerate() {
                 let (slope, across) = (axis.perp_dot(way), axis.perp_dot(from));
                 let share = -across / slope;
@@ -69,18 +70,18 @@ impl CrackGrowth {
         sight
     }
 
-    /// How a crack would divide the domain around a place; none where it could not end at others.
+    /// How a crack would divide the domain around a place; `None` if it could not end at other cracks.
     pub(super) fn across(&self, pos: Vec2, impact: u32, name: u32, clearance: f32) -> Option<Across> {
         let across = self.across_from(pos, impact, name, clearance)?;
         if self.params.steady <= 0.0 {
             return Some(across);
         }
-        // From its middle the domain is seen better.
+        // Measured again from the middle of the domain, which is more precise.
         let again = self.across_from(across.middle, impact, name, clearance);
         Some(again.map_or(across, |again| Across { middle: across.middle, ..again }))
     }
 
-    /// The same as far as can be seen from that place.
+    /// The same, measured from that place.
     fn across_from(&self, pos: Vec2, impact: u32, name: u32, clearance: f32) -> Option<Across> {
         let draw = |what: u64| hash_unit(self.seed ^ what, u64::from(name));
         let turn = PI * draw(draws::DOMAIN_AXES);
@@ -129,7 +130,7 @@ impl CrackGrowth {
     }
 }
 
-/// How far the border is from `pos` in a direction, and how far from a right angle it would be met.
+/// Distance of the border from `pos` in a direction, and deviation from a right angle there.
 fn to_border(pos: Vec2, way: Vec2, extent: Vec2) -> (f32, f32) {
     let along = |pos: f32, way: f32, extent: f32| match () {
         () if way > 0.0 => (extent - pos) / way,

@@ -1,11 +1,12 @@
-//! What the draws of a growth are for: each is combined with the seed. Where two are the same number, what else goes in is not.
+//! Salts of the random draws of a growth, combined with the seed. Where two are the same number, their other inputs
+//! differ.
 //!
-//! These numbers are frozen, like all that a seed gives.
+//! These numbers are frozen: a seed must give the same result in every version.
 
-/// How far a hit reaches in some directions.
+/// The reach of a hit by direction.
 pub(super) const UNEVEN_REACH: u64 = 0xA4;
 
-/// How far it loads the surface in some directions.
+/// The loaded area of a hit by direction.
 pub(super) const UNEVEN_LOAD: u64 = 0xA3;
 
 /// The way of a wave in which the size of domains changes, and its phase.
@@ -51,7 +52,7 @@ pub(super) const SPLIT_SIDE: u64 = 0xB5;
 pub(super) const MIXED_WIDTH: u64 = 0xA5;
 pub(super) const UNEVEN_WIDTH: u64 = 0x1D;
 
-/// Where cracks begin by themselves.
+/// Where cracks start by nucleation.
 pub(super) const NUCLEATION: u64 = 0x0C;
 
 /// Whether a tip forks, at which angle, and to which side.

@@ -1,8 +1,8 @@
 //! The markers, each with its nearest node.
 //!
-//! The usual way is to index the nodes and ask that index for every marker at every step. Here it is turned round: the
-//! markers lie still, sorted by the cells of a uniform grid, and remember their nearest node; a newborn node looks once at
-//! the markers within its reach and wins those that it is nearest to.
+//! The usual way is to index the nodes and to query that index for every marker at every step. Here it is the other
+//! way around: the markers are stored in the cells of a uniform grid and remember their nearest node. Each new node
+//! visits the markers within its reach once, and takes those to which it is the nearest.
 
 mod newborn;
 mod settle;
@@ -18,26 +18,26 @@ use super::{
 use crate::pattern::Node;
 use glam::{UVec2, Vec2};
 
-/// Squared distance of a dead marker to its node: no distance is below it.
+/// Squared distance of a removed marker to its node: no distance is below it.
 const DEAD: f32 = -1.0;
 
 /// No node attracts the marker.
 pub(super) const NO_NODE: u32 = u32::MAX;
 
-/// [`MarkerField::loyal`] of a marker that every node may win.
+/// [`MarkerField::owner`] of a marker that every node may take.
 pub(super) const ANY_IMPACT: u32 = u32::MAX;
 
-/// Markers that are compared at once; compilers turn the comparison into vector instructions.
+/// Markers that are compared at once; compilers vectorize the comparison.
 const LANES: usize = 8;
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Marker {
     pub(super) pos: Vec2,
-    /// Order of birth, for ties.
+    /// Order of creation, for ties.
     pub(super) id: u32,
 }
 
-/// A marker that was given up so often dies.
+/// A marker that was given up this often is removed.
 pub(super) const MOST_GIVEN_UP: u8 = 4;
 
 #[derive(Clone, Debug)]
@@ -45,34 +45,35 @@ pub(super) struct MarkerField {
     extent: Vec2,
     radius: f32,
     kill_sq: f32,
-    /// Whether cracks divide domains: markers only know how far the nearest is, and attract those of which they are their own.
+    /// Whether cracks divide domains: markers only store the distance to the nearest crack, and attract only that
+    /// crack.
     divides: bool,
-    // Sorted by cell, one entry a marker, then as many dead ones as there are lanes.
+    // Sorted by cell, one entry per marker, followed by as many dead entries as there are lanes.
     x: Vec<f32>,
     y: Vec<f32>,
     /// Squared distance to the nearest node; the squared crack radius while there is none within it; [`DEAD`].
     near_sq: Vec<f32>,
     node: Vec<u32>,
     id: Vec<u32>,
-    /// The impact whose nodes alone may win the marker, or [`ANY_IMPACT`]; every node that reaches it kills it. Or the ray, whose nodes
-    /// alone do either.
-    loyal: Vec<u32>,
+    /// The impact whose nodes alone may take the marker, or [`ANY_IMPACT`]; it is removed by every node that reaches
+    /// it. Or a ray, whose nodes alone may take or remove it.
+    owner: Vec<u32>,
     /// How often the marker was given up.
     given_up: Vec<u8>,
-    /// Per node: the ray that it is on; may be shorter than there are nodes.
+    /// Per node: its ray; may be shorter than the number of nodes.
     pub(super) ray_of: Vec<u32>,
-    /// Closed venation: what each marker attracts besides its nearest node.
+    /// Closed venation: the nodes that each marker attracts in addition to the nearest.
     pub(super) relations: Option<Relations>,
     /// Markers that lie in no cell yet.
     newborn: Vec<Newborn>,
-    /// Newborn markers that have not all found their places.
+    /// The state of settling new markers, while it is in progress.
     settling: Option<Box<Settling>>,
     cells: UVec2,
     /// Cells per pattern unit.
     per_unit: Vec2,
     /// First marker of each cell, and the end.
     first: Vec<u32>,
-    /// Markers that attract a node; may hold dead ones until the next sweep.
+    /// Markers that attract a node; may contain dead ones until the next sweep.
     pub(super) active: Vec<u32>,
     pub(super) made: u32,
     /// Number for the next marker.
@@ -92,7 +93,7 @@ impl MarkerField {
             near_sq: Vec::new(),
             node: Vec::new(),
             id: Vec::new(),
-            loyal: Vec::new(),
+            owner: Vec::new(),
             given_up: Vec::new(),
             ray_of: Vec::new(),
             relations: (params.venation == Venation::Closed).then(|| Relations::new(params)),
@@ -108,7 +109,7 @@ impl MarkerField {
         }
     }
 
-    /// Takes up other parameters; every marker looks for its nodes anew when it [settles](Self::settle).
+    /// Sets other parameters; every marker searches for its nodes again when it [settles](Self::settle).
     pub(super) fn set_params(&mut self, params: &GrowthParams) {
         self.radius = params.crack_radius;
         self.kill_sq = kill_sq(params);
@@ -123,11 +124,12 @@ impl MarkerField {
         self.newborn = living;
     }
 
-    /// Forgets the dead and those that `is_lost` says can never be won, so that the others may be numbered anew.
+    /// Removes dead markers, and those for which `is_lost` says that no node can take them, so that the others can be
+    /// renumbered.
     pub(super) fn forget_dead(&mut self, params: &GrowthParams, is_lost: impl Fn(u32) -> bool) {
         self.set_params(params);
         let before = self.newborn.len();
-        self.newborn.retain(|marker| !is_lost(marker.loyal));
+        self.newborn.retain(|marker| !is_lost(marker.owner));
         self.killed += (before - self.newborn.len()) as u32;
         self.newborn.sort_unstable_by_key(|marker| marker.id);
         for (id, marker) in (0..).zip(&mut self.newborn) {
@@ -139,7 +141,7 @@ impl MarkerField {
         }
     }
 
-    /// Empties the field of its settled markers and returns the living.
+    /// Removes all settled markers from the field and returns the living ones.
     fn take_living(&mut self) -> Vec<Newborn> {
         let living = (0..self.x.len()).filter(|&i| self.near_sq[i] > DEAD);
         let living = living.map(|i| self.marker_at(i)).collect();
@@ -147,33 +149,33 @@ impl MarkerField {
         living
     }
 
-    /// A settled marker as one that has not settled.
+    /// A settled marker as an unsettled one.
     fn marker_at(&self, i: usize) -> Newborn {
         Newborn {
             pos: Vec2::new(self.x[i], self.y[i]),
             id: self.id[i],
-            loyal: self.loyal[i],
+            owner: self.owner[i],
             given_up: self.given_up[i],
             near_sq: if self.divides { self.near_sq[i] } else { f32::INFINITY },
         }
     }
 
-    /// Empties the field of its settled markers.
+    /// Removes all settled markers.
     fn clear(&mut self) {
         for plane in [&mut self.x, &mut self.y, &mut self.near_sq] {
             plane.clear();
         }
         self.node.clear();
         self.id.clear();
-        self.loyal.clear();
+        self.owner.clear();
         self.given_up.clear();
         self.active.clear();
         self.first.fill(0);
     }
 
-    pub(super) fn add(&mut self, pos: Vec2, loyal: u32, relieved: f32) {
+    pub(super) fn add(&mut self, pos: Vec2, owner: u32, relieved: f32) {
         let near_sq = relieved.max(0.0) * relieved;
-        self.newborn.push(Newborn { pos, id: self.next, loyal, given_up: 0, near_sq });
+        self.newborn.push(Newborn { pos, id: self.next, owner, given_up: 0, near_sq });
         self.next += 1;
         self.made += 1;
         if let Some(relations) = &mut self.relations {
@@ -204,14 +206,14 @@ impl MarkerField {
         (low.y as usize..=high.y as usize).map(move |y| (y * width + low.x as usize, y * width + high.x as usize + 1))
     }
 
-    /// Lets a newborn node win the markers that it is nearest to, and kills those that it reaches.
+    /// Lets a new node take the markers to which it is the nearest, and removes those that it reaches.
     ///
-    /// Must be called in order of the nodes' indices: at equal distance the lower index keeps the marker.
+    /// Must be called in the order of the nodes' indices: at equal distance the lower index keeps the marker.
     pub(super) fn visit(&mut self, index: u32, nodes: &[Node], grid: &NodeGrid) {
         let node = &nodes[index as usize];
         for (from, to) in self.rows(node.pos, self.radius) {
             let (from, to) = (self.first[from] as usize, self.first[to] as usize);
-            // Whole lanes, even beyond the cells: a marker that is not won is left as it is, and there is padding.
+            // Whole lanes, even beyond the cells: markers that are not taken do not change, and there is padding.
             for i in (from..to).step_by(LANES) {
                 if self.any_won(i, node.pos) {
                     for marker in i..i + LANES {
@@ -244,9 +246,9 @@ impl MarkerField {
         if distance_sq >= self.near_sq[marker] {
             return;
         }
-        let loyal = self.loyal[marker];
-        let is_own = self.is_own(loyal, index, node);
-        if distance_sq <= self.kill_sq && (is_own || !is_ray(loyal)) {
+        let owner = self.owner[marker];
+        let is_own = self.is_own(owner, index, node);
+        if distance_sq <= self.kill_sq && (is_own || !is_ray(owner)) {
             self.near_sq[marker] = DEAD;
             self.killed += 1;
             return;
@@ -265,18 +267,18 @@ impl MarkerField {
         self.node[marker] = index;
     }
 
-    /// Whether a marker that is loyal so attracts a node.
-    fn is_own(&self, loyal: u32, index: u32, node: &Node) -> bool {
-        loyal == ANY_IMPACT
-            || loyal == node.impact
-            || (is_ray(loyal) && self.ray_of.get(index as usize) == Some(&loyal))
+    /// Whether a marker with this owner attracts a node.
+    fn is_own(&self, owner: u32, index: u32, node: &Node) -> bool {
+        owner == ANY_IMPACT
+            || owner == node.impact
+            || (is_ray(owner) && self.ray_of.get(index as usize) == Some(&owner))
     }
 
-    /// Closed venation: shows a marker a node that may come to be among its relative neighbours.
+    /// Closed venation: shows a marker a node that may become one of its relative neighbours.
     fn relate(&mut self, marker: usize, index: u32, nodes: &[Node], grid: &NodeGrid) {
         let (pos, node) = (Vec2::new(self.x[marker], self.y[marker]), &nodes[index as usize]);
         let distance_sq = distance_sq(pos.x, pos.y, node.pos);
-        let is_own = self.is_own(self.loyal[marker], index, node);
+        let is_own = self.is_own(self.owner[marker], index, node);
         let Some(relations) = self.relations.as_mut().filter(|_| distance_sq < self.near_sq[marker]) else { return };
         let bond = relations.visit((self.id[marker], pos), (index, distance_sq, is_own), nodes, grid);
         self.bind(marker, bond);
@@ -289,7 +291,7 @@ impl MarkerField {
                     self.active.push(marker as u32);
                 }
             }
-            // It stays among the active until the next sweep, and must not be put there twice.
+            // It stays in the active list until the next sweep, and must not be added twice.
             Bond::Waits => {}
             Bond::Dead => {
                 self.near_sq[marker] = DEAD;
@@ -298,7 +300,7 @@ impl MarkerField {
         }
     }
 
-    /// Makes the active markers a step older, where they can be too old.
+    /// Ages the active markers by one step, if they can be too old.
     pub(super) fn grow_older(&mut self) {
         for i in 0..self.active.len() {
             let marker = self.active[i] as usize;
@@ -334,13 +336,14 @@ impl MarkerField {
         }
     }
 
-    /// Drops the dead and the given up from the active markers.
+    /// Removes dead and given-up markers from the active list.
     pub(super) fn sweep(&mut self) {
         let (near_sq, node) = (&self.near_sq, &self.node);
         self.active.retain(|&i| near_sq[i as usize] > DEAD && node[i as usize] != NO_NODE);
     }
 
-    /// Takes a marker from its node, for which it is behind a crack: only a nearer node may win it now. After a few times it dies.
+    /// Detaches a marker from its node, because a crack lies between them: now only a nearer node may take it. After
+    /// a few times it is removed.
     pub(super) fn give_up(&mut self, index: u32, node: u32) {
         let i = index as usize;
         if let Some(relations) = &mut self.relations {
@@ -363,8 +366,8 @@ impl MarkerField {
         }
     }
 
-    /// Takes a living marker that no node attracts: of those found first from `draws.len()` places that are chosen by draws the nearest to
-    /// `center`. Returns its place and its impact.
+    /// Removes a living marker that no node attracts, and returns its position and impact. One is found from each of
+    /// `draws.len()` random places; the nearest of them to `center` is used.
     pub(super) fn take_waiting(&mut self, draws: &[u64], center: Vec2) -> Option<(Vec2, u32)> {
         let n = self.made_settled();
         let is_waiting = |i: &usize| self.near_sq[*i] > DEAD && self.node[*i] == NO_NODE;
@@ -376,20 +379,21 @@ impl MarkerField {
         let i = found.min_by(|a, b| away(a).total_cmp(&away(b)))?;
         self.near_sq[i] = DEAD;
         self.killed += 1;
-        Some((Vec2::new(self.x[i], self.y[i]), self.loyal[i]))
+        Some((Vec2::new(self.x[i], self.y[i]), self.owner[i]))
     }
 
-    /// Calls `visit` with each living marker that is further than this from all cracks: its place in the field, number, place, squared distance to
-    /// the nearest crack and impact.
+    /// Calls `visit` with each living marker that is further than this from all cracks: its index in the field,
+    /// number, position, squared distance to the nearest crack and impact.
     pub(super) fn each_beyond(&self, least_sq: f32, mut visit: impl FnMut(u32, u32, Vec2, f32, u32)) {
         for (i, &near_sq) in self.near_sq.iter().enumerate() {
             if near_sq > least_sq {
-                visit(i as u32, self.id[i], Vec2::new(self.x[i], self.y[i]), near_sq, self.loyal[i]);
+                visit(i as u32, self.id[i], Vec2::new(self.x[i], self.y[i]), near_sq, self.owner[i]);
             }
         }
     }
 
-    /// Calls `visit` with the place and squared distance of each marker within the radius that is nearer to the node at `pos` than to any other.
+    /// Calls `visit` with the position and squared distance of each marker within the radius that is nearer to the
+    /// node at `pos` than to any other.
     pub(super) fn each_own(&self, pos: Vec2, mut visit: impl FnMut(Vec2, f32)) {
         for (from, to) in self.rows(pos, self.radius) {
             for i in self.first[from] as usize..self.first[to] as usize {
@@ -406,13 +410,13 @@ impl MarkerField {
         self.near_sq[index as usize]
     }
 
-    /// Takes a marker.
+    /// Removes a marker.
     pub(super) fn take(&mut self, index: u32) {
         self.near_sq[index as usize] = DEAD;
         self.killed += 1;
     }
 
-    /// Whether newborn markers have begun to settle, and not all have found their places.
+    /// Whether settling of new markers is in progress.
     pub(super) const fn is_settling(&self) -> bool {
         self.settling.is_some()
     }
@@ -422,7 +426,7 @@ impl MarkerField {
         self.x.len().saturating_sub(LANES)
     }
 
-    /// Markers that are alive, and how many of them attract a node.
+    /// Number of living markers, and how many of them attract a node.
     pub(super) fn living(&self) -> (u32, u32) {
         let alive = self.near_sq.iter().zip(&self.node).filter(|(near_sq, _)| **near_sq > DEAD);
         let in_hand = self.settling.as_ref().map_or(0, |settling| settling.in_hand());
@@ -434,10 +438,10 @@ impl MarkerField {
         (living, attracting)
     }
 
-    /// Places of the markers that no step has taken up yet, and whose they are.
+    /// Positions and owners of the unsettled markers.
     #[cfg(test)]
     pub(super) fn unsettled(&self) -> impl Iterator<Item = (Vec2, u32)> {
-        self.newborn.iter().map(|marker| (marker.pos, marker.loyal))
+        self.newborn.iter().map(|marker| (marker.pos, marker.owner))
     }
 
     /// Markers alive, counting those that died since the last [`settle`](Self::settle).
@@ -455,17 +459,17 @@ impl MarkerField {
 }
 
 /// Whether a marker belongs to a ray.
-const fn is_ray(loyal: u32) -> bool {
-    loyal != ANY_IMPACT && loyal & RAY != 0
+const fn is_ray(owner: u32) -> bool {
+    owner != ANY_IMPACT && owner & RAY != 0
 }
 
-/// The least squared distance at which a marker dies.
+/// The squared distance within which a marker is removed.
 fn kill_sq(params: &GrowthParams) -> f32 {
     let finest = if params.venation == Venation::Dividing { 1.0 + params.focus } else { 1.0 };
     (params.kill_distance / finest) * (params.kill_distance / finest)
 }
 
-/// Room for `n` values, written once: the first write to memory is the dear one.
+/// Reserves memory for `n` values and writes it once: the first write causes page faults.
 fn get_ready<T: Copy + Default>(plane: &mut Vec<T>, n: usize) {
     let length = plane.len();
     plane.resize(n.max(length), T::default());

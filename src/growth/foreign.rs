@@ -1,17 +1,20 @@
-//! Cracks that have not grown: those of a picture, say.
+//! Adds cracks from another network, such as those of a picture.
 
 use super::{pull::NO_PULL, state::CrackGrowth};
 use crate::pattern::{Link, NO_IMPACT, NO_PARENT, Network, Node, SegmentId};
 use glam::Vec2;
 
 impl CrackGrowth {
-    /// Adds cracks that have not grown here, say those of [`Seams::network`](crate::voronoi::Seams::network). To hits and steps
-    /// afterwards they are cracks of another hit: with [`arrest`](super::GrowthParams::arrest) new ones stop at them, and a hit on one starts from it.
+    /// Adds cracks that have not grown here, such as those of [`Seams::network`](crate::voronoi::Seams::network).
+    /// Later hits and steps treat them as cracks of another hit: with [`arrest`](super::GrowthParams::arrest) new
+    /// cracks stop at them, and a hit on one starts from it.
     ///
-    /// They come in the steps after those made so far, in order of their [`birth`](Node::birth), and each opens to its width within
-    /// `opening` further steps; returns how many steps all of that takes. Lines are straight from node to node; a network of another extent is
-    /// stretched over the surface. They do not count for [`max_nodes`](super::GrowthParams::max_nodes). Where they
-    /// cross what has grown already, they cross it.
+    /// They are added in the steps after the current one, in the order of their [`birth`](Node::birth), and each
+    /// opens to its width within `opening` further steps. Returns how many steps this takes in total. Lines are
+    /// straight from node to node. A network of another extent is stretched over the surface. The added nodes do not
+    /// count for [`max_nodes`](super::GrowthParams::max_nodes). Where they cross existing cracks, nothing prevents
+    /// it.
+    ///
     ///
     /// ```
     /// use bevy_crack::{growth::{CrackGrowth, GrowthParams}, voronoi::{VoronoiBake, VoronoiParams}};
@@ -31,13 +34,13 @@ impl CrackGrowth {
             return 0;
         };
         let (extent, from) = (self.network.extent(), cracks.extent());
-        // Nothing leaves the border by rounding.
+        // Keeps border points exactly on the border.
         let place = |pos: Vec2| Vec2::select(pos.cmpeq(from), extent, (pos / from * extent).min(extent));
         let (before, first) = (self.steps, self.network.nodes.len() as u32);
-        // Links that a hit has made since the last step come in the next one.
+        // Links that a hit has added since the last step belong to the next one.
         self.timeline.begin(before.saturating_add(1));
-        (self.links_told..self.network.links.len() as u32).for_each(|_| self.timeline.add_link());
-        // Nodes and links that are there.
+        (self.links_reported..self.network.links.len() as u32).for_each(|_| self.timeline.add_link());
+        // Number of nodes and links added so far.
         let (mut node, mut link) = (0, 0);
         for step in 0..=last {
             self.steps = before.saturating_add(step).saturating_add(1);
@@ -57,8 +60,8 @@ impl CrackGrowth {
             }
         }
         self.steps = self.steps.saturating_add(opening);
-        let told = std::mem::replace(&mut self.links_told, self.network.links.len() as u32);
-        self.changes.list.extend((told..self.links_told).map(SegmentId::Link));
+        let reported = std::mem::replace(&mut self.links_reported, self.network.links.len() as u32);
+        self.changes.list.extend((reported..self.links_reported).map(SegmentId::Link));
         self.newborn = first..self.network.nodes.len() as u32;
         self.added += self.newborn.len();
         for node in self.newborn.clone() {
@@ -66,12 +69,12 @@ impl CrackGrowth {
         }
         if let Some(arrest) = &mut self.arrest {
             let branches = self.newborn.clone().map(SegmentId::Branch);
-            arrest.add_walls(&self.network, branches.chain((told..self.links_told).map(SegmentId::Link)));
+            arrest.add_walls(&self.network, branches.chain((reported..self.links_reported).map(SegmentId::Link)));
         }
         self.steps - before
     }
 
-    /// Notes a node that has not grown.
+    /// Adds a node that has not grown here.
     fn add(&mut self, node: Node) {
         self.widths.admit(node.parent);
         if let Some(arrest) = &mut self.arrest {

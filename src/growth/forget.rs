@@ -1,22 +1,24 @@
-//! Forgetting the oldest cracks, so that a surface may be hit for ever.
+//! Removes the oldest cracks, so that a surface can be hit any number of times.
 
 use super::{arrest::Arrest, nodes::NodeGrid, state::CrackGrowth};
 use crate::pattern::{NO_IMPACT, SegmentId};
 
 impl CrackGrowth {
-    /// How many more nodes may grow before the surface has [`max_nodes`](super::GrowthParams::max_nodes) of them.
+    /// How many more nodes can grow before the surface has [`max_nodes`](super::GrowthParams::max_nodes) of them.
     #[must_use]
     pub fn nodes_left(&self) -> u32 {
         u32::try_from(self.room()).unwrap_or(u32::MAX)
     }
 
-    /// Takes the oldest nodes out, so that no more than the newest `keep` are left, and room for others is made. Returns how many were
-    /// taken out: so many lower are the numbers of the others from now on.
+    /// Removes the oldest nodes, so that at most the newest `keep` are left and there is room for others. Returns how
+    /// many were removed: the numbers of the remaining nodes decrease by that.
     ///
-    /// Segments with an end among them go with them; those that stay keep their lines to the last bit. Whoever has drawn the network goes on
-    /// showing what was drawn: those cracks are *frozen*. New cracks neither grow from them nor stop at them, they close no cells, and
-    /// the [`timeline`](Self::timeline) knows them no more. Growth that is under way goes on from the nodes that are left. Segments that
-    /// are new or wider should be [taken](Self::take_changed) before.
+    /// Segments with an end among the removed nodes are removed too; the others keep their lines bit for bit. Removed
+    /// cracks that were drawn stay visible: they are *frozen*. New cracks neither grow from them nor stop at them,
+    /// they close no cells, and the [`timeline`](Self::timeline) no longer contains them. Growth that is in progress
+    /// continues from the remaining nodes. New and wider segments should be [taken](Self::take_changed) before the
+    /// call.
+    ///
     ///
     /// ```
     /// use bevy_crack::growth::{CrackGrowth, GrowthParams};
@@ -38,7 +40,7 @@ impl CrackGrowth {
         if first == 0 {
             return 0;
         }
-        // What has grown from foreign cracks may be of no impact either.
+        // Nodes that have grown from added cracks may not belong to an impact either.
         let foreign = self.network.nodes[..first].iter().filter(|node| node.impact == NO_IMPACT).count();
         self.added = self.added.saturating_sub(foreign);
         let forgotten = first as u32;
@@ -49,7 +51,7 @@ impl CrackGrowth {
             SegmentId::Branch(node) => number(node).map(SegmentId::Branch),
             SegmentId::Link(link) => links.binary_search(&link).ok().map(|link| SegmentId::Link(link as u32)),
         });
-        self.links_told = self.network.links.len() as u32;
+        self.links_reported = self.network.links.len() as u32;
         self.nodes = NodeGrid::new(self.network.extent(), 2.0 * self.params.step_length.max(self.params.kill_distance));
         for node in &self.network.nodes {
             self.nodes.push(node.pos);
@@ -68,7 +70,8 @@ impl CrackGrowth {
         if let Some(before) = self.arrest.take() {
             self.arrest = Some(Arrest::after(before, &self.network, self.params.step_length, forgotten));
         }
-        // Every marker looks for its nodes anew; what an impact of which nothing is left has waiting, nothing wins any more.
+        // Every marker searches for its nodes again. Markers of an impact without remaining nodes can no longer be
+        // reached.
         let mut is_left = vec![false; self.impacts.len()];
         for node in &self.network.nodes {
             if let Some(is_left) = is_left.get_mut(node.impact as usize) {
@@ -77,8 +80,8 @@ impl CrackGrowth {
         }
         let is_over = !self.is_growing();
         let Self { field, rays, params, .. } = self;
-        field.forget_dead(params, |loyal| {
-            let impact = rays.impact_of(loyal).unwrap_or(loyal);
+        field.forget_dead(params, |owner| {
+            let impact = rays.impact_of(owner).unwrap_or(owner);
             is_over || is_left.get(impact as usize) == Some(&false)
         });
         forgotten

@@ -1,13 +1,13 @@
-//! Rays as they grow: which node is on which, where they fork, and the rings between them.
+//! Rays as they grow: which node is on which ray, where they fork, and the rings between them.
 //!
-//! Each ray follows markers of its own (a marker attracts the nodes of its ray alone, by eq. 2 of Couto et al.). A node at which the plan has a
-//! fork bears the first node of another ray beside it; when both corners of a line of a ring are there, a tip sets out from one
-//! to the other, a segment a step, and is joined to it (`draw_connections`).
+//! Each ray follows its own markers (a marker attracts only the nodes of its ray, by eq. 2 of Couto et al.). At a
+//! node where the plan has a fork, the first node of another ray is added beside it. When both corners of a line of a
+//! ring exist, a tip runs from one to the other, one segment a step, and is linked to it (`draw_connections`).
 
 use super::{
     draws,
     params::MAX_MARKERS,
-    plan::{Blow, Plan},
+    plan::{Plan, PlannedHit},
     rays::{Corner, Fork, NO_NODE, NO_RAY, Walker, chord_steps},
     region::density_at,
     state::CrackGrowth,
@@ -23,16 +23,17 @@ impl CrackGrowth {
     pub(super) fn plan_rays(&self, impact: u32, reach: f32) -> Option<Plan> {
         let hit = self.impacts.get(impact as usize)?;
         let seed = mix(self.seed ^ mix(u64::from(impact)));
-        let blow = Blow { pos: hit.pos, energy: hit.first_energy, reach, seed };
-        Plan::new(&self.params, blow, self.network.extent())
+        let planned = PlannedHit { pos: hit.pos, energy: hit.first_energy, reach, seed };
+        Plan::new(&self.params, planned, self.network.extent())
     }
 
-    /// Begins the rays of a plan: the rim from `first` on, of which `born` tells the places that are there, and the markers.
+    /// Starts the rays of a plan: the rim from `first` on, of which `born` has the places that exist, and the
+    /// markers.
     pub(super) fn begin_rays(&mut self, plan: &Plan, impact: u32, born: &[(usize, u32)]) -> u32 {
         let is_over = !self.is_growing();
         let first = self.rays.add_plan(plan, impact, is_over);
         if born.is_empty() {
-            // The hit is on a crack, from which it has sprouted: each sprout is on the ray that is nearest to its direction.
+            // The hit is on a crack and has new branches there: each branch is on the ray with the nearest direction.
             let center = self.impacts[impact as usize].pos;
             for node in self.newborn.clone() {
                 let way = (self.network.nodes[node as usize].pos - center).normalize_or_zero();
@@ -49,7 +50,7 @@ impl CrackGrowth {
             if let Some(ray) = plan.rim[place].ray {
                 self.put_on_ray(node, first + ray as u32);
             }
-            // The rim, where it goes on to the next place.
+            // The rim, where it continues to the next place.
             let (next, to) = born[(i + 1) % born.len()];
             let follows = next == (place + 1) % plan.rim.len();
             let is_twice = born.len() == 2 && i == 1;
@@ -62,7 +63,7 @@ impl CrackGrowth {
         first
     }
 
-    /// Lays out the markers of the rays of a plan, the first of which is called `name`.
+    /// Lays out the markers of the rays of a plan, the first of which has the number `name`.
     pub(super) fn lay_out_rays(&mut self, plan: &Plan, name: u32) {
         let extent = self.network.extent();
         for (i, ray) in (0u32..).zip(&plan.rays) {
@@ -80,14 +81,14 @@ impl CrackGrowth {
         }
     }
 
-    /// Whether no marker may be here.
+    /// Whether markers are not allowed here.
     fn is_barren(&self, pos: Vec2) -> bool {
         let extent = self.network.extent();
         let density = density_at(self.density.as_ref(), pos, extent) * self.mask.density_at(pos / extent);
         density <= 0.0 || self.mask.is_forbidden(pos / extent)
     }
 
-    /// What the nodes from `first` on bring about: forks, and lines of rings; and a step of those that are on their way.
+    /// Handles the nodes from `first` on: starts forks and lines of rings, and advances the lines that are growing.
     pub(super) fn advance_rays(&mut self, first: u32) {
         let mut node = first;
         while (node as usize) < self.network.nodes.len() {
@@ -135,7 +136,7 @@ impl CrackGrowth {
         }
     }
 
-    /// One segment of a line of a ring; `None` when it has come to its end.
+    /// Adds one segment to a line of a ring; `None` when it has reached its end.
     fn walk(&mut self, mut walker: Walker) -> Option<Walker> {
         if walker.wait > 0 {
             walker.wait -= 1;
@@ -150,11 +151,11 @@ impl CrackGrowth {
             return None;
         }
         walker.steps_left = walker.steps_left.checked_sub(1)?;
-        // Another crack may have come between.
+        // Another crack may be in the way now.
         if self.params.arrest > 0.0 && segments > 2.5 && self.ends_soon(walker.tip, (to - from).normalize_or_zero()) {
             return None;
         }
-        // As many equal segments as it takes, each a little aside.
+        // Equal segments, each with a small random deviation.
         let stray =
             self.params.wander * (2.0 * hash_unit(self.seed ^ draws::CHORD, self.network.nodes.len() as u64) - 1.0);
         let way = (to - from) / segments;

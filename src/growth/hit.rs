@@ -92,7 +92,7 @@ impl CrackGrowth {
                 let reach = self.reach(center, after);
                 self.populate(index, center, self.reach(center, before), reach);
                 if let Some(division) = &mut self.division {
-                    division.go_on(index, reach);
+                    division.extend_reach(index, reach);
                 }
                 self.steps_left = self.params.num_iterations;
             }
@@ -118,7 +118,7 @@ impl CrackGrowth {
             let is_free = !self.nodes.any_within(place, 1e-4) && !self.is_on_crack(place, index);
             if is_free && !self.mask.is_forbidden(place / extent) {
                 born.push((i, self.network.nodes.len() as u32));
-                self.bear(place, NO_PARENT, 0, index, 1.0);
+                self.add_node(place, NO_PARENT, 0, index, 1.0);
             }
         }
         if first == self.network.nodes.len() as u32 {
@@ -189,7 +189,7 @@ impl CrackGrowth {
                     continue;
                 }
                 if self.arrest.is_none() {
-                    self.bear(to, start, 1, self.network.nodes[start as usize].impact, 1.0);
+                    self.add_node(to, start, 1, self.network.nodes[start as usize].impact, 1.0);
                     break;
                 }
                 if self.extend(start, to, false).is_some() {
@@ -211,8 +211,8 @@ impl CrackGrowth {
         let region = Region { center, inner, outer, extent };
         let seed = mix(self.seed ^ mix(u64::from(impact) | 1 << 40));
         // The rays of a hit have their own markers: older cracks do not grow towards them.
-        let loyal = if self.params.keeps_apart() { impact } else { ANY_IMPACT };
-        self.begin_layout(region, (impact, loyal), seed);
+        let owner = if self.params.keeps_apart() { impact } else { ANY_IMPACT };
+        self.begin_layout(region, (impact, owner), seed);
     }
 
     /// Gives each hit from which nothing could grow, because the place is too narrow, a short crack.

@@ -1,4 +1,4 @@
-//! What newborn nodes are joined to: each other, where two cracks come together, and other cracks.
+//! Links new nodes to each other, where two cracks meet, and to other cracks.
 
 use super::{arrest::AHEAD, links, state::CrackGrowth};
 use crate::pattern::{Link, LinkKind, SegmentId};
@@ -41,8 +41,8 @@ impl CrackGrowth {
             }
         }
         let all = self.network.links.len() as u32;
-        (self.links_told..all).for_each(|_| self.timeline.add_link());
-        self.changes.list.extend((self.links_told..all).map(SegmentId::Link));
-        self.links_told = all;
+        (self.links_reported..all).for_each(|_| self.timeline.add_link());
+        self.changes.list.extend((self.links_reported..all).map(SegmentId::Link));
+        self.links_reported = all;
     }
 }

@@ -1,4 +1,4 @@
-//! A layout of markers under way: a hit may lay its markers out in slices, and they are the same however large those are.
+//! Lays out markers, at once or in slices; the result does not depend on the size of the slices.
 
 use super::{
     cursor::Cursor,
@@ -9,18 +9,18 @@ use super::{
     state::CrackGrowth,
 };
 
-/// The fewest nodes that a layout makes room for.
+/// The smallest number of nodes for which memory is reserved.
 const FEW_NODES: usize = 64;
 
-/// For more than so many markers are given room in good time.
+/// Above this number of nodes memory for markers is prepared in advance.
 const MANY_NODES: usize = 4096;
 
-/// Room for so many nodes costs as much as a place.
+/// Reserving memory for this many nodes costs as much as one place.
 const ROOM: u32 = 16;
 
 impl CrackGrowth {
     /// Prepares the layout of an impact for `region`.
-    pub(super) fn begin_layout(&mut self, region: Region, (impact, loyal): (u32, u32), seed: u64) {
+    pub(super) fn begin_layout(&mut self, region: Region, (impact, owner): (u32, u32), seed: u64) {
         let mut darts = None;
         let stress = self.division.is_some().then(|| {
             self.field.settle(&self.network.nodes, &self.nodes);
@@ -28,32 +28,33 @@ impl CrackGrowth {
             Stress { region, seed: self.seed ^ u64::from(impact), apart }
         });
         if let MarkerLayout::DartThrowing { spacing } = self.params.markers {
-            // Darts keep their distance from the markers of hits that no step has taken up yet, too.
+            // Darts also keep their distance from the markers of hits that no step has processed yet.
             self.field.settle(&self.network.nodes, &self.nodes);
             let others = (self.field.made_settled(), self.network.nodes.len());
             darts = Some(Box::new(Darts::new(&region, spacing, self.mask.is_empty(), others)));
         }
         self.layout =
-            Some(Box::new(Layout { region, seed, loyal, cursor: Cursor::default(), darts, stress, room: None }));
+            Some(Box::new(Layout { region, seed, owner, cursor: Cursor::default(), darts, stress, room: None }));
     }
 
-    /// Goes on laying out the markers of a hit that was [begun](Self::begin_hit), at up to about `places` places. Returns whether some are left.
+    /// Continues to lay out the markers of a hit that was [begun](Self::begin_hit), at up to about `places` places.
+    /// Returns whether some are left.
     ///
-    /// Where markers come to lie does not depend on the slices. Whatever else is asked of the growth does what is left first.
+    /// The positions of markers do not depend on the slices. All other methods complete the layout first.
     pub fn lay_out(&mut self, places: u32) -> bool {
         let Some(mut layout) = self.layout.take() else { return false };
         layout.cursor.left = places;
         if layout.room.is_none() && self.lay_out_markers(&mut layout) {
             layout.room = Some(0);
         }
-        let is_left = !layout.room.as_mut().is_some_and(|room| self.make_room(room, &mut layout.cursor));
+        let is_left = !layout.room.as_mut().is_some_and(|room| self.reserve_nodes(room, &mut layout.cursor));
         self.layout = is_left.then_some(layout);
         is_left
     }
 
-    /// Lays out markers as far as the slice goes. Returns whether those were the last ones.
+    /// Lays out markers up to the limit of the slice. Returns whether those were the last ones.
     fn lay_out_markers(&mut self, layout: &mut Layout) -> bool {
-        let Layout { region, seed, loyal, cursor, darts, stress, .. } = layout;
+        let Layout { region, seed, owner, cursor, darts, stress, .. } = layout;
         if let Some(darts) = darts {
             let (count, markers) = (darts.others.len().min(cursor.left as usize), darts.index.markers);
             for _ in 0..count {
@@ -72,19 +73,19 @@ impl CrackGrowth {
         let mut keeper = Keeper {
             field: &mut self.field,
             shown: draw_markers.then_some((&mut self.shown_markers, &mut self.timeline, line_width)),
-            loyal: *loyal,
+            owner: *owner,
             darts: darts.as_deref_mut(),
             stress: *stress,
         };
         let wishes = (self.density.as_ref(), &*self.mask);
-        // A full field takes none of those that are left.
+        // A full field accepts no more markers.
         let is_full = keeper.field.living_at_most() >= MAX_MARKERS;
         is_full || markers::lay_out(&self.params, *region, wishes, *seed, cursor, &mut keeper)
     }
 
-    /// A large growth makes about two nodes a marker: room for them now, one kind after the other, so that no step pauses to move them
-    /// all. Returns whether there is room for all.
-    fn make_room(&mut self, next: &mut u32, cursor: &mut Cursor) -> bool {
+    /// Reserves memory for about two nodes per marker, one array after the other, so that no step pauses to move them
+    /// all. Returns whether all are done.
+    fn reserve_nodes(&mut self, next: &mut u32, cursor: &mut Cursor) -> bool {
         let more = (2 * self.field.living_at_most()).max(FEW_NODES).min(self.room());
         while cursor.left > 0 {
             match *next {
@@ -106,15 +107,26 @@ impl CrackGrowth {
         false
     }
 
-    /// Takes up the markers of hits, up to about so many of them, before the next [`step`](Self::step), which takes up all that are left. Returns
-    /// whether it has only to grow.
+    /// Processes the markers of hits, up to about `markers` of them, before the next [`step`](Self::step), which
+    /// processes all that are left. Returns whether none are left.
     ///
-    /// What grows does not depend on the slices.
+    /// The result of the growth does not depend on the slices.
+    ///
+    /// ```
+    /// use bevy_crack::growth::{CrackGrowth, GrowthParams};
+    ///
+    /// let mut growth = CrackGrowth::new(GrowthParams::DEFAULT, [1.0, 1.0].into(), 7)?;
+    /// growth.begin_hit([0.5, 0.5].into(), 1.0);
+    /// // One slice per frame.
+    /// while !growth.prepare_step(64) {}
+    /// assert!(growth.step().grew());
+    /// # Ok::<(), bevy_crack::growth::ParamError>(())
+    /// ```
     pub fn prepare_step(&mut self, markers: u32) -> bool {
         !self.lay_out(markers) && self.field.settle_some(&self.network.nodes, &self.nodes, markers)
     }
 
-    /// Whether [`prepare_step`](Self::prepare_step) has begun and is not done. A hit would do the rest of it at once.
+    /// Whether [`prepare_step`](Self::prepare_step) has begun and is not done. A hit would complete it at once.
     #[cfg_attr(not(feature = "bevy"), expect(dead_code, reason = "surfaces of the plugin are hit"))]
     pub(crate) const fn is_preparing(&self) -> bool {
         self.layout.is_some() || self.field.is_settling()
@@ -126,7 +138,7 @@ impl CrackGrowth {
         self.layout.is_some()
     }
 
-    /// Lays out what is left, and has it settle if it has begun to.
+    /// Lays out the remaining markers, and settles them if settling has begun.
     pub(super) fn finish_layout(&mut self) {
         while self.lay_out(1 << 16) {}
         if self.field.is_settling() {

@@ -1,4 +1,4 @@
-//! What a hit has still to lay out, and which markers are kept.
+//! The pending markers of a hit, and which markers are kept.
 
 use super::{
     cursor::Cursor,
@@ -11,31 +11,32 @@ use crate::pattern::{Dot, Timeline};
 use glam::{UVec2, Vec2};
 use std::ops::Range;
 
-/// What one hit has still to lay out.
+/// The markers that one hit has still to lay out.
 #[derive(Clone, Debug)]
 pub(super) struct Layout {
     pub(super) region: Region,
     pub(super) seed: u64,
-    /// The impact whose nodes alone may win the markers, or any.
-    pub(super) loyal: u32,
+    /// The impact whose nodes may win the markers, or any.
+    pub(super) owner: u32,
     pub(super) cursor: Cursor,
     pub(super) darts: Option<Box<Darts>>,
     pub(super) stress: Option<Stress>,
-    /// The next of what gets room for what will grow, once all markers are there.
+    /// The next array to reserve memory for, once all markers are there.
     pub(super) room: Option<u32>,
 }
 
-/// How far from all that relieves it the surface is, around a hit whose cracks divide domains.
+/// Distance of the surface from everything that relieves stress, around a hit whose cracks divide domains.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stress {
     pub(super) region: Region,
     pub(super) seed: u64,
-    /// Where the markers of an earlier hit are so near, they serve this one as well.
+    /// If markers of an earlier hit are this near, they serve this hit as well.
     pub(super) apart: f32,
 }
 
 impl Stress {
-    /// The distance of `pos` from the border, which is a crack too, and from the rim, beyond which there is no stress.
+    /// The distance of `pos` from the border, which counts as a crack, and from the rim, beyond which there is no
+    /// stress.
     fn relieved(&self, pos: Vec2) -> f32 {
         let Region { center, outer, extent, .. } = self.region;
         let to_rim = rim_towards(pos - center, outer, self.seed) - pos.distance(center);
@@ -43,16 +44,16 @@ impl Stress {
     }
 }
 
-/// What darts must keep their distance from.
+/// The places from which darts must keep their distance.
 #[derive(Clone, Debug)]
 pub(super) struct Darts {
     pub(super) index: Index,
     side: f32,
     cells: Cells,
-    /// Of each cell a bit: whether every place in it is too near to one marker. Darts thrown there need not be looked at.
+    /// One bit per cell: whether every place in it is too near to one marker. Darts thrown there are skipped.
     covered: Vec<u64>,
     spacing: f32,
-    /// Whether darts stay where they are thrown.
+    /// Whether darts stay where they are thrown (there is no mask that moves them).
     are_still: bool,
     /// Markers of earlier hits, then nodes, that are not in the index yet.
     pub(super) others: Range<usize>,
@@ -73,7 +74,7 @@ impl Darts {
         }
     }
 
-    /// Notes the cells that lie within the spacing of a marker altogether.
+    /// Marks the cells that lie completely within the spacing of a marker.
     fn cover(&mut self, pos: Vec2) {
         // Less for rounding.
         let limit = 0.999 * self.spacing;
@@ -98,19 +99,19 @@ impl Darts {
 /// No place.
 const NONE: u32 = u32::MAX;
 
-/// The most cells of an index of places.
+/// The largest number of cells of an index of places.
 const MOST_CELLS: f32 = 1_048_576.0;
 
-/// What lies where: small cells, a million at most, each with a list.
+/// An index of places: small cells, a million at most, each with a list.
 #[derive(Clone, Debug)]
 pub(super) struct Index {
     cells: UVec2,
     /// Cells per pattern unit.
     per_unit: Vec2,
     head: Vec<u32>,
-    /// Each place, and the one before it in its cell.
+    /// Each place, and the previous one in its cell.
     places: Vec<(Vec2, u32)>,
-    /// So many of the places are markers, the first ones.
+    /// Number of places that are markers; these come first.
     pub(super) markers: u32,
 }
 
@@ -155,12 +156,12 @@ impl Index {
     }
 }
 
-/// Takes up markers that were laid out.
+/// Collects the markers that were laid out.
 pub(super) struct Keeper<'a> {
     pub(super) field: &'a mut MarkerField,
-    /// Places to tell, and when they were made, if markers are drawn.
+    /// The list of shown markers, the timeline and the line width, if markers are drawn.
     pub(super) shown: Option<(&'a mut Vec<Vec2>, &'a mut Timeline, f32)>,
-    pub(super) loyal: u32,
+    pub(super) owner: u32,
     pub(super) darts: Option<&'a mut Darts>,
     pub(super) stress: Option<Stress>,
 }
@@ -174,14 +175,14 @@ impl Keeper<'_> {
         if self.stress.is_some_and(|stress| self.field.any_within(pos, stress.apart)) {
             return;
         }
-        self.field.add(pos, self.loyal, self.stress.map_or(f32::INFINITY, |stress| stress.relieved(pos)));
+        self.field.add(pos, self.owner, self.stress.map_or(f32::INFINITY, |stress| stress.relieved(pos)));
         if let Some((shown, timeline, radius)) = &mut self.shown {
             shown.push(pos);
             timeline.add_dot(Dot { pos, radius: *radius });
         }
     }
 
-    /// Keeps a marker that must keep its distance from others, from the markers of earlier hits and from nodes.
+    /// Keeps a marker if it is far enough from others, from the markers of earlier hits and from nodes.
     pub(super) fn throw(&mut self, pos: Vec2, spacing: f32) {
         let is_full = self.field.living_at_most() >= MAX_MARKERS;
         let Some(darts) = self.darts.as_mut().filter(|_| !is_full) else { return };

@@ -1,4 +1,4 @@
-//! Segments across branches: the rings of glass (`draw_connections`) and the cells of clay (`draw_islands`).
+//! Links between branches: the rings of glass (`draw_connections`) and the cells of clay (`draw_islands`).
 
 use super::{draws, impact::Impact, nodes::NodeGrid, params::GrowthParams};
 use crate::{
@@ -7,21 +7,21 @@ use crate::{
 };
 use std::{collections::VecDeque, ops::Range};
 
-/// Finds what newborn nodes are joined to.
+/// Finds the nodes to which new nodes are linked.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Linker {
     /// Links found and not taken yet.
     links: Vec<Link>,
-    /// Newborn nodes of one ring with their angle around the impact.
+    /// New nodes of one ring with their angle around the impact.
     ring: Vec<(f32, u32)>,
-    /// Per node: whether another grew from it.
+    /// Per node: whether another node grew from it.
     parents: Vec<bool>,
-    /// Nodes of the last steps, which may turn out to be tips.
+    /// Nodes of the last steps, which may be tips.
     waiting: VecDeque<Range<u32>>,
 }
 
-/// Nodes that meet within so many generations are of the same branch.
-const KIN: usize = 8;
+/// Nodes with a common ancestor within this many generations belong to the same branch.
+const NEAR_GENERATIONS: usize = 8;
 
 impl Linker {
     /// Links between neighbours on a ring: nodes of one impact and one generation, next to each other as seen from the impact.
@@ -53,7 +53,7 @@ impl Linker {
                 let (a, b) = (self.ring[i].1, self.ring[(i + 1) % n].1);
                 let generation = network.nodes()[a as usize].generation;
                 let (from, beside) = (network.nodes()[a as usize].pos, network.nodes()[b as usize].pos);
-                // None spans a wide gap.
+                // No link spans a wide gap.
                 let radius = from.distance(impact.pos).max(params.step_length);
                 let apart = generation != network.nodes()[b as usize].generation || from.distance(beside) > radius;
                 let is_left_out = hash_unit(seed ^ draws::CONNECTION_GAP, u64::from(a)) < params.connection_gaps;
@@ -80,7 +80,8 @@ impl Linker {
         }
     }
 
-    /// Tips that have come to rest: nodes without a child two steps after their birth; when growth has ended, all of them.
+    /// Tips that no longer grow: nodes without a child two steps after they were added; when growth has ended, all of
+    /// them.
     pub(super) fn tips_at_rest(&mut self, network: &Network, newborn: Range<u32>) -> Vec<u32> {
         self.parents.resize(network.nodes().len(), false);
         for node in newborn.clone() {
@@ -103,13 +104,13 @@ pub(super) fn island(params: &GrowthParams, network: &Network, nodes: &NodeGrid,
     let born = network.nodes()[tip as usize];
     let parent = network.nodes().get(born.parent as usize)?;
     let ahead = (born.pos - parent.pos).normalize_or_zero();
-    let kin = ancestors(network, tip);
+    let own = ancestors(network, tip);
     let mut best = (f32::INFINITY, u32::MAX);
     nodes.within(born.pos, params.island_distance, |other, distance_sq| {
         let way = network.nodes()[other as usize].pos - born.pos;
         if (distance_sq, other) < best
             && way.dot(ahead) > 0.3 * distance_sq.sqrt()
-            && !ancestors(network, other).iter().any(|a| *a != NO_PARENT && kin.contains(a))
+            && !ancestors(network, other).iter().any(|a| *a != NO_PARENT && own.contains(a))
         {
             best = (distance_sq, other);
         }
@@ -118,7 +119,8 @@ pub(super) fn island(params: &GrowthParams, network: &Network, nodes: &NodeGrid,
     (best.1 != u32::MAX).then_some(link)
 }
 
-/// Whether generation `generation` carries a ring: the rings lie at `every` times 1, 3, 6, 10 ..., wider apart further out.
+/// Whether there is a ring at generation `generation`: rings are at `every` times 1, 3, 6, 10 ..., wider apart
+/// further out.
 const fn is_ring(generation: u32, every: u32) -> bool {
     let (mut ring, mut gap) = (0, every);
     while ring < generation {
@@ -128,9 +130,9 @@ const fn is_ring(generation: u32, every: u32) -> bool {
     ring == generation
 }
 
-/// A node and those it grew from, the nearest first.
-fn ancestors(network: &Network, node: u32) -> [u32; KIN] {
-    let mut line = [NO_PARENT; KIN];
+/// A node and its ancestors, the nearest first.
+fn ancestors(network: &Network, node: u32) -> [u32; NEAR_GENERATIONS] {
+    let mut line = [NO_PARENT; NEAR_GENERATIONS];
     let mut next = node;
     for slot in &mut line {
         if next == NO_PARENT {

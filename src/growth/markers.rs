@@ -1,4 +1,4 @@
-//! Where markers come to lie.
+//! Layouts of markers.
 
 use super::{
     cursor::Cursor,
@@ -14,10 +14,11 @@ use crate::{
 use glam::Vec2;
 use std::f32::consts::TAU;
 
-/// Gives `keeper` the next markers that `params` lay out in `region`, in a fixed order, as far as the slice goes. Returns whether those were the
-/// last ones.
+/// Gives `keeper` the next markers that `params` lay out in `region`, in a fixed order, up to the limit of the slice.
+/// Returns whether those were the last ones.
 ///
-/// Each draw depends on the place alone, so that a hit that grows by energy only adds a ring, and slices may be of any size.
+/// Each random draw depends only on the place. So a hit whose energy increases only adds a ring of markers, and
+/// slices may be of any size.
 pub(super) fn lay_out(
     params: &GrowthParams,
     region: Region,
@@ -28,7 +29,7 @@ pub(super) fn lay_out(
 ) -> bool {
     let mut kept = cursor.kept;
     let apart = spacing(params, region.extent);
-    // Where a marker comes to lie that is offered a place, if it does.
+    // Decides whether a marker is created at a place, and where it moves.
     let settle = |pos: Vec2, chance: f32, probability: f32| {
         let share = region.share(pos, params.uneven, seed)?;
         let mut thinned = if params.focus > 0.0 { ops::powf(1.0 - share, params.focus) } else { 1.0 };
@@ -40,7 +41,7 @@ pub(super) fn lay_out(
         let density = density_at(density, pos, region.extent) * mask.density_at(pos / region.extent);
         (chance < probability * thinned * density).then_some(pos)
     };
-    // A closer one dies at once.
+    // A closer marker is reached at once.
     let counts = |pos: Vec2| u32::from(pos.distance(region.center) > 1.5 * params.kill_distance);
     let mut offer = |pos: Vec2, chance: f32, probability: f32| {
         if let Some(pos) = settle(pos, chance, probability) {
@@ -48,10 +49,10 @@ pub(super) fn lay_out(
             kept += counts(pos);
         }
     };
-    // Places that may move are looked for.
+    // With a mask several places are tried.
     let cost = if mask.is_empty() { 1 } else { TRIES };
     let is_over = match params.markers {
-        // They come with their plan.
+        // Markers of rays are created with their plan.
         MarkerLayout::Rays { .. } => true,
         MarkerLayout::PseudoGrid { occupancy, jitter } => {
             let [columns, lines] = grid(params, region.extent).to_array();
@@ -72,7 +73,7 @@ pub(super) fn lay_out(
             cursor.is_at(cells.rows())
         }
         MarkerLayout::DartThrowing { spacing } => {
-            // One dart per cell and round; the cells are small enough that each holds at most one marker.
+            // One dart per cell and round; the cells are so small that each holds at most one marker.
             let (cell, cells) = dart_cells(&region, spacing);
             let rows = DART_ROUNDS * cells.rows();
             for row in cursor.slice(rows, cost * cells.columns()) {
@@ -115,14 +116,14 @@ pub(super) fn lay_out(
     is_over
 }
 
-/// Rounds of darts, one for each cell.
+/// Rounds of darts, one dart per cell and round.
 const DART_ROUNDS: u64 = 6;
 
-/// Places that are looked at for the weakest one.
+/// Places that are tried to find the weakest one.
 const TRIES: u32 = 24;
 
-/// The weakest place near a marker, and how much of its chance it keeps there: none where cracks are forbidden, little where
-/// all around is strong or, if some places of the surface are weak, nothing here is.
+/// The weakest place near a marker, and the share of its probability there: zero where cracks are forbidden; small
+/// where the whole neighbourhood is strong, or where nothing near is weak although other places of the surface are.
 fn to_weak_place(pos: Vec2, apart: f32, mask: &CrackMask, extent: Vec2, seed: u64) -> (Vec2, f32) {
     let place = mix(seed ^ u64::from(pos.x.to_bits()) << 32 ^ u64::from(pos.y.to_bits()));
     let mut best = (pos, f32::NEG_INFINITY);
@@ -143,13 +144,13 @@ fn to_weak_place(pos: Vec2, apart: f32, mask: &CrackMask, extent: Vec2, seed: u6
     (best.0, kept)
 }
 
-/// A place `arm` away from the hit, along the longer side, where there is more room: even a surface that is hardly more than a
-/// line has one.
+/// A place `arm` away from the hit along the longer side, where there is more room. Even a surface that is almost a
+/// line has such a place.
 fn towards_room(region: Region, arm: f32) -> Vec2 {
     let axis = if region.extent.x >= region.extent.y { Vec2::X } else { Vec2::Y };
     let is_in_first_half = region.center.dot(axis) < 0.5 * region.extent.dot(axis);
     (region.center + if is_in_first_half { arm } else { -arm } * axis).clamp(Vec2::ZERO, region.extent)
 }
 
-/// Markers that even the weakest hit lays out, so that it shows.
+/// Number of markers that even the weakest hit creates, so that it is visible.
 const FEWEST: u32 = 3;

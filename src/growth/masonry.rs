@@ -1,43 +1,43 @@
-//! Courses of bricks, and the ways that their joints leave to cracks.
+//! Courses of bricks, and the directions that their joints offer to cracks.
 
 use super::draws;
 use crate::{Grid, math::hash_unit};
 use glam::Vec2;
 
-/// Share of a row (column) of a course that is weak where a joint runs along it.
+/// A row (column) of a course counts as a joint if this share of it is weak.
 const JOINT: f32 = 0.45;
 
-/// Bricks are so many times as long as a course is high.
+/// Ratio of the length of bricks to the height of a course.
 const BRICK: f32 = 3.0;
 
-/// Share of a course that is joint, where the picture tells nothing.
+/// Share of a course that is joint, if the picture does not say.
 const THIN: f32 = 0.14;
 
-/// A hit at the border counts places there as further away by so many times what they lack of room.
+/// For a hit at the border, places there count as further away by this factor times their lack of room.
 const OFF_BORDER: f32 = 2.2;
 
-/// Places closer than this (pattern units) are one.
+/// Places closer than this (pattern units) are the same.
 const SAME: f32 = 1e-4;
 
 /// The joints of a wall: bed joints run from side to side, head joints from bed to bed.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Masonry {
     extent: Vec2,
-    /// Where bed joints lie, from the top.
+    /// Positions of bed joints, from the top.
     beds: Vec<f32>,
-    /// Of each course, from the one above the first bed: where its head joints lie, from the left.
+    /// For each course, from the one above the first bed joint: the positions of its head joints, from the left.
     heads: Vec<Vec<f32>>,
-    /// How wide joints are, pattern units.
+    /// Width of joints, pattern units.
     joint: f32,
-    /// How long bricks are, pattern units.
+    /// Length of bricks, pattern units.
     brick: f32,
 }
 
-/// A way along a joint: its direction, and how far it is to where another joint meets it.
+/// A direction along a joint, and the distance to the next crossing joint.
 pub(super) type Way = (Vec2, f32);
 
 impl Masonry {
-    /// A wall without a picture: courses of this height, each half a brick off the one below.
+    /// A wall without a picture: courses of this height, each shifted by half a brick against the one below.
     pub(super) fn regular(extent: Vec2, course: f32, seed: u64) -> Self {
         let uneven = |i: u64| 0.06 * (hash_unit(seed ^ draws::BRICK, i) - 0.5);
         let count = |length: f32, of: f32| ((length / of) as u32).clamp(1, 4096);
@@ -59,7 +59,7 @@ impl Masonry {
         Self { extent, beds, heads, joint: THIN * course, brick }
     }
 
-    /// The joints of a picture in which these places are weak; `None` if it shows no courses of bricks.
+    /// The joints in a picture with these weak places; `None` if it does not show courses of bricks.
     pub(super) fn find(weak: &Grid<f32>, extent: Vec2) -> Option<Self> {
         let size = weak.size();
         let scale = extent / size.as_vec2();
@@ -93,7 +93,7 @@ impl Masonry {
             extent,
             beds: beds.iter().map(|&(y, _)| y * scale.y).collect(),
             heads,
-            // The lines of a picture are found a little wider than they are.
+            // The detected lines of a picture are a little too wide.
             joint: 0.7 * thick * scale.min_element(),
             brick: gaps.iter().sum::<f32>() / gaps.len() as f32,
         })
@@ -107,7 +107,7 @@ impl Masonry {
         self.brick
     }
 
-    /// The course that a height lies in, or that above the bed joint which it is.
+    /// The course at a height; on a bed joint the course above it.
     fn course(&self, y: f32) -> usize {
         self.beds.partition_point(|bed| *bed < y - SAME)
     }
@@ -127,7 +127,7 @@ impl Masonry {
         self.bed(pos.y).is_some() || self.is_head(self.course(pos.y), pos.x)
     }
 
-    /// The nearest place at which joints meet, if there is any; where it would be at the border, rather one further inside.
+    /// The nearest place at which joints meet, if there is one; instead of one at the border, one further inside.
     pub(super) fn nearest(&self, pos: Vec2) -> Option<Vec2> {
         let off = |at: f32, to: f32, extent: f32, room: f32| {
             (at - to).abs() + OFF_BORDER * (room - at.min(extent - at)).clamp(0.0, 0.5 * extent)
@@ -140,7 +140,7 @@ impl Masonry {
         Some(Vec2::new(*x, self.beds[bed]))
     }
 
-    /// The ways from a place: along its joints; within a brick up and down.
+    /// The directions from a place: along its joints; inside a brick up and down.
     pub(super) fn ways(&self, pos: Vec2) -> Vec<Way> {
         let mut ways = Vec::with_capacity(4);
         let course = self.course(pos.y);
@@ -165,7 +165,8 @@ impl Masonry {
         ways
     }
 
-    /// The place straight above (`up` -1) or below (1) a bed joint where a split of the brick there ends; none near the brick's ends.
+    /// The place above (`up` -1) or below (1) a bed joint where a crack through the brick there ends; `None` near the
+    /// brick's ends.
     pub(super) fn across(&self, pos: Vec2, up: f32) -> Option<Vec2> {
         let bed = self.bed(pos.y)?;
         let (course, y) = if up < 0.0 {
@@ -177,11 +178,11 @@ impl Masonry {
         (!self.heads[course].iter().any(is_near)).then_some(Vec2::new(pos.x, y))
     }
 
-    /// Where a segment of about `length` ends that takes a way.
+    /// The end of a segment of about `length` in this direction.
     pub(super) fn end(&self, from: Vec2, (way, far): Way, length: f32) -> Vec2 {
         let end = if far <= 1.45 * length { far } else { length };
         let mut to = (from + way * end).clamp(Vec2::ZERO, self.extent);
-        // Exactly in the middle, whatever rounding has made of it.
+        // Exactly in the middle, without rounding errors.
         if let Some(bed) = self.bed(to.y) {
             to.y = self.beds[bed];
         }
@@ -194,7 +195,7 @@ fn mean(values: impl Iterator<Item = f32>) -> f32 {
     sum / count.max(1) as f32
 }
 
-/// Runs of high values: the middle of each, weighed by them, and how long it is.
+/// Runs of high values: the weighted middle of each, and its length.
 fn ridges(values: &[f32]) -> Vec<(f32, f32)> {
     let highest = values.iter().copied().fold(0.0, f32::max);
     let least = JOINT.max(0.5 * highest);
@@ -206,11 +207,11 @@ fn ridges(values: &[f32]) -> Vec<(f32, f32)> {
             continue;
         }
         let end = (start..values.len()).find(|&i| values[i] < least).unwrap_or(values.len());
-        // With its slopes.
+        // Including its slopes.
         let (low, high) = (start.saturating_sub(1), (end + 1).min(values.len()));
         let weight: f32 = values[low..high].iter().sum();
         let middle = (low..high).map(|i| (i as f32 + 0.5) * values[i]).sum::<f32>() / weight;
-        // What lies at the border is half a joint at most.
+        // A run at the border is at most half a joint.
         if start > 0 && end < values.len() {
             found.push((middle, weight / highest));
         }

@@ -1,4 +1,4 @@
-//! An index of the nodes by place.
+//! A spatial index of nodes.
 
 use glam::{UVec2, Vec2};
 
@@ -69,7 +69,7 @@ impl NodeGrid {
         }
     }
 
-    /// Whether a node within `radius` of `pos` is as asked, by its index and squared distance.
+    /// Whether the predicate holds for a node within `radius` of `pos`, given its index and squared distance.
     pub(super) fn any(&self, pos: Vec2, radius: f32, mut is_so: impl FnMut(u32, f32) -> bool) -> bool {
         let (low, high) = (self.cell_at(pos - radius), self.cell_at(pos + radius));
         (low.y..=high.y).any(|y| {

@@ -1,4 +1,4 @@
-//! What a tip knows of the cracks around it: which are others than its own, and what becomes of those that it meets.
+//! A tip and the other cracks around it: which cracks are others, and what happens to those that it meets.
 
 use super::{
     division::{MUCH_WIDER, rim_towards},
@@ -13,13 +13,13 @@ use crate::{
 };
 use glam::Vec2;
 
-/// Cosine of the angle between the ways of two tips below which they come towards each other.
+/// Cosine of the angle between the directions of two tips below which they move towards each other.
 const HEAD_ON: f32 = 0.2;
 
-/// The same above which a steady crack does not make for a tip that waits: they run side by side.
+/// Cosine above which a steady crack does not move to a waiting tip: they run side by side.
 const ALONG: f32 = 0.6;
 
-/// A tip that has left the region of its hit is met from so many times as far as other cracks.
+/// A tip that has left the region of its hit is met from this many times the distance of other cracks.
 const INVITES: f32 = 1.4;
 
 impl CrackGrowth {
@@ -51,14 +51,15 @@ impl CrackGrowth {
     pub(super) fn each_foreign(&self, from: u32, reach: f32, mut visit: impl FnMut(u32, f32, Vec2)) {
         let pos = self.network.nodes[from as usize].pos;
         self.nodes.within(pos, reach, |node, distance_sq| {
-            if distance_sq > 0.0 && !self.is_kin(from, node) {
+            if distance_sq > 0.0 && !self.is_same_crack(from, node) {
                 visit(node, distance_sq, self.network.nodes[node as usize].pos - pos);
             }
         });
     }
 
-    /// Whether two nodes are of the same crack: not so many generations from one another that between them a cell could lie.
-    pub(super) fn is_kin(&self, one: u32, other: u32) -> bool {
+    /// Whether two nodes belong to the same crack: they are so few generations apart that no cell could lie between
+    /// them.
+    pub(super) fn is_same_crack(&self, one: u32, other: u32) -> bool {
         let (a, b) = (&self.network.nodes[one as usize], &self.network.nodes[other as usize]);
         if a.impact != b.impact {
             return false;
@@ -69,13 +70,13 @@ impl CrackGrowth {
                 || ray_of(one) != NO_RAY && ray_of(one) == ray_of(other);
         }
         let apart = (3.0 * self.params.arrest.max(self.params.island_distance) / self.params.step_length) as u32 + 2;
-        // Up from both to the node where they meet; a parent is always older than its child.
+        // Up from both to their common ancestor; a parent is always older than its child.
         let (mut a, mut b, mut steps) = (one, other, 0);
         while a != b {
             let later = if a > b { &mut a } else { &mut b };
             let parent = self.network.nodes[*later as usize].parent;
             if parent == NO_PARENT {
-                // The starts of a compact hit are of one crack.
+                // The starts of a compact hit belong to one crack.
                 let to_start = |node: u32| self.network.nodes[node as usize].generation;
                 return !self.divides()
                     && !matches!(self.params.starts, StartLayout::Points { .. })
@@ -90,14 +91,14 @@ impl CrackGrowth {
         true
     }
 
-    /// Whether a tip is one of those that stop short of other cracks.
+    /// Whether a tip is one of those that stop before other cracks.
     pub(super) fn stays_open(&self, tip: u32) -> bool {
         self.params.open_ends > 0.0
             && self.network.nodes[tip as usize].parent != NO_PARENT
             && hash_unit(self.seed ^ draws::OPEN_END, u64::from(tip)) < self.params.open_ends
     }
 
-    /// Whether a node has left what its hit has loaded.
+    /// Whether a node is outside the area that its hit has loaded.
     pub(super) fn has_left(&self, node: u32) -> bool {
         let Node { pos, impact, .. } = self.network.nodes[node as usize];
         let rim = self.division.as_ref().and_then(|division| division.begun.get(impact as usize));
@@ -110,7 +111,7 @@ impl CrackGrowth {
         }
     }
 
-    /// Of the tips that wait, the nearest within reach and ahead of a node.
+    /// The nearest waiting tip within reach and ahead of a node.
     pub(super) fn resting_ahead(&self, from: u32, heading: Vec2, reach: f32, ahead: f32) -> Option<(f32, u32)> {
         let (nodes, division) = (&self.network.nodes, self.division.as_ref()?);
         let pos = nodes[from as usize].pos;
@@ -119,7 +120,7 @@ impl CrackGrowth {
             let distance = way.length();
             let is_near = distance <= INVITES * reach && distance > 0.0 && way.dot(heading) >= ahead * distance;
             let is_aside = self.params.steady > 0.0 && self.heading_of(tip.node).dot(heading) > ALONG;
-            (is_near && !is_aside && !self.is_kin(from, tip.node)).then_some((distance, tip.node))
+            (is_near && !is_aside && !self.is_same_crack(from, tip.node)).then_some((distance, tip.node))
         });
         near.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
     }
@@ -129,14 +130,15 @@ impl CrackGrowth {
         self.division.as_ref().is_some_and(|division| division.resting.iter().any(|tip| tip.node == node))
     }
 
-    /// What waits no longer: it has been met.
+    /// Marks a tip as met: it no longer waits.
     pub(super) fn is_met(&mut self, node: u32) {
         if let Some(division) = &mut self.division {
             division.resting.retain(|tip| tip.node != node);
         }
     }
 
-    /// Whether the crack of a tip is so much wider than that of a node that it narrows where it meets it, if it is steady.
+    /// Whether the crack of a tip is so much wider than that of a node that it must narrow where it meets it, if it
+    /// is steady.
     pub(super) fn is_much_wider(&self, tip: u32, node: u32) -> bool {
         let width = |node: u32| {
             let Node { pos, impact, .. } = self.network.nodes[node as usize];
@@ -146,12 +148,13 @@ impl CrackGrowth {
         self.params.steady > 0.0 && width(tip) > MUCH_WIDER * width(node)
     }
 
-    /// Whether another crack meets that of a node there, if that makes a difference.
+    /// Whether another crack meets the crack of a node there, if that matters.
     pub(super) fn is_met_already(&self, node: u32) -> bool {
         self.params.steady > 0.0 && self.division.as_ref().is_some_and(|division| division.kind(node).is_met)
     }
 
-    /// The free end of the crack of a node, a segment or two further on, which a steady tip meets in its place: no cell lies between the two ends.
+    /// The free end of the crack of a node, a segment or two further on. A steady tip meets it instead of the node:
+    /// no cell lies between the two ends.
     pub(super) fn end_beside(&self, node: u32, tip: u32) -> Option<u32> {
         if self.params.steady <= 0.0 || !self.divides() {
             return None;
@@ -164,7 +167,7 @@ impl CrackGrowth {
             && !self.is_over(end)
             && self.are_head_on(end, tip)
             && !(pos.cmpeq(Vec2::ZERO) | pos.cmpeq(extent)).any()
-            && !self.is_kin(end, tip);
+            && !self.is_same_crack(end, tip);
         let near = 2.0 * self.params.step_length;
         (is_free && pos.distance_squared(self.network.nodes[tip as usize].pos) <= near * near).then_some(end)
     }
@@ -174,12 +177,12 @@ impl CrackGrowth {
         self.params.steady > 0.0 && self.division.as_ref().is_some_and(|division| division.kind(node).is_over)
     }
 
-    /// Whether two ends come towards each other.
+    /// Whether two ends move towards each other.
     fn are_head_on(&self, one: u32, other: u32) -> bool {
         self.heading_of(one).dot(self.heading_of(other)) < HEAD_ON
     }
 
-    /// Notes that a tip has met another crack at a node.
+    /// Records that a tip has met another crack at a node.
     pub(super) fn note_meeting(&mut self, node: u32, tip: u32) {
         let ends_both = self.child_of(node) == NO_PARENT && self.are_head_on(node, tip);
         let Some(division) = &mut self.division else { return };

@@ -1,4 +1,4 @@
-//! Where the rays of a hit are to run: the markers of each, where it forks, and which rings there are between them.
+//! The plan of the rays of a hit: the markers of each ray, where it forks, and the rings between rays.
 
 use super::{
     draws,
@@ -8,58 +8,59 @@ use crate::math::{Rng, hash_unit, mix, ops};
 use glam::Vec2;
 use std::f32::consts::TAU;
 
-/// The number of rays goes by this power of the energy: four times as many at 22 times the energy.
+/// The number of rays is proportional to this power of the energy: four times as many at 22 times the energy.
 const BY_ENERGY: f32 = 0.45;
 
-/// And so do the forks of each.
+/// The same for the forks of each ray.
 const FORKS_BY_ENERGY: f32 = 0.6;
 
-/// The most rays of one hit, forks included.
+/// The largest number of rays of one hit, forks included.
 const MOST_RAYS: usize = 400;
 
-/// The most rings of one hit.
+/// The largest number of rings of one hit.
 pub(super) const MOST_RINGS: u32 = 24;
 
-/// The longest line of a ring from ray to ray, pattern units.
+/// The longest line of a ring between two rays, pattern units.
 pub(super) const LONGEST_CHORD: f32 = 1.0;
 
-/// The widest angle between two rays that a ring bridges, radians: a line across a wider one would come too near to the hit.
+/// The widest angle between two rays that a ring bridges, radians: a line across a wider angle would come too near to
+/// the hit.
 const WIDEST: f32 = 1.4;
 
-/// And no line of a ring is so many times longer than it is to the next ring.
+/// Largest length of a line of a ring, in units of the distance to the next ring.
 const WIDER: f32 = 2.5;
 
 /// A border nearer than this (pattern units) gets fewer rays.
 const NEAR: f32 = 0.3;
 
-/// And a hit has fewer of them where there is less room for them: by this power of it. As many fewer as there is less room would be hard to
-/// see in a corner.
+/// A hit with less room has fewer rays in total, by this power of the room. A linear reduction would leave too few in
+/// a corner.
 const FEWER: f32 = 0.35;
 
-/// Length of the first straight run of a ray, pattern units; the others are longer and longer.
+/// Length of the first straight run of a ray, pattern units; the following ones are longer and longer.
 const FIRST_RUN: f32 = 0.03;
 const RUN_GROWTH: f32 = 1.5;
 
-/// How much a ray turns between two runs, at most, radians.
+/// Largest turn of a ray between two runs, radians.
 const KINK: f32 = 0.07;
 
-/// The share of a ray along which it forks.
+/// The share of a ray along which it can fork.
 const FORKING: f32 = 0.6;
 
-/// The least angle of a fork, radians: at a narrower one both would be one crack.
+/// The smallest angle of a fork, radians: at a smaller one both branches would merge.
 const LEAST_FORK: f32 = 0.42;
 
-/// A ray forks only where no other ray is so near to the first stretch of the fork; pattern units.
+/// A ray forks only where no other ray is this near to the first part of the fork; pattern units.
 const ROOMY: f32 = 0.045;
 
 /// One ray.
 #[derive(Clone, Debug)]
 pub(super) struct Ray {
-    /// The ray that it forks from and the generation at which it does; `None` for those that start at the hit.
+    /// The ray from which it forks and the generation at the fork; `None` for rays that start at the hit.
     pub(super) from: Option<(usize, u32)>,
-    /// Where it is to run, its start and its kinks; the markers lie at all but the first.
+    /// Its planned line, with start and kinks; there are markers at all points except the first.
     pub(super) line: Vec<Vec2>,
-    /// The generation of its last node, if it is to end on the surface.
+    /// The generation of its last node, if it ends on the surface.
     pub(super) last: u32,
 }
 
@@ -69,7 +70,7 @@ pub(super) struct Rim {
     pub(super) pos: Vec2,
     /// The ray that starts there.
     pub(super) ray: Option<usize>,
-    /// Whether the rim goes on to the next place, and not along the border.
+    /// Whether the rim continues to the next place, and not along the border.
     pub(super) goes_on: bool,
 }
 
@@ -80,7 +81,7 @@ pub(super) struct Chord {
     pub(super) to: (usize, u32),
 }
 
-/// All that is to come of one hit.
+/// The complete plan of one hit.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Plan {
     pub(super) rim: Vec<Rim>,
@@ -88,17 +89,17 @@ pub(super) struct Plan {
     pub(super) chords: Vec<Chord>,
 }
 
-/// The hit that is planned for.
+/// The hit for which rays are planned.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Blow {
+pub(super) struct PlannedHit {
     pub(super) pos: Vec2,
     pub(super) energy: f32,
-    /// How far its energy reaches, pattern units.
+    /// Its reach, pattern units.
     pub(super) reach: f32,
     pub(super) seed: u64,
 }
 
-/// How far it is from `pos` to the border in this direction.
+/// Distance from `pos` to the border in this direction.
 fn to_border(pos: Vec2, way: Vec2, extent: Vec2) -> f32 {
     let along = |pos: f32, way: f32, extent: f32| {
         if way > 1e-6 {
@@ -127,12 +128,12 @@ fn rim_radius(params: &GrowthParams, energy: f32) -> f32 {
 
 impl Plan {
     /// The rays of a hit, `None` if the layout has none.
-    pub(super) fn new(params: &GrowthParams, blow: Blow, extent: Vec2) -> Option<Self> {
+    pub(super) fn new(params: &GrowthParams, hit: PlannedHit, extent: Vec2) -> Option<Self> {
         let MarkerLayout::Rays { sectors, jitter, through } = params.markers else { return None };
-        let mut rng = Rng::new(blow.seed).stream("rays");
-        let Blow { pos, energy, reach, .. } = blow;
+        let mut rng = Rng::new(hit.seed).stream("rays");
+        let PlannedHit { pos, energy, reach, .. } = hit;
         let radius = rim_radius(params, energy);
-        let angles = directions(blow, extent, sectors as f32 * ops::powf(energy, BY_ENERGY), jitter, &mut rng);
+        let angles = directions(hit, extent, sectors as f32 * ops::powf(energy, BY_ENERGY), jitter, &mut rng);
         let mut plan = Self::default();
         let (n, phase) = (angles.len(), rng.unit());
         let runs_through =
@@ -141,7 +142,7 @@ impl Plan {
             let angle = ops::atan2(params.direct(ops::unit(angle)).y, params.direct(ops::unit(angle)).x);
             let way = ops::unit(angle);
             let room = to_border(pos, way, extent);
-            // Few of them are long.
+            // Few of the rays are long.
             let draw = rng.unit();
             let length = reach * (0.16 + 0.84 * draw * draw * draw.sqrt());
             let ends = !runs_through(i) && length + 0.1 < room;
@@ -152,11 +153,11 @@ impl Plan {
                 last = ((length - radius) / params.step_length).round().max(2.0) as u32;
                 let is_free = rng.unit() < params.open_ends;
                 if !is_free && params.draw_connections {
-                    // Up to a ring.
+                    // It ends at a ring.
                     let ring = (1..=MOST_RINGS)
                         .take_while(|&ring| radius + ring_generation(params, ring) as f32 * params.step_length <= reach)
                         .min_by_key(|&ring| ring_generation(params, ring).abs_diff(last));
-                    last = ring.map_or(u32::MAX, |ring| corner(params, blow.seed, i, ring, jitter));
+                    last = ring.map_or(u32::MAX, |ring| corner(params, hit.seed, i, ring, jitter));
                 }
             }
             let line = line(params, (start, angle), last, extent, jitter, &mut rng);
@@ -165,18 +166,18 @@ impl Plan {
         plan.fork(params.forks * ops::powf(energy, FORKS_BY_ENERGY), params, extent, jitter, &mut rng);
         plan.clip_rim(pos, radius, extent);
         if params.draw_connections && n > 1 {
-            plan.add_rings(params, blow, radius, extent, jitter);
+            plan.add_rings(params, hit, radius, extent, jitter);
         }
         Some(plan)
     }
 
-    /// Lets rays that run through fork.
+    /// Adds forks to the rays that run through.
     fn fork(&mut self, forks: f32, params: &GrowthParams, extent: Vec2, jitter: f32, rng: &mut Rng) {
         let mut next = 0;
         let mut share = forks;
         let angle = params.fork_angle.max(LEAST_FORK);
         let mut end = self.rays.len();
-        // Those that have forked off may do so again, half as often.
+        // Forks can fork again, half as often.
         for _ in 0..3 {
             while next < end && self.rays.len() < MOST_RAYS {
                 let Ray { line: main, last, from } = &self.rays[next];
@@ -195,12 +196,12 @@ impl Plan {
                         continue;
                     }
                     let (at, way) = along(&main, nodes * params.step_length);
-                    // Not so near to the border that it would be a splinter.
+                    // Not so near to the border that it would cut off a splinter.
                     let room = to_border(at, way, extent);
                     if !is_inside(at, extent) || room < 0.12 {
                         continue;
                     }
-                    // To the side where there is room.
+                    // To the side with more room.
                     let heading = ops::atan2(way.y, way.x);
                     let is_roomy = |heading: &f32| {
                         let clear = |far: f32| {
@@ -225,7 +226,7 @@ impl Plan {
         }
     }
 
-    /// Lets the rim end at the border where the hit is near to it.
+    /// Clips the rim at the border if the hit is near to it.
     fn clip_rim(&mut self, center: Vec2, radius: f32, extent: Vec2) {
         let on_circle = |angle: f32| center + ops::unit(angle) * radius;
         if is_inside(center - radius, extent) && is_inside(center + radius, extent) {
@@ -235,7 +236,7 @@ impl Plan {
         let all: Vec<(f32, Rim)> = self.rim.iter().map(|rim| (angle(rim), *rim)).collect();
         self.rim.clear();
         let n = all.len();
-        // Where the circle is cut between an angle inside and one outside.
+        // The intersection of the circle and the border, between an angle inside and one outside.
         let cut = |mut inside: f32, mut outside: f32| {
             for _ in 0..24 {
                 let middle = 0.5 * (inside + outside);
@@ -249,7 +250,7 @@ impl Plan {
             if is_in {
                 self.rim.push(rim);
             }
-            // In short steps, as it may leave and come back between two rays.
+            // In short steps, because the circle may leave and re-enter the surface between two rays.
             let turn = (all[(i + 1) % n].0 - from).rem_euclid(TAU);
             let turn = if turn == 0.0 { TAU } else { turn };
             let steps = (turn / 0.1).ceil() as u32;
@@ -267,13 +268,13 @@ impl Plan {
         }
     }
 
-    /// Rings: broken polygons, each corner of which lies on a ray.
-    fn add_rings(&mut self, params: &GrowthParams, blow: Blow, radius: f32, extent: Vec2, jitter: f32) {
+    /// Adds rings: broken polygons whose corners lie on rays.
+    fn add_rings(&mut self, params: &GrowthParams, hit: PlannedHit, radius: f32, extent: Vec2, jitter: f32) {
         let length = params.step_length;
         let mut corners: Vec<(f32, usize, u32, Vec2)> = Vec::new();
         for ring in 1..=MOST_RINGS {
             let generation = ring_generation(params, ring);
-            let out = (radius + generation as f32 * length) / blow.reach;
+            let out = (radius + generation as f32 * length) / hit.reach;
             if out > 1.0 {
                 break;
             }
@@ -281,13 +282,13 @@ impl Plan {
             corners.clear();
             for (i, ray) in self.rays.iter().enumerate() {
                 let begins = ray.from.map_or(0, |(_, generation)| generation + 1);
-                let generation = corner(params, blow.seed, i, ring, jitter);
+                let generation = corner(params, hit.seed, i, ring, jitter);
                 if generation <= begins + 1 || generation > ray.last {
                     continue;
                 }
                 let (at, _) = along(&ray.line, (generation - begins.saturating_sub(1)) as f32 * length);
                 if is_inside(at - length, extent) && is_inside(at + length, extent) {
-                    corners.push((ops::atan2(at.y - blow.pos.y, at.x - blow.pos.x), i, generation, at));
+                    corners.push((ops::atan2(at.y - hit.pos.y, at.x - hit.pos.x), i, generation, at));
                 }
             }
             corners.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
@@ -299,17 +300,17 @@ impl Plan {
                 if one.1 == other.1 || turn > WIDEST || apart > LONGEST_CHORD.min(WIDER * gap * length) {
                     continue;
                 }
-                let draw = |what: u64| hash_unit(mix(blow.seed ^ what << 32 ^ u64::from(ring) << 16), one.1 as u64);
-                // A ray that ends does so at a ring.
+                let draw = |what: u64| hash_unit(mix(hit.seed ^ what << 32 ^ u64::from(ring) << 16), one.1 as u64);
+                // A ray that ends on the surface ends at a ring.
                 let (ends, other_ends) = (self.rays[one.1].last == one.2, self.rays[other.1].last == other.2);
-                // Fewer further out, and across wide gaps.
+                // Fewer lines further out, and across wide gaps.
                 let wide = turn / WIDEST;
                 let thin = 1.0 - (1.0 - out * out) * (1.0 - 0.8 * wide * wide);
                 let missing = params.connection_gaps + (1.0 - params.connection_gaps) * thin;
                 if (draw(1) < missing || apart < 2.0 * length) && !ends && !other_ends {
                     continue;
                 }
-                // Some rings step at a ray instead of going on from the same place.
+                // Some rings have a step at a ray instead of continuing from the same place.
                 let step = |is_end: bool, what: u64| {
                     let stray = if draw(what) < 0.45 * jitter { 0.5 * gap * (2.0 * draw(what + 1) - 1.0) } else { 0.0 };
                     if is_end { 0 } else { stray as i32 }
@@ -322,12 +323,12 @@ impl Plan {
     }
 }
 
-/// Generation at which a ring lies: 1, 3, 6, 10 ... times `connection_every`, so wider apart further out.
+/// The generation of a ring: 1, 3, 6, 10 ... times `connection_every`, so rings are wider apart further out.
 const fn ring_generation(params: &GrowthParams, ring: u32) -> u32 {
     params.connection_every.saturating_mul(ring * (ring + 1) / 2)
 }
 
-/// The generation at which a ring meets a ray: a little further in or out than the ring lies.
+/// The generation at which a ring meets a ray: with a small random offset from that of the ring.
 fn corner(params: &GrowthParams, seed: u64, ray: usize, ring: u32, jitter: f32) -> u32 {
     let gap = params.connection_every as f32 * ring as f32;
     let stray =
@@ -335,12 +336,12 @@ fn corner(params: &GrowthParams, seed: u64, ray: usize, ring: u32, jitter: f32) 
     ring_generation(params, ring).saturating_add_signed(stray.round() as i32).max(1)
 }
 
-/// The directions of the rays of a hit: uneven, yet all around; fewer where the border is near.
-fn directions(blow: Blow, extent: Vec2, count: f32, jitter: f32, rng: &mut Rng) -> Vec<f32> {
+/// The directions of the rays of a hit: irregular, but all around; fewer where the border is near.
+fn directions(hit: PlannedHit, extent: Vec2, count: f32, jitter: f32, rng: &mut Rng) -> Vec<f32> {
     const BINS: usize = 96;
     let mut sums = [0.0; BINS + 1];
     for bin in 0..BINS {
-        let room = to_border(blow.pos, ops::unit(TAU * (bin as f32 + 0.5) / BINS as f32), extent);
+        let room = to_border(hit.pos, ops::unit(TAU * (bin as f32 + 0.5) / BINS as f32), extent);
         let weight = if room < 1e-3 { 0.0 } else { (room / NEAR).clamp(0.12, 1.0) };
         sums[bin + 1] = sums[bin] + weight;
     }
@@ -375,7 +376,7 @@ fn line(
     let longest = 0.6 * params.crack_radius;
     let mut line = vec![start];
     let (mut pos, mut run, mut stray) = (start, FIRST_RUN.min(longest), 0.0);
-    // Beyond the last node, which is sealed.
+    // Beyond the last node, which is sealed (nothing grows from it).
     let mut left = if last == u32::MAX { f32::INFINITY } else { (last as f32 + 1.5) * params.step_length };
     for _ in 0..4096 {
         let way = ops::unit(angle + stray);
@@ -384,7 +385,7 @@ fn line(
             break;
         }
         if room <= length.min(left) {
-            // Beyond it, or the marker would be reached before the border is.
+            // Beyond the border, else the marker would be reached before the border.
             line.push(pos + way * (room + 2.0 * params.kill_distance));
             break;
         }
@@ -400,14 +401,14 @@ fn line(
     line
 }
 
-/// Distance from a place to a piece of line.
+/// Distance from a place to a segment.
 fn gap(pos: Vec2, (a, b): (Vec2, Vec2)) -> f32 {
     let way = b - a;
     let share = ((pos - a).dot(way) / way.length_squared().max(1e-12)).clamp(0.0, 1.0);
     pos.distance(a + way * share)
 }
 
-/// The place so far along a line, and its direction there; beyond its end if it is shorter.
+/// The point at arc length `arc` of a line, and the direction there; extrapolated beyond its end.
 fn along(line: &[Vec2], mut arc: f32) -> (Vec2, Vec2) {
     let mut way = Vec2::X;
     for (i, pair) in line.windows(2).enumerate() {

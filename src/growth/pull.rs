@@ -1,4 +1,4 @@
-//! What pulls at a node.
+//! The pull of markers on a node.
 
 use glam::Vec2;
 
@@ -8,22 +8,22 @@ pub(super) const NO_PULL: u32 = u32::MAX;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pull {
     pub(super) node: u32,
-    /// Sum of the unit vectors to the markers, in units of 2⁻²⁴: whole numbers, so that the order does not matter.
+    /// Sum of the unit vectors to the markers, in units of 2⁻²⁴: integers, so that the order does not matter.
     pub(super) sum: [i64; 2],
     pub(super) closest: u32,
     pub(super) closest_sq: f32,
     pub(super) closest_id: u32,
     pub(super) child: Vec2,
-    /// The way to the child, but for a kink.
+    /// The direction to the child without its kink.
     pub(super) course: Vec2,
     /// The direction of the segment to the node.
     pub(super) heading: Vec2,
-    /// The angle at which the node forks, to the left of its way and to the right, where there are markers for it; 0 if it does not.
+    /// The fork angles to the left and to the right, where there are markers for a fork; 0 if there are none.
     pub(super) fork: f32,
     pub(super) has_markers: [bool; 2],
-    /// Where the side branch begins.
+    /// The end of the first segment of the side branch.
     pub(super) side: Option<Vec2>,
     pub(super) serves: bool,
-    /// Where nothing grows from the node any more: its markers on that side are given up.
+    /// The direction in which nothing can grow from the node: its markers on that side are given up.
     pub(super) stopped: Option<Vec2>,
 }

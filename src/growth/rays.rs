@@ -1,12 +1,12 @@
-//! What a growth by rays knows: which rays there are, where they fork, and the rings between them.
+//! The state of a growth by rays: the rays, where they fork, and the rings between them.
 
 use super::plan::Plan;
 use glam::Vec2;
 
-/// Set in the name of a ray, so that it is not that of an impact.
+/// A bit in the number of a ray that distinguishes it from an impact.
 pub(super) const RAY: u32 = 1 << 31;
 
-/// The ray of a node that is on none.
+/// The ray of a node that is on no ray.
 pub(super) const NO_RAY: u32 = u32::MAX;
 
 pub(super) const NO_NODE: u32 = u32::MAX;
@@ -14,17 +14,17 @@ pub(super) const NO_NODE: u32 = u32::MAX;
 /// Every ray of every hit.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Rays {
-    /// By the name of the ray: its impact, and the generation of its last node.
+    /// By number of the ray: its impact, and the generation of its last node.
     rays: Vec<(u32, u32)>,
     /// In order of ray and generation.
     pub(super) forks: Vec<Fork>,
     pub(super) corners: Vec<Corner>,
-    /// Both ends of the lines of rings, where they are there.
+    /// Both ends of the lines of rings, as far as they exist.
     pub(super) chords: Vec<[u32; 2]>,
     pub(super) walkers: Vec<Walker>,
 }
 
-/// Where a ray is to fork.
+/// A place at which a ray is to fork.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Fork {
     pub(super) at: (u32, u32),
@@ -32,7 +32,7 @@ pub(super) struct Fork {
     pub(super) way: Vec2,
 }
 
-/// An end of a line of a ring: on which ray, in which generation.
+/// An end of a line of a ring: the ray, and the generation on it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Corner {
     pub(super) at: (u32, u32),
@@ -40,12 +40,12 @@ pub(super) struct Corner {
     pub(super) end: usize,
 }
 
-/// The tip of a line of a ring that is on its way.
+/// The growing tip of a line of a ring.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Walker {
     pub(super) tip: u32,
     pub(super) to: u32,
-    /// Steps until it sets out: the rays at both ends are further on by then, so that it cannot be in their way.
+    /// Steps until it starts: the rays at both ends are further on by then, so that it cannot be in their way.
     pub(super) wait: u32,
     pub(super) steps_left: u32,
 }
@@ -64,10 +64,10 @@ impl Rays {
         self.rays.get((ray & !RAY) as usize).map_or(u32::MAX, |&(_, last)| last)
     }
 
-    /// Takes up the plan of an impact; returns the name of its first ray.
+    /// Adds the plan of an impact; returns the number of its first ray.
     pub(super) fn add_plan(&mut self, plan: &Plan, impact: u32, is_over: bool) -> u32 {
         if is_over {
-            // What was to come of older hits does not come any more.
+            // The remaining plans of older hits are dropped.
             self.forks.clear();
             self.corners.clear();
             self.chords.clear();
@@ -109,7 +109,7 @@ impl Rays {
     }
 }
 
-/// Segments that a line of a ring may have.
+/// Largest number of segments of a line of a ring.
 pub(super) fn chord_steps(apart: f32, length: f32) -> u32 {
     (1.5 * apart / length) as u32 + 2
 }

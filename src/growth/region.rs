@@ -1,4 +1,4 @@
-//! The part of a surface that a hit populates, and its cells.
+//! The part of a surface in which a hit creates markers, and its cells.
 
 use super::{
     draws,
@@ -11,18 +11,18 @@ use crate::{
 use glam::{UVec2, Vec2};
 use std::f32::consts::TAU;
 
-/// The ring-shaped part of a surface that one hit populates.
+/// The ring-shaped part of a surface in which one hit creates markers.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Region {
     pub(super) center: Vec2,
-    /// What lies closer was populated before.
+    /// The part closer than this already has markers.
     pub(super) inner: f32,
     pub(super) outer: f32,
     pub(super) extent: Vec2,
 }
 
 impl Region {
-    /// Share of the way from the centre to the rim; `None` outside of the region or the surface.
+    /// Distance from the centre as a share of the reach; `None` outside the region or the surface.
     pub(super) fn share(&self, pos: Vec2, uneven: f32, seed: u64) -> Option<f32> {
         let away = self.away(pos, uneven, seed);
         let distance = pos.distance(self.center);
@@ -31,13 +31,13 @@ impl Region {
         (inside && distance >= self.inner && distance < self.outer).then_some(distance / self.outer)
     }
 
-    /// How far the hit reaches in the direction of a place, as a share of how far it does at the most.
+    /// The reach of the hit in the direction of a place, as a share of its largest reach.
     fn away(&self, pos: Vec2, uneven: f32, seed: u64) -> f32 {
         if uneven <= 0.0 {
             return 1.0;
         }
         let way = (pos - self.center).normalize_or(Vec2::X);
-        // Cosines of multiples of the angle, each turned by a draw.
+        // Cosines of multiples of the angle, each with a random phase.
         let (mut power, mut sum) = (way, 0.0);
         for wave in 2..=5u64 {
             power = power.rotate(way);
@@ -56,7 +56,7 @@ pub(super) fn density_at(density: Option<&Grid<f32>>, pos: Vec2, extent: Vec2) -
     value.filter(|p| p.is_finite()).unwrap_or(0.0)
 }
 
-/// Cells from one column and row to others, row by row.
+/// A rectangle of cells, row by row.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cells {
     pub(super) x: (u32, u32),
@@ -73,16 +73,16 @@ impl Cells {
     }
 }
 
-/// The most lines or columns of a grid, however long the surface.
+/// The largest number of rows or columns of a grid on a long surface.
 const MAX_LINES: u32 = 4096;
 
-/// Columns and lines of the grid on a surface: as many more as it is larger than the unit square.
+/// Columns and rows of the grid on a surface: in proportion to its size relative to the unit square.
 pub(super) fn grid(params: &GrowthParams, extent: Vec2) -> UVec2 {
     let count = |number: u32, length: f32| ((number as f32 * length).round() as u32).clamp(1, MAX_LINES);
     UVec2::new(count(params.num_columns_grid, extent.x), count(params.num_lines_grid, extent.y))
 }
 
-/// About how far the markers of a layout lie from each other.
+/// Approximate distance between the markers of a layout.
 pub(super) fn spacing(params: &GrowthParams, extent: Vec2) -> f32 {
     match params.markers {
         MarkerLayout::PseudoGrid { .. } => (extent / grid(params, extent).as_vec2()).max_element(),

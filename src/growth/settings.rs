@@ -25,8 +25,8 @@ impl CrackGrowth {
     pub fn set_mask(&mut self, mask: impl Into<Arc<CrackMask>>) {
         self.finish_layout();
         self.mask = mask.into();
-        self.mind_others();
-        self.lay_bricks();
+        self.update_arrest();
+        self.update_masonry();
     }
 
     /// Replaces the parameters for later hits and steps. Existing cracks stay, and so do `roughness` and `sway`.
@@ -42,8 +42,8 @@ impl CrackGrowth {
         let division = Division::new(&params).map(|new| self.division.take().unwrap_or(new));
         self.division = division;
         self.params = params;
-        self.mind_others();
-        self.lay_bricks();
+        self.update_arrest();
+        self.update_masonry();
         Ok(())
     }
 }

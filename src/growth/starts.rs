@@ -1,11 +1,11 @@
-//! Where the cracks of a hit begin, and how much room there is for them.
+//! Where the cracks of a hit start, and how much room there is for them.
 
 use super::params::StartLayout;
 use crate::math::{Rng, ops};
 use glam::Vec2;
 use std::f32::consts::TAU;
 
-/// What is `count` at energy 1.
+/// A count at this energy; `count` is the value at energy 1.
 fn by_energy(count: u32, energy: f32, most: u32) -> u32 {
     ((count as f32 * energy.sqrt()).round() as u32).clamp(2, most.max(2))
 }
@@ -13,10 +13,10 @@ fn by_energy(count: u32, energy: f32, most: u32) -> u32 {
 /// Directions in which the room around a hit is measured.
 const DIRECTIONS: usize = 64;
 
-/// Directions to either side of an arm in which there should be as much room as on its way: 17 degrees.
+/// Number of directions on either side of an arm that should have as much room as the arm: 17 degrees.
 const BESIDE: usize = 3;
 
-/// How much of `reach` there is on the surface in each direction from `center`, 0..=1.
+/// Share of `reach` that lies on the surface in each direction from `center`, 0..=1.
 fn rooms(center: Vec2, reach: f32, extent: Vec2) -> [f32; DIRECTIONS] {
     std::array::from_fn(|i| {
         let way = ops::unit(TAU * i as f32 / DIRECTIONS as f32);
@@ -35,11 +35,12 @@ pub(super) fn room(center: Vec2, reach: f32, extent: Vec2) -> f32 {
     rooms(center, reach, extent).iter().sum::<f32>() / DIRECTIONS as f32
 }
 
-/// The directions of the arms of a hit: spread evenly, each a little off its place, over those in which there is room.
+/// The directions of the arms of a hit: evenly spaced over the directions that have room, each with a small random
+/// deviation.
 pub(super) fn arms(count: u32, (center, energy): (Vec2, f32), reach: f32, extent: Vec2, seed: u64) -> Vec<Vec2> {
     let mut rng = Rng::new(seed).stream("arms");
     let rooms = rooms(center, reach, extent);
-    // An arm that has hardly any room would not be seen, one that runs along the border would soon run into it.
+    // An arm with hardly any room would not be visible, and one along the border would soon run into it.
     let weights: [f32; DIRECTIONS] = std::array::from_fn(|i| {
         let beside = (0..=2 * BESIDE).map(|k| rooms[(i + DIRECTIONS + k - BESIDE) % DIRECTIONS]);
         beside.fold(1.0, f32::min).powi(2) + 1e-4
@@ -50,7 +51,7 @@ pub(super) fn arms(count: u32, (center, energy): (Vec2, f32), reach: f32, extent
     let count = ((count + 0.5 + 0.55 * rng.signed()) as u32).clamp(2, 1024);
     let turn = rng.unit();
     let angle = |place: f32| {
-        // The direction before which so much of the room lies.
+        // The direction below which this share of the total room lies.
         let mut left = place.rem_euclid(1.0) * total;
         for (i, weight) in weights.iter().enumerate() {
             if left < *weight {
@@ -64,7 +65,7 @@ pub(super) fn arms(count: u32, (center, energy): (Vec2, f32), reach: f32, extent
     places.iter_mut().map(|place| ops::unit(angle(*place))).collect()
 }
 
-/// The places of the first nodes of a hit.
+/// The positions of the first nodes of a hit.
 pub(super) fn starts(
     layout: StartLayout,
     (center, energy): (Vec2, f32),

@@ -1,4 +1,4 @@
-//! What a growth knows: [`CrackGrowth`], and what can be asked of it.
+//! The state of a growth: [`CrackGrowth`], and its queries.
 
 use super::{
     arrest::Arrest,
@@ -22,16 +22,16 @@ use crate::{
 use glam::Vec2;
 use std::{ops::Range, sync::Arc};
 
-/// Where all markers are: the other numbers add up to `total`.
+/// Number of markers in each state: the other numbers add up to `total`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct Census {
-    /// Markers ever made.
+    /// Markers ever created.
     pub total: u32,
     /// Reached and removed.
     pub killed: u32,
     /// Attracting a node.
     pub attracting: u32,
-    /// Out of every node's reach.
+    /// Out of reach of all nodes.
     pub waiting: u32,
 }
 
@@ -54,15 +54,15 @@ pub struct CrackGrowth {
     pub(super) network: Network,
     pub(super) field: MarkerField,
     pub(super) nodes: NodeGrid,
-    /// Only where cracks must not cross.
+    /// Only if cracks must not cross.
     pub(super) arrest: Option<Arrest>,
-    /// Only where cracks divide domains.
+    /// Only if cracks divide domains.
     pub(super) division: Option<Division>,
     pub(super) widths: Widths,
     pub(super) linker: Linker,
     pub(super) rays: Rays,
     pub(super) impacts: Vec<Impact>,
-    /// What the last hit has still to lay out.
+    /// The markers that the last hit has still to lay out.
     pub(super) layout: Option<Box<Layout>>,
     pub(super) density: Option<Grid<f32>>,
     pub(super) mask: Arc<CrackMask>,
@@ -70,30 +70,30 @@ pub struct CrackGrowth {
     pub(super) masonry: Option<Arc<Masonry>>,
     pub(super) steps: u32,
     pub(super) steps_left: u32,
-    /// Cracks that began by themselves, and markers that were tried for it.
+    /// Number of cracks started by nucleation, and of markers that were tried for it.
     pub(super) nucleated: u32,
     pub(super) tried: u32,
     /// First nodes of hits whose growth has not ended.
     pub(super) unshown: Vec<u32>,
-    /// Nodes that have not grown here.
+    /// Number of nodes that were added from other networks.
     pub(super) added: usize,
     pub(super) newborn: Range<u32>,
-    /// Links that are among the changes.
-    pub(super) links_told: u32,
-    /// Places of markers made since they were last asked for.
+    /// Number of links that are already in the list of changes.
+    pub(super) links_reported: u32,
+    /// Positions of markers created since the last call of [`take_markers`](Self::take_markers).
     pub(super) shown_markers: Vec<Vec2>,
     pub(super) changes: Changes,
     pub(super) timeline: Timeline,
     pub(super) pulls: Vec<Pull>,
-    /// Where cracks are rays: what each of `pulls` must keep to.
+    /// For rays: the directions to which each of `pulls` is bound.
     pub(super) ways: Vec<[Vec2; 3]>,
-    /// Per node: the direction in which its crack runs, but for its kinks; zero for a start.
+    /// Per node: the direction of its crack without kinks; zero for a start.
     pub(super) courses: Vec<Vec2>,
-    /// Node and entry in `pulls`, in order of the nodes.
+    /// Node and entry in `pulls`, in the order of the nodes.
     pub(super) order: Vec<(u32, u32)>,
     /// Per node: its entry in `pulls` during a step.
     pub(super) pull_of: Vec<u32>,
-    /// Nodes that one birth has made wider; empty in between.
+    /// Nodes that became wider through one new node; empty in between.
     pub(super) widened: Vec<u32>,
 }
 
@@ -102,7 +102,8 @@ impl CrackGrowth {
     /// [`SurfaceFrame::extent`](crate::pattern::SurfaceFrame::extent)).
     ///
     /// # Errors
-    /// If a parameter is out of its range, or `extent` (named so) is not within 0.0001..=64.
+    /// [`ParamError::OutOfRange`] if a parameter is out of its range, or `extent` (with this name) is not within
+    /// 0.0001..=64.
     pub fn new(params: GrowthParams, extent: Vec2, seed: u64) -> Result<Self, ParamError> {
         params.validate()?;
         for value in extent.to_array() {
@@ -133,7 +134,7 @@ impl CrackGrowth {
             unshown: Vec::new(),
             added: 0,
             newborn: 0..0,
-            links_told: 0,
+            links_reported: 0,
             shown_markers: Vec::new(),
             changes: Changes::default(),
             timeline: Timeline::default(),
@@ -146,12 +147,12 @@ impl CrackGrowth {
             params,
             seed,
         };
-        growth.lay_bricks();
+        growth.update_masonry();
         Ok(growth)
     }
 
-    /// Finds the joints in which cracks run.
-    pub(super) fn lay_bricks(&mut self) {
+    /// Computes the joints in which cracks run.
+    pub(super) fn update_masonry(&mut self) {
         let (extent, courses) = (self.network.extent(), self.params.courses);
         let is_masonry = courses > 0.0 && self.params.arrest > 0.0;
         self.masonry = match &self.mask.weak {
@@ -163,8 +164,8 @@ impl CrackGrowth {
         self.widths.set_widest(self.masonry.as_ref().map_or(f32::INFINITY, |masonry| masonry.joint()));
     }
 
-    /// Keeps account of lines if cracks must not cross, or if there are places that they must not enter.
-    pub(super) fn mind_others(&mut self) {
+    /// Creates or drops the index of lines. It exists if cracks must not cross, or if there are forbidden places.
+    pub(super) fn update_arrest(&mut self) {
         let must = self.params.keeps_apart() || self.mask.forbidden.is_some();
         if must != self.arrest.is_some() {
             self.arrest = must.then(|| Arrest::new(&self.network, self.params.step_length));
@@ -183,7 +184,7 @@ impl CrackGrowth {
         &self.network
     }
 
-    /// When all of it came.
+    /// When each part of the network was added.
     #[must_use]
     pub const fn timeline(&self) -> &Timeline {
         &self.timeline
@@ -201,28 +202,28 @@ impl CrackGrowth {
         self.steps
     }
 
-    /// Indices of the nodes born in the last step or hit.
+    /// Indices of the nodes that the last step or hit added.
     #[must_use]
     pub fn newborn(&self) -> Range<u32> {
         self.newborn.clone()
     }
 
-    /// Appends the segments that are new or wider since the last call, each once, and forgets them.
+    /// Appends the segments that are new or wider since the last call, each once, and clears the list.
     pub fn take_changed(&mut self, changed: &mut Vec<SegmentId>) {
         for segment in self.changes.list.drain(..) {
             if let SegmentId::Branch(node) = segment {
-                self.changes.kin[node as usize].is_listed = false;
+                self.changes.tree[node as usize].is_listed = false;
             }
             changed.push(segment);
         }
     }
 
-    /// Appends the places of markers made since the last call, if `draw_markers` is set.
+    /// Appends the positions of markers created since the last call, if `draw_markers` is set.
     pub fn take_markers(&mut self, markers: &mut Vec<Vec2>) {
         markers.append(&mut self.shown_markers);
     }
 
-    /// Where all markers are.
+    /// Number of markers in each state.
     #[must_use]
     pub fn census(&self) -> Census {
         let (living, attracting) = self.field.living();
@@ -235,20 +236,20 @@ impl CrackGrowth {
         &self.params
     }
 
-    /// Where cracks may run.
+    /// The current mask.
     #[cfg(feature = "bevy")]
     pub(crate) const fn mask(&self) -> &Arc<CrackMask> {
         &self.mask
     }
 
-    /// How many more nodes may grow.
+    /// How many more nodes can grow.
     pub(super) fn room(&self) -> usize {
         (self.params.max_nodes as usize + self.added).saturating_sub(self.network.nodes.len())
     }
 
     /// The last child of a node, or [`NO_PARENT`].
     pub(super) fn child_of(&self, node: u32) -> u32 {
-        self.changes.kin[node as usize].child
+        self.changes.tree[node as usize].child
     }
 
     /// The direction of the segment to a node; zero for a start.

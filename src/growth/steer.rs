@@ -1,12 +1,12 @@
-//! How much a crack turns: not on its heel, towards what is weak, and into the border where that is near.
+//! Limits and directions of turns: no sharp turns, towards weak areas, and into a nearby border.
 
 use crate::pattern::CrackMask;
 use glam::Vec2;
 
-/// Cosine and sine of the most that a crack turns from one segment to the next: 60 degrees.
+/// Cosine and sine of the largest turn of a crack from one segment to the next: 60 degrees.
 const MOST_TURN: (f32, f32) = (0.5, 0.866_025_4);
 
-/// `direction`, or as much of it as a crack that comes in `heading` may turn.
+/// `direction`, limited to the turn that a crack with this heading may make.
 pub(super) fn turned_at_most(heading: Vec2, direction: Vec2) -> Vec2 {
     if heading == Vec2::ZERO || heading.dot(direction) >= MOST_TURN.0 {
         return direction;
@@ -15,7 +15,7 @@ pub(super) fn turned_at_most(heading: Vec2, direction: Vec2) -> Vec2 {
     heading * MOST_TURN.0 + across * MOST_TURN.1
 }
 
-/// Turns `direction` by up to 80 degrees towards what is weak and away from what is strong or forbidden.
+/// Turns `direction` by up to 80 degrees towards weak areas and away from strong or forbidden ones.
 pub(super) fn steer(from: Vec2, direction: Vec2, length: f32, mask: &CrackMask, extent: Vec2) -> Vec2 {
     // Cosine and sine of 0, 10, ... 80 degrees.
     const TURNS: [(f32, f32); 9] = [
@@ -47,7 +47,8 @@ pub(super) fn steer(from: Vec2, direction: Vec2, length: f32, mask: &CrackMask, 
     best.1
 }
 
-/// The end of a segment of `length`; where the border of the surface is no further than `margin` beyond, the border.
+/// The end of a segment of `length`. If the border of the surface is at most `margin` beyond it, the end is on the
+/// border.
 ///
 /// So cracks run into the border instead of ending just before it, and never leave the surface.
 pub(super) fn up_to_border(from: Vec2, direction: Vec2, length: f32, margin: f32, extent: Vec2) -> Vec2 {

@@ -1,4 +1,4 @@
-//! The growth itself, step by step.
+//! One step of the growth.
 
 use super::{
     arrest::{Advance, Arrest},
@@ -11,10 +11,10 @@ use super::{
 use crate::{math::mix, pattern::NO_PARENT};
 use glam::Vec2;
 
-/// What one step did.
+/// The result of one step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StepReport {
-    /// Number of nodes born.
+    /// Number of nodes that were added.
     pub born: u32,
 }
 
@@ -27,17 +27,18 @@ impl StepReport {
 }
 
 impl CrackGrowth {
-    /// One step of growth (Couto et al., eq. 2): every node that attracts markers grows one node at
-    /// `c' = c + D n̂`, `n = Σ (m - c) / ‖m - c‖`, then markers within the kill distance of a node die.
+    /// One step of growth (Couto et al., eq. 2): every node that attracts markers grows one node at `c' = c + D n̂`,
+    /// `n = Σ (m - c) / ‖m - c‖`. Then markers within the kill distance of a node are removed.
     ///
-    /// Differs from the paper where the paper would never end: a node at `c + D n̂` that neither reaches a marker nor brings
-    /// one closer (by `D²/4` of squared distance) is not born; the node that is born instead lies straight towards
-    /// the closest marker, on it if that is nearer than `D`. So every birth serves a marker, and growth ends within
-    /// [`GrowthParams::most_nodes`](super::GrowthParams::most_nodes). A node beyond the border, or closer to it than the kill distance on its way, lies on it.
+    /// Differs from the paper where the paper would never end: a node at `c + D n̂` that neither reaches a marker nor
+    /// brings one closer (by `D²/4` of squared distance) is not added. Instead the new node lies straight towards the
+    /// closest marker, on it if that is nearer than `D`. So every new node serves a marker, and growth ends within
+    /// [`GrowthParams::most_nodes`](super::GrowthParams::most_nodes). A node beyond the border, or closer to it than
+    /// the kill distance in its direction, is placed on it.
     pub fn step(&mut self) -> StepReport {
         self.finish_layout();
         self.newborn = 0..0;
-        // A tip that has just set out to meet a crack may be all that moves, and has no node to show for it yet.
+        // A tip that has just turned to meet a crack may be all that moves, and it has no new node yet.
         while self.steps_left > 0 && self.newborn.is_empty() {
             self.make_step();
         }
@@ -58,7 +59,7 @@ impl CrackGrowth {
         self.aim();
         let first = self.network.nodes.len() as u32;
         let room = self.room();
-        // What comes when growth has ended takes a step of the timeline all the same.
+        // Nodes that are added when growth has ended get their own step of the timeline.
         self.timeline.begin(self.steps.saturating_add(1));
         if !self.pulls.is_empty() || self.is_running() {
             self.steps = self.steps.saturating_add(1);
@@ -72,7 +73,7 @@ impl CrackGrowth {
                 self.pull_of[node as usize] = NO_PULL;
                 if i < room {
                     let (parent, child) = (self.network.nodes[node as usize], self.pulls[slot as usize].child);
-                    self.bear_thin(child, node, parent.generation.saturating_add(1), parent.impact, 1.0);
+                    self.add_thin_node(child, node, parent.generation.saturating_add(1), parent.impact, 1.0);
                 }
             }
             self.widen_with(|widths, nodes, widened| widths.push(nodes, first, widened));
@@ -96,13 +97,13 @@ impl CrackGrowth {
         }
     }
 
-    /// Whether a tip is on its way to a goal.
+    /// Whether a tip is moving to a goal.
     fn is_running(&self) -> bool {
         self.rays.is_running() || self.arrest.as_ref().is_some_and(Arrest::is_running)
     }
 
-    /// Grows from every node that is pulled, unless older cracks are in the way; then from those that are on their way to one.
-    /// Says whether a marker was given up: the others may pull elsewhere then.
+    /// Grows from every node that is pulled, unless older cracks are in the way; then from the tips that are moving
+    /// to a crack. Returns whether a marker was given up: the other markers may pull in another direction then.
     fn advance_all(&mut self) -> bool {
         let mut any_stopped = false;
         for i in 0..self.order.len() {
@@ -127,7 +128,8 @@ impl CrackGrowth {
                         if let Some(side) = side {
                             let from = self.network.nodes[node as usize].pos;
                             let branch = self.extend(node, side, false);
-                            // Round the bricks it goes on as before, aside.
+                            // Its course combines the branch and the previous course, so that it goes around the
+                            // bricks.
                             if let Some(branch) = branch.filter(|_| self.masonry.is_some()) {
                                 let way = (side - from).normalize_or_zero();
                                 self.courses[branch as usize] = (way + course).normalize_or(way);
@@ -165,27 +167,27 @@ impl CrackGrowth {
         any_stopped
     }
 
-    /// Begins new cracks where markers are out of reach of all others.
+    /// Starts new cracks where markers are out of reach of all others.
     fn nucleate(&mut self) {
         let due = self.params.nucleation * self.steps.saturating_add(1) as f32;
-        // What springs from a blow breaks ahead of its cracks, what dries breaks anywhere.
+        // After an impact new cracks start ahead of the existing ones; in drying material they start anywhere.
         let center = self.impacts.last().map_or(Vec2::ZERO, |impact| impact.pos);
-        let is_blow = matches!(self.params.starts, StartLayout::Crushed { .. });
+        let is_impact = matches!(self.params.starts, StartLayout::Crushed { .. });
         for _ in 0..self.room() {
             if self.nucleated as f32 >= due {
                 break;
             }
             let of_try = self.seed ^ draws::NUCLEATION ^ u64::from(self.tried) << 8;
             let drawn = [0, 1, 2, 3, 4, 5].map(|i| mix(of_try ^ i << 48));
-            let drawn = if is_blow { &drawn[..] } else { &drawn[..1] };
-            let Some((place, loyal)) = self.field.take_waiting(drawn, center) else { break };
+            let drawn = if is_impact { &drawn[..] } else { &drawn[..1] };
+            let Some((place, owner)) = self.field.take_waiting(drawn, center) else { break };
             self.tried += 1;
-            let impact = if loyal == ANY_IMPACT { self.impacts.len().saturating_sub(1) as u32 } else { loyal };
+            let impact = if owner == ANY_IMPACT { self.impacts.len().saturating_sub(1) as u32 } else { owner };
             let is_free = !self.nodes.any_within(place, 2.0 * self.params.step_length)
                 && !self.mask.is_forbidden(place / self.network.extent());
             if is_free {
                 self.nucleated += 1;
-                self.bear(place, NO_PARENT, 0, impact, 1.0);
+                self.add_node(place, NO_PARENT, 0, impact, 1.0);
             }
         }
     }

@@ -1,4 +1,4 @@
-//! The drawn lines of a network, so that no other is drawn across them.
+//! An index of the drawn lines of a network, so that no other line is drawn across them.
 
 use crate::pattern::{PathPoint, SegmentPath};
 use glam::{DVec2, UVec2, Vec2};
@@ -8,13 +8,13 @@ const NONE: u32 = u32::MAX;
 /// Lines closer than this (pattern units) count as touching.
 const CLEARANCE: f64 = 2e-4;
 
-/// Lines whose bounds lie further apart touch nowhere, whatever rounding does to them.
+/// Lines whose bounds are further apart do not touch, despite rounding.
 const APART: f32 = 2.0 * CLEARANCE as f32;
 
 /// Cosine of the least angle between two lines at a node, 20 degrees: closer ones would be one line drawn twice.
 const LEAST_ANGLE: f64 = 0.94;
 
-/// One segment's line.
+/// The line of one segment.
 #[derive(Clone, Copy, Debug)]
 struct Wall {
     ends: (u32, u32),
@@ -24,7 +24,7 @@ struct Wall {
     high: Vec2,
 }
 
-/// An index of lines by place; lines are only ever added.
+/// A spatial index of lines; lines are only ever added.
 #[derive(Clone, Debug)]
 pub(super) struct Walls {
     cells: UVec2,
@@ -62,7 +62,7 @@ impl Walls {
             .flat_map(move |y| (low.x as usize..=high.x as usize).map(move |x| y * width + x))
     }
 
-    /// Room for lines that are mostly of two pieces in two cells.
+    /// Reserves memory for lines that mostly have two pieces in two cells.
     pub(super) fn reserve(&mut self, lines: usize) {
         self.entries.reserve(2 * lines);
         self.walls.reserve(lines);
@@ -82,7 +82,7 @@ impl Walls {
     }
 
     /// Whether the line `path` between the nodes `ends` would touch another elsewhere than at a shared node, or run along
-    /// it; a node that is not born yet is `u32::MAX`.
+    /// it; a node that does not exist yet is `u32::MAX`.
     pub(super) fn touches_any(&self, ends: (u32, u32), path: &SegmentPath) -> bool {
         let (low, high) = bounds(path.points());
         let (low, high) = (low - APART, high + APART);
@@ -111,7 +111,7 @@ impl Walls {
             let (a, b) = (piece[0].pos.as_dvec2(), piece[1].pos.as_dvec2());
             for (j, other) in line.windows(2).enumerate() {
                 let (c, d) = (other[0].as_dvec2(), other[1].as_dvec2());
-                // The two pieces at a shared node, as seen from it.
+                // The two pieces at a shared node, starting from it.
                 let shared = if i == 0 && j == 0 && ends.0 == wall.ends.0 {
                     Some((b - a, d - c))
                 } else if i == 0 && j == last.1 && ends.0 == wall.ends.1 {
@@ -201,7 +201,7 @@ fn gap_sq(one: (DVec2, DVec2), other: (DVec2, DVec2)) -> f64 {
     ends.min(point_gap_sq(other.0, one)).min(point_gap_sq(other.1, one))
 }
 
-/// Whether the ends of each lie on either side of the other.
+/// Whether the ends of each lie on different sides of the other.
 fn crosses((a, b): (DVec2, DVec2), (c, d): (DVec2, DVec2)) -> bool {
     let side = |p: DVec2, q: DVec2, r: DVec2| (q - p).perp_dot(r - p);
     (side(a, b, c) > 0.0) != (side(a, b, d) > 0.0) && (side(c, d, a) > 0.0) != (side(c, d, b) > 0.0)

@@ -64,7 +64,7 @@ pub struct Replay {
     seen: Entries,
     parts: Vec<Part>,
     /// Part, first child and next sibling of each node.
-    nodes: Vec<Kin>,
+    nodes: Vec<TreeLinks>,
     /// The part of each link and dot.
     links: Vec<u32>,
     dots: Vec<u32>,
@@ -84,7 +84,7 @@ pub struct Replay {
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Kin {
+struct TreeLinks {
     part: u32,
     child: u32,
     sibling: u32,
@@ -267,14 +267,14 @@ impl Replay {
 
     /// Marks the segments that change with the width of a node: a branch tapers between two widths.
     fn mark_width(&mut self, timeline: &Timeline, node: usize, late: Moment) {
-        let Kin { part, mut child, .. } = self.nodes[node];
+        let TreeLinks { part, mut child, .. } = self.nodes[node];
         self.mark_part(part);
         while child != NONE {
-            let kin = self.nodes[child as usize];
+            let node_links = self.nodes[child as usize];
             if timeline.step_of(SegmentId::Branch(child)).is_some_and(|step| step <= late.begun()) {
-                self.mark_part(kin.part);
+                self.mark_part(node_links.part);
             }
-            child = kin.sibling;
+            child = node_links.sibling;
         }
     }
 
@@ -415,13 +415,13 @@ impl Replay {
         for node in seen.nodes..all.nodes {
             let parent = network.nodes().get(node).map_or(NO_PARENT, |node| node.parent);
             let id = node as u32;
-            let mut kin = Kin { part: NONE, child: NONE, sibling: NONE };
+            let mut node_links = TreeLinks { part: NONE, child: NONE, sibling: NONE };
             if let Some(parent) = self.nodes.get_mut(parent as usize) {
-                kin.sibling = std::mem::replace(&mut parent.child, id);
-                kin.part = self.add(What::Segment(SegmentId::Branch(id)));
+                node_links.sibling = std::mem::replace(&mut parent.child, id);
+                node_links.part = self.add(What::Segment(SegmentId::Branch(id)));
             }
-            self.nodes.push(kin);
-            self.measure(kin.part, field, network, timeline);
+            self.nodes.push(node_links);
+            self.measure(node_links.part, field, network, timeline);
         }
         for link in seen.links..all.links {
             let part = self.add(What::Segment(SegmentId::Link(link as u32)));

@@ -201,7 +201,8 @@ impl Burst {
     /// ```
     ///
     /// # Errors
-    /// [`ShatterError::OutOfRange`] if a number of the floor is not finite or outside its range, or its normal is
+    /// [`ShatterError::NotFinite`] if the floor's normal is zero or not finite, [`ShatterError::OutOfRange`] if
+    /// another number of it is
     /// zero.
     pub fn with_floor(mut self, floor: Floor) -> Result<Self, ShatterError> {
         floor.validate()?;

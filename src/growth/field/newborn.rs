@@ -1,48 +1,48 @@
-//! Markers that have not settled, and how far a field has come with them.
+//! Unsettled markers, and the progress of settling them.
 
 use crate::growth::cursor::Cursor;
 use glam::Vec2;
 
-/// A marker that has not settled.
+/// A marker that is not settled yet.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Newborn {
     pub(super) pos: Vec2,
     pub(super) id: u32,
-    pub(super) loyal: u32,
+    pub(super) owner: u32,
     pub(super) given_up: u8,
-    /// Squared distance beyond which nothing is nearer.
+    /// Squared distance of the nearest known crack, or the limit of the search.
     pub(super) near_sq: f32,
 }
 
-/// How far a field has come with its newborn markers.
+/// The progress of settling new markers.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Settling {
     pub(super) phase: Phase,
     pub(super) cursor: Cursor,
     pub(super) all: Vec<Newborn>,
-    /// The cell of each of them.
+    /// The cell of each marker.
     pub(super) homes: Vec<u32>,
-    /// The next place of each cell.
+    /// The next free index of each cell.
     pub(super) next: Vec<u32>,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Phase {
-    /// The living are taken out of their places.
+    /// The living markers are collected.
     #[default]
     Gather,
-    /// Cells get to know how many they will have.
+    /// The markers of each cell are counted.
     Count,
-    /// All get a place.
+    /// All markers are sorted into cells.
     Place,
-    /// What they know of nodes already holds.
+    /// Known distances to nodes are restored.
     Recall,
-    /// Nodes look at them.
+    /// Nodes visit the new markers.
     Visit,
 }
 
 impl Settling {
-    /// Markers that are nowhere else.
+    /// Number of markers that are only stored here.
     pub(super) fn in_hand(&self) -> usize {
         if self.phase == Phase::Count { self.all.len() } else { 0 }
     }

@@ -1,4 +1,4 @@
-//! Markers that were laid out take their places among the others, in slices if need be.
+//! Sorts new markers into the field, in slices if needed.
 
 use super::{
     ANY_IMPACT, DEAD, LANES, MarkerField, NO_NODE, get_ready,
@@ -10,18 +10,19 @@ use crate::{
 };
 use glam::UVec2;
 
-/// What a node costs that looks at the markers within its reach, in markers that are moved; and so many of those that it looks at cost as
-/// much as one that is moved.
+/// Cost of a node that visits the markers within its reach, in moved markers; visiting this many markers costs as
+/// much as moving one.
 const VISIT: u32 = 8;
 const LOOKS: f32 = 8.0;
 
 impl MarkerField {
-    /// Takes up the newborn markers: forgets the dead, sorts all into cells, and lets every node win what it is nearest to.
+    /// Settles the new markers: removes the dead, sorts all into cells, and lets every node take those to which it is
+    /// the nearest.
     pub(in crate::growth) fn settle(&mut self, nodes: &[Node], grid: &NodeGrid) {
         while !self.settle_some(nodes, grid, u32::MAX) {}
     }
 
-    /// Goes on with that, by up to about so many markers. Returns whether it is done.
+    /// Continues settling, by up to about `markers` markers. Returns whether it is done.
     pub(in crate::growth) fn settle_some(&mut self, nodes: &[Node], grid: &NodeGrid, markers: u32) -> bool {
         if self.newborn.is_empty() && self.settling.is_none() {
             return true;
@@ -47,7 +48,7 @@ impl MarkerField {
         false
     }
 
-    /// Works on a phase as far as the slice goes. Returns whether it is over.
+    /// Works on a phase up to the limit of the slice. Returns whether it is complete.
     fn pass(&mut self, settling: &mut Settling, cursor: &mut Cursor, nodes: &[Node], grid: &NodeGrid) -> bool {
         let Settling { all, homes, next, .. } = settling;
         let count = match settling.phase {
@@ -92,10 +93,10 @@ impl MarkerField {
             // The markers of a cell stay in order.
             Phase::Place => {
                 for i in slice {
-                    let (Newborn { pos, id, loyal, given_up, near_sq }, slot) = (all[i], &mut next[homes[i] as usize]);
+                    let (Newborn { pos, id, owner, given_up, near_sq }, slot) = (all[i], &mut next[homes[i] as usize]);
                     let i = *slot as usize;
                     *slot += 1;
-                    (self.x[i], self.y[i], self.id[i], self.loyal[i]) = (pos.x, pos.y, id, loyal);
+                    (self.x[i], self.y[i], self.id[i], self.owner[i]) = (pos.x, pos.y, id, owner);
                     self.given_up[i] = given_up;
                     self.near_sq[i] = self.near_sq[i].min(near_sq);
                 }
@@ -114,14 +115,14 @@ impl MarkerField {
         is_over
     }
 
-    /// What a node costs that looks at the markers around it, on average: many hits lay theirs over each other.
+    /// Average cost of a node that visits the markers around it: many hits put their markers on top of each other.
     fn visit_cost(&self) -> u32 {
         let around = (2.0 * self.radius * self.per_unit + 1.0).min(self.cells.as_vec2());
         let share = around.element_product() / self.cells.as_vec2().element_product();
         VISIT + (share * self.x.len() as f32 / LOOKS) as u32
     }
 
-    /// Cells of half the radius, but with a few markers to each.
+    /// Chooses cells of half the radius, with a few markers each.
     fn choose_cells(&mut self, markers: usize) {
         let per_cell = (self.extent.x * self.extent.y * 3.0 / markers as f32).sqrt();
         let side = (0.5 * self.radius).max(per_cell).max(self.extent.max_element() / 1024.0);
@@ -131,26 +132,26 @@ impl MarkerField {
         self.first.resize(self.cells.x as usize * self.cells.y as usize + 1, 0);
     }
 
-    /// Places for so many markers, and as many dead ones as there are lanes.
+    /// Allocates entries for the markers, and as many dead ones as there are lanes.
     fn make_places(&mut self, markers: usize) {
         let padded = markers + LANES;
         self.x.resize(padded, 0.0);
         self.y.resize(padded, 0.0);
         self.id.resize(padded, 0);
-        self.loyal.resize(padded, ANY_IMPACT);
+        self.owner.resize(padded, ANY_IMPACT);
         self.given_up.resize(padded, 0);
         self.node.resize(padded, NO_NODE);
         self.near_sq.resize(markers, self.radius * self.radius);
         self.near_sq.resize(padded, DEAD);
     }
 
-    /// Gets memory ready for the markers that were added, so that no step pauses to do it.
+    /// Prepares memory for the added markers, so that no step pauses to do it.
     pub(in crate::growth) fn reserve(&mut self) {
         let n = self.x.len() + self.newborn.len() + LANES;
         for plane in [&mut self.x, &mut self.y, &mut self.near_sq] {
             get_ready(plane, n);
         }
-        for plane in [&mut self.node, &mut self.id, &mut self.loyal] {
+        for plane in [&mut self.node, &mut self.id, &mut self.owner] {
             get_ready(plane, n);
         }
         get_ready(&mut self.given_up, n);

@@ -173,7 +173,7 @@ impl Reference {
         self.nodes.get(parent as usize).map_or(Vec2::ZERO, |before| (pos - before.pos).normalize_or_zero())
     }
 
-    fn is_kin(&self, a: u32, b: u32) -> bool {
+    fn is_same_crack(&self, a: u32, b: u32) -> bool {
         let (a, b) = (self.nodes[a as usize], self.nodes[b as usize]);
         let are_starts = a.parent == NO_PARENT && b.parent == NO_PARENT;
         a.impact == b.impact && (are_starts || (a.ray != NO_RAY && a.ray == b.ray))
@@ -201,7 +201,7 @@ impl Reference {
             let (way, distance) = (place - pos, distance_sq.sqrt());
             if distance_sq > 0.0
                 && distance_sq <= (reach * length) * (reach * length)
-                && !self.is_kin(tip, node)
+                && !self.is_same_crack(tip, node)
                 && way.dot(heading) > 0.5 * heading.length() * distance
             {
                 let slant = 1.0 - way.dot(heading) / (distance * heading.length());

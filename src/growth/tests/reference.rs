@@ -91,14 +91,14 @@ impl Reference {
     fn step(&mut self) -> usize {
         let p = &self.params;
         let mut attracted: Vec<Vec<(f32, usize)>> = vec![Vec::new(); self.nodes.len()];
-        for (id, (marker, loyal, alive)) in self.markers.iter_mut().enumerate() {
+        for (id, (marker, owner, alive)) in self.markers.iter_mut().enumerate() {
             if !*alive {
                 continue;
             }
             let (mut best, mut best_sq) = (usize::MAX, p.crack_radius * p.crack_radius);
             for (node, (pos, _)) in self.nodes.iter().enumerate() {
                 let distance_sq = marker.distance_squared(*pos);
-                if distance_sq < best_sq && (*loyal == u32::MAX || *loyal == self.impacts[node]) {
+                if distance_sq < best_sq && (*owner == u32::MAX || *owner == self.impacts[node]) {
                     (best, best_sq) = (node, distance_sq);
                 }
                 *alive &=
@@ -136,7 +136,7 @@ fn equals_brute_force_node_for_node() {
         for hit in 0..3 {
             let pos = Vec2::new(rng.unit(), rng.unit()) * extent;
             growth.hit(pos, 0.2 + 2.0 * rng.unit());
-            reference.markers.extend(growth.field.unsettled().map(|(pos, loyal)| (pos, loyal, true)));
+            reference.markers.extend(growth.field.unsettled().map(|(pos, owner)| (pos, owner, true)));
             let known = reference.nodes.len();
             reference.nodes.extend(growth.network().nodes()[known..].iter().map(|node| (node.pos, node.parent)));
             reference.impacts.extend(growth.network().nodes()[known..].iter().map(|node| node.impact));
