@@ -14,7 +14,6 @@ use crate::{
 
 /// The settings of a material, such as glass: how its cracks grow, their cross-section and their look.
 ///
-///
 /// ```
 /// use bevy_crack::CrackPreset;
 ///
@@ -533,7 +532,6 @@ impl CrackPreset {
     ///
     /// Lengths are shares of the surface's shorter side. So the same preset looks four times as coarse on a wall that
     /// is four times as large in both directions as another one: use `CrackPreset::MUD.scaled(0.25)` there.
-    ///
     ///
     /// ```
     /// use bevy_crack::CrackPreset;

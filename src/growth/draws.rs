@@ -9,18 +9,18 @@ pub(super) const UNEVEN_REACH: u64 = 0xA4;
 /// The loaded area of a hit by direction.
 pub(super) const UNEVEN_LOAD: u64 = 0xA3;
 
-/// The way of a wave in which the size of domains changes, and its phase.
+/// The direction and phase of a wave in which the size of domains varies.
 pub(super) const PATCH_WAY: u64 = 0xA6;
 pub(super) const PATCH_PHASE: u64 = 0xA7;
 
-/// How the axes are turned along which a domain is measured, and how much the crack across it strays.
+/// The rotation of the axes along which a domain is measured, and the deviation of the crack across it.
 pub(super) const DOMAIN_AXES: u64 = 0xA1;
 pub(super) const DOMAIN_STRAY: u64 = 0xA2;
 
 /// Whether a crack begins with three arms; by node, where [`UNEVEN_REACH`] is by wave.
 pub(super) const STAR: u64 = 0xA4;
 
-/// How much a crack strays from node to node, and from grain to grain.
+/// The deviation of a crack from node to node, and from grain to grain.
 pub(super) const STRAY: u64 = 0x57A6;
 pub(super) const GRAIN: u64 = 0x6A41;
 
@@ -30,17 +30,17 @@ pub(super) const OPEN_END: u64 = 0x15;
 /// Whether a place of a ring is left out.
 pub(super) const CONNECTION_GAP: u64 = 0xC0;
 
-/// How much further in or out than its ring a ray is met; mixed before it is used, unlike [`CONNECTION_GAP`].
+/// The radial offset of a ring at a ray; mixed before it is used, unlike [`CONNECTION_GAP`].
 pub(super) const CORNER: u64 = 0xC0;
 
-/// How much a line from ray to ray strays.
+/// The deviation of a line from ray to ray.
 pub(super) const CHORD: u64 = 0xC1;
 
-/// How courses of bricks lie, and how uneven they are.
+/// The position of courses of bricks, and their irregularity.
 pub(super) const WALL: u64 = 0xB0;
 pub(super) const BRICK: u64 = 0xB1;
 
-/// How much a crack likes to follow a bed joint, and a head joint.
+/// The preference of a crack for a bed joint, and for a head joint.
 pub(super) const LEVEL_JOINT: u64 = 0xB2;
 pub(super) const HEAD_JOINT: u64 = 0xB3;
 
@@ -48,7 +48,7 @@ pub(super) const HEAD_JOINT: u64 = 0xB3;
 pub(super) const SPLIT: u64 = 0xB4;
 pub(super) const SPLIT_SIDE: u64 = 0xB5;
 
-/// How much narrower than others a crack is, and how its width varies.
+/// The relative width of a crack, and the variation of its width.
 pub(super) const MIXED_WIDTH: u64 = 0xA5;
 pub(super) const UNEVEN_WIDTH: u64 = 0x1D;
 

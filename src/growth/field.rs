@@ -55,8 +55,8 @@ pub(super) struct MarkerField {
     near_sq: Vec<f32>,
     node: Vec<u32>,
     id: Vec<u32>,
-    /// The impact whose nodes alone may take the marker, or [`ANY_IMPACT`]; it is removed by every node that reaches
-    /// it. Or a ray, whose nodes alone may take or remove it.
+    /// The owner: an impact or a ray, or [`ANY_IMPACT`]. Only nodes of the owner may take the marker. A marker of an
+    /// impact is removed by every node that reaches it, a marker of a ray only by nodes of the ray.
     owner: Vec<u32>,
     /// How often the marker was given up.
     given_up: Vec<u8>,

@@ -15,7 +15,6 @@ impl CrackGrowth {
     /// count for [`max_nodes`](super::GrowthParams::max_nodes). Where they cross existing cracks, nothing prevents
     /// it.
     ///
-    ///
     /// ```
     /// use bevy_crack::{growth::{CrackGrowth, GrowthParams}, voronoi::{VoronoiBake, VoronoiParams}};
     ///

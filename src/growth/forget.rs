@@ -19,7 +19,6 @@ impl CrackGrowth {
     /// continues from the remaining nodes. New and wider segments should be [taken](Self::take_changed) before the
     /// call.
     ///
-    ///
     /// ```
     /// use bevy_crack::growth::{CrackGrowth, GrowthParams};
     ///

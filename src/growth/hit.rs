@@ -37,7 +37,6 @@ impl CrackGrowth {
     /// Like [`hit`](Self::hit), but leaves the markers to [`lay_out`](Self::lay_out), so that a hit with many markers
     /// can be spread over several frames. The resulting cracks are the same.
     ///
-    ///
     /// ```
     /// use bevy_crack::{CrackPreset, growth::CrackGrowth};
     ///

@@ -9,7 +9,6 @@
 //! [`CrackGrowth::step`] lists the differences from the paper. All lengths are in pattern units: the surface's
 //! shorter side is 1.
 //!
-//!
 //! ```
 //! use bevy_crack::growth::{CrackGrowth, GrowthParams, MarkerLayout};
 //!

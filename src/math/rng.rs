@@ -9,7 +9,6 @@ use rand_pcg::Pcg32;
 /// Each consumer draws from its own named stream, so that a new consumer does not shift the others. The generator
 /// implements the traits of [`rand_core`], so the distributions of `rand` can draw from it.
 ///
-///
 /// ```
 /// use bevy_crack::math::Rng;
 ///

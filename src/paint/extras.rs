@@ -381,7 +381,7 @@ mod tests {
         common: [0.9, -0.4, 0.2],
     };
 
-    /// Plates fade to nothing where they are told, and are as they are near the hit.
+    /// Plates fade out at the given distance, and are unchanged near the hit.
     #[test]
     fn plates_fade_out() {
         let facets = Facets { fade: 0.4, dish: 0.2, ..Facets::DEFAULT };
@@ -390,7 +390,7 @@ mod tests {
         assert!(tone(0.3).abs() < tone(0.1).abs() && tone(0.4) == 0.0 && tone(2.0) == 0.0);
     }
 
-    /// A dish is brighter on the side that faces the light, by what it is told at the most.
+    /// A dish is brighter on the side that faces the light, by at most its parameter.
     #[test]
     fn dishes_are_lit_from_the_upper_left() {
         let facets = Facets { tone: 0.0, dish: 0.2, ..Facets::DEFAULT };
@@ -400,7 +400,7 @@ mod tests {
         assert!(all.into_iter().all(|tone| (0.7..=1.4).contains(&tone)));
     }
 
-    /// Neighbours have in common what they are told.
+    /// Neighbours are as similar as the parameter says.
     #[test]
     fn bundles_share_their_tone() {
         let spread = |bundle: f32| {

@@ -181,7 +181,6 @@ impl Look {
     /// The layers that a depth field needs in addition to depths so that this look can be painted. `seed` fixes their
     /// random details.
     ///
-    ///
     /// ```
     /// use bevy_crack::{
     ///     CrackPreset,

@@ -155,7 +155,7 @@ impl Job<'_> {
     ) {
         let size = rect.size();
         let width = size.x.min(WIDE as u32);
-        // A patch has two rows and columns more than are painted; the room suffices for one row at least.
+        // A patch has two rows and columns more than are painted; the buffer suffices for at least one row.
         let height = ((ROOM - BLOCK) as u32 / (width + 2) - 2).min(size.y);
         for y in (rect.min.y..rect.max.y).step_by(height as usize) {
             for x in (rect.min.x..rect.max.x).step_by(WIDE) {

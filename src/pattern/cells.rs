@@ -1,12 +1,13 @@
 //! [`CellTracker`]: the closed cells of a growing network, found as they close.
 //!
 //! The network is a planar drawing: its nodes are the vertices, its segments (taken as straight) and the surface's
-//! border the edges. The tracker keeps the half-edges of that drawing in loops, one loop for each side of each connected
-//! part (Muller and Preparata 1978). A new edge either joins two parts, which merges two loops, or two places of one part,
-//! which splits a loop: then a cell has closed. The two new loops are walked side by side until the shorter one ends, and only
-//! that one is marked anew; areas and moments are whole numbers, so the longer loop's follow by subtraction.
+//! border are the edges. The tracker stores the half-edges of that drawing in loops, one loop for each side of each
+//! connected part (Muller and Preparata 1978). A new edge either joins two parts, which merges two loops, or connects
+//! two places of one part, which splits a loop: then a cell has closed. The two new loops are walked side by side
+//! until the shorter one ends, and only that one is relabelled. Areas and moments are integers, so those of the
+//! longer loop follow by subtraction.
 //!
-//! Directions are compared by exact cross products of whole numbers, never by angles.
+//! Directions are compared by exact integer cross products, never by angles.
 
 mod closing;
 mod half_edge;
@@ -61,7 +62,6 @@ pub struct Cell {
 /// Nodes closer than about 2⁻³⁰ of the surface's longer side count as one. A segment that runs along another or along
 /// the border, or crosses from one cell into another, closes nothing and is ignored.
 ///
-///
 /// ```
 /// use bevy_crack::{CrackPreset, growth::CrackGrowth, pattern::CellTracker};
 ///
@@ -90,7 +90,8 @@ pub struct CellTracker {
     links: usize,
     /// Distance along the border from the top left, and the half-edge along it that begins there.
     border: BTreeMap<i64, u32>,
-    /// Per half-edge: where it begins, the next of its loop, and a loop whose root is its own. `h ^ 1` runs the other way.
+    /// Per half-edge: its origin, the next one of its loop, and a loop whose root is its loop. `h ^ 1` is the
+    /// opposite half-edge.
     origin: Vec<u32>,
     next: Vec<u32>,
     loop_of: Vec<u32>,
@@ -140,7 +141,7 @@ impl CellTracker {
         Self { closings: Some(Closings::default()), ..Self::new(extent) }
     }
 
-    /// What was kept by a tracker that is [`recording`](Self::recording).
+    /// The cells recorded by a tracker that is [`recording`](Self::recording).
     pub(crate) const fn closings(&self) -> Option<&Closings> {
         self.closings.as_ref()
     }
@@ -194,8 +195,8 @@ impl CellTracker {
         first..self.cells.len() as u32
     }
 
-    /// As [`update`](Self::update), in the order of a timeline, whose steps count as births: hits in the middle of growth do not change it
-    /// either.
+    /// Like [`update`](Self::update), in the order of a timeline, whose steps are used as births: hits in the middle
+    /// of growth do not change the result either.
     pub(crate) fn follow(&mut self, network: &Network, timeline: &Timeline) {
         let (nodes, links) = (network.nodes(), network.links());
         while !self.cells.is_empty() && (self.vertex_of.len() < nodes.len() || self.links < links.len()) {
@@ -265,14 +266,14 @@ impl CellTracker {
         self.cells.get(cell as usize).into_iter().flat_map(|cell| &cell.holes).map(|&hole| self.trace(hole))
     }
 
-    /// Place of a point of an outline, pattern units.
+    /// Position of a point of an outline, pattern units.
     #[must_use]
     pub fn pos(&self, point: u32) -> Option<Vec2> {
         let vertex = if point >= CORNERS { point - CORNERS } else { *self.vertex_of.get(point as usize)? };
         self.vertices.get(vertex as usize).map(|vertex| vertex.pos)
     }
 
-    /// The cell at a place; costs as much as the network is large.
+    /// The cell at a position; the cost is proportional to the size of the network.
     #[must_use]
     pub fn cell_at(&self, pos: Vec2) -> Option<u32> {
         let inside = !self.cells.is_empty() && pos.is_finite() && pos.cmpge(Vec2::ZERO).all();
@@ -284,7 +285,7 @@ impl CellTracker {
         [coordinate(pos.x), coordinate(pos.y)]
     }
 
-    /// How far along the border a place is, if it is on it.
+    /// Distance of a place along the border, if it is on it.
     fn way(&self, [x, y]: [i32; 2]) -> Option<i64> {
         let [w, h] = self.corner.map(i64::from);
         let (x, y) = (i64::from(x), i64::from(y));

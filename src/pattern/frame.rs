@@ -10,7 +10,6 @@ pub const MAX_ASPECT: f32 = 64.0;
 
 /// The position of a surface of `size` texels in pattern space.
 ///
-///
 /// ```
 /// use bevy_crack::pattern::SurfaceFrame;
 ///

@@ -9,7 +9,6 @@ use glam::{UVec2, Vec2};
 /// The layers may have any size, each its own: they are sampled by texture coordinates (0..1, v down). A missing
 /// layer counts as 0 everywhere; NaN counts as 0 too.
 ///
-///
 /// ```
 /// use bevy_crack::pattern::CrackMask;
 ///

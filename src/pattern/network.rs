@@ -41,7 +41,7 @@ pub enum LinkKind {
     Junction,
 }
 
-/// A segment between two nodes neither of which is the other's parent.
+/// A segment between two nodes of which neither is the parent of the other.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Link {
     /// Index of one end.
@@ -102,7 +102,8 @@ pub struct Network {
 impl Network {
     /// A network without nodes on a surface of `extent` pattern units.
     ///
-    /// `roughness` is how far a segment's path strays from the straight line, as a share of its length (0 = straight);
+    /// `roughness` is how far a segment's path deviates from the straight line, as a share of its length (0 =
+    /// straight);
     /// `seed` fixes the paths.
     #[must_use]
     pub const fn new(extent: Vec2, roughness: f32, seed: u64) -> Self {

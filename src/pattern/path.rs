@@ -165,7 +165,7 @@ pub(super) fn rough_path(
 mod tests {
     use super::*;
 
-    /// Lines that meet still meet, by no more than they are told aside, and what ends at the border still does.
+    /// Lines that meet still meet, no point moves further than allowed, and ends on the border stay there.
     #[test]
     fn lines_sway_together() {
         let (extent, by) = (Vec2::new(1.0, 0.7), 0.006);

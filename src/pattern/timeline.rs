@@ -6,7 +6,6 @@ use std::ops::Range;
 
 /// A time of a [`Timeline`]: steps of growth, with a resolution of 1/256.
 ///
-///
 /// ```
 /// use bevy_crack::pattern::Moment;
 ///
@@ -80,7 +79,6 @@ pub struct Dot {
 /// their whole length.
 ///
 /// Entries are only ever appended, in order of their steps.
-///
 ///
 /// ```
 /// use bevy_crack::{growth::{CrackGrowth, GrowthParams}, pattern::{Moment, SegmentId}};

@@ -25,7 +25,6 @@ const FEW: usize = 64;
 /// in proportion to the marked tiles. The first few hundred marks are kept exactly, so that rectangles are no larger
 /// than what was marked.
 ///
-///
 /// ```
 /// use bevy_crack::raster::{DirtyTiles, TexelRect};
 ///

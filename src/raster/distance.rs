@@ -17,7 +17,6 @@ const BLOCK: usize = 32;
 ///
 /// Exact up to `reach` (clamped to [`MAX_DISTANCE`]); `f32::INFINITY` beyond.
 ///
-///
 /// ```
 /// use bevy_crack::{pattern::SurfaceFrame, raster::{DepthField, crack_distance}};
 ///

@@ -25,7 +25,6 @@ const NONE: u32 = u32::MAX;
 /// of stamping every segment once. A move costs in proportion to the changes between the two moments, not to the
 /// network.
 ///
-///
 /// ```
 /// use bevy_crack::{
 ///     growth::{CrackGrowth, GrowthParams},

@@ -185,7 +185,6 @@ impl Burst {
 
     /// The same burst with a floor on which pieces come to rest.
     ///
-    ///
     /// ```
     /// use bevy_crack::shatter::{Burst, BurstParams, Cuts, Floor, ShatterParams, shatter};
     /// use glam::Vec3;

@@ -56,7 +56,6 @@ pub(super) fn in_range(name: &'static str, value: f32, min: f64, max: f64) -> Re
 /// Lines may cross, touch, overlap and end anywhere. Points are moved by up to half a unit of the lattice, which is
 /// up to 2⁻²⁴ of the longer side, and points off the surface are moved to its border.
 ///
-///
 /// ```
 /// use bevy_crack::{CrackPreset, growth::CrackGrowth, shatter::{Cuts, ShatterParams, shatter}};
 ///

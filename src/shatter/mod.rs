@@ -9,7 +9,6 @@
 //! neighbours. [`Support`] computes what falls, [`Shards::break_again`] cuts a piece further, and [`Burst`] moves the
 //! pieces as a function of time, so that they can be shown at any speed, and backwards.
 //!
-//!
 //! ```
 //! use bevy_crack::shatter::{Cuts, ShatterParams, shatter};
 //!

@@ -21,7 +21,6 @@ pub enum Anchor {
 ///
 /// A held shard holds its neighbours, and so on; shards that are no longer held fall.
 ///
-///
 /// ```
 /// use bevy_crack::shatter::{Anchor, Cuts, ShatterParams, Support, shatter};
 ///

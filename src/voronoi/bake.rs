@@ -52,7 +52,6 @@ enum Stage {
 
 /// Computes a map: call [`step`](Self::step) until it is done, or drop it.
 ///
-///
 /// ```
 /// use bevy_crack::voronoi::{BakeProgress, VoronoiBake, VoronoiParams};
 ///
@@ -437,7 +436,6 @@ impl VoronoiMap {
     ///
     /// Only what can change is computed: the texels whose path used an edge that became more expensive, and those to
     /// which a cheaper edge gives a shorter path. The result equals a new map.
-    ///
     ///
     /// ```
     /// use bevy_crack::{Grid, voronoi::{Guide, VoronoiBake, VoronoiParams}};

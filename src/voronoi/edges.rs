@@ -11,7 +11,6 @@ const FULL: f32 = 0.4;
 /// The slope is computed with Sobel's kernel. A picture without edges gives a guide that is zero everywhere; NaN
 /// counts as 0.
 ///
-///
 /// ```
 /// use bevy_crack::{Grid, voronoi::edges};
 ///

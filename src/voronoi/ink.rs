@@ -23,7 +23,6 @@ pub fn lightness(size: UVec2, rgba: &[u8]) -> Option<Grid<f32>> {
 /// light; 0 where it is transparent. In a picture with a transparent background everything else counts as drawing.
 /// `None` if the picture does not have exactly `size` texels.
 ///
-///
 /// ```
 /// use bevy_crack::voronoi::ink;
 ///

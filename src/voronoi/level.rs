@@ -22,7 +22,7 @@ pub(super) struct Level {
     walls: bool,
 }
 
-/// Calls a method of whichever search there is.
+/// Calls a method of the search, for either number type.
 macro_rules! paths {
     ($paths:expr, $search:ident => $call:expr) => {
         match $paths {
@@ -33,7 +33,7 @@ macro_rules! paths {
 }
 
 impl Level {
-    /// Begins with `sites`; there may be up to `most`.
+    /// A level that starts with `sites`; more can be added, up to `most`.
     pub(super) fn new(size: UVec2, sites: &[UVec2], most: usize, walls: bool) -> Self {
         let paths = if most <= <i32 as Packed>::MAX_SITES {
             Paths::Narrow(Search::new(size))

@@ -18,21 +18,6 @@
 //! Differs from the paper: a level of cracks divides the regions of the level before exactly, as if crossing an older
 //! crack were impossible; the paper only makes it more expensive.
 //!
-//!
-//! ```text
-//! e_ij = α max(N_i, N_j) + β + Σ_k γ_k max(I^k_i, I^k_j)        (eq. 1, 2 and 4)
-//! ```
-//!
-//! where `N` is noise and the `I^k` are guides. A texel belongs to the *site* that has the cheapest path to it. Where two
-//! regions meet there is a crack; strokes of a guide are dear to cross, so regions from either side meet in their middle.
-//!
-//! [`VoronoiParams`] and [`Guide`] are what is asked, [`VoronoiBake`] what runs, row by row; [`VoronoiMap`] has regions and
-//! costs of every texel, [`Seams`] the cracks as lines. Costs are whole numbers (β is 256 units), so the map is the same on
-//! every machine; ties go to the lower site.
-//!
-//! Differs from the paper: a level of cracks divides the regions of the one before exactly, as if crossing an
-//! older crack had no price; the paper only makes it dearer.
-//!
 //! ```
 //! use bevy_crack::voronoi::{SiteLayout, VoronoiParams, voronoi_map};
 //! use std::ops::ControlFlow;

@@ -109,7 +109,7 @@ pub(super) struct Search<P> {
     /// The next row of the sweep.
     row: usize,
     upwards: bool,
-    /// Whether this sweep has changed anything, and how many in a row have not.
+    /// Whether this sweep has changed anything, and the number of successive sweeps without a change.
     moved: bool,
     quiet: u32,
     /// Sweeps begun since the search was last at rest.

@@ -49,7 +49,7 @@ pub(super) fn even(
     if n <= points.len() {
         return points;
     }
-    // About two points to a cell at the end.
+    // Finally about two points per cell.
     let cell = (2.0 * extent.x * extent.y / n as f32).sqrt();
     let columns = (extent / cell).ceil().max(Vec2::ONE).as_uvec2();
     let mut cells = vec![Vec::<u32>::new(); columns.x as usize * columns.y as usize];

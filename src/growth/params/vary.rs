@@ -8,7 +8,6 @@ impl GrowthParams {
     /// The same material at another scale: every length times `by` (above 1 = seen from nearer). Lengths are clamped
     /// to their ranges. `by` is clamped to 0.01..=100; NaN counts as 1.
     ///
-    ///
     /// ```
     /// use bevy_crack::growth::GrowthParams;
     ///

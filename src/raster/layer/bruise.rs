@@ -15,7 +15,7 @@ const RINGS: f32 = 4.2;
 const INNER: u32 = 8;
 const MORE: u32 = 5;
 
-/// What a bruise shows at a place, each 0..=1: a crack, and how pale the flake is.
+/// The bruise at a place, each 0..=1: a crack, and the paleness of the flake.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Bruise {
     pub(super) crack: f32,
@@ -42,7 +42,7 @@ pub(super) fn bruise(off: Vec2, q: f32, dense: f32, fine: f32, seed: u32) -> Bru
         let (wide, long) = (TAU * distance / count as f32, distance / (0.5 * along).max(0.5));
         let line = |off: f32, thick: f32| (thick + 0.5 - off.abs()).clamp(0.0, 1.0);
         if draw(41) < chance {
-            // A radial one, which runs out as a needle.
+            // A radial crack, which ends in a point.
             let middle = 0.25 + 0.5 * draw(42) + 0.3 * (draw(43) - 0.5) * share;
             let left = 1.0 - share * (0.3 + 0.9 * draw(44));
             let strength = (0.3 + 0.7 * draw(45)) * left.clamp(0.0, 1.0);

@@ -3,11 +3,11 @@
 //!
 //! These numbers are frozen: a seed must give the same result in every version.
 
-/// How far the edge of what crumbles strays: in wide bumps and in fine ones.
+/// Deviation of a crumbling edge: in wide bumps and in fine ones.
 pub(super) const JAG_WIDE: u32 = 0x58;
 pub(super) const JAG_FINE: u32 = 0x59;
 
-/// Where its wall is a slope, and how the edge of the basin strays.
+/// Where its wall is a slope, and the deviation of the edge of the basin.
 pub(super) const WALL_SLOPE: u32 = 0x5A;
 pub(super) const BASIN_EDGE: u32 = 0x5B;
 
@@ -15,7 +15,7 @@ pub(super) const BASIN_EDGE: u32 = 0x5B;
 pub(super) const PLATES: u32 = 0x51;
 pub(super) const SMALL_PLATES: u32 = 0x54;
 
-/// Tones of a floor that crumbles, from place to place and over all of it.
+/// Tones of a crumbling floor: local ones and a global one.
 pub(super) const COARSE_TONE: u32 = 0x56;
 pub(super) const BROAD_TONE: u32 = 0x5F;
 
@@ -37,17 +37,17 @@ pub(super) const CHIP_FACE: u32 = 0x67;
 /// Crumbs; the next numbers are those of one crumb.
 pub(super) const CRUMBS: u32 = 0x80;
 
-/// Sizes and places of all that breaks off.
+/// Sizes and positions of the pieces that break off.
 pub(super) const PIECES: u32 = 0x0B0E;
 
-/// Outlines: the crater, its basin, a drawn pit, and a hole with what has come off around it.
+/// Outlines: of the crater, its basin, a drawn pit, and a hole with its broken edge.
 pub(super) const CRATER: u32 = 0x60;
 pub(super) const BASIN: u32 = 0x61;
 pub(super) const PIT: u32 = 0x62;
 pub(super) const HOLE: u32 = 0x71;
 pub(super) const SHELL: u32 = 0x72;
 
-/// Scattered places: how far down each lies, and what is its own.
+/// Scattered places: the vertical position of each, and its own random number.
 pub(super) const SITE_DOWN: u32 = 0x77;
 pub(super) const SITE_OWN: u32 = 0x7A;
 

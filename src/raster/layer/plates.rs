@@ -247,7 +247,7 @@ mod tests {
         PlateField::new(SurfaceFrame::new(size).unwrap(), 3, 0.0)
     }
 
-    /// A network that has only the nodes and links of the births up to `birth`, and its timeline: each comes in the step after.
+    /// A network with only the nodes and links up to step `birth`, and its timeline: each belongs to the step after.
     fn up_to(network: &Network, birth: u32) -> (Network, Timeline) {
         let (mut part, mut timeline) = (network.clone(), Timeline::default());
         part.nodes.retain(|node| node.birth <= birth);

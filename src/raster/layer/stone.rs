@@ -1,4 +1,4 @@
-//! Facets, grains and rounded stones on the floor of what has broken off.
+//! Facets, grains and rounded stones on the floor where material has broken off.
 
 use super::{
     draws,

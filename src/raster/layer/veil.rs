@@ -67,27 +67,29 @@ impl Default for Veil {
     }
 }
 
-/// No floor is so many texels wide.
+/// No floor is this many texels wide.
 const MOST_HALF: f32 = 16_384.0;
 
 /// Streaks a pattern unit.
 const STREAKS: f32 = 46.0;
 
-/// How dense the sheets are at each texel.
+/// The density of the sheets at each texel.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct VeilField {
     veil: Veil,
     frame: SurfaceFrame,
     seed: u32,
-    /// From a crack to the far end of its sheet, texels.
+    /// Extent of a sheet from its crack, texels.
     hang: Vec2,
-    /// 0 = none, 255 = as dense as it gets; combined by max.
+    /// 0 = none, 255 = full density; combined by max.
     density: Grid<u8>,
-    /// In place of sheets, the floors of cracks: how far they are moved, as a share of the half width.
+    /// If set, the field holds the floors of cracks instead of sheets: how far they are moved, as a share of the half
+    /// width.
     floor: Option<f32>,
 }
 
-/// What the draws of veils are combined with: those of their way, and of their noise. Frozen, like all that a seed gives.
+/// Salts of the random draws of veils: for their direction, and for their noise. Frozen: a seed must give the same
+/// result in every version.
 const VEIL_WAY: u64 = 0x7E11;
 const VEIL_NOISE: u64 = 0x5EA1;
 
@@ -107,7 +109,7 @@ impl VeilField {
         }
     }
 
-    /// The floors of cracks, each moved to the upper left by a share of its half width, and pattern units at the most.
+    /// The floors of cracks, each moved to the upper left by a share of its half width, limited in pattern units.
     pub(super) fn floor([share, most]: [f32; 2], frame: SurfaceFrame) -> Self {
         let way = Vec2::splat(-std::f32::consts::FRAC_1_SQRT_2);
         let hang = way * (most.clamp(0.0, 0.5) * frame.texels_per_unit());
@@ -122,7 +124,7 @@ impl VeilField {
         &mut self.density
     }
 
-    /// The box that sheets of a crack at zero lie in, texels.
+    /// The bounding box of the sheets of a crack at the origin, texels.
     pub(in crate::raster) fn hang(&self) -> (Vec2, Vec2) {
         let other = if self.veil.uneven > 0.0 && self.floor.is_none() { -self.hang } else { Vec2::ZERO };
         // And a bubble at its end.
@@ -135,7 +137,7 @@ impl VeilField {
         (0.0011 + 0.0044 * size) * self.frame.texels_per_unit()
     }
 
-    /// Hangs a sheet from a line; returns the texels that it may have changed.
+    /// Adds the sheet of a line; returns the texels that it may have changed.
     pub(in crate::raster) fn stamp(&mut self, path: &SegmentPath) -> TexelRect {
         let mut bounds = TexelRect::default();
         if let Some(share) = self.floor {
@@ -148,7 +150,7 @@ impl VeilField {
             }
             return bounds;
         }
-        // Sheets of some directions catch more light than others.
+        // The brightness of a sheet depends on its direction.
         let ends = path.points().first().zip(path.points().last());
         let way = ends.map_or(Vec2::ZERO, |(from, to)| (to.pos - from.pos).normalize_or_zero());
         // Twice the angle: the same both ways.
@@ -171,7 +173,7 @@ impl VeilField {
         bounds
     }
 
-    /// A floor between two places of these half widths: how much of each texel it covers.
+    /// The floor between two places with these half widths: the cover of each texel.
     fn stamp_floor(&mut self, [(a, from), (b, to)]: [(Vec2, f32); 2]) -> TexelRect {
         if !a.is_finite() || !b.is_finite() || from.max(to) <= 0.0 {
             return TexelRect::default();
@@ -202,9 +204,10 @@ impl VeilField {
         TexelRect { min, max }
     }
 
-    /// As [`stamp_piece`](Self::stamp_piece), of a sheet that is not like the others. `twice` is the direction of the crack, twice the angle.
+    /// Like [`stamp_piece`](Self::stamp_piece), for uneven sheets. `twice` is the direction of the crack with its
+    /// angle doubled.
     fn stamp_uneven(&mut self, [a, b]: [Vec2; 2], dense: [f32; 2], twice: Vec2) -> TexelRect {
-        // Few hang to the other side, and between both there is a direction without any.
+        // Few sheets are on the other side, and at the directions in between there is none.
         let side = 0.3 + noise(self.seed ^ 8, 1.1 * twice.x + 5.0, 1.1 * twice.y);
         let hang = if side < 0.0 { -self.hang } else { self.hang };
         let along = b - a;
@@ -215,7 +218,7 @@ impl VeilField {
         }
         let (uneven, unit) = (self.veil.uneven, 1.0 / self.frame.texels_per_unit());
         let faint = (7.0 * side.abs()).min(1.0);
-        // What changes slowly from place to place, at both ends: so that it goes on from piece to piece.
+        // Slow variations, at both ends of the piece, so that they are continuous from piece to piece.
         let slow = |k: u32, bumps: f32| {
             [a, b].map(|end| {
                 let end = end * (unit * bumps);
@@ -250,7 +253,7 @@ impl VeilField {
                     continue;
                 }
                 let (way, rest) = (s / end, 1.0 - s / end);
-                // Some fade out, some are a pane with a far edge of its own.
+                // Some sheets fade out, others have a visible far edge.
                 let pane = (0.5 + 1.6 * mix(kind)).clamp(0.0, 1.0);
                 let fade = rest * (0.18 + 0.82 * rest * rest);
                 let border = ((end - s) * hang.length() * (1.0 / 1.5)).min(1.0);
@@ -271,7 +274,7 @@ impl VeilField {
         rect
     }
 
-    /// A bubble beside the crack at the start of a segment, if one is there: a bright ring with a highlight.
+    /// A bubble beside the crack at the start of a segment, if there is one: a bright ring with a highlight.
     fn stamp_bubble(&mut self, pos: Vec2) -> TexelRect {
         let key = mix(u64::from(self.seed) ^ u64::from(pos.x.to_bits()) << 32 ^ u64::from(pos.y.to_bits()));
         let draw = |k: u64| (mix(key ^ k << 8) >> 40) as f32 * (1.0 / 16_777_216.0);
@@ -318,7 +321,7 @@ impl VeilField {
             return TexelRect::default();
         }
         let inv = 1.0 / det;
-        // Half a texel more at the ends, so that there is no gap between two pieces.
+        // Half a texel longer at the ends, so that there is no gap between two pieces.
         let slack = 0.5 / along.length().max(0.5);
         let streak = hang.perp() / hang.length() * (STREAKS / self.frame.texels_per_unit());
         for y in rect.min.y..rect.max.y {
@@ -337,7 +340,7 @@ impl VeilField {
                 // It ends at different distances.
                 let thick = dense[0] + (dense[1] - dense[0]) * u;
                 let end = (0.3 + 0.7 * thick) * (0.72 + 0.28 * noise(self.seed ^ 1, 0.31 * place, 3.0));
-                // Most of it next to the crack, a little far away.
+                // Densest next to the crack.
                 let fall = (1.0 - s / end).max(0.0);
                 let value = thick * fall * (0.3 + 0.7 * fall * fall) * curtain;
                 let value = (255.0 * value.clamp(0.0, 1.0) + 0.5) as u8;
@@ -354,7 +357,7 @@ mod tests {
     use super::*;
     use crate::{math::Rng, pattern::PathPoint};
 
-    /// Whatever hangs from a crack lies in the box that is told, and it is the same in one go and piece by piece.
+    /// All changes lie in the reported box, and the result is the same in one call and piece by piece.
     #[test]
     fn sheets_bubbles_and_floors_stay_in_their_box() {
         let (frame, mut rng) = (SurfaceFrame::new(UVec2::splat(256)).unwrap(), Rng::new(4));

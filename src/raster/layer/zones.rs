@@ -1,4 +1,4 @@
-//! Crushed zones: what a hit leaves around itself.
+//! The crushed zones of all hits.
 
 use super::{
     crushed::Crushed,
@@ -359,7 +359,7 @@ impl Shape<'_> {
         }
     }
 
-    /// `off` is the way from the centre, `at` the place in the field.
+    /// The content of a place; `off` is the offset from the centre, `at` the position in the field.
     fn place(&self, off: Vec2, at: Vec2, seed: u32) -> Place {
         let Crushed { ragged, soft, hole, pale, speckle, flake, dust, chips, reach, .. } = *self.crushed;
         let mut place = Place::NONE;
