@@ -45,7 +45,7 @@ struct Rereading {
     stage: Stage,
     since: Instant,
     asked: Instant,
-    /// How often it had to begin again; a picture that changes all the time is taken as it is then.
+    /// How often it had to begin again.
     restarts: u32,
 }
 
@@ -105,7 +105,12 @@ pub(crate) fn draft(
 }
 
 /// The pictures of a plan, read; `None` if that takes some frames more.
-fn base(world: &mut World, plan: &PicturePlan, shown: &Shown) -> Result<Option<Arc<BasePicture>>, CrackError> {
+fn base(
+    world: &mut World,
+    entity: Entity,
+    plan: &PicturePlan,
+    shown: &Shown,
+) -> Result<Option<Arc<BasePicture>>, CrackError> {
     let key = plan.key(shown);
     let is_small = plan.size.as_usizevec2().element_product() <= MAX_AT_ONCE;
     let has_threads = world.resource::<Threads>().pool().is_some();
@@ -118,7 +123,13 @@ fn base(world: &mut World, plan: &PicturePlan, shown: &Shown) -> Result<Option<A
     if world.resource_mut::<Rereadings>().changes_often(entity, key) {
         return plan.clone().draft(world, shown).map(|draft| Some(draft.base));
     }
-    world.resource_scope(|world, mut readings: Mut<Rereadings>| readings.step(world, plan, shown, key))
+    world.resource_scope(|world, mut readings: Mut<Rereadings>| {
+        let base = readings.step(world, plan, shown, key)?;
+        if base.is_some() {
+            readings.asked.remove(&entity);
+        }
+        Ok(base)
+    })
 }
 
 impl Rereadings {
@@ -152,7 +163,7 @@ impl Rereadings {
         if self.copied.0 != frame {
             self.copied = (frame, MAX_BYTES);
         }
-        let Self { list, copied: (_, left) } = self;
+        let Self { list, copied: (_, left), .. } = self;
         let images = world.get_resource::<Assets<Image>>().ok_or(CrackError::NoImages)?;
         let reading = &mut list[index];
         reading.asked = now;
