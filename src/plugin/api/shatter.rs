@@ -200,6 +200,8 @@ impl Default for ShatterRequest {
 
 /// A piece of a surface that has left it. Its entity is a child of the surface, its origin the shard's centre.
 ///
+/// Shards go when their surface is despawned, as all children do, and when it is healed. To keep one, take `ChildOf` and this component off it.
+///
 /// Where the crate moves shards, their entities serve for others when they are gone, without this component meanwhile: take off again
 /// what you put on (observe `Remove` of `Shard`). One that has a [`CrackSurface`](super::CrackSurface) then is despawned instead, with all that
 /// was made for it.
@@ -322,6 +324,12 @@ pub enum ShardsError {
     /// [`CrackMaps::diffuse`](super::CrackMaps::diffuse) is off, so that holes could not be seen.
     #[error("the surface has no diffuse texture of its own: `write.diffuse` is off")]
     NoDiffuse,
+    /// The shards could not be made.
+    #[error("its shards could not be made: {reason}")]
+    Failed {
+        /// Why.
+        reason: String,
+    },
     /// Not enough of [`CrackBudget::max_texture_bytes`](super::CrackBudget::max_texture_bytes) is left.
     #[error("the picture on its shards needs {needed} bytes, the budget has {left} left")]
     TextureBudget {

@@ -201,6 +201,7 @@ impl Carrier {
 }
 
 /// What a surface is going to look like.
+#[cfg_attr(not(any(feature = "2d", feature = "3d")), expect(dead_code, reason = "there are no kinds then"))]
 pub(crate) enum NextLook<'a> {
     /// It shows these maps.
     Cracked(Maps),

@@ -5,6 +5,7 @@ use super::kind::{CarrierKind, Found};
 use super::lit::CrackLitMaterial;
 #[cfg(any(feature = "2d", feature = "3d"))]
 use super::material::MaterialKind;
+#[cfg(feature = "2d")]
 use super::sprite::SpriteKind;
 use crate::plugin::api::error::CrackError;
 use bevy::prelude::*;

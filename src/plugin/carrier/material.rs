@@ -8,7 +8,9 @@ use super::shard_visual::{MaterialVisuals, ShardVisuals};
 use super::slot::{CrackMaterial, MaterialSlot, mesh_of, to_picture, typed};
 #[cfg(feature = "3d")]
 use super::split;
-use crate::plugin::api::error::{CrackError, EntityLabel};
+use crate::plugin::api::error::CrackError;
+#[cfg(feature = "3d")]
+use crate::plugin::api::error::EntityLabel;
 use crate::plugin::api::hit::HitPoint;
 use crate::plugin::api::textures::{CrackTextures, Maps};
 use crate::raster::TexelRect;

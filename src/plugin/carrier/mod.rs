@@ -12,11 +12,11 @@ pub(crate) mod lit;
 mod material;
 #[cfg(any(feature = "2d", feature = "3d"))]
 mod mesh;
-#[cfg_attr(not(any(feature = "2d", feature = "3d")), expect(dead_code, reason = "there are no kinds then"))]
 pub(crate) mod pipelines;
 #[cfg(any(feature = "2d", feature = "3d"))]
 pub(crate) mod place;
 pub(crate) mod plane;
+#[cfg_attr(not(any(feature = "2d", feature = "3d")), expect(dead_code, reason = "there are no kinds then"))]
 pub(crate) mod shard_visual;
 #[cfg_attr(not(any(feature = "2d", feature = "3d")), expect(dead_code, reason = "there are no kinds then"))]
 mod slot;

@@ -25,13 +25,16 @@ use bevy::{
 };
 #[cfg(any(feature = "2d", feature = "3d"))]
 use core::any::TypeId;
+#[cfg(any(feature = "2d", feature = "3d"))]
+use core::hash::{Hash, Hasher};
 use core::{
-    hash::{Hash, Hasher},
     sync::atomic::{AtomicU64, Ordering},
     time::Duration,
 };
+#[cfg(any(feature = "2d", feature = "3d"))]
+use std::hash::DefaultHasher;
 use std::{
-    collections::{BTreeMap, VecDeque, hash_map::DefaultHasher},
+    collections::{BTreeMap, VecDeque},
     sync::Arc,
 };
 

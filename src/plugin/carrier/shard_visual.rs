@@ -6,7 +6,6 @@ use bevy::{asset::UntypedHandle, prelude::*};
 use core::marker::PhantomData;
 
 /// What a shard or its sides are shown with.
-#[cfg_attr(not(any(feature = "2d", feature = "3d")), expect(dead_code, reason = "there are no kinds then"))]
 pub(crate) struct ShardVisual {
     pub(crate) parent: Entity,
     pub(crate) place: Transform,

@@ -74,10 +74,7 @@ pub(crate) fn guarded<T>(run: impl FnOnce() -> Result<T, CrackError>) -> Result<
 }
 
 /// The same, of another kind.
-pub(crate) fn guarded_as<T>(
-    error: impl FnOnce(String) -> CrackError,
-    run: impl FnOnce() -> Result<T, CrackError>,
-) -> Result<T, CrackError> {
+pub(crate) fn guarded_as<T, E>(error: impl FnOnce(String) -> E, run: impl FnOnce() -> Result<T, E>) -> Result<T, E> {
     catch_unwind(AssertUnwindSafe(run)).unwrap_or_else(|panic| {
         let text = panic.downcast_ref::<&str>().copied().or(panic.downcast_ref::<String>().map(String::as_str));
         Err(error(format!("it panicked: {}", text.unwrap_or("unknown"))))
@@ -100,13 +97,13 @@ mod tests {
         let (mut here, mut there) = (0, 0);
         for number in 0..200 {
             let (tell, told) = mpsc::channel();
-            let beside = BackgroundJob::start((number, tell), run);
+            let job = BackgroundJob::start((number, tell), run);
             let mut who = None;
             if number % 2 == 0 {
                 // Not before it is done.
                 who = told.recv().ok();
             }
-            assert_eq!(beside.finish(), Some(2 * number));
+            assert_eq!(job.finish(), Some(2 * number));
             let who = who.or_else(|| told.recv().ok()).expect("it was done");
             assert!(told.recv().is_err(), "only once");
             *if who == thread::current().id() { &mut here } else { &mut there } += 1;
@@ -120,24 +117,24 @@ mod tests {
         for is_late in [false, true] {
             let (free, wait) = mpsc::channel::<()>();
             let (begin, begun) = mpsc::channel();
-            let mut beside = BackgroundJob::start((wait, begin), |(wait, begin)| {
+            let mut job = BackgroundJob::start((wait, begin), |(wait, begin)| {
                 begin.send(()).expect("someone listens");
                 wait.recv().is_err()
             });
             begun.recv().expect("it begins");
-            assert_eq!(beside.take_if_done(is_late), None, "a thread is at it");
+            assert_eq!(job.take_if_done(is_late), None, "a thread is at it");
             drop(free);
-            while !beside.is_done() {
+            while !job.is_done() {
                 thread::yield_now();
             }
-            assert_eq!(beside.take_if_done(is_late), Some(true));
-            assert_eq!(beside.take_if_done(is_late), None, "once");
+            assert_eq!(job.take_if_done(is_late), Some(true));
+            assert_eq!(job.take_if_done(is_late), None, "once");
         }
         // No thread will ever begin this one.
         let work = Arc::new(Mutex::new(Some(4)));
-        let mut beside = BackgroundJob { work, run: |number| 2 * number, task: None };
-        assert_eq!(beside.take_if_done(false), None);
-        assert_eq!(beside.take_if_done(true), Some(8));
-        assert_eq!(beside.take_if_done(true), None);
+        let mut job = BackgroundJob { work, run: |number| 2 * number, task: None };
+        assert_eq!(job.take_if_done(false), None);
+        assert_eq!(job.take_if_done(true), Some(8));
+        assert_eq!(job.take_if_done(true), None);
     }
 }

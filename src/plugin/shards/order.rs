@@ -12,6 +12,7 @@ use crate::plugin::api::shatter::rim_for;
 use crate::plugin::api::{CrackBudget, GravitySpace, ShardsError, ShatterCracks, ShatterRequest};
 use crate::plugin::carrier::plane::Plane;
 use crate::plugin::carrier::space;
+use crate::plugin::jobs::background::guarded_as;
 use crate::plugin::source::mask;
 use crate::plugin::source::picture::BasePicture;
 use crate::plugin::surface::active::Active;
@@ -213,8 +214,12 @@ impl ShatterJob {
         })
     }
 
-    /// Makes all that needs no world.
+    /// Makes all that needs no world. A panic is an error.
     pub(super) fn make(self) -> Result<CutSurface, ShardsError> {
+        guarded_as(|reason| ShardsError::Failed { reason }, || self.cut())
+    }
+
+    fn cut(self) -> Result<CutSurface, ShardsError> {
         let is_new = matches!(self.pieces, CutFrom::Lines(..));
         let is_kept = matches!(self.pieces, CutFrom::Cut(..));
         let (cut, mut support) = match self.pieces {

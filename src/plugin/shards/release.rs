@@ -87,7 +87,7 @@ fn attend(
             queue.requests.push(request);
             return Ok(None);
         }
-        Ok(Progress::CutSurface(made)) => release(world, entity, active, *made),
+        Ok(Progress::Ready(made)) => release(world, entity, active, *made),
         Err(error) => Err(error),
     };
     active.turn.is_to_shatter = false;
@@ -100,7 +100,7 @@ fn attend(
 
 enum Progress {
     Wait(Request),
-    CutSurface(Box<CutSurface>),
+    Ready(Box<CutSurface>),
 }
 
 /// Begins to make what was asked for, waits for it, or has it. It is not to be had before `is_warm`.
@@ -136,7 +136,7 @@ fn proceed(world: &World, active: &Active, mut request: Request, is_warm: bool) 
     };
     // It has become another surface: in this frame, or it would never be done where that happens often.
     let made = made.unwrap_or_else(|| order(&request)?.make())?;
-    Ok(Progress::CutSurface(Box::new(made)))
+    Ok(Progress::Ready(Box::new(made)))
 }
 
 /// Counts the shards that are shown.

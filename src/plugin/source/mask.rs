@@ -4,7 +4,7 @@ use super::layout::Layout;
 use super::picture::{self, BasePicture, Space};
 use crate::pattern::{CrackMask, MaskError};
 use crate::plugin::api::{CrackError, CrackMaskSource};
-use crate::plugin::jobs::background::{BackgroundJob, PATIENCE};
+use crate::plugin::jobs::background::{BackgroundJob, PATIENCE, guarded_as};
 use crate::plugin::jobs::copy::MAX_RESTARTS;
 use crate::raster::TexelRect;
 use crate::{CrackPreset, Grid};
@@ -72,7 +72,7 @@ pub(crate) struct PictureMasks {
 struct InWork {
     key: MaskKey,
     /// Its picture, which is not to be read twice meanwhile; `None` = it has changed, and nobody has asked since.
-    task: Option<(Arc<BasePicture>, BackgroundJob<(MaskKey, Arc<BasePicture>), Arc<CrackMask>>)>,
+    task: Option<(Arc<BasePicture>, BackgroundJob<(MaskKey, Arc<BasePicture>), Result<Arc<CrackMask>, CrackError>>)>,
     since: Instant,
     asked: Instant,
     /// Up to [`MAX_RESTARTS`]; then the one that is being made has to do.
@@ -92,16 +92,19 @@ pub(crate) struct MaskKey {
 }
 
 impl MaskKey {
-    /// The mask of the picture.
-    pub(crate) fn make(self, base: &[u8]) -> Arc<CrackMask> {
-        let (size, texels) = (self.rect.size(), part(base, self.size, self.rect));
-        let mask = match self.part {
-            PicturePart::Lines => {
-                CrackMask::weak_from_picture(size, &texels).map(|weak| CrackMask { weak, ..CrackMask::default() })
-            }
-            PicturePart::LinesAndAlpha => CrackMask::from_picture(size, &texels),
+    /// The mask of the picture. A panic is an error.
+    pub(crate) fn make(self, base: &[u8]) -> Result<Arc<CrackMask>, CrackError> {
+        let make = || {
+            let (size, texels) = (self.rect.size(), part(base, self.size, self.rect));
+            let mask = match self.part {
+                PicturePart::Lines => {
+                    CrackMask::weak_from_picture(size, &texels).map(|weak| CrackMask { weak, ..CrackMask::default() })
+                }
+                PicturePart::LinesAndAlpha => CrackMask::from_picture(size, &texels),
+            };
+            Ok(Arc::new(mask.unwrap_or_default()))
         };
-        Arc::new(mask.unwrap_or_default())
+        guarded_as(|reason| CrackError::Textures { reason }, make)
     }
 }
 
@@ -131,16 +134,21 @@ impl PictureMasks {
     }
 
     /// The mask of a picture; `None` if it is being made, which it is not if the frame `has_time`.
-    pub(crate) fn get(&mut self, key: MaskKey, base: &Arc<BasePicture>, has_time: bool) -> Option<Arc<CrackMask>> {
+    pub(crate) fn get(
+        &mut self,
+        key: MaskKey,
+        base: &Arc<BasePicture>,
+        has_time: bool,
+    ) -> Result<Option<Arc<CrackMask>>, CrackError> {
         if let Some(mask) = self.find(key) {
-            return Some(mask);
+            return Ok(Some(mask));
         }
         let now = Instant::now();
         self.in_work.retain(|work| work.key == key || now - work.asked < KEPT);
         if has_time || AsyncComputeTaskPool::try_get().is_none() {
-            let mask = key.make(&base.diffuse);
+            let mask = key.make(&base.diffuse)?;
             self.remember(key, &mask);
-            return Some(mask);
+            return Ok(Some(mask));
         }
         let index = self.in_work.iter().position(|work| work.key == key).unwrap_or_else(|| {
             self.in_work.push(InWork { key, task: None, since: now, asked: now, restarts: 0, is_outdated: false });
@@ -150,12 +158,13 @@ impl PictureMasks {
         work.asked = now;
         let begin = || (base.clone(), BackgroundJob::start((key, base.clone()), |(key, base)| key.make(&base.diffuse)));
         let (_, task) = work.task.get_or_insert_with(begin);
-        let mask = task.take_if_done(now - work.since >= PATIENCE)?;
-        if self.in_work.swap_remove(index).is_outdated {
-            return Some(mask);
+        let Some(mask) = task.take_if_done(now - work.since >= PATIENCE) else { return Ok(None) };
+        let is_outdated = self.in_work.swap_remove(index).is_outdated;
+        let mask = mask?;
+        if !is_outdated {
+            self.remember(key, &mask);
         }
-        self.remember(key, &mask);
-        Some(mask)
+        Ok(Some(mask))
     }
 }
 

@@ -64,7 +64,7 @@ impl SurfaceInputs {
         };
         let mask = match &self.mask {
             RawMask::Made(mask) => mask.clone(),
-            RawMask::FromPicture(key) => key.make(&base.diffuse),
+            RawMask::FromPicture(key) => key.make(&base.diffuse)?,
             RawMask::Images(layers) => {
                 let [weak, strong, forbidden] = layers.map(|index| copy(index).map(mask::layer).transpose());
                 Arc::new(CrackMask { weak: weak?, strong: strong?, forbidden: forbidden?, density: None })

@@ -210,7 +210,7 @@ pub(crate) fn resolve_mask(
         (MaskFrom::Picture(part), Some(picture)) => {
             let has_time = world.resource::<CrackBudget>().is_unlimited();
             let key = draft.plan.mask_key(picture, part);
-            world.resource_mut::<PictureMasks>().get(key, &draft.base, has_time)
+            world.resource_mut::<PictureMasks>().get(key, &draft.base, has_time)?
         }
         // Without a picture there is nothing to go by.
         (MaskFrom::Nothing | MaskFrom::Picture(_), _) => Some(Arc::default()),
