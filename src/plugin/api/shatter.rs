@@ -5,7 +5,7 @@ use crate::shatter::{Anchor, BreakAgain, BurstParams, ConvexPiece, RimLook, Shar
 use bevy::{prelude::*, reflect::serde::ReflectSerializeWithRegistry};
 use std::sync::Arc;
 
-/// How a surface shatters, and when by itself. Without it, [`shatter_cracks`](super::CrackCommandsExt::shatter_cracks) goes by the
+/// How a surface shatters, and when by itself. Without it, [`shatter_cracks`](crate::plugin::CrackCommandsExt::shatter_cracks) goes by the
 /// defaults.
 ///
 /// ```
@@ -121,7 +121,7 @@ pub enum GravitySpace {
 #[derive(Reflect, Clone, Copy, Debug, Default, PartialEq)]
 #[reflect(Default)]
 pub enum ShatterWhen {
-    /// Only on [`shatter_cracks`](super::CrackCommandsExt::shatter_cracks).
+    /// Only on [`shatter_cracks`](crate::plugin::CrackCommandsExt::shatter_cracks).
     #[default]
     Never,
     /// When the cracks of a hit have come to their end and [`CrackState::damage`](super::CrackState::damage) is at least this. Not a
@@ -131,7 +131,7 @@ pub enum ShatterWhen {
     CellsAsTheyClose,
 }
 
-/// What [`shatter_cracks`](super::CrackCommandsExt::shatter_cracks) is to knock out of a surface.
+/// What [`shatter_cracks`](crate::plugin::CrackCommandsExt::shatter_cracks) is to knock out of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShatterRequest {
     /// Where the blow lands, texture coordinates of the surface's picture or sprite frame, 0..=1, v down; from beside it no further than

@@ -16,8 +16,8 @@ pub struct CrackPlace {
     pub normal: Vec3,
 }
 
-/// Where points of a crack are in the world: for the dust at [`CrackTip::uv`](super::CrackTip::uv) and the grains at
-/// [`CellClosed::uv`](super::CellClosed::uv).
+/// Where points of a crack are in the world: for the dust at [`CrackTip::uv`](crate::plugin::CrackTip::uv) and the grains at
+/// [`CellClosed::uv`](crate::plugin::CellClosed::uv).
 ///
 /// ```
 /// use bevy::prelude::*;
