@@ -227,7 +227,7 @@ pub struct GrowthParams {
     /// area that the hit has loaded. At 1 next to nothing is left at the rim. 0..=1; default 0.
     pub thinning: f32,
     /// With [`Venation::Dividing`]: how much the width varies between cracks of one generation: a crack is narrower
-    /// by up to this factor. 0..=0.9; default 0.
+    /// than the widest ones by up to this share. 0..=0.9; default 0.
     pub mixed: f32,
     /// With [`Venation::Dividing`]: speed of the front that runs outward from the hit; cracks start behind it.
     /// Pattern units for each step since the hit; 0 = cracks start anywhere at once. 0..=1.

@@ -46,8 +46,8 @@ impl Floor {
     }
 
     /// Where a piece of this size that starts at `start` lands; `motion` gives its offset and velocity after some
-    /// seconds. `None` if it never reaches the floor, or starts below it. A piece that `must` land always does: parts
-    /// of a piece that lands are such pieces, however far they reach into the floor.
+    /// seconds. `None` if it never reaches the floor, or if it starts below it, unless it `must` land. That is set
+    /// for parts of a piece that lands, however far they reach into the floor.
     pub(super) fn landing(
         &self,
         start: Vec3,

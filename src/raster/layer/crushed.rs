@@ -42,8 +42,8 @@ pub struct Crushed {
     /// Radius of the deeper hollow in the middle of a [`broken`](Self::broken) zone, as a share of the radius; it has
     /// more than half of the depth. 0..=1; default 0 = a flat floor.
     pub basin: f32,
-    /// Number of smaller flakes that have come off further out, for a [`broken`](Self::broken) zone: at energy 1, in
-    /// proportion to its root. 0..=16; default 0.
+    /// Number of smaller flakes that have come off further out, for a [`broken`](Self::broken) zone at energy 1;
+    /// proportional to the root of the energy. 0..=16; default 0.
     pub flakes: u32,
     /// Share of the picture's own colour in [`color`](Self::color), so that crushed material has the tone of the
     /// surface. 0..=1; default 0.
@@ -58,8 +58,8 @@ pub struct Crushed {
     /// radius. It is shown as part of [drawn](crate::paint::Cel) cracks with a [`slant`](crate::paint::Cel::slant).
     /// 0..=2; default 0 = none.
     pub pit: f32,
-    /// Number of chips of a [`broken`](Self::broken) zone that have ink strokes behind them, two strokes each (a
-    /// drawing). 0..=16; default 0.
+    /// Number of ink strokes behind the chips of a [`broken`](Self::broken) zone, two for each chip (a drawing).
+    /// 0..=16; default 0.
     pub ticks: u32,
     /// How much of the zone consists of short radial and ring cracks with flakes between them, which thin out up to
     /// [`reach`](Self::reach), instead of powder with an outline (laminated glass, ice). 0..=1; default 0.

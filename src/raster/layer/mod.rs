@@ -41,9 +41,9 @@ pub struct LayerPlan {
     pub crushed: Option<Crushed>,
     /// Sheets along cracks; default none.
     pub veil: Option<Veil>,
-    /// How far the floor of a crack is moved to the upper left, and how much of the crack it leaves open: as a share
-    /// of the crack's half width, and in pattern units at the most. Not used with a veil. 0..=1 and 0..=0.5; default
-    /// 0 = no floor.
+    /// How far the floor of a crack is moved to the upper left: as a share of the crack's half width, and the largest
+    /// distance in pattern units. The field records how much of each texel the floor covers. Not used with a veil.
+    /// 0..=1 and 0..=0.5; default 0 = no floor.
     pub floor: [f32; 2],
     /// How much of its depth a line has only where it catches the light: lines that run towards the light are stamped
     /// less deep, and so are some places along each line. 0..=1; default 0 = all lines are as deep as their profile
