@@ -149,6 +149,8 @@ pub(crate) trait CarrierKind: Send + Sync {
 /// What shows the pictures of a surface, and what it showed before.
 pub(crate) struct Carrier {
     pub(crate) kind: &'static dyn CarrierKind,
+    /// Whether its shards have thickness.
+    pub(crate) is_solid: bool,
     /// What it showed before.
     pub(crate) shown: Shown,
     /// The sprite's image or the material that it shows now; `None` = as before.
@@ -169,6 +171,7 @@ impl Carrier {
     pub(crate) fn new(kind: &'static dyn CarrierKind, shown: Shown) -> Self {
         Self {
             kind,
+            is_solid: kind.is_solid(),
             shown,
             own: None,
             mesh: None,

@@ -161,7 +161,7 @@ impl ShatterJob {
         if let (Some(height), Some(place)) =
             (settings.floor.filter(|height| height.is_finite()), world.get::<GlobalTransform>(entity))
         {
-            let is_solid = active.carrier.kind.is_solid();
+            let is_solid = active.carrier.is_solid;
             let thickness = is_solid.then(|| plane.thickness(settings.thickness, extent));
             if let Some(floor) = plane.floor(extent, place, height, thickness) {
                 burst = burst.with_floor(floor)?;
@@ -189,7 +189,7 @@ impl ShatterJob {
             revision: active.revision.clone(),
             rim,
             plane,
-            is_solid: active.carrier.kind.is_solid(),
+            is_solid: active.carrier.is_solid,
             from,
             reach: if is_everything { MOST_REACH } else { request.reach },
             burst,

@@ -406,10 +406,10 @@ fn inside(
 ) -> Option<UntypedHandle> {
     #[cfg(feature = "3d")]
     if let Some(inside) = &settings.inside {
-        return active.carrier.kind.is_solid().then(|| inside.clone().untyped());
+        return active.carrier.is_solid.then(|| inside.clone().untyped());
     }
     let carrier = &active.carrier;
-    if before.is_some() || !carrier.kind.is_solid() {
+    if before.is_some() || !carrier.is_solid {
         return before;
     }
     carrier.kind.side_material(world, carrier, active.canvas.base.mean(), bright)

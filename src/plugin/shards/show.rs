@@ -57,7 +57,7 @@ impl Broken {
         carrier: &Carrier,
         shown: Vec<ShownPiece>,
     ) -> Vec<(Entity, [u32; 2])> {
-        let (is_solid, inside) = (carrier.kind.is_solid(), self.inside.clone());
+        let (is_solid, inside) = (carrier.is_solid, self.inside.clone());
         if shown.is_empty() || !world.contains_resource::<Assets<Mesh>>() {
             return Vec::new();
         }
@@ -179,7 +179,7 @@ impl Broken {
 
     /// How its shards are formed.
     pub(super) fn style(&self, carrier: &Carrier) -> Style {
-        let thickness = carrier.kind.is_solid().then(|| self.thickness());
+        let thickness = carrier.is_solid.then(|| self.thickness());
         Style { plane: self.plane, rim: self.rim, thickness }
     }
 
@@ -190,7 +190,7 @@ impl Broken {
 
     /// How much of [`LEVELS`] is there.
     fn level(&self, carrier: &Carrier, pose: Pose) -> usize {
-        if carrier.kind.is_solid() {
+        if carrier.is_solid {
             return LEVELS;
         }
         (pose.opacity * LEVELS as f32).ceil().clamp(1.0, LEVELS as f32) as usize
@@ -198,7 +198,7 @@ impl Broken {
 
     /// Where a piece is.
     fn place(&self, carrier: &Carrier, index: usize, mut pose: Pose) -> Option<Transform> {
-        let is_solid = carrier.kind.is_solid();
+        let is_solid = carrier.is_solid;
         if !is_solid {
             // In 2D, z is only for the order of drawing.
             pose.offset.z = 0.0;
