@@ -235,3 +235,106 @@ fn give_size_back(sprite: &mut Mut<Sprite>, given: Option<Vec2>) {
         sprite.custom_size = None;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Rng;
+    use bevy::sprite::{BorderRect, SliceScaleMode, SpriteImageMode, TextureSlice, TextureSlicer};
+
+    /// The parts into which the engine cuts a sprite.
+    fn parts(mode: &SpriteImageMode, picture: Vec2, size: Vec2) -> Vec<TextureSlice> {
+        let texture_rect = Rect { min: Vec2::ZERO, max: picture };
+        match mode {
+            SpriteImageMode::Sliced(slicer) => slicer.compute_slices(texture_rect, Some(size)),
+            SpriteImageMode::Tiled { tile_x, tile_y, stretch_value } => {
+                TextureSlice { texture_rect, draw_size: size, offset: Vec2::ZERO }
+                    .tiled(*stretch_value, (*tile_x, *tile_y))
+            }
+            _ => Vec::new(),
+        }
+    }
+
+    /// The place in the picture that one of the parts shows at a point of the sprite (from its top left).
+    fn shown(parts: &[TextureSlice], size: Vec2, at: Vec2) -> Option<Vec2> {
+        let at = (at - size / 2.0) * Vec2::new(1.0, -1.0);
+        parts.iter().find_map(|part| {
+            let share = (at - part.offset) * Vec2::new(1.0, -1.0) / part.draw_size + 0.5;
+            let is_inside = share.cmpge(Vec2::ZERO).all() && share.cmple(Vec2::ONE).all();
+            is_inside.then(|| part.texture_rect.min + share * part.texture_rect.size())
+        })
+    }
+
+    #[test]
+    fn places_are_those_of_the_parts_that_the_engine_draws() {
+        let mut rng = Rng::new(5);
+        let (mut checked, mut cut) = (0, 0);
+        for round in 0..300 {
+            let picture = UVec2::new(8 + rng.next_u32() % 60, 8 + rng.next_u32() % 60);
+            let size = Vec2::new(rng.range(5.0, 300.0), rng.range(5.0, 300.0));
+            let mut scale_mode = || match rng.next_u32() % 2 {
+                0 => SliceScaleMode::Stretch,
+                _ => SliceScaleMode::Tile { stretch_value: rng.range(0.2, 2.0) },
+            };
+            let (center_scale_mode, sides_scale_mode) = (scale_mode(), scale_mode());
+            let mode = if round % 2 == 0 {
+                let mut inset = || Vec2::new(rng.range(0.5, 3.9), rng.range(0.5, 3.9));
+                SpriteImageMode::Sliced(TextureSlicer {
+                    border: BorderRect { min_inset: inset(), max_inset: inset() },
+                    center_scale_mode,
+                    sides_scale_mode,
+                    max_corner_scale: rng.range(0.3, 2.0),
+                })
+            } else {
+                let [tile_x, tile_y] = [(); 2].map(|()| rng.unit() < 0.5);
+                SpriteImageMode::Tiled { tile_x, tile_y, stretch_value: rng.range(0.1, 2.0) }
+            };
+            let parts = parts(&mode, picture.as_vec2(), size);
+            let Some(layout) = layout(&mode, Some(size)) else {
+                assert!(matches!(mode, SpriteImageMode::Tiled { tile_x: false, tile_y: false, .. }));
+                continue;
+            };
+            let texels = UVec2::new(1 + rng.next_u32() % 90, 1 + rng.next_u32() % 90);
+            let places = layout.places(picture, texels);
+            for _ in 0..60 {
+                let texel = UVec2::new(rng.next_u32() % texels.x, rng.next_u32() % texels.y);
+                let at = (texel.as_vec2() + 0.5) / texels.as_vec2() * size;
+                // Where parts meet, rounding decides; so only what is the same a little to all sides is compared.
+                let near = [Vec2::X, Vec2::Y, -Vec2::X, -Vec2::Y].map(|side| shown(&parts, size, at + 1e-3 * side));
+                let Some(want) = shown(&parts, size, at) else { continue };
+                if near.iter().any(|near| near.is_none_or(|near| near.distance(want) > 0.1)) {
+                    cut += 1;
+                    continue;
+                }
+                let got = places(texel.x, texel.y);
+                assert!(got.distance(want) < 0.05, "{mode:?} {picture} {size} {texel} of {texels}: {got}, not {want}");
+                checked += 1;
+            }
+        }
+        assert!(checked > 50 * cut && checked > 10_000, "{checked} places checked, {cut} lie where parts meet");
+    }
+
+    #[test]
+    fn textures_show_as_much_as_the_picture_has() {
+        let size = Vec2::new(300.0, 100.0);
+        let texels =
+            |mode: &SpriteImageMode, size| layout(mode, Some(size)).unwrap().texels(UVec2::splat(64)).to_array();
+        let tiled = |stretch_value, tile_y| SpriteImageMode::Tiled { tile_x: true, tile_y, stretch_value };
+        assert_eq!(texels(&tiled(1.0, true), size), [300, 100]);
+        assert_eq!(texels(&tiled(0.5, true), size), [600, 200]);
+        assert_eq!(texels(&tiled(2.0, false), size), [150, 64]);
+        let nine = SpriteImageMode::Sliced(TextureSlicer { border: BorderRect::all(8.0), ..default() });
+        assert_eq!(texels(&nine, size), [300, 100]);
+        assert_eq!(texels(&nine, Vec2::new(300.0, 32.0)), [600, 64], "its corners are shown at half their size");
+        let hidden = TextureSlicer { border: BorderRect::all(8.0), max_corner_scale: 0.0, ..default() };
+        assert_eq!(texels(&SpriteImageMode::Sliced(hidden), size), [64, 64], "its borders are not shown");
+        let crowded = SpriteImageMode::Sliced(TextureSlicer { border: BorderRect::all(32.0), ..default() });
+        assert_eq!(texels(&crowded, size), [64, 64], "its borders leave no room");
+        assert_eq!(layout(&tiled(0.5, true), None).unwrap().texels(UVec2::new(64, 32)), UVec2::new(128, 64));
+        let fine = SliceScaleMode::Tile { stretch_value: 0.25 };
+        let nine = TextureSlicer { border: BorderRect::all(8.0), center_scale_mode: fine, ..default() };
+        assert_eq!(texels(&SpriteImageMode::Sliced(nine), size), [1200, 400], "its middle at a quarter");
+        let [width, height] = texels(&tiled(0.001, true), Vec2::splat(1.0e9));
+        assert!(width == height && width * height <= 2_097_152, "{width} x {height}");
+    }
+}
