@@ -630,7 +630,7 @@ fn panes(count: usize, run: Run) -> (App, Vec<Entity>) {
         .map(|seed| {
             let image = app.world_mut().resource_mut::<Assets<Image>>().add(picture(256));
             let settings = ShatterCracks {
-                cut: ShatterParams { carry_on: true, max_shards: 500, ..ShatterParams::DEFAULT },
+                cut: ShatterParams { extend_cracks: true, max_shards: 500, ..ShatterParams::DEFAULT },
                 anchor: Anchor::Nothing,
                 speed: 0.0,
                 ..default()

@@ -121,13 +121,13 @@ fn steps(c: &mut Criterion) {
     }
 }
 
-/// Astride: trial maps on a small lattice, then the map.
+/// StrokePairs: trial maps on a small lattice, then the map.
 fn astride(c: &mut Criterion) {
     let mut group = c.benchmark_group("astride");
     group.sample_size(10);
     for side in [400, 2048] {
         let guides = vec![Guide::new(drawing(side, 1.0))];
-        let params = VoronoiParams { layout: SiteLayout::Astride, ..VoronoiParams::DEFAULT };
+        let params = VoronoiParams { layout: SiteLayout::StrokePairs, ..VoronoiParams::DEFAULT };
         group.bench_function(BenchmarkId::from_parameter(side), |b| b.iter(|| all(&params, &guides, side)));
     }
 }

@@ -108,7 +108,7 @@ pub(crate) fn bake(options: &Options) -> Done<()> {
     let wide = Studio::new(UVec2::new(2 * SIDE + GAP, SIDE), options.seed)?;
     let usual = VoronoiParams::DEFAULT;
     let even = VoronoiParams { layout: SiteLayout::Even, ..usual.clone() };
-    let astride = VoronoiParams { layout: SiteLayout::Astride, ..usual.clone() };
+    let astride = VoronoiParams { layout: SiteLayout::StrokePairs, ..usual.clone() };
 
     // 1: pavement, and a title in its cracks.
     let (_, pavement) = square.map(VoronoiParams { sites: 12, ..usual.clone() }, &[])?;

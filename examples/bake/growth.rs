@@ -141,8 +141,8 @@ pub(crate) fn bake(options: &Options) -> Result<(Network, RgbaImage), Box<dyn Er
 
     let clock = Instant::now();
     let mut field = DepthField::new(frame);
-    field.forbid(&layers);
-    field.lay(preset.look.layer(options.seed));
+    field.set_forbidden(&layers);
+    field.set_layers(preset.look.layer(options.seed));
     let mut changed = Vec::new();
     growth.take_changed(&mut changed);
     for segment in changed {
@@ -156,7 +156,7 @@ pub(crate) fn bake(options: &Options) -> Result<(Network, RgbaImage), Box<dyn Er
         stamp_dot(&mut field, marker, 2.0 / frame.texels_per_unit(), 0.6);
     }
     let (timeline, mut rects) = (growth.timeline(), Vec::new());
-    field.show_layer(growth.network(), timeline, Moment::after(timeline.end()), &mut rects);
+    field.show_layers(growth.network(), timeline, Moment::after(timeline.end()), &mut rects);
     let stamped = clock.elapsed();
 
     let clock = Instant::now();

@@ -47,7 +47,7 @@ pub(crate) struct Options {
     /// How many sites there are
     #[arg(long, default_value_t = 175)]
     sites: u32,
-    /// Where they lie; by default astride the drawing, or uniform where there is none
+    /// Where they lie; by default in pairs on both sides of the drawing, or uniform where there is none
     #[arg(long, value_enum)]
     layout: Option<Layout>,
     /// Where the impact is, for `--layout impact` and `--animate front`: u,v
@@ -93,7 +93,7 @@ enum Layout {
     Even,
     Impact,
     Image,
-    Astride,
+    StrokePairs,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -148,7 +148,7 @@ fn params(options: &Options, guides: &[Guide], frame: &SurfaceFrame) -> Result<V
     let layout = match options.layout {
         None if guides.is_empty() => SiteLayout::Uniform,
         Some(Layout::Uniform) => SiteLayout::Uniform,
-        None | Some(Layout::Astride) => SiteLayout::Astride,
+        None | Some(Layout::StrokePairs) => SiteLayout::StrokePairs,
         Some(Layout::Even) => SiteLayout::Even,
         Some(Layout::Impact) => SiteLayout::Impact { at: frame.uv_to_pos(options.at), focus: 2.2 },
         Some(Layout::Image) => {

@@ -55,7 +55,7 @@ pub(crate) fn draw(
     params: VoronoiParams,
 ) -> Result<(GrayImage, StrokeReport), Box<dyn Error>> {
     let size = image.size();
-    let params = VoronoiParams { layout: SiteLayout::Astride, ..params };
+    let params = VoronoiParams { layout: SiteLayout::StrokePairs, ..params };
     let (map, seams) = VoronoiBake::new(params, vec![Guide::new(image)], size, seed)?.finish();
     let mut field = DepthField::new(SurfaceFrame::new(size)?);
     seams.stamp(&mut field, &PROFILE);

@@ -19,7 +19,7 @@ pub(crate) struct Options {
     growth: growth::Options,
     /// Carry cracks that end inside a piece on to the next crack
     #[arg(long)]
-    carry_on: bool,
+    extend_cracks: bool,
     /// Pieces below this area join a neighbour; the shorter side is 1
     #[arg(long, default_value_t = ShatterParams::DEFAULT.min_area)]
     min_area: f32,
@@ -35,8 +35,12 @@ pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
     let (network, diffuse) = growth::bake(&options.growth)?;
     let seed = options.growth.seed;
     let clock = Instant::now();
-    let params =
-        ShatterParams { carry_on: options.carry_on, min_area: options.min_area, seed, ..ShatterParams::DEFAULT };
+    let params = ShatterParams {
+        extend_cracks: options.extend_cracks,
+        min_area: options.min_area,
+        seed,
+        ..ShatterParams::DEFAULT
+    };
     let shards = shatter(Cuts::from_network(&network)?, &params)?;
     let cut = clock.elapsed();
     let mut sets = vec![];
@@ -59,7 +63,7 @@ pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
         "{} shards in {:.2} ms, the smallest of area {smallest:.6}; {} cracks carried on",
         shards.len(),
         cut.as_secs_f64() * 1e3,
-        shards.carried().len()
+        shards.extended_lines().len()
     );
     Ok(())
 }
@@ -101,7 +105,7 @@ fn describe(shards: &Shards) -> serde_json::Value {
         })
         .collect();
     let carried: Vec<Vec<[f32; 2]>> =
-        shards.carried().iter().map(|line| line.iter().map(|point| point.to_array()).collect()).collect();
+        shards.extended_lines().iter().map(|line| line.iter().map(|point| point.to_array()).collect()).collect();
     json!({ "extent": shards.extent().to_array(), "shards": pieces, "carried": carried })
 }
 

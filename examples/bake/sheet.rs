@@ -75,14 +75,14 @@ fn moments(preset: &CrackPreset, name: &str, seed: u64, side: u32) -> Result<Vec
     for share in MOMENTS {
         let moment = Moment::nearest(f64::from(share) * f64::from(growth.timeline().end()));
         let mut field = DepthField::new(frame);
-        field.forbid(&mask);
-        field.lay(preset.look.layer(seed));
+        field.set_forbidden(&mask);
+        field.set_layers(preset.look.layer(seed));
         for segment in growth.network().segments() {
             if let Some(path) = growth.timeline().path_at(growth.network(), segment, moment) {
                 stamp_path(&mut field, &preset.profile, &path);
             }
         }
-        field.show_layer(growth.network(), growth.timeline(), moment, &mut Vec::new());
+        field.show_layers(growth.network(), growth.timeline(), moment, &mut Vec::new());
         let [cracked, _] = paint(&base, &field, &table);
         // What one sees through panes of glass.
         let mut picture = behind.clone();

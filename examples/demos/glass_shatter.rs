@@ -53,7 +53,7 @@ fn setup(mut commands: Commands, assets: Res<AssetServer>) {
         Transform::from_xyz(0.0, 40.0, 0.0),
         CrackSurface::new(CrackPreset::GLASS).with_seed(5),
         ShatterCracks {
-            cut: ShatterParams { carry_on: true, ..ShatterParams::DEFAULT },
+            cut: ShatterParams { extend_cracks: true, ..ShatterParams::DEFAULT },
             anchor: Anchor::Nothing,
             again: Some(BreakAgain { after: 0.5, ..BreakAgain::DEFAULT }),
             burst: BurstParams { hold: 0.25, speed: 1.4, gravity: Vec2::new(0.0, -1.6), ..BurstParams::DEFAULT },

@@ -110,7 +110,7 @@ fn setup(
                     .with_seed(6)
                     .with_resolution(CrackResolution::Fixed(UVec2::splat(768))),
                 ShatterCracks {
-                    cut: ShatterParams { carry_on: true, ..ShatterParams::DEFAULT },
+                    cut: ShatterParams { extend_cracks: true, ..ShatterParams::DEFAULT },
                     floor: Some(0.0),
                     burst: BurstParams {
                         hold: 0.0,

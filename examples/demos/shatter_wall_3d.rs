@@ -150,7 +150,7 @@ fn setup(
             // When the cracks of a shot have come to their end.
             when: ShatterWhen::AtDamage(0.0),
             reach: REACH,
-            cut: ShatterParams { carry_on: true, ..ShatterParams::DEFAULT },
+            cut: ShatterParams { extend_cracks: true, ..ShatterParams::DEFAULT },
             burst: BurstParams {
                 hold: 0.05,
                 speed: 1.6,

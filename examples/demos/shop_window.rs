@@ -183,7 +183,7 @@ fn set_up_window(
         Transform::from_xyz(0.0, HEIGHT, 0.0),
         CrackSurface::new(CrackPreset::GLASS).with_seed(4),
         ShatterCracks {
-            cut: ShatterParams { carry_on: true, ..ShatterParams::DEFAULT },
+            cut: ShatterParams { extend_cracks: true, ..ShatterParams::DEFAULT },
             anchor: Anchor::Nothing,
             floor: Some(0.0),
             burst: BurstParams {

@@ -23,7 +23,7 @@ const LAST: f32 = 1.35;
 /// How much more a dividing crack avoids turns than slanted meetings, per one minus the cosine.
 const HOOK: f32 = 4.0;
 
-/// How much a steady crack avoids a place where a third crack meets another, segment lengths.
+/// How much a straight crack avoids a place where a third crack meets another, segment lengths.
 const TAKEN: f32 = 2.0;
 
 /// Segment lengths that a tip needs to turn.
@@ -335,7 +335,7 @@ impl CrackGrowth {
             } else {
                 self.widen_end(tip);
                 // If two ends meet, neither is a free end any more.
-                let like = if self.params.steady > 0.0 { MUCH_WIDER } else { 1.0 };
+                let like = if self.params.straightness > 0.0 { MUCH_WIDER } else { 1.0 };
                 let is_thinner = |division: &Division| division.share(node) <= like * division.share(tip);
                 let is_end = self.network.nodes[node as usize].parent != NO_PARENT && self.child_of(node) == NO_PARENT;
                 if is_end && self.division.as_ref().is_some_and(is_thinner) {

@@ -26,7 +26,7 @@ impl CrackGrowth {
     pub(super) fn add_thin_node(&mut self, pos: Vec2, parent: u32, generation: u32, impact: u32, bend: f32) {
         let node = self.network.nodes.len() as u64;
         let wider = self.impacts.get(impact as usize).map_or(1.0, |impact| impact.widening);
-        let (mixed, draw) = (self.params.mixed, hash_unit(self.seed ^ draws::MIXED_WIDTH, node));
+        let (mixed, draw) = (self.params.width_variation, hash_unit(self.seed ^ draws::MIXED_WIDTH, node));
         let share = |division: &mut Division| division.add_node(node as u32, parent, 1.0 - mixed * draw);
         let wider = self.division.as_mut().map_or(1.0, share) * wider * self.thinned(pos, impact);
         let width = self.widths.tip(parent, || hash_unit(self.seed ^ draws::UNEVEN_WIDTH, node), wider);

@@ -27,8 +27,8 @@ impl GrowthParams {
             let chord = u64::from(rays::chord_steps(plan::LONGEST_CHORD, self.step_length));
             births += markers * (1 + u64::from(plan::MOST_RINGS) * chord);
         }
-        let starts = starts + if self.nucleation > 0.0 || self.venation == Venation::Dividing { markers } else { 0 };
-        if self.venation == Venation::Dividing {
+        let starts = starts + if self.nucleation > 0.0 || self.venation == Venation::Subdivision { markers } else { 0 };
+        if self.venation == Venation::Subdivision {
             // Each start has two tips, which may run straight on.
             births += 2 * starts * (1 + u64::from(divide::STRAIGHT));
         }

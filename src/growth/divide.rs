@@ -50,8 +50,8 @@ const STRANDED: f32 = 3.0;
 /// Cosine of the largest angle to its direction in which it searches for that crack.
 const ASIDE: f32 = 0.25;
 
-/// The same for a steady crack.
-const STEADY_ASIDE: f32 = 0.35;
+/// The same for a straight crack.
+const STRAIGHT_ASIDE: f32 = 0.35;
 
 /// A crack starts in a step only if its marker is still at least this share of its distance away from those that have
 /// started in it.
@@ -88,7 +88,7 @@ impl CrackGrowth {
         let is_idle = tips.is_empty() && fresh.is_empty() && !is_running;
         let mut candidates = self.candidates(is_idle);
         self.timeline.begin(self.steps.saturating_add(1));
-        self.newborn = first..first;
+        self.new_nodes = first..first;
         if is_idle && candidates.is_empty() && self.room() > 0 {
             self.run_out();
         }
@@ -127,7 +127,7 @@ impl CrackGrowth {
             self.begin_crack(candidate);
         }
         self.nucleated = self.nucleated.max(due as u32);
-        self.newborn = first..self.network.nodes.len() as u32;
+        self.new_nodes = first..self.network.nodes.len() as u32;
         self.join_newborn();
     }
 
@@ -237,7 +237,7 @@ impl CrackGrowth {
     fn run_out_of(&mut self, node: u32, Across { way, longer, .. }: Across) {
         let pos = self.network.nodes[node as usize].pos;
         let draw = hash_unit(self.seed ^ draws::STAR, u64::from(node));
-        let is_star = self.params.stars > 0.0 && longer < ROUND && draw < self.params.stars;
+        let is_star = self.params.three_arm_share > 0.0 && longer < ROUND && draw < self.params.three_arm_share;
         let third = Vec2::new(-0.5, 0.866_025_4);
         let ways = [way, if is_star { third.rotate(way) } else { -way }, Vec2::new(-0.5, -0.866_025_4).rotate(way)];
         for way in ways.into_iter().take(if is_star { 3 } else { 2 }) {
@@ -270,7 +270,7 @@ impl CrackGrowth {
         let this = self.network.nodes[node as usize];
         let Some(before) = self.network.nodes.get(this.parent as usize) else { return };
         let last = (this.pos - before.pos).normalize_or_zero();
-        let heading = (last + (course - last) * self.params.steady).normalize_or(last);
+        let heading = (last + (course - last) * self.params.straightness).normalize_or(last);
         let (length, child) = (self.params.step_length, self.network.nodes.len() as u32);
         let stray = self.params.wander * self.stray(before.pos, this.pos, child);
         let drawn = self.drawn(this.pos, heading).map(|pull| {
@@ -379,7 +379,7 @@ impl CrackGrowth {
     fn closes(&mut self, tip: u32) -> bool {
         let Node { pos, parent, .. } = self.network.nodes[tip as usize];
         let heading = self.network.nodes.get(parent as usize).map_or(Vec2::ZERO, |before| pos - before.pos);
-        let aside = ASIDE + STEADY_ASIDE * self.params.steady;
+        let aside = ASIDE + STRAIGHT_ASIDE * self.params.straightness;
         !self.stays_open(tip) && self.run_on(tip, heading.normalize_or_zero(), CLOSE * self.params.kill_distance, aside)
     }
 

@@ -24,7 +24,7 @@ const PATCHES: f32 = 0.95;
 /// Largest reduction of the loaded radius by direction, as a share.
 const UNEVEN: f32 = 0.3;
 
-/// A steady crack narrows where it meets one that is narrower by this factor.
+/// A straight crack narrows where it meets one that is narrower by this factor.
 pub(super) const MUCH_WIDER: f32 = 1.7;
 
 /// Share of the distance to the rim from which cracks become thinner.
@@ -84,7 +84,7 @@ pub(super) struct Tip {
 
 impl Division {
     pub(super) fn new(params: &GrowthParams) -> Option<Self> {
-        (params.venation == Venation::Dividing).then(Self::default)
+        (params.venation == Venation::Subdivision).then(Self::default)
     }
 
     pub(super) fn kind(&self, node: u32) -> Kind {
@@ -164,7 +164,7 @@ impl GrowthParams {
 
     /// Factor of that distance at a place, at least 1.
     pub(super) fn patch(&self, pos: Vec2, seed: u64) -> f32 {
-        if self.patches <= 0.0 {
+        if self.patchiness <= 0.0 {
             return 1.0;
         }
         // Waves with lengths of a few kill distances, in all directions.
@@ -174,7 +174,7 @@ impl GrowthParams {
         };
         let sum: f32 = (0..5).map(wave).sum();
         let share = (0.5 + 0.33 * sum).clamp(0.0, 1.0);
-        1.0 + self.patches * share * share
+        1.0 + self.patchiness * share * share
     }
 
     /// 1 at the hit, 0 where it no longer affects domains.

@@ -20,7 +20,7 @@ const BEYOND: f32 = 1.5;
 /// How much a crack avoids starting where it would meet others at a slant.
 const SLANT: f32 = 0.25;
 
-/// Additional weight of that for a steady crack.
+/// Additional weight of that for a straight crack.
 const STEEP: f32 = 0.75;
 
 /// Per axis: the distance of the nearest crack in one direction, and how much the angle there deviates from a right
@@ -73,7 +73,7 @@ impl CrackGrowth {
     /// How a crack would divide the domain around a place; `None` if it could not end at other cracks.
     pub(super) fn across(&self, pos: Vec2, impact: u32, name: u32, clearance: f32) -> Option<Across> {
         let across = self.across_from(pos, impact, name, clearance)?;
-        if self.params.steady <= 0.0 {
+        if self.params.straightness <= 0.0 {
             return Some(across);
         }
         // Measured again from the middle of the domain, which is more precise.
@@ -111,7 +111,7 @@ impl CrackGrowth {
         let sum = |i: usize| seen[i % AXES][0].0 + seen[i % AXES][1].0;
         let around = |i: usize| 0.5 * sum(i) + 0.25 * (sum(i + 1) + sum(i + AXES - 1));
         let score = |i: usize| {
-            let slant = 1.0 + (SLANT + STEEP * self.params.steady) * (seen[i][0].1 + seen[i][1].1);
+            let slant = 1.0 + (SLANT + STEEP * self.params.straightness) * (seen[i][0].1 + seen[i][1].1);
             around(i) * slant * (1.0 + 1.2 * near_hit * (1.0 - axes[i].dot(out).abs()))
         };
         let may_leave = self.division.as_ref().is_none_or(|division| division.generation == 0);
@@ -123,7 +123,7 @@ impl CrackGrowth {
             |there: Vec2| (there - hit).length() > rim_towards(there - hit, reach, self.seed ^ u64::from(impact));
         let middle = if is_out(middle) { pos } else { middle };
         let stray =
-            2.0 * self.params.wander * (1.0 - 0.7 * self.params.steady) * (2.0 * draw(draws::DOMAIN_STRAY) - 1.0);
+            2.0 * self.params.wander * (1.0 - 0.7 * self.params.straightness) * (2.0 * draw(draws::DOMAIN_STRAY) - 1.0);
         let way = (axes[best] + axes[best].perp() * stray).normalize_or(Vec2::X);
         let length = around(long);
         Some(Across { way, middle: middle.clamp(Vec2::ZERO, extent), length, longer: length / around(best).max(1e-6) })

@@ -87,7 +87,7 @@ impl MarkerField {
             extent,
             radius: params.crack_radius,
             kill_sq: kill_sq(params),
-            divides: params.venation == Venation::Dividing,
+            divides: params.venation == Venation::Subdivision,
             x: Vec::new(),
             y: Vec::new(),
             near_sq: Vec::new(),
@@ -113,7 +113,7 @@ impl MarkerField {
     pub(super) fn set_params(&mut self, params: &GrowthParams) {
         self.radius = params.crack_radius;
         self.kill_sq = kill_sq(params);
-        self.divides = params.venation == Venation::Dividing;
+        self.divides = params.venation == Venation::Subdivision;
         self.relations = (params.venation == Venation::Closed).then(|| {
             let mut relations = Relations::new(params);
             (0..self.next).for_each(|_| relations.add());
@@ -465,7 +465,7 @@ const fn is_ray(owner: u32) -> bool {
 
 /// The squared distance within which a marker is removed.
 fn kill_sq(params: &GrowthParams) -> f32 {
-    let finest = if params.venation == Venation::Dividing { 1.0 + params.focus } else { 1.0 };
+    let finest = if params.venation == Venation::Subdivision { 1.0 + params.focus } else { 1.0 };
     (params.kill_distance / finest) * (params.kill_distance / finest)
 }
 

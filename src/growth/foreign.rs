@@ -61,13 +61,13 @@ impl CrackGrowth {
         self.steps = self.steps.saturating_add(opening);
         let reported = std::mem::replace(&mut self.links_reported, self.network.links.len() as u32);
         self.changes.list.extend((reported..self.links_reported).map(SegmentId::Link));
-        self.newborn = first..self.network.nodes.len() as u32;
-        self.added += self.newborn.len();
-        for node in self.newborn.clone() {
+        self.new_nodes = first..self.network.nodes.len() as u32;
+        self.added += self.new_nodes.len();
+        for node in self.new_nodes.clone() {
             self.field.visit(node, &self.network.nodes, &self.nodes);
         }
         if let Some(arrest) = &mut self.arrest {
-            let branches = self.newborn.clone().map(SegmentId::Branch);
+            let branches = self.new_nodes.clone().map(SegmentId::Branch);
             arrest.add_walls(&self.network, branches.chain((reported..self.links_reported).map(SegmentId::Link)));
         }
         self.steps - before

@@ -25,7 +25,7 @@ impl CrackGrowth {
     /// let mut growth = CrackGrowth::new(GrowthParams { max_nodes: 500, ..GrowthParams::DEFAULT }, [1.0, 1.0].into(), 7)?;
     /// for i in 0..20 {
     ///     if growth.nodes_left() < 250 {
-    ///         growth.forget_oldest(250);
+    ///         growth.remove_oldest(250);
     ///     }
     ///     growth.hit([0.05 * i as f32, 0.3].into(), 1.0);
     ///     while growth.step().grew() {}
@@ -33,7 +33,7 @@ impl CrackGrowth {
     /// assert!(growth.network().nodes().len() <= 500);
     /// # Ok::<(), bevy_crack::growth::ParamError>(())
     /// ```
-    pub fn forget_oldest(&mut self, keep: u32) -> u32 {
+    pub fn remove_oldest(&mut self, keep: u32) -> u32 {
         self.finish_layout();
         let first = self.network.nodes.len().saturating_sub(keep as usize);
         if first == 0 {
@@ -65,7 +65,7 @@ impl CrackGrowth {
             division.forget(forgotten);
         }
         self.unshown = self.unshown.iter().filter_map(|&node| number(node)).collect();
-        self.newborn = self.newborn.start.saturating_sub(forgotten)..self.newborn.end.saturating_sub(forgotten);
+        self.new_nodes = self.new_nodes.start.saturating_sub(forgotten)..self.new_nodes.end.saturating_sub(forgotten);
         if let Some(before) = self.arrest.take() {
             self.arrest = Some(Arrest::after(before, &self.network, self.params.step_length, forgotten));
         }
@@ -133,7 +133,7 @@ mod tests {
                 let moments = [0.3, 0.7, 1.0].map(|share| Moment::nearest(share * f64::from(growth.timeline().end())));
                 let before = growth.clone();
                 let keep = rng.next_u32() % growth.network().nodes().len() as u32;
-                let gone = growth.forget_oldest(keep);
+                let gone = growth.remove_oldest(keep);
                 assert_eq!(growth.network().nodes().len() as u32, keep);
                 assert_eq!(gone + keep, before.network().nodes().len() as u32, "{name}");
                 for moment in moments {
@@ -147,12 +147,12 @@ mod tests {
                         ends.filter(|(a, b)| *a.min(b) >= gone).count()
                     );
                 }
-                let census = growth.census();
+                let census = growth.marker_counts();
                 assert_eq!(census.total, census.killed + census.attracting + census.waiting);
                 // It is taken in small bites as it is at once.
                 let mut twice = before.clone();
-                twice.forget_oldest(keep + gone / 2);
-                twice.forget_oldest(keep);
+                twice.remove_oldest(keep + gone / 2);
+                twice.remove_oldest(keep);
                 assert_eq!(twice.network().nodes(), growth.network().nodes());
                 assert_eq!(twice.network().links(), growth.network().links());
                 while growth.step().grew() {}
@@ -182,7 +182,7 @@ mod tests {
             [a, b].map(|node| network.nodes()[node as usize].pos.to_array().map(f32::to_bits))
         };
         let network = growth.network().clone();
-        let gone = growth.forget_oldest(network.nodes().len() as u32 / 2);
+        let gone = growth.remove_oldest(network.nodes().len() as u32 / 2);
         let is_left = |segment: &SegmentId| network.ends(*segment).is_some_and(|(a, b)| a.min(b) >= gone);
         let expected: Vec<_> = before.into_iter().filter(is_left).map(|segment| place(&network, segment)).collect();
         let mut after = Vec::new();
@@ -203,13 +203,13 @@ mod tests {
             let mut rng = Rng::new(seed);
             for _ in 0..30 {
                 if growth.nodes_left() < 150 {
-                    growth.forget_oldest(150);
+                    growth.remove_oldest(150);
                 }
                 growth.hit(Vec2::new(rng.unit(), rng.unit()), 1.0);
                 while growth.step().grew() {}
                 assert!(growth.network().nodes().len() <= 300 + foreign.network().nodes().len());
             }
-            growth.forget_oldest(0);
+            growth.remove_oldest(0);
             assert!(growth.network().nodes().is_empty() && growth.nodes_left() == 300);
         }
     }
@@ -223,14 +223,14 @@ mod tests {
             let mut frozen = 0;
             for _ in 0..400 {
                 if growth.nodes_left() < 300 {
-                    frozen += growth.forget_oldest(300);
+                    frozen += growth.remove_oldest(300);
                 }
                 let outcome = growth.hit(Vec2::new(rng.unit(), rng.unit()), 0.3);
                 assert!(!matches!(outcome, HitOutcome::Rejected(_)), "{name}: {outcome:?}");
                 for _ in 0..20 {
                     growth.step();
                 }
-                assert!(growth.network().nodes().len() <= 600 && growth.census().waiting < 20_000, "{name}");
+                assert!(growth.network().nodes().len() <= 600 && growth.marker_counts().waiting < 20_000, "{name}");
             }
             assert!(frozen > 100, "{name}: {frozen}");
         }

@@ -35,7 +35,7 @@ impl CrackGrowth {
         if born.is_empty() {
             // The hit is on a crack and has new branches there: each branch is on the ray with the nearest direction.
             let center = self.impacts[impact as usize].pos;
-            for node in self.newborn.clone() {
+            for node in self.new_nodes.clone() {
                 let way = (self.network.nodes[node as usize].pos - center).normalize_or_zero();
                 let nearest = (0..plan.rays.len()).filter(|&i| plan.rays[i].from.is_none()).max_by(|&a, &b| {
                     let towards = |i: usize| (plan.rays[i].line[0] - center).normalize_or_zero().dot(way);

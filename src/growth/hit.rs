@@ -34,7 +34,7 @@ impl CrackGrowth {
         outcome
     }
 
-    /// Like [`hit`](Self::hit), but leaves the markers to [`lay_out`](Self::lay_out), so that a hit with many markers
+    /// Like [`hit`](Self::hit), but leaves the markers to [`continue_hit`](Self::continue_hit), so that a hit with many markers
     /// can be spread over several frames. The resulting cracks are the same.
     ///
     /// ```
@@ -44,7 +44,7 @@ impl CrackGrowth {
     /// let mut growth = CrackGrowth::new(fine, [1.0, 1.0].into(), 7)?;
     /// growth.begin_hit([0.5, 0.5].into(), 1.0);
     /// let mut slices = 1;
-    /// while growth.lay_out(4096) {
+    /// while growth.continue_hit(4096) {
     ///     slices += 1;
     /// }
     /// assert!(slices > 4);
@@ -129,7 +129,7 @@ impl CrackGrowth {
         } else if let StartLayout::Arms { count } = self.params.starts {
             self.branch_out(first, starts::arms(count, (pos, energy), self.params.reach, extent, seed));
         }
-        self.newborn = first..self.network.nodes.len() as u32;
+        self.new_nodes = first..self.network.nodes.len() as u32;
         let named = plan.map(|plan| (self.begin_rays(&plan, index, &born), plan));
         for node in first..self.network.nodes.len() as u32 {
             self.field.visit(node, &self.network.nodes, &self.nodes);
@@ -143,7 +143,7 @@ impl CrackGrowth {
         }
         self.populate(index, pos, 0.0, reach);
         if let Some(division) = &mut self.division {
-            division.begin(self.newborn.clone(), self.steps, reach);
+            division.begin(self.new_nodes.clone(), self.steps, reach);
         }
         self.steps_left = self.params.num_iterations;
         HitOutcome::Started(index)
@@ -233,7 +233,7 @@ impl CrackGrowth {
                     break;
                 }
             }
-            self.newborn = born as u32..self.network.nodes.len() as u32;
+            self.new_nodes = born as u32..self.network.nodes.len() as u32;
         }
     }
 

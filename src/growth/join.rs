@@ -5,7 +5,7 @@ use crate::pattern::{Link, LinkKind, SegmentId};
 
 impl CrackGrowth {
     pub(super) fn join_newborn(&mut self) {
-        let newborn = self.newborn.clone();
+        let new_nodes = self.new_nodes.clone();
         let met = self.field.relations.as_mut().map(|relations| std::mem::take(&mut relations.met));
         for (a, b) in met.into_iter().flatten() {
             let nodes = &self.network.nodes;
@@ -17,13 +17,13 @@ impl CrackGrowth {
             }
         }
         if self.params.draw_connections && !self.has_rays() {
-            self.linker.rings(&self.params, &self.network, &self.impacts, newborn.clone(), self.seed);
+            self.linker.rings(&self.params, &self.network, &self.impacts, new_nodes.clone(), self.seed);
             for link in self.linker.take_links() {
                 self.link(link);
             }
         }
         if self.params.draw_islands {
-            for tip in self.linker.tips_at_rest(&self.network, newborn) {
+            for tip in self.linker.tips_at_rest(&self.network, new_nodes) {
                 if self.stays_open(tip) {
                     continue;
                 }

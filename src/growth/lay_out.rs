@@ -41,7 +41,7 @@ impl CrackGrowth {
     /// Returns whether some are left.
     ///
     /// The positions of markers do not depend on the slices. All other methods complete the layout first.
-    pub fn lay_out(&mut self, places: u32) -> bool {
+    pub fn continue_hit(&mut self, places: u32) -> bool {
         let Some(mut layout) = self.layout.take() else { return false };
         layout.cursor.left = places;
         if layout.room.is_none() && self.lay_out_markers(&mut layout) {
@@ -123,7 +123,7 @@ impl CrackGrowth {
     /// # Ok::<(), bevy_crack::growth::ParamError>(())
     /// ```
     pub fn prepare_step(&mut self, markers: u32) -> bool {
-        !self.lay_out(markers) && self.field.settle_some(&self.network.nodes, &self.nodes, markers)
+        !self.continue_hit(markers) && self.field.settle_some(&self.network.nodes, &self.nodes, markers)
     }
 
     /// Whether [`prepare_step`](Self::prepare_step) has begun and is not done. A hit would complete it at once.
@@ -140,7 +140,7 @@ impl CrackGrowth {
 
     /// Lays out the remaining markers, and settles them if settling has begun.
     pub(super) fn finish_layout(&mut self) {
-        while self.lay_out(1 << 16) {}
+        while self.continue_hit(1 << 16) {}
         if self.field.is_settling() {
             self.field.settle(&self.network.nodes, &self.nodes);
         }

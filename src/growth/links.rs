@@ -30,13 +30,13 @@ impl Linker {
         params: &GrowthParams,
         network: &Network,
         impacts: &[Impact],
-        newborn: Range<u32>,
+        new_nodes: Range<u32>,
         seed: u64,
     ) {
-        let Some(first) = newborn.clone().next() else { return };
+        let Some(first) = new_nodes.clone().next() else { return };
         for (index, impact) in (0u32..).zip(impacts) {
             self.ring.clear();
-            for node in newborn.clone() {
+            for node in new_nodes.clone() {
                 let born = network.nodes()[node as usize];
                 if born.impact == index {
                     let arm = born.pos - impact.pos;
@@ -82,16 +82,16 @@ impl Linker {
 
     /// Tips that no longer grow: nodes without a child two steps after they were added; when growth has ended, all of
     /// them.
-    pub(super) fn tips_at_rest(&mut self, network: &Network, newborn: Range<u32>) -> Vec<u32> {
+    pub(super) fn tips_at_rest(&mut self, network: &Network, new_nodes: Range<u32>) -> Vec<u32> {
         self.parents.resize(network.nodes().len(), false);
-        for node in newborn.clone() {
+        for node in new_nodes.clone() {
             if let Some(is_parent) = self.parents.get_mut(network.nodes()[node as usize].parent as usize) {
                 *is_parent = true;
             }
         }
-        self.waiting.push_back(newborn.clone());
+        self.waiting.push_back(new_nodes.clone());
         let mut tips = Vec::new();
-        while self.waiting.len() > 2 || (newborn.is_empty() && !self.waiting.is_empty()) {
+        while self.waiting.len() > 2 || (new_nodes.is_empty() && !self.waiting.is_empty()) {
             let settled = self.waiting.pop_front().into_iter().flatten();
             tips.extend(settled.filter(|&node| !self.parents[node as usize]));
         }

@@ -31,7 +31,7 @@ pub(super) fn lay_out(
     let apart = spacing(params, region.extent);
     // Decides whether a marker is created at a place, and where it moves.
     let settle = |pos: Vec2, chance: f32, probability: f32| {
-        let share = region.share(pos, params.uneven, seed)?;
+        let share = region.share(pos, params.reach_variation, seed)?;
         let mut thinned = if params.focus > 0.0 { ops::powf(1.0 - share, params.focus) } else { 1.0 };
         let mut pos = pos;
         if !mask.is_empty() {

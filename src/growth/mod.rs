@@ -75,5 +75,5 @@ mod width;
 
 pub use impact::{HitOutcome, Impact, MAX_ENERGY, Rejected};
 pub use params::{GrowthParams, MAX_MARKERS, MarkerLayout, ParamError, StartLayout, Venation};
-pub use state::{Census, CrackGrowth};
+pub use state::{CrackGrowth, MarkerCounts};
 pub use step::StepReport;

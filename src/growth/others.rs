@@ -16,7 +16,7 @@ use glam::Vec2;
 /// Cosine of the angle between the directions of two tips below which they move towards each other.
 const HEAD_ON: f32 = 0.2;
 
-/// Cosine above which a steady crack does not move to a waiting tip: they run side by side.
+/// Cosine above which a straight crack does not move to a waiting tip: they run side by side.
 const ALONG: f32 = 0.6;
 
 /// A tip that has left the region of its hit is met from this many times the distance of other cracks.
@@ -119,7 +119,7 @@ impl CrackGrowth {
             let way = nodes[tip.node as usize].pos - pos;
             let distance = way.length();
             let is_near = distance <= INVITES * reach && distance > 0.0 && way.dot(heading) >= ahead * distance;
-            let is_aside = self.params.steady > 0.0 && self.heading_of(tip.node).dot(heading) > ALONG;
+            let is_aside = self.params.straightness > 0.0 && self.heading_of(tip.node).dot(heading) > ALONG;
             (is_near && !is_aside && !self.is_same_crack(from, tip.node)).then_some((distance, tip.node))
         });
         near.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
@@ -138,25 +138,25 @@ impl CrackGrowth {
     }
 
     /// Whether the crack of a tip is so much wider than that of a node that it must narrow where it meets it, if it
-    /// is steady.
+    /// is straight.
     pub(super) fn is_much_wider(&self, tip: u32, node: u32) -> bool {
         let width = |node: u32| {
             let Node { pos, impact, .. } = self.network.nodes[node as usize];
             let energy = self.impacts.get(impact as usize).map_or(1.0, |impact| impact.widening);
             self.division.as_ref().map_or(1.0, |division| division.share(node)) * self.thinned(pos, impact) * energy
         };
-        self.params.steady > 0.0 && width(tip) > MUCH_WIDER * width(node)
+        self.params.straightness > 0.0 && width(tip) > MUCH_WIDER * width(node)
     }
 
     /// Whether another crack meets the crack of a node there, if that matters.
     pub(super) fn is_met_already(&self, node: u32) -> bool {
-        self.params.steady > 0.0 && self.division.as_ref().is_some_and(|division| division.kind(node).is_met)
+        self.params.straightness > 0.0 && self.division.as_ref().is_some_and(|division| division.kind(node).is_met)
     }
 
-    /// The free end of the crack of a node, a segment or two further on. A steady tip meets it instead of the node:
+    /// The free end of the crack of a node, a segment or two further on. A straight tip meets it instead of the node:
     /// no cell lies between the two ends.
     pub(super) fn end_beside(&self, node: u32, tip: u32) -> Option<u32> {
-        if self.params.steady <= 0.0 || !self.divides() {
+        if self.params.straightness <= 0.0 || !self.divides() {
             return None;
         }
         let child = |node: u32| Some(self.child_of(node)).filter(|&child| child != NO_PARENT);
@@ -172,9 +172,9 @@ impl CrackGrowth {
         (is_free && pos.distance_squared(self.network.nodes[tip as usize].pos) <= near * near).then_some(end)
     }
 
-    /// Whether a steady crack ends at a node.
+    /// Whether a straight crack ends at a node.
     pub(super) fn is_over(&self, node: u32) -> bool {
-        self.params.steady > 0.0 && self.division.as_ref().is_some_and(|division| division.kind(node).is_over)
+        self.params.straightness > 0.0 && self.division.as_ref().is_some_and(|division| division.kind(node).is_over)
     }
 
     /// Whether two ends move towards each other.

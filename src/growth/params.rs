@@ -60,7 +60,7 @@ pub enum Venation {
     /// [`focus`](GrowthParams::focus) how much finer the domains are near the hit. With
     /// [`open_ends`](GrowthParams::open_ends) at 0 even the ends that leave the reach of the hit grow on until they
     /// meet something. Markers should lie closer than 0.7 kill distances.
-    Dividing,
+    Subdivision,
 }
 
 /// The nodes from which the cracks of a hit start.
@@ -144,8 +144,8 @@ pub struct GrowthParams {
     /// Pattern units, 0.01..=64.
     pub reach: f32,
     /// How much the reach varies with direction: it is shorter by up to this share of it, for all layouts but rays.
-    /// With [`Venation::Dividing`] the reach is uneven even at 0. 0..=0.9.
-    pub uneven: f32,
+    /// With [`Venation::Subdivision`] the reach is uneven even at 0. 0..=0.9.
+    pub reach_variation: f32,
     /// The nodes from which the cracks of a hit start.
     pub starts: StartLayout,
     /// Width of a crack at its tip. Pattern units, 0.0005..=0.2.
@@ -213,28 +213,28 @@ pub struct GrowthParams {
     /// Number of new cracks for each step of growth that start where markers are out of reach of all cracks, 0..=64.
     /// They start late, so they end at the older cracks.
     pub nucleation: f32,
-    /// With [`Venation::Dividing`]: number of generations of cracks. The domains of each generation are 1.6 times
+    /// With [`Venation::Subdivision`]: number of generations of cracks. The domains of each generation are 1.6 times
     /// smaller, and its cracks half as wide, as those of the generation before. 1..=4.
     pub generations: u32,
-    /// With [`Venation::Dividing`]: share of the cracks that start with three arms, 120 degrees apart, instead of
+    /// With [`Venation::Subdivision`]: share of the cracks that start with three arms, 120 degrees apart, instead of
     /// two. This happens where a domain is about as wide as long; more cells have five and six sides then. 0..=1.
-    pub stars: f32,
-    /// With [`Venation::Dividing`]: how strongly a crack keeps the direction in which it started, with kinks instead
+    pub three_arm_share: f32,
+    /// With [`Venation::Subdivision`]: how strongly a crack keeps the direction in which it started, with kinks instead
     /// of bends, straight across the widest place of its domain. Plates become polygons, and no two cracks meet a
     /// third one at the same place from both sides. 0..=1; default 0.
-    pub steady: f32,
-    /// With [`Venation::Dividing`]: how much thinner cracks and how much larger domains become towards the rim of the
+    pub straightness: f32,
+    /// With [`Venation::Subdivision`]: how much thinner cracks and how much larger domains become towards the rim of the
     /// area that the hit has loaded. At 1 next to nothing is left at the rim. 0..=1; default 0.
     pub thinning: f32,
-    /// With [`Venation::Dividing`]: how much the width varies between cracks of one generation: a crack is narrower
+    /// With [`Venation::Subdivision`]: how much the width varies between cracks of one generation: a crack is narrower
     /// than the widest ones by up to this share. 0..=0.9; default 0.
-    pub mixed: f32,
-    /// With [`Venation::Dividing`]: speed of the front that runs outward from the hit; cracks start behind it.
+    pub width_variation: f32,
+    /// With [`Venation::Subdivision`]: speed of the front that runs outward from the hit; cracks start behind it.
     /// Pattern units for each step since the hit; 0 = cracks start anywhere at once. 0..=1.
     pub front: f32,
-    /// With [`Venation::Dividing`]: how much larger domains are in random patches of a few domains each: the size is
+    /// With [`Venation::Subdivision`]: how much larger domains are in random patches of a few domains each: the size is
     /// multiplied by up to 1 plus this value. 0..=4.
-    pub patches: f32,
+    pub patchiness: f32,
     /// How much surfaces differ from each other by their seed: widths, roughness, the spacing of markers, the number
     /// of starts and of free ends, the axis. 0 = not at all; at 1 each value differs by a factor of up to 2 either
     /// way, mostly much less. 0..=1.
@@ -245,12 +245,12 @@ pub struct GrowthParams {
     pub courses: f32,
     /// How far lines are displaced by smooth noise, together with everything that follows them: uneven joints.
     /// Pattern units, 0..=0.05; 0 = not at all.
-    pub sway: f32,
+    pub distortion: f32,
     /// Whether the markers themselves are drawn, as dots.
     pub draw_markers: bool,
     /// Largest number of nodes that a surface has at once, 1..=1000000. In the plugin a hit that finds less than a
     /// quarter of them left freezes the oldest cracks: see
-    /// [`CrackGrowth::forget_oldest`](super::CrackGrowth::forget_oldest).
+    /// [`CrackGrowth::remove_oldest`](super::CrackGrowth::remove_oldest).
     pub max_nodes: u32,
 }
 
@@ -267,7 +267,7 @@ impl GrowthParams {
         venation: Venation::Open,
         focus: 0.0,
         reach: 0.6,
-        uneven: 0.0,
+        reach_variation: 0.0,
         starts: StartLayout::Point,
         line_width: 0.004,
         line_growth: 0.4,
@@ -293,15 +293,15 @@ impl GrowthParams {
         arrest: 0.0,
         nucleation: 0.0,
         generations: 1,
-        stars: 0.0,
-        steady: 0.0,
+        three_arm_share: 0.0,
+        straightness: 0.0,
         thinning: 0.0,
-        mixed: 0.0,
+        width_variation: 0.0,
         front: 0.0,
-        patches: 0.0,
+        patchiness: 0.0,
         variety: 0.0,
         courses: 0.0,
-        sway: 0.0,
+        distortion: 0.0,
         draw_markers: false,
         max_nodes: 20_000,
     };
@@ -355,7 +355,7 @@ pub(super) const PROGRESS: f32 = 0.25;
 impl GrowthParams {
     /// Whether cracks must not cross.
     pub(super) fn keeps_apart(&self) -> bool {
-        self.arrest > 0.0 || self.venation == Venation::Dividing
+        self.arrest > 0.0 || self.venation == Venation::Subdivision
     }
 
     /// Turns a direction towards the axis.

@@ -24,7 +24,7 @@ use std::{ops::Range, sync::Arc};
 
 /// Number of markers in each state: the other numbers add up to `total`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub struct Census {
+pub struct MarkerCounts {
     /// Markers ever created.
     pub total: u32,
     /// Reached and removed.
@@ -77,7 +77,7 @@ pub struct CrackGrowth {
     pub(super) unshown: Vec<u32>,
     /// Number of nodes that were added from other networks.
     pub(super) added: usize,
-    pub(super) newborn: Range<u32>,
+    pub(super) new_nodes: Range<u32>,
     /// Number of links that are already in the list of changes.
     pub(super) links_reported: u32,
     /// Positions of markers created since the last call of [`take_markers`](Self::take_markers).
@@ -112,7 +112,7 @@ impl CrackGrowth {
             }
         }
         let params = params.varied(seed);
-        let network = Network::new(extent, params.roughness, seed).with_sway(params.sway);
+        let network = Network::new(extent, params.roughness, seed).with_distortion(params.distortion);
         let mut growth = Self {
             arrest: params.keeps_apart().then(|| Arrest::new(&network, params.step_length)),
             division: Division::new(&params),
@@ -133,7 +133,7 @@ impl CrackGrowth {
             tried: 0,
             unshown: Vec::new(),
             added: 0,
-            newborn: 0..0,
+            new_nodes: 0..0,
             links_reported: 0,
             shown_markers: Vec::new(),
             changes: Changes::default(),
@@ -204,8 +204,8 @@ impl CrackGrowth {
 
     /// Indices of the nodes that the last step or hit added.
     #[must_use]
-    pub fn newborn(&self) -> Range<u32> {
-        self.newborn.clone()
+    pub fn new_nodes(&self) -> Range<u32> {
+        self.new_nodes.clone()
     }
 
     /// Appends the segments that are new or wider since the last call, each once, and clears the list.
@@ -225,9 +225,9 @@ impl CrackGrowth {
 
     /// Number of markers in each state.
     #[must_use]
-    pub fn census(&self) -> Census {
+    pub fn marker_counts(&self) -> MarkerCounts {
         let (living, attracting) = self.field.living();
-        Census { total: self.field.made, killed: self.field.killed, attracting, waiting: living - attracting }
+        MarkerCounts { total: self.field.made, killed: self.field.killed, attracting, waiting: living - attracting }
     }
 
     /// The parameters, as [varied](GrowthParams::varied) by the seed.

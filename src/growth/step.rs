@@ -37,15 +37,15 @@ impl CrackGrowth {
     /// the kill distance in its direction, is placed on it.
     pub fn step(&mut self) -> StepReport {
         self.finish_layout();
-        self.newborn = 0..0;
+        self.new_nodes = 0..0;
         // A tip that has just turned to meet a crack may be all that moves, and it has no new node yet.
-        while self.steps_left > 0 && self.newborn.is_empty() {
+        while self.steps_left > 0 && self.new_nodes.is_empty() {
             self.make_step();
         }
         if self.steps_left == 0 && self.arrest.is_some() {
             self.show_hits();
         }
-        StepReport { born: self.newborn.len() as u32 }
+        StepReport { born: self.new_nodes.len() as u32 }
     }
 
     fn make_step(&mut self) {
@@ -84,7 +84,7 @@ impl CrackGrowth {
         }
         self.advance_rays(first);
         let last = self.network.nodes.len() as u32;
-        self.newborn = first..last;
+        self.new_nodes = first..last;
         for node in first..last {
             self.field.visit(node, &self.network.nodes, &self.nodes);
         }

@@ -59,7 +59,7 @@ impl<'a, const ROOM: usize> Extras<'a, ROOM> {
             ids: plates.map(|plates| plates.ids()),
             plates: plates.map_or(&[], |plates| plates.plates()),
             crushed,
-            are_gone: plates.is_some() && look.facets.is_some_and(|facets| facets.gone),
+            are_gone: plates.is_some() && look.facets.is_some_and(|facets| facets.missing_whole),
             color: settings.map_or([0.0; 3], |all| all.color.map(|channel| 255.0 * channel * (1.0 - all.tint))),
             tint: settings.map_or(0.0, |all| all.tint),
             shades: settings.is_some_and(|all| all.broken),
@@ -136,7 +136,7 @@ impl<'a, const ROOM: usize> Extras<'a, ROOM> {
     /// Adds the slopes of plates.
     #[inline(always)]
     pub(super) fn tilt(&self, patch: &mut Patch<ROOM>) {
-        if self.facets.is_some_and(|facets| facets.dish > 0.0) {
+        if self.facets.is_some_and(|facets| facets.concavity > 0.0) {
             patch.tilt(|k| {
                 let at = self.min + Vec2::new((k % self.stride) as f32, (k / self.stride) as f32);
                 let facet = self.facet(self.room.plate[k]);
@@ -157,7 +157,7 @@ impl<'a, const ROOM: usize> Extras<'a, ROOM> {
         let facet = match (self.facets, self.plates.get(usize::from(id))) {
             (Some(facets), Some(plate)) if id != 0 => {
                 let mut facet = facets.of(plate);
-                if facets.gone {
+                if facets.missing_whole {
                     facet.is_gone = self.crushed.and_then(|crushed| crushed.is_gone(plate.centre, plate.extent));
                 }
                 facet
@@ -335,25 +335,25 @@ impl Facets {
     /// The appearance of a plate.
     pub(super) fn of(&self, plate: &Plate) -> Facet {
         let [a, b, c, d, e, f] = plate.draws;
-        let [together, right, down] = plate.common.map(|common| self.bundle * common);
-        let (own, a) = (1.0 - 0.5 * self.bundle, a * (1.0 - 0.5 * self.bundle) + together);
+        let [together, right, down] = plate.common.map(|common| self.similarity * common);
+        let (own, a) = (1.0 - 0.5 * self.similarity, a * (1.0 - 0.5 * self.similarity) + together);
         let (b, c, d) = (own * b + right, own * c + down, d + 0.7 * right);
         let share = if self.fade > 0.0 { (2.0 - 2.0 * plate.away / self.fade).clamp(0.0, 1.0) } else { 1.0 };
-        let weight = (1.0 - self.near + self.near * plate.near) * (share * share * (3.0 - 2.0 * share));
+        let weight = (1.0 - self.falloff + self.falloff * plate.near) * (share * share * (3.0 - 2.0 * share));
         let lean = Vec2::new(b, c);
         let shift = (self.shift * weight * lean).round().as_ivec2().to_array();
         // A few plates flash. Of the others, those that lean towards the light shine a little.
-        let strength = if d > 1.0 - 2.0 * self.flash { 0.45 + 0.55 * e.abs() } else { 0.25 * f.max(0.0) };
+        let strength = if d > 1.0 - 2.0 * self.bright_share { 0.45 + 0.55 * e.abs() } else { 0.25 * f.max(0.0) };
         // In patches: brighter towards the middle of a patch, with small random differences.
         let glow = (1.15 * plate.common[0] + 0.34 * d + 0.35 * plate.common[2]).clamp(0.0, 1.0);
-        let strength = strength + self.sweep * (glow * (0.55 + 0.45 * e.abs()) - strength);
-        let high = self.gleam * strength * weight.sqrt();
+        let strength = strength + self.patch_share * (glow * (0.55 + 0.45 * e.abs()) - strength);
+        let high = self.reflection * strength * weight.sqrt();
         let low = 0.25 * high;
         let gain = lean.normalize_or(Vec2::Y) * (high - low) * plate.inv_side;
         let sheen = 0.5 * (low + high) - gain.dot(plate.centre);
         Facet {
             tone: 1.0 + self.tone * weight * a,
-            dish: self.dish * weight * (0.7 + 0.3 * e),
+            dish: self.concavity * weight * (0.7 + 0.3 * e),
             centre: plate.centre,
             inv_side: plate.inv_side,
             is_gone: None,
@@ -384,7 +384,7 @@ mod tests {
     /// Plates fade out at the given distance, and are unchanged near the hit.
     #[test]
     fn plates_fade_out() {
-        let facets = Facets { fade: 0.4, dish: 0.2, ..Facets::DEFAULT };
+        let facets = Facets { fade: 0.4, concavity: 0.2, ..Facets::DEFAULT };
         let tone = |away: f32| facets.of(&Plate { away, ..PLATE }).tone(58, 66) - 1.0;
         assert_eq!(tone(0.1), Facets { fade: 0.0, ..facets }.of(&PLATE).tone(58, 66) - 1.0);
         assert!(tone(0.3).abs() < tone(0.1).abs() && tone(0.4) == 0.0 && tone(2.0) == 0.0);
@@ -393,7 +393,7 @@ mod tests {
     /// A dish is brighter on the side that faces the light, by at most its parameter.
     #[test]
     fn dishes_are_lit_from_the_upper_left() {
-        let facets = Facets { tone: 0.0, dish: 0.2, ..Facets::DEFAULT };
+        let facets = Facets { tone: 0.0, concavity: 0.2, ..Facets::DEFAULT };
         let facet = facets.of(&PLATE);
         assert!(facet.tone(57, 67) > 1.02 && facet.tone(43, 53) < 1.0);
         let all = (0..200).flat_map(|y| (0..200).map(move |x| (x, y))).map(|(x, y)| facet.tone(x, y));
@@ -404,7 +404,7 @@ mod tests {
     #[test]
     fn bundles_share_their_tone() {
         let spread = |bundle: f32| {
-            let facets = Facets { tone: 0.4, bundle, ..Facets::DEFAULT };
+            let facets = Facets { tone: 0.4, similarity: bundle, ..Facets::DEFAULT };
             let tone = |a: f32| facets.of(&Plate { draws: [a; 6], ..PLATE }).tone(50, 60);
             tone(1.0) - tone(-1.0)
         };

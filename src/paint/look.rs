@@ -5,7 +5,7 @@ use super::{
     facets::Facets,
     range::{LookError, within},
 };
-use crate::raster::{Crushed, LayerPlan, Veil};
+use crate::raster::{CrushedZone, LayerPlan, Veil};
 use std::borrow::Cow;
 
 /// A point of a [`Look`]'s ramp.
@@ -51,7 +51,7 @@ pub struct Look {
     pub sparkle: f32,
     /// How much fainter cracks are that do not catch the light, depending on their direction and slowly varying along
     /// each crack (glass): up to this share of their depth is removed. 0..=1; default 0.
-    pub catch: f32,
+    pub directionality: f32,
     /// How much the cover varies from texel to texel (frosted glass): up to this share of it is removed. 0..=1.
     pub grain: f32,
     /// Displacement of the picture where the crack tilts the surface (refraction), texels at the steepest slope.
@@ -77,7 +77,7 @@ pub struct Look {
     /// Draws closed cells as separate plates; default none.
     pub facets: Option<Facets>,
     /// The crushed zone around a hit; default none.
-    pub crushed: Option<Crushed>,
+    pub crushed: Option<CrushedZone>,
     /// Translucent sheets to one side of cracks; default none.
     pub veil: Option<Veil>,
     /// Light that cracks emit by their depth, in the format of [`ramp`](Self::ramp). It is written to the emissive
@@ -144,7 +144,7 @@ impl Look {
         gloss: 0.0,
         grain: 0.12,
         sparkle: 0.0,
-        catch: 0.0,
+        directionality: 0.0,
         shift: 0.0,
         relief: 0.012,
         curl: 0.0,
@@ -197,7 +197,7 @@ impl Look {
     /// let mut field = DepthField::new(frame);
     /// field.lay(preset.look.layer(7));
     /// let (timeline, mut changed) = (growth.timeline(), Vec::new());
-    /// field.show_layer(growth.network(), timeline, Moment::after(timeline.end()), &mut changed);
+    /// field.show_layers(growth.network(), timeline, Moment::after(timeline.end()), &mut changed);
     /// assert!(!changed.is_empty());
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
@@ -205,8 +205,8 @@ impl Look {
     pub const fn layer(&self, seed: u64) -> LayerPlan {
         LayerPlan {
             plates: self.facets.is_some(),
-            thick: match self.facets {
-                Some(facets) => facets.thick,
+            thickness: match self.facets {
+                Some(facets) => facets.thickness,
                 None => 0.0,
             },
             crushed: self.crushed,
@@ -215,7 +215,7 @@ impl Look {
                 Some(cel) => [cel.slant, cel.wall],
                 None => [0.0; 2],
             },
-            catch: self.catch,
+            directionality: self.directionality,
             full_rim: self.full_rim,
             seed,
         }
@@ -247,7 +247,7 @@ impl Look {
         within("glint", self.glint, 0.0..=4.0, "0..=4")?;
         within("gloss", self.gloss, 0.0..=4.0, "0..=4")?;
         within("sparkle", self.sparkle, 0.0..=1.0, unit)?;
-        within("catch", self.catch, 0.0..=1.0, unit)?;
+        within("directionality", self.directionality, 0.0..=1.0, unit)?;
         within("full_rim", self.full_rim, 0.0..=1.0, unit)?;
         within("grain", self.grain, 0.0..=1.0, unit)?;
         within("shift", self.shift, 0.0..=16.0, "0..=16")?;
@@ -261,22 +261,22 @@ impl Look {
             within("facets.tone", facets.tone, 0.0..=1.0, unit)?;
             within("facets.tilt", facets.tilt, 0.0..=1.0, unit)?;
             within("facets.shift", facets.shift, 0.0..=16.0, "0..=16")?;
-            within("facets.gleam", facets.gleam, 0.0..=1.0, unit)?;
-            within("facets.flash", facets.flash, 0.0..=1.0, unit)?;
-            for channel in facets.sheen {
-                within("facets.sheen", channel, 0.0..=1.0, unit)?;
+            within("facets.reflection", facets.reflection, 0.0..=1.0, unit)?;
+            within("facets.bright_share", facets.bright_share, 0.0..=1.0, unit)?;
+            for channel in facets.reflection_color {
+                within("facets.reflection_color", channel, 0.0..=1.0, unit)?;
             }
-            for channel in facets.side {
-                within("facets.side", channel, 0.0..=1.0, unit)?;
+            for channel in facets.side_color {
+                within("facets.side_color", channel, 0.0..=1.0, unit)?;
             }
-            within("facets.sweep", facets.sweep, 0.0..=1.0, unit)?;
-            within("facets.thick", facets.thick, 0.0..=0.02, "0..=0.02")?;
-            within("facets.near", facets.near, 0.0..=1.0, unit)?;
-            within("facets.dish", facets.dish, 0.0..=1.0, unit)?;
+            within("facets.patch_share", facets.patch_share, 0.0..=1.0, unit)?;
+            within("facets.thickness", facets.thickness, 0.0..=0.02, "0..=0.02")?;
+            within("facets.falloff", facets.falloff, 0.0..=1.0, unit)?;
+            within("facets.concavity", facets.concavity, 0.0..=1.0, unit)?;
             within("facets.fade", facets.fade, 0.0..=16.0, "0..=16")?;
-            within("facets.bundle", facets.bundle, 0.0..=1.0, unit)?;
+            within("facets.similarity", facets.similarity, 0.0..=1.0, unit)?;
         }
-        match self.crushed.as_ref().and_then(Crushed::fault).or(self.veil.as_ref().and_then(Veil::fault)) {
+        match self.crushed.as_ref().and_then(CrushedZone::fault).or(self.veil.as_ref().and_then(Veil::fault)) {
             Some((field, value, range)) => Err(LookError::OutOfRange { field, value, range }),
             None => Ok(()),
         }

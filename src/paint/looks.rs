@@ -1,7 +1,7 @@
 //! The looks of the presets.
 
 use super::{Cel, Facets, Look, look::stop};
-use crate::raster::{Crushed, Veil};
+use crate::raster::{CrushedZone, Veil};
 use std::borrow::Cow;
 
 impl Look {
@@ -15,17 +15,17 @@ impl Look {
             stop(0.75, [0.97, 0.99, 1.0], 0.85),
             stop(1.0, [0.98, 1.0, 1.0], 0.95),
         ]),
-        catch: 0.8,
+        directionality: 0.8,
         facets: Some(Facets {
             tone: 0.11,
             tilt: 0.10,
             shift: 3.0,
-            gleam: 0.46,
-            flash: 0.16,
-            near: 0.68,
+            reflection: 0.46,
+            bright_share: 0.16,
+            falloff: 0.68,
             ..Facets::DEFAULT
         }),
-        crushed: Some(Crushed {
+        crushed: Some(CrushedZone {
             radius: 0.026,
             ragged: 0.75,
             soft: 0.75,
@@ -41,7 +41,7 @@ impl Look {
             reach: 2.6,
             needles: 0.7,
             edge: 0.9,
-            ..Crushed::DEFAULT
+            ..CrushedZone::DEFAULT
         }),
         ..Self::FROSTED
     };
@@ -59,16 +59,16 @@ impl Look {
             tone: 0.26,
             tilt: 0.22,
             shift: 3.0,
-            gleam: 0.66,
-            flash: 0.14,
-            near: 0.2,
-            bundle: 0.6,
-            gone: true,
-            sweep: 0.5,
-            thick: 0.011,
+            reflection: 0.66,
+            bright_share: 0.14,
+            falloff: 0.2,
+            similarity: 0.6,
+            missing_whole: true,
+            patch_share: 0.5,
+            thickness: 0.011,
             ..Facets::DEFAULT
         }),
-        crushed: Some(Crushed {
+        crushed: Some(CrushedZone {
             radius: 0.03,
             ragged: 0.6,
             soft: 0.8,
@@ -83,7 +83,7 @@ impl Look {
             dust: 0.15,
             chips: 0.05,
             reach: 3.5,
-            ..Crushed::DEFAULT
+            ..CrushedZone::DEFAULT
         }),
         ..Self::FROSTED
     };
@@ -91,17 +91,17 @@ impl Look {
     /// Laminated glass: a milky disc, lines whose brightness varies along them, plates that stay in place.
     pub const LAMINATED_GLASS: Self = Self {
         sparkle: 0.5,
-        catch: 0.8,
+        directionality: 0.8,
         facets: Some(Facets {
             tone: 0.06,
             tilt: 0.05,
             shift: 1.0,
-            gleam: 0.28,
-            flash: 0.12,
-            near: 0.8,
+            reflection: 0.28,
+            bright_share: 0.12,
+            falloff: 0.8,
             ..Facets::DEFAULT
         }),
-        crushed: Some(Crushed {
+        crushed: Some(CrushedZone {
             radius: 0.06,
             ragged: 0.9,
             soft: 1.0,
@@ -115,7 +115,7 @@ impl Look {
             chips: 0.0,
             reach: 2.2,
             needles: 0.8,
-            ..Crushed::DEFAULT
+            ..CrushedZone::DEFAULT
         }),
         ..Self::FROSTED
     };
@@ -132,26 +132,26 @@ impl Look {
         gloss: 0.6,
         glint: 0.5,
         sparkle: 0.5,
-        catch: 0.75,
+        directionality: 0.75,
         veil: Some(Veil {
             reach: 0.19,
             full_width: 0.005,
             cover: 0.8,
             color: [0.88, 0.95, 1.0],
-            uneven: 0.75,
+            variation: 0.75,
             bubbles: 0.12,
         }),
         facets: Some(Facets {
             tone: 0.05,
             tilt: 0.03,
             shift: 2.0,
-            gleam: 0.12,
-            flash: 0.12,
-            sheen: [0.85, 0.95, 1.0],
-            near: 0.2,
+            reflection: 0.12,
+            bright_share: 0.12,
+            reflection_color: [0.85, 0.95, 1.0],
+            falloff: 0.2,
             ..Facets::DEFAULT
         }),
-        crushed: Some(Crushed {
+        crushed: Some(CrushedZone {
             radius: 0.055,
             ragged: 0.9,
             soft: 1.0,
@@ -167,7 +167,7 @@ impl Look {
             needles: 0.9,
             crazing: 0.5,
             bubbles: 12,
-            ..Crushed::DEFAULT
+            ..CrushedZone::DEFAULT
         }),
         ..Self::FROSTED
     };
@@ -180,7 +180,7 @@ impl Look {
             stop(0.70, [0.27, 0.24, 0.21], 0.97),
             stop(1.0, [0.15, 0.13, 0.112], 1.0),
         ]),
-        crushed: Some(Crushed {
+        crushed: Some(CrushedZone {
             radius: 0.040,
             ragged: 0.7,
             depth: 0.016,
@@ -200,7 +200,7 @@ impl Look {
             bare: 0.6,
             jag: 0.003,
             stones: 0.9,
-            ..Crushed::DEFAULT
+            ..CrushedZone::DEFAULT
         }),
         glint: 0.6,
         relief: 0.009,
@@ -216,7 +216,7 @@ impl Look {
         ]),
         relief: 0.006,
         glint: 0.6,
-        crushed: Some(Crushed {
+        crushed: Some(CrushedZone {
             radius: 0.036,
             ragged: 0.6,
             depth: 0.016,
@@ -236,7 +236,7 @@ impl Look {
             bare: 0.9,
             jag: 0.0018,
             stones: 0.25,
-            ..Crushed::DEFAULT
+            ..CrushedZone::DEFAULT
         }),
         facets: Some(Facets { tone: 0.035, tilt: 0.025, fade: 0.3, ..Facets::DEFAULT }),
         ..Self::GROOVE
@@ -250,7 +250,7 @@ impl Look {
             stop(0.70, [0.22, 0.19, 0.17], 0.97),
             stop(1.0, [0.12, 0.10, 0.09], 1.0),
         ]),
-        crushed: Some(Crushed {
+        crushed: Some(CrushedZone {
             radius: 0.034,
             ragged: 0.75,
             depth: 0.016,
@@ -269,7 +269,7 @@ impl Look {
             fall: 0.8,
             bare: 0.4,
             jag: 0.0018,
-            ..Crushed::DEFAULT
+            ..CrushedZone::DEFAULT
         }),
         glint: 0.75,
         facets: Some(Facets { tone: 0.10, tilt: 0.05, shift: 2.0, fade: 0.2, ..Facets::DEFAULT }),
@@ -292,7 +292,7 @@ impl Look {
             lit: [0.60, 0.40, 0.29],
             ..Cel::DEFAULT
         }),
-        crushed: Some(Crushed {
+        crushed: Some(CrushedZone {
             radius: 0.055,
             ragged: 0.3,
             depth: 0.0,
@@ -309,7 +309,7 @@ impl Look {
             outline: 0.0026,
             pit: 0.8,
             ticks: 4,
-            ..Crushed::DEFAULT
+            ..CrushedZone::DEFAULT
         }),
         ..Self::GROOVE
     };
@@ -328,8 +328,8 @@ impl Look {
         curl: 0.03,
         curl_depth: 0.08,
         full_rim: 0.008,
-        facets: Some(Facets { tone: 0.11, tilt: 0.02, dish: 0.07, fade: 0.33, ..Facets::DEFAULT }),
-        crushed: Some(Crushed {
+        facets: Some(Facets { tone: 0.11, tilt: 0.02, concavity: 0.07, fade: 0.33, ..Facets::DEFAULT }),
+        crushed: Some(CrushedZone {
             radius: 0.032,
             ragged: 0.8,
             depth: 0.009,
@@ -347,7 +347,7 @@ impl Look {
             bare: 0.8,
             jag: 0.0022,
             stones: 0.15,
-            ..Crushed::DEFAULT
+            ..CrushedZone::DEFAULT
         }),
         ..Self::GROOVE
     };
@@ -368,8 +368,8 @@ impl Look {
         curl: 0.07,
         curl_depth: 0.08,
         full_rim: 0.02,
-        facets: Some(Facets { tone: 0.12, tilt: 0.05, dish: 0.17, fade: 0.38, ..Facets::DEFAULT }),
-        crushed: Some(Crushed {
+        facets: Some(Facets { tone: 0.12, tilt: 0.05, concavity: 0.17, fade: 0.38, ..Facets::DEFAULT }),
+        crushed: Some(CrushedZone {
             radius: 0.042,
             ragged: 0.8,
             depth: 0.016,
@@ -387,7 +387,7 @@ impl Look {
             bare: 0.75,
             jag: 0.003,
             stones: 0.2,
-            ..Crushed::DEFAULT
+            ..CrushedZone::DEFAULT
         }),
         ..Self::GROOVE
     };
@@ -402,9 +402,9 @@ impl Look {
         glint: 0.6,
         grain: 0.08,
         sparkle: 0.25,
-        catch: 0.45,
+        directionality: 0.45,
         relief: 0.0,
-        crushed: Some(Crushed {
+        crushed: Some(CrushedZone {
             radius: 0.016,
             ragged: 0.9,
             depth: 0.006,
@@ -421,7 +421,7 @@ impl Look {
             tint: 0.35,
             bare: 0.95,
             jag: 0.0008,
-            ..Crushed::DEFAULT
+            ..CrushedZone::DEFAULT
         }),
         ..Self::GROOVE
     };
@@ -432,9 +432,9 @@ impl Look {
             tone: 0.20,
             tilt: 0.16,
             shift: 9.0,
-            gleam: 0.40,
-            flash: 0.22,
-            near: 0.25,
+            reflection: 0.40,
+            bright_share: 0.22,
+            falloff: 0.25,
             ..Facets::DEFAULT
         }),
         sparkle: 0.2,

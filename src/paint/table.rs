@@ -144,9 +144,9 @@ impl LookTable {
             curve: look.curve(),
             cel: look.cel.map(|cel| Strokes::new(&cel, texels_per_unit)),
             facets,
-            side: facets.map_or([0.0; 3], |facets| facets.side.map(|channel| 255.0 * channel)),
-            thick: facets.map_or(0.0, |facets| facets.thick * texels_per_unit),
-            sheen: facets.map_or([0.0; 3], |facets| facets.sheen.map(|channel| 255.0 * channel)),
+            side: facets.map_or([0.0; 3], |facets| facets.side_color.map(|channel| 255.0 * channel)),
+            thick: facets.map_or(0.0, |facets| facets.thickness * texels_per_unit),
+            sheen: facets.map_or([0.0; 3], |facets| facets.reflection_color.map(|channel| 255.0 * channel)),
             veil: look.veil.map_or([0.0; 3], |veil| veil.color.map(|channel| 255.0 * channel)),
             veil_cover: look.veil.map_or(0.0, |veil| veil.cover * (1.0 / 255.0)),
             grain,
@@ -190,7 +190,7 @@ mod tests {
     use super::*;
     use crate::{
         paint::{cel::Cel, look::stop},
-        raster::{Crushed, Veil},
+        raster::{CrushedZone, Veil},
     };
 
     fn layer(table: &LookTable, depth: u16) -> [f32; 4] {
@@ -223,7 +223,7 @@ mod tests {
             assert_eq!(refused(&Look { tint: bad, ..Look::GROOVE }), Some("tint"));
             assert_eq!(refused(&Look { gloss: bad, ..Look::GROOVE }), Some("gloss"));
             assert_eq!(refused(&Look { sparkle: bad, ..Look::GROOVE }), Some("sparkle"));
-            assert_eq!(refused(&Look { catch: bad, ..Look::GROOVE }), Some("catch"));
+            assert_eq!(refused(&Look { directionality: bad, ..Look::GROOVE }), Some("directionality"));
             assert_eq!(refused(&Look { full_rim: bad, ..Look::GROOVE }), Some("full_rim"));
             assert_eq!(refused(&Look { curl: bad, ..Look::GROOVE }), Some("curl"));
             assert_eq!(refused(&Look { curl_depth: bad, ..Look::GROOVE }), Some("curl_depth"));
@@ -239,50 +239,53 @@ mod tests {
             assert_eq!(facets(Facets { tone: bad, ..Facets::DEFAULT }), Some("facets.tone"));
             assert_eq!(facets(Facets { tilt: bad, ..Facets::DEFAULT }), Some("facets.tilt"));
             assert_eq!(facets(Facets { shift: bad, ..Facets::DEFAULT }), Some("facets.shift"));
-            assert_eq!(facets(Facets { gleam: bad, ..Facets::DEFAULT }), Some("facets.gleam"));
-            assert_eq!(facets(Facets { flash: bad, ..Facets::DEFAULT }), Some("facets.flash"));
-            assert_eq!(facets(Facets { sheen: [0.0, 0.0, bad], ..Facets::DEFAULT }), Some("facets.sheen"));
-            assert_eq!(facets(Facets { near: bad, ..Facets::DEFAULT }), Some("facets.near"));
-            assert_eq!(facets(Facets { dish: bad, ..Facets::DEFAULT }), Some("facets.dish"));
+            assert_eq!(facets(Facets { reflection: bad, ..Facets::DEFAULT }), Some("facets.reflection"));
+            assert_eq!(facets(Facets { bright_share: bad, ..Facets::DEFAULT }), Some("facets.bright_share"));
+            assert_eq!(
+                facets(Facets { reflection_color: [0.0, 0.0, bad], ..Facets::DEFAULT }),
+                Some("facets.reflection_color")
+            );
+            assert_eq!(facets(Facets { falloff: bad, ..Facets::DEFAULT }), Some("facets.falloff"));
+            assert_eq!(facets(Facets { concavity: bad, ..Facets::DEFAULT }), Some("facets.concavity"));
             assert_eq!(facets(Facets { fade: bad, ..Facets::DEFAULT }), Some("facets.fade"));
-            assert_eq!(facets(Facets { bundle: bad, ..Facets::DEFAULT }), Some("facets.bundle"));
-            assert_eq!(facets(Facets { sweep: bad, ..Facets::DEFAULT }), Some("facets.sweep"));
-            assert_eq!(facets(Facets { thick: bad, ..Facets::DEFAULT }), Some("facets.thick"));
-            assert_eq!(facets(Facets { side: [0.0, bad, 0.0], ..Facets::DEFAULT }), Some("facets.side"));
+            assert_eq!(facets(Facets { similarity: bad, ..Facets::DEFAULT }), Some("facets.similarity"));
+            assert_eq!(facets(Facets { patch_share: bad, ..Facets::DEFAULT }), Some("facets.patch_share"));
+            assert_eq!(facets(Facets { thickness: bad, ..Facets::DEFAULT }), Some("facets.thickness"));
+            assert_eq!(facets(Facets { side_color: [0.0, bad, 0.0], ..Facets::DEFAULT }), Some("facets.side_color"));
             let crushed = |crushed| refused(&Look { crushed: Some(crushed), ..Look::GROOVE });
-            assert_eq!(crushed(Crushed { radius: bad, ..Crushed::DEFAULT }), Some("crushed.radius"));
-            assert_eq!(crushed(Crushed { ragged: bad, ..Crushed::DEFAULT }), Some("crushed.ragged"));
-            assert_eq!(crushed(Crushed { soft: bad, ..Crushed::DEFAULT }), Some("crushed.soft"));
-            assert_eq!(crushed(Crushed { hole: bad, ..Crushed::DEFAULT }), Some("crushed.hole"));
-            assert_eq!(crushed(Crushed { depth: bad, ..Crushed::DEFAULT }), Some("crushed.depth"));
-            assert_eq!(crushed(Crushed { rough: bad, ..Crushed::DEFAULT }), Some("crushed.rough"));
-            assert_eq!(crushed(Crushed { grain: bad, ..Crushed::DEFAULT }), Some("crushed.grain"));
-            assert_eq!(crushed(Crushed { color: [0.0, bad, 0.0], ..Crushed::DEFAULT }), Some("crushed.color"));
-            assert_eq!(crushed(Crushed { pale: bad, ..Crushed::DEFAULT }), Some("crushed.pale"));
-            assert_eq!(crushed(Crushed { speckle: bad, ..Crushed::DEFAULT }), Some("crushed.speckle"));
-            assert_eq!(crushed(Crushed { flake: bad, ..Crushed::DEFAULT }), Some("crushed.flake"));
-            assert_eq!(crushed(Crushed { dust: bad, ..Crushed::DEFAULT }), Some("crushed.dust"));
-            assert_eq!(crushed(Crushed { chips: bad, ..Crushed::DEFAULT }), Some("crushed.chips"));
-            assert_eq!(crushed(Crushed { reach: bad, ..Crushed::DEFAULT }), Some("crushed.reach"));
-            assert_eq!(crushed(Crushed { bare: bad, ..Crushed::DEFAULT }), Some("crushed.bare"));
-            assert_eq!(crushed(Crushed { jag: bad, ..Crushed::DEFAULT }), Some("crushed.jag"));
-            assert_eq!(crushed(Crushed { stones: bad, ..Crushed::DEFAULT }), Some("crushed.stones"));
-            assert_eq!(crushed(Crushed { tint: bad, ..Crushed::DEFAULT }), Some("crushed.tint"));
-            assert_eq!(crushed(Crushed { basin: bad, ..Crushed::DEFAULT }), Some("crushed.basin"));
-            assert_eq!(crushed(Crushed { fall: bad, ..Crushed::DEFAULT }), Some("crushed.fall"));
-            assert_eq!(crushed(Crushed { outline: bad, ..Crushed::DEFAULT }), Some("crushed.outline"));
-            assert_eq!(crushed(Crushed { pit: bad, ..Crushed::DEFAULT }), Some("crushed.pit"));
-            assert_eq!(crushed(Crushed { ticks: 17, ..Crushed::DEFAULT }), Some("crushed.ticks"));
-            assert_eq!(crushed(Crushed { flakes: 17, ..Crushed::DEFAULT }), Some("crushed.flakes"));
-            assert_eq!(crushed(Crushed { needles: bad, ..Crushed::DEFAULT }), Some("crushed.needles"));
-            assert_eq!(crushed(Crushed { crazing: bad, ..Crushed::DEFAULT }), Some("crushed.crazing"));
-            assert_eq!(crushed(Crushed { bubbles: 65, ..Crushed::DEFAULT }), Some("crushed.bubbles"));
-            assert_eq!(crushed(Crushed { edge: bad, ..Crushed::DEFAULT }), Some("crushed.edge"));
+            assert_eq!(crushed(CrushedZone { radius: bad, ..CrushedZone::DEFAULT }), Some("crushed.radius"));
+            assert_eq!(crushed(CrushedZone { ragged: bad, ..CrushedZone::DEFAULT }), Some("crushed.ragged"));
+            assert_eq!(crushed(CrushedZone { soft: bad, ..CrushedZone::DEFAULT }), Some("crushed.soft"));
+            assert_eq!(crushed(CrushedZone { hole: bad, ..CrushedZone::DEFAULT }), Some("crushed.hole"));
+            assert_eq!(crushed(CrushedZone { depth: bad, ..CrushedZone::DEFAULT }), Some("crushed.depth"));
+            assert_eq!(crushed(CrushedZone { rough: bad, ..CrushedZone::DEFAULT }), Some("crushed.rough"));
+            assert_eq!(crushed(CrushedZone { grain: bad, ..CrushedZone::DEFAULT }), Some("crushed.grain"));
+            assert_eq!(crushed(CrushedZone { color: [0.0, bad, 0.0], ..CrushedZone::DEFAULT }), Some("crushed.color"));
+            assert_eq!(crushed(CrushedZone { pale: bad, ..CrushedZone::DEFAULT }), Some("crushed.pale"));
+            assert_eq!(crushed(CrushedZone { speckle: bad, ..CrushedZone::DEFAULT }), Some("crushed.speckle"));
+            assert_eq!(crushed(CrushedZone { flake: bad, ..CrushedZone::DEFAULT }), Some("crushed.flake"));
+            assert_eq!(crushed(CrushedZone { dust: bad, ..CrushedZone::DEFAULT }), Some("crushed.dust"));
+            assert_eq!(crushed(CrushedZone { chips: bad, ..CrushedZone::DEFAULT }), Some("crushed.chips"));
+            assert_eq!(crushed(CrushedZone { reach: bad, ..CrushedZone::DEFAULT }), Some("crushed.reach"));
+            assert_eq!(crushed(CrushedZone { bare: bad, ..CrushedZone::DEFAULT }), Some("crushed.bare"));
+            assert_eq!(crushed(CrushedZone { jag: bad, ..CrushedZone::DEFAULT }), Some("crushed.jag"));
+            assert_eq!(crushed(CrushedZone { stones: bad, ..CrushedZone::DEFAULT }), Some("crushed.stones"));
+            assert_eq!(crushed(CrushedZone { tint: bad, ..CrushedZone::DEFAULT }), Some("crushed.tint"));
+            assert_eq!(crushed(CrushedZone { basin: bad, ..CrushedZone::DEFAULT }), Some("crushed.basin"));
+            assert_eq!(crushed(CrushedZone { fall: bad, ..CrushedZone::DEFAULT }), Some("crushed.fall"));
+            assert_eq!(crushed(CrushedZone { outline: bad, ..CrushedZone::DEFAULT }), Some("crushed.outline"));
+            assert_eq!(crushed(CrushedZone { pit: bad, ..CrushedZone::DEFAULT }), Some("crushed.pit"));
+            assert_eq!(crushed(CrushedZone { ticks: 17, ..CrushedZone::DEFAULT }), Some("crushed.ticks"));
+            assert_eq!(crushed(CrushedZone { flakes: 17, ..CrushedZone::DEFAULT }), Some("crushed.flakes"));
+            assert_eq!(crushed(CrushedZone { needles: bad, ..CrushedZone::DEFAULT }), Some("crushed.needles"));
+            assert_eq!(crushed(CrushedZone { crazing: bad, ..CrushedZone::DEFAULT }), Some("crushed.crazing"));
+            assert_eq!(crushed(CrushedZone { bubbles: 65, ..CrushedZone::DEFAULT }), Some("crushed.bubbles"));
+            assert_eq!(crushed(CrushedZone { edge: bad, ..CrushedZone::DEFAULT }), Some("crushed.edge"));
             let veil = |veil| refused(&Look { veil: Some(veil), ..Look::GROOVE });
             assert_eq!(veil(Veil { reach: bad, ..Veil::DEFAULT }), Some("veil.reach"));
             assert_eq!(veil(Veil { full_width: bad, ..Veil::DEFAULT }), Some("veil.full_width"));
             assert_eq!(veil(Veil { cover: bad, ..Veil::DEFAULT }), Some("veil.cover"));
-            assert_eq!(veil(Veil { uneven: bad, ..Veil::DEFAULT }), Some("veil.uneven"));
+            assert_eq!(veil(Veil { variation: bad, ..Veil::DEFAULT }), Some("veil.variation"));
             assert_eq!(veil(Veil { bubbles: bad, ..Veil::DEFAULT }), Some("veil.bubbles"));
             assert_eq!(veil(Veil { color: [bad, 0.0, 0.0], ..Veil::DEFAULT }), Some("veil.color"));
             let glow = |stops: &[ColorStop]| refused(&Look { glow: stops.to_vec().into(), ..Look::GROOVE });

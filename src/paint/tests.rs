@@ -7,7 +7,8 @@ use crate::{
     math::Rng,
     pattern::{Moment, PathPoint, SegmentPath, SurfaceFrame},
     raster::{
-        Crushed, DepthField, DirtyTiles, Profile, Redrawn, Replay, TexelRect, stamp_dot, stamp_path, stamp_path_with,
+        CrushedZone, DepthField, DirtyTiles, Profile, Replay, ReplayChanges, TexelRect, stamp_dot, stamp_path,
+        stamp_path_with,
     },
 };
 use glam::{UVec2, Vec2};
@@ -351,12 +352,12 @@ fn grown(preset: &CrackPreset, frame: SurfaceFrame, rng: &mut Rng) -> CrackGrowt
 /// The field of a moment, drawn from nothing.
 fn drawn(preset: &CrackPreset, growth: &CrackGrowth, frame: SurfaceFrame, moment: Moment) -> DepthField {
     let mut field = DepthField::new(frame);
-    field.lay(preset.look.layer(5));
+    field.set_layers(preset.look.layer(5));
     let (network, timeline) = (growth.network(), growth.timeline());
     for path in network.segments().filter_map(|segment| timeline.path_at(network, segment, moment)) {
         stamp_path(&mut field, &preset.profile, &path);
     }
-    field.show_layer(network, timeline, moment, &mut Vec::new());
+    field.show_layers(network, timeline, moment, &mut Vec::new());
     field
 }
 
@@ -395,8 +396,8 @@ fn presets_painted_where_they_change_equal_the_whole_at_any_time() {
         let (network, timeline) = (growth.network(), growth.timeline());
         let canvas = Canvas::new(&mut rng, size);
         let mut field = DepthField::new(frame);
-        field.lay(preset.look.layer(5));
-        let (mut replay, mut redrawn) = (Replay::new(size, preset.profile), Redrawn::default());
+        field.set_layers(preset.look.layer(5));
+        let (mut replay, mut redrawn) = (Replay::new(size, preset.profile), ReplayChanges::default());
         let (mut dirty, mut rects, mut painted) = (DirtyTiles::new(size), Vec::new(), canvas.untouched());
         let end = f64::from(timeline.end());
         let mut moment = Moment::START;
@@ -440,7 +441,7 @@ fn presets_that_grow_painted_where_they_change_equal_the_whole() {
         let mut growth = CrackGrowth::new(preset.growth.clone(), frame.extent(), 3).unwrap();
         let canvas = Canvas::new(&mut rng, size);
         let mut field = DepthField::new(frame);
-        field.lay(preset.look.layer(5));
+        field.set_layers(preset.look.layer(5));
         let look = table(&preset.look, &field);
         let (mut dirty, mut rects, mut painted) = (DirtyTiles::new(size), Vec::new(), canvas.untouched());
         let mut segments = Vec::new();
@@ -454,7 +455,7 @@ fn presets_that_grow_painted_where_they_change_equal_the_whole() {
                 stamp_path_with(&mut field, &preset.profile, &path, &mut |rect| rects.push(rect));
             }
             let timeline = growth.timeline();
-            field.show_layer(growth.network(), timeline, Moment::after(timeline.end()), &mut rects);
+            field.show_layers(growth.network(), timeline, Moment::after(timeline.end()), &mut rects);
             rects.drain(..).for_each(|rect| dirty.mark(rect.grow(1, size)));
             dirty.take_rects(&mut rects);
             canvas.paint_all(&field, &look, &rects, UVec2::ZERO, &mut painted);
@@ -478,16 +479,23 @@ fn a_bare_floor_shows_no_crack() {
     let frame = SurfaceFrame::new(size).unwrap();
     let canvas = Canvas::new(&mut rng, size);
     let paint = |bare: f32, is_cracked: bool| {
-        let crushed =
-            Crushed { broken: true, bare, radius: 0.2, depth: 0.01, rough: 0.0, chips: 0.0, ..Crushed::DEFAULT };
+        let crushed = CrushedZone {
+            broken: true,
+            bare,
+            radius: 0.2,
+            depth: 0.01,
+            rough: 0.0,
+            chips: 0.0,
+            ..CrushedZone::DEFAULT
+        };
         let look = Look { crushed: Some(crushed), ..Look::GROOVE };
         let mut field = DepthField::new(frame);
-        field.lay(look.layer(5));
+        field.set_layers(look.layer(5));
         let mut growth = CrackGrowth::new(CrackPreset::CONCRETE.growth, frame.extent(), 3).unwrap();
         growth.hit(Vec2::splat(0.5), 1.0);
         growth.step();
         let timeline = growth.timeline();
-        field.show_layer(growth.network(), timeline, Moment::after(timeline.end()), &mut Vec::new());
+        field.show_layers(growth.network(), timeline, Moment::after(timeline.end()), &mut Vec::new());
         if is_cracked {
             let point = |x| PathPoint { pos: Vec2::new(x, 0.5), width: 0.02 };
             stamp_path(&mut field, &Profile::DEFAULT, &SegmentPath::straight(point(0.0), point(1.0)));

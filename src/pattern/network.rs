@@ -120,7 +120,7 @@ impl Network {
     }
 
     /// The same network with lines that are displaced by up to `sway` pattern units.
-    pub(crate) fn with_sway(mut self, sway: f32) -> Self {
+    pub(crate) fn with_distortion(mut self, sway: f32) -> Self {
         self.sway = sway;
         self
     }

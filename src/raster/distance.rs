@@ -37,7 +37,7 @@ pub fn crack_distance(field: &DepthField, depth: u16, reach: u8) -> Grid<f32> {
     for y in (0..h).rev() {
         let out = vertical.row_mut(y);
         begin(out, field.depth.row(y), depth, reach + 1);
-        carry_on(&mut columns, out);
+        extend_cracks(&mut columns, out);
         out.copy_from_slice(&columns);
     }
     columns.fill(reach + 1);
@@ -46,7 +46,7 @@ pub fn crack_distance(field: &DepthField, depth: u16, reach: u8) -> Grid<f32> {
     let mut squares = vec![far_square(reach); w.next_multiple_of(BLOCK) + 2 * margin];
     let mut distance = Vec::with_capacity(w * h);
     for y in 0..h {
-        carry_on(&mut columns, vertical.row(y));
+        extend_cracks(&mut columns, vertical.row(y));
         for (square, &column) in squares[margin..].iter_mut().zip(&columns) {
             *square = i16::from(column) * i16::from(column);
         }
@@ -69,7 +69,7 @@ fn begin(out: &mut [u8], row: &[u16], depth: u16, far: u8) {
 
 /// The next row: one step further, or a nearer crack in this row.
 #[inline(never)]
-fn carry_on(columns: &mut [u8], row: &[u8]) {
+fn extend_cracks(columns: &mut [u8], row: &[u8]) {
     for (column, &here) in columns.iter_mut().zip(row) {
         *column = (*column + 1).min(here);
     }

@@ -38,10 +38,10 @@ mod stamp;
 
 pub use dirty::DirtyTiles;
 pub use distance::{MAX_DISTANCE, crack_distance};
-pub use layer::{Crushed, LayerPlan, Veil};
 pub(crate) use layer::{CrushedField, Layer, PIT_STEPS, Plate, SLOPE_UNIT, Spot, noise};
+pub use layer::{CrushedZone, LayerPlan, Veil};
 pub use rect::TexelRect;
-pub use replay::{DOT_DEPTH, Redrawn, Replay};
+pub use replay::{DOT_DEPTH, Replay, ReplayChanges};
 pub use stamp::{stamp_dot, stamp_path, stamp_path_with};
 
 use crate::{
@@ -88,7 +88,7 @@ impl DepthField {
     }
 
     /// Sets the layers that the field holds in addition to depths, all empty.
-    pub fn lay(&mut self, plan: LayerPlan) {
+    pub fn set_layers(&mut self, plan: LayerPlan) {
         self.layer = Layer::new(plan, self.frame);
     }
 
@@ -104,12 +104,18 @@ impl DepthField {
     /// `network` and `timeline` must belong to one growth, which may have grown since the last call. The result
     /// depends only on the moment. A cell that closes costs its own area once, a hit its crushed zone.
     /// [`Replay::show`] calls this itself.
-    pub fn show_layer(&mut self, network: &Network, timeline: &Timeline, moment: Moment, changed: &mut Vec<TexelRect>) {
+    pub fn show_layers(
+        &mut self,
+        network: &Network,
+        timeline: &Timeline,
+        moment: Moment,
+        changed: &mut Vec<TexelRect>,
+    ) {
         self.begin_layer(network, timeline, moment, changed);
         self.crush(usize::MAX, changed);
     }
 
-    /// Like [`show_layer`](Self::show_layer) without the crushed zones, which [`crush`](Self::crush) draws.
+    /// Like [`show_layers`](Self::show_layers) without the crushed zones, which [`crush`](Self::crush) draws.
     pub(crate) fn begin_layer(
         &mut self,
         network: &Network,
@@ -155,7 +161,7 @@ impl DepthField {
     /// Keeps every texel whose centre `mask` forbids untouched from now on, and clears those that were drawn on.
     ///
     /// Growth keeps the centre lines out of these texels; this keeps the width of the lines out as well.
-    pub fn forbid(&mut self, mask: &CrackMask) {
+    pub fn set_forbidden(&mut self, mask: &CrackMask) {
         let size = self.frame.size();
         self.forbidden = mask.forbidden.as_ref().map(|_| {
             let forbids = |x, y| mask.is_forbidden((UVec2::new(x, y).as_vec2() + 0.5) / size.as_vec2());

@@ -29,7 +29,7 @@ const NONE: u32 = u32::MAX;
 /// use bevy_crack::{
 ///     growth::{CrackGrowth, GrowthParams},
 ///     pattern::{Moment, SurfaceFrame},
-///     raster::{DepthField, Profile, Redrawn, Replay},
+///     raster::{DepthField, Profile, ReplayChanges, Replay},
 /// };
 ///
 /// let frame = SurfaceFrame::new([256, 256].into())?;
@@ -37,7 +37,7 @@ const NONE: u32 = u32::MAX;
 /// growth.hit([0.5, 0.5].into(), 1.0);
 /// while growth.step().grew() {}
 ///
-/// let (mut field, mut redrawn) = (DepthField::new(frame), Redrawn::default());
+/// let (mut field, mut redrawn) = (DepthField::new(frame), ReplayChanges::default());
 /// let mut replay = Replay::new(frame.size(), Profile::default());
 /// let mut show = |field: &mut _, steps| {
 ///     replay.show(field, growth.network(), growth.timeline(), Moment::nearest(steps), &mut redrawn);
@@ -108,7 +108,7 @@ enum What {
 
 /// The result of a move of a [`Replay`].
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Redrawn {
+pub struct ReplayChanges {
     /// Tiles that were cleared and drawn again; disjoint.
     pub cleared: Vec<TexelRect>,
     /// The rectangle of each segment that was stamped.
@@ -118,7 +118,7 @@ pub struct Redrawn {
     pub changed: Vec<TexelRect>,
 }
 
-impl Redrawn {
+impl ReplayChanges {
     fn clear(&mut self) {
         self.cleared.clear();
         self.stamped.clear();
@@ -157,7 +157,7 @@ impl Replay {
 
     /// A replay for a field with any content: the first move redraws all of it.
     #[must_use]
-    pub fn over(size: UVec2, profile: Profile) -> Self {
+    pub fn stale(size: UVec2, profile: Profile) -> Self {
         Self { is_stale: true, ..Self::new(size, profile) }
     }
 
@@ -183,7 +183,7 @@ impl Replay {
         network: &Network,
         timeline: &Timeline,
         to: Moment,
-        redrawn: &mut Redrawn,
+        redrawn: &mut ReplayChanges,
     ) {
         self.show_lines(field, network, timeline, to, redrawn);
         field.crush(usize::MAX, &mut redrawn.changed);
@@ -196,7 +196,7 @@ impl Replay {
         network: &Network,
         timeline: &Timeline,
         to: Moment,
-        redrawn: &mut Redrawn,
+        redrawn: &mut ReplayChanges,
     ) {
         self.begin(field, network, timeline, to, redrawn);
         while !self.draw(field, network, timeline, usize::MAX, redrawn) {}
@@ -210,10 +210,10 @@ impl Replay {
         network: &Network,
         timeline: &Timeline,
         to: Moment,
-        redrawn: &mut Redrawn,
+        redrawn: &mut ReplayChanges,
     ) {
         if field.depth.size() != self.size {
-            *self = Self::over(field.depth.size(), self.profile);
+            *self = Self::stale(field.depth.size(), self.profile);
         }
         redrawn.clear();
         self.turn += 1;
@@ -302,7 +302,7 @@ impl Replay {
     }
 
     /// Clears the marked tiles and keeps a copy of their texels.
-    fn clear_marked(&mut self, field: &mut DepthField, redrawn: &mut Redrawn) {
+    fn clear_marked(&mut self, field: &mut DepthField, redrawn: &mut ReplayChanges) {
         self.before.clear();
         for &tile in &self.marked {
             let rect = self.tile(tile);
@@ -338,7 +338,7 @@ impl Replay {
         network: &Network,
         timeline: &Timeline,
         most: usize,
-        redrawn: &mut Redrawn,
+        redrawn: &mut ReplayChanges,
     ) -> bool {
         let columns = self.tiles.x.div_ceil(CELL);
         let mut looked_at = 0;
@@ -383,7 +383,7 @@ impl Replay {
         field: &mut DepthField,
         network: &Network,
         timeline: &Timeline,
-        redrawn: &mut Redrawn,
+        redrawn: &mut ReplayChanges,
     ) {
         for (&tile, before) in self.marked.iter().zip(&self.before) {
             let rect = self.tile(tile);

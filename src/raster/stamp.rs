@@ -85,7 +85,7 @@ fn stamp_pieces<const REPORT: bool>(
     let unit = field.frame.texels_per_unit();
     let plan = field.layer.plan();
     let section = Section::new(profile, unit).with_rims(plan.full_rim, unit);
-    let catch = (plan.catch > 0.0).then(|| Catch::new(plan.catch, plan.seed));
+    let catch = (plan.directionality > 0.0).then(|| Catch::new(plan.directionality, plan.seed));
     let mut bounds = TexelRect::default();
     for pair in path.points().windows(2) {
         if let Some(mut capsule) = Capsule::clipped(&field.frame, field.depth.size(), &section, pair[0], pair[1]) {

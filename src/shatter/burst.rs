@@ -1,6 +1,6 @@
 //! [`Burst`]: the flight of pieces as a function of time.
 
-use super::{Floor, Shard, ShatterError, cuts::in_range, floor::Landing};
+use super::{Floor, ShardShape, ShatterError, cuts::in_range, floor::Landing};
 use crate::math::{Rng, ops};
 use glam::{Quat, Vec2, Vec3};
 
@@ -211,7 +211,7 @@ impl Burst {
 
     /// The flight of a piece that the burst knocks out; `number` distinguishes the random draws of pieces.
     #[must_use]
-    pub fn flight(&self, number: u32, shard: &Shard) -> Flight {
+    pub fn flight(&self, number: u32, shard: &ShardShape) -> Flight {
         let BurstParams { speed, falloff, along, scatter, .. } = self.params;
         let away = shard.centroid - self.from;
         let distance = away.length();
@@ -228,7 +228,7 @@ impl Burst {
 
     /// The flight of a piece that only falls.
     #[must_use]
-    pub fn fall(&self, number: u32, shard: &Shard) -> Flight {
+    pub fn fall(&self, number: u32, shard: &ShardShape) -> Flight {
         let mut rng = Rng::new(self.seed).stream("fall").substream(u64::from(number));
         let velocity = Vec3::new(rng.signed(), 0.0, rng.signed()) * (0.04 * self.params.scatter);
         let mut flight = self.released(shard, velocity, shard.centroid.distance(self.from), rng);
@@ -236,7 +236,7 @@ impl Burst {
         flight
     }
 
-    fn released(&self, shard: &Shard, velocity: Vec3, distance: f32, mut rng: Rng) -> Flight {
+    fn released(&self, shard: &ShardShape, velocity: Vec3, distance: f32, mut rng: Rng) -> Flight {
         let BurstParams { hold, front, spin, tumble, drag, fade_after, fade, .. } = self.params;
         let any = Vec3::new(rng.signed(), rng.signed(), 0.5 * rng.signed());
         let turn = rng.signed();
@@ -284,7 +284,7 @@ impl Flight {
     }
 
     /// Computes where the piece comes to rest if there is a floor. `must` is set for parts of a piece that lands.
-    fn land(&mut self, shard: &Shard, must: bool) {
+    fn land(&mut self, shard: &ShardShape, must: bool) {
         let start = Vec3::new(shard.centroid.x, -shard.centroid.y, 0.0) + self.offset;
         let size = shard.area.max(0.0).sqrt();
         self.landing = self.floor.and_then(|floor| {
@@ -333,7 +333,7 @@ impl Flight {
     /// then, with the velocity of that part of the rotating piece, plus `apart` (pattern units a second) away from
     /// the middle. It fades when the piece would have. `seed` fixes how it tumbles.
     #[must_use]
-    pub fn fragment(&self, seconds: f32, piece: &Shard, fragment: &Shard, apart: f32, seed: u64) -> Self {
+    pub fn fragment(&self, seconds: f32, piece: &ShardShape, fragment: &ShardShape, apart: f32, seed: u64) -> Self {
         let time = (seconds - self.delay).max(0.0);
         let Moving { offset, velocity, rotation, spin } = self.moving(time);
         let turning = self.axis * spin;

@@ -62,7 +62,7 @@ pub(super) fn in_range(name: &'static str, value: f32, min: f64, max: f64) -> Re
 /// let mut growth = CrackGrowth::new(CrackPreset::GLASS.growth, [1.0, 1.0].into(), 1)?;
 /// growth.hit([0.5, 0.5].into(), 1.0);
 /// while growth.step().grew() {}
-/// let shards = shatter(Cuts::from_network(growth.network())?, &ShatterParams { carry_on: true, ..Default::default() })?;
+/// let shards = shatter(Cuts::from_network(growth.network())?, &ShatterParams { extend_cracks: true, ..Default::default() })?;
 /// assert!(shards.len() > 4);
 /// let area: f32 = shards.iter().map(|shard| shard.area).sum();
 /// assert!((area - 1.0).abs() < 1e-4);
@@ -123,7 +123,7 @@ impl Cuts {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct ShatterParams {
     /// Whether cracks that end inside a piece are extended to the next crack or the border. Default: `false`.
-    pub carry_on: bool,
+    pub extend_cracks: bool,
     /// Pieces below this area are merged into the neighbour with which they share most of their outline. Pattern
     /// units squared, 0..=1; default: 2e-5, five texels of a surface of 512. 0 keeps every splinter.
     pub min_area: f32,
@@ -135,7 +135,7 @@ pub struct ShatterParams {
 
 impl ShatterParams {
     /// The default.
-    pub const DEFAULT: Self = Self { carry_on: false, min_area: 2e-5, max_shards: 10_000, seed: 0 };
+    pub const DEFAULT: Self = Self { extend_cracks: false, min_area: 2e-5, max_shards: 10_000, seed: 0 };
 }
 
 impl Default for ShatterParams {
@@ -155,7 +155,7 @@ pub fn shatter(cuts: Cuts, params: &ShatterParams) -> Result<Shards, ShatterErro
     in_range("max_shards", params.max_shards as f32, 1.0, 1e6)?;
     let mut drawing = cuts.drawing;
     drawing.make_planar();
-    let carried = if params.carry_on { drawing.carry_on(params.seed) } else { Vec::new() };
+    let carried = if params.extend_cracks { drawing.extend_cracks(params.seed) } else { Vec::new() };
     let scale = drawing.lattice.scale;
     let least = (2.0 * f64::from(params.min_area) * scale * scale) as i64;
     let mut faces = Faces::trace(&mut drawing);

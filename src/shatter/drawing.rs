@@ -201,7 +201,7 @@ impl Drawing {
     }
 
     /// Extends every open end in its direction to the next line. The drawing must be planar. Returns the new lines.
-    pub(super) fn carry_on(&mut self, seed: u64) -> Vec<Vec<Vec2>> {
+    pub(super) fn extend_cracks(&mut self, seed: u64) -> Vec<Vec<Vec2>> {
         let mut at: Vec<(u32, u32)> = vec![(0, u32::MAX); self.places.len()];
         for (edge, ends) in (0u32..).zip(&self.edges) {
             for &end in ends {

@@ -44,5 +44,5 @@ pub use cuts::{Cuts, ShatterError, ShatterParams, shatter};
 pub use floor::Floor;
 pub use mesh::{MeshFrame, ShardMesh};
 pub use rim::RimLook;
-pub use shards::{ConvexPiece, Neighbour, Shard, Shards};
+pub use shards::{ConvexPiece, Neighbour, ShardShape, Shards};
 pub use support::{Anchor, Fallen, Support};

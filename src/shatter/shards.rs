@@ -12,7 +12,7 @@ use std::{ops::Range, sync::Arc};
 
 /// A piece of the surface.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Shard {
+pub struct ShardShape {
     /// Area, pattern units squared.
     pub area: f32,
     /// Centre of the area, pattern units.
@@ -51,7 +51,7 @@ pub struct Shards {
     rings: Vec<u32>,
     triangles: Vec<[u32; 3]>,
     neighbours: Vec<Neighbour>,
-    pub(super) shards: Vec<Shard>,
+    pub(super) shards: Vec<ShardShape>,
     carried: Arc<[Vec<Vec2>]>,
 }
 
@@ -121,13 +121,13 @@ impl Shards {
     }
 
     /// All shards, by number.
-    pub fn iter(&self) -> std::slice::Iter<'_, Shard> {
+    pub fn iter(&self) -> std::slice::Iter<'_, ShardShape> {
         self.shards.iter()
     }
 
     /// The shard with this number; `None` if there is none.
     #[must_use]
-    pub fn get(&self, shard: u32) -> Option<&Shard> {
+    pub fn get(&self, shard: u32) -> Option<&ShardShape> {
         self.shards.get(shard as usize)
     }
 
@@ -178,7 +178,7 @@ impl Shards {
 
     /// The lines by which cracks were extended, pattern units. They are cracks too and should be drawn.
     #[must_use]
-    pub fn carried(&self) -> &[Vec<Vec2>] {
+    pub fn extended_lines(&self) -> &[Vec<Vec2>] {
         &self.carried
     }
 
@@ -363,7 +363,7 @@ impl Builder<'_> {
         neighbours.extend(
             self.shared.drain(..).map(|(shard, length)| Neighbour { shard, length: (length * to_units) as f32 }),
         );
-        shards.push(Shard {
+        shards.push(ShardShape {
             area: (moments.area * to_units * to_units) as f32,
             centroid: Vec2::new((moments.centroid[0] * to_units) as f32, (moments.centroid[1] * to_units) as f32),
             second_moment: (moments.second * to_units * to_units * to_units * to_units) as f32,

@@ -88,9 +88,9 @@ impl Support {
     /// The support of a surface that has been cracked further: shards that lie where an old shard was missing are
     /// missing too.
     #[must_use]
-    pub fn renewed(&self, old: &Shards, new: &Shards, anchor: Anchor) -> Self {
+    pub fn after_new_cracks(&self, old: &Shards, new: &Shards, anchor: Anchor) -> Self {
         let mut support = Self::new(new, anchor);
-        let mut holes: Vec<(f64, f64, u32)> = self.gone().map(|shard| span(old, shard)).collect();
+        let mut holes: Vec<(f64, f64, u32)> = self.missing().map(|shard| span(old, shard)).collect();
         holes.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.2.cmp(&b.2)));
         for shard in 0..new.len() as u32 {
             let Some(at) = new.inner_place(shard) else { continue };
@@ -103,12 +103,12 @@ impl Support {
 
     /// Whether a shard is in its place.
     #[must_use]
-    pub fn is_there(&self, shard: u32) -> bool {
+    pub fn is_in_place(&self, shard: u32) -> bool {
         self.gone.get(shard as usize).is_some_and(|gone| !gone)
     }
 
     /// Shards that are no longer in their places, by number.
-    pub fn gone(&self) -> impl Iterator<Item = u32> + '_ {
+    pub fn missing(&self) -> impl Iterator<Item = u32> + '_ {
         (0u32..).zip(&self.gone).filter(|(_, gone)| **gone).map(|(shard, _)| shard)
     }
 
@@ -147,7 +147,7 @@ impl Support {
         }
         let mut hit = Vec::new();
         for shard in 0..self.gone.len().min(shards.len()) as u32 {
-            let distance = if self.is_there(shard) { shards.distance(shard, at) } else { f32::INFINITY };
+            let distance = if self.is_in_place(shard) { shards.distance(shard, at) } else { f32::INFINITY };
             if distance <= if self.anchored[shard as usize] { 0.0 } else { reach } {
                 hit.push(shard);
                 self.gone[shard as usize] = true;
@@ -167,13 +167,13 @@ impl Support {
         let mut open: Vec<u32> = (0u32..).zip(&held).filter(|(_, held)| **held).map(|(shard, _)| shard).collect();
         while let Some(shard) = open.pop() {
             for neighbour in shards.neighbours(shard) {
-                if self.is_there(neighbour.shard) && !std::mem::replace(&mut held[neighbour.shard as usize], true) {
+                if self.is_in_place(neighbour.shard) && !std::mem::replace(&mut held[neighbour.shard as usize], true) {
                     open.push(neighbour.shard);
                 }
             }
         }
         let loose: Vec<u32> =
-            (0..held.len() as u32).filter(|&shard| self.is_there(shard) && !held[shard as usize]).collect();
+            (0..held.len() as u32).filter(|&shard| self.is_in_place(shard) && !held[shard as usize]).collect();
         for &shard in &loose {
             self.gone[shard as usize] = true;
         }

@@ -10,7 +10,7 @@ use super::{
     seams::Seams,
     search::BLOCK,
     sites::{sites, texel},
-    strokes::Astride,
+    strokes::StrokePairs,
     trace::Tracer,
     widths::Guidance,
 };
@@ -19,7 +19,7 @@ use glam::UVec2;
 
 /// The progress of a bake.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum BakeProgress {
+pub enum BakeStatus {
     /// There is more to do; the share that is done, 0..1, which never decreases.
     Working(f32),
     /// The map is complete: [`VoronoiBake::finish`] has nothing left to do.
@@ -37,8 +37,8 @@ enum Stage {
     },
     /// Sites are laid out.
     Sites,
-    /// Sites are laid out astride strokes, round by round.
-    Astride(Box<Astride>),
+    /// Sites are laid out on both sides of strokes, round by round.
+    StrokePairs(Box<StrokePairs>),
     /// The regions of the level before become walls, row by row.
     Walls {
         y: usize,
@@ -141,7 +141,7 @@ impl VoronoiBake {
     }
 
     /// Does the work of about `rows` rows of texels.
-    pub fn step(&mut self, rows: usize) -> BakeProgress {
+    pub fn step(&mut self, rows: usize) -> BakeStatus {
         let rows = rows.max(1);
         let height = self.map.height();
         self.stage = match std::mem::replace(&mut self.stage, Stage::Sites) {
@@ -159,9 +159,9 @@ impl VoronoiBake {
                 if end < height { Stage::Costs { y: end } } else { Stage::Sites }
             }
             Stage::Sites => self.lay_sites(),
-            Stage::Astride(mut astride) => {
+            Stage::StrokePairs(mut astride) => {
                 if astride.advance() {
-                    Stage::Astride(astride)
+                    Stage::StrokePairs(astride)
                 } else {
                     self.map.strokes = Some(astride.report());
                     let mut rng = Rng::new(self.seed).stream("sites");
@@ -200,15 +200,15 @@ impl VoronoiBake {
         let share = self.share();
         self.progress = self.progress.max(share);
         match self.stage {
-            Stage::Done(_) => BakeProgress::Done,
-            _ => BakeProgress::Working(self.progress),
+            Stage::Done(_) => BakeStatus::Done,
+            _ => BakeStatus::Working(self.progress),
         }
     }
 
     /// The map and its seams, after completing the remaining work.
     #[must_use]
     pub fn finish(mut self) -> (VoronoiMap, Seams) {
-        while let BakeProgress::Working(_) = self.step(1 << 20) {}
+        while let BakeStatus::Working(_) = self.step(1 << 20) {}
         match self.stage {
             Stage::Done(seams) => (self.map, seams),
             _ => (self.map, Seams::default()),
@@ -224,7 +224,7 @@ impl VoronoiBake {
             Stage::Guides { y } => 0.3 * rows(*y),
             Stage::Costs { y } => 0.3 + 0.1 * rows(*y),
             Stage::Sites => 0.4,
-            Stage::Astride(astride) => 0.4 + 0.1 * astride.progress(),
+            Stage::StrokePairs(astride) => 0.4 + 0.1 * astride.progress(),
             Stage::Walls { .. } => level(1.0),
             Stage::Search => level(self.map.levels.last().map_or(0.0, Level::progress)),
             Stage::Seams(tracer) => 0.9 + 0.1 * tracer.progress(),
@@ -244,10 +244,10 @@ impl VoronoiBake {
 
     fn lay_sites(&mut self) -> Stage {
         let map = &mut self.map;
-        if map.params.layout == SiteLayout::Astride
-            && let Some(astride) = Astride::new(&map.frame, &map.layers, map.params.sites as usize)
+        if map.params.layout == SiteLayout::StrokePairs
+            && let Some(astride) = StrokePairs::new(&map.frame, &map.layers, map.params.sites as usize)
         {
-            return Stage::Astride(Box::new(astride));
+            return Stage::StrokePairs(Box::new(astride));
         }
         map.sites = sites(&map.params, &map.frame, self.seed);
         self.first_level()
@@ -338,7 +338,7 @@ impl VoronoiMap {
         &self.sites
     }
 
-    /// How well the cracks cover the strokes of the guides; `None` unless the layout was [`SiteLayout::Astride`] and
+    /// How well the cracks cover the strokes of the guides; `None` unless the layout was [`SiteLayout::StrokePairs`] and
     /// there are strokes.
     #[must_use]
     pub const fn strokes(&self) -> Option<StrokeReport> {

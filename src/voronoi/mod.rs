@@ -51,7 +51,7 @@ mod tests;
 mod trace;
 mod widths;
 
-pub use bake::{BakeProgress, VoronoiBake, VoronoiMap};
+pub use bake::{BakeStatus, VoronoiBake, VoronoiMap};
 pub use edges::edges;
 pub use front::{FRONT_STEP, Front};
 pub use ink::{ink, lightness};
@@ -80,7 +80,7 @@ pub fn voronoi_map(
     mut progress: impl FnMut(f32) -> ControlFlow<()>,
 ) -> Result<VoronoiMap, VoronoiError> {
     let mut bake = VoronoiBake::new(params.clone(), guides.to_vec(), size, seed)?.regions_alone();
-    while let BakeProgress::Working(share) = bake.step(SLICE) {
+    while let BakeStatus::Working(share) = bake.step(SLICE) {
         if progress(share).is_break() {
             return Err(VoronoiError::Cancelled);
         }

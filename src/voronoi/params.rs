@@ -39,7 +39,7 @@ pub enum SiteLayout {
     /// This goes beyond the paper ("automatic mechanisms for placing Voronoi sites to produce images are not
     /// available", section 4). If no guide has strokes (no value above a half, or hardly any other value), sites are
     /// laid out as with `Even`.
-    Astride,
+    StrokePairs,
 }
 
 /// A picture that cracks are to follow.

@@ -19,14 +19,14 @@ pub(super) fn texel(frame: &SurfaceFrame, pos: Vec2) -> UVec2 {
     frame.to_texel(pos).max(Vec2::ZERO).as_uvec2().min(frame.size() - 1)
 }
 
-/// The sites of every layout except [`SiteLayout::Astride`], ordered so that every prefix is such a layout too.
+/// The sites of every layout except [`SiteLayout::StrokePairs`], ordered so that every prefix is such a layout too.
 pub(super) fn sites(params: &VoronoiParams, frame: &SurfaceFrame, seed: u64) -> Vec<UVec2> {
     let mut rng = Rng::new(seed).stream("sites");
     let n = params.sites.min(MAX_SITES) as usize;
     let extent = frame.extent();
     let points = match &params.layout {
         SiteLayout::Uniform => (0..n).map(|_| Vec2::new(rng.unit(), rng.unit()) * extent).collect(),
-        SiteLayout::Even | SiteLayout::Astride => even(n, Vec::new(), extent, &mut rng, |_| true),
+        SiteLayout::Even | SiteLayout::StrokePairs => even(n, Vec::new(), extent, &mut rng, |_| true),
         SiteLayout::Impact { at, focus } => around(n, *at, *focus, extent, &mut rng),
         SiteLayout::Density(density) => {
             by_density(n, density, extent, &mut rng).unwrap_or_else(|| even(n, Vec::new(), extent, &mut rng, |_| true))

@@ -38,7 +38,7 @@ pub struct StrokeReport {
 }
 
 /// Lays sites astride the strokes, round by round.
-pub(super) struct Astride {
+pub(super) struct StrokePairs {
     size: UVec2,
     scale: f32,
     ink: Vec<bool>,
@@ -66,7 +66,7 @@ const AROUND: [IVec2; 8] = [
     IVec2::new(-1, -1),
 ];
 
-impl Astride {
+impl StrokePairs {
     /// Prepares `n` sites over `frame`; `None` where the guides have no strokes.
     ///
     /// `layers` are noise and guides of the surface, of its own size.

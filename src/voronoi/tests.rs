@@ -3,7 +3,7 @@
 mod seams;
 
 use super::{
-    BakeProgress, Guide, Seams, SiteLayout, VoronoiBake, VoronoiError, VoronoiMap, VoronoiParams,
+    BakeStatus, Guide, Seams, SiteLayout, VoronoiBake, VoronoiError, VoronoiMap, VoronoiParams,
     lattice::{Lattice, Layer, WALL},
     resample::Resampler,
     search::{Packed, Search},
@@ -240,12 +240,12 @@ fn changed_weights_give_the_map_that_a_new_one_has() {
 fn slices_of_any_size_give_the_same_bits_and_progress_never_falls() {
     let mut rng = Rng::new(3);
     let guide = Guide::new(drawing(&mut rng, UVec2::new(60, 40)));
-    let params = VoronoiParams { layout: SiteLayout::Astride, levels: 2, ..VoronoiParams::DEFAULT };
+    let params = VoronoiParams { layout: SiteLayout::StrokePairs, levels: 2, ..VoronoiParams::DEFAULT };
     let (whole, whole_seams) = made(&params, std::slice::from_ref(&guide), [150, 100], 5);
     for rows in [1, 7, 100] {
         let mut bake = VoronoiBake::new(params.clone(), vec![guide.clone()], [150, 100].into(), 5).unwrap();
         let mut last = 0.0;
-        while let BakeProgress::Working(share) = bake.step(rows) {
+        while let BakeStatus::Working(share) = bake.step(rows) {
             assert!((last..=1.0).contains(&share), "{share} after {last}");
             last = share;
         }
@@ -289,7 +289,7 @@ fn g1_g2_guides_of_any_kind() {
         grid(&|i| if i == n / 2 { 1.0 } else { 0.0 });
     }
     for image in images {
-        for layout in [SiteLayout::Uniform, SiteLayout::Astride, SiteLayout::Density(image.clone())] {
+        for layout in [SiteLayout::Uniform, SiteLayout::StrokePairs, SiteLayout::Density(image.clone())] {
             let params = VoronoiParams { sites: 20, layout, ..VoronoiParams::DEFAULT };
             let (map, seams) = made(&params, &[Guide::new(image.clone())], [64, 48], 1);
             assert_eq!(map.sites().len(), 20);
@@ -426,7 +426,7 @@ fn maps_are_frozen() {
         print(SiteLayout::Even, 3),
         print(impact, 1),
         print(SiteLayout::Density(guide.image.clone()), 1),
-        print(SiteLayout::Astride, 2),
+        print(SiteLayout::StrokePairs, 2),
     ];
     assert_eq!(
         prints,

@@ -8,7 +8,7 @@ use bevy_crack::{
     CrackPreset,
     growth::GrowthParams,
     paint::{Cel, ColorStop, Facets, Look},
-    raster::{Crushed, Profile, Veil},
+    raster::{CrushedZone, Profile, Veil},
 };
 use source::{Source, default_of};
 use std::{
@@ -284,7 +284,7 @@ fn generated() -> Vec<(&'static str, String)> {
         ("Look", table(&source, "Look", "", &Look::default())),
         ("ColorStop", table(&source, "ColorStop", "ramp.", &ColorStop { depth: 0.0, color: [0.0; 3], cover: 0.0 })),
         ("Facets", table(&source, "Facets", "facets.", &Facets::DEFAULT)),
-        ("Crushed", table(&source, "Crushed", "crushed.", &Crushed::DEFAULT)),
+        ("CrushedZone", table(&source, "CrushedZone", "crushed.", &CrushedZone::DEFAULT)),
         ("Veil", table(&source, "Veil", "veil.", &Veil::DEFAULT)),
         ("Cel", table(&source, "Cel", "cel.", &Cel::DEFAULT)),
     ]

@@ -1430,7 +1430,7 @@ fn t15_frames_that_are_cut_off_by_the_edge_of_the_sheet() {
             (BVec2::new(sprite.flip_x, sprite.flip_y), sprite.rect.unwrap_or(Rect::new(32.0, 0.0, 64.0, 32.0)));
         let size = sprite.custom_size.unwrap_or(whole.size());
         let shatter = ShatterCracks {
-            cut: bevy_crack::shatter::ShatterParams { carry_on: true, ..default() },
+            cut: bevy_crack::shatter::ShatterParams { extend_cracks: true, ..default() },
             anchor: bevy_crack::shatter::Anchor::Nothing,
             rim: Some(bevy_crack::shatter::RimLook::PLAIN),
             speed: 0.0,

@@ -386,7 +386,7 @@ mod in_apps {
                 stamp_path(&mut field, &preset.profile, &growth.network().path(segment).unwrap());
             }
             let timeline = growth.timeline();
-            field.show_layer(growth.network(), timeline, Moment::after(timeline.end()), &mut Vec::new());
+            field.show_layers(growth.network(), timeline, Moment::after(timeline.end()), &mut Vec::new());
             let mut diffuse = picture.as_raw().clone();
             paint_into(
                 BaseTexels { size, diffuse: picture.as_raw(), normal: None, depth: None },

@@ -23,12 +23,12 @@ fn paint(preset: &CrackPreset) -> (RgbaImage, RgbaImage) {
     growth.hit(Vec2::new(1.1, 0.7), 0.4);
     while growth.step().grew() {}
     let mut field = DepthField::new(frame);
-    field.lay(preset.look.layer(1));
+    field.set_layers(preset.look.layer(1));
     for segment in growth.network().segments() {
         stamp_path(&mut field, &preset.profile, &growth.network().path(segment).unwrap());
     }
     let timeline = growth.timeline();
-    field.show_layer(growth.network(), timeline, Moment::after(timeline.end()), &mut Vec::new());
+    field.show_layers(growth.network(), timeline, Moment::after(timeline.end()), &mut Vec::new());
     let base = RgbaImage::from_fn(SIZE.x, SIZE.y, |x, y| {
         let shade = 110 + ((x / 8 + y / 8) % 2) as u8 * 30;
         image::Rgba([shade, shade, shade - 10, if x < 4 { 0 } else { 255 }])

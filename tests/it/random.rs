@@ -468,7 +468,7 @@ impl Game {
                         1 => ShatterWhen::AtDamage(0.05),
                         _ => ShatterWhen::CellsAsTheyClose,
                     },
-                    cut: ShatterParams { carry_on: true, ..ShatterParams::DEFAULT },
+                    cut: ShatterParams { extend_cracks: true, ..ShatterParams::DEFAULT },
                     anchor: Anchor::Nothing,
                     again: again.then_some(BreakAgain::DEFAULT),
                     speed,

@@ -5,7 +5,7 @@ use bevy_crack::{
     growth::{CrackGrowth, Venation},
     math::Rng,
     pattern::{CrackMask, Moment, Node, SegmentId, SurfaceFrame},
-    raster::{DOT_DEPTH, DepthField, Redrawn, Replay, TexelRect, stamp_dot, stamp_path},
+    raster::{DOT_DEPTH, DepthField, Replay, ReplayChanges, TexelRect, stamp_dot, stamp_path},
     voronoi::{VoronoiBake, VoronoiParams},
 };
 use glam::{UVec2, Vec2};
@@ -17,7 +17,7 @@ struct Scene {
     field: DepthField,
     untouched: DepthField,
     replay: Replay,
-    redrawn: Redrawn,
+    redrawn: ReplayChanges,
 }
 
 impl Scene {
@@ -32,9 +32,9 @@ impl Scene {
         }
         growth.set_mask(mask.clone());
         let mut field = DepthField::new(frame);
-        field.forbid(&mask);
+        field.set_forbidden(&mask);
         let untouched = field.clone();
-        Self { growth, field, untouched, replay, redrawn: Redrawn::default(), preset }
+        Self { growth, field, untouched, replay, redrawn: ReplayChanges::default(), preset }
     }
 
     fn hit(&mut self, rng: &mut Rng) {
@@ -294,7 +294,7 @@ fn a_move_stamps_what_has_changed() {
     scene.show(end);
     assert_eq!(scene.redrawn.stamped.len(), all, "from nothing to all: each segment once");
     scene.show(end);
-    assert_eq!(scene.redrawn, Redrawn::default(), "the same moment costs nothing");
+    assert_eq!(scene.redrawn, ReplayChanges::default(), "the same moment costs nothing");
     let (mut stamped, mut changes, mut moves) = (0, 0, 0);
     for step in (0..scene.end()).rev() {
         for part in [0.5, 0.0] {
@@ -322,7 +322,7 @@ fn strange_fields_are_drawn_anew() {
     scene.grow();
     let moment = Moment::nearest(12.6);
     scene.field.depth.as_mut_slice().fill(4711);
-    scene.replay = Replay::over(scene.field.depth.size(), scene.preset.profile);
+    scene.replay = Replay::stale(scene.field.depth.size(), scene.preset.profile);
     scene.show(moment);
     assert!(scene.field == scene.drawn(moment));
     scene.field = DepthField::new(SurfaceFrame::new(UVec2::new(33, 41)).unwrap());

@@ -30,7 +30,7 @@ fn heard<E: Event + Clone>(app: &mut App) -> Vec<E> {
 /// Everything may fall, lines go on to the next one, nothing moves.
 pub(crate) fn loose() -> ShatterCracks {
     ShatterCracks {
-        cut: ShatterParams { carry_on: true, ..ShatterParams::DEFAULT },
+        cut: ShatterParams { extend_cracks: true, ..ShatterParams::DEFAULT },
         anchor: Anchor::Nothing,
         rim: Some(RimLook::PLAIN),
         speed: 0.0,

@@ -502,8 +502,8 @@ fn s9_everything_goes() {
         (CrackPreset::GLASS, false, 4.0),
         (CrackPreset::BRICK, true, 1.0),
     ];
-    for (preset, carry_on, energy) in cases {
-        let cut = ShatterParams { carry_on, ..ShatterParams::DEFAULT };
+    for (preset, extend_cracks, energy) in cases {
+        let cut = ShatterParams { extend_cracks, ..ShatterParams::DEFAULT };
         let settings = ShatterCracks { cut, anchor: Anchor::Border, ..loose() };
         let image = add(&mut app, picture(UVec2::new(96, 64)));
         let surface = CrackSurface::new(preset).with_seed(4);
@@ -511,7 +511,7 @@ fn s9_everything_goes() {
         hit(&mut app, CrackHit::uv(entity, Vec2::new(0.3, 0.4)).with_energy(energy));
         settle(&mut app, entity);
         let left = |app: &App| shown(app, entity).as_chunks::<4>().0.iter().filter(|texel| texel[3] != 0).count();
-        if carry_on || energy > 1.0 {
+        if extend_cracks || energy > 1.0 {
             shatter(&mut app, entity, ShatterRequest::ALL);
             assert!(left(&app) > 0, "something is held");
         }

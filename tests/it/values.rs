@@ -139,7 +139,7 @@ fn e9_blows_of_any_strength_and_direction() {
         .add_observer(|done: On<Shattered>, mut all: ResMut<Outcomes>| all.0.push(Ok(done.shards.len())))
         .add_observer(|failed: On<ShatterFailed>, mut all: ResMut<Outcomes>| all.0.push(Err(failed.error.clone())));
     let settings = || ShatterCracks {
-        cut: ShatterParams { carry_on: true, ..ShatterParams::DEFAULT },
+        cut: ShatterParams { extend_cracks: true, ..ShatterParams::DEFAULT },
         anchor: Anchor::Nothing,
         ..default()
     };

@@ -111,7 +111,7 @@ fn g2_any_text_is_a_guide() {
             let has_ink = guide.as_slice().iter().any(|&ink| ink > 0.0);
             assert!(may_have_ink || !has_ink, "{start:?} at {size}");
             assert!(has_ink || size != UVec2::splat(64) || !["A", "漢字 Ω ж"].contains(&text), "{start:?}");
-            let params = VoronoiParams { layout: SiteLayout::Astride, ..VoronoiParams::DEFAULT };
+            let params = VoronoiParams { layout: SiteLayout::StrokePairs, ..VoronoiParams::DEFAULT };
             let (map, seams) = VoronoiBake::new(params, vec![Guide::new(guide)], size, 1).unwrap().finish();
             assert_eq!(map.sites().len(), 175, "{start:?} at {size}");
             assert!(seams.seams.iter().flat_map(|seam| &seam.points).all(|point| point.width.is_finite()));

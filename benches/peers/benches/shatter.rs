@@ -135,10 +135,10 @@ fn grown(c: &mut Criterion) {
         growth.hit(Vec2::splat(0.5), 1.0);
         while growth.step().grew() {}
         let network = growth.network();
-        for carry_on in [false, true] {
-            let params = ShatterParams { carry_on, ..ShatterParams::DEFAULT };
+        for extend_cracks in [false, true] {
+            let params = ShatterParams { extend_cracks, ..ShatterParams::DEFAULT };
             let run = || shatter(Cuts::from_network(network).unwrap(), &params).unwrap();
-            let what = if carry_on { "carried on" } else { "as it is" };
+            let what = if extend_cracks { "carried on" } else { "as it is" };
             println!("{name}, {what}: {} nodes, {} shards", network.nodes().len(), run().len());
             group.bench_function(BenchmarkId::new(name, what), |b| b.iter(|| run().len()));
         }

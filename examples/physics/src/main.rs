@@ -91,7 +91,7 @@ fn setup(mut commands: Commands, mut images: ResMut<Assets<Image>>) -> Result {
             // The physics engine moves them.
             fly: false,
             anchor: Anchor::Nothing,
-            cut: ShatterParams { carry_on: true, min_area: 1e-4, ..ShatterParams::DEFAULT },
+            cut: ShatterParams { extend_cracks: true, min_area: 1e-4, ..ShatterParams::DEFAULT },
             burst: BurstParams { tumble: false, ..BurstParams::DEFAULT },
             ..default()
         },

@@ -32,7 +32,7 @@ impl GrowthParams {
         num_columns_grid: u32 = 1.0, 512.0;
         focus: f32 = 0.0, 4.0;
         reach: f32 = 0.01, 64.0;
-        uneven: f32 = 0.0, 0.9;
+        reach_variation: f32 = 0.0, 0.9;
         line_width: f32 = 0.0005, 0.2;
         line_growth: f32 = 0.0, 16.0;
         murray: f32 = 1.0, 8.0;
@@ -55,15 +55,15 @@ impl GrowthParams {
         arrest: f32 = 0.0, 1.0;
         nucleation: f32 = 0.0, 64.0;
         generations: u32 = 1.0, 4.0;
-        stars: f32 = 0.0, 1.0;
-        steady: f32 = 0.0, 1.0;
+        three_arm_share: f32 = 0.0, 1.0;
+        straightness: f32 = 0.0, 1.0;
         thinning: f32 = 0.0, 1.0;
-        mixed: f32 = 0.0, 0.9;
+        width_variation: f32 = 0.0, 0.9;
         front: f32 = 0.0, 1.0;
-        patches: f32 = 0.0, 4.0;
+        patchiness: f32 = 0.0, 4.0;
         variety: f32 = 0.0, 1.0;
         courses: f32 = 0.0, 1.0;
-        sway: f32 = 0.0, 0.05;
+        distortion: f32 = 0.0, 0.05;
         max_nodes: u32 = 1.0, 1_000_000.0;
     }
 
@@ -157,7 +157,7 @@ impl GrowthParams {
                 self.venation = match text {
                     "open" => Venation::Open,
                     "closed" => Venation::Closed,
-                    "dividing" => Venation::Dividing,
+                    "dividing" => Venation::Subdivision,
                     _ => return Err(unreadable()),
                 }
             }

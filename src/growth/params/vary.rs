@@ -31,7 +31,7 @@ impl GrowthParams {
         length(&mut scaled.arrest, 0.0, 1.0);
         length(&mut scaled.grain, 0.0, 1.0);
         length(&mut scaled.courses, 0.0, 1.0);
-        length(&mut scaled.sway, 0.0, 0.05);
+        length(&mut scaled.distortion, 0.0, 0.05);
         length(&mut scaled.front, 0.0, 1.0);
         // Number of grid lines on the same surface.
         let count = |count: u32| ((count as f32 / by).round() as u32).clamp(1, 512);

@@ -23,7 +23,7 @@ pub(super) fn random_arrest(rng: &mut Rng) -> GrowthParams {
         kill_distance: rng.range(0.01, 0.07).min(crack_radius),
         venation: match rng.next_u32() % 6 {
             0 | 1 => Venation::Closed,
-            2 | 3 => Venation::Dividing,
+            2 | 3 => Venation::Subdivision,
             _ => Venation::Open,
         },
         front: if rng.unit() < 0.5 { 0.0 } else { rng.range(0.005, 0.1) },
@@ -174,11 +174,11 @@ fn always_ends_with_arrest_and_closed_venation() {
             }
         }
         let starts = growth.network().nodes().iter().filter(|node| node.parent == NO_PARENT).count() as u64;
-        let bound = params.most_nodes(u64::from(growth.census().total), starts);
+        let bound = params.most_nodes(u64::from(growth.marker_counts().total), starts);
         while growth.step().grew() {
             assert!((growth.network().nodes().len() as u64) < bound, "case {case}: {params:?}");
         }
-        let census = growth.census();
+        let census = growth.marker_counts();
         assert!(!growth.is_growing(), "case {case}");
         assert_eq!(census.attracting, 0, "case {case}: {params:?}");
         assert_eq!(census.killed + census.waiting, census.total, "case {case}: {census:?}");
@@ -288,7 +288,7 @@ fn forbidden_texels_hold_no_crack() {
             while growth.step().grew() {}
         }
         let mut field = DepthField::new(SurfaceFrame::new(UVec2::splat(160)).unwrap());
-        field.forbid(&mask);
+        field.set_forbidden(&mask);
         for path in growth.network().segments().filter_map(|segment| growth.network().path(segment)) {
             for pair in path.points().windows(2) {
                 // Far finer than a texel of the mask.

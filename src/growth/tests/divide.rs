@@ -141,7 +141,7 @@ fn cracks_do_not_hook_round() {
 fn stars_have_three_arms() {
     for (stars, arms) in [(0.0, 2), (1.0, 3)] {
         let mut preset = CrackPreset::MUD;
-        preset.growth.stars = stars;
+        preset.growth.three_arm_share = stars;
         preset.growth.starts = StartLayout::Point;
         let starts = of_seeds(&preset, 1.0).filter(|growth| {
             let nodes = growth.network().nodes();
@@ -152,12 +152,12 @@ fn stars_have_three_arms() {
     }
 }
 
-/// Steady cracks are nearly as long as the straight way between their ends, whatever their kinks.
+/// Straight cracks are nearly as long as the straight way between their ends, whatever their kinks.
 #[test]
-fn steady_cracks_run_straight() {
+fn straight_cracks_run_straight() {
     let straightness = |steady: f32| {
         let mut preset = CrackPreset::MUD;
-        preset.growth.steady = steady;
+        preset.growth.straightness = steady;
         let mut shares = Vec::new();
         for growth in of_seeds(&preset, 2.0) {
             let (nodes, step) = (growth.network().nodes(), growth.params().step_length);
@@ -179,7 +179,7 @@ fn steady_cracks_run_straight() {
 fn cracks_thin_out() {
     let widths = |thinning: f32| {
         let mut preset = CrackPreset::CLAY;
-        (preset.growth.thinning, preset.growth.mixed) = (thinning, 0.0);
+        (preset.growth.thinning, preset.growth.width_variation) = (thinning, 0.0);
         let (mut near, mut far) = (Vec::new(), Vec::new());
         for growth in of_seeds(&preset, 1.0) {
             let hit = growth.impacts()[0].pos;
@@ -203,7 +203,7 @@ fn cracks_thin_out() {
 fn cracks_of_a_generation_are_mixed() {
     let mut preset = CrackPreset::CLAY;
     for mixed in [0.0, 0.5] {
-        preset.growth.mixed = mixed;
+        preset.growth.width_variation = mixed;
         let growth = grown(&preset, Vec2::splat(0.5), 4.0, 3);
         let division = growth.division.as_ref().unwrap();
         let nodes = growth.network().nodes();

@@ -174,11 +174,11 @@ fn always_ends_with_the_rules_of_the_presets() {
             }
         }
         let starts = growth.network().nodes().iter().filter(|node| node.parent == NO_PARENT).count() as u64;
-        let bound = growth.params().most_nodes(u64::from(growth.census().total), starts);
+        let bound = growth.params().most_nodes(u64::from(growth.marker_counts().total), starts);
         while growth.step().grew() {
             assert!((growth.network().nodes().len() as u64) < bound, "case {case}");
         }
-        let census = growth.census();
+        let census = growth.marker_counts();
         assert!(!growth.is_growing() && growth.steps() < 100_000, "case {case}");
         assert_eq!(census.attracting, 0, "case {case}");
         assert_eq!(census.killed + census.waiting, census.total, "case {case}");

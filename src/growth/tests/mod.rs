@@ -66,10 +66,10 @@ fn random_params(rng: &mut Rng, small: bool) -> GrowthParams {
         venation: Venation::Open,
         nucleation: 0.0,
         generations: 1 + rng.next_u32() % 3,
-        stars: 0.0,
-        steady: 0.0,
+        three_arm_share: 0.0,
+        straightness: 0.0,
         thinning: 0.0,
-        mixed: 0.0,
+        width_variation: 0.0,
         front: 0.0,
         tip_taper: if rng.unit() < 0.3 { 0.0 } else { 12.0 * rng.unit() },
         unevenness: 0.0,
@@ -78,12 +78,12 @@ fn random_params(rng: &mut Rng, small: bool) -> GrowthParams {
         directed: 0.0,
         variety: 0.0,
         courses: 0.0,
-        sway: 0.01,
+        distortion: 0.01,
         draw_markers: rng.unit() < 0.2,
         max_nodes: 1_000_000,
         zigzag: if rng.unit() < 0.5 { 0.0 } else { rng.unit() },
-        uneven: 0.0,
-        patches: 0.0,
+        reach_variation: 0.0,
+        patchiness: 0.0,
     };
     params.validate().expect("random parameters are valid");
     params
@@ -117,13 +117,13 @@ fn always_ends() {
         let mut growth = CrackGrowth::new(params.clone(), extent, case).unwrap();
         growth.hit(Vec2::new(rng.unit(), rng.unit()) * extent, 16.0 * rng.unit());
         let starts = growth.network().nodes().len() as u64;
-        let bound = params.most_nodes(u64::from(growth.census().total), starts);
+        let bound = params.most_nodes(u64::from(growth.marker_counts().total), starts);
         let mut steps = 0u64;
         while growth.step().grew() {
             steps += 1;
             assert!(steps <= bound, "case {case}: {steps} steps, bound {bound}: {params:?}");
         }
-        let census = growth.census();
+        let census = growth.marker_counts();
         assert!(steps < u64::from(params.num_iterations), "case {case} was cut off: {params:?}");
         assert_eq!(census.attracting, 0, "case {case}: a marker is neither reached nor out of reach");
         assert_eq!(census.killed + census.waiting, census.total, "case {case}: {census:?}");
@@ -169,7 +169,7 @@ fn ends_on_the_numbers_of_the_paper() {
             growth.hit(Vec2::splat(0.5), 1.0);
             while growth.step().grew() {}
             assert!(growth.steps() < 100_000, "figure {figure} at scale {scale} was cut off");
-            assert_eq!(growth.census().attracting, 0, "figure {figure} at scale {scale}");
+            assert_eq!(growth.marker_counts().attracting, 0, "figure {figure} at scale {scale}");
         }
     }
 }
@@ -318,12 +318,12 @@ fn i5_same_point_hit_ten_thousand_times() {
     assert!(outcomes[1..].iter().all(|outcome| *outcome == HitOutcome::Merged(0)));
     assert_eq!(growth.impacts().len(), 1);
     assert_eq!(growth.impacts()[0].energy, MAX_ENERGY);
-    let markers = growth.census().total;
+    let markers = growth.marker_counts().total;
     assert!(markers <= 400, "{markers} markers on a grid of 400");
     // All energy at once lays out the same markers as many hits.
     let mut once = CrackGrowth::new(GrowthParams::default(), Vec2::ONE, 1).unwrap();
     once.hit(Vec2::splat(0.4), MAX_ENERGY);
-    assert_eq!(once.census().total, markers);
+    assert_eq!(once.marker_counts().total, markers);
 }
 
 #[test]

@@ -313,11 +313,11 @@ fn always_ends_with_rays() {
             }
         }
         let starts = growth.network().nodes().iter().filter(|node| node.parent == NO_PARENT).count() as u64;
-        let bound = params.most_nodes(u64::from(growth.census().total), starts);
+        let bound = params.most_nodes(u64::from(growth.marker_counts().total), starts);
         while growth.step().grew() {
             assert!((growth.network().nodes().len() as u64) < bound, "case {case}: {params:?}");
         }
-        let census = growth.census();
+        let census = growth.marker_counts();
         assert!(!growth.is_growing(), "case {case}");
         assert_eq!(census.attracting, 0, "case {case}: {params:?}");
         assert_eq!(census.killed + census.waiting, census.total, "case {case}: {census:?}");

@@ -431,7 +431,7 @@ fn compare(params: GrowthParams, extent: Vec2, case: u64, name: &str) -> (usize,
     // As varied by the seed.
     let params = growth.params().clone();
     let mut slow = Reference {
-        drafts: Network::new(extent, params.roughness, case).with_sway(params.sway),
+        drafts: Network::new(extent, params.roughness, case).with_distortion(params.distortion),
         params,
         extent,
         seed: case,

@@ -152,7 +152,7 @@ fn equals_brute_force_node_for_node() {
             }
             if !growth.is_growing() {
                 let alive = reference.markers.iter().filter(|(.., alive)| *alive).count() as u32;
-                let census = growth.census();
+                let census = growth.marker_counts();
                 assert_eq!((census.attracting, census.waiting), (0, alive), "case {case}: a marker is lost");
                 ended += 1;
             }

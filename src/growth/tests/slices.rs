@@ -3,7 +3,7 @@
 use super::{fingerprint, random_extent, random_params};
 use crate::{
     CrackPreset, Grid,
-    growth::{Census, CrackGrowth, GrowthParams, MarkerLayout, StepReport},
+    growth::{CrackGrowth, GrowthParams, MarkerCounts, MarkerLayout, StepReport},
     math::{Rng, hash_unit, mix},
     pattern::CrackMask,
 };
@@ -11,7 +11,7 @@ use glam::Vec2;
 
 /// Places, then numbers of markers.
 fn markers(growth: &CrackGrowth) -> (Vec<[u32; 2]>, [u32; 4]) {
-    let census = growth.census();
+    let census = growth.marker_counts();
     let places = growth.field.unsettled().map(|(pos, _)| pos.to_array().map(f32::to_bits)).collect();
     (places, [census.total, census.killed, census.attracting, census.waiting])
 }
@@ -21,7 +21,7 @@ fn step_in_slices(growth: &mut CrackGrowth, rng: &mut Rng) -> (StepReport, u32) 
     let most = rng.next_u32() % 40;
     let slices = (0..most).take_while(|_| {
         let is_left = !growth.prepare_step(1 + rng.next_u32() % 60);
-        let Census { total, killed, attracting, waiting } = growth.census();
+        let MarkerCounts { total, killed, attracting, waiting } = growth.marker_counts();
         assert_eq!(total, killed + attracting + waiting);
         is_left
     });
@@ -51,7 +51,7 @@ fn b5_slices_of_any_size_lay_out_the_same() {
         for _ in 0..3 {
             let (pos, energy) = (Vec2::new(rng.unit(), rng.unit()) * extent, 2.0 * rng.unit());
             assert_eq!(at_once.hit(pos, energy), in_slices.begin_hit(pos, energy), "case {case}");
-            while in_slices.lay_out(1 + rng.next_u32() % 40) {
+            while in_slices.continue_hit(1 + rng.next_u32() % 40) {
                 sliced += 1;
                 if rng.unit() < 0.02 {
                     interrupted += 1;
@@ -89,11 +89,11 @@ fn b5_fine_presets_in_slices() {
             assert_eq!(at_once.hit(pos, 1.0), in_slices.begin_hit(pos, 1.0));
             let most = 2048;
             let mut rng = Rng::new(4);
-            let mut before = in_slices.census().total;
+            let mut before = in_slices.marker_counts().total;
             let mut is_going_on = true;
             while is_going_on {
-                is_going_on = in_slices.lay_out(most);
-                let now = in_slices.census().total;
+                is_going_on = in_slices.continue_hit(most);
+                let now = in_slices.marker_counts().total;
                 assert!(now - before <= most, "{name}: {} markers in a slice", now - before);
                 before = now;
             }

@@ -52,10 +52,10 @@ pub struct GuidedCracks {
 }
 
 impl GuidedCracks {
-    /// Cracks that follow one guide, with sites astride its strokes, which come at once.
+    /// Cracks that follow one guide, with sites on both sides of its strokes, which come at once.
     #[must_use]
     pub fn new(guide: CrackGuide) -> Self {
-        let params = VoronoiParams { layout: SiteLayout::Astride, ..VoronoiParams::DEFAULT };
+        let params = VoronoiParams { layout: SiteLayout::StrokePairs, ..VoronoiParams::DEFAULT };
         Self { guides: vec![guide], params, ..Self::default() }
     }
 
@@ -241,6 +241,6 @@ pub struct CrackBaked {
     /// The surface.
     pub entity: Entity,
     /// The share of the length of the guides' strokes that has a crack within the stroke, 0..=1; `None` unless sites were to lie
-    /// [astride](SiteLayout::Astride) and there are strokes.
+    /// [in pairs](SiteLayout::StrokePairs) and there are strokes.
     pub covered: Option<f32>,
 }

@@ -4,7 +4,7 @@ use bevy::{prelude::*, reflect::serde::ReflectSerializeWithRegistry};
 
 /// Where cracks like to run, where they do not, and where they never go. See [`CrackMask`](crate::pattern::CrackMask).
 ///
-/// Cracks that [divide](crate::growth::Venation::Dividing) what there is (tempered glass, plaster, clay, mud, glaze) hardly mind where they like to run.
+/// Cracks that [divide](crate::growth::Venation::Subdivision) what there is (tempered glass, plaster, clay, mud, glaze) hardly mind where they like to run.
 #[derive(Reflect, Clone, Debug, Default, PartialEq)]
 #[reflect(Default, SerializeWithRegistry)]
 pub enum CrackMaskSource {

@@ -19,7 +19,7 @@ use crate::plugin::surface::regrow::{Past, grown_anew};
 use crate::plugin::surface::stamp::stamp_all;
 use crate::plugin::surface::tile_set::Touched;
 use crate::plugin::surface::time::First;
-use crate::raster::{DepthField, Redrawn, Replay, TexelRect};
+use crate::raster::{DepthField, Replay, ReplayChanges, TexelRect};
 use bevy::prelude::*;
 use std::sync::Arc;
 
@@ -193,7 +193,7 @@ impl FinishInputs {
                 None
             }
             Some(moment) => {
-                let (mut replay, mut redrawn) = (Replay::new(frame.size(), profile), Redrawn::default());
+                let (mut replay, mut redrawn) = (Replay::new(frame.size(), profile), ReplayChanges::default());
                 replay.show(&mut field, growth.network(), growth.timeline(), moment, &mut redrawn);
                 touched.follow(&redrawn);
                 Some((replay, moment))

@@ -15,7 +15,7 @@ use crate::plugin::surface::active::Active;
 use crate::plugin::surface::cracked::{Cracked, active_mut};
 use crate::plugin::surface::queues::Queues;
 use crate::plugin::surface::tile_set::Touched;
-use crate::raster::{DepthField, DirtyTiles, Redrawn, Replay};
+use crate::raster::{DepthField, DirtyTiles, Replay, ReplayChanges};
 use bevy::{
     ecs::{entity_disabling::Disabled, query::Allow},
     platform::time::Instant,
@@ -141,7 +141,7 @@ impl AsyncPlayback {
             touched: core::mem::take(&mut drawing.touched),
             back: self.back.take(),
             dirty: core::mem::replace(&mut view.dirty, DirtyTiles::new(size)),
-            redrawn: Redrawn::default(),
+            redrawn: ReplayChanges::default(),
             stage: Stage::Begin,
             changed: Vec::new(),
             staged: [const { None }; MAPS],

@@ -9,7 +9,7 @@ use crate::plugin::gpu::textures;
 use crate::plugin::gpu::textures::TextureKind;
 use crate::plugin::source::picture::BasePicture;
 use crate::plugin::surface::tile_set::Touched;
-use crate::raster::{DepthField, DirtyTiles, Redrawn, Replay, TexelRect};
+use crate::raster::{DepthField, DirtyTiles, Replay, ReplayChanges, TexelRect};
 use bevy::prelude::*;
 use std::sync::Arc;
 
@@ -61,7 +61,7 @@ pub(crate) struct FrameJob {
     pub(crate) back: Option<Back>,
     /// What is not as the textures show it.
     pub(crate) dirty: DirtyTiles,
-    pub(crate) redrawn: Redrawn,
+    pub(crate) redrawn: ReplayChanges,
     pub(crate) stage: Stage,
     /// The same when it is made: texels of the field.
     pub(crate) changed: Vec<TexelRect>,

@@ -14,7 +14,7 @@ pub(crate) fn freeze_if_full(active: &mut Active) {
     }
     stamp(active, &mut Scratch::default());
     active.cracks.cells.update(active.cracks.growth.network());
-    let gone = active.cracks.growth.forget_oldest(most / 2);
+    let gone = active.cracks.growth.remove_oldest(most / 2);
     active.drawing.field.freeze_layer(active.cracks.growth.network(), active.cracks.growth.timeline());
     let before = active.drawing.frozen.take();
     let (nodes, cells) = before.map_or((0, 0), |before| (before.nodes, before.cells));

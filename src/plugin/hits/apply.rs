@@ -102,7 +102,7 @@ fn lay_out(world: &mut World, timer: &Timer) -> bool {
     {
         let is_left = active_mut(world, entity).is_some_and(|active| {
             has_worked |= active.cracks.growth.is_laying_out();
-            active.cracks.growth.lay_out(SLICE)
+            active.cracks.growth.continue_hit(SLICE)
         });
         if !is_left {
             world.resource_mut::<Queues>().laying_out.pop_front();
@@ -205,9 +205,9 @@ fn apply(world: &mut World, entity: Entity, hit: QueuedHit, timer: &Timer) -> Re
     let pos = uv * active.cracks.growth.network().extent();
     freeze_if_full(active);
     let outcome = active.cracks.growth.begin_hit(pos, hit.energy);
-    let mut is_left = active.cracks.growth.lay_out(SLICE);
+    let mut is_left = active.cracks.growth.continue_hit(SLICE);
     while is_left && !timer.is_over() {
-        is_left = active.cracks.growth.lay_out(SLICE);
+        is_left = active.cracks.growth.continue_hit(SLICE);
     }
     if matches!(outcome, HitOutcome::Started(_) | HitOutcome::Merged(_)) {
         let energy = hit.energy.min(HARDEST);

@@ -119,7 +119,7 @@ impl ShatterJob {
         let budget = world.resource::<CrackBudget>();
         let is_everything = request.reach == f32::INFINITY;
         if is_everything {
-            settings.cut.carry_on = true;
+            settings.cut.extend_cracks = true;
             (settings.anchor, settings.anchor_mask) = (Anchor::Nothing, None);
         }
         // Fewer and larger ones, rather than some that nobody sees.
@@ -184,7 +184,7 @@ impl ShatterJob {
             }
             None => CutFrom::Lines(network.clone(), Vec::new(), None),
         };
-        let is_sketched = settings.cut.carry_on && matches!(pieces, CutFrom::Lines(..));
+        let is_sketched = settings.cut.extend_cracks && matches!(pieces, CutFrom::Lines(..));
         Ok(Self {
             revision: active.revision.clone(),
             rim,

@@ -432,7 +432,7 @@ mod tests {
         let mut app = app(CrackBudget::default());
         let image = app.world_mut().resource_mut::<Assets<Image>>().add(blank(UVec2::splat(64)));
         let settings = ShatterCracks {
-            cut: ShatterParams { carry_on: true, ..ShatterParams::DEFAULT },
+            cut: ShatterParams { extend_cracks: true, ..ShatterParams::DEFAULT },
             anchor: Anchor::Nothing,
             ..default()
         };

@@ -100,7 +100,7 @@ mod tests {
                 let line = [place(), place()];
                 cuts.add_line(&line).unwrap();
             }
-            let shards = shatter(cuts, &ShatterParams { carry_on: true, ..ShatterParams::DEFAULT }).unwrap();
+            let shards = shatter(cuts, &ShatterParams { extend_cracks: true, ..ShatterParams::DEFAULT }).unwrap();
             let mut covered = Grid::new(frame.size(), 0u8);
             let (mut holes, mut all) = (Holes::new(frame.size()), Vec::new());
             for shard in 0..shards.len() as u32 {

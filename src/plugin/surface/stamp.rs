@@ -4,7 +4,7 @@ use super::active::Active;
 use super::tile_set::Touched;
 use crate::growth::CrackGrowth;
 use crate::pattern::{Moment, PathPoint, SegmentId, SegmentPath};
-use crate::raster::{DOT_DEPTH, DepthField, Profile, Redrawn, TexelRect, stamp_dot, stamp_path, stamp_path_with};
+use crate::raster::{DOT_DEPTH, DepthField, Profile, ReplayChanges, TexelRect, stamp_dot, stamp_path, stamp_path_with};
 use bevy::prelude::*;
 
 /// Buffers kept from frame to frame.
@@ -12,7 +12,7 @@ use bevy::prelude::*;
 pub(crate) struct Scratch {
     segments: Vec<SegmentId>,
     markers: Vec<Vec2>,
-    redrawn: Redrawn,
+    redrawn: ReplayChanges,
     pub(crate) rects: Vec<TexelRect>,
 }
 
@@ -88,7 +88,7 @@ pub(crate) fn stamp_all(growth: &CrackGrowth, profile: &Profile, field: &mut Dep
             touched.mark(stamp_path(field, profile, &path));
         }
     }
-    field.show_layer(network, timeline, end, &mut Vec::new());
+    field.show_layers(network, timeline, end, &mut Vec::new());
 }
 
 /// How wide a crack is that was carried on, as a share of the narrowest that grow.

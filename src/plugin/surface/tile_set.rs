@@ -1,6 +1,6 @@
 //! [`Touched`]: a set of tiles.
 
-use crate::raster::{DirtyTiles, Redrawn, TexelRect};
+use crate::raster::{DirtyTiles, ReplayChanges, TexelRect};
 use bevy::prelude::*;
 
 /// A set of tiles.
@@ -33,7 +33,7 @@ impl Touched {
     }
 
     /// Takes up what has been drawn again.
-    pub(crate) fn follow(&mut self, redrawn: &Redrawn) {
+    pub(crate) fn follow(&mut self, redrawn: &ReplayChanges) {
         redrawn.cleared.iter().for_each(|tile| self.unmark(*tile));
         redrawn.stamped.iter().for_each(|rect| self.mark(*rect));
     }

@@ -2,7 +2,7 @@
 
 use super::{
     broken::{Broken, Chip, LONG_SHADOW, SHADOW},
-    crushed::Crushed,
+    crushed::CrushedZone,
     draws,
     noise::{draw, lattice, noise},
     outline::FAR_OUT,
@@ -47,7 +47,7 @@ impl Shape<'_> {
 
     /// Adds what is at a place in material that breaks along chords.
     pub(super) fn break_off(&self, place: &mut Place, broken: &Broken, off: Vec2, at: Vec2, seed: u32) {
-        let Crushed { dust, chips, reach, fall, .. } = *self.crushed;
+        let CrushedZone { dust, chips, reach, fall, .. } = *self.crushed;
         let within = self.within(broken, off, at, seed);
         let inside = (within + 0.5).clamp(0.0, 1.0);
         if inside > 0.0 {
@@ -107,7 +107,7 @@ impl Shape<'_> {
         at: Vec2,
         seed: u32,
     ) {
-        let Crushed { pale, speckle, stones, .. } = *self.crushed;
+        let CrushedZone { pale, speckle, stones, .. } = *self.crushed;
         let crumbles = self.jag > 0.0;
         let bump = |k: u32, size: f32| noise(seed ^ k, at.x / size, at.y / size);
         let share = if broken.basin.is_some() { SHELF } else { 1.0 };

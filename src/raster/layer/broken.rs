@@ -1,7 +1,7 @@
 //! The outlines of material that a hit breaks off, and the chips around it.
 
 use super::{
-    crushed::Crushed,
+    crushed::CrushedZone,
     draws,
     noise::draw,
     outline::{FAR_OUT, Outline},
@@ -37,8 +37,8 @@ pub(super) struct Broken {
 }
 
 impl Broken {
-    pub(super) fn new(crushed: &Crushed, unit: f32, radius: f32, grain: f32, seed: u32) -> Self {
-        let Crushed { ragged, reach, fall, .. } = *crushed;
+    pub(super) fn new(crushed: &CrushedZone, unit: f32, radius: f32, grain: f32, seed: u32) -> Self {
+        let CrushedZone { ragged, reach, fall, .. } = *crushed;
         // The root of the energy.
         let more = radius / (crushed.radius * unit).max(1.0e-3);
         let pick = |k: u32, what: i32| draw(seed ^ draws::PIECES, k as i32, what);

@@ -1,11 +1,11 @@
-//! The crushed zone around a hit: [`Crushed`].
+//! The crushed zone around a hit: [`CrushedZone`].
 
 /// The crushed zone around a hit. Its size depends on the energy of the hit. All details are computed from the seed
 /// and the position, at any resolution.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
-pub struct Crushed {
+pub struct CrushedZone {
     /// Radius at energy 1; it is proportional to the square root of the energy. Pattern units, 0..=0.5; default 0.03.
     pub radius: f32,
     /// How far the outline deviates from a circle, as a share of the radius. 0..=1; default 0.4.
@@ -84,7 +84,7 @@ pub struct Crushed {
     pub stones: f32,
 }
 
-impl Crushed {
+impl CrushedZone {
     /// The default: a crater in stone.
     pub const DEFAULT: Self = Self {
         radius: 0.03,
@@ -171,7 +171,7 @@ impl Crushed {
     }
 }
 
-impl Default for Crushed {
+impl Default for CrushedZone {
     fn default() -> Self {
         Self::DEFAULT
     }

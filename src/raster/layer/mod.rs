@@ -14,7 +14,7 @@ mod stone;
 mod veil;
 mod zones;
 
-pub use crushed::Crushed;
+pub use crushed::CrushedZone;
 pub(crate) use noise::noise;
 pub(crate) use plates::Plate;
 pub(crate) use spot::{PIT_STEPS, SLOPE_UNIT, Spot};
@@ -36,9 +36,9 @@ pub struct LayerPlan {
     /// Whether to record which closed cell each texel lies in; default no.
     pub plates: bool,
     /// Thickness of plates beside those that are missing in a hole, pattern units, 0..=0.02; default 0.
-    pub thick: f32,
+    pub thickness: f32,
     /// Crushed zones around hits; default none.
-    pub crushed: Option<Crushed>,
+    pub crushed: Option<CrushedZone>,
     /// Sheets along cracks; default none.
     pub veil: Option<Veil>,
     /// How far the floor of a crack is moved to the upper left: as a share of the crack's half width, and the largest
@@ -48,7 +48,7 @@ pub struct LayerPlan {
     /// How much of its depth a line has only where it catches the light: lines that run towards the light are stamped
     /// less deep, and so are some places along each line. 0..=1; default 0 = all lines are as deep as their profile
     /// says.
-    pub catch: f32,
+    pub directionality: f32,
     /// Width from which a crack has the whole rim of its profile; narrower cracks have a fainter rim. Pattern units,
     /// 0..=1; default 0 = all cracks have the whole rim.
     pub full_rim: f32,
@@ -75,11 +75,11 @@ pub(crate) struct Layer {
 
 impl Layer {
     pub(super) fn new(plan: LayerPlan, frame: SurfaceFrame) -> Self {
-        let plates = plan.plates.then(|| Box::new(PlateField::new(frame, plan.seed, plan.thick)));
+        let plates = plan.plates.then(|| Box::new(PlateField::new(frame, plan.seed, plan.thickness)));
         let crushed = plan
             .crushed
             .as_ref()
-            .map(|crushed| Box::new(CrushedField::new(crushed, frame, plan.seed).with_sides(plan.thick)));
+            .map(|crushed| Box::new(CrushedField::new(crushed, frame, plan.seed).with_sides(plan.thickness)));
         let veil = match &plan.veil {
             Some(veil) => Some(Box::new(VeilField::new(veil, frame, plan.seed))),
             None => (plan.floor[0] > 0.0).then(|| Box::new(VeilField::floor(plan.floor, frame))),

@@ -3,7 +3,7 @@
 use super::{
     broken::Broken,
     bruise::{self, Bruise},
-    crushed::Crushed,
+    crushed::CrushedZone,
     draws,
     noise::{hash, lattice, noise},
     outline::{Outline, WIDEST},
@@ -15,7 +15,7 @@ pub(super) const TO_LIGHT: Vec2 = Vec2::new(-std::f32::consts::FRAC_1_SQRT_2, -s
 
 /// A crushed zone in texels.
 pub(super) struct Shape<'a> {
-    pub(super) crushed: &'a Crushed,
+    pub(super) crushed: &'a CrushedZone,
     pub(super) radius: f32,
     pub(super) depth: f32,
     pub(super) rough: f32,
@@ -43,7 +43,7 @@ impl Place {
 }
 
 impl<'a> Shape<'a> {
-    pub(super) fn new(crushed: &'a Crushed, unit: f32, radius: f32, seed: u32) -> Self {
+    pub(super) fn new(crushed: &'a CrushedZone, unit: f32, radius: f32, seed: u32) -> Self {
         let grain = (crushed.grain * unit).max(1.0);
         Self {
             crushed,
@@ -70,7 +70,7 @@ impl<'a> Shape<'a> {
 
     /// Short cracks and flakes that thin out outward.
     pub(super) fn add_bruise(&self, place: &mut Place, off: Vec2, radii: f32, at: Vec2, seed: u32) {
-        let Crushed { ragged, pale, speckle, reach, needles, .. } = self.crushed;
+        let CrushedZone { ragged, pale, speckle, reach, needles, .. } = self.crushed;
         let way = off.normalize_or_zero();
         let round = |k: u32, times: f32| noise(seed ^ k, way.x * times + 17.0, way.y * times + 31.0);
         let cloud = noise(seed ^ 10, at.x / (3.0 * self.grain), at.y / (3.0 * self.grain));

@@ -27,7 +27,7 @@ pub struct Veil {
     pub color: [f32; 3],
     /// How much sheets differ from each other and along each crack: in width, strength and fall-off, with ragged far
     /// edges and fine arcs; some are on the other side. 0..=1; default 0 = all are alike.
-    pub uneven: f32,
+    pub variation: f32,
     /// How many bubbles lie along cracks, in strings. 0..=1; default 0 = none.
     pub bubbles: f32,
 }
@@ -35,7 +35,7 @@ pub struct Veil {
 impl Veil {
     /// The default: a sheet in ice.
     pub const DEFAULT: Self =
-        Self { reach: 0.06, full_width: 0.005, cover: 0.5, color: [0.90, 0.96, 1.0], uneven: 0.0, bubbles: 0.0 };
+        Self { reach: 0.06, full_width: 0.005, cover: 0.5, color: [0.90, 0.96, 1.0], variation: 0.0, bubbles: 0.0 };
 
     /// The first field that is out of its range or not finite: its name, value and range.
     pub(crate) fn fault(&self) -> Option<(&'static str, f32, &'static str)> {
@@ -43,7 +43,7 @@ impl Veil {
             ("veil.reach", self.reach, 0.0..=0.5, "0..=0.5"),
             ("veil.full_width", self.full_width, 0.0001..=1.0, "0.0001..=1"),
             ("veil.cover", self.cover, 0.0..=1.0, "0..=1"),
-            ("veil.uneven", self.uneven, 0.0..=1.0, "0..=1"),
+            ("veil.uneven", self.variation, 0.0..=1.0, "0..=1"),
             ("veil.bubbles", self.bubbles, 0.0..=1.0, "0..=1"),
         ];
         fields.extend(self.color.map(|channel| ("veil.color", channel, 0.0..=1.0, "0..=1")));
@@ -126,7 +126,7 @@ impl VeilField {
 
     /// The bounding box of the sheets of a crack at the origin, texels.
     pub(in crate::raster) fn hang(&self) -> (Vec2, Vec2) {
-        let other = if self.veil.uneven > 0.0 && self.floor.is_none() { -self.hang } else { Vec2::ZERO };
+        let other = if self.veil.variation > 0.0 && self.floor.is_none() { -self.hang } else { Vec2::ZERO };
         // And a bubble at its end.
         let more = if self.veil.bubbles > 0.0 { self.bubble(1.0) + 0.1 * self.hang.length() + 1.0 } else { 0.0 };
         (self.hang.min(other).min(Vec2::ZERO) - more, self.hang.max(other).max(Vec2::ZERO) + more)
@@ -159,7 +159,7 @@ impl VeilField {
         for pair in path.points().windows(2) {
             let ends = [pair[0], pair[1]].map(|point| self.frame.to_texel(point.pos));
             let dense = [pair[0], pair[1]].map(|point| lit * (point.width / self.veil.full_width).clamp(0.0, 1.0));
-            if self.veil.uneven > 0.0 {
+            if self.veil.variation > 0.0 {
                 bounds = bounds.union(self.stamp_uneven(ends, dense, twice));
             } else {
                 bounds = bounds.union(self.stamp_piece(ends, dense));
@@ -216,7 +216,7 @@ impl VeilField {
         if !det.is_finite() || det.abs() < 1.0e-3 || dense == [0.0; 2] || rect.is_empty() {
             return TexelRect::default();
         }
-        let (uneven, unit) = (self.veil.uneven, 1.0 / self.frame.texels_per_unit());
+        let (uneven, unit) = (self.veil.variation, 1.0 / self.frame.texels_per_unit());
         let faint = (7.0 * side.abs()).min(1.0);
         // Slow variations, at both ends of the piece, so that they are continuous from piece to piece.
         let slow = |k: u32, bumps: f32| {
@@ -361,7 +361,7 @@ mod tests {
     #[test]
     fn sheets_bubbles_and_floors_stay_in_their_box() {
         let (frame, mut rng) = (SurfaceFrame::new(UVec2::splat(256)).unwrap(), Rng::new(4));
-        let veil = Veil { uneven: 1.0, bubbles: 1.0, ..Veil::DEFAULT };
+        let veil = Veil { variation: 1.0, bubbles: 1.0, ..Veil::DEFAULT };
         let mut covered = [0; 2];
         for case in 0..60 {
             let mut field = match case % 2 {

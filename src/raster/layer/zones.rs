@@ -1,7 +1,7 @@
 //! The crushed zones of all hits.
 
 use super::{
-    crushed::Crushed,
+    crushed::CrushedZone,
     noise::noise,
     outline::WIDEST,
     shape::{Place, Shape},
@@ -57,7 +57,7 @@ fn tiles_of(rect: &TexelRect) -> impl Iterator<Item = UVec2> + use<> {
 /// The crushed zones of all impacts, in tiles that exist only where there are zones.
 #[derive(Clone, Debug)]
 pub(crate) struct CrushedField {
-    crushed: Crushed,
+    crushed: CrushedZone,
     frame: SurfaceFrame,
     seed: u32,
     /// By impact.
@@ -91,7 +91,7 @@ impl PartialEq for CrushedField {
 }
 
 impl CrushedField {
-    pub(super) fn new(crushed: &Crushed, frame: SurfaceFrame, seed: u64) -> Self {
+    pub(super) fn new(crushed: &CrushedZone, frame: SurfaceFrame, seed: u64) -> Self {
         let count = frame.size().map(|side| side.div_ceil(TILE));
         Self {
             crushed: *crushed,
@@ -117,7 +117,7 @@ impl CrushedField {
         self.used == 0
     }
 
-    pub(crate) const fn settings(&self) -> &Crushed {
+    pub(crate) const fn settings(&self) -> &CrushedZone {
         &self.crushed
     }
 
@@ -226,7 +226,7 @@ impl CrushedField {
         }
         let zone = (energy > 0.0).then(|| {
             let pos = self.frame.to_texel(strike.pos);
-            let Crushed { reach, flake, ragged, .. } = self.crushed;
+            let CrushedZone { reach, flake, ragged, .. } = self.crushed;
             let radius = self.radius(energy) * reach.max(flake).max(1.0 + WIDEST * ragged);
             let limit = self.frame.size().as_vec2();
             let min = (pos - radius - 2.0).floor().clamp(Vec2::ZERO, limit).as_uvec2();
@@ -361,7 +361,7 @@ impl Shape<'_> {
 
     /// The content of a place; `off` is the offset from the centre, `at` the position in the field.
     fn place(&self, off: Vec2, at: Vec2, seed: u32) -> Place {
-        let Crushed { ragged, soft, hole, pale, speckle, flake, dust, chips, reach, .. } = *self.crushed;
+        let CrushedZone { ragged, soft, hole, pale, speckle, flake, dust, chips, reach, .. } = *self.crushed;
         let mut place = Place::NONE;
         let distance = off.length();
         let radii = distance / self.radius.max(0.5);
@@ -465,7 +465,7 @@ mod tests {
             let mut rng = Rng::new(seed);
             let timeline = timeline(&mut rng);
             let all = timeline.strikes();
-            let crushed = Crushed { broken: seed % 2 == 0, radius: 0.06, ..Crushed::DEFAULT };
+            let crushed = CrushedZone { broken: seed % 2 == 0, radius: 0.06, ..CrushedZone::DEFAULT };
             let mut field = CrushedField::new(&crushed, frame, seed);
             let mut shown = Grid::new(frame.size(), Spot::NONE);
             for _ in 0..80 {
@@ -505,7 +505,7 @@ mod tests {
     #[test]
     fn it_is_drawn_from_the_hit_outward() {
         let frame = SurfaceFrame::new(UVec2::splat(512)).unwrap();
-        let mut field = CrushedField::new(&Crushed { radius: 0.2, ..Crushed::DEFAULT }, frame, 1);
+        let mut field = CrushedField::new(&CrushedZone { radius: 0.2, ..CrushedZone::DEFAULT }, frame, 1);
         let mut timeline = Timeline::default();
         timeline.strike(0, Vec2::new(0.3, 0.6), 0.0, 1.0);
         field.follow(timeline.strikes(), timeline.strikes());
@@ -529,7 +529,7 @@ mod tests {
     fn what_breaks_is_deep_inside_and_level_far_away() {
         let frame = SurfaceFrame::new(UVec2::splat(256)).unwrap();
         for seed in 0..20 {
-            let crushed = Crushed { broken: true, basin: 0.6, depth: 0.02, radius: 0.1, ..Crushed::DEFAULT };
+            let crushed = CrushedZone { broken: true, basin: 0.6, depth: 0.02, radius: 0.1, ..CrushedZone::DEFAULT };
             let mut field = CrushedField::new(&crushed, frame, seed);
             let mut timeline = Timeline::default();
             timeline.strike(0, Vec2::splat(0.5), 0.0, 1.0);

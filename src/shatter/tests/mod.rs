@@ -173,7 +173,7 @@ fn random_cuts(rng: &mut Rng) -> Cuts {
 
 fn random_params(rng: &mut Rng) -> ShatterParams {
     ShatterParams {
-        carry_on: rng.next_u32().is_multiple_of(2),
+        extend_cracks: rng.next_u32().is_multiple_of(2),
         min_area: [0.0, 2e-5, 0.01][rng.next_u32() as usize % 3],
         max_shards: [10_000, 4][usize::from(rng.unit() < 0.1)],
         seed: u64::from(rng.next_u32()),

@@ -66,7 +66,7 @@ fn what_no_anchor_holds_falls() {
     let mut fell = 0;
     for _ in 0..300 {
         let network = planar_network(60, Vec2::ONE, &mut rng);
-        let params = ShatterParams { carry_on: true, ..ShatterParams::DEFAULT };
+        let params = ShatterParams { extend_cracks: true, ..ShatterParams::DEFAULT };
         let shards = shatter(Cuts::from_network(&network).unwrap(), &params).unwrap();
         let sides = [0; 4].map(|_| rng.unit() < 0.4);
         let mut support = Support::new(&shards, Anchor::Sides(sides));
@@ -78,10 +78,10 @@ fn what_no_anchor_holds_falls() {
             for shard in 0..shards.len() as u32 {
                 let distance = shards.distance(shard, at);
                 let in_reach = distance <= if held(shard) { 0.0 } else { reach };
-                assert_eq!(hit.contains(&shard), before.is_there(shard) && in_reach);
+                assert_eq!(hit.contains(&shard), before.is_in_place(shard) && in_reach);
             }
             // By spreading until nothing changes.
-            let there = |shard: u32| before.is_there(shard) && !hit.contains(&shard);
+            let there = |shard: u32| before.is_in_place(shard) && !hit.contains(&shard);
             let mut stays: Vec<bool> = (0..shards.len() as u32).map(|shard| there(shard) && held(shard)).collect();
             for _ in 0..shards.len() {
                 for shard in 0..shards.len() as u32 {
@@ -92,7 +92,7 @@ fn what_no_anchor_holds_falls() {
             for shard in 0..shards.len() as u32 {
                 let falls = sides.contains(&true) && there(shard) && !stays[shard as usize];
                 assert_eq!(loose.contains(&shard), falls);
-                assert_eq!(support.is_there(shard), there(shard) && !falls);
+                assert_eq!(support.is_in_place(shard), there(shard) && !falls);
             }
             fell += loose.len();
         }
@@ -112,13 +112,13 @@ fn a_hole_stays_when_the_rest_cracks_further() {
         let mut support = Support::new(&old, Anchor::Nothing);
         let extent = old.extent();
         support.hit(&old, extent * 0.5, 0.2).unwrap();
-        let hole: f32 = support.gone().map(|shard| old.get(shard).unwrap().area).sum();
+        let hole: f32 = support.missing().map(|shard| old.get(shard).unwrap().area).sum();
         for _ in 0..5 {
             cuts.add_line(&[0, 1].map(|_| Vec2::new(rng.unit(), rng.unit()) * extent)).unwrap();
         }
         let new = shatter(cuts.clone(), &EVERYTHING).unwrap();
-        let renewed = support.renewed(&old, &new, Anchor::Nothing);
-        let after: f32 = renewed.gone().map(|shard| new.get(shard).unwrap().area).sum();
+        let renewed = support.after_new_cracks(&old, &new, Anchor::Nothing);
+        let after: f32 = renewed.missing().map(|shard| new.get(shard).unwrap().area).sum();
         assert!((after - hole).abs() < 1e-5 * extent.element_product(), "{hole} {after}");
     }
 }

@@ -19,7 +19,7 @@ fn random_lines_tile() {
         }
         shards_in_all += shards.len();
         holes += (0..shards.len() as u32).map(|shard| shards.holes(shard).count()).sum::<usize>();
-        carried += shards.carried().len();
+        carried += shards.extended_lines().len();
     }
     assert!(shards_in_all > 50_000 && holes > 100 && carried > 1000, "{shards_in_all} {holes} {carried}");
 }
@@ -30,9 +30,12 @@ fn presets_tile() {
         for seed in 0..4 {
             let network = grown(&CrackPreset::named(name).unwrap(), 1 + seed as u32 % 3, seed);
             let cuts = Cuts::from_network(&network).unwrap();
-            for carry_on in [false, true] {
-                let shards =
-                    shatter(cuts.clone(), &ShatterParams { carry_on, seed, ..ShatterParams::DEFAULT }).unwrap();
+            for extend_cracks in [false, true] {
+                let shards = shatter(
+                    cuts.clone(),
+                    &ShatterParams { extend_cracks: extend_cracks, seed, ..ShatterParams::DEFAULT },
+                )
+                .unwrap();
                 check_tiling(&shards);
                 if seed == 0 {
                     check_meshes(&shards, &mut Rng::new(1));
@@ -46,15 +49,17 @@ fn presets_tile() {
 #[test]
 fn edges_lie_on_drawn_lines() {
     let network = grown(&CrackPreset::GLASS, 2, 5);
-    let shards =
-        shatter(Cuts::from_network(&network).unwrap(), &ShatterParams { carry_on: true, ..ShatterParams::DEFAULT })
-            .unwrap();
+    let shards = shatter(
+        Cuts::from_network(&network).unwrap(),
+        &ShatterParams { extend_cracks: true, ..ShatterParams::DEFAULT },
+    )
+    .unwrap();
     let mut lines: Vec<(Vec2, Vec2)> = network
         .segments()
         .filter_map(|segment| network.path(segment))
         .flat_map(|path| path.points().windows(2).map(|pair| (pair[0].pos, pair[1].pos)).collect::<Vec<_>>())
         .collect();
-    lines.extend(shards.carried().iter().flat_map(|line| line.windows(2).map(|pair| (pair[0], pair[1]))));
+    lines.extend(shards.extended_lines().iter().flat_map(|line| line.windows(2).map(|pair| (pair[0], pair[1]))));
     let mut checked = 0;
     for shard in 0..shards.len() as u32 {
         for [a, b] in edges(shards.outline(shard)) {
@@ -105,7 +110,8 @@ fn degenerate_lines_are_survived() {
         check_tiling(&shards);
         assert_eq!(shards.len(), pieces, "{name}");
         let whole =
-            shatter(cuts.clone(), &ShatterParams { carry_on: true, max_shards: 1, ..ShatterParams::DEFAULT }).unwrap();
+            shatter(cuts.clone(), &ShatterParams { extend_cracks: true, max_shards: 1, ..ShatterParams::DEFAULT })
+                .unwrap();
         assert_eq!(whole.len(), 1);
         check_tiling(&whole);
     }
@@ -155,8 +161,8 @@ fn open_cracks_are_carried_on() {
     let mut cuts = Cuts::new(Vec2::ONE).unwrap();
     cuts.add_line(&[Vec2::new(0.2, 0.5), Vec2::new(0.6, 0.5)]).unwrap();
     assert_eq!(shatter(cuts.clone(), &EVERYTHING).unwrap().len(), 1);
-    let shards = shatter(cuts.clone(), &ShatterParams { carry_on: true, ..EVERYTHING }).unwrap();
-    assert_eq!((shards.len(), shards.carried().len()), (2, 2));
+    let shards = shatter(cuts.clone(), &ShatterParams { extend_cracks: true, ..EVERYTHING }).unwrap();
+    assert_eq!((shards.len(), shards.extended_lines().len()), (2, 2));
     check_tiling(&shards);
 
     let mut rng = Rng::new(22);
@@ -165,7 +171,7 @@ fn open_cracks_are_carried_on() {
         let cuts = Cuts::from_network(&network).unwrap();
         let mut drawing = cuts.drawing.clone();
         drawing.make_planar();
-        drawing.carry_on(1);
+        drawing.extend_cracks(1);
         let mut degree = vec![0; drawing.places.len()];
         drawing.edges.iter().flatten().for_each(|&end| degree[end as usize] += 1);
         let on_border = |place| drawing.lattice.sides(place).contains(&true);
@@ -229,7 +235,7 @@ fn shards_are_the_closed_cells() {
 #[test]
 fn shards_are_the_same_every_time() {
     let network = grown(&CrackPreset::GLASS, 2, 1);
-    let params = ShatterParams { carry_on: true, ..ShatterParams::DEFAULT };
+    let params = ShatterParams { extend_cracks: true, ..ShatterParams::DEFAULT };
     let once = shatter(Cuts::from_network(&network).unwrap(), &params).unwrap();
     let again = shatter(Cuts::from_network(&network).unwrap(), &params).unwrap();
     assert_eq!(once, again);

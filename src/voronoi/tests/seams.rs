@@ -18,7 +18,7 @@ fn cracks_cover_the_strokes() {
             let params = VoronoiParams { layout, ..VoronoiParams::DEFAULT };
             made(&params, &[Guide::new(image.clone())], [400, 400], seed).0.strokes()
         };
-        let report = report(SiteLayout::Astride).unwrap();
+        let report = report(SiteLayout::StrokePairs).unwrap();
         assert!(report.covered >= 0.95 && report.length > 1.0, "{report:?}");
     }
 }
