@@ -4,12 +4,11 @@ use crate::{
     guided::regions,
     maps::{Paint, base_picture},
     ocr::{PROFILE, SIDE, deep},
-    text::{FONT, draw_text},
 };
 use bevy_crack::{
     pattern::SurfaceFrame,
     raster::{DepthField, Profile},
-    voronoi::{Front, Guide, Seams, SiteLayout, VoronoiBake, VoronoiMap, VoronoiParams},
+    voronoi::{FONT, Front, Guide, Seams, SiteLayout, VoronoiBake, VoronoiMap, VoronoiParams, draw_text},
 };
 use clap::Args;
 use glam::{UVec2, Vec2};

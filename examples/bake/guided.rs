@@ -6,12 +6,11 @@ use crate::{
     maps::{Paint, base_picture, write_maps},
     ocr::{PROFILE, deep},
     pictures::read_picture,
-    text::{FONT, draw_text},
 };
 use bevy_crack::{
     pattern::{NO_PARENT, SurfaceFrame},
     raster::DepthField,
-    voronoi::{Front, Guide, Seams, SiteLayout, VoronoiBake, VoronoiMap, VoronoiParams, edges},
+    voronoi::{FONT, Front, Guide, Seams, SiteLayout, VoronoiBake, VoronoiMap, VoronoiParams, draw_text, edges},
 };
 use clap::{Args, ValueEnum};
 use glam::{UVec2, Vec2};

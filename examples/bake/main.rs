@@ -21,7 +21,6 @@ mod painting;
 mod pictures;
 mod shatter;
 mod sheet;
-mod text;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;

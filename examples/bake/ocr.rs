@@ -1,11 +1,10 @@
 //! Words drawn by cracks, as Tesseract reads them.
 
-use super::text::draw_text;
 use bevy_crack::{
     Grid,
     pattern::SurfaceFrame,
     raster::{DepthField, Profile},
-    voronoi::{Guide, SiteLayout, StrokeReport, VoronoiBake, VoronoiParams},
+    voronoi::{Guide, SiteLayout, StrokeReport, VoronoiBake, VoronoiParams, draw_text},
 };
 use glam::UVec2;
 use image::GrayImage;

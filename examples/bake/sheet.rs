@@ -4,7 +4,6 @@ use crate::{
     own::{exhibit, own_picture},
     painting::{fitted, paint},
     pictures::read_picture,
-    text::{FONT, draw_text},
 };
 use bevy_crack::{
     CrackPreset,
@@ -12,6 +11,7 @@ use bevy_crack::{
     paint::LookTable,
     pattern::{CrackMask, Moment, SurfaceFrame},
     raster::{DepthField, stamp_path},
+    voronoi::{FONT, draw_text},
 };
 use glam::{UVec2, Vec2};
 use image::{

@@ -11,12 +11,10 @@ mod painting;
 mod pictures;
 #[path = "../bake/sheet.rs"]
 mod sheet;
-#[path = "../bake/text.rs"]
-mod text;
 
 use bevy::prelude::*;
 use bevy_crack::prelude::*;
-use bevy_crack_demos::{DemoArguments, OnCanvas, Output, Script, demo_app, heal_on_h, hit_on_press, play};
+use bevy_crack_demos::{DemoArguments, Label, OnCanvas, Output, Script, demo_app, heal_on_h, hit_on_press, play};
 use std::{error::Error, fs, path::Path};
 
 /// Pictures, fonts and presets that ship with the crate.
@@ -85,9 +83,7 @@ fn setup(mut commands: Commands, assets: Res<AssetServer>) {
             ))
             .observe(hit_on_press);
         commands.spawn((
-            Text2d::new(name.replace('_', " ")),
-            TextFont { font_size: FontSize::Px(16.0), ..default() },
-            TextColor(Color::srgb(0.7, 0.72, 0.75)),
+            Label::grey(name.replace('_', " "), 16.0, 0.7),
             Transform::from_translation((at - Vec2::Y * (SIDE / 2.0 + 16.0)).extend(1.0)),
         ));
     }

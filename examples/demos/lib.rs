@@ -3,10 +3,12 @@
 #![cfg(feature = "engine")]
 
 mod film;
+mod label;
 mod machine;
 mod moving;
 mod play;
 
 pub use film::OnCanvas;
+pub use label::Label;
 pub use machine::{DemoArguments, Output, demo_app};
 pub use play::{Cursor, Script, caption, heal_on_h, hit_on_press, play, with_normals};

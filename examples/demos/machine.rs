@@ -1,6 +1,9 @@
 //! A window, an off-screen picture, or the CPU alone: what this machine can do, found out before the app starts.
 
-use crate::film::{FilmPlugin, RATE};
+use crate::{
+    film::{FilmPlugin, RATE},
+    label::draw_labels,
+};
 use bevy::{
     app::ScheduleRunnerPlugin,
     asset::AssetPlugin,
@@ -114,7 +117,7 @@ pub fn demo_app(title: &str, arguments: &DemoArguments) -> App {
     if output == Output::Window {
         app.add_plugins(MeshPickingPlugin);
     }
-    app.add_plugins((CrackPlugins, FilmPlugin));
+    app.add_plugins((CrackPlugins, FilmPlugin)).add_systems(Update, draw_labels);
     app
 }
 

@@ -2,6 +2,7 @@
 
 use crate::{
     film::Film,
+    label::Label,
     machine::{DemoArguments, Output},
 };
 use bevy::{
@@ -107,12 +108,7 @@ pub fn heal_on_h(mut commands: Commands, keys: Res<ButtonInput<KeyCode>>, surfac
 /// A line of text in a 2D scene, as a hint what to press.
 #[must_use]
 pub fn caption(text: &str, at: Vec2) -> impl Bundle {
-    (
-        Text2d::new(text),
-        TextFont { font_size: FontSize::Px(18.0), ..default() },
-        TextColor(Color::srgb(0.6, 0.63, 0.67)),
-        Transform::from_translation(at.extend(3.0)),
-    )
+    (Label::grey(text, 18.0, 0.6), Transform::from_translation(at.extend(3.0)))
 }
 
 /// A picture that ships with the crate, and its normal map.

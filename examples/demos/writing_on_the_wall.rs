@@ -5,20 +5,19 @@
 //!
 //! Without a display (or with `--headless`) a script types, and pictures and a GIF are written to `--out`.
 
-#[path = "../bake/text.rs"]
-mod text;
-
 use bevy::{
     asset::RenderAssetUsages,
     input::keyboard::{Key, KeyboardInput},
     prelude::*,
     render::render_resource::{Extent3d, TextureDimension, TextureFormat},
 };
-use bevy_crack::{prelude::*, voronoi::VoronoiParams};
-use bevy_crack_demos::{Cursor, DemoArguments, OnCanvas, Script, demo_app, play};
+use bevy_crack::{
+    prelude::*,
+    voronoi::{FONT, VoronoiParams, draw_text},
+};
+use bevy_crack_demos::{Cursor, DemoArguments, Label, OnCanvas, Script, demo_app, play};
 use clap::Parser;
 use std::{thread, time::Duration};
-use text::{FONT, draw_text};
 
 /// Size of the wall's picture, texels, and in the world.
 const TEXELS: UVec2 = UVec2::new(1024, 512);
@@ -96,13 +95,7 @@ fn setup(mut commands: Commands, mut images: ResMut<Assets<Image>>) -> Result {
         Transform::from_xyz(0.0, -275.0, 1.0).with_scale(Vec3::new(0.001, BAR.y, 1.0)),
         OnCanvas { picture: amber, size: Vec2::ONE },
     ));
-    commands.spawn((
-        Caption,
-        Text2d::new(""),
-        TextFont { font_size: FontSize::Px(20.0), ..default() },
-        TextColor(Color::srgb(0.75, 0.77, 0.8)),
-        Transform::from_xyz(0.0, -310.0, 1.0),
-    ));
+    commands.spawn((Caption, Label::grey("", 20.0, 0.75), Transform::from_xyz(0.0, -310.0, 1.0)));
     Ok(())
 }
 
@@ -127,9 +120,9 @@ fn write_word(
     mut commands: Commands,
     word: Res<Word>,
     wall: Single<Entity, With<Wall>>,
-    mut caption: Single<&mut Text2d, With<Caption>>,
+    mut caption: Single<&mut Label, With<Caption>>,
 ) {
-    caption.0 = if word.0.is_empty() {
+    caption.text = if word.0.is_empty() {
         "type a word      click: hit      escape: heal".into()
     } else {
         format!("{}      (click: hit, escape: heal)", word.0)

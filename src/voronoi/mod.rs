@@ -48,6 +48,7 @@ mod sites;
 mod strokes;
 #[cfg(test)]
 mod tests;
+mod text;
 mod trace;
 mod widths;
 
@@ -58,6 +59,7 @@ pub use ink::{ink, lightness};
 pub use params::{Guide, MAX_LEVELS, MAX_SITES, SiteLayout, VoronoiError, VoronoiParams};
 pub use seams::{Seam, SeamVertex, Seams};
 pub use strokes::StrokeReport;
+pub use text::{FONT, draw_text};
 
 use glam::UVec2;
 use std::ops::ControlFlow;

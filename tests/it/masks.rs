@@ -381,7 +381,7 @@ mod in_apps {
             growth.hit(frame.uv_to_pos(at), 1.0);
             while growth.step().grew() {}
             let mut field = DepthField::new(frame);
-            field.lay(preset.look.layer(0));
+            field.set_layers(preset.look.layer(0));
             for segment in growth.network().segments() {
                 stamp_path(&mut field, &preset.profile, &growth.network().path(segment).unwrap());
             }

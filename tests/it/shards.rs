@@ -98,7 +98,7 @@ fn a_hole_is_where_a_shard_was_and_the_shards_show_what_was_there() {
     let entity = cracked(&mut app, size, ShatterCracks { anchor: Anchor::Border, ..loose() });
     let before = shown(&app, entity);
     shatter(&mut app, entity, ShatterRequest::ALL);
-    let drawn = get::<CrackShards>(&app, entity).pieces.carried().to_vec();
+    let drawn = get::<CrackShards>(&app, entity).pieces.extended_lines().to_vec();
     let told = heard::<Shattered>(&mut app);
     assert_eq!(told.len(), 1);
     assert_eq!(told[0].shards.len(), shards(&mut app).len());

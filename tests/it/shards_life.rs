@@ -180,7 +180,7 @@ fn every_edge_lies_on_a_drawn_crack() {
     crack(&mut app, entity);
     shatter(&mut app, entity, ShatterRequest::ALL);
     let cut = get::<CrackShards>(&app, entity).pieces;
-    assert!(!cut.carried().is_empty());
+    assert!(!cut.extended_lines().is_empty());
     let picture = shown(&app, entity);
     let is_drawn = |at: Vec2| {
         let texel = (at * side as f32).as_uvec2().min(UVec2::splat(side - 1));

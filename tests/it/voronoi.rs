@@ -9,10 +9,8 @@ mod ink;
 mod ocr;
 #[path = "../../examples/bake/pictures.rs"]
 mod pictures;
-#[path = "../../examples/bake/text.rs"]
-mod text;
 
-use bevy_crack::voronoi::{Guide, SiteLayout, VoronoiBake, VoronoiParams};
+use bevy_crack::voronoi::{FONT, Guide, SiteLayout, VoronoiBake, VoronoiParams, draw_text};
 use glam::UVec2;
 use image::{Rgba, RgbaImage};
 use std::{env, fs, io::Write, path::PathBuf};
@@ -53,7 +51,7 @@ fn words_are_legible() {
     if !ocr::can_read() {
         return passed_over("words are not read: there is no `tesseract`");
     }
-    let mut fonts = vec![("the crate's font", text::FONT.to_vec())];
+    let mut fonts = vec![("the crate's font", FONT.to_vec())];
     for path in FONTS {
         match fs::read(path) {
             Ok(font) => fonts.push((path, font)),
@@ -105,7 +103,7 @@ fn g2_any_text_is_a_guide() {
     for size in [UVec2::ONE, UVec2::new(1, 300), UVec2::new(90, 3), UVec2::splat(64)] {
         for (text, may_have_ink) in all {
             let start: String = text.chars().take(20).collect();
-            let guide = text::draw_text(text::FONT, text, size, f32::INFINITY).unwrap();
+            let guide = draw_text(FONT, text, size, f32::INFINITY).unwrap();
             assert_eq!(guide.size(), size);
             assert!(guide.as_slice().iter().all(|ink| (0.0..=1.0).contains(ink)), "{start:?}");
             let has_ink = guide.as_slice().iter().any(|&ink| ink > 0.0);
@@ -117,9 +115,9 @@ fn g2_any_text_is_a_guide() {
             assert!(seams.seams.iter().flat_map(|seam| &seam.points).all(|point| point.width.is_finite()));
         }
     }
-    assert!(text::draw_text(b"no font", "A", UVec2::splat(9), f32::INFINITY).is_none());
-    assert!(text::draw_text(&[], "A", UVec2::splat(9), f32::INFINITY).is_none());
-    assert!(text::draw_text(&text::FONT[..200], "A", UVec2::splat(9), f32::INFINITY).is_none());
+    assert!(draw_text(b"no font", "A", UVec2::splat(9), f32::INFINITY).is_none());
+    assert!(draw_text(&[], "A", UVec2::splat(9), f32::INFINITY).is_none());
+    assert!(draw_text(&FONT[..200], "A", UVec2::splat(9), f32::INFINITY).is_none());
 }
 
 /// A chunk of a PNG file.

@@ -184,8 +184,8 @@ impl FinishInputs {
     fn draw(&self, growth: CrackGrowth, cells: CellTracker) -> Result<Stage, CrackError> {
         let frame = frame(self.rect)?;
         let (mut field, mut touched) = (DepthField::new(frame), Touched::new(frame.size()));
-        field.forbid(&self.mask);
-        field.lay(self.preset.look.layer(self.surface.seed));
+        field.set_forbidden(&self.mask);
+        field.set_layers(self.preset.look.layer(self.surface.seed));
         let profile = self.preset.profile;
         let replay = match self.first.moment(growth.timeline().end()) {
             None => {

@@ -101,7 +101,7 @@ impl MapJob {
             self.map = Some(map.map_err(|error| CrackError::Bake { reason: error.to_string() })?);
             return Ok(None);
         };
-        if let voronoi::BakeProgress::Working(share) = map.step((SLICE / self.size.x).max(1) as usize) {
+        if let voronoi::BakeStatus::Working(share) = map.step((SLICE / self.size.x).max(1) as usize) {
             self.progress = READ + (MAPPED - READ) * share;
             return Ok(None);
         }

@@ -137,7 +137,7 @@ impl AsyncPlayback {
             rect: view.rect,
             stager: self.stager.clone(),
             field: field.take(),
-            replay: core::mem::replace(&mut playback.replay, Replay::over(UVec2::ZERO, profile)),
+            replay: core::mem::replace(&mut playback.replay, Replay::stale(UVec2::ZERO, profile)),
             touched: core::mem::take(&mut drawing.touched),
             back: self.back.take(),
             dirty: core::mem::replace(&mut view.dirty, DirtyTiles::new(size)),
@@ -192,8 +192,8 @@ fn can_be_async(active: &Active) -> bool {
 fn start_over(active: &mut Active) {
     let frame = active.drawing.field.frame;
     active.drawing.field = DepthField::new(frame);
-    active.drawing.field.forbid(active.cracks.growth.mask());
-    active.drawing.field.lay(active.preset.look.layer(active.surface.seed));
+    active.drawing.field.set_forbidden(active.cracks.growth.mask());
+    active.drawing.field.set_layers(active.preset.look.layer(active.surface.seed));
     active.drawing.touched = Touched::new(frame.size());
     if let Some(playback) = &mut active.playhead.playback {
         playback.start_over(frame, active.drawing.profile);

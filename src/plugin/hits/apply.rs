@@ -263,7 +263,7 @@ mod tests {
         }
         let made = |app: &App| -> u32 {
             let active = |entity: &Entity| active(app.world(), *entity);
-            entities.iter().filter_map(active).map(|active| active.cracks.growth.census().total).sum()
+            entities.iter().filter_map(active).map(|active| active.cracks.growth.marker_counts().total).sum()
         };
         let (mut before, mut frames, mut has_waited) = (0, 0, false);
         loop {

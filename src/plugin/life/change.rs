@@ -161,7 +161,7 @@ fn update_preset(
     let plan = preset.look.layer(active.surface.seed);
     if active.drawing.profile != preset.profile || *active.drawing.field.plan() != plan {
         active.drawing.profile = preset.profile;
-        active.drawing.field.lay(plan);
+        active.drawing.field.set_layers(plan);
         stamp_anew(active);
     }
     active.playhead.rate = preset.steps_per_second;
@@ -233,8 +233,8 @@ fn update_picture(
     if frame != active.drawing.field.frame || had_mask || !mask.is_empty() {
         active.canvas.look = look;
         active.drawing.field = DepthField::new(frame);
-        active.drawing.field.forbid(&mask);
-        active.drawing.field.lay(active.preset.look.layer(active.surface.seed));
+        active.drawing.field.set_forbidden(&mask);
+        active.drawing.field.set_layers(active.preset.look.layer(active.surface.seed));
         stamp_anew(active);
     }
     active.canvas.views.clear();

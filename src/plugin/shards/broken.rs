@@ -215,7 +215,7 @@ impl Broken {
             return;
         }
         // The surface has been cut again since: what lies in the piece is back.
-        for shard in self.support.gone().collect::<Vec<u32>>() {
+        for shard in self.support.missing().collect::<Vec<u32>>() {
             let place = self.cut.inner_point(shard);
             if place.is_some_and(|place| piece.cut.distance(piece.number, place) == 0.0) {
                 self.support.put_back(shard);

@@ -235,7 +235,7 @@ impl ShatterJob {
                 }
                 let cut = Arc::new(shatter(cuts, &self.settings.cut)?);
                 let support = match before {
-                    Some((old, support)) => support.renewed(&old, &cut, self.settings.anchor),
+                    Some((old, support)) => support.after_new_cracks(&old, &cut, self.settings.anchor),
                     None => Support::new(&cut, self.settings.anchor),
                 };
                 (cut, support)
@@ -293,8 +293,8 @@ impl ShatterJob {
         let density = holes.density(self.view, self.alpha_mask.then_some(&*self.base));
         let room = if self.is_first && !batches.is_empty() { vec![1; self.base.diffuse.len()] } else { Vec::new() };
         let drawn = match self.sketch {
-            Some(sketch) if !batches.is_empty() && !cut.carried().is_empty() => {
-                Some(sketch.draw(cut.carried(), &self.base))
+            Some(sketch) if !batches.is_empty() && !cut.extended_lines().is_empty() => {
+                Some(sketch.draw(cut.extended_lines(), &self.base))
             }
             _ => None,
         };

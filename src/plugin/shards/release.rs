@@ -197,11 +197,11 @@ fn release(world: &mut World, entity: Entity, active: &mut Active, made: CutSurf
     if is_first {
         can_copy_picture(world, active)?;
     }
-    if is_new && !cut.carried().is_empty() {
+    if is_new && !cut.extended_lines().is_empty() {
         match drawn.filter(|drawn| drawn.fits(active)) {
             Some(drawn) => drawn.put_on(world, active),
             None => {
-                active.stamp_lines(cut.carried());
+                active.stamp_lines(cut.extended_lines());
                 paint_now(world, active);
             }
         }
@@ -215,7 +215,7 @@ fn release(world: &mut World, entity: Entity, active: &mut Active, made: CutSurf
             Box::new(Broken::new((cut.clone(), support.clone()), grown, settings.clone(), picture, plane))
         }
     };
-    if is_new && !cut.carried().is_empty() {
+    if is_new && !cut.extended_lines().is_empty() {
         active.drawing.carried.push(cut.shared_carried());
     }
     broken.inside = inside(world, active, &settings, rim.bright, broken.inside.take());

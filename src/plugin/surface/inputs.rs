@@ -104,8 +104,8 @@ impl BlankSurface {
         }
         growth.set_mask(mask.clone());
         let mut field = DepthField::new(frame);
-        field.forbid(mask);
-        field.lay(preset.look.layer(surface.seed));
+        field.set_forbidden(mask);
+        field.set_layers(preset.look.layer(surface.seed));
         Ok(Self { growth, field, look })
     }
 }

@@ -156,7 +156,7 @@ impl Active {
             (self.drawing.field.frame.size(), self.drawing.profile, self.cracks.growth.timeline().end());
         self.playhead.playback.get_or_insert_with(|| Playback {
             // A growth without steps has left no trace yet.
-            replay: if end == 0 { Replay::new(size, profile) } else { Replay::over(size, profile) },
+            replay: if end == 0 { Replay::new(size, profile) } else { Replay::stale(size, profile) },
             want: f64::from(end),
             shown: Moment::after(end),
         })

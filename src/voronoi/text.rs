@@ -1,27 +1,38 @@
-//! Filled letters as a guide.
+//! Words as guides.
 
+use crate::Grid;
 use ab_glyph::{Font, FontRef, Glyph, PxScale, ScaleFont, point};
-use bevy_crack::Grid;
-use glam::UVec2;
+use glam::{UVec2, Vec2};
 
-/// The font that ships with the crate (see `assets/CREDITS.md`).
-pub(crate) const FONT: &[u8] = include_bytes!("../../assets/fonts/open_sans_extra_bold.ttf");
+/// The font that ships with the crate, as the content of a TTF file: Open Sans ExtraBold, for languages in Latin letters. Strokes
+/// this wide are drawn well by cracks. Its licence is in `assets/CREDITS.md`.
+pub const FONT: &[u8] = include_bytes!("../../assets/fonts/open_sans_extra_bold.ttf");
 
 /// Share of the surface that stays free on each side.
 const MARGIN: f32 = 0.06;
 
-/// The lines of `text` as large as they fit into `size` texels, in letters of at most `most` texels: 1 inside the letters, 0 outside; `None` if the font
-/// cannot be read.
+/// The lines of a text as a guide: 1 inside the letters, 0 outside, partial cover at their edges.
 ///
-/// Letters that the font lacks are drawn as its box; a text without letters gives an empty guide.
-pub(crate) fn draw_text(font: &[u8], text: &str, size: UVec2, most: f32) -> Option<Grid<f32>> {
+/// `font` is the content of a TTF or OTF file. The letters are as large as `size` allows, with a margin of 6 % on each side, but at most
+/// `most` texels high. Letters that the font lacks are drawn as its box. A text without letters gives an empty guide. `None` if the
+/// font cannot be read.
+///
+/// ```
+/// use bevy_crack::voronoi::{FONT, draw_text};
+///
+/// let guide = draw_text(FONT, "ICE", [64, 32].into(), f32::INFINITY).unwrap();
+/// assert!(guide.as_slice().contains(&1.0));
+/// assert_eq!(draw_text(b"not a font", "ICE", [64, 32].into(), f32::INFINITY), None);
+/// ```
+#[must_use]
+pub fn draw_text(font: &[u8], text: &str, size: UVec2, most: f32) -> Option<Grid<f32>> {
     let font = FontRef::try_from_slice(font).ok()?;
     let mut grid = Grid::new(size, 0.0f32);
     // Laid out at a size of 100, then scaled.
     let letters = lay_out(&font, text, 100.0);
     let Some((min, max)) = bounds(&font, &letters) else { return Some(grid) };
     let room = size.as_vec2() * (1.0 - 2.0 * MARGIN);
-    let scale = (room / (max - min).max(glam::Vec2::splat(1.0e-3))).min_element().min(most / 100.0);
+    let scale = (room / (max - min).max(Vec2::splat(1.0e-3))).min_element().min(most / 100.0);
     let letters = lay_out(&font, text, 100.0 * scale);
     let Some((min, max)) = bounds(&font, &letters) else { return Some(grid) };
     let shift = (size.as_vec2() - (max - min)) * 0.5 - min;
@@ -69,9 +80,9 @@ fn lay_out(font: &FontRef<'_>, text: &str, scale: f32) -> Vec<Glyph> {
     glyphs
 }
 
-fn bounds(font: &FontRef<'_>, glyphs: &[Glyph]) -> Option<(glam::Vec2, glam::Vec2)> {
+fn bounds(font: &FontRef<'_>, glyphs: &[Glyph]) -> Option<(Vec2, Vec2)> {
     let boxes = glyphs.iter().filter_map(|glyph| Some(font.outline_glyph(glyph.clone())?.px_bounds()));
     boxes
-        .map(|b| (glam::Vec2::new(b.min.x, b.min.y), glam::Vec2::new(b.max.x, b.max.y)))
+        .map(|b| (Vec2::new(b.min.x, b.min.y), Vec2::new(b.max.x, b.max.y)))
         .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
 }
