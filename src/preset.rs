@@ -3,6 +3,7 @@
 mod check;
 #[cfg(feature = "serde")]
 mod file;
+mod modulated;
 
 pub use check::PresetError;
 

@@ -10,7 +10,9 @@ use crate::{
 use bevy_crack::{
     pattern::{NO_PARENT, SurfaceFrame},
     raster::DepthField,
-    voronoi::{FONT, Front, Guide, Seams, SiteLayout, VoronoiBake, VoronoiMap, VoronoiParams, draw_text, edges},
+    voronoi::{
+        FONT, Front, Guide, SeamMotion, Seams, SiteLayout, VoronoiBake, VoronoiMap, VoronoiParams, draw_text, edges,
+    },
 };
 use clap::{Args, ValueEnum};
 use glam::{UVec2, Vec2};
@@ -183,39 +185,34 @@ pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
     let at = frame.uv_to_pos(options.at);
     fs::write(options.out.join("network.json"), serde_json::to_string(&describe(&seams, at))?)?;
 
+    let (strokes, n_sites) = (map.strokes(), map.sites().len());
     if let Some(animation) = options.animate {
         let front = Front::new(&seams, at);
-        if animation == Animation::Morph {
-            map.set_gammas(&[GAMMA, 0.0])?;
-            map.rescale_widths();
-        }
+        let mut motion = match (animation, &gammas[..]) {
+            (Animation::Gamma, _) => Some(SeamMotion::new(map, vec![0.0; gammas.len()], gammas)?),
+            (Animation::Morph, &[first, second, ..]) => {
+                map.set_gammas(&[first, 0.0])?;
+                map.rescale_widths();
+                Some(SeamMotion::new(map, vec![first, 0.0], vec![0.0, second])?)
+            }
+            (Animation::Morph, _) => return Err("`--animate morph` needs two guides".into()),
+            (Animation::Width | Animation::Front, _) => None,
+        };
         animate(options, &base, &paint, |t, field| {
-            let weights: Vec<f32> = match animation {
-                Animation::Gamma => gammas.iter().map(|gamma| gamma * t).collect(),
-                Animation::Morph => match gammas[..] {
-                    [first, second, ..] => vec![first * (1.0 - t), second * t],
-                    _ => return Err("`--animate morph` needs two guides".into()),
-                },
-                Animation::Width => {
-                    seams.stamp_share(field, &PROFILE, t);
-                    return Ok(());
-                }
-                Animation::Front => {
-                    seams.stamp_front(field, &PROFILE, &front, t * front.reach());
-                    return Ok(());
-                }
+            match &mut motion {
+                Some(motion) => motion.at(t)?.stamp(field, &PROFILE),
+                None if animation == Animation::Width => seams.stamp_share(field, &PROFILE, t),
+                None => seams.stamp_front(field, &PROFILE, &front, t * front.reach()),
             };
-            map.set_gammas(&weights)?;
-            map.seams().stamp(field, &PROFILE);
             Ok(())
         })?;
     }
-    let report = map.strokes().map_or(String::new(), |strokes| {
+    let report = strokes.map_or(String::new(), |strokes| {
         format!("; {:.1} % of {:.2} units of strokes are covered", strokes.covered * 100.0, strokes.length)
     });
     println!(
         "{} sites, {} seams in {:.2} ms{report}; written to {}",
-        map.sites().len(),
+        n_sites,
         seams.seams.len(),
         baked.as_secs_f64() * 1e3,
         options.out.display()

@@ -11,10 +11,7 @@ use bevy::{
     prelude::*,
     render::render_resource::{Extent3d, TextureDimension, TextureFormat},
 };
-use bevy_crack::{
-    prelude::*,
-    voronoi::{FONT, VoronoiParams, draw_text},
-};
+use bevy_crack::{prelude::*, voronoi::VoronoiParams};
 use bevy_crack_demos::{Cursor, DemoArguments, Label, OnCanvas, Script, demo_app, play};
 use clap::Parser;
 use std::{thread, time::Duration};
@@ -131,8 +128,7 @@ fn write_word(
         commands.entity(*wall).remove::<GuidedCracks>().heal_cracks();
         return;
     }
-    let Some(letters) = draw_text(FONT, &word.0, TEXELS, f32::INFINITY) else { return };
-    let guided = GuidedCracks::new(CrackGuide::new(letters)).with_seed(word.0.len() as u64);
+    let guided = GuidedCracks::new(CrackGuide::text(&word.0)).with_seed(word.0.len() as u64);
     let from = Vec2::new(0.0, 0.5);
     commands.entity(*wall).insert(GuidedCracks {
         params: VoronoiParams { sites: 260, ..guided.params.clone() },

@@ -12,7 +12,7 @@
 //! middle.
 //!
 //! [`VoronoiParams`] and [`Guide`] hold the settings, [`VoronoiBake`] computes the map row by row. [`VoronoiMap`]
-//! holds regions and costs of every texel, [`Seams`] the cracks as lines. Costs are integers (β is 256 units), so the
+//! holds regions and costs of every texel, [`Seams`] the cracks as lines. [`SeamMotion`] moves them as weights change. Costs are integers (β is 256 units), so the
 //! map is the same on every machine; ties go to the lower site.
 //!
 //! Differs from the paper: a level of cracks divides the regions of the level before exactly, as if crossing an older
@@ -39,6 +39,7 @@ mod front;
 mod ink;
 mod lattice;
 mod level;
+mod motion;
 mod noise;
 mod params;
 mod resample;
@@ -56,6 +57,7 @@ pub use bake::{BakeStatus, VoronoiBake, VoronoiMap};
 pub use edges::edges;
 pub use front::{FRONT_STEP, Front};
 pub use ink::{ink, lightness};
+pub use motion::SeamMotion;
 pub use params::{Guide, MAX_LEVELS, MAX_SITES, SiteLayout, VoronoiError, VoronoiParams};
 pub use seams::{Seam, SeamVertex, Seams};
 pub use strokes::StrokeReport;

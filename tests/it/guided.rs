@@ -7,7 +7,7 @@ use bevy_crack::{
     math::Rng,
     plugin::CrackUploadStats,
     prelude::*,
-    voronoi::{MAX_SITES, SiteLayout},
+    voronoi::{FONT, MAX_SITES, SiteLayout, VoronoiParams, draw_text},
 };
 use std::{
     sync::Arc,
@@ -471,6 +471,111 @@ fn cracks_appear_as_asked() {
         assert_cracks(&mut app, entity);
     }
     assert_eq!(told(&app).failed, []);
+}
+
+/// A bake of even sites whose cracks are all of one width, so that only the weights decide where they are.
+fn weighed(gammas: [f32; 2], appearance: GuidedAppearance) -> GuidedCracks {
+    let bar = Grid::from_vec(UVec2::new(5, 1), vec![0.0, 1.0, 0.0, 0.0, 0.0]).unwrap();
+    let guides = [cross(UVec2::splat(64)), bar].into_iter().zip(gammas);
+    let params = VoronoiParams {
+        sites: 40,
+        layout: SiteLayout::Even,
+        width: 0.01,
+        least_width: 0.01,
+        stroke_width: 0.0,
+        ..default()
+    };
+    let guides = guides.map(|(grid, gamma)| CrackGuide::new(grid).with_gamma(gamma)).collect();
+    GuidedCracks { guides, params, seed: 3, appearance, max_side: 128 }
+}
+
+/// The picture of a bake whose clock has been set to a share of its time.
+fn picture_at(app: &mut App, guided: GuidedCracks, share: f32) -> Vec<u8> {
+    let n_ended = told(app).baked.len() + told(app).failed.len();
+    let entity = spawn(app, guided);
+    app.world_mut().entity_mut(entity).insert(CrackClock::value(share));
+    wait_for(app, "the end of the bake", |app| told(app).baked.len() + told(app).failed.len() > n_ended);
+    for _ in 0..20 {
+        steps(app, 1);
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    shown(app, entity)
+}
+
+/// Eq. 4 of the paper: on the way a picture is that of the weights on the way, and it ends as that of the last ones, with tasks and in the
+/// frame itself.
+#[test]
+fn cracks_move_as_their_weights_do() {
+    let unlimited = || {
+        let mut app = guided_app();
+        app.insert_resource(CrackBudget { milliseconds: 1e4, ..default() });
+        app
+    };
+    for mut app in [guided_app(), unlimited()] {
+        let emerge = weighed([24.0, 12.0], GuidedAppearance::Emerge { seconds: 1.0 });
+        let morph = weighed([24.0, 12.0], GuidedAppearance::Morph { seconds: 1.0 });
+        let still = |app: &mut App, gammas| picture_at(app, weighed(gammas, GuidedAppearance::AtOnce), 1.0);
+        let untouched = [180, 180, 180, 255].repeat(128 * 128);
+        for (moving, ways) in
+            [(emerge, [[6.0, 3.0], [12.0, 6.0], [24.0, 12.0]]), (morph, [[18.0, 3.0], [12.0, 6.0], [0.0, 12.0]])]
+        {
+            let mut seen = vec![untouched.clone()];
+            assert!(picture_at(&mut app, moving.clone(), 0.0) == untouched);
+            for (share, gammas) in [0.25, 0.5, 1.0].into_iter().zip(ways) {
+                let (got, wanted) = (picture_at(&mut app, moving.clone(), share), still(&mut app, gammas));
+                assert!(got == wanted, "{:?} at {share}", moving.appearance);
+                assert!(!seen.contains(&got), "{:?} at {share}: they move", moving.appearance);
+                seen.push(got);
+            }
+        }
+        assert_eq!(told(&app).failed, []);
+    }
+}
+
+/// Without a clock the cracks move within their time, there and no further, and hits then meet those that stay.
+#[test]
+fn moving_cracks_come_to_rest() {
+    let mut app = guided_app();
+    let still = spawn(&mut app, weighed([24.0, 12.0], GuidedAppearance::AtOnce));
+    bake(&mut app, still);
+    settle(&mut app, still);
+    let entity = spawn(&mut app, weighed([24.0, 12.0], GuidedAppearance::Emerge { seconds: 1.0 }));
+    bake(&mut app, entity);
+    let mut pictures = vec![shown(&app, entity)];
+    let mut frames = 0;
+    while state(&app, entity).status != CrackStatus::Done {
+        step(&mut app);
+        std::thread::sleep(Duration::from_millis(1));
+        pictures.push(shown(&app, entity));
+        frames += 1;
+        assert!(frames < 1000);
+    }
+    pictures.dedup();
+    assert!((47..=60).contains(&frames) && pictures.len() > 8, "{frames} frames, {} pictures", pictures.len());
+    assert!(shown(&app, entity) == shown(&app, still), "where they stay");
+    assert_cracks(&mut app, entity);
+}
+
+/// A text is a guide, drawn at the size of the map; what cannot be drawn fails once.
+#[test]
+fn texts_are_guides() {
+    let mut app = guided_app();
+    let drawn = draw_text(FONT, "HA", UVec2::splat(128), f32::INFINITY).unwrap();
+    let [text, grid] = [CrackGuide::text("HA"), CrackGuide::new(drawn)].map(|guide| {
+        let entity = spawn(&mut app, GuidedCracks::new(guide));
+        bake(&mut app, entity);
+        settle(&mut app, entity);
+        shown(&app, entity)
+    });
+    assert!(text == grid && text.chunks(4).any(|texel| texel[0] < 100));
+    let source = GuideSource::Text { text: "HA".into(), font: Some(Arc::from(*b"no font")) };
+    let entity = spawn(&mut app, GuidedCracks::new(CrackGuide::new(source)));
+    bake(&mut app, entity);
+    let error = CrackError::Guide { index: 0, reason: "its font cannot be read".into() };
+    assert_eq!(told(&app).failed, [(entity, error)]);
+    let alone = GuidedCracks { appearance: GuidedAppearance::Morph { seconds: 1.0 }, ..guided() };
+    let error = CrackError::OutOfRange { field: "guides".into(), value: 1.0, min: 2.0, max: 64.0 };
+    assert_eq!(alone.validate(), Err(error));
 }
 
 /// A picture of another size keeps the word, stretched with it.

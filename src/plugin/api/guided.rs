@@ -16,8 +16,7 @@ use std::sync::Arc;
 ///
 /// The cracks take the place of those of an earlier bake. To hits they are older cracks: new ones start from them and, where the preset has
 /// [`arrest`](crate::growth::GrowthParams::arrest), stop at them. Cracks that hits made before are grown again around them, from the same places.
-/// The guide is a picture, dark strokes on light or the other way round: a word is one that your game draws or loads (the crate has no
-/// fonts; the example `writing_on_the_wall` draws its own).
+/// A guide is a picture, dark strokes on light or the other way round, or a text ([`CrackGuide::text`]).
 /// A [`CrackClock`](super::CrackClock) moves them as it moves all cracks. A changed picture keeps them, stretched if its
 /// proportions are others; removing the component keeps them too. Healing takes them away, for good until the component is changed.
 ///
@@ -92,10 +91,13 @@ impl GuidedCracks {
         let (from, seconds) = match self.appearance {
             GuidedAppearance::AtOnce => (Vec2::ZERO, 0.0),
             GuidedAppearance::Front { from, seconds } => (from, seconds),
-            GuidedAppearance::Widen { seconds } => (Vec2::ZERO, seconds),
+            GuidedAppearance::Widen { seconds }
+            | GuidedAppearance::Emerge { seconds }
+            | GuidedAppearance::Morph { seconds } => (Vec2::ZERO, seconds),
         };
+        let least_guides = if matches!(self.appearance, GuidedAppearance::Morph { .. }) { 2.0 } else { 0.0 };
         for (field, value, min, max) in [
-            ("guides", self.guides.len() as f32, 0.0, MAX_GUIDES as f32),
+            ("guides", self.guides.len() as f32, least_guides, MAX_GUIDES as f32),
             ("appearance.from", from.x, -FURTHEST, FURTHEST),
             ("appearance.from", from.y, -FURTHEST, FURTHEST),
             // Not a number and what is below zero mean at once.
@@ -147,6 +149,19 @@ impl CrackGuide {
         Self { source: source.into(), gamma: 28.0 }
     }
 
+    /// A word or lines of text, in the font that ships with the crate.
+    ///
+    /// ```
+    /// use bevy_crack::prelude::*;
+    ///
+    /// let sign = GuidedCracks::new(CrackGuide::text("KEEP\nOUT"));
+    /// assert!(sign.validate().is_ok());
+    /// ```
+    #[must_use]
+    pub fn text(text: impl Into<String>) -> Self {
+        Self::new(GuideSource::Text { text: text.into(), font: None })
+    }
+
     /// The edges of the surface's own picture.
     #[must_use]
     pub fn own_edges() -> Self {
@@ -175,6 +190,13 @@ pub enum GuideSource {
     /// The drawing in a PNG file, which may come from anywhere: more than 8192 texels a side or 256 MiB are refused by its
     /// header. Needs the engine's `png` feature.
     Png(Arc<[u8]>),
+    /// Lines of text, as large as they fit on the surface with a margin of 6 %; see [`draw_text`](crate::voronoi::draw_text).
+    Text {
+        /// The lines.
+        text: String,
+        /// The content of a TTF or OTF file; default [`FONT`](crate::voronoi::FONT).
+        font: Option<Arc<[u8]>>,
+    },
     /// The edges of the surface's own picture, its transparency included, see [`edges`](crate::voronoi::edges).
     OwnEdges,
 }
@@ -224,6 +246,36 @@ pub enum GuidedAppearance {
         /// Until all are open, up to 1e6. Not a number, zero or below: at once.
         seconds: f32,
     },
+    /// The picture emerges from plain cracks: the weights of the guides rise from zero to [`CrackGuide::gamma`] (Mould 2005, section 6.1).
+    ///
+    /// While cracks move, each picture of the surface is drawn as a whole, and the map is kept: some 12 bytes a texel of it more. Where
+    /// there are no threads, moving the cracks is one slice. Once shards have left the surface, its cracks open as with
+    /// [`Widen`](Self::Widen).
+    Emerge {
+        /// Until the picture is there, up to 1e6. Not a number, zero or below: at once.
+        seconds: f32,
+    },
+    /// The first guide turns into the second (Mould 2005, eq. 4); further guides keep their weights. The cracks that stay are those of the
+    /// second one. What is said of [`Emerge`](Self::Emerge) holds here as well.
+    Morph {
+        /// Until the second guide is there, up to 1e6. Not a number, zero or below: at once.
+        seconds: f32,
+    },
+}
+
+impl GuidedAppearance {
+    /// The time that it takes, seconds; `None` = at once.
+    #[must_use]
+    pub fn seconds(&self) -> Option<f32> {
+        match *self {
+            Self::AtOnce => None,
+            Self::Front { seconds, .. }
+            | Self::Widen { seconds }
+            | Self::Emerge { seconds }
+            | Self::Morph { seconds } => Some(seconds),
+        }
+        .filter(|seconds| *seconds > 0.0)
+    }
 }
 
 /// How far the bake of a [`GuidedCracks`] is: 0 while its pictures load, 1 when its cracks are on the surface, and as long as they are,

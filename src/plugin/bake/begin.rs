@@ -38,6 +38,7 @@ pub(super) fn begin(world: &mut World, entity: Entity, bake: &mut Bake) -> Resul
             GuideSource::Grid(grid) => Source::Grid(grid.clone()),
             GuideSource::Png(file) => Source::Png(file.clone()),
             GuideSource::OwnEdges => Source::Own,
+            GuideSource::Text { text, font } => Source::Text(text.clone(), font.clone()),
             GuideSource::Image(picture) => {
                 if !picture::is_loaded(world, picture).map_err(named)? {
                     return Ok(None);

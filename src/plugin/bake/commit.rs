@@ -3,13 +3,14 @@
 use super::finish::{Finish, FinishInputs, FinishStep, Finished};
 use super::map_job::Lines;
 use super::work::{Bake, BakeJob, Work};
-use crate::plugin::api::{CrackClock, CrackError, CrackStatus, CrackTextures, GuidedAppearance, GuidedCracks};
+use crate::plugin::api::{CrackClock, CrackError, CrackStatus, CrackTextures, GuidedCracks};
 use crate::plugin::draw::async_playback::{self, AsyncPlayback};
 use crate::plugin::gpu::uploads::Uploads;
 use crate::plugin::jobs::background::drop_in_background;
 use crate::plugin::shards::broken::drop_shards;
 use crate::plugin::surface::active::Active;
 use crate::plugin::surface::cracked::{self, active, has_cracked, with_queues};
+use crate::plugin::surface::cracks::Added;
 use crate::plugin::surface::create::{install, make_ready_now, set_status};
 use crate::plugin::surface::inputs::BaseAndMask;
 use crate::plugin::surface::plan::Plan;
@@ -24,11 +25,7 @@ const MAX_ROUNDS: u32 = 8;
 
 /// The seconds in which cracks appear; `None` = at once.
 fn seconds(world: &World, entity: Entity) -> Option<f32> {
-    match world.get::<GuidedCracks>(entity)?.appearance {
-        GuidedAppearance::AtOnce => None,
-        GuidedAppearance::Front { seconds, .. } | GuidedAppearance::Widen { seconds } => Some(seconds),
-    }
-    .filter(|seconds| *seconds > 0.0)
+    world.get::<GuidedCracks>(entity)?.appearance.seconds()
 }
 
 /// Has the surface made with these cracks, as it is now; from the start if it is another one.
@@ -123,7 +120,8 @@ fn again(world: &mut World, entity: Entity, bake: &mut Bake, finished: Finished)
     drop_in_background((growth, cells, field, pictures, replay));
     let ground = BaseAndMask { base: past.base, mask: past.mask };
     let ground = past.is_new.then_some(ground);
-    start_finish(world, entity, bake, Lines { network: added.network, opening: added.opening, covered, ground })?;
+    let Added { network, opening, motion, .. } = added;
+    start_finish(world, entity, bake, Lines { network, opening, motion, covered, ground })?;
     bake.rounds += 1;
     if bake.rounds < MAX_ROUNDS {
         return Ok(());

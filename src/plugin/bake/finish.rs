@@ -16,7 +16,7 @@ use crate::plugin::surface::active::Active;
 use crate::plugin::surface::cracks::Added;
 use crate::plugin::surface::frame::{frame, look};
 use crate::plugin::surface::regrow::{Past, grown_anew};
-use crate::plugin::surface::stamp::stamp_all;
+use crate::plugin::surface::stamp_network::stamp_all;
 use crate::plugin::surface::tile_set::Touched;
 use crate::plugin::surface::time::First;
 use crate::raster::{DepthField, Replay, ReplayChanges, TexelRect};
@@ -130,8 +130,8 @@ pub(super) enum FinishStep {
 
 impl Finish {
     pub(super) fn new(order: FinishInputs, lines: Lines) -> Self {
-        let Lines { network, opening, covered, .. } = lines;
-        Self { order, added: Added { network, opening, steps: 0 }, covered, stage: Stage::Grow }
+        let Lines { network, opening, motion, covered, .. } = lines;
+        Self { order, added: Added { network, opening, motion, steps: 0 }, covered, stage: Stage::Grow }
     }
 
     /// A slice of the work.
@@ -139,7 +139,7 @@ impl Finish {
         let Self { order, mut added, covered, stage } = *self;
         let stage = match stage {
             Stage::Grow => order.grow(&mut added)?,
-            Stage::Draw(growth, cells) => order.draw(growth, cells)?,
+            Stage::Draw(growth, cells) => order.draw(growth, cells, &added)?,
             Stage::Paint { growth, cells, drawn, mut texels, row } if row < order.rect.size().y => {
                 let row = order.paint(&drawn, &mut texels, row);
                 Stage::Paint { growth, cells, drawn, texels, row }
@@ -181,7 +181,7 @@ impl FinishInputs {
         Ok(Stage::Draw(growth, cells))
     }
 
-    fn draw(&self, growth: CrackGrowth, cells: CellTracker) -> Result<Stage, CrackError> {
+    fn draw(&self, growth: CrackGrowth, cells: CellTracker, added: &Added) -> Result<Stage, CrackError> {
         let frame = frame(self.rect)?;
         let (mut field, mut touched) = (DepthField::new(frame), Touched::new(frame.size()));
         field.set_forbidden(&self.mask);
@@ -191,6 +191,12 @@ impl FinishInputs {
             None => {
                 stamp_all(&growth, &profile, &mut field, &mut touched);
                 None
+            }
+            Some(moment)
+                if let Some(on_the_way) = added.motion_at(moment, growth.params())
+                    && on_the_way.draw(&profile, &mut field, &mut touched) =>
+            {
+                Some((Replay::stale(frame.size(), profile), moment))
             }
             Some(moment) => {
                 let (mut replay, mut redrawn) = (Replay::new(frame.size(), profile), ReplayChanges::default());

@@ -6,8 +6,9 @@ use crate::plugin::api::{CrackError, GuidedAppearance, GuidedCracks};
 use crate::plugin::source::mask;
 use crate::plugin::source::picture::{self, BasePicture, Space};
 use crate::plugin::surface::inputs::{BaseAndMask, SurfaceInputs};
+use crate::plugin::surface::motion::Motion;
 use crate::raster::TexelRect;
-use crate::voronoi::{self, Guide, Seams, VoronoiBake};
+use crate::voronoi::{self, Guide, SeamMotion, Seams, VoronoiBake, VoronoiError, VoronoiMap};
 use bevy::{
     asset::RenderAssetUsages,
     image::{CompressedImageFormats, ImageSampler, ImageType},
@@ -29,6 +30,9 @@ const FRONT_OPENING: u32 = 12;
 
 /// Steps in which cracks open that widen all at once.
 const WIDE_OPENING: u32 = 32;
+
+/// Steps in which cracks move to where they stay.
+const MOTION_STEPS: u32 = 64;
 
 /// Shares of the whole that reading the guides and drawing the lines count for in the progress.
 const READ: f32 = 0.1;
@@ -63,6 +67,8 @@ pub(super) enum Source {
     Image(usize),
     Grid(Arc<Grid<f32>>),
     Png(Arc<[u8]>),
+    /// Lines of text, and their font unless it is the crate's own.
+    Text(String, Option<Arc<[u8]>>),
     /// The surface's own picture.
     Own,
 }
@@ -71,6 +77,8 @@ pub(super) enum Source {
 pub(super) struct Lines {
     pub(super) network: Network,
     pub(super) opening: u32,
+    /// If they move on the way there.
+    pub(super) motion: Option<Motion>,
     pub(super) covered: Option<f32>,
     pub(super) ground: Option<BaseAndMask>,
 }
@@ -107,16 +115,41 @@ impl MapJob {
         }
         let Some((map, seams)) = self.map.take().map(VoronoiBake::finish) else { return Ok(None) };
         let covered = map.strokes().map(|strokes| strokes.covered);
-        drop(map);
+        let (seams, motion) =
+            self.motion(map, seams).map_err(|error| CrackError::Bake { reason: error.to_string() })?;
         let (network, opening) = lines(&seams, self.guided.appearance);
         let ground = if let BakeSurface::Read(ground, _) = &self.surface { Some(ground.clone()) } else { None };
-        Ok(Some(Lines { network, opening, covered, ground }))
+        Ok(Some(Lines { network, opening, motion, covered, ground }))
+    }
+
+    /// How the cracks move until they are where they stay, and the seams there.
+    fn motion(&self, mut map: VoronoiMap, seams: Seams) -> Result<(Seams, Option<Motion>), VoronoiError> {
+        if self.guided.appearance.seconds().is_none() {
+            return Ok((seams, None));
+        }
+        let gammas: Vec<f32> = self.guided.guides.iter().map(|guide| guide.gamma).collect();
+        let (from, to) = match (self.guided.appearance, &gammas[..]) {
+            (GuidedAppearance::Emerge { .. }, _) => (vec![0.0; gammas.len()], gammas),
+            (GuidedAppearance::Morph { .. }, &[first, second, ..]) => {
+                map.set_gammas(&[first, 0.0])?;
+                map.rescale_widths();
+                (vec![first, 0.0], vec![0.0, second])
+            }
+            _ => return Ok((seams, None)),
+        };
+        let mut motion = SeamMotion::new(map, from, to)?;
+        Ok((motion.at(1.0)?, Some(Motion::new(motion))))
     }
 
     fn read(&self, source: Source) -> Result<Grid<f32>, String> {
         let decoded;
         let image = match source {
             Source::Grid(grid) => return Ok(Arc::unwrap_or_clone(grid)),
+            Source::Text(text, font) => {
+                let font = font.as_deref().unwrap_or(voronoi::FONT);
+                let letters = voronoi::draw_text(font, &text, self.size, f32::INFINITY);
+                return Ok(letters.ok_or("its font cannot be read")?);
+            }
             Source::Own => {
                 let (base, rect) = match &self.surface {
                     BakeSurface::Known(base, rect) | BakeSurface::Read(BaseAndMask { base, .. }, rect) => (base, *rect),
@@ -146,7 +179,12 @@ fn lines(seams: &Seams, appearance: GuidedAppearance) -> (Network, u32) {
     let mut network = seams.network(Vec2::ZERO);
     network.nodes.iter_mut().for_each(|node| node.birth = 0);
     network.links.iter_mut().for_each(|link| link.birth = 0);
-    (network, if matches!(appearance, GuidedAppearance::AtOnce) { 0 } else { WIDE_OPENING })
+    let opening = match appearance {
+        GuidedAppearance::AtOnce => 0,
+        GuidedAppearance::Emerge { .. } | GuidedAppearance::Morph { .. } => MOTION_STEPS,
+        GuidedAppearance::Front { .. } | GuidedAppearance::Widen { .. } => WIDE_OPENING,
+    };
+    (network, opening)
 }
 
 /// A PNG file as an image; what is too large is refused before memory is taken.

@@ -139,6 +139,8 @@ impl AsyncPlayback {
             field: field.take(),
             replay: core::mem::replace(&mut playback.replay, Replay::stale(UVec2::ZERO, profile)),
             touched: core::mem::take(&mut drawing.touched),
+            profile,
+            motion: cracks.motion_at(moment),
             back: self.back.take(),
             dirty: core::mem::replace(&mut view.dirty, DirtyTiles::new(size)),
             redrawn: ReplayChanges::default(),
@@ -186,6 +188,12 @@ impl AsyncPlayback {
 /// Whether a task can make the times of a surface: nothing else is to paint its textures.
 fn can_be_async(active: &Active) -> bool {
     active.playhead.playback.is_some() && active.drawing.cutouts.is_none() && active.canvas.views.len() == 1
+}
+
+/// Whether the field has to be drawn again. That of cracks that move is drawn for each moment.
+fn shows_stale(active: &Active) -> bool {
+    let playback = active.playhead.playback.as_ref();
+    playback.is_some_and(|playback| playback.replay.is_stale() && active.cracks.motion_at(playback.shown).is_none())
 }
 
 /// Draws all of a surface again: what was drawn is lost.
@@ -279,12 +287,17 @@ pub(crate) fn play_async(
                 report_painted(active, entity, before, &mut states, &mut commands);
             }
             let is_stale = active.canvas.views.get(active.canvas.view).is_some_and(|view| !view.dirty.is_empty());
-            let is_stale =
-                is_stale || active.playhead.playback.as_ref().is_some_and(|playback| playback.replay.is_stale());
+            let is_stale = is_stale || shows_stale(active);
             let is_wanted = active.is_behind() || is_stale;
             let is_due = !budget.is_unlimited() && !active.turn.is_to_shatter;
             if !(is_due && can_be_async(active)) {
                 playback.rest();
+                if !budget.is_unlimited()
+                    && let Some(added) = &mut active.cracks.added
+                {
+                    // It takes longer than a frame has.
+                    added.motion = None;
+                }
                 if is_wanted {
                     queues.mark_dirty(entity, &mut active.turn);
                 }

@@ -8,8 +8,9 @@ use crate::plugin::gpu::buffer::{Staged, Stager};
 use crate::plugin::gpu::textures;
 use crate::plugin::gpu::textures::TextureKind;
 use crate::plugin::source::picture::BasePicture;
+use crate::plugin::surface::motion::MotionFrame;
 use crate::plugin::surface::tile_set::Touched;
-use crate::raster::{DepthField, DirtyTiles, Replay, ReplayChanges, TexelRect};
+use crate::raster::{DepthField, DirtyTiles, Profile, Replay, ReplayChanges, TexelRect};
 use bevy::prelude::*;
 use std::sync::Arc;
 
@@ -57,6 +58,9 @@ pub(crate) struct FrameJob {
     pub(crate) stager: Option<Stager>,
     pub(crate) field: DepthField,
     pub(crate) replay: Replay,
+    pub(crate) profile: Profile,
+    /// If the cracks are on their way to where they stay.
+    pub(crate) motion: Option<MotionFrame>,
     pub(crate) touched: Touched,
     pub(crate) back: Option<Back>,
     /// What is not as the textures show it.
@@ -87,11 +91,16 @@ impl FrameJob {
 
     /// A slice of the work; says whether it was the last one.
     pub(crate) fn step(&mut self) -> bool {
-        let TimelineSnapshot { network, timeline } = &*self.timeline;
+        let snapshot = self.timeline.clone();
+        let TimelineSnapshot { network, timeline } = &*snapshot;
         match &mut self.stage {
             Stage::Begin => {
-                self.replay.begin(&mut self.field, network, timeline, self.moment, &mut self.redrawn);
-                self.stage = Stage::Draw;
+                self.stage = if self.draw_motion() {
+                    Stage::Crush
+                } else {
+                    self.replay.begin(&mut self.field, network, timeline, self.moment, &mut self.redrawn);
+                    Stage::Draw
+                };
             }
             Stage::Draw => {
                 if self.replay.draw(&mut self.field, network, timeline, SEGMENTS, &mut self.redrawn) {
@@ -120,6 +129,18 @@ impl FrameJob {
             Stage::Made => {}
         }
         matches!(self.stage, Stage::Made)
+    }
+
+    /// Draws cracks that are on their way; returns whether they are.
+    fn draw_motion(&mut self) -> bool {
+        let Self { motion, profile, field, touched, replay, redrawn, .. } = self;
+        if !motion.as_ref().is_some_and(|motion| motion.draw(profile, field, touched)) {
+            return false;
+        }
+        let size = field.frame.size();
+        *replay = Replay::stale(size, *profile);
+        *redrawn = ReplayChanges { changed: vec![TexelRect::whole(size)], ..ReplayChanges::default() };
+        true
     }
 
     /// Finds out what is to be painted.

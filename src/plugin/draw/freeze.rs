@@ -16,6 +16,10 @@ pub(crate) fn freeze_if_full(active: &mut Active) {
     active.cracks.cells.update(active.cracks.growth.network());
     let gone = active.cracks.growth.remove_oldest(most / 2);
     active.drawing.field.freeze_layer(active.cracks.growth.network(), active.cracks.growth.timeline());
+    if let Some(added) = &mut active.cracks.added {
+        // What is forgotten does not move any more.
+        added.motion = None;
+    }
     let before = active.drawing.frozen.take();
     let (nodes, cells) = before.map_or((0, 0), |before| (before.nodes, before.cells));
     let closed = cells + active.cracks.cells.closed();

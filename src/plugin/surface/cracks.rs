@@ -1,7 +1,8 @@
 //! [`Cracks`]: the cracks of a surface.
 
-use crate::growth::CrackGrowth;
-use crate::pattern::{CellTracker, Network};
+use super::motion::{Motion, MotionFrame};
+use crate::growth::{CrackGrowth, GrowthParams};
+use crate::pattern::{CellTracker, Moment, Network};
 use bevy::prelude::*;
 
 /// The cracks of a surface, and what was reported of them.
@@ -26,6 +27,25 @@ pub(crate) struct Added {
     pub(crate) opening: u32,
     /// How many steps of growth they take.
     pub(crate) steps: u32,
+    /// If they move in these steps instead of growing.
+    pub(crate) motion: Option<Motion>,
+}
+
+impl Cracks {
+    /// The place of moving cracks at a moment; `None` if they do not move then.
+    pub(crate) fn motion_at(&self, moment: Moment) -> Option<MotionFrame> {
+        self.added.as_ref()?.motion_at(moment, self.growth.params())
+    }
+}
+
+impl Added {
+    /// The same for cracks that are yet to be put on a surface.
+    pub(crate) fn motion_at(&self, moment: Moment, params: &GrowthParams) -> Option<MotionFrame> {
+        let is_on_the_way = moment > Moment::START && moment < Moment::after(self.steps);
+        let motion = self.motion.clone().filter(|_| is_on_the_way)?;
+        let share = (moment.steps() / f64::from(self.steps)) as f32;
+        Some(MotionFrame { motion, share, params: params.clone() })
+    }
 }
 
 /// The last hit of a surface.

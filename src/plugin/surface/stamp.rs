@@ -1,10 +1,12 @@
 //! From networks to depths: what is stamped into the field of a surface.
 
 use super::active::Active;
+use super::stamp_network::stamp_all;
 use super::tile_set::Touched;
-use crate::growth::CrackGrowth;
 use crate::pattern::{Moment, PathPoint, SegmentId, SegmentPath};
-use crate::raster::{DOT_DEPTH, DepthField, Profile, ReplayChanges, TexelRect, stamp_dot, stamp_path, stamp_path_with};
+use crate::raster::{
+    DOT_DEPTH, DepthField, Profile, Replay, ReplayChanges, TexelRect, stamp_dot, stamp_path, stamp_path_with,
+};
 use bevy::prelude::*;
 
 /// Buffers kept from frame to frame.
@@ -19,6 +21,9 @@ pub(crate) struct Scratch {
 /// Stamps what has grown since the last time into the field, or whatever is to be shown, but for what hits have crushed.
 pub(crate) fn stamp(active: &mut Active, scratch: &mut Scratch) {
     let moment = active.moment();
+    if stamp_motion(active, moment) {
+        return;
+    }
     if let Some(playback) = &mut active.playhead.playback {
         let (growth, redrawn) = (&active.cracks.growth, &mut scratch.redrawn);
         playback.replay.show_lines(&mut active.drawing.field, growth.network(), growth.timeline(), moment, redrawn);
@@ -49,6 +54,20 @@ pub(crate) fn stamp(active: &mut Active, scratch: &mut Scratch) {
     }
 }
 
+/// Draws a moment of cracks that move in place of what is in the field; returns whether they do.
+fn stamp_motion(active: &mut Active, moment: Moment) -> bool {
+    let (frame, drawing) = (active.cracks.motion_at(moment), &mut active.drawing);
+    let (Some(frame), Some(playback)) = (frame, &mut active.playhead.playback) else { return false };
+    if !frame.draw(&drawing.profile, &mut drawing.field, &mut drawing.touched) {
+        return false;
+    }
+    playback.replay = Replay::stale(drawing.field.frame.size(), drawing.profile);
+    playback.shown = moment;
+    active.stamp_carried();
+    active.mark_all();
+    true
+}
+
 impl Active {
     /// Finds out what a hit crushes, which counts as part of the hit. It is drawn when the surface is painted.
     pub(crate) fn note_hit(&mut self) {
@@ -74,21 +93,6 @@ pub(crate) fn stamp_anew(active: &mut Active) {
     }
     stamp_all(&active.cracks.growth, &active.drawing.profile, &mut active.drawing.field, &mut active.drawing.touched);
     active.stamp_carried();
-}
-
-/// Stamps the end of a growth into an untouched field.
-pub(crate) fn stamp_all(growth: &CrackGrowth, profile: &Profile, field: &mut DepthField, touched: &mut Touched) {
-    let (network, timeline) = (growth.network(), growth.timeline());
-    let end = Moment::after(timeline.end());
-    for dot in (0..).map_while(|dot| timeline.dot_at(dot, end)) {
-        stamp_dot(field, dot.pos, dot.radius, DOT_DEPTH);
-    }
-    for segment in network.segments() {
-        if let Some(path) = network.path(segment) {
-            touched.mark(stamp_path(field, profile, &path));
-        }
-    }
-    field.show_layers(network, timeline, end, &mut Vec::new());
 }
 
 /// How wide a crack is that was carried on, as a share of the narrowest that grow.
