@@ -11,6 +11,7 @@
 //! - [`growth`]: cracks by space colonization, step by step.
 //! - [`raster`]: draws networks into a depth field.
 //! - [`voronoi`]: cracks that draw a picture, all at once.
+//! - [`blend`]: blends the relief of cracks into normal maps.
 //! - [`paint`]: turns a base picture and a depth field into diffuse, normal and depth textures.
 //! - [`preset`]: materials: how cracks grow, their cross-section and their look.
 //! - [`shatter`]: the pieces into which cracks cut a surface, and how they fall.
@@ -29,6 +30,7 @@
 //! # Ok::<(), bevy_crack::growth::ParamError>(())
 //! ```
 
+pub mod blend;
 mod grid;
 pub mod growth;
 pub mod math;

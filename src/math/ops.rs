@@ -46,3 +46,10 @@ pub fn powf(x: f32, y: f32) -> f32 {
 pub fn unit(angle: f32) -> Vec2 {
     Vec2::new(cos(angle), sin(angle))
 }
+
+/// Cosine and sine of `share` of a whole turn, with the accuracy of `f32`.
+#[must_use]
+pub(crate) fn turn(share: f64) -> [f32; 2] {
+    let angle = std::f64::consts::TAU * share;
+    [libm::cos(angle) as f32, libm::sin(angle) as f32]
+}

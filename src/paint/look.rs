@@ -5,7 +5,10 @@ use super::{
     facets::Facets,
     range::{LookError, within},
 };
-use crate::raster::{CrushedZone, LayerPlan, Veil};
+use crate::{
+    blend::NormalBlending,
+    raster::{CrushedZone, LayerPlan, Veil},
+};
 use std::borrow::Cow;
 
 /// A point of a [`Look`]'s ramp.
@@ -83,6 +86,9 @@ pub struct Look {
     /// Light that cracks emit by their depth, in the format of [`ramp`](Self::ramp). It is written to the emissive
     /// map. Default nothing.
     pub glow: Cow<'static, [ColorStop]>,
+    /// How the slopes of cracks and the surface's own normal map become one; default
+    /// [`Plain`](NormalBlending::Plain). It has no effect on a surface without a normal map of its own.
+    pub normals: NormalBlending,
     /// Whether the cover of cracks makes a translucent picture opaque (glass panes). Fully transparent texels stay
     /// transparent.
     pub opaque: bool,
@@ -155,6 +161,7 @@ impl Look {
         crushed: None,
         veil: None,
         glow: Cow::Borrowed(&[]),
+        normals: NormalBlending::Plain,
         opaque: false,
     };
 

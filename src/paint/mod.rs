@@ -5,6 +5,9 @@
 //! painted alone equals the same part of a full repaint, bit for bit. Where the field is untouched, the painted texel
 //! is the base texel.
 //!
+//! Normals of a look that blends by Poisson depend on one thing more: the slopes that [`correct_normals`] has solved for
+//! all of the cracks.
+//!
 //! ```
 //! use bevy_crack::{
 //!     paint::{BaseTexels, Look, LookTable, PaintTargets, paint_into},
@@ -54,4 +57,4 @@ pub use look::{ColorStop, Look};
 pub use modulate::{Modulation, modulate};
 pub use range::LookError;
 pub use table::LookTable;
-pub use texel::{BaseTexels, PaintTargets, paint_into, paint_rects};
+pub use texel::{BaseTexels, PaintTargets, correct_normals, paint_into, paint_rects};

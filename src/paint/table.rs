@@ -7,7 +7,7 @@ use super::{
     patch::Curve,
     range::{LookError, within},
 };
-use crate::pattern::MAX_SIDE;
+use crate::{blend::NormalBlending, pattern::MAX_SIDE};
 use glam::Vec4;
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
@@ -60,6 +60,7 @@ pub struct LookTable {
     pub(super) deep: f32,
     /// From the Sobel sum of `u16` depths to the slope of the surface.
     pub(super) slope: f32,
+    pub(super) normals: NormalBlending,
     pub(super) opaque: bool,
 }
 
@@ -132,7 +133,7 @@ impl LookTable {
         let glow = (!look.glow.is_empty()).then(|| shared_ramp(&look.glow));
         // Sobel's kernel weighs a slope of one depth step per texel with 8.
         let slope = look.relief * texels_per_unit / (8.0 * 65535.0);
-        let Look { tint, glint, gloss, sparkle, grain, shift, opaque, facets, .. } = *look;
+        let Look { tint, glint, gloss, sparkle, grain, shift, normals, opaque, facets, .. } = *look;
         Ok(Self {
             ramp,
             glow,
@@ -153,6 +154,7 @@ impl LookTable {
             shift,
             deep: if look.relief > 0.0 { 1.0 / look.relief } else { 0.0 },
             slope,
+            normals,
             opaque,
         })
     }

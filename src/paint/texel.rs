@@ -11,11 +11,12 @@ use super::{
     diffuse::{Frame, diffuse_patch},
     extras::Extras,
     patch::{BLOCK, Patch},
-    rows::{Rgba, depth_row, flat_row, tilted_row},
+    rows::{Rgba, corrected_row, depth_row, flat_row, level_row, tilted_row, whiteout_row},
 };
 use crate::{
+    blend::{BlendError, NormalBlending, solve_correction},
     math::vectorized,
-    raster::{DepthField, TexelRect},
+    raster::{DepthField, SlopeCorrection, TexelRect},
 };
 use glam::UVec2;
 use std::ops::Range;
@@ -106,6 +107,7 @@ pub fn paint_rects(
         frame: Frame { base: diffuse, stride: base.size.x as usize, origin, size: visible },
         field,
         look,
+        correction: field.correction().filter(|_| look.normals == NormalBlending::Poisson),
         normal,
         depth: base.depth,
         diffuse_out,
@@ -128,11 +130,68 @@ pub fn paint_rects(
     }
 }
 
+/// Makes the normals of a field and a base those of one surface, for a look with [`NormalBlending::Poisson`]: solves
+/// for the slopes that its picture needs, keeps them in the field, and returns rectangles around the texels that are to
+/// be painted for it. `origin` is as for [`paint_into`].
+///
+/// It is meant for cracks at rest. Painting without it, and with what was solved for earlier depths, is defined as well:
+/// a texel then depends on its own 3 x 3 depths, the base and the slopes that the field holds. After it the painted
+/// normals are a function of the base, the depths and the look only, in whatever order the cracks have grown and
+/// rectangles have been painted. [`solve_correction`] tells which rectangle is solved and what holds around it. A base
+/// without normals, or without texels of the field, needs no correction.
+///
+/// # Errors
+/// Those of [`solve_correction`]; the field is unchanged then.
+///
+/// ```
+/// use bevy_crack::{
+///     blend::NormalBlending,
+///     paint::{BaseTexels, Look, LookTable, PaintTargets, correct_normals, paint_into, paint_rects},
+///     pattern::{PathPoint, SegmentPath, SurfaceFrame},
+///     raster::{DepthField, Profile, TexelRect, stamp_path},
+/// };
+/// use glam::UVec2;
+///
+/// let size = UVec2::splat(64);
+/// let mut field = DepthField::new(SurfaceFrame::new(size)?);
+/// let [from, to] = [0.2, 0.8].map(|x| PathPoint { pos: [x, 0.5].into(), width: 0.1 });
+/// stamp_path(&mut field, &Profile::DEFAULT, &SegmentPath::straight(from, to));
+///
+/// let slope = [170, 128, 240, 255].repeat(64 * 64);
+/// let base = BaseTexels { size, diffuse: &[], normal: Some(&slope), depth: None };
+/// let look = Look { normals: NormalBlending::Poisson, ..Look::GROOVE };
+/// let look = LookTable::new(&look, field.frame.texels_per_unit())?;
+/// let mut painted = slope.clone();
+/// let mut targets = PaintTargets { diffuse: None, normal: Some(&mut painted), depth: None };
+/// paint_into(base, &field, &look, TexelRect::whole(size), UVec2::ZERO, &mut targets);
+///
+/// let changed = correct_normals(base, &mut field, UVec2::ZERO)?;
+/// assert!(!changed.is_empty());
+/// paint_rects(base, &field, &look, &changed, UVec2::ZERO, &mut targets);
+/// assert_eq!(correct_normals(base, &mut field, UVec2::ZERO)?, [], "it is at rest");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn correct_normals(
+    base: BaseTexels<'_>,
+    field: &mut DepthField,
+    origin: UVec2,
+) -> Result<Vec<TexelRect>, BlendError> {
+    let solved = match base.normal {
+        Some(normals) => solve_correction(normals, base.size, origin, &field.depth)?,
+        None => None,
+    };
+    let changed = SlopeCorrection::changes(field.correction(), solved.as_ref(), field.depth.size());
+    field.correct(solved);
+    Ok(changed)
+}
+
 /// The checked arguments of [`paint_into`].
 struct Job<'a> {
     frame: Frame<'a>,
     field: &'a DepthField,
     look: &'a LookTable,
+    /// Slopes that are added to the base, where it is untouched as well.
+    correction: Option<&'a SlopeCorrection>,
     normal: Option<&'a [Rgba]>,
     depth: Option<&'a [u8]>,
     diffuse_out: Option<&'a mut [Rgba]>,
@@ -178,17 +237,24 @@ impl Job<'_> {
         first..first + rect.size().x as usize
     }
 
-    /// Copies the base to texels that are untouched.
+    /// Copies the base to texels that are untouched, and adds the correction of its normals.
     fn restore(&mut self, rect: TexelRect) {
+        let corrected = self.correction.filter(|correction| !correction.rect().intersect(rect).is_empty());
+        let mut steps = [[0; 2]; WIDE];
         for y in rect.min.y..rect.max.y {
             let range = self.range(rect, y);
             if let Some(out) = &mut self.diffuse_out {
                 out[range.clone()].copy_from_slice(&self.frame.base[range.clone()]);
             }
             if let Some(out) = &mut self.normal_out {
-                match self.normal {
-                    Some(base) => out[range.clone()].copy_from_slice(&base[range.clone()]),
-                    None => out[range.clone()].fill(FLAT),
+                let out = &mut out[range.clone()];
+                match (self.normal, corrected) {
+                    (Some(base), Some(correction)) => {
+                        correction.read_row(rect.min.x, y, &mut steps[..out.len()]);
+                        level_row(out, &base[range.clone()], &steps);
+                    }
+                    (Some(base), None) => out.copy_from_slice(&base[range.clone()]),
+                    (None, _) => out.fill(FLAT),
                 }
             }
             if let Some(out) = &mut self.depth_out {
@@ -269,12 +335,19 @@ impl Job<'_> {
         {
             extras.tilt(patch);
         }
+        let mut steps = [[0; 2]; WIDE];
         for (row, y) in (rect.min.y..rect.max.y).enumerate() {
             let range = self.range(rect, y);
             if let Some(out) = &mut self.normal_out {
                 let out = &mut out[range.clone()];
-                match self.normal {
-                    Some(base) => tilted_row(out, &base[range.clone()], patch, row),
+                match self.normal.map(|base| (&base[range.clone()], self.look.normals)) {
+                    Some((base, NormalBlending::Plain)) => tilted_row(out, base, patch, row),
+                    Some((base, NormalBlending::Whiteout)) => whiteout_row(out, base, patch, row),
+                    Some((base, NormalBlending::Poisson)) => {
+                        let steps = &mut steps[..out.len()];
+                        self.correction.inspect(|correction| correction.read_row(rect.min.x, y, steps));
+                        corrected_row(out, base, steps, patch, row);
+                    }
                     None => flat_row(out, patch, row),
                 }
             }

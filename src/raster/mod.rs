@@ -28,6 +28,7 @@
 //! ```
 
 mod catch;
+mod correction;
 mod dirty;
 mod distance;
 mod layer;
@@ -36,6 +37,7 @@ mod replay;
 mod section;
 mod stamp;
 
+pub use correction::SlopeCorrection;
 pub use dirty::DirtyTiles;
 pub use distance::{MAX_DISTANCE, crack_distance};
 pub(crate) use layer::{CrushedField, Layer, PIT_STEPS, Plate, SLOPE_UNIT, Spot, noise};
@@ -60,6 +62,7 @@ pub struct DepthField {
     /// Texels that always stay untouched.
     forbidden: Option<Grid<bool>>,
     layer: Layer,
+    correction: Option<SlopeCorrection>,
 }
 
 impl DepthField {
@@ -70,19 +73,20 @@ impl DepthField {
         // while cracks grow.
         let mut depth = Grid::new(frame.size(), u16::MAX);
         std::hint::black_box(&mut depth).as_mut_slice().fill(0);
-        Self { frame, depth, forbidden: None, layer: Layer::default() }
+        Self { frame, depth, forbidden: None, layer: Layer::default(), correction: None }
     }
 
     /// Moves the field out and leaves one without texels, on which nothing is drawn.
     #[cfg(feature = "bevy")]
     pub(crate) fn take(&mut self) -> Self {
-        let empty =
-            Self { frame: self.frame, depth: Grid::new(UVec2::ZERO, 0), forbidden: None, layer: Layer::default() };
+        let (frame, depth) = (self.frame, Grid::new(UVec2::ZERO, 0));
+        let empty = Self { frame, depth, forbidden: None, layer: Layer::default(), correction: None };
         std::mem::replace(self, empty)
     }
 
-    /// Makes all texels untouched. Forbidden texels stay forbidden.
+    /// Makes all texels untouched. Forbidden texels stay forbidden; a correction of slopes is removed.
     pub fn clear(&mut self) {
+        self.correction = None;
         self.depth.as_mut_slice().fill(0);
         self.layer.clear(self.frame);
     }
@@ -96,6 +100,18 @@ impl DepthField {
     #[must_use]
     pub const fn plan(&self) -> &LayerPlan {
         self.layer.plan()
+    }
+
+    /// Sets the slopes that are added to the surface's own normals where a look blends by Poisson, or removes them.
+    /// They should be [solved](crate::blend::solve_correction) from the depths of this field.
+    pub fn correct(&mut self, correction: Option<SlopeCorrection>) {
+        self.correction = correction;
+    }
+
+    /// The slopes that are added to the surface's own normals, if there are any.
+    #[must_use]
+    pub const fn correction(&self) -> Option<&SlopeCorrection> {
+        self.correction.as_ref()
     }
 
     /// Updates the layers to those of `network` at `moment`, and appends the rectangles of the texels that may have

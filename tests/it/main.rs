@@ -3,6 +3,7 @@
 
 #![cfg(test)]
 
+mod blend;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod blink;
 #[cfg(all(feature = "2d", feature = "3d"))]
