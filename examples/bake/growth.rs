@@ -1,6 +1,7 @@
 //! `bake growth`: hits in, textures and the network out.
 
 use crate::{
+    blend::write_blended,
     maps::write_maps,
     own::own_picture,
     painting::{fitted, paint},
@@ -39,6 +40,9 @@ pub(crate) struct Options {
     /// The picture to crack; by default one that suits the preset
     #[arg(long)]
     base: Option<PathBuf>,
+    /// A normal map of the surface: the cracks are blended into it in each way, side by side
+    #[arg(long)]
+    base_normal: Option<PathBuf>,
     /// A growth parameter, as in `kill_distance=0.02`; may be given many times
     #[arg(long, value_parser = setting)]
     set: Vec<(String, String)>,
@@ -166,6 +170,9 @@ pub(crate) fn bake(options: &Options) -> Result<(Network, RgbaImage), Box<dyn Er
 
     let craters = if preset.look.crushed.is_some() { depths(&field, &table) } else { Vec::new() };
     write_maps(&options.out, &maps, &field, &craters)?;
+    if let Some(normals) = &options.base_normal {
+        write_blended(&options.out, normals, &mut field, &preset.look)?;
+    }
     if !preset.look.glow.is_empty() {
         let mut light = RgbaImage::new(size.x, size.y);
         paint_glow(None, size, &field, &table, &[TexelRect::whole(size)], UVec2::ZERO, &mut light);

@@ -27,8 +27,11 @@ pub struct ReliefPatch<'a> {
 /// is kept. The slopes of the patch are those of Sobel's operator, its border repeated.
 ///
 /// With [`NormalBlending::Poisson`] the slopes of the map, less their covered share, and those of the patch are together
-/// the guidance; the height with the nearest slopes is solved in the rectangle of the patch, while around it the height
-/// of the map is kept. Nothing outside of the patch changes. Every normal in the patch has length one.
+/// the guidance. In the outer 8 texels of the patch (or half of its shorter side, if that is less) it passes smoothly
+/// from the map's slopes to that. The height with the nearest slopes is solved in the rectangle of the patch, while around
+/// it the height of the map is kept. Nothing outside of the patch changes. Every normal in the patch has length one.
+///
+/// Differs from the paper: the passage, without which the height has no step at the border but its slopes do.
 ///
 /// Paper: Pérez, Gangnet and Blake 2003, "Poisson Image Editing", eq. 3, 9 and 11, with heights for the image.
 ///
@@ -66,8 +69,9 @@ pub fn blend_relief(
             let base = texels[place(y)..].iter();
             for ((x, i), base) in own.row(y).enumerate().zip(base) {
                 let cover = cover.map_or(1.0, |cover| cover.row(y)[x].clamp(0.0, 1.0));
-                let [right, down] = slope_of(*base);
-                (added.right[i], added.down[i]) = (own.right[i] - cover * right, own.down[i] - cover * down);
+                let ([right, down], inside) = (slope_of(*base), inside(part, x, y));
+                added.right[i] = inside * (own.right[i] - cover * right);
+                added.down[i] = inside * (own.down[i] - cover * down);
             }
         }
         let guidance = [added.right.clone(), added.down.clone()];
@@ -88,6 +92,18 @@ pub fn blend_relief(
         }
     }
     Ok(rect)
+}
+
+/// Width of the border in which the guidance passes from the map to the patch, texels: narrower ones show as a crease,
+/// wider ones take more of the patch.
+const PASSAGE: f32 = 8.0;
+
+/// How far a texel is inside of a patch of this size, 0..=1, across the passage.
+fn inside(size: UVec2, x: usize, y: usize) -> f32 {
+    let from_border = |at: usize, side: u32| (at as f32 + 0.5).min(side as f32 - at as f32 - 0.5);
+    let nearest = from_border(x, size.x).min(from_border(y, size.y));
+    let share = (nearest / PASSAGE.min(0.5 * size.min_element() as f32)).min(1.0);
+    share * share * (3.0 - 2.0 * share)
 }
 
 /// The slope of the sum of the horizontal parts of two unit normals, over the product of the vertical ones.

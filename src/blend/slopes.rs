@@ -90,9 +90,8 @@ impl Slopes {
         for y in 0..height.height() {
             around[self.row(y)].copy_from_slice(height.row(y));
         }
-        let averaged = |slopes: &[f32], i: usize, step: usize| {
-            0.25 * (slopes[i - step] + 2.0 * slopes[i] + slopes[i + step])
-        };
+        let averaged =
+            |slopes: &[f32], i: usize, step: usize| 0.25 * (slopes[i - step] + 2.0 * slopes[i] + slopes[i + step]);
         let mut corrected = Self::new(self.size);
         for y in 0..height.height() {
             for i in self.row(y) {

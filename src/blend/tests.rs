@@ -1,6 +1,4 @@
-use super::{
-    BlendError, NormalBlending, ReliefPatch, blend_relief, cover, slope_of, solve_correction, solve_poisson,
-};
+use super::{BlendError, NormalBlending, ReliefPatch, blend_relief, cover, slope_of, solve_correction, solve_poisson};
 use crate::{Grid, math::Rng};
 use glam::UVec2;
 
@@ -129,7 +127,8 @@ struct Wide {
 
 impl Wide {
     fn new(size: UVec2, slope: impl Fn(u32, u32) -> [f64; 2]) -> Self {
-        let all: Vec<_> = (0..size.y).flat_map(|y| (0..size.x).map(move |x| (x, y))).map(|(x, y)| slope(x, y)).collect();
+        let all: Vec<_> =
+            (0..size.y).flat_map(|y| (0..size.x).map(move |x| (x, y))).map(|(x, y)| slope(x, y)).collect();
         Self { size, right: all.iter().map(|s| s[0]).collect(), down: all.iter().map(|s| s[1]).collect() }
     }
 
@@ -182,7 +181,6 @@ fn random_normals(rng: &mut Rng, size: UVec2) -> Vec<u8> {
     (0..size.element_product()).flat_map(|_| texel()).collect()
 }
 
-/// Pictures of a base: shades of noise, and the real ones.
 #[test]
 fn blended_patches_are_those_of_a_direct_solve() {
     let mut rng = Rng::new(4);
@@ -215,7 +213,11 @@ fn blended_patches_are_those_of_a_direct_solve() {
                     right -= weight / 8.0 * (near(x + 1, y + k) - near(x - 1, y + k));
                     down -= weight / 8.0 * (near(x + k, y + 1) - near(x + k, y - 1));
                 }
-                [right - share * own[0], down - share * own[1]]
+                let from_border = |at: i64, side: u32| (at as f64 + 0.5).min(f64::from(side) - at as f64 - 0.5);
+                let width = (0.5 * f64::from(part.min_element())).min(8.0);
+                let t = (from_border(x, part.x).min(from_border(y, part.y)) / width).min(1.0);
+                let inside = t * t * (3.0 - 2.0 * t);
+                [inside * (right - share * own[0]), inside * (down - share * own[1])]
             });
             let added = added.nearest();
             for (y, x) in (0..part.y).flat_map(|y| (0..part.x).map(move |x| (y, x))) {
@@ -271,7 +273,8 @@ fn corrections_are_those_of_a_direct_solve() {
         let (low, high) = touched.iter().fold((UVec2::MAX, UVec2::ZERO), |(a, b), at| (a.min(*at), b.max(*at + 1)));
         // The least rectangle, 31 texels more, up to a size with a fast transform.
         let solved = (high - low).map(|side| {
-            let is_fast = |period: u32| [1, 3, 5, 9, 15].iter().any(|f| period % f == 0 && (period / f).is_power_of_two());
+            let is_fast =
+                |period: u32| [1, 3, 5, 9, 15].iter().any(|f| period % f == 0 && (period / f).is_power_of_two());
             (side + 63..).find(|period| is_fast(*period)).unwrap() - 1
         });
         let min = low.as_ivec2() - ((solved - (high - low)) / 2).as_ivec2();

@@ -26,6 +26,8 @@ mod tests {
     #[cfg(target_arch = "x86_64")]
     use super::Level;
     use crate::{
+        Grid,
+        blend::{NormalBlending, solve_poisson},
         math::Rng,
         paint::{BaseTexels, Look, LookTable, PaintTargets, paint_into},
         pattern::{CrackMask, PathPoint, SegmentPath, SurfaceFrame},
@@ -83,7 +85,9 @@ mod tests {
                 let normal = (seed % 2 == 0).then_some(&*normal);
                 let base = BaseTexels { size: UVec2::new(150, 97), diffuse: &diffuse, normal, depth: Some(&depth) };
                 let look = &[Look::GROOVE, Look::FROSTED, Look::TOON][seed as usize % 3];
-                let look = LookTable::new(look, 97.0).unwrap();
+                let normals =
+                    [NormalBlending::Plain, NormalBlending::Whiteout, NormalBlending::Poisson][seed as usize / 3 % 3];
+                let look = LookTable::new(&Look { normals, ..look.clone() }, 97.0).unwrap();
                 let [mut diffuse, mut normal, mut depth] = [vec![0; 4 * n], vec![0; 4 * n], vec![0; n]];
                 let mut targets =
                     PaintTargets { diffuse: Some(&mut diffuse), normal: Some(&mut normal), depth: Some(&mut depth) };
@@ -92,6 +96,19 @@ mod tests {
             });
             assert!(wide.0.depth.as_slice().iter().any(|&depth| depth > 0), "something is stamped");
             assert!(wide == plain, "seed {seed}");
+        }
+    }
+
+    #[test]
+    fn solved_heights_are_the_same_without_wide_vectors() {
+        for size in [[1, 1], [61, 53], [64, 30], [72, 18], [143, 95]].map(UVec2::from) {
+            let [wide, plain] = both(9, |rng| {
+                let mut grid = Grid::new(size, 0.0);
+                grid.as_mut_slice().iter_mut().for_each(|value| *value = rng.range(-1.0, 1.0));
+                solve_poisson(&mut grid).unwrap();
+                grid
+            });
+            assert!(wide == plain, "{size}");
         }
     }
 

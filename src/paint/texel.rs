@@ -19,7 +19,7 @@ use crate::{
     raster::{DepthField, SlopeCorrection, TexelRect},
 };
 use glam::UVec2;
-use std::ops::Range;
+use std::{ops::Range, sync::Arc};
 
 /// The untouched picture. All slices are row-major and cover the whole image of `size` texels.
 #[derive(Clone, Copy, Debug)]
@@ -107,7 +107,7 @@ pub fn paint_rects(
         frame: Frame { base: diffuse, stride: base.size.x as usize, origin, size: visible },
         field,
         look,
-        correction: field.correction().filter(|_| look.normals == NormalBlending::Poisson),
+        correction: field.correction().map(Arc::as_ref).filter(|_| look.normals == NormalBlending::Poisson),
         normal,
         depth: base.depth,
         diffuse_out,
@@ -180,8 +180,8 @@ pub fn correct_normals(
         Some(normals) => solve_correction(normals, base.size, origin, &field.depth)?,
         None => None,
     };
-    let changed = SlopeCorrection::changes(field.correction(), solved.as_ref(), field.depth.size());
-    field.correct(solved);
+    let changed = SlopeCorrection::changes(field.correction().map(Arc::as_ref), solved.as_ref(), field.depth.size());
+    field.correct(solved.map(Arc::new));
     Ok(changed)
 }
 

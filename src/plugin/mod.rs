@@ -171,7 +171,9 @@ impl Plugin for CrackPlugin {
                     )
                         .chain()
                         .in_set(Grow),
-                    (draw::async_playback::play_async, draw::paint::paint_surfaces).chain().in_set(Paint),
+                    (draw::async_playback::play_async, draw::blend::blend_normals, draw::paint::paint_surfaces)
+                        .chain()
+                        .in_set(Paint),
                     (gpu::uploads::drop_unwanted, jobs::frame_time::end_frame).chain().in_set(Upload),
                 ),
             );

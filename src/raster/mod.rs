@@ -51,6 +51,7 @@ use crate::{
     pattern::{CrackMask, Moment, Network, SurfaceFrame, Timeline},
 };
 use glam::UVec2;
+use std::sync::Arc;
 
 /// How deep the crack is at each texel: 0 = untouched, 65535 = the deepest; row-major from the top left.
 #[derive(Clone, Debug, PartialEq)]
@@ -62,7 +63,7 @@ pub struct DepthField {
     /// Texels that always stay untouched.
     forbidden: Option<Grid<bool>>,
     layer: Layer,
-    correction: Option<SlopeCorrection>,
+    correction: Option<Arc<SlopeCorrection>>,
 }
 
 impl DepthField {
@@ -104,13 +105,13 @@ impl DepthField {
 
     /// Sets the slopes that are added to the surface's own normals where a look blends by Poisson, or removes them.
     /// They should be [solved](crate::blend::solve_correction) from the depths of this field.
-    pub fn correct(&mut self, correction: Option<SlopeCorrection>) {
+    pub fn correct(&mut self, correction: Option<Arc<SlopeCorrection>>) {
         self.correction = correction;
     }
 
     /// The slopes that are added to the surface's own normals, if there are any.
     #[must_use]
-    pub const fn correction(&self) -> Option<&SlopeCorrection> {
+    pub const fn correction(&self) -> Option<&Arc<SlopeCorrection>> {
         self.correction.as_ref()
     }
 

@@ -5,9 +5,9 @@ use bevy_crack::{
     blend::{NormalBlending, ReliefPatch, blend_relief},
     growth::CrackGrowth,
     math::Rng,
-    paint::{BaseTexels, Look, LookTable, PaintTargets, correct_normals, paint_into, paint_rects},
-    pattern::{Moment, SurfaceFrame},
-    raster::{DepthField, Replay, TexelRect, stamp_path},
+    paint::{BaseTexels, Look, LookTable, PaintTargets, correct_normals, paint_rects},
+    pattern::SurfaceFrame,
+    raster::{DepthField, TexelRect, stamp_path},
 };
 use glam::{UVec2, Vec2};
 use image::RgbaImage;
@@ -91,4 +91,170 @@ fn seams_of_poisson_are_weaker_than_those_of_adding_and_of_whiteout() {
             assert!(poisson < plain && poisson < whiteout, "{name} on {base}");
         }
     }
+}
+
+const SIZE: UVec2 = UVec2::new(190, 141);
+
+/// The normals of a corner of bricks, and a crack through them.
+fn bricks() -> (Vec<u8>, CrackPreset, CrackGrowth) {
+    let normals = image::imageops::crop_imm(&asset("brick_red_normal.png"), 20, 30, SIZE.x, SIZE.y).to_image();
+    let look = Look { normals: NormalBlending::Poisson, ..Look::GROOVE };
+    let preset = CrackPreset { look, ..CrackPreset::CLAY };
+    let growth = grown(&preset, SIZE, &[Vec2::new(0.6, 0.5), Vec2::new(0.3, 0.8)], 5);
+    (normals.into_raw(), preset, growth)
+}
+
+fn table(look: &Look, field: &DepthField) -> LookTable {
+    LookTable::new(look, field.frame.texels_per_unit()).unwrap()
+}
+
+fn paint(base: BaseTexels, field: &DepthField, look: &Look, rects: &[TexelRect], out: &mut [u8]) {
+    let mut targets = PaintTargets { diffuse: None, normal: Some(out), depth: None };
+    paint_rects(base, field, &table(look, field), rects, UVec2::ZERO, &mut targets);
+}
+
+#[test]
+fn normals_at_rest_do_not_depend_on_the_frames_before() {
+    let (normals, preset, growth) = bricks();
+    let base = BaseTexels { size: SIZE, diffuse: &[], normal: Some(&normals), depth: None };
+    let mut field = stamped(&growth, &preset, SIZE);
+    let whole = [TexelRect::whole(SIZE)];
+    let mut unsolved = normals.clone();
+    paint(base, &field, &preset.look, &whole, &mut unsolved);
+    assert!(!correct_normals(base, &mut field, UVec2::ZERO).unwrap().is_empty());
+    let mut expected = normals.clone();
+    paint(base, &field, &preset.look, &whole, &mut expected);
+    assert_ne!(unsolved, expected, "something is solved");
+    for seed in 0..6 {
+        let mut rng = Rng::new(seed);
+        let mut segments: Vec<_> = growth.network().segments().collect();
+        for i in (1..segments.len()).rev() {
+            segments.swap(i, rng.next_u32() as usize % (i + 1));
+        }
+        let mut field = DepthField::new(SurfaceFrame::new(SIZE).unwrap());
+        let mut painted = normals.clone();
+        for some in segments.chunks(40) {
+            let stamp = |segment| {
+                let path = growth.network().path(segment).unwrap();
+                stamp_path(&mut field, &preset.profile, &path).grow(1, SIZE)
+            };
+            let dirty: Vec<_> = some.iter().copied().map(stamp).collect();
+            paint(base, &field, &preset.look, &dirty, &mut painted);
+            // Now and then it rests.
+            if rng.unit() < 0.3 {
+                let changed = correct_normals(base, &mut field, UVec2::ZERO).unwrap();
+                paint(base, &field, &preset.look, &changed, &mut painted);
+            }
+        }
+        let changed = correct_normals(base, &mut field, UVec2::ZERO).unwrap();
+        paint(base, &field, &preset.look, &changed, &mut painted);
+        assert!(painted == expected, "seed {seed}");
+        assert_eq!(correct_normals(base, &mut field, UVec2::ZERO), Ok(Vec::new()), "it is at rest");
+    }
+}
+
+/// The formulas of the documentation, in f64, and what is guaranteed: base texels where nothing is touched or corrected, and slopes
+/// that fade out towards the border of the solved rectangle.
+#[test]
+fn painted_normals_are_those_of_the_formulas() {
+    let (normals, preset, growth) = bricks();
+    let base = BaseTexels { size: SIZE, diffuse: &[], normal: Some(&normals), depth: None };
+    let mut field = stamped(&growth, &preset, SIZE);
+    correct_normals(base, &mut field, UVec2::ZERO).unwrap();
+    let correction = field.correction().unwrap().clone();
+    let unit = |texel: &[u8]| [0, 1, 2].map(|i| (f64::from(texel[i]) - 127.5) / 127.5);
+    let depth = |x: i64, y: i64| {
+        let (x, y) = (x.clamp(0, i64::from(SIZE.x) - 1), y.clamp(0, i64::from(SIZE.y) - 1));
+        f64::from(field.depth.get(x as u32, y as u32).unwrap()) / 65535.0
+    };
+    let scale = f64::from(preset.look.relief * field.frame.texels_per_unit()) / 8.0;
+    let mut counts = [0; 3];
+    for blending in [NormalBlending::Whiteout, NormalBlending::Poisson] {
+        let look = Look { normals: blending, ..preset.look.clone() };
+        let mut painted = normals.clone();
+        paint(base, &field, &look, &[TexelRect::whole(SIZE)], &mut painted);
+        for (i, (own, painted)) in normals.chunks(4).zip(painted.chunks(4)).enumerate() {
+            let (x, y) = ((i as u32 % SIZE.x) as i64, (i as u32 / SIZE.x) as i64);
+            let (mut right, mut down) = (0.0, 0.0);
+            for (k, weight) in [(-1, 1.0), (0, 2.0), (1, 1.0)] {
+                right += weight * scale * (depth(x + 1, y + k) - depth(x - 1, y + k));
+                down += weight * scale * (depth(x + k, y + 1) - depth(x + k, y - 1));
+            }
+            let [nx, ny, nz] = unit(own);
+            let more = correction.at(x as u32, y as u32).map(f64::from);
+            let is_level = right == 0.0 && down == 0.0;
+            let left = 1.0 - (depth(x, y) / 0.3).min(1.0);
+            let sum = if blending == NormalBlending::Whiteout {
+                let length = (right * right + down * down + 1.0).sqrt();
+                [nx + right / length, ny - down / length, nz / length]
+            } else {
+                [left * nx / nz + more[0] + right, left * ny / nz - more[1] - down, 1.0]
+            };
+            let is_base = is_level && (blending == NormalBlending::Whiteout || (left == 1.0 && more == [0.0; 2]));
+            if is_base {
+                counts[0] += 1;
+                assert_eq!(own, painted, "{x} {y}");
+                continue;
+            }
+            counts[1] += 1;
+            counts[2] += usize::from(is_level);
+            let length = sum.map(|v| v * v).iter().sum::<f64>().sqrt();
+            for (got, expected) in unit(painted).into_iter().zip(sum) {
+                assert!((got - expected / length).abs() < 0.505 / 127.5, "{blending:?} {x} {y}: {got} {expected}");
+            }
+            assert_eq!(own[3], painted[3]);
+        }
+    }
+    assert!(counts.iter().all(|count| *count > 300), "{counts:?}");
+}
+
+#[test]
+fn corrections_fade_out_before_the_border_of_what_is_solved() {
+    let size = UVec2::splat(200);
+    let preset = CrackPreset::CLAY;
+    for name in ["brick_red_normal.png", "concrete_fine_normal.png"] {
+        let normals = image::imageops::crop_imm(&asset(name), 10, 10, size.x, size.y).to_image();
+        // Short cracks in the middle: the solved rectangle lies in the picture.
+        let mut growth = CrackGrowth::new(preset.growth.clone(), Vec2::ONE, 2).unwrap();
+        growth.hit(Vec2::splat(0.5), 1.0);
+        (0..4).for_each(|_| {
+            growth.step();
+        });
+        let mut field = stamped(&growth, &preset, size);
+        let base = BaseTexels { size, diffuse: &[], normal: Some(normals.as_raw()), depth: None };
+        let changed = correct_normals(base, &mut field, UVec2::ZERO).unwrap();
+        let correction = field.correction().unwrap();
+        let TexelRect { min, max } = correction.rect();
+        assert!(min.min_element() > 0 && max.max_element() < 200, "{min} {max}");
+        let ring = (min.x..max.x).flat_map(|x| [(x, min.y), (x, max.y - 1)]);
+        let ring = ring.chain((min.y..max.y).flat_map(|y| [(min.x, y), (max.x - 1, y)]));
+        let largest = |texels: &mut dyn Iterator<Item = (u32, u32)>| {
+            texels.flat_map(|(x, y)| correction.at(x, y)).fold(0.0f32, |most, slope| most.max(slope.abs()))
+        };
+        let (edge, all) =
+            (largest(&mut ring.into_iter()), largest(&mut (0..size.y).flat_map(|y| (0..size.x).map(move |x| (x, y)))));
+        println!("{name}: {edge} at the border, {all} in all");
+        // One step of a byte is a slope of 2/255.
+        assert!(edge <= 1.0 / 255.0 && all > 5.0 * edge.max(1e-3), "{name}: {edge} {all}");
+        assert!(changed.iter().all(|rect| rect.intersect(correction.rect()) == *rect || rect.size() == UVec2::ZERO));
+    }
+}
+
+/// The same bits on every thread, whatever the others do.
+#[test]
+fn threads_blend_the_same() {
+    let base = asset("brick_red_normal.png");
+    let size = UVec2::from(base.dimensions());
+    let (_, height) = patches().remove(0);
+    let blend = || {
+        let mut normals = base.clone();
+        let patch = ReliefPatch { height: &height, cover: None, origin: UVec2::splat(9) };
+        blend_relief(&mut normals, size, &patch, NormalBlending::Poisson).unwrap();
+        normals
+    };
+    let expected = blend();
+    std::thread::scope(|scope| {
+        let threads: Vec<_> = (0..4).map(|_| scope.spawn(blend)).collect();
+        assert!(threads.into_iter().all(|thread| thread.join().unwrap() == expected));
+    });
 }

@@ -29,6 +29,8 @@ mod lifecycle;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod looks;
 mod masks;
+#[cfg(all(feature = "2d", feature = "3d"))]
+mod normals;
 mod pictures;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod plugin;

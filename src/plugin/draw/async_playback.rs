@@ -162,6 +162,7 @@ impl AsyncPlayback {
         }
         let Some(mut back) = back else { return };
         if !changed.is_empty() {
+            active.canvas.revision += 1;
             let pictures = active.canvas.textures.all().into_iter().zip(&mut back.texels).zip(staged);
             for ((texture, texels), staged) in pictures {
                 // Without an asset event, which would upload the whole image.
@@ -285,6 +286,9 @@ pub(crate) fn play_async(
                     News::Lost => start_over(active),
                 }
                 report_painted(active, entity, before, &mut states, &mut commands);
+                if active.has_normals_to_blend() {
+                    queues.mark_blending(entity, &mut active.turn);
+                }
             }
             let is_stale = active.canvas.views.get(active.canvas.view).is_some_and(|view| !view.dirty.is_empty());
             let is_stale = is_stale || shows_stale(active);

@@ -1,6 +1,7 @@
 //! Each frame: growth, time, painting.
 
 pub(crate) mod async_playback;
+pub(crate) mod blend;
 pub(crate) mod clock;
 pub(crate) mod frame_job;
 pub(crate) mod freeze;

@@ -59,7 +59,7 @@ pub(crate) fn paint_surfaces(
     let Some(mut images) = images else { return };
     let timer = clock.start(&budget, BUDGET_SHARE);
     let most_crushed = if budget.is_unlimited() { usize::MAX } else { CRUSHED };
-    let dirty = &mut queues.dirty;
+    let Queues { dirty, blending, .. } = &mut *queues;
     let (mut left, mut behind) = (Vec::new(), Vec::new());
     while left.is_empty() && !dirty.is_empty() {
         let mut jobs: Vec<PaintJob> =
@@ -89,6 +89,9 @@ pub(crate) fn paint_surfaces(
                 continue;
             }
             report_painted(active, entity, before, &mut states, &mut commands);
+            if active.has_normals_to_blend() && !core::mem::replace(&mut active.turn.is_blending, true) {
+                blending.push_back(entity);
+            }
             if active.drawing.field.is_behind() {
                 active.turn.is_dirty = true;
                 behind.push(entity);

@@ -1,5 +1,6 @@
 //! [`Active`]: a surface that has been hit.
 
+use super::blending::Blending;
 use super::canvas::Canvas;
 use super::cracks::Cracks;
 use super::drawing::Drawing;
@@ -28,6 +29,7 @@ pub(crate) struct Active {
     pub(crate) drawing: Drawing,
     pub(crate) canvas: Canvas,
     pub(crate) playhead: Playhead,
+    pub(crate) blending: Blending,
     pub(crate) carrier: Carrier,
     pub(crate) turn: Turn,
     /// Bytes of its textures.
@@ -49,6 +51,8 @@ pub(crate) struct Turn {
     pub(crate) is_late: bool,
     /// Whether its end has not been reported yet.
     pub(crate) is_open: bool,
+    /// Whether it is in the queue of those whose normals are to be blended.
+    pub(crate) is_blending: bool,
     /// Whether it is to shatter: nothing else makes its pictures then.
     pub(crate) is_to_shatter: bool,
 }
@@ -78,6 +82,7 @@ impl Active {
             views: Vec::new(),
             view: 0,
             unstretched,
+            revision: 0,
             read_at,
             is_outdated: false,
             offered: Vec::new(),
@@ -89,6 +94,7 @@ impl Active {
             drawing: Drawing::new(field, preset.profile),
             canvas,
             playhead: Playhead::new(preset.steps_per_second),
+            blending: Blending::default(),
             carrier,
             turn: Turn::default(),
             bytes,

@@ -20,6 +20,8 @@ pub(crate) struct Canvas {
     pub(crate) view: usize,
     /// The size that the textures would have if the picture were not shown stretched; `None` if another size was asked for.
     pub(crate) unstretched: Option<UVec2>,
+    /// Changes whenever the depths do, or the part of the image that is shown.
+    pub(crate) revision: u64,
     /// The frame in which the pictures were read, see `FrameCount`.
     pub(crate) read_at: u64,
     /// Whether the pictures have changed since.
@@ -45,6 +47,12 @@ impl Canvas {
     pub(crate) fn mark(&mut self, rect: TexelRect, size: UVec2) {
         // A normal depends on the texels around it.
         let rect = rect.grow(1, size);
+        self.mark_normals(rect);
+        self.revision += 1;
+    }
+
+    /// Marks texels to be painted again whose depths are as they were.
+    pub(crate) fn mark_normals(&mut self, rect: TexelRect) {
         for view in &mut self.views {
             view.dirty.mark(rect);
         }
@@ -60,6 +68,7 @@ impl Canvas {
                 self.views.remove(0);
             }
             self.views.push(View { rect, dirty });
+            self.revision += 1;
             self.views.len() - 1
         });
     }

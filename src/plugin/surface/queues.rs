@@ -15,6 +15,8 @@ pub(crate) struct Queues {
     pub(crate) laying_out: VecDeque<Entity>,
     /// Surfaces to paint, each once, in turns.
     pub(crate) dirty: VecDeque<Entity>,
+    /// Surfaces whose normals are to be blended once they are at rest, each once, in turns.
+    pub(crate) blending: VecDeque<Entity>,
     /// Surfaces whose components or pictures have changed.
     pub(crate) changed: Vec<Entity>,
 }
@@ -40,6 +42,13 @@ impl Queues {
         }
     }
 
+    /// Has the normals of a surface blended.
+    pub(crate) fn mark_blending(&mut self, entity: Entity, turn: &mut Turn) {
+        if !core::mem::replace(&mut turn.is_blending, true) {
+            self.blending.push_back(entity);
+        }
+    }
+
     /// Takes a surface out of the queues at once: if it comes back before its turn, it must not be in them twice.
     pub(super) fn remove(&mut self, entity: Entity, turn: &Turn) {
         if turn.is_growing {
@@ -48,6 +57,9 @@ impl Queues {
         }
         if turn.is_dirty {
             self.dirty.retain(|other| *other != entity);
+        }
+        if turn.is_blending {
+            self.blending.retain(|other| *other != entity);
         }
     }
 }
