@@ -31,8 +31,7 @@ fn spawn(app: &mut App, preset: CrackPreset, is_3d: bool) -> Entity {
     let mesh = add(app, Mesh::from(Rectangle::new(1.25, 1.0)));
     let surface = CrackSurface::new(preset).with_seed(3);
     if is_3d {
-        let own =
-            StandardMaterial { base_color_texture: Some(picture), normal_map_texture: Some(waves), ..default() };
+        let own = StandardMaterial { base_color_texture: Some(picture), normal_map_texture: Some(waves), ..default() };
         let material = add(app, own);
         app.world_mut().spawn((Mesh3d(mesh), MeshMaterial3d(material), surface)).id()
     } else {

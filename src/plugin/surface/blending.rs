@@ -107,25 +107,14 @@ impl Active {
                 self.blending.stage = if is_whole { self.start(of, texels) } else { Stage::Copy(of, texels) };
                 is_unlimited
             }
-            Stage::Solve(of, mut job, since) => {
-                let solved = if is_unlimited {
-                    Some(job.finish().unwrap_or_default())
-                } else {
-                    job.take_if_done(since.elapsed() >= PATIENCE)
-                };
-                match solved {
-                    Some(Solved { correction, changes }) => {
-                        self.drawing.field.correct(correction);
-                        self.blending.solved = Some(of);
-                        self.blending.stage = Stage::Show(changes);
-                        true
-                    }
-                    None => {
-                        self.blending.stage = Stage::Solve(of, job, since);
-                        false
-                    }
+            Stage::Solve(of, job, _) if is_unlimited => self.show_solved(of, job.finish().unwrap_or_default()),
+            Stage::Solve(of, mut job, since) => match job.take_if_done(since.elapsed() >= PATIENCE) {
+                Some(solved) => self.show_solved(of, solved),
+                None => {
+                    self.blending.stage = Stage::Solve(of, job, since);
+                    false
                 }
-            }
+            },
             Stage::Show(mut rects) => {
                 let mut area = 0;
                 let most = if is_unlimited { u64::MAX } else { SHOWN };
@@ -143,6 +132,14 @@ impl Active {
                 false
             }
         }
+    }
+
+    fn show_solved(&mut self, of: u64, solved: Solved) -> bool {
+        let Solved { correction, changes } = solved;
+        self.drawing.field.correct(correction);
+        self.blending.solved = Some(of);
+        self.blending.stage = Stage::Show(changes);
+        true
     }
 
     fn start(&self, revision: u64, texels: Vec<u16>) -> Stage {
