@@ -43,7 +43,7 @@ impl Veil {
             ("veil.reach", self.reach, 0.0..=0.5, "0..=0.5"),
             ("veil.full_width", self.full_width, 0.0001..=1.0, "0.0001..=1"),
             ("veil.cover", self.cover, 0.0..=1.0, "0..=1"),
-            ("veil.uneven", self.variation, 0.0..=1.0, "0..=1"),
+            ("veil.variation", self.variation, 0.0..=1.0, "0..=1"),
             ("veil.bubbles", self.bubbles, 0.0..=1.0, "0..=1"),
         ];
         fields.extend(self.color.map(|channel| ("veil.color", channel, 0.0..=1.0, "0..=1")));
