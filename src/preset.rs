@@ -87,7 +87,7 @@ impl CrackPreset {
             variety: 0.15,
             ..GrowthParams::DEFAULT
         },
-        profile: Profile { wall: 0.35, ..Profile::DEFAULT },
+        profile: Profile { wall: 0.35, ragged: 0.0022, ..Profile::DEFAULT },
         look: Look::CONCRETE,
         steps_per_second: 60.0,
         follows_lines: false,
@@ -131,6 +131,7 @@ impl CrackPreset {
             rim_width: 0.0,
             rim_depth: 0.0,
             faintest: 0.0,
+            ragged: 0.0012,
             ..Profile::DEFAULT
         },
         look: Look::PLASTER,
@@ -169,8 +170,9 @@ impl CrackPreset {
             full_width: 0.006,
             wall: 0.5,
             rim_width: 0.003,
-            rim_depth: 0.12,
+            rim_depth: 0.08,
             faintest: 0.0,
+            ragged: 0.0024,
             ..Profile::DEFAULT
         },
         look: Look::BRICK,
@@ -238,10 +240,10 @@ impl CrackPreset {
             front: 0.008,
             patchiness: 0.8,
             reach: 64.0,
-            line_width: 0.0020,
+            line_width: 0.0016,
             tip_taper: 0.0,
             line_growth: 0.0,
-            max_width: 0.0020,
+            max_width: 0.0016,
             unevenness: 0.2,
             inertia: 3.0,
             wander: 0.1,
@@ -347,10 +349,11 @@ impl CrackPreset {
         profile: Profile {
             depth: 1.0,
             full_width: 0.010,
-            wall: 0.7,
+            wall: 0.6,
             rim_width: 0.007,
             rim_depth: 0.08,
             faintest: 0.0,
+            ragged: 0.0018,
             ..Profile::DEFAULT
         },
         look: Look::CLAY,
@@ -373,7 +376,7 @@ impl CrackPreset {
             three_arm_share: 0.5,
             grain: 0.045,
             reach: 0.385,
-            line_width: 0.022,
+            line_width: 0.019,
             line_growth: 0.05,
             murray: 3.0,
             max_width: 0.04,
@@ -396,10 +399,11 @@ impl CrackPreset {
         profile: Profile {
             depth: 1.0,
             full_width: 0.022,
-            wall: 0.85,
+            wall: 0.8,
             rim_width: 0.024,
             rim_depth: 0.08,
             faintest: 0.0,
+            ragged: 0.0034,
             ..Profile::DEFAULT
         },
         look: Look::MUD,
@@ -547,7 +551,8 @@ impl CrackPreset {
         let by = growth.step_length / self.growth.step_length;
         let full_width = (self.profile.full_width * by).clamp(0.0001, 1.0);
         let rim_width = (self.profile.rim_width * by).clamp(0.0, 0.2);
-        let profile = Profile { full_width, rim_width, ..self.profile };
+        let ragged = (self.profile.ragged * by).clamp(0.0, 0.05);
+        let profile = Profile { full_width, rim_width, ragged, ..self.profile };
         let crushed = self.look.crushed.map(|crushed| crushed.scaled(by));
         let veil = self.look.veil.map(|veil| veil.scaled(by));
         let cel = self.look.cel.map(|cel| cel.scaled(by));

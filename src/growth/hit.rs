@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{
     math::mix,
-    pattern::{Link, LinkKind, NO_PARENT, Node},
+    pattern::{Bricks, Link, LinkKind, NO_BRICKS, NO_PARENT, Node},
 };
 use glam::Vec2;
 
@@ -85,7 +85,7 @@ impl CrackGrowth {
             impact.energy = (before + energy).min(MAX_ENERGY);
             let (center, after) = (impact.pos, impact.energy);
             if after > before {
-                let crushes = self.masonry.as_ref().and_then(|masonry| masonry.nearest(center)).unwrap_or(center);
+                let crushes = self.crushes(center);
                 self.timeline.strike(index, crushes, before, after);
                 self.widen(index);
                 let reach = self.reach(center, after);
@@ -99,8 +99,7 @@ impl CrackGrowth {
         }
         let index = self.impacts.len() as u32;
         let energy = energy.min(MAX_ENERGY);
-        // In masonry the crushed zone is centred where the cracks begin: in the nearest joint.
-        let crushes = self.masonry.as_ref().and_then(|masonry| masonry.nearest(pos)).unwrap_or(pos);
+        let crushes = self.crushes(pos);
         self.impacts.push(Impact { pos, energy, first_energy: energy, widening: widening(energy) });
         self.timeline.strike(index, crushes, 0.0, energy);
         let reach = self.reach(pos, energy);
@@ -147,6 +146,13 @@ impl CrackGrowth {
         }
         self.steps_left = self.params.num_iterations;
         HitOutcome::Started(index)
+    }
+
+    /// Where a hit crushes the surface. In masonry that is where the cracks begin, in the nearest joint, and the bricks
+    /// around it.
+    fn crushes(&self, pos: Vec2) -> (Vec2, Bricks) {
+        let found = self.masonry.as_ref().and_then(|masonry| Some((masonry, masonry.nearest(pos)?)));
+        found.map_or((pos, NO_BRICKS), |(masonry, joint)| (joint, masonry.bricks(joint)))
     }
 
     /// The reach of the first hit of an impact.

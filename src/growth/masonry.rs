@@ -1,7 +1,11 @@
 //! Courses of bricks, and the directions that their joints offer to cracks.
 
 use super::draws;
-use crate::{Grid, math::hash_unit};
+use crate::{
+    Grid,
+    math::hash_unit,
+    pattern::{Bricks, NO_BRICKS},
+};
 use glam::Vec2;
 
 /// A row (column) of a course counts as a joint if this share of it is weak.
@@ -138,6 +142,34 @@ impl Masonry {
         let heads = self.heads[bed].iter().chain(&self.heads[bed + 1]);
         let x = heads.min_by(|a, b| columns(a).total_cmp(&columns(b)))?;
         Some(Vec2::new(*x, self.beds[bed]))
+    }
+
+    /// The bricks around a place where joints meet.
+    pub(super) fn bricks(&self, pos: Vec2) -> Bricks {
+        let (mut all, mut count) = (NO_BRICKS, 0);
+        let Some(bed) = self.bed(pos.y) else { return all };
+        let lines = [
+            bed.checked_sub(1).map_or(0.0, |above| self.beds[above]),
+            self.beds[bed],
+            self.beds.get(bed + 1).copied().unwrap_or(self.extent.y),
+        ];
+        for (course, height) in [bed, bed + 1].into_iter().zip(lines.windows(2)) {
+            let heads = || self.heads[course].iter().copied();
+            let left = heads().filter(|x| *x < pos.x - SAME).fold(0.0, f32::max);
+            let right = heads().filter(|x| *x > pos.x + SAME).fold(self.extent.x, f32::min);
+            let middle = self.is_head(course, pos.x).then_some(pos.x);
+            let ends = [Some(left), middle, Some(right)];
+            let ends: Vec<f32> = ends.into_iter().flatten().collect();
+            for across in ends.windows(2) {
+                let half = 0.5 * self.joint;
+                let brick = [Vec2::new(across[0], height[0]) + half, Vec2::new(across[1], height[1]) - half];
+                if brick[0].cmplt(brick[1]).all() {
+                    all[count] = brick;
+                    count += 1;
+                }
+            }
+        }
+        all
     }
 
     /// The directions from a place: along its joints; inside a brick up and down.

@@ -68,7 +68,8 @@ mod tests {
             };
             let path = SegmentPath::straight(point(), point());
             let rim_width = if rng.unit() < 0.5 { 0.0 } else { 0.03 };
-            let profile = Profile { wall: rng.unit(), rim_width, rim_depth: rng.unit(), ..Profile::DEFAULT };
+            let ragged = if rng.unit() < 0.5 { 0.0 } else { 0.02 };
+            let profile = Profile { wall: rng.unit(), rim_width, rim_depth: rng.unit(), ragged, ..Profile::DEFAULT };
             stamp_path(&mut field, &profile, &path);
         }
         field

@@ -331,11 +331,19 @@ impl Block<'_> {
             }
             return over;
         }
+        let mut depth = *self.depth;
+        if look.shadow > 0.0 {
+            for i in 0..BLOCK {
+                let away = (self.x[i] + self.y[i]) * self.inv_len[i] * std::f32::consts::FRAC_1_SQRT_2;
+                let deeper = f32::from(depth[i]) * (1.0 + look.shadow * away);
+                depth[i] = if deeper < 65535.0 { deeper as i32 as u16 } else { u16::MAX };
+            }
+        }
         let mut between = [0.0; BLOCK];
-        for (between, &depth) in between.iter_mut().zip(self.depth) {
+        for (between, &depth) in between.iter_mut().zip(&depth) {
             *between = LookTable::between(depth);
         }
-        let layer = |i: usize| look.layer(self.depth[i], between[i]) * share[i];
+        let layer = |i: usize| look.layer(depth[i], between[i]) * share[i];
         let mut over = [[0.0; BLOCK]; 4];
         for i in (0..BLOCK).step_by(4) {
             let turned = Mat4::from_cols(layer(i), layer(i + 1), layer(i + 2), layer(i + 3)).transpose();

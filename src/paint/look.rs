@@ -50,6 +50,9 @@ pub struct Look {
     /// How much of the light on walls is an added highlight instead of a share of the colour below it (glass). 0..=4;
     /// default 0.
     pub gloss: f32,
+    /// How much less deep a crack looks where its wall faces the light, and how much deeper on the other side: the
+    /// colour is that of a depth changed by up to this share, depending on the slope. 0..=1; default 0.
+    pub shadow: f32,
     /// How much the cover varies along a crack (glass, ice): up to this share of it is removed. 0..=1; default 0.
     pub sparkle: f32,
     /// How much fainter cracks are that do not catch the light, depending on their direction and slowly varying along
@@ -148,6 +151,7 @@ impl Look {
         tint: 1.0,
         glint: 0.9,
         gloss: 0.0,
+        shadow: 0.0,
         grain: 0.12,
         sparkle: 0.0,
         directionality: 0.0,
@@ -253,6 +257,7 @@ impl Look {
         within("tint", self.tint, 0.0..=1.0, unit)?;
         within("glint", self.glint, 0.0..=4.0, "0..=4")?;
         within("gloss", self.gloss, 0.0..=4.0, "0..=4")?;
+        within("shadow", self.shadow, 0.0..=1.0, unit)?;
         within("sparkle", self.sparkle, 0.0..=1.0, unit)?;
         within("directionality", self.directionality, 0.0..=1.0, unit)?;
         within("full_rim", self.full_rim, 0.0..=1.0, unit)?;

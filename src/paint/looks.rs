@@ -53,8 +53,10 @@ impl Look {
             stop(0.45, [0.86, 0.93, 0.92], 0.20),
             stop(1.0, [0.93, 0.98, 0.97], 0.50),
         ]),
-        glint: 0.66,
-        relief: 0.0026,
+        glint: 0.5,
+        sparkle: 0.6,
+        directionality: 0.6,
+        relief: 0.002,
         facets: Some(Facets {
             tone: 0.26,
             tilt: 0.22,
@@ -75,13 +77,13 @@ impl Look {
             hole: 0.7,
             depth: 0.001,
             rough: 0.0003,
-            grain: 0.005,
+            grain: 0.0075,
             color: [0.95, 0.98, 1.0],
             pale: 0.75,
             speckle: 0.5,
             flake: 0.0,
             dust: 0.15,
-            chips: 0.05,
+            chips: 0.35,
             reach: 3.5,
             ..CrushedZone::DEFAULT
         }),
@@ -131,7 +133,7 @@ impl Look {
         ]),
         gloss: 0.6,
         glint: 0.5,
-        sparkle: 0.5,
+        sparkle: 0.6,
         directionality: 0.75,
         veil: Some(Veil {
             reach: 0.19,
@@ -139,7 +141,7 @@ impl Look {
             cover: 0.8,
             color: [0.88, 0.95, 1.0],
             variation: 0.75,
-            bubbles: 0.12,
+            bubbles: 0.04,
         }),
         facets: Some(Facets {
             tone: 0.05,
@@ -164,9 +166,9 @@ impl Look {
             dust: 0.2,
             chips: 0.0,
             reach: 2.6,
-            needles: 0.9,
-            crazing: 0.5,
-            bubbles: 12,
+            needles: 0.8,
+            crazing: 0.25,
+            bubbles: 4,
             ..CrushedZone::DEFAULT
         }),
         ..Self::FROSTED
@@ -203,6 +205,7 @@ impl Look {
             ..CrushedZone::DEFAULT
         }),
         glint: 0.6,
+        shadow: 0.5,
         relief: 0.009,
         ..Self::GROOVE
     };
@@ -216,6 +219,7 @@ impl Look {
         ]),
         relief: 0.006,
         glint: 0.6,
+        shadow: 0.5,
         crushed: Some(CrushedZone {
             radius: 0.036,
             ragged: 0.6,
@@ -251,7 +255,7 @@ impl Look {
             stop(1.0, [0.12, 0.10, 0.09], 1.0),
         ]),
         crushed: Some(CrushedZone {
-            radius: 0.034,
+            radius: 0.040,
             ragged: 0.75,
             depth: 0.016,
             rough: 0.005,
@@ -272,6 +276,7 @@ impl Look {
             ..CrushedZone::DEFAULT
         }),
         glint: 0.75,
+        shadow: 0.5,
         facets: Some(Facets { tone: 0.10, tilt: 0.05, shift: 2.0, fade: 0.2, ..Facets::DEFAULT }),
         ..Self::GROOVE
     };
@@ -323,12 +328,13 @@ impl Look {
             stop(0.55, [0.50, 0.42, 0.34], 0.92),
             stop(1.0, [0.20, 0.155, 0.12], 1.0),
         ]),
-        glint: 1.0,
+        glint: 0.7,
+        shadow: 0.7,
         relief: 0.007,
         curl: 0.03,
         curl_depth: 0.08,
         full_rim: 0.008,
-        facets: Some(Facets { tone: 0.11, tilt: 0.02, concavity: 0.07, fade: 0.33, ..Facets::DEFAULT }),
+        facets: Some(Facets { tone: 0.13, tilt: 0.02, concavity: 0.12, fade: 0.33, ..Facets::DEFAULT }),
         crushed: Some(CrushedZone {
             radius: 0.032,
             ragged: 0.8,
@@ -357,18 +363,19 @@ impl Look {
     pub const MUD: Self = Self {
         ramp: Cow::Borrowed(&[
             stop(0.085, [0.85, 0.79, 0.72], 0.02),
-            stop(0.20, [0.60, 0.51, 0.42], 0.70),
-            stop(0.45, [0.50, 0.40, 0.315], 0.92),
-            stop(0.68, [0.30, 0.225, 0.17], 0.97),
-            stop(0.86, [0.09, 0.064, 0.046], 1.0),
+            stop(0.15, [0.66, 0.57, 0.48], 0.60),
+            stop(0.36, [0.50, 0.405, 0.32], 0.94),
+            stop(0.60, [0.24, 0.18, 0.135], 0.98),
+            stop(0.82, [0.085, 0.062, 0.046], 1.0),
             stop(1.0, [0.05, 0.036, 0.026], 1.0),
         ]),
-        glint: 2.3,
+        glint: 1.1,
+        shadow: 0.8,
         relief: 0.024,
-        curl: 0.07,
+        curl: 0.05,
         curl_depth: 0.08,
         full_rim: 0.02,
-        facets: Some(Facets { tone: 0.12, tilt: 0.05, concavity: 0.17, fade: 0.38, ..Facets::DEFAULT }),
+        facets: Some(Facets { tone: 0.15, tilt: 0.05, concavity: 0.20, fade: 0.38, ..Facets::DEFAULT }),
         crushed: Some(CrushedZone {
             radius: 0.042,
             ragged: 0.8,

@@ -39,6 +39,7 @@ pub struct LookTable {
     pub(super) tint: f32,
     pub(super) glint: f32,
     pub(super) gloss: f32,
+    pub(super) shadow: f32,
     pub(super) sparkle: f32,
     /// Bumps of the sparkle noise per texel.
     pub(super) sparkle_scale: f32,
@@ -133,13 +134,14 @@ impl LookTable {
         let glow = (!look.glow.is_empty()).then(|| shared_ramp(&look.glow));
         // Sobel's kernel weighs a slope of one depth step per texel with 8.
         let slope = look.relief * texels_per_unit / (8.0 * 65535.0);
-        let Look { tint, glint, gloss, sparkle, grain, shift, normals, opaque, facets, .. } = *look;
+        let Look { tint, glint, gloss, shadow, sparkle, grain, shift, normals, opaque, facets, .. } = *look;
         Ok(Self {
             ramp,
             glow,
             tint,
             glint,
             gloss,
+            shadow,
             sparkle,
             sparkle_scale: SPARKLES / texels_per_unit,
             curve: look.curve(),
@@ -226,6 +228,7 @@ mod tests {
             assert_eq!(refused(&Look { gloss: bad, ..Look::GROOVE }), Some("gloss"));
             assert_eq!(refused(&Look { sparkle: bad, ..Look::GROOVE }), Some("sparkle"));
             assert_eq!(refused(&Look { directionality: bad, ..Look::GROOVE }), Some("directionality"));
+            assert_eq!(refused(&Look { shadow: bad, ..Look::GROOVE }), Some("shadow"));
             assert_eq!(refused(&Look { full_rim: bad, ..Look::GROOVE }), Some("full_rim"));
             assert_eq!(refused(&Look { curl: bad, ..Look::GROOVE }), Some("curl"));
             assert_eq!(refused(&Look { curl_depth: bad, ..Look::GROOVE }), Some("curl_depth"));

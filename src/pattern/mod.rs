@@ -29,5 +29,5 @@ pub use frame::{FrameError, MAX_ASPECT, MAX_SIDE, SurfaceFrame};
 pub use mask::{CrackMask, MaskError};
 pub use network::{Link, LinkKind, NO_IMPACT, NO_PARENT, Network, Node, SegmentId};
 pub use path::{MAX_PATH_POINTS, PathPoint, SegmentPath};
+pub(crate) use timeline::{Bricks, Entries, NO_BRICKS, Strike};
 pub use timeline::{Dot, Moment, Timeline};
-pub(crate) use timeline::{Entries, Strike};

@@ -109,6 +109,12 @@ pub struct Timeline {
     open: u32,
 }
 
+/// The bricks around a place in masonry: two opposite corners of each, pattern units; equal corners = no brick.
+pub(crate) type Bricks = [[Vec2; 2]; 4];
+
+/// A place that is not in masonry.
+pub(crate) const NO_BRICKS: Bricks = [[Vec2::ZERO; 2]; 4];
+
 /// A hit that started an impact or added energy to one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Strike {
@@ -118,6 +124,7 @@ pub(crate) struct Strike {
     pub(crate) pos: Vec2,
     pub(crate) before: f32,
     pub(crate) energy: f32,
+    pub(crate) bricks: Bricks,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -222,8 +229,8 @@ impl Timeline {
     }
 
     /// Records an impact at `pos` that is new, or has more energy than `before`.
-    pub(crate) fn strike(&mut self, impact: u32, pos: Vec2, before: f32, energy: f32) {
-        self.strikes.push(Strike { step: self.now, impact, pos, before, energy });
+    pub(crate) fn strike(&mut self, impact: u32, (pos, bricks): (Vec2, Bricks), before: f32, energy: f32) {
+        self.strikes.push(Strike { step: self.now, impact, pos, before, energy, bricks });
     }
 
     /// All hits, in order; [`entries`](Self::entries) gives the number of those up to a step.

@@ -83,6 +83,7 @@ impl CrackPreset {
             ("profile.rim_width", profile.rim_width, 0.0..=0.2),
             ("profile.rim_depth", profile.rim_depth, 0.0..=1.0),
             ("profile.faintest", profile.faintest, 0.0..=1.0),
+            ("profile.ragged", profile.ragged, 0.0..=0.05),
             ("steps_per_second", self.steps_per_second, 0.0..=10_000.0),
         ] {
             within(name, value, &range)?;

@@ -1,6 +1,6 @@
 //! The cross-section of a crack in texels, for the stamps; `raster/stamp.rs` has the formula.
 
-use super::Profile;
+use super::{Profile, ragged};
 
 /// Half widths are clamped to this many texels, far above the diagonal of the largest surface.
 pub(super) const MAX_RADIUS: f32 = 1.0e6;
@@ -45,7 +45,14 @@ pub(super) struct Section {
     rim_least: f32,
     /// Increase of a thin line's share of depth per texel of half width.
     strength: f32,
+    /// Largest deviation of an edge, texels.
+    ragged: f32,
+    /// Shares of that deviation by texel, see [`ragged::at`]; empty if edges are smooth.
+    pub(super) tile: &'static [i8],
 }
+
+/// Largest deviation of an edge, as a share of the half width above half a texel.
+const DEVIATION: f32 = 0.6;
 
 /// The cross-section at a known half width.
 #[derive(Clone, Copy)]
@@ -59,12 +66,15 @@ pub(super) struct Cut {
     /// 65535, less for lines thinner than a texel.
     pub(super) scale: f32,
     pub(super) rim_depth: f32,
+    /// Deviation of the edge for one step of the tile.
+    pub(super) swing: f32,
 }
 
 impl Section {
     pub(super) fn new(profile: &Profile, texels_per_unit: f32) -> Self {
         let full_width = max(clamped(profile.full_width * texels_per_unit, MAX_RADIUS), 1.0e-6);
         let rim = clamped(profile.rim_width * texels_per_unit, MAX_RADIUS);
+        let ragged = clamped(profile.ragged * texels_per_unit, MAX_RADIUS);
         Self {
             depth: clamped(profile.depth, 1.0),
             least: if profile.even_walls { 2.0 / full_width } else { 0.4 },
@@ -76,6 +86,8 @@ impl Section {
             strength: 2.0 / max(1.0 - clamped(profile.faintest, 1.0), 1.0e-3),
             rim_gain: 0.0,
             rim_least: 1.0,
+            ragged,
+            tile: if ragged > 0.0 { ragged::tile(ragged) } else { &[] },
         }
     }
 
@@ -99,6 +111,8 @@ impl Section {
             strength: 2.0,
             rim_gain: 0.0,
             rim_least: 1.0,
+            ragged: 0.0,
+            tile: &[],
         }
     }
 
@@ -113,12 +127,20 @@ impl Section {
             rim_reach: r + self.rim,
             scale: 65535.0 * min(self.strength * r, 1.0),
             rim_depth: self.rim_depth * min(self.rim_least + self.rim_gain * r, 1.0),
+            swing: self.swing(r) * (1.0 / 127.0),
         }
+    }
+
+    /// Largest deviation of an edge at half width `r`. It grows by less than `r`, so that a wider line is nowhere
+    /// less deep.
+    #[inline(always)]
+    fn swing(&self, r: f32) -> f32 {
+        min(self.ragged, DEVIATION * max(r - 0.5, 0.0))
     }
 
     /// Distance from the centre line beyond which nothing is drawn.
     pub(super) fn reach(&self, r: f32) -> f32 {
         let rim = if self.rim_depth > 0.0 { r + self.rim } else { 0.0 };
-        max(max(r, 0.5) + 0.5, rim)
+        max(max(r, 0.5) + 0.5, rim) + self.swing(r)
     }
 }

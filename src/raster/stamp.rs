@@ -17,6 +17,9 @@
 //! wide covers 0.3 texels of area (`faintest` 0) wherever it lies between the texel centres, and is never dotted. A
 //! pointed end fades out.
 //!
+//! With ragged edges `d` is increased by `min(ragged, 0.6 max(r - 1/2, 0))` times a random value in `-1..=1` of the
+//! texel.
+//!
 //! If a [plan](super::LayerPlan) says so, a line has only a share of that depth, by the light that it catches, and
 //! narrow lines have a fainter rim.
 //!
@@ -25,6 +28,7 @@
 use super::{
     DepthField, DirtyTiles, Profile, TexelRect,
     catch::Catch,
+    ragged,
     section::{MAX_RADIUS, Section, clamp01, clamped, max, min},
 };
 use crate::{
@@ -206,10 +210,13 @@ impl Capsule {
         vectorized(
             #[inline(always)]
             || match (self.r_gain != 0.0, section.rim_depth > 0.0) {
-                (false, false) => self.stamp_rows::<REPORT, false, false>(field, section, rect, changed),
-                (false, true) => self.stamp_rows::<REPORT, false, true>(field, section, rect, changed),
-                (true, false) => self.stamp_rows::<REPORT, true, false>(field, section, rect, changed),
-                (true, true) => self.stamp_rows::<REPORT, true, true>(field, section, rect, changed),
+                _ if !section.tile.is_empty() => {
+                    self.stamp_rows::<REPORT, true, true, true>(field, section, rect, changed);
+                }
+                (false, false) => self.stamp_rows::<REPORT, false, false, false>(field, section, rect, changed),
+                (false, true) => self.stamp_rows::<REPORT, false, true, false>(field, section, rect, changed),
+                (true, false) => self.stamp_rows::<REPORT, true, false, false>(field, section, rect, changed),
+                (true, true) => self.stamp_rows::<REPORT, true, true, false>(field, section, rect, changed),
             },
         );
         rect
@@ -218,7 +225,7 @@ impl Capsule {
     /// Stamps row by row: blocks of [`LANES`] texels and at most one of half as many. A block may exceed `rect`: the
     /// values there are zero.
     #[inline(always)]
-    fn stamp_rows<const REPORT: bool, const TAPER: bool, const RIM: bool>(
+    fn stamp_rows<const REPORT: bool, const TAPER: bool, const RIM: bool, const RAGGED: bool>(
         &self,
         field: &mut DepthField,
         section: &Section,
@@ -231,7 +238,7 @@ impl Capsule {
         let width = field.depth.width();
         let blocks = (rect.size().x as usize).div_ceil(LANES);
         if blocks <= FEW_BLOCKS && blocks * LANES <= width {
-            self.stamp_blocks::<REPORT, TAPER, RIM>(field, section, rect, blocks, changed);
+            self.stamp_blocks::<REPORT, TAPER, RIM, RAGGED>(field, section, rect, blocks, changed);
             return;
         }
         let mut band = TexelRect::default();
@@ -264,15 +271,15 @@ impl Capsule {
             };
             let (blocks, rest) = field.depth.row_mut(y as usize)[x0..end].as_chunks_mut::<LANES>();
             for block in blocks {
-                add(x0, self.stamp_block::<LANES, TAPER, RIM>(block, section, x0 as f32, dy));
+                add(x0, self.stamp_block::<LANES, TAPER, RIM, RAGGED>(block, section, (x0, y as usize), dy));
                 x0 += LANES;
             }
             if let Ok(block) = <&mut [u16; LANES / 2]>::try_from(&mut *rest) {
-                add(x0, self.stamp_block::<{ LANES / 2 }, TAPER, RIM>(block, section, x0 as f32, dy));
+                add(x0, self.stamp_block::<{ LANES / 2 }, TAPER, RIM, RAGGED>(block, section, (x0, y as usize), dy));
             } else if !rest.is_empty() {
                 let mut block = [0; LANES];
                 block[..rest.len()].copy_from_slice(rest);
-                add(x0, self.stamp_block::<LANES, TAPER, RIM>(&mut block, section, x0 as f32, dy));
+                add(x0, self.stamp_block::<LANES, TAPER, RIM, RAGGED>(&mut block, section, (x0, y as usize), dy));
                 rest.copy_from_slice(&block[..rest.len()]);
             }
             if REPORT && span.start < span.end {
@@ -290,7 +297,7 @@ impl Capsule {
 
     /// The same number of blocks in every row: for few blocks the branches are predictable then.
     #[inline(always)]
-    fn stamp_blocks<const REPORT: bool, const TAPER: bool, const RIM: bool>(
+    fn stamp_blocks<const REPORT: bool, const TAPER: bool, const RIM: bool, const RAGGED: bool>(
         &self,
         field: &mut DepthField,
         section: &Section,
@@ -309,8 +316,8 @@ impl Capsule {
                 let row = &mut field.depth.row_mut(y as usize)[x0..x0 + blocks * LANES];
                 let mut change = 0;
                 for (k, block) in row.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
-                    let x = (x0 + k * LANES) as f32;
-                    change |= self.stamp_block::<LANES, TAPER, RIM>(block, section, x, dy) << (k * LANES);
+                    let at = (x0 + k * LANES, y as usize);
+                    change |= self.stamp_block::<LANES, TAPER, RIM, RAGGED>(block, section, at, dy) << (k * LANES);
                 }
                 columns |= change;
                 rows |= u32::from(change != 0) << i;
@@ -326,21 +333,29 @@ impl Capsule {
 
     /// Returns the changed texels, one bit each.
     #[inline(always)]
-    fn stamp_block<const N: usize, const TAPER: bool, const RIM: bool>(
+    fn stamp_block<const N: usize, const TAPER: bool, const RIM: bool, const RAGGED: bool>(
         &self,
         block: &mut [u16; N],
         section: &Section,
-        x: f32,
+        (x, y): (usize, usize),
         dy: f32,
     ) -> u32 {
         let uniform = section.cut(self.r_from);
+        let mut uneven = [0.0; N];
+        if RAGGED {
+            uneven.iter_mut().zip(ragged::at(section.tile, x, y)).for_each(|(to, step)| *to = f32::from(*step));
+        }
+        let x = x as f32;
         let mut values = [0.0; N];
         for i in 0..N {
             let dx = (x + CENTRES[i]) - self.from.x;
             let t = clamp01((dx * self.along.x + dy * self.along.y) * self.inv_len_sq);
             let (across_x, across_y) = (dx - t * self.along.x, dy - t * self.along.y);
-            let distance = (across_x * across_x + across_y * across_y).sqrt();
+            let mut distance = (across_x * across_x + across_y * across_y).sqrt();
             let cut = if TAPER { section.cut(self.r_from + t * self.r_gain) } else { uniform };
+            if RAGGED {
+                distance += cut.swing * uneven[i];
+            }
             let mut value = cut.peak * clamp01((cut.reach - distance) * cut.inv_wall);
             if RIM {
                 value = max(value, cut.rim_depth * clamp01((cut.rim_reach - distance) * section.inv_rim));

@@ -150,7 +150,13 @@ impl Shape<'_> {
             let turned = Vec2::new(0.8 * at.x - 0.6 * at.y, 0.6 * at.x + 0.8 * at.y);
             let pit = noise(seed ^ draws::SAND_PITS, 0.42 * turned.x, 0.42 * turned.y);
             let sand = 0.3 * sand + 0.5 * pit - 0.9 * (-pit - 0.55).max(0.0);
-            bumps += 0.6 * self.rough * pit * fade;
+            // Lumps of several sizes, each turned against the others.
+            let lump = |k: u32, size: f32, [x, y]: [f32; 2]| {
+                noise(seed ^ k, (x * at.x - y * at.y) / size, (y * at.x + x * at.y) / size)
+            };
+            let lumps = 0.9 * lump(draws::LUMPS, 3.1 * self.grain, [0.92, 0.39])
+                + 0.45 * lump(draws::LUMPS + 1, 1.3 * self.grain, [0.6, 0.8]);
+            bumps += self.rough * (lumps + 0.16 * pit) * fade;
             // Less of the sky lights the floor next to the wall.
             let corner = (1.0 - within / (1.3 * self.depth).max(1.0)).clamp(0.0, 1.0);
             let mut tone = 0.30 * coarse + 0.16 * plate + (0.5 - 0.2 * stones) * sand

@@ -4,9 +4,12 @@ use super::{
     crushed::CrushedZone,
     draws,
     noise::draw,
-    outline::{FAR_OUT, Outline},
+    outline::{FAR_OUT, Outline, WIDEST},
 };
-use crate::math::{mix, ops};
+use crate::{
+    math::{mix, ops},
+    pattern::Bricks,
+};
 use glam::Vec2;
 
 /// Length of shadows, in units of the height of the caster, and how dark they are.
@@ -24,10 +27,46 @@ pub(super) struct Chip {
     pub(super) ink: f32,
 }
 
+/// A part of a brick's face.
+pub(super) struct Face {
+    outline: Outline,
+    /// Opposite corners of the brick.
+    min: Vec2,
+    max: Vec2,
+}
+
+/// Sizes of the parts that come off the bricks around a hit, in radii.
+const FACES: [f32; 4] = [1.9, 1.1, 0.75, 0.45];
+
+impl Face {
+    /// Those of the bricks around a hit, each larger than the next.
+    fn all(bricks: &Bricks, crushed: &CrushedZone, radius: f32, seed: u32) -> Vec<Self> {
+        let bricks: Vec<[Vec2; 2]> = bricks.iter().copied().filter(|[min, max]| min != max).collect();
+        let first = (draw(seed, -3, 1) * bricks.len() as f32) as usize;
+        let face = |k: usize| {
+            let [min, max] = bricks[(first + k) % bricks.len()];
+            let seed = mix_in(seed, 0x400 + k as u32);
+            let most = radius * crushed.reach / (1.0 + WIDEST * crushed.ragged);
+            let size = (FACES[k] * radius * (0.85 + 0.3 * draw(seed, -3, 2))).min(0.75 * most);
+            let near = Vec2::ZERO.clamp(min, max);
+            let centre = near + (0.5 * (min + max) - near).clamp_length_max(0.3 * size);
+            Self { outline: Outline::new(centre, size, 6, 2, 0.8 * crushed.ragged, seed), min, max }
+        };
+        (0..bricks.len()).map(face).collect()
+    }
+
+    fn within(&self, at: Vec2) -> f32 {
+        let beside = (at - self.min).min(self.max - at);
+        self.outline.within(at).min(beside.min_element())
+    }
+}
+
 /// Broken-off pieces and where they lie; positions relative to the hit, texels.
 pub(super) struct Broken {
     /// The crater and the flakes around it.
     pub(super) off: Vec<Outline>,
+    /// Faces of bricks that have come off, in place of those: each is the part of an outline that lies in its brick.
+    pub(super) faces: Vec<Face>,
     pub(super) basin: Option<Outline>,
     pub(super) chips: Vec<Chip>,
     /// Strokes between two places; the first end is the wide one.
@@ -37,7 +76,7 @@ pub(super) struct Broken {
 }
 
 impl Broken {
-    pub(super) fn new(crushed: &CrushedZone, unit: f32, radius: f32, grain: f32, seed: u32) -> Self {
+    pub(super) fn new(crushed: &CrushedZone, unit: f32, radius: f32, grain: f32, seed: u32, bricks: &Bricks) -> Self {
         let CrushedZone { ragged, reach, fall, .. } = *crushed;
         // The root of the energy.
         let more = radius / (crushed.radius * unit).max(1.0e-3);
@@ -63,6 +102,10 @@ impl Broken {
             let centre = ops::unit(std::f32::consts::TAU * pick(k, 3)) * far.max(0.0);
             let seed = mix_in(seed, 0x100 + k);
             off.push(shape(Outline::new(centre, size, 5, levels, 0.6, seed), 0x340 + k));
+        }
+        let faces = Face::all(bricks, crushed, radius, seed ^ draws::FACES);
+        if !faces.is_empty() {
+            off.clear();
         }
         let basin = (crushed.basin > 0.0).then(|| {
             let centre = Vec2::new(pick(0, 4) - 0.5, pick(0, 5) - 0.3) * (0.3 * radius);
@@ -106,7 +149,7 @@ impl Broken {
                 [near, near - way * (1.0 + 1.1 * pick(k, 24)) * outline.reach]
             })
             .collect();
-        Self { off, basin, chips, ticks, thick: 0.8 * crushed.outline * unit, pit }
+        Self { off, faces, basin, chips, ticks, thick: 0.8 * crushed.outline * unit, pit }
     }
 
     /// Drops the pieces that do not reach into a rectangle, texels from the hit.
@@ -116,12 +159,14 @@ impl Broken {
             nearest.distance_squared(outline.centre) <= (outline.reach + beyond) * (outline.reach + beyond)
         };
         self.off.retain(|outline| is_near(outline, 3.0 + LONG_SHADOW.max(SHADOW) * depth));
+        self.faces.retain(|face| is_near(&face.outline, 3.0 + LONG_SHADOW.max(SHADOW) * depth));
         self.chips.retain(|chip| is_near(&chip.outline, 2.0 + chip.outline.reach));
     }
 
     /// Distance of a place from the edge of the broken-off area; positive inside.
     pub(super) fn within(&self, at: Vec2) -> f32 {
-        self.off.iter().map(|outline| outline.within(at)).fold(-FAR_OUT, f32::max)
+        let off = self.off.iter().map(|outline| outline.within(at));
+        off.chain(self.faces.iter().map(|face| face.within(at))).fold(-FAR_OUT, f32::max)
     }
 }
 

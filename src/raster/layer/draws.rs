@@ -23,6 +23,9 @@ pub(super) const BROAD_TONE: u32 = 0x5F;
 pub(super) const SAND: u32 = 0x57;
 pub(super) const SAND_PITS: u32 = 0x65;
 
+/// Its lumps, of two sizes.
+pub(super) const LUMPS: u32 = 0x68;
+
 /// Rounded stones in it.
 pub(super) const STONES: u32 = 0x5C;
 
@@ -39,6 +42,9 @@ pub(super) const CRUMBS: u32 = 0x80;
 
 /// Sizes and positions of the pieces that break off.
 pub(super) const PIECES: u32 = 0x0B0E;
+
+/// Which bricks break off.
+pub(super) const FACES: u32 = 0x63;
 
 /// Outlines: of the crater, its basin, a drawn pit, and a hole with its broken edge.
 pub(super) const CRATER: u32 = 0x60;

@@ -8,6 +8,7 @@ use super::{
     noise::{hash, lattice, noise},
     outline::{Outline, WIDEST},
 };
+use crate::pattern::Bricks;
 use glam::Vec2;
 
 /// Direction to the light: the upper left.
@@ -43,7 +44,7 @@ impl Place {
 }
 
 impl<'a> Shape<'a> {
-    pub(super) fn new(crushed: &'a CrushedZone, unit: f32, radius: f32, seed: u32) -> Self {
+    pub(super) fn new(crushed: &'a CrushedZone, unit: f32, radius: f32, seed: u32, bricks: &Bricks) -> Self {
         let grain = (crushed.grain * unit).max(1.0);
         Self {
             crushed,
@@ -52,7 +53,7 @@ impl<'a> Shape<'a> {
             rough: crushed.rough * unit,
             grain,
             jag: crushed.jag * unit,
-            broken: crushed.broken.then(|| Broken::new(crushed, unit, radius, grain, seed)),
+            broken: crushed.broken.then(|| Broken::new(crushed, unit, radius, grain, seed, bricks)),
             hole: (crushed.hole > 0.0 && crushed.edge > 0.0).then(|| {
                 let hole = crushed.hole * radius;
                 // Within the extent of other outlines.
@@ -169,15 +170,16 @@ impl<'a> Shape<'a> {
         let radius = self.grain * (0.35 + 0.85 * draw(21) * draw(22));
         let middle = (cell + 0.5) * side + (Vec2::new(draw(23), draw(24)) - 0.5) * (side - 2.0 * radius).max(0.0);
         let off = at - middle;
-        // An angular one: a square on its corner, turned.
+        // A turned square without its corners.
         let turn = Vec2::new(draw(25) - 0.5, draw(26) - 0.5).normalize_or(Vec2::X);
         let (u, v) = (off.dot(turn).abs(), off.perp_dot(turn).abs());
-        let far = (0.75 * u + 0.75 * v).max(u.max(v)) / radius;
+        let far = (0.58 * (u + v)).max(u.max(1.2 * v)) / radius;
         let inside = ((1.0 - far) * radius + 0.5).clamp(0.0, 1.0);
         if inside > 0.0 {
             place.height += 0.9 * radius * (1.0 - far).clamp(0.0, 0.6);
-            place.pale = place.pale.max(self.crushed.pale.max(0.4) * inside);
-            place.shade += (0.5 * draw(27) - 0.25) * inside;
+            let pale = self.crushed.pale.max(0.4) * (0.45 + 0.55 * draw(28));
+            place.pale = place.pale.max(pale * inside);
+            place.shade += (0.9 * draw(27) - 0.55) * inside;
         }
     }
 }

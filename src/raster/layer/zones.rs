@@ -10,7 +10,7 @@ use super::{
 use crate::{
     Grid,
     math::mix,
-    pattern::{Strike, SurfaceFrame},
+    pattern::{Bricks, Strike, SurfaceFrame},
     raster::TexelRect,
 };
 use glam::{UVec2, Vec2};
@@ -26,6 +26,8 @@ struct Zone {
     pos: Vec2,
     energy: f32,
     bounds: TexelRect,
+    /// Relative to `pos`, texels.
+    bricks: Bricks,
 }
 
 /// At most this many zones are drawn on one tile, the first ones: more make no visible difference.
@@ -228,10 +230,11 @@ impl CrushedField {
             let pos = self.frame.to_texel(strike.pos);
             let CrushedZone { reach, flake, ragged, .. } = self.crushed;
             let radius = self.radius(energy) * reach.max(flake).max(1.0 + WIDEST * ragged);
+            let bricks = strike.bricks.map(|corners| corners.map(|corner| self.frame.to_texel(corner) - pos));
             let limit = self.frame.size().as_vec2();
             let min = (pos - radius - 2.0).floor().clamp(Vec2::ZERO, limit).as_uvec2();
             let max = (pos + radius + 2.0).ceil().clamp(Vec2::ZERO, limit).as_uvec2();
-            Zone { pos, energy, bounds: TexelRect { min, max } }
+            Zone { pos, energy, bounds: TexelRect { min, max }, bricks }
         });
         let before = std::mem::replace(&mut self.zones[index], zone);
         if before != zone {
@@ -258,7 +261,7 @@ impl CrushedField {
         self.used += usize::from(slot.is_none());
         let texels = slot.get_or_insert_with(|| Box::new([Spot::NONE; (TILE * TILE) as usize]));
         let seed = self.seed ^ index.wrapping_mul(0x9E37_79B1);
-        let mut shape = Shape::new(&self.crushed, self.frame.texels_per_unit(), radius, seed);
+        let mut shape = Shape::new(&self.crushed, self.frame.texels_per_unit(), radius, seed, &zone.bricks);
         if let Some(broken) = &mut shape.broken {
             broken.keep_near(rect.min.as_vec2() - zone.pos, rect.max.as_vec2() - zone.pos, shape.depth);
         }
@@ -437,7 +440,10 @@ impl Shape<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{math::Rng, pattern::Timeline};
+    use crate::{
+        math::Rng,
+        pattern::{NO_BRICKS, Timeline},
+    };
 
     /// Hits here and there, some of which merge with earlier ones and come long after them.
     fn timeline(rng: &mut Rng) -> Timeline {
@@ -448,10 +454,10 @@ mod tests {
             let pos = |impact: usize| 0.2 + 0.6 * Vec2::new((impact % 4) as f32, (impact / 4) as f32) / 4.0;
             if rng.range(0.0, 1.0) < 0.4 && !energies.is_empty() {
                 let impact = rng.range(0.0, energies.len() as f32) as usize % energies.len();
-                timeline.strike(impact as u32, pos(impact), energies[impact], energies[impact] + energy);
+                timeline.strike(impact as u32, (pos(impact), NO_BRICKS), energies[impact], energies[impact] + energy);
                 energies[impact] += energy;
             } else {
-                timeline.strike(energies.len() as u32, pos(energies.len()), 0.0, energy);
+                timeline.strike(energies.len() as u32, (pos(energies.len()), NO_BRICKS), 0.0, energy);
                 energies.push(energy);
             }
         }
@@ -507,7 +513,7 @@ mod tests {
         let frame = SurfaceFrame::new(UVec2::splat(512)).unwrap();
         let mut field = CrushedField::new(&CrushedZone { radius: 0.2, ..CrushedZone::DEFAULT }, frame, 1);
         let mut timeline = Timeline::default();
-        timeline.strike(0, Vec2::new(0.3, 0.6), 0.0, 1.0);
+        timeline.strike(0, (Vec2::new(0.3, 0.6), NO_BRICKS), 0.0, 1.0);
         field.follow(timeline.strikes(), timeline.strikes());
         let mut last = 0.0;
         loop {
@@ -532,7 +538,7 @@ mod tests {
             let crushed = CrushedZone { broken: true, basin: 0.6, depth: 0.02, radius: 0.1, ..CrushedZone::DEFAULT };
             let mut field = CrushedField::new(&crushed, frame, seed);
             let mut timeline = Timeline::default();
-            timeline.strike(0, Vec2::splat(0.5), 0.0, 1.0);
+            timeline.strike(0, (Vec2::splat(0.5), NO_BRICKS), 0.0, 1.0);
             field.follow(timeline.strikes(), timeline.strikes());
             field.draw_some(usize::MAX, None, &mut Vec::new());
             let mut row = [Spot::default(); 256];

@@ -27,6 +27,7 @@ fn random_profile(rng: &mut Rng) -> Profile {
         rim_depth: rng.unit(),
         faintest: if below(rng, 2) == 0 { 0.0 } else { rng.unit() },
         even_walls: below(rng, 4) == 0,
+        ragged: if below(rng, 2) == 0 { 0.0 } else { 0.05 * rng.unit() },
     }
 }
 
@@ -48,7 +49,11 @@ fn reference(field: &DepthField, profile: &Profile, path: &SegmentPath, x: u32, 
     let (a, b) = (from.pos.as_dvec2() * unit, to.pos.as_dvec2() * unit);
     let t = ((texel - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0);
     let width = f64::from(from.width) + t * (f64::from(to.width) - f64::from(from.width));
-    let (d, r) = (texel.distance(a + (b - a) * t), 0.5 * width * unit);
+    let r = 0.5 * width * unit;
+    let most = f64::from(profile.ragged) * unit;
+    let uneven =
+        if most > 0.0 { f64::from(ragged::at(ragged::tile(most as f32), x as usize, y as usize)[0]) } else { 0.0 };
+    let d = texel.distance(a + (b - a) * t) + uneven / 127.0 * most.min(0.6 * (r - 0.5).max(0.0));
     let full = f64::from(profile.full_width);
     let share =
         if profile.even_walls { (1.0 + r) * 2.0 / (full * unit) } else { (0.4 + 0.6 * width / full).clamp(0.4, 1.0) };
@@ -146,7 +151,7 @@ fn hairlines_are_as_strong_as_they_are_wide_and_never_dotted() {
 fn order_does_not_matter_and_wider_never_lowers() {
     let mut rng = Rng::new(2);
     let empty = field([120, 90]);
-    let profile = Profile { rim_width: 0.03, rim_depth: 0.3, ..Profile::DEFAULT };
+    let profile = Profile { rim_width: 0.03, rim_depth: 0.3, ragged: 0.02, ..Profile::DEFAULT };
     let paths: Vec<_> = (0..40).map(|_| random_piece(&mut rng, &empty)).collect();
     let (mut forward, mut backward) = (empty.clone(), empty.clone());
     paths.iter().for_each(|path| _ = stamp_path(&mut forward, &profile, path));
@@ -171,14 +176,15 @@ fn the_loop_for_even_widths_gives_the_bits_of_the_tapered_one() {
     for _ in 0..200 {
         let mut general = field([80, 61]);
         let mut special = general.clone();
-        let section = Section::new(&random_profile(&mut rng), general.frame.texels_per_unit());
+        let section =
+            Section::new(&Profile { ragged: 0.0, ..random_profile(&mut rng) }, general.frame.texels_per_unit());
         let points = random_piece(&mut rng, &general).points().to_vec();
         let to = PathPoint { width: points[0].width, ..points[1] };
         let Some(capsule) = Capsule::clipped(&general.frame, general.depth.size(), &section, points[0], to) else {
             continue;
         };
         let rect = capsule.stamp::<false>(&mut special, &section, &mut |_| {});
-        capsule.stamp_rows::<false, true, true>(&mut general, &section, rect, &mut |_| {});
+        capsule.stamp_rows::<false, true, true, false>(&mut general, &section, rect, &mut |_| {});
         assert_eq!(general, special);
     }
 }
@@ -192,9 +198,9 @@ fn wild_numbers_neither_hang_nor_panic() {
         let mut field = field([33, 17]);
         let mut point = || PathPoint { pos: Vec2::new(pick(), pick()), width: pick() };
         let path = SegmentPath::straight(point(), point());
-        let [depth, full_width, wall, rim_width, rim_depth, faintest] = std::array::from_fn(|_| pick());
+        let [depth, full_width, wall, rim_width, rim_depth, faintest, ragged] = std::array::from_fn(|_| pick());
         let even_walls = depth > 0.0;
-        let profile = Profile { depth, full_width, wall, rim_width, rim_depth, faintest, even_walls };
+        let profile = Profile { depth, full_width, wall, rim_width, rim_depth, faintest, even_walls, ragged };
         stamp_path(&mut field, &profile, &path);
         stamp_dot(&mut field, Vec2::new(pick(), pick()), pick(), pick());
     }
