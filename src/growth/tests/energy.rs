@@ -4,9 +4,10 @@ use crate::{
     CrackPreset,
     growth::CrackGrowth,
     math::Rng,
-    pattern::{NO_PARENT, SegmentId},
+    pattern::{Moment, NO_PARENT, SegmentId, SurfaceFrame},
+    raster::{DepthField, Spot},
 };
-use glam::Vec2;
+use glam::{UVec2, Vec2};
 
 /// The presets for which this is promised: those whose cracks run from the hit. Not tempered glass, of which the whole pane goes at once.
 const PRESETS: [&str; 4] = ["concrete", "plaster", "brick", "toon"];
@@ -82,6 +83,68 @@ fn more_energy_is_more_of_everything() {
             }
         }
         assert!(before.0 >= 2.5 * at_one.0 && before.1 >= 2.5 * at_one.1, "{name}: {before:?} from {at_one:?}");
+    }
+}
+
+/// Area of what a hit crushes: holes, drawn pits, and texels that are clearly deeper or paler than before. Of tempered
+/// glass only the hole counts.
+fn crushed(name: &str, seed: u64, energy: f32) -> f32 {
+    let preset = CrackPreset::named(name).unwrap();
+    let mut rng = Rng::new(seed).stream("where");
+    let pos = Vec2::new(rng.range(0.3, 0.7), rng.range(0.3, 0.7));
+    let mut growth = CrackGrowth::new(preset.growth.clone(), Vec2::ONE, seed).unwrap();
+    growth.hit(pos, energy);
+    let mut field = DepthField::new(SurfaceFrame::new(UVec2::splat(512)).unwrap());
+    field.set_layers(preset.look.layer(seed));
+    field.show_layers(growth.network(), growth.timeline(), Moment::after(1), &mut Vec::new());
+    let zone = field.layer().crushed().unwrap();
+    let counts = |spot: &&Spot| {
+        let is_hole = spot.dark > 127 || spot.pit[0] > 0;
+        is_hole || (name != "tempered_glass" && (spot.pale > 60 || spot.deep > 60))
+    };
+    let mut row = [Spot::default(); 512];
+    let in_row = |y: u32| {
+        zone.read(0, y, &mut row);
+        row.iter().filter(counts).count()
+    };
+    (0..512).map(in_row).sum::<usize>() as f32
+}
+
+#[test]
+fn more_energy_crushes_more() {
+    for name in CrackPreset::NAMES {
+        let areas = [0.5, 1.0, 2.0, 4.0, 8.0]
+            .map(|energy| median((0..SEEDS).map(|seed| crushed(name, seed, energy)).collect()));
+        println!("{name}: {areas:?} texels crushed");
+        assert!(areas.windows(2).all(|pair| pair[1] > pair[0]), "{name}: {areas:?}");
+        assert!(areas[4] >= 2.5 * areas[1], "{name}: {areas:?}");
+    }
+}
+
+/// From root to tip the width of an arm of concrete falls to a third at least.
+#[test]
+fn arms_of_concrete_are_three_times_as_wide_at_the_root() {
+    for seed in 0..SEEDS {
+        let growth = grown("concrete", seed, Vec2::new(0.45, 0.55), 1.0);
+        let nodes = growth.network().nodes();
+        // For each arm its root and the node furthest along it.
+        let mut arms = Vec::<(usize, usize)>::new();
+        for (node, root) in (0..nodes.len()).filter_map(|node| {
+            let mut root = node;
+            while nodes[root].parent != 0 {
+                root = nodes.get(nodes[root].parent as usize).map(|_| nodes[root].parent as usize)?;
+            }
+            Some((node, root))
+        }) {
+            match arms.iter_mut().find(|arm| arm.0 == root) {
+                Some(arm) if nodes[arm.1].generation < nodes[node].generation => arm.1 = node,
+                Some(_) => {}
+                None => arms.push((root, node)),
+            }
+        }
+        arms.retain(|(root, tip)| nodes[*tip].generation > nodes[*root].generation + 8);
+        let ratios: Vec<f32> = arms.iter().map(|(root, tip)| nodes[*root].width / nodes[*tip].width).collect();
+        assert!(ratios.len() >= 3 && median(ratios.clone()) >= 3.0, "{seed}: {ratios:?}");
     }
 }
 

@@ -86,3 +86,36 @@ fn cracks_keep_to_the_joints_of_a_picture() {
         assert!(courses > 1000.0);
     }
 }
+
+/// The bricks around a place where joints meet: no joint runs through them, and there is one along each side.
+#[test]
+fn bricks_lie_between_joints() {
+    let mut counts = [0; 5];
+    for seed in 0..60 {
+        let mut rng = Rng::new(seed).stream("bricks");
+        let extent = Vec2::new(1.0, rng.range(0.6, 1.5));
+        let growth = CrackGrowth::new(CrackPreset::BRICK.growth, extent, seed).unwrap();
+        let masonry = growth.masonry.as_ref().unwrap();
+        let joint = masonry.joint();
+        let pos = masonry.nearest(Vec2::new(rng.unit(), rng.unit()) * extent).unwrap();
+        let bricks: Vec<[Vec2; 2]> = masonry.bricks(pos).into_iter().filter(|[min, max]| min != max).collect();
+        counts[bricks.len()] += 1;
+        for [min, max] in bricks {
+            assert!(min.cmplt(max).all() && pos.clamp(min, max).distance(pos) < 0.75 * joint, "{min} {max} at {pos}");
+            let middle = 0.5 * (min + max);
+            let (low, high) = (min - 0.5 * joint, max + 0.5 * joint);
+            let steps = |from: f32, to: f32| {
+                let count = ((to - from) / 1e-4) as u32;
+                (0..=count).map(move |k| from + (to - from) * k as f32 / count as f32)
+            };
+            assert!(steps(min.x, max.x).all(|x| !masonry.is_in_joint(Vec2::new(x, middle.y))), "seed {seed}");
+            assert!(steps(min.y, max.y).all(|y| !masonry.is_in_joint(Vec2::new(middle.x, y))), "seed {seed}");
+            let sides = [low.with_y(middle.y), high.with_y(middle.y), low.with_x(middle.x), high.with_x(middle.x)];
+            for side in sides {
+                let is_border = side.min(extent - side).min_element() < 1e-4;
+                assert!(is_border || masonry.is_in_joint(side), "seed {seed}: {side}");
+            }
+        }
+    }
+    assert!(counts[0] == 0 && counts[3] > 20, "{counts:?}");
+}
