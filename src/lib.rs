@@ -12,6 +12,7 @@
 //! - [`raster`]: draws networks into a depth field.
 //! - [`voronoi`]: cracks that draw a picture, all at once.
 //! - [`blend`]: blends the relief of cracks into normal maps.
+//! - [`strands`]: cracks that follow a guidance field, made of small images.
 //! - [`paint`]: turns a base picture and a depth field into diffuse, normal and depth textures.
 //! - [`preset`]: materials: how cracks grow, their cross-section and their look.
 //! - [`shatter`]: the pieces into which cracks cut a surface, and how they fall.
@@ -39,6 +40,7 @@ pub mod pattern;
 pub mod preset;
 pub mod raster;
 pub mod shatter;
+pub mod strands;
 pub mod voronoi;
 
 #[cfg(feature = "bevy")]

@@ -10,7 +10,9 @@
 
 mod blend;
 mod figures;
+mod figures_strands;
 mod gallery;
+mod grounds;
 mod growth;
 mod guided;
 mod ink;
@@ -22,6 +24,7 @@ mod painting;
 mod pictures;
 mod shatter;
 mod sheet;
+mod strands;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -46,8 +49,12 @@ enum Method {
     Guided(Box<guided::Options>),
     /// The figures of the paper on image-guided fracture, made again.
     FiguresMould(figures::Options),
+    /// The figures of the paper on primitives along a guidance field, made again.
+    FiguresStrands(figures_strands::Options),
     /// Words drawn by cracks and read back, to see how legible they are.
     Legible(legible::Options),
+    /// Single cracks that follow a direction: primitives along a guidance field.
+    Strands(Box<strands::Options>),
     /// Shards: the pieces into which the cracks cut the picture.
     Shatter(Box<shatter::Options>),
 }
@@ -58,7 +65,9 @@ fn main() -> ExitCode {
         Method::Growth(options) => growth::bake(&options).map(drop),
         Method::Guided(options) => guided::bake(&options),
         Method::FiguresMould(options) => figures::bake(&options),
+        Method::FiguresStrands(options) => figures_strands::bake(&options),
         Method::Legible(options) => legible::bake(&options),
+        Method::Strands(options) => strands::bake(&options),
         Method::Shatter(options) => shatter::bake(&options),
     };
     match done {

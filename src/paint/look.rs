@@ -99,7 +99,7 @@ pub struct Look {
 
 impl Look {
     /// The names that [`named`](Self::named) knows.
-    pub const NAMES: [&'static str; 15] = [
+    pub const NAMES: [&'static str; 18] = [
         "groove",
         "frosted",
         "toon",
@@ -108,6 +108,9 @@ impl Look {
         "laminated_glass",
         "ice",
         "concrete",
+        "asphalt",
+        "marble",
+        "sand",
         "plaster",
         "brick",
         "clay",
@@ -129,6 +132,9 @@ impl Look {
             "laminated_glass" => Some(Self::LAMINATED_GLASS),
             "ice" => Some(Self::ICE),
             "concrete" => Some(Self::CONCRETE),
+            "asphalt" => Some(Self::ASPHALT),
+            "marble" => Some(Self::MARBLE),
+            "sand" => Some(Self::SAND),
             "plaster" => Some(Self::PLASTER),
             "brick" => Some(Self::BRICK),
             "clay" => Some(Self::CLAY),

@@ -210,6 +210,46 @@ impl Look {
         ..Self::GROOVE
     };
 
+    /// Asphalt: dark gaps between stones, with a worn edge.
+    pub const ASPHALT: Self = Self {
+        ramp: Cow::Borrowed(&[
+            stop(0.10, [0.62, 0.60, 0.58], 0.15),
+            stop(0.40, [0.36, 0.34, 0.32], 0.90),
+            stop(1.0, [0.12, 0.11, 0.10], 1.0),
+        ]),
+        glint: 0.8,
+        relief: 0.008,
+        grain: 0.2,
+        ..Self::GROOVE
+    };
+
+    /// Marble: fine, sharp lines.
+    pub const MARBLE: Self = Self {
+        ramp: Cow::Borrowed(&[
+            stop(0.15, [0.70, 0.68, 0.64], 0.25),
+            stop(0.50, [0.42, 0.39, 0.35], 0.90),
+            stop(1.0, [0.20, 0.18, 0.16], 1.0),
+        ]),
+        glint: 0.9,
+        relief: 0.004,
+        grain: 0.05,
+        ..Self::GROOVE
+    };
+
+    /// Sand: wide, deep gaps with crumbling walls.
+    pub const SAND: Self = Self {
+        ramp: Cow::Borrowed(&[
+            stop(0.14, [0.92, 0.88, 0.82], 0.10),
+            stop(0.35, [0.66, 0.60, 0.54], 0.75),
+            stop(0.75, [0.38, 0.32, 0.27], 0.95),
+            stop(1.0, [0.17, 0.13, 0.10], 1.0),
+        ]),
+        glint: 1.5,
+        relief: 0.022,
+                grain: 0.25,
+        ..Self::GROOVE
+    };
+
     /// Plaster: thin cracks, and flakes that have come off around the hit and show the darker coat below.
     pub const PLASTER: Self = Self {
         ramp: Cow::Borrowed(&[
