@@ -145,7 +145,12 @@ fn dot(panel: &mut RgbaImage, at: Vec2, radius: i32, color: Rgba<u8>) {
     for dy in -radius..=radius {
         for dx in -radius..=radius {
             let (x, y) = (at.x as i32 + dx, at.y as i32 + dy);
-            if dx * dx + dy * dy <= radius * radius && x >= 0 && y >= 0 && x < panel.width() as i32 && y < panel.height() as i32 {
+            if dx * dx + dy * dy <= radius * radius
+                && x >= 0
+                && y >= 0
+                && x < panel.width() as i32
+                && y < panel.height() as i32
+            {
                 panel.put_pixel(x as u32, y as u32, color);
             }
         }
@@ -218,12 +223,9 @@ fn fields(studio: &Studio, out: &std::path::Path) -> Done<()> {
     // The other kinds of directions, which the paper leaves to the user.
     let center = Vec2::splat(0.5);
     let drawn = (0..=20).map(|i| Vec2::new(0.1 + 0.04 * i as f32, 0.5 + 0.25 * (0.5 * i as f32).sin())).collect();
-    let kinds = [
-        Directions::Swirl { center, turn: 0.4 * PI },
-        Directions::Along { line: drawn, hold: 0.12 },
-        DOWN,
-    ];
-    let panels: Done<Vec<_>> = kinds.into_iter().map(|kind| Ok(studio.arrows(&studio.field(kind, 5.0, 0.2)?))).collect();
+    let kinds = [Directions::Swirl { center, turn: 0.4 * PI }, Directions::Along { line: drawn, hold: 0.12 }, DOWN];
+    let panels: Done<Vec<_>> =
+        kinds.into_iter().map(|kind| Ok(studio.arrows(&studio.field(kind, 5.0, 0.2)?))).collect();
     Ok(sheet(&[panels?]).save(out.join("fig_06_more_fields.png"))?)
 }
 
@@ -269,7 +271,8 @@ fn branches(studio: &Studio, out: &std::path::Path) -> Done<()> {
     sheet(&[panels?]).save(out.join("fig_12_branching.png"))?;
     let strands = grown(1.3)?;
     let network = strands.network(&Material::Asphalt.primitives())?;
-    let [parent, child] = [params.frequency, params.child_frequency].map(|frequency| studio.field(EAST, frequency, params.rotation));
+    let [parent, child] =
+        [params.frequency, params.child_frequency].map(|frequency| studio.field(EAST, frequency, params.rotation));
     let panels = vec![
         studio.paths(studio.white(), &strands),
         studio.heights(&network, &setting.profile),
@@ -309,14 +312,18 @@ fn parameters(studio: &Studio, out: &std::path::Path) -> Done<()> {
         let [diffuse, _] = studio.painted(&network, &setting, &base)?;
         Ok(diffuse)
     };
-    let usual = StrandParams { depth: 0, propagation: Propagation::Costs, rotation: 0.5, inertia: 0.3, ..setting.params };
+    let usual =
+        StrandParams { depth: 0, propagation: Propagation::Costs, rotation: 0.5, inertia: 0.3, ..setting.params };
     let frequencies = [2.0, 6.0, 14.0];
     let colors: Done<Vec<_>> = frequencies.iter().map(|&f| Ok(studio.colors(&studio.field(DOWN, f, 0.5)?))).collect();
-    let cracks: Done<Vec<_>> = frequencies.iter().map(|&frequency| panel(StrandParams { frequency, ..usual })).collect();
+    let cracks: Done<Vec<_>> =
+        frequencies.iter().map(|&frequency| panel(StrandParams { frequency, ..usual })).collect();
     sheet(&[colors?, cracks?]).save(out.join("fig_17_frequency.png"))?;
-    let turns: Done<Vec<_>> = [0.1, 0.45, 0.85].map(|rotation| panel(StrandParams { rotation, ..usual })).into_iter().collect();
+    let turns: Done<Vec<_>> =
+        [0.1, 0.45, 0.85].map(|rotation| panel(StrandParams { rotation, ..usual })).into_iter().collect();
     let usual = StrandParams { propagation: Propagation::Continuous, frequency: 10.0, ..usual };
-    let inert: Done<Vec<_>> = [0.1, 0.9, 0.975].map(|inertia| panel(StrandParams { inertia, ..usual })).into_iter().collect();
+    let inert: Done<Vec<_>> =
+        [0.1, 0.9, 0.975].map(|inertia| panel(StrandParams { inertia, ..usual })).into_iter().collect();
     Ok(sheet(&[turns?, inert?]).save(out.join("fig_18_rotation_and_inertia.png"))?)
 }
 
@@ -351,7 +358,15 @@ fn primitives(studio: &Studio, out: &std::path::Path) -> Done<()> {
     let mut panels = Vec::new();
     for (name, lanes, tile) in [("asphalt", 4, 0.075), ("sand", 3, 0.15)] {
         let setting = material(name).ok_or(name)?;
-        let params = StrandParams { lanes, tile, depth: 0, repulsion: 0.0, rotation: 0.2, width: 0.6 * setting.params.width, ..setting.params };
+        let params = StrandParams {
+            lanes,
+            tile,
+            depth: 0,
+            repulsion: 0.0,
+            rotation: 0.2,
+            width: 0.6 * setting.params.width,
+            ..setting.params
+        };
         let start = [StrandStart { pos: Vec2::new(0.02, 0.5), direction: Some(Vec2::X) }];
         let network = studio.strands(&params, EAST, &start)?.network(&params.material.nets())?;
         let [diffuse, _] = studio.painted(&network, &setting, &ground(name, studio.frame.size())?)?;
@@ -359,7 +374,8 @@ fn primitives(studio: &Studio, out: &std::path::Path) -> Done<()> {
     }
     // On a picture of the crate, along a drawn line.
     let setting = material("asphalt").ok_or("asphalt")?;
-    let line: Vec<Vec2> = (0..=20).map(|i| Vec2::new(0.06 + 0.044 * i as f32, 0.5 + 0.25 * (0.3 * i as f32).sin())).collect();
+    let line: Vec<Vec2> =
+        (0..=20).map(|i| Vec2::new(0.06 + 0.044 * i as f32, 0.5 + 0.25 * (0.3 * i as f32).sin())).collect();
     let start = [StrandStart::new(line[0])];
     let strands = studio.strands(&setting.params, Directions::Along { line, hold: 0.1 }, &start)?;
     let network = strands.network(&Material::Asphalt.primitives())?;

@@ -20,7 +20,8 @@ pub(crate) fn ground(name: &str, size: UVec2) -> Result<RgbaImage, Box<dyn Error
 fn each(size: UVec2, mut color: impl FnMut(Vec2) -> [f32; 3]) -> RgbaImage {
     let unit = size.min_element() as f32;
     RgbaImage::from_fn(size.x, size.y, |x, y| {
-        let [r, g, b] = color(Vec2::new(x as f32 + 0.5, y as f32 + 0.5) / unit).map(|c| (c.clamp(0.0, 1.0) * 255.0) as u8);
+        let [r, g, b] =
+            color(Vec2::new(x as f32 + 0.5, y as f32 + 0.5) / unit).map(|c| (c.clamp(0.0, 1.0) * 255.0) as u8);
         Rgba([r, g, b, 255])
     })
 }
@@ -54,7 +55,8 @@ fn asphalt(size: UVec2) -> RgbaImage {
                 let off = turn.rotate(Vec2::new(x as f32, y as f32) + 0.5 - at) / squash;
                 if off.length() < radius && x >= 0 && y >= 0 && x < size.x as i32 && y < size.y as i32 {
                     let shade = light * (1.0 - 0.25 * (off.x + off.y) / (2.0 * radius));
-                    let texel = [shade + warm, shade + 0.3 * warm, shade - warm].map(|c| (c.clamp(0.0, 1.0) * 255.0) as u8);
+                    let texel =
+                        [shade + warm, shade + 0.3 * warm, shade - warm].map(|c| (c.clamp(0.0, 1.0) * 255.0) as u8);
                     picture.put_pixel(x as u32, y as u32, Rgba([texel[0], texel[1], texel[2], 255]));
                 }
             }

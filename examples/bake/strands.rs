@@ -96,14 +96,8 @@ pub(crate) fn material(name: &str) -> Option<Setting> {
             Profile { full_width: 0.008, wall: 0.5, rim_width: 0.002, rim_depth: 0.14, ..Profile::DEFAULT },
             Look::ASPHALT,
         ),
-        "marble" => {
-            (StrandParams::MARBLE, Profile { full_width: 0.004, wall: 0.4, ..Profile::DEFAULT }, Look::MARBLE)
-        }
-        "sand" => (
-            StrandParams::SAND,
-            Profile { full_width: 0.028, wall: 0.85, ..Profile::DEFAULT },
-            Look::SAND,
-        ),
+        "marble" => (StrandParams::MARBLE, Profile { full_width: 0.004, wall: 0.4, ..Profile::DEFAULT }, Look::MARBLE),
+        "sand" => (StrandParams::SAND, Profile { full_width: 0.028, wall: 0.85, ..Profile::DEFAULT }, Look::SAND),
         _ => return None,
     };
     Some(Setting { params, profile, look })
@@ -124,7 +118,8 @@ fn heights(picture: &RgbaImage) -> Grid<u16> {
         let light = (u32::from(texel[0]) + u32::from(texel[1]) + u32::from(texel[2])) / 3;
         257 * (255 - light as u16)
     };
-    Grid::from_vec(picture.dimensions().into(), picture.pixels().map(depth).collect()).unwrap_or(Grid::new(UVec2::ZERO, 0))
+    Grid::from_vec(picture.dimensions().into(), picture.pixels().map(depth).collect())
+        .unwrap_or(Grid::new(UVec2::ZERO, 0))
 }
 
 pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
@@ -136,11 +131,8 @@ pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
         setting.params.propagation = Propagation::Costs;
     }
     let frame = SurfaceFrame::new(options.size)?;
-    let starts: Vec<_> = options
-        .start
-        .iter()
-        .map(|&(uv, direction)| StrandStart { pos: frame.uv_to_pos(uv), direction })
-        .collect();
+    let starts: Vec<_> =
+        options.start.iter().map(|&(uv, direction)| StrandStart { pos: frame.uv_to_pos(uv), direction }).collect();
     let mut primitives = Vec::new();
     for path in &options.primitive {
         let image = heights(&read_picture(path)?);

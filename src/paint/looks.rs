@@ -246,7 +246,7 @@ impl Look {
         ]),
         glint: 1.5,
         relief: 0.022,
-                grain: 0.25,
+        grain: 0.25,
         ..Self::GROOVE
     };
 

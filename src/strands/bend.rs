@@ -55,7 +55,12 @@ struct Bender<'a> {
 }
 
 /// The primitives along each strand.
-pub(super) fn place(params: &StrandParams, primitives: &[Primitive], strands: &[Strand], seed: u64) -> Vec<Vec<Placed>> {
+pub(super) fn place(
+    params: &StrandParams,
+    primitives: &[Primitive],
+    strands: &[Strand],
+    seed: u64,
+) -> Vec<Vec<Placed>> {
     let every = params.tile_steps() as usize;
     let rng = Rng::new(seed).stream("primitives");
     (0u64..)
@@ -116,7 +121,9 @@ impl Bender<'_> {
         let lanes = self.params.lanes as usize;
         let middle = (lanes - 1) / 2;
         let first = match self.strands[strand].parent {
-            Some((parent, point)) => self.joints[parent as usize].get((point / self.params.tile_steps()) as usize).copied(),
+            Some((parent, point)) => {
+                self.joints[parent as usize].get((point / self.params.tile_steps()) as usize).copied()
+            }
             None => None,
         };
         // The node at which each lane goes on.
@@ -140,13 +147,20 @@ impl Bender<'_> {
     }
 
     /// Adds a primitive; returns the nodes at its tail and at its right connector.
-    fn add_primitive(&mut self, strand: usize, tile: &Placed, (head, beside): (u32, Option<u32>), is_middle: bool) -> (u32, Option<u32>) {
+    fn add_primitive(
+        &mut self,
+        strand: usize,
+        tile: &Placed,
+        (head, beside): (u32, Option<u32>),
+        is_middle: bool,
+    ) -> (u32, Option<u32>) {
         let primitives = self.primitives;
         let primitive = &primitives[tile.primitive];
         let mean = primitive.mean_width();
         // A mirrored primitive has its left connector on the right.
         let sides = primitive.sides().map(|[left, right]| if tile.side > 0.0 { [left, right] } else { [right, left] });
-        let [outer_left, outer_right] = [tile.lane == -0.5 * (self.params.lanes - 1) as f32, tile.lane == 0.5 * (self.params.lanes - 1) as f32];
+        let [outer_left, outer_right] =
+            [tile.lane == -0.5 * (self.params.lanes - 1) as f32, tile.lane == 0.5 * (self.params.lanes - 1) as f32];
         let mut ids: Vec<Vec<u32>> = Vec::new();
         let mut right = None;
         for (number, PrimitiveLine { from, points }) in (0u32..).zip(primitive.lines()) {
@@ -267,7 +281,8 @@ impl Bender<'_> {
         let Some(&(_, end)) = self.mains[strand].last() else { return };
         let pos = self.nodes[end as usize].pos;
         let reach = self.params.tile_steps() as f32;
-        let near = self.mains[other as usize].iter().filter(|(s, node)| (s - point as f32).abs() <= reach && *node != end);
+        let near =
+            self.mains[other as usize].iter().filter(|(s, node)| (s - point as f32).abs() <= reach && *node != end);
         let distance = |&(_, node): &(f32, u32)| self.nodes[node as usize].pos.distance_squared(pos);
         if let Some(&(_, near)) = near.min_by(|a, b| distance(a).total_cmp(&distance(b)).then(a.1.cmp(&b.1))) {
             self.link(end, near);

@@ -6,7 +6,7 @@ use glam::Vec2;
 /// The points of a path without the stairs of the lattice.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Course {
-    points: Vec<Vec2>,
+    pub(super) points: Vec<Vec2>,
     /// Number of points over which normals are taken, on either side.
     reach: f32,
 }
@@ -18,6 +18,9 @@ impl Course {
             Propagation::Costs => 7,
             Propagation::Continuous => 2,
         };
+        // Strands that keep their distance must not lose it.
+        let room = (params.repulsion / (3.0 * params.step)) as usize;
+        let half = if room > 0 { half.min(room.max(2)) } else { half };
         let sums: Vec<Vec2> = std::iter::once(Vec2::ZERO)
             .chain(path.iter().scan(Vec2::ZERO, |sum, point| {
                 *sum += *point - path[0];

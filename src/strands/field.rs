@@ -224,7 +224,13 @@ impl GuidanceField {
             }
         }
         directions.validate()?;
-        Ok(Self { directions: Arc::new(directions), frequency, rotation, extent, noise: Turbulence::new(seed, "guidance") })
+        Ok(Self {
+            directions: Arc::new(directions),
+            frequency,
+            rotation,
+            extent,
+            noise: Turbulence::new(seed, "guidance"),
+        })
     }
 
     /// The same directions turned by other noise.

@@ -4,7 +4,7 @@ use super::{
     error::StrandError,
     field::{Directions, GuidanceField, Turbulence},
     near::{Mark, Near},
-    params::StrandParams,
+    params::{Propagation, StrandParams},
     walk::Walk,
 };
 use crate::math::{hash_unit, mix};
@@ -26,6 +26,9 @@ const BRANCH_FREQUENCY: f32 = 7.0;
 /// A tip moves towards a strand, and meets it, if the cosine of the angle to it is above this; otherwise it is turned
 /// away.
 const STEEP: f32 = 0.75;
+
+/// Strands that touch may be close within this many repulsion distances of where they do.
+const JOINT: f32 = 1.6;
 
 /// A branch shorter than this many repulsion distances is taken back if it returns to its start.
 const SHORT: f32 = 8.0;
@@ -65,6 +68,8 @@ pub enum StrandEnd {
         /// Index of the point of that strand at which it ends.
         point: u32,
     },
+    /// It has come close to a place where other strands meet already.
+    Stopped,
     /// It would have started too close to another strand or come back at once, and has one point only.
     Crowded,
 }
@@ -141,7 +146,8 @@ impl Paths {
                 return Err(StrandError::StartOutside { index, x, y, width: extent.x, height: extent.y });
             }
         }
-        let child = |depth: u32| field.with_noise(params.child_frequency, mix(seed ^ CHILD_FIELD ^ u64::from(depth) << 32));
+        let child =
+            |depth: u32| field.with_noise(params.child_frequency, mix(seed ^ CHILD_FIELD ^ u64::from(depth) << 32));
         let fields = std::iter::once(field.clone()).chain((1..=params.depth).map(child)).collect();
         let reach = 2.0 * params.repulsion;
         let mut paths = Self {
@@ -192,7 +198,7 @@ impl Paths {
             self.joints[other as usize].push((strand, pos));
         }
         // A branch needs room to grow.
-        let room = if parent.is_some() { f32::INFINITY } else { self.meeting() };
+        let room = if parent.is_some() { JOINT * self.params.repulsion } else { self.meeting() };
         let is_crowded = self.nearest(strand, 0, pos).is_some_and(|(distance, _)| distance <= room);
         if is_crowded && parent.is_some() {
             self.joints.pop();
@@ -240,20 +246,22 @@ impl Paths {
             Contact::None => {}
             Contact::Turned(turned) => v = turned,
             Contact::Meets(mark) => {
-                if !self.take_back(tip.strand, mark) {
-                    self.join(tip.strand, mark);
-                }
+                self.meet(tip.strand, mark);
                 return false;
             }
         }
         tip.walk.advance(v);
         let next = tip.walk.pos();
         let inside = next.clamp(Vec2::ZERO, self.extent);
-        self.push(tip.strand, if inside == next { next } else { self.on_border(pos, next) });
         if inside != next {
+            let end = self.on_border(pos, next);
+            if end != pos {
+                self.push(tip.strand, end);
+            }
             self.strands[index].end = StrandEnd::Border;
             return false;
         }
+        self.push(tip.strand, next);
         tip.left -= 1;
         self.branch(tip, number + 1, next);
         true
@@ -280,7 +288,8 @@ impl Paths {
         for axis in 0..2 {
             let wall = if to[axis] < 0.0 { 0.0 } else { self.extent[axis] };
             // Exactly on the border, whatever the rounding.
-            if (to[axis] < 0.0 || to[axis] > self.extent[axis]) && (pos[axis] - wall).abs() < 1.0e-4 * self.params.step {
+            if (to[axis] < 0.0 || to[axis] > self.extent[axis]) && (pos[axis] - wall).abs() < 1.0e-4 * self.params.step
+            {
                 pos[axis] = wall;
             }
         }
@@ -297,21 +306,22 @@ impl Paths {
     /// The nearest point of another strand within twice the repulsion distance of a tip, joints aside.
     fn nearest(&self, strand: u32, number: u32, pos: Vec2) -> Option<(f32, Mark)> {
         let (near, repulsion, step) = (self.near.as_ref()?, self.params.repulsion, self.params.step);
-        let joint = 1.6 * repulsion + 2.0 * step;
+        let joint = JOINT * repulsion + 2.0 * step;
         let own = (4.0 * repulsion / step) as u32 + 8;
         let mut best: Option<(f32, Mark)> = None;
         near.within(pos, 2.0 * repulsion, |mark, distance_sq| {
             // A strand that was taken back has left its marks.
             let is_there = (mark.number as usize) < self.strands[mark.strand as usize].points.len();
-            let is_nearer = best.is_none_or(|(least, at)| {
-                (distance_sq, mark.strand, mark.number) < (least, at.strand, at.number)
-            });
-            let is_free = is_there && is_nearer && match mark.strand == strand {
-                true => number.abs_diff(mark.number) > own,
-                false => !self.joints[strand as usize].iter().any(|(other, at)| {
-                    *other == mark.strand && at.distance(pos) <= joint && at.distance(mark.pos) <= joint
-                }),
-            };
+            let is_nearer =
+                best.is_none_or(|(least, at)| (distance_sq, mark.strand, mark.number) < (least, at.strand, at.number));
+            let is_free = is_there
+                && is_nearer
+                && match mark.strand == strand {
+                    true => number.abs_diff(mark.number) > own,
+                    false => !self.joints[strand as usize].iter().any(|(other, at)| {
+                        *other == mark.strand && at.distance(pos) <= joint && at.distance(mark.pos) <= joint
+                    }),
+                };
             if is_free {
                 best = Some((distance_sq, mark));
             }
@@ -321,7 +331,20 @@ impl Paths {
 
     /// Distance at which strands meet.
     fn meeting(&self) -> f32 {
-        self.params.repulsion + 1.5 * self.params.step
+        // The smooth curve of a path of four directions cuts corners.
+        let slack = if self.params.propagation == Propagation::Costs { 4.0 } else { 2.0 };
+        1.05 * self.params.repulsion + slack * self.params.step
+    }
+
+    /// Whether a third strand is close to where a strand would join another one.
+    fn is_busy(&self, strand: u32, mark: Mark) -> bool {
+        let Some(near) = &self.near else { return false };
+        let mut is_busy = false;
+        near.within(mark.pos, self.params.repulsion, |third, _| {
+            let is_there = (third.number as usize) < self.strands[third.strand as usize].points.len();
+            is_busy |= is_there && third.strand != mark.strand && third.strand != strand;
+        });
+        is_busy
     }
 
     /// What a tip has to heed: strands closer than the repulsion distance are met, others repel it.
@@ -339,6 +362,18 @@ impl Paths {
         Contact::Turned(aside.normalize_or(v))
     }
 
+    /// Ends a strand that has come close to another one.
+    fn meet(&mut self, strand: u32, mark: Mark) {
+        if self.take_back(strand, mark) {
+            return;
+        }
+        if self.is_busy(strand, mark) {
+            self.strands[strand as usize].end = StrandEnd::Stopped;
+        } else {
+            self.join(strand, mark);
+        }
+    }
+
     /// Removes a branch that would come back at once to where it started, or to itself; returns whether it did.
     fn take_back(&mut self, strand: u32, mark: Mark) -> bool {
         let index = strand as usize;
@@ -347,7 +382,9 @@ impl Paths {
         let is_back = mark.strand == strand || points[0].distance(mark.pos) < SHORT * self.params.repulsion;
         // Others may have joined it: all that it touches must be where it starts.
         let is_alone = self.joints[index].iter().all(|(_, at)| *at == points[0]);
-        let is_own = mark.strand == *parent || mark.strand == strand || self.strands[mark.strand as usize].points[0] == points[0];
+        let is_own = mark.strand == *parent
+            || mark.strand == strand
+            || self.strands[mark.strand as usize].points[0] == points[0];
         let is_taken = is_short && is_back && is_own && is_alone;
         if is_taken {
             let strand = &mut self.strands[index];
@@ -361,7 +398,8 @@ impl Paths {
     /// Ends a strand at a point of another one, in a straight line.
     fn join(&mut self, strand: u32, mark: Mark) {
         let index = strand as usize;
-        let (from, heading) = (self.strands[index].points[self.strands[index].points.len() - 1], self.heading(index, Vec2::ZERO));
+        let (from, heading) =
+            (self.strands[index].points[self.strands[index].points.len() - 1], self.heading(index, Vec2::ZERO));
         let pieces = (from.distance(mark.pos) / self.params.step).ceil().max(1.0) as u32;
         for piece in 1..pieces {
             self.push(strand, from.lerp(mark.pos, piece as f32 / pieces as f32));

@@ -98,16 +98,17 @@ impl Material {
                 hair_width: 0.5,
             },
             Self::Sand => Style {
-                bend: 0.09,
-                finer: 0.7,
+                pieces: 64,
+                bend: 0.1,
+                finer: 0.74,
                 kinks: 0.25,
                 width: 0.085,
                 uneven: 0.55,
-                even: 0.75,
-                hairs: 4,
+                even: 0.6,
+                hairs: 8,
                 hair: (0.05, 0.1),
                 angle: (0.8, 1.5),
-                hair_width: 0.9,
+                hair_width: 0.75,
                 ..asphalt
             },
             Self::Glass => Style {
@@ -223,7 +224,7 @@ impl Style {
             let free = (8.0 * along.min(1.0 - along)).min(1.0);
             let slow = 0.5 * ops::sin(phase + 7.0 * along);
             let uneven = 1.0 + free * self.uneven * (slow + rough);
-            PrimitivePoint { at, width: self.width * share * uneven.max(0.25) * (1.0 - narrows * along) }
+            PrimitivePoint { at, width: self.width * share * uneven.max(0.3) * (1.0 - narrows * along) }
         });
         points.collect()
     }
@@ -255,7 +256,7 @@ fn draw(lines: &[PrimitiveLine], size: UVec2) -> Grid<u16> {
     let middle = Vec2::new(0.5 * frame.extent().x, 0.0);
     let mut field = DepthField::new(frame);
     let width = lines[0].points.iter().map(|point| point.width).fold(0.0, f32::max) * unit;
-    let profile = Profile { full_width: width.max(1.0e-4), wall: 0.7, ..Profile::DEFAULT };
+    let profile = Profile { full_width: (0.6 * width).max(1.0e-4), wall: 0.5, faintest: 1.0, ..Profile::DEFAULT };
     let place = |point: &PrimitivePoint| PathPoint { pos: middle + point.at * unit, width: point.width * unit };
     for line in lines {
         let begin = line.from.and_then(|(line, point)| lines.get(line as usize)?.points.get(point as usize));

@@ -187,10 +187,13 @@ fn sin_cos_pi(x: f32) -> (f32, f32) {
     let half = x * std::f32::consts::FRAC_PI_2;
     let sq = half * half;
     let sin = half
-        * (1.0 + sq * (-1.0 / 6.0 + sq * (1.0 / 120.0 + sq * (-1.0 / 5040.0 + sq * (1.0 / 362_880.0 - sq / 39_916_800.0)))));
+        * (1.0
+            + sq * (-1.0 / 6.0
+                + sq * (1.0 / 120.0 + sq * (-1.0 / 5040.0 + sq * (1.0 / 362_880.0 - sq / 39_916_800.0)))));
     let cos = 1.0
         + sq * (-0.5
-            + sq * (1.0 / 24.0 + sq * (-1.0 / 720.0 + sq * (1.0 / 40_320.0 + sq * (-1.0 / 3_628_800.0 + sq / 479_001_600.0)))));
+            + sq * (1.0 / 24.0
+                + sq * (-1.0 / 720.0 + sq * (1.0 / 40_320.0 + sq * (-1.0 / 3_628_800.0 + sq / 479_001_600.0)))));
     (2.0 * sin * cos, cos * cos - sin * sin)
 }
 
@@ -207,7 +210,8 @@ mod tests {
             let frame = SurfaceFrame::new([40 + rng.next_u32() % 90, 30 + rng.next_u32() % 60].into()).unwrap();
             let center = Vec2::new(rng.range(-0.5, 1.5), rng.range(-0.5, 1.5));
             let line = (0..5).map(|_| Vec2::new(rng.unit(), rng.unit())).collect();
-            let painted = Grid::from_vec([3, 2].into(), (0..6).map(|_| [rng.signed(), rng.signed()]).collect()).unwrap();
+            let painted =
+                Grid::from_vec([3, 2].into(), (0..6).map(|_| [rng.signed(), rng.signed()]).collect()).unwrap();
             let directions = [
                 Directions::Linear(center),
                 Directions::Radial { center },

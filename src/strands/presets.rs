@@ -9,7 +9,7 @@ impl StrandParams {
     /// Asphalt: jagged cracks of uneven width, with medium rotation and inertia.
     pub const ASPHALT: Self = Self {
         frequency: 4.0,
-        rotation: 0.45,
+        rotation: 0.4,
         inertia: 0.6,
         propagation: Propagation::Continuous,
         length: 2.0,
@@ -30,7 +30,7 @@ impl StrandParams {
     /// Marble: thin, sharp cracks that change their direction often; higher rotation, low inertia.
     pub const MARBLE: Self = Self {
         frequency: 9.0,
-        rotation: 0.65,
+        rotation: 0.55,
         inertia: 0.15,
         propagation: Propagation::Continuous,
         length: 1.8,

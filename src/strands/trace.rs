@@ -73,7 +73,8 @@ impl Tracer {
     fn new(image: &Grid<u16>) -> Self {
         let (width, height) = (image.width(), image.height());
         let n = width * height;
-        let mut inside: Vec<u32> = image.as_slice().iter().map(|&depth| if depth > DEEP { NONE / 2 } else { 0 }).collect();
+        let mut inside: Vec<u32> =
+            image.as_slice().iter().map(|&depth| if depth > DEEP { NONE / 2 } else { 0 }).collect();
         // Distances by two passes with steps of 3 and 4; the crack goes on beyond the image.
         let mut pass = |i: usize, near: [Option<(usize, u32)>; 4]| {
             let least = near.into_iter().flatten().map(|(j, far)| inside[j].saturating_add(far)).min();
@@ -82,27 +83,42 @@ impl Tracer {
         for i in 0..n {
             let (x, y) = (i % width, i / width);
             let up = |is: bool, back: usize, far| (y > 0 && is).then(|| (i - back, far));
-            pass(i, [
-                (x > 0).then(|| (i - 1, 3)),
-                up(true, width, 3),
-                up(x > 0, width + 1, 4),
-                up(x + 1 < width, width - 1, 4),
-            ]);
+            pass(
+                i,
+                [
+                    (x > 0).then(|| (i - 1, 3)),
+                    up(true, width, 3),
+                    up(x > 0, width + 1, 4),
+                    up(x + 1 < width, width - 1, 4),
+                ],
+            );
         }
         for i in (0..n).rev() {
             let (x, y) = (i % width, i / width);
             let down = |is: bool, on: usize, far| (y + 1 < height && is).then(|| (i + on, far));
-            pass(i, [
-                (x + 1 < width).then(|| (i + 1, 3)),
-                down(true, width, 3),
-                down(x + 1 < width, width + 1, 4),
-                down(x > 0, width - 1, 4),
-            ]);
+            pass(
+                i,
+                [
+                    (x + 1 < width).then(|| (i + 1, 3)),
+                    down(true, width, 3),
+                    down(x + 1 < width, width + 1, 4),
+                    down(x > 0, width - 1, 4),
+                ],
+            );
         }
         // An image that is all crack has no edge.
         inside.iter_mut().for_each(|far| *far = (*far).min(3 * width.max(height) as u32));
         let (before, length) = (vec![NONE; n], vec![NONE; n]);
-        Self { width, height, inside, before, length, on_line: vec![None; n], is_covered: vec![false; n], lines: Vec::new() }
+        Self {
+            width,
+            height,
+            inside,
+            before,
+            length,
+            on_line: vec![None; n],
+            is_covered: vec![false; n],
+            lines: Vec::new(),
+        }
     }
 
     /// The texel of a side, given in order, at which the crack reaches its middle third.
@@ -215,7 +231,10 @@ impl Tracer {
         let mut out: Vec<PrimitiveLine> = Vec::new();
         for (index, (from, texels)) in (0u32..).zip(&self.lines) {
             let last = texels.len() - 1;
-            let mut line = PrimitiveLine { from: from.map(|(line, point)| (line, kept[line as usize][point as usize])), points: Vec::new() };
+            let mut line = PrimitiveLine {
+                from: from.map(|(line, point)| (line, kept[line as usize][point as usize])),
+                points: Vec::new(),
+            };
             let mut numbers = vec![0; texels.len()];
             for (i, number) in numbers.iter_mut().enumerate() {
                 let is_kept = i % every == 0 && (i + every <= last || i == 0) || i == last;
@@ -226,12 +245,15 @@ impl Tracer {
                 let reach = (every / 2).min(i).min(last - i);
                 let near = &texels[i - reach..=i + reach];
                 let mut at = near.iter().map(|&texel| place(texel)).sum::<Vec2>() / near.len() as f32;
-                let width = near.iter().map(|&texel| self.inside[texel as usize] as f32).sum::<f32>() / near.len() as f32;
+                let width =
+                    near.iter().map(|&texel| self.inside[texel as usize] as f32).sum::<f32>() / near.len() as f32;
                 if index == 0 && i == last {
                     at.y = self.height as f32;
                 } else if index == 0 && i == 0 {
                     at.y = 0.0;
-                } else if let Some(side) = sides.and_then(|sides| sides.iter().position(|&side| side == index)).filter(|_| i == last) {
+                } else if let Some(side) =
+                    sides.and_then(|sides| sides.iter().position(|&side| side == index)).filter(|_| i == last)
+                {
                     at = Vec2::new([0.0, self.width as f32][side], self.height as f32 * 0.5);
                 }
                 let at = (at - Vec2::new(0.5 * self.width as f32, 0.0)) / self.height as f32;
