@@ -7,7 +7,7 @@ use crate::{
     strands::{Setting, material, stamped},
 };
 use bevy_crack::{
-    math::Rng,
+    math::{Rng, ops},
     paint::LookTable,
     pattern::{Network, SurfaceFrame},
     raster::{DepthField, Profile},
@@ -222,7 +222,7 @@ fn fields(studio: &Studio, out: &std::path::Path) -> Done<()> {
     sheet(&rows).save(out.join("fig_06_fields.png"))?;
     // The other kinds of directions, which the paper leaves to the user.
     let center = Vec2::splat(0.5);
-    let drawn = (0..=20).map(|i| Vec2::new(0.1 + 0.04 * i as f32, 0.5 + 0.25 * (0.5 * i as f32).sin())).collect();
+    let drawn = (0..=20).map(|i| Vec2::new(0.1 + 0.04 * i as f32, 0.5 + 0.25 * ops::sin(0.5 * i as f32))).collect();
     let kinds = [Directions::Swirl { center, turn: 0.4 * PI }, Directions::Along { line: drawn, hold: 0.12 }, DOWN];
     let panels: Done<Vec<_>> =
         kinds.into_iter().map(|kind| Ok(studio.arrows(&studio.field(kind, 5.0, 0.2)?))).collect();
@@ -375,7 +375,7 @@ fn primitives(studio: &Studio, out: &std::path::Path) -> Done<()> {
     // On a picture of the crate, along a drawn line.
     let setting = material("asphalt").ok_or("asphalt")?;
     let line: Vec<Vec2> =
-        (0..=20).map(|i| Vec2::new(0.06 + 0.044 * i as f32, 0.5 + 0.25 * (0.3 * i as f32).sin())).collect();
+        (0..=20).map(|i| Vec2::new(0.06 + 0.044 * i as f32, 0.5 + 0.25 * ops::sin(0.3 * i as f32))).collect();
     let start = [StrandStart::new(line[0])];
     let strands = studio.strands(&setting.params, Directions::Along { line, hold: 0.1 }, &start)?;
     let network = strands.network(&Material::Asphalt.primitives())?;

@@ -1,7 +1,7 @@
 //! Pictures of grounds for strands: asphalt, marble, sand, and what else there is in `assets/textures`.
 
 use crate::{own::own_picture, painting::fitted, pictures::read_picture};
-use bevy_crack::math::Rng;
+use bevy_crack::math::{Rng, ops};
 use glam::{UVec2, Vec2};
 use image::{Rgba, RgbaImage};
 use noise::{Fbm, MultiFractal, NoiseFn, Perlin};
@@ -72,7 +72,7 @@ fn marble(size: UVec2) -> RgbaImage {
         let bent = at + 0.22 * Vec2::new(warp(at), warp(at + 7.3));
         let vein = |wide: f32, turn: Vec2, every: f32| {
             let wave = ((bent.dot(turn) * every) % 1.0 + 1.0) % 1.0;
-            (-((wave - 0.5) / wide).powi(2)).exp()
+            ops::exp(-((wave - 0.5) / wide).powi(2))
         };
         let veins = 0.55 * vein(0.05, Vec2::new(0.8, 0.6), 2.3) + 0.3 * vein(0.025, Vec2::new(0.5, -0.8), 3.7);
         let light = 0.90 - 0.20 * veins * (0.6 + cloud(at)).clamp(0.0, 1.2) + 0.05 * cloud(at) + 0.012 * fine(at);
@@ -85,7 +85,7 @@ fn sand(size: UVec2) -> RgbaImage {
     let mut rng = Rng::new(5);
     let (dune, warp, fine) = (clouds(6, 3, 2.0), clouds(7, 3, 4.0), clouds(8, 3, 60.0));
     each(size, |at| {
-        let ripple = ((at.y * 1.0 + 0.25 * at.x) * 70.0 + 9.0 * warp(at)).sin();
+        let ripple = ops::sin((at.y + 0.25 * at.x) * 70.0 + 9.0 * warp(at));
         let light = 0.70 + 0.07 * dune(at) + 0.018 * ripple + 0.06 * fine(at) + 0.09 * rng.signed() * rng.unit();
         [light * 1.04, light * 0.88, light * 0.66]
     })

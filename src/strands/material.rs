@@ -69,21 +69,20 @@ impl Material {
     pub const ALL: [Self; 5] = [Self::Asphalt, Self::Marble, Self::Sand, Self::Glass, Self::Clay];
 
     const fn style(self) -> Style {
-        let asphalt = Style {
-            pieces: 32,
-            bend: 0.11,
-            finer: 0.68,
-            kinks: 0.35,
-            width: 0.03,
-            uneven: 0.75,
-            even: 0.3,
-            hairs: 3,
-            hair: (0.05, 0.22),
-            angle: (0.6, 1.3),
-            hair_width: 0.45,
-        };
         match self {
-            Self::Asphalt => asphalt,
+            Self::Asphalt => Style {
+                pieces: 32,
+                bend: 0.11,
+                finer: 0.68,
+                kinks: 0.35,
+                width: 0.03,
+                uneven: 0.75,
+                even: 0.3,
+                hairs: 3,
+                hair: (0.05, 0.22),
+                angle: (0.6, 1.3),
+                hair_width: 0.45,
+            },
             Self::Marble => Style {
                 pieces: 16,
                 bend: 0.07,
@@ -109,7 +108,6 @@ impl Material {
                 hair: (0.05, 0.1),
                 angle: (0.8, 1.5),
                 hair_width: 0.75,
-                ..asphalt
             },
             Self::Glass => Style {
                 pieces: 16,
