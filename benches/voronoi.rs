@@ -121,9 +121,9 @@ fn steps(c: &mut Criterion) {
     }
 }
 
-/// StrokePairs: trial maps on a small lattice, then the map.
-fn astride(c: &mut Criterion) {
-    let mut group = c.benchmark_group("astride");
+/// Sites in pairs: trial maps on a small lattice, then the map.
+fn stroke_pairs(c: &mut Criterion) {
+    let mut group = c.benchmark_group("stroke pairs");
     group.sample_size(10);
     for side in [400, 2048] {
         let guides = vec![Guide::new(drawing(side, 1.0))];
@@ -148,5 +148,5 @@ fn distance(c: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, maps, steps, astride, distance);
+criterion_group!(benches, maps, steps, stroke_pairs, distance);
 criterion_main!(benches);

@@ -1,14 +1,11 @@
 //! Cracks in a surface with a normal map of its own, blended in each way, side by side.
 
-use crate::{
-    painting::fitted,
-    pictures::read_picture,
-    text::{FONT, draw_text},
-};
+use crate::{painting::fitted, pictures::read_picture};
 use bevy_crack::{
     blend::NormalBlending,
     paint::{BaseTexels, Look, LookTable, PaintTargets, correct_normals, paint_into},
     raster::{DepthField, TexelRect},
+    voronoi::{FONT, draw_text},
 };
 use glam::{UVec2, Vec3};
 use image::{

@@ -47,7 +47,7 @@ pub fn solve_poisson(grid: &mut Grid<f32>) -> Result<(), BlendError> {
 /// Finds a value that cannot be taken.
 pub(super) fn check(grid: &Grid<f32>) -> Result<(), BlendError> {
     // Largest first: a loop without a way out is vectorised.
-    let is_bad = |value: &f32| !(value.abs() <= MOST);
+    let is_bad = |value: &f32| value.is_nan() || value.abs() > MOST;
     if !grid.as_slice().iter().fold(false, |any, value| any | is_bad(value)) {
         return Ok(());
     }

@@ -273,8 +273,9 @@ fn corrections_are_those_of_a_direct_solve() {
         let (low, high) = touched.iter().fold((UVec2::MAX, UVec2::ZERO), |(a, b), at| (a.min(*at), b.max(*at + 1)));
         // The least rectangle, 31 texels more, up to a size with a fast transform.
         let solved = (high - low).map(|side| {
-            let is_fast =
-                |period: u32| [1, 3, 5, 9, 15].iter().any(|f| period % f == 0 && (period / f).is_power_of_two());
+            let is_fast = |period: u32| {
+                [1, 3, 5, 9, 15].iter().any(|f| period.is_multiple_of(*f) && (period / f).is_power_of_two())
+            };
             (side + 63..).find(|period| is_fast(*period)).unwrap() - 1
         });
         let min = low.as_ivec2() - ((solved - (high - low)) / 2).as_ivec2();

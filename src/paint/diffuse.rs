@@ -333,10 +333,10 @@ impl Block<'_> {
         }
         let mut depth = *self.depth;
         if look.shadow > 0.0 {
-            for i in 0..BLOCK {
+            for (i, depth) in depth.iter_mut().enumerate() {
                 let away = (self.x[i] + self.y[i]) * self.inv_len[i] * std::f32::consts::FRAC_1_SQRT_2;
-                let deeper = f32::from(depth[i]) * (1.0 + look.shadow * away);
-                depth[i] = if deeper < 65535.0 { deeper as i32 as u16 } else { u16::MAX };
+                let deeper = f32::from(*depth) * (1.0 + look.shadow * away);
+                *depth = if deeper < 65535.0 { deeper as i32 as u16 } else { u16::MAX };
             }
         }
         let mut between = [0.0; BLOCK];

@@ -95,7 +95,7 @@ mod tests {
                 let pos = Vec2::new((i % 256) as f32 + 0.5, (i / 256) as f32 + 0.5) / 256.0;
                 let along = ((pos - from).dot(to - from) / (to - from).length_squared()).clamp(0.0, 1.0);
                 let distance = (pos.distance(from.lerp(to, along)) - 0.5 * width).max(0.0);
-                let share = (-distance / modulation.fade).exp();
+                let share = f64::from(-distance / modulation.fade).exp() as f32;
                 for (channel, tone) in texel.iter().zip(modulation.tone) {
                     let wanted = base + (255.0 * tone - base) * share;
                     assert!((f32::from(*channel) - wanted).abs() < 3.0, "{channel}, not {wanted}, {distance} away");

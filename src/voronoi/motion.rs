@@ -47,7 +47,7 @@ impl SeamMotion {
     /// # Errors
     /// None: weights between two valid ones are valid. The type is that of [`VoronoiMap::set_gammas`].
     pub fn at(&mut self, share: f32) -> Result<Seams, VoronoiError> {
-        let share = share.max(0.0).min(1.0);
+        let share = if share.is_nan() { 0.0 } else { share.clamp(0.0, 1.0) };
         // Exactly the last weights at the end.
         let weights: Vec<f32> =
             self.from.iter().zip(&self.to).map(|(from, to)| from * (1.0 - share) + to * share).collect();

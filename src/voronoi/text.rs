@@ -4,7 +4,7 @@ use crate::Grid;
 use ab_glyph::{Font, FontRef, Glyph, PxScale, ScaleFont, point};
 use glam::{UVec2, Vec2};
 
-/// The font that ships with the crate, as the content of a TTF file: Open Sans ExtraBold, for languages in Latin letters. Strokes
+/// The font that ships with the crate, as the content of a TTF file: Open Sans Extra Bold, for languages in Latin letters. Strokes
 /// this wide are drawn well by cracks. Its licence is in `assets/CREDITS.md`.
 pub const FONT: &[u8] = include_bytes!("../../assets/fonts/open_sans_extra_bold.ttf");
 

@@ -31,11 +31,8 @@ fn presets_tile() {
             let network = grown(&CrackPreset::named(name).unwrap(), 1 + seed as u32 % 3, seed);
             let cuts = Cuts::from_network(&network).unwrap();
             for extend_cracks in [false, true] {
-                let shards = shatter(
-                    cuts.clone(),
-                    &ShatterParams { extend_cracks: extend_cracks, seed, ..ShatterParams::DEFAULT },
-                )
-                .unwrap();
+                let shards =
+                    shatter(cuts.clone(), &ShatterParams { extend_cracks, seed, ..ShatterParams::DEFAULT }).unwrap();
                 check_tiling(&shards);
                 if seed == 0 {
                     check_meshes(&shards, &mut Rng::new(1));
