@@ -159,13 +159,13 @@ impl VoronoiBake {
                 if end < height { Stage::Costs { y: end } } else { Stage::Sites }
             }
             Stage::Sites => self.lay_sites(),
-            Stage::StrokePairs(mut astride) => {
-                if astride.advance() {
-                    Stage::StrokePairs(astride)
+            Stage::StrokePairs(mut pairs) => {
+                if pairs.advance() {
+                    Stage::StrokePairs(pairs)
                 } else {
-                    self.map.strokes = Some(astride.report());
+                    self.map.strokes = Some(pairs.report());
                     let mut rng = Rng::new(self.seed).stream("sites");
-                    let points = astride.finish(self.map.frame.extent(), &mut rng);
+                    let points = pairs.finish(self.map.frame.extent(), &mut rng);
                     self.map.sites = points.into_iter().map(|point| texel(&self.map.frame, point)).collect();
                     self.first_level()
                 }
@@ -224,7 +224,7 @@ impl VoronoiBake {
             Stage::Guides { y } => 0.3 * rows(*y),
             Stage::Costs { y } => 0.3 + 0.1 * rows(*y),
             Stage::Sites => 0.4,
-            Stage::StrokePairs(astride) => 0.4 + 0.1 * astride.progress(),
+            Stage::StrokePairs(pairs) => 0.4 + 0.1 * pairs.progress(),
             Stage::Walls { .. } => level(1.0),
             Stage::Search => level(self.map.levels.last().map_or(0.0, Level::progress)),
             Stage::Seams(tracer) => 0.9 + 0.1 * tracer.progress(),
@@ -245,9 +245,9 @@ impl VoronoiBake {
     fn lay_sites(&mut self) -> Stage {
         let map = &mut self.map;
         if map.params.layout == SiteLayout::StrokePairs
-            && let Some(astride) = StrokePairs::new(&map.frame, &map.layers, map.params.sites as usize)
+            && let Some(pairs) = StrokePairs::new(&map.frame, &map.layers, map.params.sites as usize)
         {
-            return Stage::StrokePairs(Box::new(astride));
+            return Stage::StrokePairs(Box::new(pairs));
         }
         map.sites = sites(&map.params, &map.frame, self.seed);
         self.first_level()

@@ -18,7 +18,7 @@ const INK: u16 = 1 << 15;
 /// Guides whose strokes cover more than this share of the surface do not count as drawings.
 const MOST_INK: f32 = 0.7;
 
-/// Share of the sites that is laid astride strokes at first, and largest share after all gaps have been closed.
+/// Share of the sites that is laid on both sides of strokes at first, and largest share after all gaps have been closed.
 const AT_ONCE: f32 = 0.2;
 const IN_ALL: f32 = 0.85;
 
@@ -37,7 +37,7 @@ pub struct StrokeReport {
     pub covered: f32,
 }
 
-/// Lays sites astride the strokes, round by round.
+/// Lays sites on both sides of the strokes, round by round.
 pub(super) struct StrokePairs {
     size: UVec2,
     scale: f32,
@@ -123,7 +123,7 @@ impl StrokePairs {
             || self.round == 1 && !gaps.is_empty()
     }
 
-    /// All sites, pattern units: first those astride strokes, then the remaining ones evenly beside the strokes.
+    /// All sites, pattern units: first those beside strokes in pairs, then the remaining ones evenly beside the strokes.
     pub(super) fn finish(self, extent: Vec2, rng: &mut Rng) -> Vec<Vec2> {
         let points = self.sites.iter().map(|site| (site.as_vec2() + 0.5) / self.scale).collect();
         let beside = |point: Vec2| {
