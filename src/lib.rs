@@ -69,5 +69,6 @@ pub struct ReadmeExamples;
 #[doc = include_str!("../docs/presets.md")]
 #[doc = include_str!("../docs/shattering.md")]
 #[doc = include_str!("../docs/sprites.md")]
+#[doc = include_str!("../docs/strands.md")]
 #[doc = include_str!("../docs/walls_3d.md")]
 pub struct PageExamples;

@@ -144,6 +144,8 @@ impl Bender<'_> {
                 (heads[lane], beside) = (Some(tail), right);
             }
         }
+        // A branch may start where the strand ends.
+        self.joints[strand].extend(heads[middle]);
     }
 
     /// Adds a primitive; returns the nodes at its tail and at its right connector.
@@ -211,7 +213,7 @@ impl Bender<'_> {
         pos = inside;
         if at.x == 0.0 && tile.lane == 0.0 && (s == 0.0 || s == (of.points.len() - 1) as f32) {
             // Ends on the border stay there.
-            pos = self.courses[strand].at(s).0;
+            pos = self.courses[strand].at(s).0.clamp(Vec2::ZERO, self.extent);
         }
         let width = self.width_at(strand, s, pos) * width.unwrap_or(1.0);
         let before = self.nodes.get(parent as usize).copied();

@@ -358,8 +358,9 @@ impl Paths {
             return Contact::None;
         }
         let push = (2.0 * self.params.repulsion - distance) / self.params.repulsion;
-        let aside = v - away * v.dot(away).min(0.0) + away * push;
-        Contact::Turned(aside.normalize_or(v))
+        let aside = (v - away * v.dot(away).min(0.0) + away * push).normalize_or(v);
+        // Rather than turn back it goes to the other one.
+        if aside.dot(heading) < 0.0 { Contact::Meets(mark) } else { Contact::Turned(aside) }
     }
 
     /// Ends a strand that has come close to another one.

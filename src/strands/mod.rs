@@ -7,7 +7,7 @@
 //!
 //! This goes beyond the paper: strands keep [a distance](StrandParams::repulsion) or join in a T, primitives
 //! with connectors on four sides make [nets](StrandParams::lanes), paths can turn in any direction, and the result is a
-//! [`Network`], which grows, is painted and shatters like all other cracks.
+//! [`Network`](crate::pattern::Network), which grows, is painted and shatters like all other cracks.
 //!
 //! ```
 //! use bevy_crack::{growth::{CrackGrowth, GrowthParams}, strands::{Directions, StrandParams, StrandStart, Strands}};
