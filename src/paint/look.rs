@@ -89,7 +89,7 @@ pub struct Look {
     /// Light that cracks emit by their depth, in the format of [`ramp`](Self::ramp). It is written to the emissive
     /// map. Default nothing.
     pub glow: Cow<'static, [ColorStop]>,
-    /// How the slopes of cracks and the surface's own normal map become one; default
+    /// How the slopes of cracks and the surface's own normal map become one: `Plain`, `Whiteout` or `Poisson`; default
     /// [`Plain`](NormalBlending::Plain). It has no effect on a surface without a normal map of its own.
     pub normals: NormalBlending,
     /// Whether the cover of cracks makes a translucent picture opaque (glass panes). Fully transparent texels stay
