@@ -158,11 +158,11 @@ impl CrackPreset {
             inertia: 1.5,
             wander: 0.3,
             forks: 0.02,
-            roughness: 0.09,
+            roughness: 0.12,
             arrest: 0.06,
             variety: 0.0,
             courses: 0.0625,
-            distortion: 0.0036,
+            distortion: 0.0048,
             ..GrowthParams::DEFAULT
         },
         profile: Profile {

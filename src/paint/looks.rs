@@ -417,7 +417,7 @@ impl Look {
         full_rim: 0.02,
         facets: Some(Facets { tone: 0.15, tilt: 0.05, concavity: 0.20, fade: 0.38, ..Facets::DEFAULT }),
         crushed: Some(CrushedZone {
-            radius: 0.042,
+            radius: 0.036,
             ragged: 0.8,
             depth: 0.016,
             rough: 0.0045,
@@ -431,7 +431,7 @@ impl Look {
             broken: true,
             basin: 0.6,
             tint: 0.55,
-            bare: 0.75,
+            bare: 0.9,
             jag: 0.003,
             stones: 0.2,
             ..CrushedZone::DEFAULT
