@@ -33,9 +33,9 @@ mod surface;
 pub use api::{
     BakeProgress, CellClosed, CrackBaked, CrackBudget, CrackClock, CrackDrive, CrackError, CrackFailed, CrackFinished,
     CrackGuide, CrackHit, CrackMaps, CrackMaskSource, CrackResolution, CrackShards, CrackState, CrackStats,
-    CrackStatus, CrackSurface, CrackSystems, CrackTextures, CrackTip, CrackUploadStats, GravitySpace, GuideSource,
-    GuidedAppearance, GuidedCracks, HitPoint, PresetSource, Reassembled, Shard, ShardsError, ShatterCracks,
-    ShatterFailed, ShatterRequest, ShatterWhen, Shattered,
+    CrackStatus, CrackStrands, CrackSurface, CrackSystems, CrackTextures, CrackTip, CrackUploadStats, GravitySpace,
+    GuideSource, GuidedAppearance, GuidedCracks, HitPoint, PresetSource, Reassembled, Shard, ShardsError,
+    ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen, Shattered, StrandField,
 };
 #[cfg(feature = "2d")]
 pub use carrier::lit::{CrackLight2d, CrackLitMaterial, CrackLitUniform, MAX_LIGHTS};
@@ -55,9 +55,9 @@ pub mod prelude {
     pub use super::{
         BakeProgress, CellClosed, CrackBaked, CrackBudget, CrackClock, CrackCommandsExt, CrackDrive, CrackError,
         CrackFailed, CrackFinished, CrackGuide, CrackHit, CrackMaps, CrackMaskSource, CrackPlugin, CrackPlugins,
-        CrackResolution, CrackShards, CrackState, CrackStats, CrackStatus, CrackSurface, CrackSystems, CrackTextures,
-        CrackTip, GravitySpace, GuideSource, GuidedAppearance, GuidedCracks, HitPoint, PresetSource, Reassembled,
-        Shard, ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen, Shattered,
+        CrackResolution, CrackShards, CrackState, CrackStats, CrackStatus, CrackStrands, CrackSurface, CrackSystems,
+        CrackTextures, CrackTip, GravitySpace, GuideSource, GuidedAppearance, GuidedCracks, HitPoint, PresetSource,
+        Reassembled, Shard, ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen, Shattered, StrandField,
     };
     #[cfg(feature = "2d")]
     pub use super::{CrackLight2d, CrackLitMaterial};
@@ -88,6 +88,8 @@ impl Plugin for CrackPlugin {
             .register_type::<CrackState>()
             .register_type::<GuidedCracks>()
             .register_type::<GuidedAppearance>()
+            .register_type::<CrackStrands>()
+            .register_type::<StrandField>()
             .register_type::<BakeProgress>()
             .register_type::<CrackBaked>()
             .register_type::<CrackTextures>()
@@ -125,7 +127,8 @@ impl Plugin for CrackPlugin {
             .init_resource::<carrier::pipelines::PipelineRequests>()
             .add_message::<CrackHit>()
             .add_observer(hits::collect::receive_hit)
-            .add_observer(bake::work::cancel_removed)
+            .add_observer(bake::work::cancel_removed::<GuidedCracks>)
+            .add_observer(bake::work::cancel_removed::<CrackStrands>)
             .add_observer(life::heal::disown_added)
             .add_observer(life::heal::heal_removed)
             .add_observer(life::heal::heal_closed)
@@ -155,7 +158,7 @@ impl Plugin for CrackPlugin {
                             life::watch::watch_surfaces,
                             life::watch::watch_pictures,
                             life::watch::watch_presets,
-                            bake::work::watch_guided,
+                            bake::work::watch_baked,
                         ),
                         life::change::update_changed.run_if(life::watch::any_changed),
                         hits::collect::collect_hits,

@@ -54,6 +54,8 @@ mod shards_order;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod solids;
 #[cfg(all(feature = "2d", feature = "3d"))]
+mod strands;
+#[cfg(all(feature = "2d", feature = "3d"))]
 mod support;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod values;

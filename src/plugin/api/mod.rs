@@ -10,6 +10,7 @@ pub(crate) mod preset;
 mod reflect;
 pub(crate) mod shatter;
 pub(crate) mod state;
+pub(crate) mod strands;
 pub(crate) mod surface;
 pub(crate) mod systems;
 pub(crate) mod textures;
@@ -26,6 +27,7 @@ pub use shatter::{
     ShatterWhen, Shattered,
 };
 pub use state::{CellClosed, CrackFailed, CrackFinished, CrackState, CrackStatus, CrackTip};
+pub use strands::{CrackStrands, StrandField};
 pub use surface::{CrackMaps, CrackResolution, CrackSurface};
 pub use systems::CrackSystems;
 pub use textures::CrackTextures;

@@ -100,4 +100,12 @@ macro_rules! written {
     };
 }
 
-written!(super::CrackSurface, super::PresetSource, super::CrackMaskSource, super::GuideSource, super::ShatterCracks);
+written!(
+    super::CrackSurface,
+    super::CrackStrands,
+    super::PresetSource,
+    super::CrackMaskSource,
+    super::GuideSource,
+    super::ShatterCracks,
+    super::StrandField
+);

@@ -1,8 +1,9 @@
 //! What a bake needs: it is looked for in the frames until all of it is there.
 
-use super::map_job::{BakeSurface, MAX_SIDE, MapJob, Source};
-use super::work::{Bake, Work};
-use crate::plugin::api::{CrackError, GuideSource, GuidedCracks};
+use super::map_job::{BakeSurface, CracksOrder, MAX_SIDE, MapJob, Source};
+use super::strands_job::StrandsOrder;
+use super::work::{Bake, Baked, Work};
+use crate::plugin::api::{CrackError, CrackStrands, GuideSource, GuidedCracks};
 use crate::plugin::jobs::copy::PictureCopies;
 use crate::plugin::jobs::threads::Threads;
 use crate::plugin::source::picture;
@@ -13,9 +14,19 @@ use bevy::prelude::*;
 
 /// All that a bake needs; `None` if its pictures are not there yet.
 pub(super) fn begin(world: &mut World, entity: Entity, bake: &mut Bake) -> Result<Option<Work>, CrackError> {
-    let Some(guided) = world.get::<GuidedCracks>(entity).cloned() else { return Ok(None) };
-    guided.validate()?;
     let mut copies = Copies::default();
+    let (guided, order) = match bake.kind {
+        Baked::Guided => {
+            let Some(guided) = world.get::<GuidedCracks>(entity).cloned() else { return Ok(None) };
+            guided.validate()?;
+            (Some(guided), None)
+        }
+        Baked::Strands => {
+            let Some(strands) = world.get::<CrackStrands>(entity).cloned() else { return Ok(None) };
+            let Some(order) = StrandsOrder::new(world, entity, &strands, &mut copies)? else { return Ok(None) };
+            (None, Some(order))
+        }
+    };
     let known = active(world, entity).and_then(|active| {
         let rect = active.canvas.views.get(active.canvas.view)?.rect;
         Some(BakeSurface::Known(active.canvas.base.clone(), rect))
@@ -31,8 +42,8 @@ pub(super) fn begin(world: &mut World, entity: Entity, bake: &mut Bake) -> Resul
         }
     };
     let images = world.get_resource::<Assets<Image>>().ok_or(CrackError::NoImages)?;
-    let mut sources = Vec::with_capacity(guided.guides.len());
-    for (index, guide) in guided.guides.iter().enumerate() {
+    let mut sources = Vec::new();
+    for (index, guide) in guided.iter().flat_map(|guided| &guided.guides).enumerate() {
         let named = |error: CrackError| CrackError::Guide { index, reason: error.to_string() };
         let source = match &guide.source {
             GuideSource::Grid(grid) => Source::Grid(grid.clone()),
@@ -57,10 +68,22 @@ pub(super) fn begin(world: &mut World, entity: Entity, bake: &mut Bake) -> Resul
         BakeSurface::Known(_, rect) | BakeSurface::Read(_, rect) => rect.size(),
         BakeSurface::Raw(raw) => raw.plan.rect.size(),
     };
-    let side = size.max_element();
-    let scale = f64::from(guided.max_side.clamp(1, side.max(1))) / f64::from(side.max(1));
-    let size = (size.as_dvec2() * scale).round().as_uvec2().max(UVec2::ONE);
+    let (order, size) = match (guided, order) {
+        (Some(guided), _) => {
+            let size = scaled(size, guided.max_side);
+            (CracksOrder::Guided(Box::new(guided)), size)
+        }
+        (None, Some(order)) => (CracksOrder::Strands(Box::new(order)), size.max(UVec2::ONE)),
+        (None, None) => return Ok(None),
+    };
     let has_threads = world.resource::<Threads>().pool().is_some();
     let Some(reading) = PictureCopies::new(copies.0, images, has_threads) else { return Ok(None) };
-    Ok(Some(Work::Reading(reading, Box::new(MapJob::new(guided, size, surface, sources)))))
+    Ok(Some(Work::Reading(reading, Box::new(MapJob::new(order, size, surface, sources)))))
+}
+
+/// The size of a map of at most `max_side` texels along its longer side.
+fn scaled(size: UVec2, max_side: u32) -> UVec2 {
+    let side = size.max_element().max(1);
+    let scale = f64::from(max_side.clamp(1, side)) / f64::from(side);
+    (size.as_dvec2() * scale).round().as_uvec2().max(UVec2::ONE)
 }

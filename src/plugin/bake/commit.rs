@@ -2,8 +2,8 @@
 
 use super::finish::{Finish, FinishInputs, FinishStep, Finished};
 use super::map_job::Lines;
-use super::work::{Bake, BakeJob, Work};
-use crate::plugin::api::{CrackClock, CrackError, CrackStatus, CrackTextures, GuidedCracks};
+use super::work::{Bake, BakeJob, Baked, Work};
+use crate::plugin::api::{CrackClock, CrackError, CrackStatus, CrackStrands, CrackTextures, GuidedCracks};
 use crate::plugin::draw::async_playback::{self, AsyncPlayback};
 use crate::plugin::gpu::uploads::Uploads;
 use crate::plugin::jobs::background::drop_in_background;
@@ -24,13 +24,16 @@ use bevy::{prelude::*, render::renderer::RenderDevice};
 const MAX_ROUNDS: u32 = 8;
 
 /// The seconds in which cracks appear; `None` = at once.
-fn seconds(world: &World, entity: Entity) -> Option<f32> {
-    world.get::<GuidedCracks>(entity)?.appearance.seconds()
+fn seconds(world: &World, entity: Entity, kind: Baked) -> Option<f32> {
+    match kind {
+        Baked::Strands => Some(world.get::<CrackStrands>(entity)?.seconds).filter(|seconds| *seconds > 0.0),
+        Baked::Guided => world.get::<GuidedCracks>(entity)?.appearance.seconds(),
+    }
 }
 
 /// Has the surface made with these cracks, as it is now; from the start if it is another one.
 pub(super) fn start_finish(world: &mut World, entity: Entity, bake: &mut Bake, lines: Lines) -> Result<(), CrackError> {
-    let seconds = seconds(world, entity);
+    let seconds = seconds(world, entity, bake.kind);
     let stager = world.resource::<Uploads>().stager(world.get_resource::<RenderDevice>());
     if !has_cracked(world, entity) {
         let (Some(plan), Some(ground)) = (&mut bake.plan, &lines.ground) else { return Ok(()) };
@@ -84,7 +87,7 @@ pub(super) fn commit(
         (Some(active), plan) => {
             bake.plan = plan;
             if finished.order.fits(&active) {
-                replace(world, entity, active, *finished);
+                replace(world, entity, bake.kind, active, *finished);
                 return Ok(Some(covered));
             }
             cracked::put_back(world, entity, active);
@@ -105,7 +108,7 @@ pub(super) fn commit(
                 bake.work = Work::Uploading(finished, frames + 1);
                 return Ok(None);
             }
-            settle(world, entity, *plan, textures, *finished);
+            settle(world, entity, bake.kind, *plan, textures, *finished);
             return Ok(Some(covered));
         }
         (None, plan) => bake.plan = plan,
@@ -142,8 +145,8 @@ fn again(world: &mut World, entity: Entity, bake: &mut Bake, finished: Finished)
 }
 
 /// Makes a surface of one that has not cracked before, whose textures are where they are shown from.
-fn settle(world: &mut World, entity: Entity, plan: Plan, textures: CrackTextures, finished: Finished) {
-    let seconds = seconds(world, entity);
+fn settle(world: &mut World, entity: Entity, kind: Baked, plan: Plan, textures: CrackTextures, finished: Finished) {
+    let seconds = seconds(world, entity, kind);
     let is_outdated = plan.is_outdated;
     let Finished { order, added, growth, cells, field, touched, look, replay, playback, .. } = finished;
     let ground = plan.ground(world, BaseAndMask { base: order.base, mask: order.mask }, look, textures);
@@ -158,8 +161,8 @@ fn settle(world: &mut World, entity: Entity, plan: Plan, textures: CrackTextures
 }
 
 /// Puts baked cracks on a surface that has cracked before and is taken out of the others.
-fn replace(world: &mut World, entity: Entity, mut active: Box<Active>, mut finished: Finished) {
-    let seconds = seconds(world, entity);
+fn replace(world: &mut World, entity: Entity, kind: Baked, mut active: Box<Active>, mut finished: Finished) {
+    let seconds = seconds(world, entity, kind);
     async_playback::stop(world, entity, &mut active);
     // Shards are of the cells that were.
     drop_shards(world, entity, &mut active);

@@ -1,5 +1,6 @@
-//! From guides to a network: what a bake does before it knows of its surface.
+//! From guides or strands to a network: what a bake does before it knows of its surface.
 
+use super::strands_job::StrandsOrder;
 use crate::Grid;
 use crate::pattern::Network;
 use crate::plugin::api::{CrackError, GuidedAppearance, GuidedCracks};
@@ -41,7 +42,7 @@ pub(super) const MAPPED: f32 = 0.95;
 
 /// A map as a machine that is stepped; depends on nothing but itself.
 pub(super) struct MapJob {
-    pub(super) guided: GuidedCracks,
+    order: CracksOrder,
     pub(super) size: UVec2,
     /// Copies of the pictures of surface, mask and guides.
     pub(super) copies: Vec<Image>,
@@ -50,6 +51,12 @@ pub(super) struct MapJob {
     guides: Vec<Guide>,
     map: Option<VoronoiBake>,
     pub(super) progress: f32,
+}
+
+/// The cracks that are to be made.
+pub(super) enum CracksOrder {
+    Guided(Box<GuidedCracks>),
+    Strands(Box<StrandsOrder>),
 }
 
 /// The surface that is to crack.
@@ -84,9 +91,9 @@ pub(super) struct Lines {
 }
 
 impl MapJob {
-    pub(super) fn new(guided: GuidedCracks, size: UVec2, surface: BakeSurface, sources: Vec<(Source, f32)>) -> Self {
+    pub(super) fn new(order: CracksOrder, size: UVec2, surface: BakeSurface, sources: Vec<(Source, f32)>) -> Self {
         let (copies, guides) = (Vec::new(), Vec::with_capacity(sources.len()));
-        Self { guided, size, copies, surface, sources: sources.into_iter(), guides, map: None, progress: 0.0 }
+        Self { order, size, copies, surface, sources: sources.into_iter(), guides, map: None, progress: 0.0 }
     }
 
     /// A slice of the work.
@@ -103,9 +110,16 @@ impl MapJob {
             self.progress = READ * self.guides.len() as f32 / (self.guides.len() + self.sources.len()) as f32;
             return Ok(None);
         }
+        let guided = match &self.order {
+            CracksOrder::Guided(guided) => guided,
+            CracksOrder::Strands(order) => {
+                let (network, opening) = order.lines(&self.copies, self.size)?;
+                return Ok(Some(Lines { network, opening, motion: None, covered: None, ground: self.ground() }));
+            }
+        };
         let Some(map) = &mut self.map else {
-            let (params, guides) = (self.guided.params.clone(), core::mem::take(&mut self.guides));
-            let map = VoronoiBake::new(params, guides, self.size, self.guided.seed);
+            let (params, guides) = (guided.params.clone(), core::mem::take(&mut self.guides));
+            let map = VoronoiBake::new(params, guides, self.size, guided.seed);
             self.map = Some(map.map_err(|error| CrackError::Bake { reason: error.to_string() })?);
             return Ok(None);
         };
@@ -116,29 +130,14 @@ impl MapJob {
         let Some((map, seams)) = self.map.take().map(VoronoiBake::finish) else { return Ok(None) };
         let covered = map.strokes().map(|strokes| strokes.covered);
         let (seams, motion) =
-            self.motion(map, seams).map_err(|error| CrackError::Bake { reason: error.to_string() })?;
-        let (network, opening) = lines(&seams, self.guided.appearance);
-        let ground = if let BakeSurface::Read(ground, _) = &self.surface { Some(ground.clone()) } else { None };
-        Ok(Some(Lines { network, opening, motion, covered, ground }))
+            motion(guided, map, seams).map_err(|error| CrackError::Bake { reason: error.to_string() })?;
+        let (network, opening) = lines(&seams, guided.appearance);
+        Ok(Some(Lines { network, opening, motion, covered, ground: self.ground() }))
     }
 
-    /// How the cracks move until they are where they stay, and the seams there.
-    fn motion(&self, mut map: VoronoiMap, seams: Seams) -> Result<(Seams, Option<Motion>), VoronoiError> {
-        if self.guided.appearance.seconds().is_none() {
-            return Ok((seams, None));
-        }
-        let gammas: Vec<f32> = self.guided.guides.iter().map(|guide| guide.gamma).collect();
-        let (from, to) = match (self.guided.appearance, &gammas[..]) {
-            (GuidedAppearance::Emerge { .. }, _) => (vec![0.0; gammas.len()], gammas),
-            (GuidedAppearance::Morph { .. }, &[first, second, ..]) => {
-                map.set_gammas(&[first, 0.0])?;
-                map.rescale_widths();
-                (vec![first, 0.0], vec![0.0, second])
-            }
-            _ => return Ok((seams, None)),
-        };
-        let mut motion = SeamMotion::new(map, from, to)?;
-        Ok((motion.at(1.0)?, Some(Motion::new(motion))))
+    /// What was read of the surface.
+    fn ground(&self) -> Option<BaseAndMask> {
+        if let BakeSurface::Read(ground, _) = &self.surface { Some(ground.clone()) } else { None }
     }
 
     fn read(&self, source: Source) -> Result<Grid<f32>, String> {
@@ -169,6 +168,29 @@ impl MapJob {
         let rgba = picture::read(image, Space::Srgb, size).map_err(|error| error.to_string())?;
         Ok(voronoi::ink(size, &rgba).ok_or("its size is wrong")?)
     }
+}
+
+/// How the cracks move until they are where they stay, and the seams there.
+fn motion(
+    guided: &GuidedCracks,
+    mut map: VoronoiMap,
+    seams: Seams,
+) -> Result<(Seams, Option<Motion>), VoronoiError> {
+    if guided.appearance.seconds().is_none() {
+        return Ok((seams, None));
+    }
+    let gammas: Vec<f32> = guided.guides.iter().map(|guide| guide.gamma).collect();
+    let (from, to) = match (guided.appearance, &gammas[..]) {
+        (GuidedAppearance::Emerge { .. }, _) => (vec![0.0; gammas.len()], gammas),
+        (GuidedAppearance::Morph { .. }, &[first, second, ..]) => {
+            map.set_gammas(&[first, 0.0])?;
+            map.rescale_widths();
+            (vec![first, 0.0], vec![0.0, second])
+        }
+        _ => return Ok((seams, None)),
+    };
+    let mut motion = SeamMotion::new(map, from, to)?;
+    Ok((motion.at(1.0)?, Some(Motion::new(motion))))
 }
 
 /// The seams in the order in which they come, and the steps in which each opens.

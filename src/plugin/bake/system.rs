@@ -153,7 +153,7 @@ fn end(world: &mut World, entity: Entity, result: Result<Option<f32>, CrackError
             world.trigger(CrackBaked { entity, covered });
         }
         Err(error) => {
-            warn!("the guided cracks of {} are not made: {error}", EntityLabel::of(world, entity));
+            warn!("the baked cracks of {} are not made: {error}", EntityLabel::of(world, entity));
             with_queue(world, |_, queue, stats| queue.purge(entity, stats));
             world.trigger(CrackFailed { entity, error });
         }

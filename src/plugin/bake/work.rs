@@ -2,7 +2,7 @@
 
 use super::finish::{Finish, FinishStep, Finished};
 use super::map_job::{Lines, MAPPED, MapJob};
-use crate::plugin::api::{BakeProgress, CrackError, CrackSurface, GuidedCracks};
+use crate::plugin::api::{BakeProgress, CrackError, CrackStrands, CrackSurface, GuidedCracks};
 use crate::plugin::jobs::background::guarded;
 use crate::plugin::jobs::copy::PictureCopies;
 use crate::plugin::surface::plan::Plan;
@@ -27,8 +27,16 @@ pub(crate) struct Bakes {
     pub(super) cancelled: Option<EntityHashSet>,
 }
 
+/// The component whose cracks are baked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Baked {
+    Guided,
+    Strands,
+}
+
 /// A bake that goes on.
 pub(super) struct Bake {
+    pub(super) kind: Baked,
     pub(super) work: Work,
     /// The surface, if it has not cracked when the bake began.
     pub(super) plan: Option<Box<Plan>>,
@@ -57,12 +65,12 @@ impl Work {
 
 impl Bakes {
     /// Begins a bake again.
-    pub(crate) fn want(&mut self, entity: Entity) {
+    fn want(&mut self, entity: Entity, kind: Baked) {
         self.cancel(entity);
         if let Some(cancelled) = &mut self.cancelled {
             cancelled.remove(&entity);
         }
-        self.list.push((entity, Bake { work: Work::Wanted, plan: None, rounds: 0 }));
+        self.list.push((entity, Bake { kind, work: Work::Wanted, plan: None, rounds: 0 }));
     }
 
     /// Ends a bake silently.
@@ -198,24 +206,27 @@ impl BakeJob {
     }
 }
 
+/// Surfaces on which a component is new, or that are new.
+type Fresh<'w, 's, T> = Query<'w, 's, Entity, (With<T>, With<CrackSurface>, Or<(Changed<T>, Added<CrackSurface>)>)>;
+
 /// Notes what is to be baked.
-pub(crate) fn watch_guided(
-    changed: Query<Entity, (With<GuidedCracks>, With<CrackSurface>, Or<(Changed<GuidedCracks>, Added<CrackSurface>)>)>,
-    mut bakes: ResMut<Bakes>,
-) {
-    for entity in &changed {
-        bakes.want(entity);
+pub(crate) fn watch_baked(guided: Fresh<GuidedCracks>, strands: Fresh<CrackStrands>, mut bakes: ResMut<Bakes>) {
+    for entity in &guided {
+        bakes.want(entity, Baked::Guided);
+    }
+    for entity in &strands {
+        bakes.want(entity, Baked::Strands);
     }
 }
 
 /// Cancels the bake of a component that goes. The cracks of a bake that is done stay.
-pub(crate) fn cancel_removed(
-    guided: On<Remove, GuidedCracks>,
+pub(crate) fn cancel_removed<T: Component>(
+    removed: On<Remove, T>,
     mut bakes: ResMut<Bakes>,
     mut progress: Query<&mut BakeProgress>,
 ) {
-    bakes.cancel(guided.entity);
-    if let Ok(mut progress) = progress.get_mut(guided.entity)
+    bakes.cancel(removed.entity);
+    if let Ok(mut progress) = progress.get_mut(removed.entity)
         && progress.0 < 1.0
     {
         reset(&mut progress);
