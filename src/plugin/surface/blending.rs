@@ -107,9 +107,9 @@ impl Active {
                 self.blending.stage = if is_whole { self.start(of, texels) } else { Stage::Copy(of, texels) };
                 is_unlimited
             }
-            Stage::Solve(of, job, _) if is_unlimited => self.show_solved(of, job.finish().unwrap_or_default()),
+            Stage::Solve(of, job, _) if is_unlimited => self.take_up(of, job.finish().unwrap_or_default()),
             Stage::Solve(of, mut job, since) => match job.take_if_done(since.elapsed() >= PATIENCE) {
-                Some(solved) => self.show_solved(of, solved),
+                Some(solved) => self.take_up(of, solved),
                 None => {
                     self.blending.stage = Stage::Solve(of, job, since);
                     false
@@ -134,11 +134,11 @@ impl Active {
         }
     }
 
-    fn show_solved(&mut self, of: u64, solved: Solved) -> bool {
-        let Solved { correction, changes } = solved;
-        self.drawing.field.correct(correction);
-        self.blending.solved = Some(of);
-        self.blending.stage = Stage::Show(changes);
+    /// Paints with what was solved from now on.
+    fn take_up(&mut self, revision: u64, solved: Solved) -> bool {
+        self.drawing.field.correct(solved.correction);
+        self.blending.solved = Some(revision);
+        self.blending.stage = Stage::Show(solved.changes);
         true
     }
 
