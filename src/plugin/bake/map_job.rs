@@ -171,11 +171,7 @@ impl MapJob {
 }
 
 /// How the cracks move until they are where they stay, and the seams there.
-fn motion(
-    guided: &GuidedCracks,
-    mut map: VoronoiMap,
-    seams: Seams,
-) -> Result<(Seams, Option<Motion>), VoronoiError> {
+fn motion(guided: &GuidedCracks, mut map: VoronoiMap, seams: Seams) -> Result<(Seams, Option<Motion>), VoronoiError> {
     if guided.appearance.seconds().is_none() {
         return Ok((seams, None));
     }

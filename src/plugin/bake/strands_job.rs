@@ -108,8 +108,7 @@ impl StrandsOrder {
             params: strands.params,
             primitives: strands.primitives.iter().map(|image| copies.add(image)).collect(),
             seed: strands.seed,
-            // Not a number is not above zero either.
-            is_at_once: !(strands.seconds > 0.0),
+            is_at_once: strands.seconds.is_nan() || strands.seconds <= 0.0,
         }))
     }
 
