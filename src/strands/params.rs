@@ -90,8 +90,8 @@ params! {
     inertia: f32 = 0.4, 0.0, 1.0;
     /// Length at which a strand ends. 0.001..=64; default 1.5.
     length: f32 = 1.5, 0.001, 64.0;
-    /// Length of one step of a path, and side of a lattice cell. 0.0005..=0.05; default 1/512.
-    step: f32 = 1.0 / 512.0, 0.0005, 0.05;
+    /// Length of one step of a path, and side of a lattice cell. 0.0001..=0.05; default 1/512.
+    step: f32 = 1.0 / 512.0, 0.0001, 0.05;
     /// How many times branches branch: 0 = none, 1 = only the strands that start by themselves. 0..=3; default 0.
     depth: u32 = 0, 0.0, 3.0;
     /// Number of children at a joint, on one side or on both. 1..=2; default 2.
