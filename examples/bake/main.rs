@@ -42,7 +42,7 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Method {
     /// Cracks that grow from hits, by space colonization.
-    Growth(growth::Options),
+    Growth(Box<growth::Options>),
     /// Every preset on its own picture, at three moments, on one sheet.
     Gallery(gallery::Options),
     /// Cracks that draw a picture or a word, all at once.

@@ -1,7 +1,7 @@
 //! Surfaces with a normal map of their own, and how looks blend cracks into it.
 
 use crate::support::*;
-use bevy::prelude::*;
+use bevy::{math::ops, prelude::*};
 use bevy_crack::{blend::NormalBlending, paint::Look, prelude::*};
 use std::{thread::sleep, time::Duration};
 
@@ -17,7 +17,7 @@ fn waves() -> Image {
     image.texture_descriptor.format = bevy::render::render_resource::TextureFormat::Rgba8Unorm;
     let texel = |i: u32| {
         let (x, y) = ((i % SIZE.x) as f32, (i / SIZE.x) as f32);
-        let normal = Vec3::new(0.5 * (0.2 * x + 0.1 * y).sin(), 0.4 * (0.3 * y).cos(), 1.0).normalize();
+        let normal = Vec3::new(0.5 * ops::sin(0.2 * x + 0.1 * y), 0.4 * ops::cos(0.3 * y), 1.0).normalize();
         let [x, y, z] = (127.5 * normal + 128.0).to_array();
         [x as u8, y as u8, z as u8, 255]
     };
