@@ -17,11 +17,11 @@ use glam::Vec2;
 /// ```
 /// use bevy_crack::strands::{Directions, StrandParams, StrandStart, Strands};
 ///
-/// let starts = [StrandStart::new([0.2, 0.5].into())];
+/// let starts = [StrandStart::new([0.25, 0.5].into())];
 /// let params = StrandParams { rotation: 0.0, inertia: 0.0, length: 0.25, ..StrandParams::DEFAULT };
 /// let strands = Strands::new(&params, Directions::Linear([1.0, 0.0].into()), &starts, [1.0, 1.0].into(), 7)?;
 /// let end = strands.strands()[0].points.last().copied();
-/// assert_eq!(end, Some([0.45, 0.5].into()));
+/// assert_eq!(end, Some([0.5, 0.5].into()));
 /// # Ok::<(), bevy_crack::strands::StrandError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
