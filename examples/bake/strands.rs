@@ -156,6 +156,7 @@ pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
     };
     fs::create_dir_all(&options.out)?;
     let maps = paint(&base, &field, &LookTable::new(&setting.look, frame.texels_per_unit())?);
+    base.save(options.out.join("base.png"))?;
     write_maps(&options.out, &maps, &field, &[])?;
     println!(
         "{} strands, {} nodes; paths in {:.2} ms, network in {:.2} ms, stamped in {:.2} ms; written to {}",
