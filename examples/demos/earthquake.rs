@@ -17,8 +17,10 @@ const STARTS: [Vec2; 3] = [Vec2::new(0.0, 0.3), Vec2::new(0.0, 0.62), Vec2::new(
 struct Road;
 
 fn main() -> AppExit {
-    let mut app =
-        demo_app("bevy_crack: earthquake", &DemoArguments::given("Cracks run over a road and branch as the earth shakes"));
+    let mut app = demo_app(
+        "bevy_crack: earthquake",
+        &DemoArguments::given("Cracks run over a road and branch as the earth shakes"),
+    );
     app.insert_resource(ClearColor(Color::srgb(0.24, 0.27, 0.2))).add_systems(Startup, setup);
     play(app, (shake_by_hand, crack_anew, heal_on_h), shake_by_script)
 }

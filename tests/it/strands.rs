@@ -24,9 +24,13 @@ fn across() -> CrackStrands {
 
 /// The dark texels.
 fn dark(app: &App, entity: Entity) -> Vec<Vec2> {
+    darker_than(120, app, entity)
+}
+
+fn darker_than(level: u8, app: &App, entity: Entity) -> Vec<Vec2> {
     let texels = shown(app, entity);
     let side = 128;
-    let all = (0..side * side).filter(|i| texels[4 * i] < 120);
+    let all = (0..side * side).filter(|i| texels[4 * i] < level);
     all.map(|i| Vec2::new((i % side) as f32, (i / side) as f32)).collect()
 }
 
@@ -68,7 +72,8 @@ fn strands_follow_a_line_in_the_world() {
     bake(&mut app, entity);
     settle(&mut app, entity);
     assert_eq!(told(&app).failed, []);
-    let cracked = dark(&app, entity);
+    // The ends run out as hairlines, which are not dark.
+    let cracked = darker_than(175, &app, entity);
     for point in points {
         let texel = Vec2::new(64.0 + point.x, 64.0 - point.y);
         let nearest = cracked.iter().map(|at| at.distance(texel)).fold(f32::INFINITY, f32::min);
