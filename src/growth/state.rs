@@ -44,7 +44,7 @@ pub struct MarkerCounts {
 /// growth.hit([0.5, 0.5].into(), 1.0);
 /// while growth.step().grew() {}
 /// assert!(growth.network().nodes().len() > 100);
-/// assert_eq!(growth.census().attracting, 0);
+/// assert_eq!(growth.marker_counts().attracting, 0);
 /// # Ok::<(), bevy_crack::growth::ParamError>(())
 /// ```
 #[derive(Clone, Debug)]

@@ -212,7 +212,7 @@ impl Look {
     /// while growth.step().grew() {}
     ///
     /// let mut field = DepthField::new(frame);
-    /// field.lay(preset.look.layer(7));
+    /// field.set_layers(preset.look.layer(7));
     /// let (timeline, mut changed) = (growth.timeline(), Vec::new());
     /// field.show_layers(growth.network(), timeline, Moment::after(timeline.end()), &mut changed);
     /// assert!(!changed.is_empty());

@@ -53,10 +53,10 @@ enum Stage {
 /// Computes a map: call [`step`](Self::step) until it is done, or drop it.
 ///
 /// ```
-/// use bevy_crack::voronoi::{BakeProgress, VoronoiBake, VoronoiParams};
+/// use bevy_crack::voronoi::{BakeStatus, VoronoiBake, VoronoiParams};
 ///
 /// let mut bake = VoronoiBake::new(VoronoiParams::DEFAULT, Vec::new(), [64, 48].into(), 7)?;
-/// while let BakeProgress::Working(_share) = bake.step(16) {}
+/// while let BakeStatus::Working(_share) = bake.step(16) {}
 /// let (map, seams) = bake.finish();
 /// assert_eq!(map.sites().len(), 175);
 /// assert!(!seams.seams.is_empty());
