@@ -4,8 +4,9 @@ use super::{
     course::Course,
     field::Turbulence,
     grow::{Strand, StrandEnd},
+    line::PrimitiveLine,
     params::StrandParams,
-    primitive::{Primitive, PrimitiveLine},
+    primitive::Primitive,
 };
 use crate::{
     math::{Rng, ops},

@@ -1,6 +1,9 @@
 //! [`Material`]: the shipped libraries of primitives, drawn by a generator.
 
-use super::primitive::{Primitive, PrimitiveLine, PrimitivePoint};
+use super::{
+    line::{PrimitiveLine, PrimitivePoint},
+    primitive::Primitive,
+};
 use crate::{
     Grid,
     math::{Rng, ops},

@@ -1,29 +1,11 @@
 //! [`Primitive`]: a small height image of a crack, and the lines that are traced in it.
 
-use super::{error::PrimitiveError, trace::trace};
+use super::{error::PrimitiveError, line::PrimitiveLine, trace::trace};
 use crate::Grid;
 use glam::Vec2;
 
 /// The shortest and the longest side of an image that can be a primitive, texels.
 pub const PRIMITIVE_SIDES: (u32, u32) = (8, 1024);
-
-/// A point of a line of a primitive, in heights of its image.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct PrimitivePoint {
-    /// Across: 0 in the middle, positive to the right. Down: 0 at the head, 1 at the tail.
-    pub at: Vec2,
-    /// Width of the crack there.
-    pub width: f32,
-}
-
-/// A line of a primitive.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct PrimitiveLine {
-    /// Line and point at which it begins; `None` for the main line, which runs from head to tail.
-    pub from: Option<(u32, u32)>,
-    /// Its points; for a side line without the point at which it begins.
-    pub points: Vec<PrimitivePoint>,
-}
 
 /// A small image of a crack that is joined to others, head (top centre) to tail (bottom centre).
 ///

@@ -6,7 +6,7 @@
 
 use super::{
     error::PrimitiveError,
-    primitive::{PrimitiveLine, PrimitivePoint},
+    line::{PrimitiveLine, PrimitivePoint},
 };
 use crate::Grid;
 use glam::Vec2;

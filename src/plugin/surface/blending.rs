@@ -1,28 +1,23 @@
 //! [`Blending`]: the normals of a surface at rest, made one with the cracks by a task.
 
-use super::active::Active;
 use crate::Grid;
-use crate::blend::{NormalBlending, solve_correction};
-use crate::plugin::jobs::background::{BackgroundJob, PATIENCE, guarded};
+use crate::blend::solve_correction;
+use crate::plugin::jobs::background::{BackgroundJob, guarded};
 use crate::plugin::source::picture::BasePicture;
 use crate::raster::{SlopeCorrection, TexelRect};
 use bevy::{platform::time::Instant, prelude::*};
 use std::sync::Arc;
 
-/// Depths that a frame copies for a task, and texels that it has painted again of what a task has made.
-const COPIED: usize = 1 << 18;
-const SHOWN: u64 = 1 << 15;
-
 /// How far the normals of a surface are made one with its cracks.
 #[derive(Default)]
 pub(crate) struct Blending {
     /// For which revision of the canvas they were solved.
-    solved: Option<u64>,
-    stage: Stage,
+    pub(super) solved: Option<u64>,
+    pub(super) stage: Stage,
 }
 
 #[derive(Default)]
-enum Stage {
+pub(super) enum Stage {
     #[default]
     Rest,
     /// The depths of this revision are being copied.
@@ -34,131 +29,36 @@ enum Stage {
 }
 
 /// What a task solves.
-struct Work {
-    base: Arc<BasePicture>,
-    origin: UVec2,
-    depth: Grid<u16>,
-    before: Option<Arc<SlopeCorrection>>,
+pub(super) struct Work {
+    pub(super) base: Arc<BasePicture>,
+    pub(super) origin: UVec2,
+    pub(super) depth: Grid<u16>,
+    pub(super) before: Option<Arc<SlopeCorrection>>,
 }
 
 #[derive(Default)]
-struct Solved {
-    correction: Option<Arc<SlopeCorrection>>,
-    changes: Vec<TexelRect>,
+pub(super) struct Solved {
+    pub(super) correction: Option<Arc<SlopeCorrection>>,
+    pub(super) changes: Vec<TexelRect>,
 }
 
 impl Work {
-    fn solve(self) -> Solved {
+    pub(super) fn solve(self) -> Solved {
         let Self { base, origin, depth, before } = self;
         let Some(normals) = &base.normal else { return Solved::default() };
         let solved = guarded(|| Ok(solve_correction(normals, base.size, origin, &depth)));
-        let correction = solved.ok().and_then(Result::ok).flatten().map(Arc::new);
+        let correction = match solved.map(|solved| solved.map_err(|error| error.to_string())) {
+            Ok(Ok(correction)) => correction.map(Arc::new),
+            Ok(Err(error)) => refused(error),
+            Err(error) => refused(error.to_string()),
+        };
         let changes = SlopeCorrection::changes(before.as_deref(), correction.as_deref(), depth.size());
         Solved { correction, changes }
     }
 }
 
-impl Active {
-    /// Whether its look asks for normals that are made one with the cracks. They are for one view: what is solved depends on the normals
-    /// that are shown.
-    fn is_to_blend(&self) -> bool {
-        self.preset.look.normals == NormalBlending::Poisson
-            && self.canvas.textures.normal.is_some()
-            && self.canvas.base.normal.is_some()
-            && self.canvas.views.len() == 1
-    }
-
-    /// Whether its normals are not what the cracks that are shown make them.
-    pub(crate) fn has_normals_to_blend(&self) -> bool {
-        match self.is_to_blend() {
-            true => self.blending.solved != Some(self.canvas.revision) || !matches!(self.blending.stage, Stage::Rest),
-            false => self.drawing.field.correction().is_some(),
-        }
-    }
-
-    /// Goes on with it, at rest; with all of it if there is no limit. Marks what is to be painted.
-    pub(crate) fn blend_normals(&mut self, is_unlimited: bool) {
-        if !self.is_to_blend() {
-            self.blending = Blending::default();
-            self.drawing.field.correct(None);
-            if self.preset.look.normals == NormalBlending::Poisson {
-                self.mark_all();
-            }
-            return;
-        }
-        while self.has_normals_to_blend() && self.step(is_unlimited) {}
-    }
-
-    /// A step; whether the next one can follow at once.
-    fn step(&mut self, is_unlimited: bool) -> bool {
-        let revision = self.canvas.revision;
-        match core::mem::take(&mut self.blending.stage) {
-            Stage::Rest => {
-                self.blending.stage = Stage::Copy(revision, Vec::new());
-                true
-            }
-            Stage::Copy(of, _) | Stage::Solve(of, ..) if of != revision => true,
-            Stage::Copy(of, mut texels) => {
-                let depth = self.drawing.field.depth.as_slice();
-                let end = if is_unlimited { depth.len() } else { depth.len().min(texels.len() + COPIED) };
-                texels.reserve_exact(depth.len() - texels.len());
-                texels.extend_from_slice(&depth[texels.len()..end]);
-                let is_whole = end == depth.len();
-                self.blending.stage = if is_whole { self.start(of, texels) } else { Stage::Copy(of, texels) };
-                is_unlimited
-            }
-            Stage::Solve(of, job, _) if is_unlimited => self.take_up(of, job.finish().unwrap_or_default()),
-            Stage::Solve(of, mut job, since) => match job.take_if_done(since.elapsed() >= PATIENCE) {
-                Some(solved) => self.take_up(of, solved),
-                None => {
-                    self.blending.stage = Stage::Solve(of, job, since);
-                    false
-                }
-            },
-            Stage::Show(mut rects) => {
-                let mut area = 0;
-                let most = if is_unlimited { u64::MAX } else { SHOWN };
-                while area < most
-                    && let Some(rect) = rects.pop()
-                {
-                    let (now, later) = split(rect, most - area);
-                    area += now.area();
-                    self.canvas.mark_normals(now);
-                    rects.extend(later);
-                }
-                if !rects.is_empty() {
-                    self.blending.stage = Stage::Show(rects);
-                }
-                false
-            }
-        }
-    }
-
-    /// Paints with what was solved from now on.
-    fn take_up(&mut self, revision: u64, solved: Solved) -> bool {
-        self.drawing.field.correct(solved.correction);
-        self.blending.solved = Some(revision);
-        self.blending.stage = Stage::Show(solved.changes);
-        true
-    }
-
-    fn start(&self, revision: u64, texels: Vec<u16>) -> Stage {
-        let field = &self.drawing.field;
-        let work = Work {
-            base: self.canvas.base.clone(),
-            origin: self.canvas.seen().map_or(UVec2::ZERO, |rect| rect.min),
-            depth: Grid::from_vec(field.depth.size(), texels).unwrap_or_else(|| field.depth.clone()),
-            before: field.correction().cloned(),
-        };
-        Stage::Solve(revision, BackgroundJob::start(work, Work::solve), Instant::now())
-    }
-}
-
-/// The first rows of a rectangle, as many as have no more than `most` texels but one at least, and the others.
-fn split(rect: TexelRect, most: u64) -> (TexelRect, Option<TexelRect>) {
-    let rows = (most / u64::from(rect.size().x.max(1))).max(1);
-    let y = u32::try_from(rows).map_or(rect.max.y, |rows| rect.min.y.saturating_add(rows).min(rect.max.y));
-    let [mut first, mut rest] = [rect; 2];
-    (first.max.y, rest.min.y) = (y, y);
-    (first, (!rest.is_empty()).then_some(rest))
+/// Without a solution the cracks keep the normals that they have while they grow.
+fn refused(error: String) -> Option<Arc<SlopeCorrection>> {
+    warn!("the normals of a surface are not blended with its cracks: {error}");
+    None
 }

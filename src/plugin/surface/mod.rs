@@ -1,6 +1,7 @@
 //! A surface that cracks: what it is made of, how it is made, how its time passes.
 
 pub(crate) mod active;
+mod blend_steps;
 pub(crate) mod blending;
 pub(crate) mod canvas;
 pub(crate) mod cracked;
