@@ -17,6 +17,7 @@
 //! - [`preset`]: materials: how cracks grow, their cross-section and their look.
 //! - [`shatter`]: the pieces into which cracks cut a surface, and how they fall.
 //! - `plugin` (feature `bevy`): components, hits, systems, upload to the GPU.
+//! - `editor` (feature `editor`): the workbench, a panel over any running game or scene.
 //!
 //! Without the feature `bevy` everything but `plugin` builds, with no engine.
 //!
@@ -43,6 +44,8 @@ pub mod shatter;
 pub mod strands;
 pub mod voronoi;
 
+#[cfg(feature = "editor")]
+pub mod editor;
 #[cfg(feature = "bevy")]
 pub mod plugin;
 

@@ -19,7 +19,7 @@ use bevy::{
     winit::WinitPlugin,
 };
 use bevy_crack::prelude::{CrackBudget, CrackPlugins};
-use clap::{CommandFactory, FromArgMatches, Parser};
+use clap::{Arg, CommandFactory, FromArgMatches, Parser};
 use std::{panic, path::PathBuf, time::Duration};
 
 /// What every demo takes on its command line.
@@ -54,6 +54,15 @@ impl DemoArguments {
     pub fn given(about: &'static str) -> Self {
         let matches = Self::command().about(about).get_matches();
         Self::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
+    }
+
+    /// The same, and a name before them.
+    #[must_use]
+    pub fn given_with_name(about: &'static str) -> (Self, Option<String>) {
+        let name = Arg::new("name").index(1).help("What to show");
+        let matches = Self::command().about(about).arg(name).get_matches();
+        let arguments = Self::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
+        (arguments, matches.get_one::<String>("name").cloned())
     }
 }
 

@@ -141,6 +141,12 @@ impl MarkerField {
         }
     }
 
+    /// Positions of the living markers in the field.
+    pub(super) fn living_positions(&self) -> impl Iterator<Item = Vec2> + '_ {
+        let all = self.x.iter().zip(&self.y).zip(&self.near_sq);
+        all.filter(|(_, near_sq)| **near_sq > DEAD).map(|((x, y), _)| Vec2::new(*x, *y))
+    }
+
     /// Removes all settled markers from the field and returns the living ones.
     fn take_living(&mut self) -> Vec<Newborn> {
         let living = (0..self.x.len()).filter(|&i| self.near_sq[i] > DEAD);

@@ -223,6 +223,11 @@ impl CrackGrowth {
         markers.append(&mut self.shown_markers);
     }
 
+    /// Positions of the markers that are not reached yet, pattern units.
+    pub fn living_markers(&self) -> impl Iterator<Item = Vec2> + '_ {
+        self.field.living_positions()
+    }
+
     /// Number of markers in each state.
     #[must_use]
     pub fn marker_counts(&self) -> MarkerCounts {

@@ -24,6 +24,8 @@ mod gpu;
 #[cfg(all(test, feature = "2d"))]
 mod headless;
 mod hits;
+#[cfg(feature = "editor")]
+pub(crate) mod inspect;
 mod jobs;
 mod life;
 mod shards;
@@ -32,10 +34,10 @@ mod surface;
 
 pub use api::{
     BakeProgress, CellClosed, CrackBaked, CrackBudget, CrackClock, CrackDrive, CrackError, CrackFailed, CrackFinished,
-    CrackGuide, CrackHit, CrackMaps, CrackMaskSource, CrackResolution, CrackShards, CrackState, CrackStats,
-    CrackStatus, CrackStrands, CrackSurface, CrackSystems, CrackTextures, CrackTip, CrackUploadStats, GravitySpace,
-    GuideSource, GuidedAppearance, GuidedCracks, HitPoint, PresetSource, Reassembled, Shard, ShardsError,
-    ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen, Shattered, StrandField,
+    CrackGuide, CrackHit, CrackMaps, CrackMaskSource, CrackResolution, CrackScript, CrackShards, CrackState,
+    CrackStats, CrackStatus, CrackStrands, CrackSurface, CrackSystems, CrackTextures, CrackTip, CrackUploadStats,
+    GravitySpace, GuideSource, GuidedAppearance, GuidedCracks, HitPoint, PresetSource, Reassembled, ScriptedHit, Shard,
+    ShardsError, ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen, Shattered, StrandField,
 };
 #[cfg(feature = "2d")]
 pub use carrier::lit::{CrackLight2d, CrackLitMaterial, CrackLitUniform, MAX_LIGHTS};
@@ -55,9 +57,10 @@ pub mod prelude {
     pub use super::{
         BakeProgress, CellClosed, CrackBaked, CrackBudget, CrackClock, CrackCommandsExt, CrackDrive, CrackError,
         CrackFailed, CrackFinished, CrackGuide, CrackHit, CrackMaps, CrackMaskSource, CrackPlugin, CrackPlugins,
-        CrackResolution, CrackShards, CrackState, CrackStats, CrackStatus, CrackStrands, CrackSurface, CrackSystems,
-        CrackTextures, CrackTip, GravitySpace, GuideSource, GuidedAppearance, GuidedCracks, HitPoint, PresetSource,
-        Reassembled, Shard, ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen, Shattered, StrandField,
+        CrackResolution, CrackScript, CrackShards, CrackState, CrackStats, CrackStatus, CrackStrands, CrackSurface,
+        CrackSystems, CrackTextures, CrackTip, GravitySpace, GuideSource, GuidedAppearance, GuidedCracks, HitPoint,
+        PresetSource, Reassembled, ScriptedHit, Shard, ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen,
+        Shattered, StrandField,
     };
     #[cfg(feature = "2d")]
     pub use super::{CrackLight2d, CrackLitMaterial};
@@ -89,6 +92,7 @@ impl Plugin for CrackPlugin {
             .register_type::<GuidedCracks>()
             .register_type::<GuidedAppearance>()
             .register_type::<CrackStrands>()
+            .register_type::<CrackScript>()
             .register_type::<StrandField>()
             .register_type::<BakeProgress>()
             .register_type::<CrackBaked>()
@@ -155,6 +159,7 @@ impl Plugin for CrackPlugin {
                     (
                         (
                             jobs::frame_time::start_frame,
+                            life::script::play_scripts,
                             life::watch::watch_surfaces,
                             life::watch::watch_pictures,
                             life::watch::watch_presets,

@@ -8,6 +8,7 @@ pub(crate) mod hit;
 pub(crate) mod mask;
 pub(crate) mod preset;
 mod reflect;
+pub(crate) mod script;
 pub(crate) mod shatter;
 pub(crate) mod state;
 pub(crate) mod strands;
@@ -22,6 +23,7 @@ pub use guided::{BakeProgress, CrackBaked, CrackGuide, GuideSource, GuidedAppear
 pub use hit::{CrackHit, HitPoint};
 pub use mask::CrackMaskSource;
 pub use preset::PresetSource;
+pub use script::{CrackScript, ScriptedHit};
 pub use shatter::{
     CrackShards, GravitySpace, Reassembled, Shard, ShardsError, ShatterCracks, ShatterFailed, ShatterRequest,
     ShatterWhen, Shattered,

@@ -51,6 +51,12 @@ impl Uploads {
         }
     }
 
+    /// The rectangles that nobody has fetched yet.
+    #[cfg(feature = "editor")]
+    pub(crate) fn changed(&self) -> impl Iterator<Item = (AssetId<Image>, TexelRect)> + '_ {
+        self.rects.iter().map(|changed| (changed.image, changed.rect))
+    }
+
     /// Lends some packers to `paint`, and takes what they have packed, one after the other. What they have no room for is packed when
     /// the renderer fetches it.
     pub(crate) fn pack(&mut self, count: usize, paint: impl FnOnce(&mut [Packer])) {

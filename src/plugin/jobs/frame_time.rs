@@ -38,6 +38,12 @@ impl FrameClock {
         Timer { start: Instant::now(), before: self.spent, limit: self.unmeasured + rest.mul_f32(share) }
     }
 
+    /// What the crate's systems have spent in this frame, milliseconds.
+    #[cfg(feature = "editor")]
+    pub(crate) fn milliseconds(&self) -> f32 {
+        self.spent.as_secs_f32() * 1000.0
+    }
+
     /// Adds what the system has spent.
     pub(crate) fn stop(&mut self, timer: &Timer) {
         self.spent = timer.before + timer.start.elapsed();

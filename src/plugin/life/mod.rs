@@ -3,4 +3,5 @@
 pub(crate) mod change;
 pub(crate) mod commands;
 pub(crate) mod heal;
+pub(crate) mod script;
 pub(crate) mod watch;

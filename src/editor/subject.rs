@@ -1,0 +1,106 @@
+//! What the panel knows of the surface that is chosen: values that it shows and changes. No part of it is in the world.
+
+use crate::plugin::{
+    BakeProgress, CrackClock, CrackState, CrackStrands, CrackSurface, GuidedCracks, ShatterCracks, ShatterRequest,
+};
+use bevy::prelude::*;
+use bevy_egui::egui::TextureId;
+use std::path::PathBuf;
+
+/// The surface that is chosen, as values: what the panel changes in them goes to the components of the same names.
+#[derive(Clone, Debug, Default)]
+pub struct Subject {
+    /// What it is called: its [`Name`], or its number.
+    pub name: String,
+    /// Its settings.
+    pub surface: CrackSurface,
+    /// The preset in a file, if it has one and it is loaded: shown in place of what `surface` has.
+    pub preset: Option<crate::CrackPreset>,
+    /// How its cracks are; read only.
+    pub state: CrackState,
+    /// Its time.
+    pub clock: Option<CrackClock>,
+    /// Its guided cracks.
+    pub guided: Option<GuidedCracks>,
+    /// Its strands.
+    pub strands: Option<CrackStrands>,
+    /// How far a bake is; read only.
+    pub progress: Option<BakeProgress>,
+    /// How it shatters.
+    pub shatter: Option<ShatterCracks>,
+    /// Its shards: shown, gone and all; read only.
+    pub shards: Option<(u32, u32, u32)>,
+    /// Its textures, by name; read only.
+    pub textures: Vec<(&'static str, TextureId, UVec2)>,
+}
+
+/// What all cracks cost in the last frame; read only.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Costs {
+    /// Time of the crate's own systems, milliseconds, and what the budget allows.
+    pub milliseconds: f32,
+    /// Limit of the budget, milliseconds.
+    pub budget: f32,
+    /// Bytes that went to the GPU.
+    pub bytes: u64,
+    /// Rectangles that they were.
+    pub rects: u32,
+    /// Nodes of all networks.
+    pub nodes: u64,
+    /// Surfaces that have cracks.
+    pub cracked: u32,
+    /// Bytes of all textures.
+    pub texture_bytes: u64,
+}
+
+/// What a user asks for by a button of the panel.
+#[derive(Clone, Debug, PartialEq)]
+pub enum EditorCommand {
+    /// Show the settings of another surface.
+    Choose(Entity),
+    /// Hit the chosen surface at these texture coordinates.
+    Hit(Vec2),
+    /// Take all cracks away at once.
+    Heal,
+    /// Close all cracks within so many seconds.
+    Close(f32),
+    /// Knock shards out.
+    Shatter(ShatterRequest),
+    /// Go back to the settings before the last change.
+    Undo,
+    /// Go forth again.
+    Redo,
+    /// Write the preset to a file.
+    SavePreset(PathBuf),
+    /// Write something of the surface into a folder.
+    Export(Export, PathBuf),
+}
+
+/// What can be written to files.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Export {
+    /// Every texture as a PNG file.
+    Maps,
+    /// The growth as a GIF.
+    Gif,
+    /// The growth as one PNG, its moments side by side.
+    Sheet,
+    /// The outlines of the shards as SVG.
+    Shards,
+}
+
+impl Export {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Maps, Self::Gif, Self::Sheet, Self::Shards];
+
+    /// What its button says.
+    #[must_use]
+    pub const fn label(self) -> &'static str {
+        match self {
+            Self::Maps => "Maps as PNG",
+            Self::Gif => "Growth as GIF",
+            Self::Sheet => "Growth as sprite sheet",
+            Self::Shards => "Shards as SVG",
+        }
+    }
+}
