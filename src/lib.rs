@@ -74,4 +74,5 @@ pub struct ReadmeExamples;
 #[doc = include_str!("../docs/sprites.md")]
 #[doc = include_str!("../docs/strands.md")]
 #[doc = include_str!("../docs/walls_3d.md")]
+#[doc = include_str!("../docs/workbench.md")]
 pub struct PageExamples;

@@ -4,6 +4,7 @@ use super::{
     cel::Cel,
     facets::Facets,
     range::{LookError, within},
+    shades::Shades,
 };
 use crate::{
     blend::NormalBlending,
@@ -92,6 +93,8 @@ pub struct Look {
     /// How the slopes of cracks and the surface's own normal map become one: `Plain`, `Whiteout` or `Poisson`; default
     /// [`Plain`](NormalBlending::Plain). It has no effect on a surface without a normal map of its own.
     pub normals: NormalBlending,
+    /// In how many shades cracks show, for pixel art: `Auto`, `Smooth` or `Steps`; default [`Auto`](Shades::Auto).
+    pub shades: Shades,
     /// Whether the cover of cracks makes a translucent picture opaque (glass panes). Fully transparent texels stay
     /// transparent.
     pub opaque: bool,
@@ -172,6 +175,7 @@ impl Look {
         veil: None,
         glow: Cow::Borrowed(&[]),
         normals: NormalBlending::Plain,
+        shades: Shades::Auto,
         opaque: false,
     };
 
@@ -272,6 +276,9 @@ impl Look {
         within("relief", self.relief, 0.0..=1.0, unit)?;
         within("curl", self.curl, 0.0..=1.0, unit)?;
         within("curl_depth", self.curl_depth, 0.001..=0.5, "0.001..=0.5")?;
+        if let Shades::Steps(steps) = self.shades {
+            within("shades", steps.into(), 1.0..=f32::from(Shades::MOST), "1..=16")?;
+        }
         if let Some(cel) = &self.cel {
             cel.validate()?;
         }

@@ -45,6 +45,7 @@ mod modulate;
 mod patch;
 mod range;
 mod rows;
+mod shades;
 mod table;
 #[cfg(test)]
 mod tests;
@@ -56,5 +57,6 @@ pub use glow::paint_glow;
 pub use look::{ColorStop, Look};
 pub use modulate::{Modulation, modulate};
 pub use range::LookError;
+pub use shades::Shades;
 pub use table::LookTable;
 pub use texel::{BaseTexels, PaintTargets, correct_normals, paint_into, paint_rects};

@@ -6,6 +6,7 @@ use super::{
     look::{ColorStop, Look},
     patch::Curve,
     range::{LookError, within},
+    shades::Shades,
 };
 use crate::{blend::NormalBlending, pattern::MAX_SIDE};
 use glam::Vec4;
@@ -63,6 +64,8 @@ pub struct LookTable {
     pub(super) slope: f32,
     pub(super) normals: NormalBlending,
     pub(super) opaque: bool,
+    /// Number of shades; `None` = smooth.
+    pub(super) steps: Option<u8>,
 }
 
 impl Look {
@@ -158,6 +161,10 @@ impl LookTable {
             slope,
             normals,
             opaque,
+            steps: match look.shades {
+                Shades::Auto | Shades::Smooth => None,
+                Shades::Steps(steps) => Some(steps),
+            },
         })
     }
 

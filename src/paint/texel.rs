@@ -12,6 +12,7 @@ use super::{
     extras::Extras,
     patch::{BLOCK, Patch},
     rows::{Rgba, corrected_row, depth_row, flat_row, level_row, tilted_row, whiteout_row},
+    shades::reduce_shades,
 };
 use crate::{
     blend::{BlendError, NormalBlending, solve_correction},
@@ -328,6 +329,13 @@ impl Job<'_> {
             match &extras {
                 None => diffuse_patch::<ROOM, false>(out, &self.frame, patch, None, self.look, rect),
                 Some(extras) => diffuse_patch::<ROOM, true>(out, &self.frame, patch, Some(extras), self.look, rect),
+            }
+            if let Some(steps) = self.look.steps {
+                for y in rect.min.y..rect.max.y {
+                    let first = self.frame.index(rect.min.x, y);
+                    let row = first..first + rect.size().x as usize;
+                    reduce_shades(&mut out[row.clone()], &self.frame.base[row], steps);
+                }
             }
         }
         if self.normal_out.is_some()

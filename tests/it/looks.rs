@@ -1,8 +1,11 @@
 //! What looks show beside cracks (plates, crushed zones, veils, light) on surfaces that heal, run backwards and change.
 
 use crate::support::*;
-use bevy::prelude::*;
-use bevy_crack::{paint::Look, prelude::*};
+use bevy::{image::ImageSampler, prelude::*};
+use bevy_crack::{
+    paint::{Look, Shades},
+    prelude::*,
+};
 
 const SIZE: UVec2 = UVec2::new(120, 96);
 
@@ -114,4 +117,36 @@ fn cracks_that_glow_write_an_emissive_map_and_heal() {
     app.world_mut().commands().entity(entity).heal_cracks();
     steps(&mut app, 2);
     assert_eq!(get::<MeshMaterial3d<StandardMaterial>>(&app, entity).0, material);
+}
+
+/// Pixel art: where texels are shown as squares, cracks are whole texels in few shades of the picture's own colours, unless the preset says
+/// otherwise; where they are not, cracks are smooth.
+#[test]
+fn cracks_in_pixel_art_are_shades_of_its_colours() {
+    let shades = |nearest: bool, shades: Shades| {
+        let mut app = app();
+        let mut texture = picture(SIZE);
+        texture.sampler = if nearest { ImageSampler::nearest() } else { ImageSampler::linear() };
+        let image = add(&mut app, texture);
+        let before = texels(&app, &image);
+        let mut preset = CrackPreset::CONCRETE;
+        preset.look.shades = shades;
+        let entity = spawn(&mut app, &image, &preset);
+        hit_twice(&mut app, entity);
+        settle(&mut app, entity);
+        let after = shown(&app, entity);
+        let changed: Vec<_> = before.chunks(4).zip(after.chunks(4)).filter(|(before, after)| before != after).collect();
+        assert!(changed.len() > 200, "{} texels show cracks", changed.len());
+        let is_shade = |before: &[u8], after: &[u8], share: f32| {
+            (0..3).all(|c| (f32::from(before[c]) * share).round().min(255.0) as u8 == after[c])
+        };
+        let steps = [0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
+        let n = changed.iter().filter(|(a, b)| steps.iter().any(|k| is_shade(a, b, k / 3.0))).count();
+        n as f32 / changed.len() as f32
+    };
+    assert_eq!(shades(true, Shades::Auto), 1.0);
+    assert_eq!(shades(false, Shades::Steps(3)), 1.0);
+    for smooth in [shades(false, Shades::Auto), shades(true, Shades::Smooth)] {
+        assert!(smooth < 0.3, "{smooth} of the texels are shades by chance");
+    }
 }

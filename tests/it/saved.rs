@@ -6,8 +6,9 @@ use bevy::{
     ecs::reflect::AppTypeRegistry,
     prelude::*,
     reflect::{
-        FromReflect, PartialReflect, TypeInfo, TypeRegistry,
+        FromReflect, PartialReflect, ReflectFromReflect, TypeInfo, TypeRegistration, TypeRegistry,
         serde::{ReflectSerializer, TypedReflectDeserializer, TypedReflectSerializer},
+        structs::DynamicStruct,
     },
 };
 use bevy_crack::{Grid, plugin::CrackTextures, prelude::*, voronoi::SiteLayout};
@@ -139,4 +140,71 @@ fn what_games_look_into_is_registered() {
     for type_id in [core::any::TypeId::of::<Shard>(), core::any::TypeId::of::<CrackShards>()] {
         assert!(registry.get_type_data::<ReflectComponent>(type_id).is_some());
     }
+}
+
+/// All types of the crate that tools may write into a world.
+fn writable(registry: &TypeRegistry) -> Vec<&TypeRegistration> {
+    let all = registry.iter().filter(|registration| registration.type_info().type_path().starts_with("bevy_crack::"));
+    all.filter(|registration| {
+        registration.data::<ReflectComponent>().is_some()
+            || registration.data::<ReflectEvent>().is_some()
+            || registration.data::<ReflectResource>().is_some()
+    })
+    .collect()
+}
+
+/// Editors and remote tools may leave any field out: there is a default for it, or the engine's reflection would panic.
+#[test]
+fn tools_may_leave_fields_out() {
+    let app = app();
+    let registry = app.world().resource::<AppTypeRegistry>().read();
+    let writable = writable(&registry);
+    assert!(writable.len() >= 18, "{}", writable.len());
+    for registration in writable {
+        let path = registration.type_info().type_path();
+        assert!(registration.data::<ReflectDefault>().is_some(), "{path} has no default");
+        let empty = DynamicStruct::default();
+        let made = registration.data::<ReflectFromReflect>().map(|from| from.from_reflect(&empty));
+        assert!(made.is_none_or(|made| made.is_some()), "{path} cannot be made from nothing");
+    }
+}
+
+/// A hit as the engine's remote protocol reads and triggers it (`world.trigger_event`).
+#[test]
+fn a_hit_from_json_cracks_the_wall_and_nonsense_does_not() {
+    let mut app = app();
+    let wall = spawn_picture(&mut app, UVec2::splat(64));
+    let registry = app.world().resource::<AppTypeRegistry>().clone();
+    let trigger = |app: &mut App, value: Value| {
+        let registry = registry.read();
+        let hit = registry.get(core::any::TypeId::of::<CrackHit>()).expect("it is registered");
+        let event = TypedReflectDeserializer::new(hit, &registry).deserialize(value).map_err(|e| e.to_string())?;
+        let triggers = hit.data::<ReflectEvent>().expect("it is an event");
+        triggers.trigger(app.world_mut(), &*event, &registry);
+        Ok::<(), String>(())
+    };
+    for nonsense in [
+        serde_json::json!({ "entity": "a wall" }),
+        serde_json::json!({ "entity": wall.to_bits(), "at": { "Uv": [0.5] } }),
+        serde_json::json!({ "entity": wall.to_bits(), "at": { "Nowhere": 1 } }),
+        serde_json::json!({ "entity": wall.to_bits(), "force": 1.0 }),
+    ] {
+        assert!(trigger(&mut app, nonsense.clone()).is_err(), "{nonsense}");
+    }
+    // Read, but refused or about nobody.
+    for useless in [
+        serde_json::json!({}),
+        serde_json::json!({ "entity": wall.to_bits(), "at": { "Uv": [7.0, 0.5] } }),
+        serde_json::json!({ "entity": wall.to_bits(), "energy": 0.0 }),
+    ] {
+        assert_eq!(trigger(&mut app, useless), Ok(()));
+    }
+    steps(&mut app, 3);
+    assert_eq!(state(&app, wall).status, CrackStatus::Untouched);
+    let value = serde_json::json!({ "entity": wall.to_bits(), "at": { "Uv": [0.5, 0.5] }, "energy": 2.0 });
+    assert_eq!(trigger(&mut app, value), Ok(()));
+    settle(&mut app, wall);
+    assert!(state(&app, wall).nodes > 0);
+    let stats = counts(&app);
+    assert_eq!((stats.sent, stats.applied, stats.ignored, stats.rejected), (4, 1, 1, 2));
 }

@@ -288,7 +288,7 @@ pub struct BakeProgress(pub f32);
 
 /// The cracks of a [`GuidedCracks`] are made and on the surface; [`CrackFinished`](super::CrackFinished) tells when all of them are shown.
 #[derive(EntityEvent, Reflect, Clone, Copy, Debug, PartialEq)]
-#[reflect(Event)]
+#[reflect(Event, Default)]
 pub struct CrackBaked {
     /// The surface.
     pub entity: Entity,

@@ -15,7 +15,7 @@ use bevy::prelude::*;
 /// }
 /// ```
 #[derive(EntityEvent, Message, Reflect, Clone, Copy, Debug, PartialEq)]
-#[reflect(Event, Message)]
+#[reflect(Event, Message, Default)]
 pub struct CrackHit {
     /// The surface.
     pub entity: Entity,
@@ -29,6 +29,7 @@ pub struct CrackHit {
 
 /// Where a hit lands.
 #[derive(Reflect, Clone, Copy, Debug, PartialEq)]
+#[reflect(Default)]
 pub enum HitPoint {
     /// A point of the world, as it is when the frame's transforms are propagated. Sprites ignore the depth along their
     /// own z; meshes take the closest point of their triangles.

@@ -2,6 +2,7 @@
 
 pub(crate) mod budget;
 pub(crate) mod clock;
+mod defaults;
 pub(crate) mod error;
 pub(crate) mod guided;
 pub(crate) mod hit;

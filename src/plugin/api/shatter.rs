@@ -208,7 +208,7 @@ impl Default for ShatterRequest {
 ///
 /// With [`ShatterCracks::fly`] off, this is what a physics engine needs: colliders, mass and the velocity of the blow.
 #[derive(Component, Reflect, Clone, Debug)]
-#[reflect(Component, Clone, Debug)]
+#[reflect(Component, Clone, Debug, Default)]
 #[component(clone_behavior = Ignore)]
 pub struct Shard {
     /// The surface that it is a piece of.
@@ -249,7 +249,7 @@ impl Shard {
 
 /// What has become of a surface that has shattered. Written by the crate, gone when it is whole again.
 #[derive(Component, Reflect, Clone, Debug)]
-#[reflect(Component, Clone, Debug)]
+#[reflect(Component, Clone, Debug, Default)]
 #[component(clone_behavior = Ignore)]
 pub struct CrackShards {
     /// The pieces into which the surface was cut last.
@@ -268,7 +268,7 @@ pub struct CrackShards {
 /// No more than 256 leave in one frame, those first that move first, unless [`CrackBudget::milliseconds`](super::CrackBudget::milliseconds)
 /// is a second or more: of a larger burst the event comes for each of its frames.
 #[derive(EntityEvent, Reflect, Clone, Debug, PartialEq)]
-#[reflect(Event)]
+#[reflect(Event, Default)]
 pub struct Shattered {
     /// The surface.
     pub entity: Entity,
@@ -280,7 +280,7 @@ pub struct Shattered {
 
 /// All shards of a surface have returned to their places, time having run backwards.
 #[derive(EntityEvent, Reflect, Clone, Copy, Debug, PartialEq)]
-#[reflect(Event)]
+#[reflect(Event, Default)]
 pub struct Reassembled {
     /// The surface.
     pub entity: Entity,

@@ -71,7 +71,7 @@ pub struct CrackTip {
 
 /// Cracks have closed a cell: a piece that could fall. Told when the crack that closes it is shown for the first time.
 #[derive(EntityEvent, Reflect, Clone, Copy, Debug, PartialEq)]
-#[reflect(Event)]
+#[reflect(Event, Default)]
 pub struct CellClosed {
     /// The surface.
     pub entity: Entity,
@@ -87,7 +87,7 @@ pub struct CellClosed {
 /// [`CrackClock`](super::CrackClock) runs over the end. A hit that widens what is there already is one of them: under hammering this
 /// comes again and again.
 #[derive(EntityEvent, Reflect, Clone, Copy, Debug, PartialEq)]
-#[reflect(Event)]
+#[reflect(Event, Default)]
 pub struct CrackFinished {
     /// The surface.
     pub entity: Entity,
@@ -95,7 +95,7 @@ pub struct CrackFinished {
 
 /// A surface cannot crack; the hits that waited on it are rejected.
 #[derive(EntityEvent, Reflect, Clone, Debug, PartialEq)]
-#[reflect(Event)]
+#[reflect(Event, Default)]
 pub struct CrackFailed {
     /// The surface.
     pub entity: Entity,

@@ -205,7 +205,7 @@ impl FinishInputs {
                 Some((replay, moment))
             }
         };
-        let drawn = Box::new(Drawn { field, touched, look: look(&self.preset, frame)?, replay });
+        let drawn = Box::new(Drawn { field, touched, look: look(&self.preset, frame, self.base.is_nearest)?, replay });
         Ok(Stage::Paint { growth, cells, drawn, texels: textures::texels(self.maps, &self.base), row: 0 })
     }
 

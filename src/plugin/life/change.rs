@@ -151,7 +151,7 @@ fn update_preset(
     if preset == active.preset {
         return Ok(());
     }
-    let look = look(&preset, active.drawing.field.frame)?;
+    let look = look(&preset, active.drawing.field.frame, active.canvas.base.is_nearest)?;
     recall(world, entity, active);
     if preset.growth != active.preset.growth {
         let outcome = active.cracks.growth.set_params(preset.growth.clone());
@@ -203,7 +203,7 @@ fn update_picture(
     let Some(draft) = draft(world, entity, active, other, &shown)? else { return Ok(false) };
     let Some(mask) = resolve_mask(world, &active.surface, &active.preset, &shown, &draft)? else { return Ok(false) };
     let frame = frame(draft.plan.rect)?;
-    let look = look(&active.preset, frame)?;
+    let look = look(&active.preset, frame, draft.base.is_nearest)?;
     recall(world, entity, active);
     let regrown = regrow(active, frame, mask.clone())?;
     active.canvas.textures = make_textures(world, &draft, Some(&active.canvas.textures))?;

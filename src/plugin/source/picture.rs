@@ -19,6 +19,8 @@ use std::sync::{Arc, LazyLock, Weak};
 pub(crate) struct BasePicture {
     pub(crate) size: UVec2,
     has_holes: bool,
+    /// Whether its texels are shown as squares.
+    pub(crate) is_nearest: bool,
     /// RGBA8, sRGB.
     pub(crate) diffuse: Vec<u8>,
     /// RGBA8, linear; `None` = flat.
@@ -33,7 +35,7 @@ const OPAQUE: u8 = 8;
 impl BasePicture {
     pub(crate) fn new(size: UVec2, diffuse: Vec<u8>, normal: Option<Vec<u8>>, depth: Option<Vec<u8>>) -> Self {
         let has_holes = diffuse.as_chunks::<4>().0.iter().any(|texel| texel[3] < OPAQUE);
-        Self { size, has_holes, diffuse, normal, depth }
+        Self { size, has_holes, is_nearest: false, diffuse, normal, depth }
     }
 
     /// Whether the texel is a hole.

@@ -96,7 +96,7 @@ impl BlankSurface {
         rect: TexelRect,
     ) -> Result<Self, CrackError> {
         let frame = frame(rect)?;
-        let look = look(preset, frame)?;
+        let look = look(preset, frame, base.is_nearest)?;
         let mut growth = CrackGrowth::new(preset.growth.clone(), frame.extent(), surface.seed)
             .map_err(|error| CrackError::Preset { reason: error.to_string() })?;
         if surface.alpha_mask {

@@ -84,7 +84,9 @@ impl PicturePlan {
         let normal = if self.maps.normal { read(normal)? } else { None };
         let depth = if self.maps.depth { read(depth)?.map(|rgba| picture::red(&rgba)) } else { None };
         let all = |texels: Vec<u8>| if self.is_twofold { texels.repeat(2) } else { texels };
-        Ok(BasePicture::new(self.size, all(diffuse), normal.map(all), depth.map(all)))
+        let mut picture = BasePicture::new(self.size, all(diffuse), normal.map(all), depth.map(all));
+        picture.is_nearest = self.is_nearest;
+        Ok(picture)
     }
 }
 

@@ -1,8 +1,8 @@
-//! The workbench from the outside: its panel without a window, in an app without a renderer, scenes in files, and hits by HTTP.
+//! The workbench from the outside: its panel without a window, in an app without a renderer, and scenes in files.
+#![cfg(test)]
 #![cfg(feature = "engine")]
 
 mod panel;
-mod remote;
 mod scenes;
 
 use bevy::{

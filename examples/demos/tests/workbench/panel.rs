@@ -9,10 +9,7 @@ use bevy_crack::{
     prelude::*,
 };
 use bevy_egui::egui;
-use egui_kittest::{
-    Harness,
-    kittest::{NodeT, Queryable},
-};
+use egui_kittest::{Harness, kittest::Queryable};
 
 /// A panel and what it was asked for.
 struct Shown {
