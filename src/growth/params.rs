@@ -157,9 +157,8 @@ pub struct GrowthParams {
     /// Exponent of the pipe model: at a `line_growth` of 1 a node with `n` nodes behind it is `n^(1/murray)` times as
     /// wide as a tip. 1..=8.
     pub murray: f32,
-    /// Largest width that [`line_growth`](Self::line_growth) gives a crack at energy 1. Pattern units, at least
-    /// `line_width`, at most 0.4. All widths are proportional to the fourth root of the energy: 16 makes them twice
-    /// as wide.
+    /// Largest width that [`line_growth`](Self::line_growth) gives a crack at energy 1; at least `line_width`. Pattern
+    /// units, 0.0005..=0.4. All widths are proportional to the fourth root of the energy: 16 makes them twice as wide.
     pub max_width: f32,
     /// Number of segments over which a free end narrows to a point. An end that meets another crack does not narrow.
     /// 0 = ends are as wide as `line_width`. 0..=64.

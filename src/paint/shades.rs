@@ -22,6 +22,9 @@ pub enum Shades {
     /// Smooth edges and any colour.
     Smooth,
     /// Whole texels: each is the colour of the picture there, as dark or as light as one of so many steps. 1..=16.
+    ///
+    /// Draw such cracks with a [`Profile::faintest`](crate::raster::Profile::faintest) of 1, as the plugin does, or those thinner than a texel
+    /// are too faint for a step.
     Steps(u8),
 }
 
@@ -74,7 +77,7 @@ mod tests {
         math::Rng,
         paint::{BaseTexels, LookTable, PaintTargets, paint_into},
         pattern::SurfaceFrame,
-        raster::{DepthField, TexelRect, stamp_path},
+        raster::{DepthField, Profile, TexelRect, stamp_path},
     };
     use glam::UVec2;
 
@@ -85,8 +88,12 @@ mod tests {
         let mut growth = CrackGrowth::new(preset.growth.clone(), field.frame.extent(), 5).unwrap();
         growth.hit([0.5, 0.5].into(), 1.0);
         while growth.step().grew() {}
+        let profile = match shades {
+            Shades::Steps(_) => Profile { faintest: 1.0, ..preset.profile },
+            _ => preset.profile,
+        };
         for segment in growth.network().segments() {
-            stamp_path(&mut field, &preset.profile, &growth.network().path(segment).unwrap());
+            stamp_path(&mut field, &profile, &growth.network().path(segment).unwrap());
         }
         let mut rng = Rng::new(3);
         let picture = (0..size.element_product()).flat_map(|_| {

@@ -234,11 +234,12 @@ fn i6_ten_thousand_hits_in_one_frame_stay_in_the_budget() {
         }
         (before, nodes) = (after, now);
         n_frames += 1;
-        assert!(n_frames <= 40_000, "the queue does not drain: {after:?}");
+        assert!(n_frames <= 80_000, "the queue does not drain: {after:?}");
     }
     let [applied, merged, born] = most;
     println!("{n_frames} frames; at most {applied} hits applied, {merged} merged, {born} nodes in one of them");
-    assert!(applied + merged <= 2 && born <= 4000, "{applied} applied, {merged} merged, {born} nodes");
+    // Hits that are merged are no more than a sum.
+    assert!(applied <= 1 && born <= 400, "{applied} applied, {merged} merged, {born} nodes");
     app.world_mut().resource_mut::<CrackBudget>().milliseconds = 1000.0;
     settle(&mut app, entity);
 }
@@ -256,7 +257,7 @@ fn hit_many(app: &mut App, surfaces: &[Entity]) -> usize {
     while surfaces.iter().any(|entity| state(app, *entity).nodes == 0) {
         step(app);
         n_frames += 1;
-        assert!(n_frames <= surfaces.len(), "some surface starves");
+        assert!(n_frames <= 4 * surfaces.len(), "some surface starves");
     }
     n_frames
 }
@@ -272,8 +273,10 @@ fn i7_hits_on_a_thousand_surfaces_take_turns() {
     let stats = counts(&app);
     assert_eq!((stats.sent, stats.rejected), (10_000, 0));
     println!("each of 1000 surfaces shows a crack after {n_frames} frames, {} hits wait", stats.queued);
-    // In turns: none had its second hit before all had their first.
-    assert!(stats.queued >= 9000 - 16, "{stats:?}");
+    // In turns: none has had two hits more than another.
+    let hits: Vec<u32> = surfaces.iter().map(|entity| state(&app, *entity).hits).collect();
+    let (least, most) = (hits.iter().min(), hits.iter().max());
+    assert!(most.zip(least).is_some_and(|(most, least)| most - least <= 1), "{least:?} to {most:?} hits");
     app.world_mut().resource_mut::<CrackBudget>().milliseconds = 1000.0;
     wait_for(&mut app, "all hits", |app| counts(app).queued == 0);
     for entity in surfaces {

@@ -1,6 +1,6 @@
 //! The state of cracks, and cracks that are baked: guided ones and strands.
 
-use super::Panel;
+use super::settings::Panel;
 use crate::{
     editor::{form, subject::Subject},
     plugin::{CrackGuide, CrackState, CrackStatus, CrackStrands, GuideSource, GuidedCracks, HitPoint},
@@ -22,7 +22,7 @@ pub(super) fn show_state(ui: &mut Ui, state: &CrackState) {
     ui.horizontal_wrapped(|ui| {
         ui.strong(text);
         ui.weak(format!(
-            "damage {:.0} %, {} hits, {} nodes, {} cells",
+            "damage {:.0} %, hits {}, nodes {}, cells {}",
             state.damage * 100.0,
             state.hits,
             state.nodes,

@@ -1,6 +1,6 @@
 //! What can be written to files.
 
-use super::Panel;
+use super::settings::Panel;
 use crate::editor::subject::{EditorCommand, Export};
 use bevy_egui::egui::Ui;
 use std::path::Path;

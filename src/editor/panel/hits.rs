@@ -1,6 +1,6 @@
 //! Hits.
 
-use super::Panel;
+use super::settings::Panel;
 use crate::editor::subject::EditorCommand;
 use bevy::math::Vec2;
 use bevy_egui::egui::{self, Ui};

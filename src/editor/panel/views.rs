@@ -1,6 +1,6 @@
 //! What is drawn over the surface, and its textures.
 
-use super::Overlays;
+use super::settings::Overlays;
 use bevy::math::UVec2;
 use bevy_egui::egui::{self, TextureId, Ui};
 

@@ -7,6 +7,7 @@ use core::time::Duration;
 ///
 /// A clock decides only *when* something happens, never *what*: the cracks of a surface are the same on a slow machine.
 #[derive(Resource, Reflect, Clone, Debug, PartialEq)]
+#[type_path = "bevy_crack"]
 #[reflect(Resource, Default)]
 pub struct CrackBudget {
     /// Time for hits, growth and painting in one frame, milliseconds, however many threads grow and paint; default 2. Up to a quarter of it
@@ -50,6 +51,7 @@ impl Default for CrackBudget {
 
 /// What became of all hits ever sent: `sent = applied + merged + ignored + rejected + queued`, after every frame.
 #[derive(Resource, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[type_path = "bevy_crack"]
 #[reflect(Resource, Default)]
 pub struct CrackStats {
     /// Hits sent, as events or messages.
@@ -80,6 +82,7 @@ impl CrackBudget {
 
 /// What went to the GPU in the last frame that was rendered.
 #[derive(Resource, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[type_path = "bevy_crack"]
 #[reflect(Resource, Default)]
 pub struct CrackUploadStats {
     /// Bytes of texels.

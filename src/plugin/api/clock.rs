@@ -29,6 +29,7 @@ use bevy::prelude::*;
 /// }
 /// ```
 #[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq)]
+#[type_path = "bevy_crack"]
 #[reflect(Component, Default)]
 pub struct CrackClock {
     /// What makes time pass.
@@ -43,6 +44,7 @@ pub struct CrackClock {
 
 /// What makes time pass for the cracks of a surface.
 #[derive(Reflect, Clone, Copy, Debug, PartialEq)]
+#[type_path = "bevy_crack"]
 #[reflect(Default)]
 pub enum CrackDrive {
     /// Seconds of the app's [`Time`], at this many times the preset's

@@ -5,6 +5,7 @@ use std::fmt;
 
 /// Why a surface cannot crack.
 #[derive(Clone, Debug, PartialEq, Reflect, thiserror::Error)]
+#[type_path = "bevy_crack"]
 #[non_exhaustive]
 pub enum CrackError {
     /// It has neither a sprite nor a material that the crate knows.

@@ -34,6 +34,7 @@ use std::sync::Arc;
 /// }
 /// ```
 #[derive(Component, Reflect, Clone, Debug, PartialEq)]
+#[type_path = "bevy_crack"]
 #[reflect(Component, Default, Clone, Debug, PartialEq)]
 #[require(BakeProgress)]
 pub struct GuidedCracks {
@@ -134,6 +135,7 @@ impl Default for GuidedCracks {
 
 /// One picture that cracks follow.
 #[derive(Reflect, Clone, Debug, PartialEq)]
+#[type_path = "bevy_crack"]
 #[reflect(Clone, Debug, PartialEq)]
 pub struct CrackGuide {
     /// Where it comes from. It is stretched over the shown part of the surface's picture.
@@ -178,6 +180,7 @@ impl CrackGuide {
 
 /// Where a guide comes from.
 #[derive(Reflect, Clone, Debug, PartialEq)]
+#[type_path = "bevy_crack"]
 #[reflect(Clone, Debug, PartialEq, SerializeWithRegistry)]
 pub enum GuideSource {
     /// The drawing in an image, see [`ink`](crate::voronoi::ink): at most 8192 texels a side, readable on the CPU. The bake
@@ -228,6 +231,7 @@ impl From<Arc<[u8]>> for GuideSource {
 /// takes some 8 bytes a texel more. Where there are no threads it is done in slices inside the [`CrackBudget`](super::CrackBudget);
 /// with a budget of a second or more, in the frame itself.
 #[derive(Reflect, Clone, Copy, Debug, Default, PartialEq)]
+#[type_path = "bevy_crack"]
 #[reflect(Clone, Debug, Default, PartialEq)]
 pub enum GuidedAppearance {
     /// All at once.
@@ -282,12 +286,14 @@ impl GuidedAppearance {
 /// without the component as well. Falls only when a new bake begins, or to 0 when one is cancelled or the surface is healed. Written by the
 /// crate.
 #[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq)]
+#[type_path = "bevy_crack"]
 #[reflect(Component, Default)]
 #[component(clone_behavior = Ignore)]
 pub struct BakeProgress(pub f32);
 
 /// The cracks of a [`GuidedCracks`] are made and on the surface; [`CrackFinished`](super::CrackFinished) tells when all of them are shown.
 #[derive(EntityEvent, Reflect, Clone, Copy, Debug, PartialEq)]
+#[type_path = "bevy_crack"]
 #[reflect(Event, Default)]
 pub struct CrackBaked {
     /// The surface.

@@ -15,6 +15,7 @@ use bevy::prelude::*;
 /// }
 /// ```
 #[derive(EntityEvent, Message, Reflect, Clone, Copy, Debug, PartialEq)]
+#[type_path = "bevy_crack"]
 #[reflect(Event, Message, Default)]
 pub struct CrackHit {
     /// The surface.
@@ -29,6 +30,7 @@ pub struct CrackHit {
 
 /// Where a hit lands.
 #[derive(Reflect, Clone, Copy, Debug, PartialEq)]
+#[type_path = "bevy_crack"]
 #[reflect(Default)]
 pub enum HitPoint {
     /// A point of the world, as it is when the frame's transforms are propagated. Sprites ignore the depth along their

@@ -6,6 +6,7 @@ use bevy::{prelude::*, reflect::serde::ReflectSerializeWithRegistry};
 ///
 /// Cracks that [divide](crate::growth::Venation::Subdivision) what there is (tempered glass, plaster, clay, mud, glaze) hardly mind where they like to run.
 #[derive(Reflect, Clone, Debug, Default, PartialEq)]
+#[type_path = "bevy_crack"]
 #[reflect(Default, SerializeWithRegistry)]
 pub enum CrackMaskSource {
     /// As the preset has it: cracks of brick, and of every preset that [follows lines](crate::CrackPreset::follows_lines), follow the lines of the

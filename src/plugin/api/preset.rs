@@ -17,6 +17,7 @@ use bevy::{prelude::*, reflect::serde::ReflectSerializeWithRegistry};
 /// }
 /// ```
 #[derive(Reflect, Clone, Debug, PartialEq)]
+#[type_path = "bevy_crack"]
 #[reflect(Default, SerializeWithRegistry)]
 #[expect(clippy::large_enum_variant, reason = "the large one is the usual one")]
 pub enum PresetSource {

@@ -25,6 +25,7 @@ use bevy::prelude::*;
 /// }
 /// ```
 #[derive(Component, Reflect, Clone, Debug, Default, PartialEq)]
+#[type_path = "bevy_crack"]
 #[reflect(Component, Default, Clone, Debug, PartialEq)]
 pub struct CrackScript {
     /// The hits, in any order.
@@ -40,6 +41,7 @@ pub struct CrackScript {
 
 /// A hit of a [`CrackScript`].
 #[derive(Reflect, Clone, Copy, Debug, PartialEq)]
+#[type_path = "bevy_crack"]
 #[reflect(Default, Clone, Debug, PartialEq)]
 pub struct ScriptedHit {
     /// When it comes, seconds; a time that is not a number or below zero never comes.

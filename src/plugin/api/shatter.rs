@@ -33,6 +33,7 @@ use std::sync::Arc;
 /// }
 /// ```
 #[derive(Component, Reflect, Clone, Debug, PartialEq)]
+#[type_path = "bevy_crack"]
 #[reflect(Component, Default, SerializeWithRegistry)]
 pub struct ShatterCracks {
     /// When shards fall by themselves.
@@ -104,6 +105,7 @@ impl Default for ShatterCracks {
 
 /// In which axes [`BurstParams::gravity`] is meant.
 #[derive(Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[type_path = "bevy_crack"]
 #[reflect(Default)]
 pub enum GravitySpace {
     /// Those of the world: y is up, whichever way the surface is turned, mirrored or scaled, in 2D and in 3D. Pieces of a floor fall
@@ -119,6 +121,7 @@ pub enum GravitySpace {
 
 /// When shards fall by themselves.
 #[derive(Reflect, Clone, Copy, Debug, Default, PartialEq)]
+#[type_path = "bevy_crack"]
 #[reflect(Default)]
 pub enum ShatterWhen {
     /// Only on [`shatter_cracks`](crate::plugin::CrackCommandsExt::shatter_cracks).
@@ -208,6 +211,7 @@ impl Default for ShatterRequest {
 ///
 /// With [`ShatterCracks::fly`] off, this is what a physics engine needs: colliders, mass and the velocity of the blow.
 #[derive(Component, Reflect, Clone, Debug)]
+#[type_path = "bevy_crack"]
 #[reflect(Component, Clone, Debug, Default)]
 #[component(clone_behavior = Ignore)]
 pub struct Shard {
@@ -249,6 +253,7 @@ impl Shard {
 
 /// What has become of a surface that has shattered. Written by the crate, gone when it is whole again.
 #[derive(Component, Reflect, Clone, Debug)]
+#[type_path = "bevy_crack"]
 #[reflect(Component, Clone, Debug, Default)]
 #[component(clone_behavior = Ignore)]
 pub struct CrackShards {
@@ -268,6 +273,7 @@ pub struct CrackShards {
 /// No more than 256 leave in one frame, those first that move first, unless [`CrackBudget::milliseconds`](super::CrackBudget::milliseconds)
 /// is a second or more: of a larger burst the event comes for each of its frames.
 #[derive(EntityEvent, Reflect, Clone, Debug, PartialEq)]
+#[type_path = "bevy_crack"]
 #[reflect(Event, Default)]
 pub struct Shattered {
     /// The surface.
@@ -280,6 +286,7 @@ pub struct Shattered {
 
 /// All shards of a surface have returned to their places, time having run backwards.
 #[derive(EntityEvent, Reflect, Clone, Copy, Debug, PartialEq)]
+#[type_path = "bevy_crack"]
 #[reflect(Event, Default)]
 pub struct Reassembled {
     /// The surface.

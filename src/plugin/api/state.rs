@@ -8,6 +8,7 @@ use bevy::prelude::*;
 /// Damage, time, tips and the end are written in [`CrackSystems::Paint`](super::CrackSystems::Paint), the status also in the sets before it, all
 /// in `PostUpdate`: a system in `Update` reads what was so at the end of the frame before. Healing sets it back at once.
 #[derive(Component, Reflect, Clone, Debug, Default, PartialEq)]
+#[type_path = "bevy_crack"]
 #[reflect(Component, Default)]
 #[component(clone_behavior = Ignore)]
 pub struct CrackState {
@@ -44,6 +45,7 @@ impl CrackState {
 
 /// What a surface is at.
 #[derive(Reflect, Clone, Debug, Default, PartialEq)]
+#[type_path = "bevy_crack"]
 pub enum CrackStatus {
     /// Not hit yet, or healed.
     #[default]
@@ -60,6 +62,7 @@ pub enum CrackStatus {
 
 /// The end of a growing crack.
 #[derive(Reflect, Clone, Copy, Debug, Default, PartialEq)]
+#[type_path = "bevy_crack"]
 pub struct CrackTip {
     /// Texture coordinates in the surface's picture or sprite frame, 0..=1, v down.
     pub uv: Vec2,
@@ -71,6 +74,7 @@ pub struct CrackTip {
 
 /// Cracks have closed a cell: a piece that could fall. Told when the crack that closes it is shown for the first time.
 #[derive(EntityEvent, Reflect, Clone, Copy, Debug, PartialEq)]
+#[type_path = "bevy_crack"]
 #[reflect(Event, Default)]
 pub struct CellClosed {
     /// The surface.
@@ -87,6 +91,7 @@ pub struct CellClosed {
 /// [`CrackClock`](super::CrackClock) runs over the end. A hit that widens what is there already is one of them: under hammering this
 /// comes again and again.
 #[derive(EntityEvent, Reflect, Clone, Copy, Debug, PartialEq)]
+#[type_path = "bevy_crack"]
 #[reflect(Event, Default)]
 pub struct CrackFinished {
     /// The surface.
@@ -95,6 +100,7 @@ pub struct CrackFinished {
 
 /// A surface cannot crack; the hits that waited on it are rejected.
 #[derive(EntityEvent, Reflect, Clone, Debug, PartialEq)]
+#[type_path = "bevy_crack"]
 #[reflect(Event, Default)]
 pub struct CrackFailed {
     /// The surface.

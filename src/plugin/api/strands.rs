@@ -27,6 +27,7 @@ use bevy::{prelude::*, reflect::serde::ReflectSerializeWithRegistry};
 /// }
 /// ```
 #[derive(Component, Reflect, Clone, Debug, PartialEq)]
+#[type_path = "bevy_crack"]
 #[reflect(Component, Default, Clone, Debug, PartialEq, SerializeWithRegistry)]
 #[require(BakeProgress)]
 pub struct CrackStrands {
@@ -49,6 +50,7 @@ pub struct CrackStrands {
 
 /// The directions of [`CrackStrands`], before noise turns them.
 #[derive(Reflect, Clone, Debug, PartialEq)]
+#[type_path = "bevy_crack"]
 #[reflect(Clone, Debug, PartialEq, SerializeWithRegistry)]
 pub enum StrandField {
     /// The same everywhere: x to the right of the picture, y down.

@@ -21,6 +21,7 @@ use bevy::{prelude::*, reflect::serde::ReflectSerializeWithRegistry};
 /// and is hit from all sides. Where a face shows a part of the picture twice itself, where the picture repeats, faces share vertices, or there
 /// are more than 65,536 triangles, the mesh stays as it is, and cracks show wherever their place of the picture does.
 #[derive(Component, Reflect, Clone, Debug, PartialEq)]
+#[type_path = "bevy_crack"]
 #[reflect(Component, Default, SerializeWithRegistry)]
 #[require(CrackState)]
 pub struct CrackSurface {
@@ -104,6 +105,7 @@ impl Default for CrackSurface {
 
 /// Size of a surface's textures.
 #[derive(Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[type_path = "bevy_crack"]
 pub enum CrackResolution {
     /// As its picture; with more columns or rows where it is shown stretched by more than 1.4, so that the cracks are not, by the sprite's
     /// `custom_size`, the mesh's texture coordinates or a scale that stretches it. That is seen to when the textures are made, as far as two
@@ -123,6 +125,7 @@ pub enum CrackResolution {
 /// With a look that [glows](crate::paint::Look::glow) when a surface first cracks, 3D meshes whose material has no emissive picture of its own get an
 /// emissive map as well.
 #[derive(Reflect, Clone, Copy, Debug, PartialEq, Eq)]
+#[type_path = "bevy_crack"]
 #[reflect(Default)]
 pub struct CrackMaps {
     /// The picture itself.

@@ -6,6 +6,7 @@ use bevy::prelude::*;
 
 /// The private textures of a cracked surface, for materials of your own. Written by the crate, gone after healing.
 #[derive(Component, Reflect, Clone, Debug, Default, PartialEq)]
+#[type_path = "bevy_crack"]
 #[reflect(Component, Default)]
 #[component(clone_behavior = Ignore)]
 pub struct CrackTextures {

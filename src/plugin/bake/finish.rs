@@ -14,7 +14,7 @@ use crate::plugin::gpu::textures::{self, Picture};
 use crate::plugin::source::picture::BasePicture;
 use crate::plugin::surface::active::Active;
 use crate::plugin::surface::cracks::Added;
-use crate::plugin::surface::frame::{frame, look};
+use crate::plugin::surface::frame::{frame, look, profile};
 use crate::plugin::surface::regrow::{Past, grown_anew};
 use crate::plugin::surface::stamp_network::stamp_all;
 use crate::plugin::surface::tile_set::Touched;
@@ -186,7 +186,7 @@ impl FinishInputs {
         let (mut field, mut touched) = (DepthField::new(frame), Touched::new(frame.size()));
         field.set_forbidden(&self.mask);
         field.set_layers(self.preset.look.layer(self.surface.seed));
-        let profile = self.preset.profile;
+        let profile = profile(&self.preset, self.base.is_nearest);
         let replay = match self.first.moment(growth.timeline().end()) {
             None => {
                 stamp_all(&growth, &profile, &mut field, &mut touched);

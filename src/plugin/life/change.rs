@@ -15,7 +15,7 @@ use crate::plugin::source::preset;
 use crate::plugin::surface::active::Active;
 use crate::plugin::surface::cracked::{self, active, with_queues};
 use crate::plugin::surface::create::{attach, make_textures, report_textures, set_status};
-use crate::plugin::surface::frame::{frame, look};
+use crate::plugin::surface::frame::{frame, look, profile};
 use crate::plugin::surface::plan::resolve_mask;
 use crate::plugin::surface::prepare::fail;
 use crate::plugin::surface::queues::Queues;
@@ -159,8 +159,9 @@ fn update_preset(
     }
     active.canvas.look = look;
     let plan = preset.look.layer(active.surface.seed);
-    if active.drawing.profile != preset.profile || *active.drawing.field.plan() != plan {
-        active.drawing.profile = preset.profile;
+    let profile = profile(&preset, active.canvas.base.is_nearest);
+    if active.drawing.profile != profile || *active.drawing.field.plan() != plan {
+        active.drawing.profile = profile;
         active.drawing.field.set_layers(plan);
         stamp_anew(active);
     }
@@ -228,10 +229,12 @@ fn update_picture(
     active.cracks.growth.set_mask(mask.clone());
     active.bytes = world.resource::<TextureMemory>().count(draft.plan.bytes);
     active.canvas.unstretched = draft.plan.unstretched;
+    let profile = profile(&active.preset, draft.base.is_nearest);
     active.canvas.base = draft.base;
+    active.canvas.look = look;
     // What the mask forbids may be elsewhere now.
-    if frame != active.drawing.field.frame || had_mask || !mask.is_empty() {
-        active.canvas.look = look;
+    if frame != active.drawing.field.frame || had_mask || !mask.is_empty() || profile != active.drawing.profile {
+        active.drawing.profile = profile;
         active.drawing.field = DepthField::new(frame);
         active.drawing.field.set_forbidden(&mask);
         active.drawing.field.set_layers(active.preset.look.layer(active.surface.seed));

@@ -4,6 +4,7 @@ use super::blending::Blending;
 use super::canvas::Canvas;
 use super::cracks::Cracks;
 use super::drawing::Drawing;
+use super::frame::profile;
 use super::playhead::Playhead;
 use crate::growth::CrackGrowth;
 use crate::paint::LookTable;
@@ -75,6 +76,7 @@ impl Active {
     /// A surface whose textures show what is in the field.
     pub(crate) fn new(ground: SurfaceParts, growth: CrackGrowth, field: DepthField) -> Self {
         let SurfaceParts { surface, preset, look, base, textures, carrier, bytes, rect, unstretched, read_at } = ground;
+        let profile = profile(&preset, base.is_nearest);
         let mut canvas = Canvas {
             look,
             base,
@@ -91,7 +93,7 @@ impl Active {
         canvas.views.iter_mut().for_each(|view| view.dirty.clear());
         Self {
             cracks: Cracks::new(growth),
-            drawing: Drawing::new(field, preset.profile),
+            drawing: Drawing::new(field, profile),
             canvas,
             playhead: Playhead::new(preset.steps_per_second),
             blending: Blending::default(),

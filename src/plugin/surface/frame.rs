@@ -4,7 +4,7 @@ use crate::CrackPreset;
 use crate::paint::{LookTable, Shades};
 use crate::pattern::SurfaceFrame;
 use crate::plugin::api::error::CrackError;
-use crate::raster::TexelRect;
+use crate::raster::{Profile, TexelRect};
 use std::borrow::Cow;
 
 /// Where the cracks of a surface lie that shows `rect`.
@@ -19,4 +19,15 @@ pub(crate) fn look(preset: &CrackPreset, frame: SurfaceFrame, is_nearest: bool) 
         look.to_mut().shades = Shades::Steps(Shades::PIXELS);
     }
     LookTable::new(&look, frame.texels_per_unit()).map_err(|error| CrackError::Preset { reason: error.to_string() })
+}
+
+/// The profile to draw the cracks of a surface with. Where it has few shades, cracks thinner than a texel do not fade: a faint line would be
+/// no shade at all.
+pub(crate) fn profile(preset: &CrackPreset, is_nearest: bool) -> Profile {
+    let is_smooth = match preset.look.shades {
+        Shades::Auto => !is_nearest,
+        Shades::Smooth => true,
+        Shades::Steps(_) => false,
+    };
+    if is_smooth { preset.profile } else { Profile { faintest: 1.0, ..preset.profile } }
 }

@@ -22,9 +22,14 @@ pub(crate) const ASSETS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../asse
 
 /// All that a game has but a window and a renderer; 20 ms a frame.
 pub(crate) fn app(add: impl FnOnce(&mut App)) -> App {
+    app_in(ASSETS, add)
+}
+
+/// The same with another folder of assets.
+pub(crate) fn app_in(assets: &str, add: impl FnOnce(&mut App)) -> App {
     let mut app = App::new();
     let plugins = DefaultPlugins
-        .set(AssetPlugin { file_path: ASSETS.into(), ..default() })
+        .set(AssetPlugin { file_path: assets.into(), ..default() })
         .set(RenderPlugin { render_creation: WgpuSettings { backends: None, ..default() }.into(), ..default() })
         .set(WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() })
         .disable::<bevy::log::LogPlugin>()

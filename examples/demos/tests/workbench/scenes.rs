@@ -1,10 +1,10 @@
 //! Scenes in files: every file is what its description makes, loads, and plays.
 
-use crate::{ASSETS, app, state, wait_for};
+use crate::{ASSETS, app, app_in, state, wait_for};
 use bevy::{
     ecs::reflect::AppTypeRegistry,
     prelude::*,
-    world_serialization::{DynamicWorldBuilder, DynamicWorldRoot},
+    world_serialization::{DynamicWorld, DynamicWorldBuilder, DynamicWorldRoot},
 };
 use bevy_crack::{plugin::PresetSource, prelude::*, shatter::BurstParams};
 use std::{fs, path::PathBuf};
@@ -158,7 +158,9 @@ fn files_are_as_they_are_described() {
 fn every_scene_loads_and_plays() {
     for name in NAMES {
         let mut app = app(|_| {});
-        let scene = app.world().resource::<AssetServer>().load(format!("scenes/{name}.scn.ron"));
+        let scene: Handle<DynamicWorld> = app.world().resource::<AssetServer>().load(format!("scenes/{name}.scn.ron"));
+        // Time passes in frames, while files are loaded in real time.
+        wait_for(&mut app, name, |app| app.world().resource::<AssetServer>().is_loaded_with_dependencies(&scene));
         app.world_mut().spawn(DynamicWorldRoot(scene));
         let mut surfaces = Vec::new();
         wait_for(&mut app, name, |app| {
@@ -186,24 +188,31 @@ fn every_scene_loads_and_plays() {
 
 #[test]
 fn a_broken_scene_is_an_error_and_no_more() {
-    let mut app = app(|app| {
-        app.world_mut();
-    });
-    let file = path("broken_for_a_test");
-    let text = written("mud_flat").replacen("seed", "seeds", 1);
-    // Beside the others, but gone before anybody counts them: a folder of its own.
-    let folder = std::env::temp_dir().join(format!("bevy_crack_scene_{}", std::process::id()));
+    let whole = written("mud_flat");
+    let broken = [
+        ("unknown", whole.replacen("bevy_crack::CrackScript", "bevy_crack::NoSuchThing", 1)),
+        ("mistyped", whole.replacen("seed: 9", "seed: \"nine\"", 1)),
+        ("cut_off", whole[..whole.len() / 2].to_owned()),
+    ];
+    // A folder of its own, with the pictures of a bystander.
+    let folder = std::env::temp_dir().join(format!("bevy_crack_scenes_{}", std::process::id()));
     fs::create_dir_all(&folder).expect("a folder");
-    let file = folder.join(file.file_name().expect("a name"));
-    fs::write(&file, text).expect("a file");
-    let picture = app.world().resource::<AssetServer>().load("textures/mud.png");
-    let bystander = app.world_mut().spawn((Sprite::from_image(picture), CrackSurface::default())).id();
+    for (name, text) in &broken {
+        assert_ne!(text, &whole);
+        fs::write(folder.join(format!("{name}.scn.ron")), text).expect("a file");
+    }
+    let mut app = app_in(folder.to_str().expect("a name"), |_| {});
+    let bystander =
+        app.world_mut().spawn((Sprite::from_color(Color::WHITE, Vec2::splat(64.0)), CrackSurface::default()));
+    let bystander = bystander.id();
     let server = app.world().resource::<AssetServer>().clone();
-    let scene = server.load_builder().override_unapproved().load(file.clone());
-    app.world_mut().spawn(DynamicWorldRoot(scene.clone()));
-    wait_for(&mut app, "an error", |_| server.load_state(&scene).is_failed());
+    for (name, _) in broken {
+        let scene = server.load(format!("{name}.scn.ron"));
+        app.world_mut().spawn(DynamicWorldRoot(scene.clone()));
+        wait_for(&mut app, name, |_| server.load_state(&scene).is_failed());
+    }
     let surfaces = app.world_mut().query_filtered::<(), With<CrackSurface>>().iter(app.world()).count();
-    assert_eq!(surfaces, 1, "nothing of it is there");
+    assert_eq!(surfaces, 1, "nothing of them is there");
     app.world_mut().trigger(CrackHit::uv(bystander, Vec2::splat(0.5)));
     wait_for(&mut app, "cracks", |app| state(app, bystander).status == CrackStatus::Done);
     fs::remove_dir_all(folder).expect("it was there");
@@ -219,7 +228,7 @@ fn scripts_do_not_depend_on_the_frame_rate() {
         });
         let picture = app.world().resource::<AssetServer>().load("textures/plaster.png");
         let script =
-            CrackScript::new([(0.5, Vec2::new(0.3, 0.4)), (3.5, Vec2::new(0.7, 0.6)), (0.0, Vec2::splat(0.5))]);
+            CrackScript::new([(4.0, Vec2::new(0.3, 0.4)), (8.0, Vec2::new(0.7, 0.6)), (0.0, Vec2::splat(0.5))]);
         let surface = CrackSurface::new(CrackPreset::CONCRETE);
         let wall = app.world_mut().spawn((Sprite::from_image(picture), surface, script)).id();
         wait_for(&mut app, "three hits", |app| state(app, wall).hits == 3);
@@ -236,6 +245,8 @@ fn a_script_repeats_itself() {
     let picture = app.world().resource::<AssetServer>().load("textures/plaster.png");
     let mut script = CrackScript::new([(0.1, Vec2::splat(0.5)), (f32::NAN, Vec2::ZERO), (-1.0, Vec2::ZERO)]);
     script.repeat_after = Some(1.0);
+    // Time passes in frames, while the picture is loaded in real time.
+    wait_for(&mut app, "the picture", |app| app.world().resource::<AssetServer>().is_loaded(&picture));
     let surface = CrackSurface::new(CrackPreset::PLASTER);
     let wall = app.world_mut().spawn((Sprite::from_image(picture), surface, script)).id();
     wait_for(&mut app, "the first time", |app| state(app, wall).nodes > 0);
