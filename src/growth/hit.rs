@@ -24,10 +24,9 @@ impl CrackGrowth {
     /// Hits the surface at `pos` (pattern units) with `energy` (1 = an ordinary hit; 4 reaches twice as far).
     ///
     /// Creates starts and markers; cracks grow in [`step`](Self::step). A hit near an earlier one adds its energy to
-    /// that
-    /// impact, so many hits on one spot cost no more than one hard hit. Near means: closer than `step_length` or
-    /// `kill_distance`, whichever is longer, but at most 0.05 pattern units. A hit that cannot be used is
-    /// that cannot be used is reported as [`HitOutcome::Rejected`].
+    /// that impact, so many hits on one spot cost no more than one hard hit. Near means: closer than `step_length` or
+    /// `kill_distance`, whichever is longer, but at most 0.05 pattern units. A hit that cannot be used is reported as
+    /// [`HitOutcome::Rejected`].
     pub fn hit(&mut self, pos: Vec2, energy: f32) -> HitOutcome {
         let outcome = self.begin_hit(pos, energy);
         self.finish_layout();

@@ -2,7 +2,7 @@
 
 use crate::support::*;
 use bevy::prelude::*;
-use bevy_crack::{CrackPreset, math::Rng, prelude::*};
+use bevy_crack::{CrackPreset, math::Rng, paint::Shades, prelude::*};
 
 const MOST: u32 = 200;
 
@@ -12,6 +12,8 @@ fn preset() -> CrackPreset {
     preset.growth.draw_islands = true;
     // What is crushed is made anew where it is hit again; this is about cracks.
     preset.look.crushed = None;
+    // With few shades some light and some shadow are the picture's own shade.
+    preset.look.shades = Shades::Smooth;
     // As wide as texels, or what is lit and what is in shadow cancel out in some.
     (preset.growth.line_width, preset.growth.max_width) = (0.012, 0.03);
     preset

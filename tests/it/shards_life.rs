@@ -6,6 +6,7 @@ use crate::{
 };
 use bevy::{mesh::VertexAttributeValues, prelude::*};
 use bevy_crack::{
+    paint::Shades,
     prelude::*,
     shatter::{BreakAgain, BurstParams, RimLook, SizeClasses},
 };
@@ -175,6 +176,7 @@ fn every_edge_lies_on_a_drawn_crack() {
     // Its cracks end in the open. They are wide enough for each texel of them to be seen, and have no needles at their ends.
     let mut preset = CrackPreset::CONCRETE;
     (preset.growth.line_width, preset.growth.tip_taper) = (0.012, 0.0);
+    preset.look.shades = Shades::Smooth;
     let surface = CrackSurface::new(preset).with_seed(4);
     let entity = app.world_mut().spawn((Sprite::from_image(image), surface, loose())).id();
     crack(&mut app, entity);

@@ -128,7 +128,7 @@ pub(crate) fn picture_of(size: UVec2, format: TextureFormat) -> Image {
     let data = (0..n).map(|i| if i % 4 == 3 { 255 } else { 150 + (i * 7 % 60) as u8 }).collect();
     let mut image = Image::new_uninit(extent, TextureDimension::D2, format, RenderAssetUsages::default());
     image.data = Some(data);
-    image.sampler = ImageSampler::linear();
+    image.sampler = ImageSampler::nearest();
     image
 }
 
