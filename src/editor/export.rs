@@ -2,7 +2,10 @@
 
 use super::subject::Export;
 use crate::{
-    plugin::{CrackShards, CrackSurface, CrackTextures, PresetSource, inspect::Film},
+    plugin::{
+        CrackCommandsExt, CrackRecord, CrackShards, CrackSurface, CrackTextures, PresetSource,
+        inspect::{Film, recorded},
+    },
     shatter::Shards,
 };
 use bevy::{
@@ -49,6 +52,19 @@ fn said(path: &Path, done: Result<(), String>) -> String {
     }
 }
 
+/// Gives a surface the cracks of a file, and says what came of it.
+pub(super) fn load_record(world: &mut World, entity: Entity, path: &Path) -> String {
+    let read = fs::read_to_string(path).map_err(|error| error.to_string());
+    let record = read.and_then(|text| ron::from_str::<CrackRecord>(&text).map_err(|error| error.to_string()));
+    match record {
+        Ok(record) => {
+            world.commands().entity(entity).heal_cracks().insert(record);
+            format!("Read {}", path.display())
+        }
+        Err(error) => format!("Could not read {}: {error}", path.display()),
+    }
+}
+
 /// Begins to write; the task says what came of it.
 pub(super) fn start(world: &World, entity: Entity, what: Export, folder: PathBuf) -> Result<Task<String>, String> {
     let pool = AsyncComputeTaskPool::try_get().ok_or("There are no threads to write with.")?;
@@ -67,6 +83,18 @@ pub(super) fn start(world: &World, entity: Entity, what: Export, folder: PathBuf
                 let done = in_folder(&path).and_then(|()| match what {
                     Export::Gif => write_gif(&film, &path),
                     _ => write_sheet(&film, &path),
+                });
+                said(&path, done)
+            })
+        }
+        Export::Record => {
+            let record = recorded(world, entity).ok_or("There are no cracks yet: hit the surface.")?;
+            pool.spawn(async move {
+                let path = folder.join(Export::RECORD);
+                let text = ron::ser::to_string_pretty(&record, ron::ser::PrettyConfig::default());
+                let done = text.map_err(|error| error.to_string()).and_then(|text| {
+                    in_folder(&path)?;
+                    fs::write(&path, text).map_err(|error| error.to_string())
                 });
                 said(&path, done)
             })

@@ -72,6 +72,8 @@ pub enum EditorCommand {
     Redo,
     /// Write the preset to a file.
     SavePreset(PathBuf),
+    /// Read cracks from a file that [`Export::Record`] has written.
+    LoadRecord(PathBuf),
     /// Write something of the surface into a folder.
     Export(Export, PathBuf),
 }
@@ -87,11 +89,16 @@ pub enum Export {
     Sheet,
     /// The outlines of the shards as SVG.
     Shards,
+    /// The cracks themselves, as a [`CrackRecord`](crate::plugin::CrackRecord) in RON.
+    Record,
 }
 
 impl Export {
     /// All of them.
-    pub const ALL: [Self; 4] = [Self::Maps, Self::Gif, Self::Sheet, Self::Shards];
+    pub const ALL: [Self; 5] = [Self::Maps, Self::Gif, Self::Sheet, Self::Shards, Self::Record];
+
+    /// Name of the file with a record.
+    pub const RECORD: &str = "cracks.ron";
 
     /// What its button says.
     #[must_use]
@@ -101,6 +108,7 @@ impl Export {
             Self::Gif => "Growth as GIF",
             Self::Sheet => "Growth as sprite sheet",
             Self::Shards => "Shards as SVG",
+            Self::Record => "Save cracks",
         }
     }
 }

@@ -201,6 +201,7 @@ fn obey(world: &mut World, editor: &mut CrackEditor, command: EditorCommand) {
         EditorCommand::Undo => step(world, editor, true),
         EditorCommand::Redo => step(world, editor, false),
         EditorCommand::SavePreset(path) => editor.panel.message = export::save_preset(world, entity, &path),
+        EditorCommand::LoadRecord(path) => editor.panel.message = export::load_record(world, entity, &path),
         EditorCommand::Export(what, folder) => match export::start(world, entity, what, folder) {
             Ok(task) => {
                 editor.panel.message = "Writing …".into();

@@ -39,6 +39,7 @@ impl CrackGrowth {
         if first == 0 {
             return 0;
         }
+        self.record.removal(keep);
         // Nodes that have grown from added cracks may not belong to an impact either.
         let foreign = self.network.nodes[..first].iter().filter(|node| node.impact == NO_IMPACT).count();
         self.added = self.added.saturating_sub(foreign);

@@ -51,6 +51,12 @@ impl CrackGrowth {
     /// ```
     pub fn begin_hit(&mut self, pos: Vec2, energy: f32) -> HitOutcome {
         self.finish_layout();
+        let outcome = self.apply_hit(pos, energy);
+        self.record.hit(pos, energy, &outcome);
+        outcome
+    }
+
+    fn apply_hit(&mut self, pos: Vec2, energy: f32) -> HitOutcome {
         if !pos.is_finite() || !energy.is_finite() {
             return HitOutcome::Rejected(Rejected::NotFinite);
         }

@@ -59,6 +59,7 @@ mod masonry;
 mod nodes;
 mod others;
 mod params;
+mod past;
 mod plan;
 mod pull;
 mod rays;
@@ -75,5 +76,6 @@ mod width;
 
 pub use impact::{HitOutcome, Impact, MAX_ENERGY, Rejected};
 pub use params::{GrowthParams, MAX_MARKERS, MarkerLayout, ParamError, StartLayout, Venation};
+pub use past::{Past, PastError, PastEvent};
 pub use state::{CrackGrowth, MarkerCounts};
 pub use step::StepReport;

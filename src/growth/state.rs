@@ -11,6 +11,7 @@ use super::{
     masonry::Masonry,
     nodes::NodeGrid,
     params::{GrowthParams, MarkerLayout, ParamError},
+    past::Record,
     pull::Pull,
     rays::Rays,
     width::Widths,
@@ -70,6 +71,8 @@ pub struct CrackGrowth {
     pub(super) masonry: Option<Arc<Masonry>>,
     pub(super) steps: u32,
     pub(super) steps_left: u32,
+    /// What has happened so far.
+    pub(super) record: Record,
     /// Number of cracks started by nucleation, and of markers that were tried for it.
     pub(super) nucleated: u32,
     pub(super) tried: u32,
@@ -129,6 +132,7 @@ impl CrackGrowth {
             masonry: None,
             steps: 0,
             steps_left: 0,
+            record: Record::default(),
             nucleated: 0,
             tried: 0,
             unshown: Vec::new(),

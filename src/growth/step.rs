@@ -38,6 +38,9 @@ impl CrackGrowth {
     pub fn step(&mut self) -> StepReport {
         self.finish_layout();
         self.new_nodes = 0..0;
+        if self.is_growing() {
+            self.record.step();
+        }
         // A tip that has just turned to meet a crack may be all that moves, and it has no new node yet.
         while self.steps_left > 0 && self.new_nodes.is_empty() {
             self.make_step();

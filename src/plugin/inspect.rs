@@ -1,7 +1,7 @@
 //! What tools see of a surface that games do not: its network, markers and cells in texture coordinates, costs, a film of its growth.
 
-use super::api::CrackBudget;
 use super::api::textures::MAPS;
+use super::api::{CrackBudget, CrackRecord};
 use super::carrier::{kind::Found, kinds, space};
 use super::gpu::{memory::TextureMemory, textures, uploads::Uploads};
 use super::jobs::frame_time::FrameClock;
@@ -31,6 +31,11 @@ pub(crate) fn frame_cost(world: &mut World) -> FrameCost {
         n_cracked += 1;
     }
     FrameCost { milliseconds, texture_bytes, nodes, cracked: n_cracked }
+}
+
+/// What has happened to a surface; `None` if it has no cracks, or was hit too often.
+pub(crate) fn recorded(world: &World, entity: Entity) -> Option<CrackRecord> {
+    cracked::active(world, entity)?.record()
 }
 
 /// A straight part of a crack.

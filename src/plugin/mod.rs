@@ -34,16 +34,16 @@ mod surface;
 
 pub use api::{
     BakeProgress, CellClosed, CrackBaked, CrackBudget, CrackClock, CrackDrive, CrackError, CrackFailed, CrackFinished,
-    CrackGuide, CrackHit, CrackMaps, CrackMaskSource, CrackResolution, CrackScript, CrackShards, CrackState,
-    CrackStats, CrackStatus, CrackStrands, CrackSurface, CrackSystems, CrackTextures, CrackTip, CrackUploadStats,
-    GravitySpace, GuideSource, GuidedAppearance, GuidedCracks, HitPoint, PresetSource, Reassembled, ScriptedHit, Shard,
-    ShardsError, ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen, Shattered, StrandField,
+    CrackGuide, CrackHit, CrackMaps, CrackMaskSource, CrackRecord, CrackResolution, CrackScript, CrackShards,
+    CrackState, CrackStats, CrackStatus, CrackStrands, CrackSurface, CrackSystems, CrackTextures, CrackTip,
+    CrackUploadStats, GravitySpace, GuideSource, GuidedAppearance, GuidedCracks, HitPoint, PresetSource, Reassembled,
+    ScriptedHit, Shard, ShardsError, ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen, Shattered, StrandField,
 };
 #[cfg(feature = "2d")]
 pub use carrier::lit::{CrackLight2d, CrackLitMaterial, CrackLitUniform, MAX_LIGHTS};
 #[cfg(any(feature = "2d", feature = "3d"))]
 pub use carrier::place::{CrackPlace, CrackPlaces};
-pub use life::commands::CrackCommandsExt;
+pub use life::{commands::CrackCommandsExt, record::CrackRecords};
 
 use bevy::{
     app::{PluginGroup, PluginGroupBuilder, PostUpdate},
@@ -57,10 +57,10 @@ pub mod prelude {
     pub use super::{
         BakeProgress, CellClosed, CrackBaked, CrackBudget, CrackClock, CrackCommandsExt, CrackDrive, CrackError,
         CrackFailed, CrackFinished, CrackGuide, CrackHit, CrackMaps, CrackMaskSource, CrackPlugin, CrackPlugins,
-        CrackResolution, CrackScript, CrackShards, CrackState, CrackStats, CrackStatus, CrackStrands, CrackSurface,
-        CrackSystems, CrackTextures, CrackTip, GravitySpace, GuideSource, GuidedAppearance, GuidedCracks, HitPoint,
-        PresetSource, Reassembled, ScriptedHit, Shard, ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen,
-        Shattered, StrandField,
+        CrackRecord, CrackRecords, CrackResolution, CrackScript, CrackShards, CrackState, CrackStats, CrackStatus,
+        CrackStrands, CrackSurface, CrackSystems, CrackTextures, CrackTip, GravitySpace, GuideSource, GuidedAppearance,
+        GuidedCracks, HitPoint, PresetSource, Reassembled, ScriptedHit, Shard, ShatterCracks, ShatterFailed,
+        ShatterRequest, ShatterWhen, Shattered, StrandField,
     };
     #[cfg(feature = "2d")]
     pub use super::{CrackLight2d, CrackLitMaterial};
@@ -93,6 +93,7 @@ impl Plugin for CrackPlugin {
             .register_type::<GuidedAppearance>()
             .register_type::<CrackStrands>()
             .register_type::<CrackScript>()
+            .register_type::<CrackRecord>()
             .register_type::<StrandField>()
             .register_type::<BakeProgress>()
             .register_type::<CrackBaked>()
@@ -133,6 +134,7 @@ impl Plugin for CrackPlugin {
             .add_observer(hits::collect::receive_hit)
             .add_observer(bake::work::cancel_removed::<GuidedCracks>)
             .add_observer(bake::work::cancel_removed::<CrackStrands>)
+            .add_observer(bake::work::cancel_removed::<CrackRecord>)
             .add_observer(life::heal::disown_added)
             .add_observer(life::heal::heal_removed)
             .add_observer(life::heal::heal_closed)
@@ -163,7 +165,11 @@ impl Plugin for CrackPlugin {
                             life::watch::watch_surfaces,
                             life::watch::watch_pictures,
                             life::watch::watch_presets,
-                            bake::work::watch_baked,
+                            (
+                                bake::work::watch_baked,
+                                bake::work::watch_records.run_if(any_with_component::<CrackRecord>),
+                            )
+                                .chain(),
                         ),
                         life::change::update_changed.run_if(life::watch::any_changed),
                         hits::collect::collect_hits,

@@ -40,6 +40,8 @@ mod prepare;
 mod presets;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod random;
+#[cfg(all(feature = "2d", feature = "3d"))]
+mod records;
 mod replay;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod saved;

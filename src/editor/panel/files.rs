@@ -24,5 +24,9 @@ pub(super) fn show(ui: &mut Ui, panel: &mut Panel, asked: &mut Vec<EditorCommand
                 asked.push(EditorCommand::Export(export, folder.to_owned()));
             }
         }
+        let load = ui.button("Load cracks").on_hover_text("Those of “Save cracks”, in place of what is there.");
+        if load.clicked() {
+            asked.push(EditorCommand::LoadRecord(folder.join(Export::RECORD)));
+        }
     });
 }

@@ -123,6 +123,12 @@ pub enum CrackError {
         /// Which one and why.
         reason: String,
     },
+    /// A [`CrackRecord`](super::CrackRecord) cannot be taken up.
+    #[error("its record cannot be used: {reason}")]
+    Record {
+        /// Why.
+        reason: String,
+    },
     /// Its textures could not be made.
     #[error("its textures could not be made: {reason}")]
     Textures {

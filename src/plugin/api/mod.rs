@@ -8,6 +8,7 @@ pub(crate) mod guided;
 pub(crate) mod hit;
 pub(crate) mod mask;
 pub(crate) mod preset;
+pub(crate) mod record;
 mod reflect;
 pub(crate) mod script;
 pub(crate) mod shatter;
@@ -24,6 +25,7 @@ pub use guided::{BakeProgress, CrackBaked, CrackGuide, GuideSource, GuidedAppear
 pub use hit::{CrackHit, HitPoint};
 pub use mask::CrackMaskSource;
 pub use preset::PresetSource;
+pub use record::CrackRecord;
 pub use script::{CrackScript, ScriptedHit};
 pub use shatter::{
     CrackShards, GravitySpace, Reassembled, Shard, ShardsError, ShatterCracks, ShatterFailed, ShatterRequest,

@@ -3,7 +3,7 @@
 use super::map_job::{BakeSurface, CracksOrder, MAX_SIDE, MapJob, Source};
 use super::strands_job::StrandsOrder;
 use super::work::{Bake, Baked, Work};
-use crate::plugin::api::{CrackError, CrackStrands, GuideSource, GuidedCracks};
+use crate::plugin::api::{CrackError, CrackRecord, CrackStrands, CrackSurface, GuideSource, GuidedCracks};
 use crate::plugin::jobs::copy::PictureCopies;
 use crate::plugin::jobs::threads::Threads;
 use crate::plugin::source::picture;
@@ -24,7 +24,17 @@ pub(super) fn begin(world: &mut World, entity: Entity, bake: &mut Bake) -> Resul
         Baked::Strands => {
             let Some(strands) = world.get::<CrackStrands>(entity).cloned() else { return Ok(None) };
             let Some(order) = StrandsOrder::new(world, entity, &strands, &mut copies)? else { return Ok(None) };
-            (None, Some(order))
+            (None, Some(CracksOrder::Strands(Box::new(order))))
+        }
+        Baked::Record => {
+            let Some(record) = world.get::<CrackRecord>(entity).cloned() else { return Ok(None) };
+            record.validate()?;
+            if let Some(mut surface) = world.get_mut::<CrackSurface>(entity)
+                && surface.seed != record.seed
+            {
+                surface.seed = record.seed;
+            }
+            (None, Some(CracksOrder::Record(Box::new(record))))
         }
     };
     let known = active(world, entity).and_then(|active| {
@@ -73,7 +83,7 @@ pub(super) fn begin(world: &mut World, entity: Entity, bake: &mut Bake) -> Resul
             let size = scaled(size, guided.max_side);
             (CracksOrder::Guided(Box::new(guided)), size)
         }
-        (None, Some(order)) => (CracksOrder::Strands(Box::new(order)), size.max(UVec2::ONE)),
+        (None, Some(order)) => (order, size.max(UVec2::ONE)),
         (None, None) => return Ok(None),
     };
     let has_threads = world.resource::<Threads>().pool().is_some();

@@ -1,8 +1,9 @@
 //! What the frames do of a bake: they order a surface, and apply what was made.
 
-use super::finish::{Finish, FinishInputs, FinishStep, Finished};
+use super::finish::{Finish, FinishInputs, FinishStep, Finished, Seen};
 use super::map_job::Lines;
 use super::work::{Bake, BakeJob, Baked, Work};
+use crate::growth::Past;
 use crate::plugin::api::{CrackClock, CrackError, CrackStatus, CrackStrands, CrackTextures, GuidedCracks};
 use crate::plugin::draw::async_playback::{self, AsyncPlayback};
 use crate::plugin::gpu::uploads::Uploads;
@@ -10,13 +11,11 @@ use crate::plugin::jobs::background::drop_in_background;
 use crate::plugin::shards::broken::drop_shards;
 use crate::plugin::surface::active::Active;
 use crate::plugin::surface::cracked::{self, active, has_cracked, with_queues};
-use crate::plugin::surface::cracks::Added;
 use crate::plugin::surface::create::{install, make_ready_now, set_status};
 use crate::plugin::surface::inputs::BaseAndMask;
 use crate::plugin::surface::plan::Plan;
 use crate::plugin::surface::prepare::MAX_UPLOAD_FRAMES;
 use crate::plugin::surface::queues::Queues;
-use crate::plugin::surface::regrow::Past;
 use crate::plugin::surface::time::First;
 use bevy::{prelude::*, render::renderer::RenderDevice};
 
@@ -28,11 +27,17 @@ fn seconds(world: &World, entity: Entity, kind: Baked) -> Option<f32> {
     match kind {
         Baked::Strands => Some(world.get::<CrackStrands>(entity)?.seconds).filter(|seconds| *seconds > 0.0),
         Baked::Guided => world.get::<GuidedCracks>(entity)?.appearance.seconds(),
+        Baked::Record => None,
     }
 }
 
 /// Has the surface made with these cracks, as it is now; from the start if it is another one.
-pub(super) fn start_finish(world: &mut World, entity: Entity, bake: &mut Bake, lines: Lines) -> Result<(), CrackError> {
+pub(super) fn start_finish(
+    world: &mut World,
+    entity: Entity,
+    bake: &mut Bake,
+    mut lines: Lines,
+) -> Result<(), CrackError> {
     let seconds = seconds(world, entity, bake.kind);
     let stager = world.resource::<Uploads>().stager(world.get_resource::<RenderDevice>());
     if !has_cracked(world, entity) {
@@ -42,6 +47,7 @@ pub(super) fn start_finish(world: &mut World, entity: Entity, bake: &mut Bake, l
         }
         if plan.has_room(world) {
             let clock = world.get::<CrackClock>(entity).copied();
+            let record = lines.record.as_deref();
             let order = FinishInputs {
                 surface: plan.surface.clone(),
                 preset: plan.preset.clone(),
@@ -49,9 +55,9 @@ pub(super) fn start_finish(world: &mut World, entity: Entity, bake: &mut Bake, l
                 mask: ground.mask.clone(),
                 rect: plan.pictures.rect,
                 maps: plan.pictures.maps,
-                past: Past { hits: Vec::new(), steps: 0 },
-                hits: 0,
-                first: First::of(clock, 0.0, seconds),
+                past: record.map_or_else(Past::default, |record| record.past.clone()),
+                seen: Seen::default(),
+                first: First::of(clock, record.map_or(0.0, |record| record.time), seconds),
                 has_clock: clock.is_some(),
                 is_new: true,
                 stager,
@@ -68,7 +74,11 @@ pub(super) fn start_finish(world: &mut World, entity: Entity, bake: &mut Bake, l
         }
     }
     let active = active(world, entity);
-    if let Some(order) = active.and_then(|active| FinishInputs::of(active, seconds, stager)) {
+    if let (Some(active), Some(_)) = (active, &lines.record) {
+        // What it shows beside hits stays.
+        lines.added = active.cracks.added.clone();
+    }
+    if let Some(order) = active.and_then(|active| FinishInputs::of(active, seconds, stager, lines.record.as_deref())) {
         bake.work = Work::Ready(BakeJob::Finish(Box::new(Finish::new(order, lines))));
     }
     Ok(())
@@ -119,12 +129,11 @@ pub(super) fn commit(
 
 /// Has a surface made again that has changed meanwhile.
 fn again(world: &mut World, entity: Entity, bake: &mut Bake, finished: Finished) -> Result<(), CrackError> {
-    let Finished { order: past, added, covered, growth, cells, field, pictures, replay, .. } = finished;
+    let Finished { order: past, added, record, covered, growth, cells, field, pictures, replay, .. } = finished;
     drop_in_background((growth, cells, field, pictures, replay));
     let ground = BaseAndMask { base: past.base, mask: past.mask };
     let ground = past.is_new.then_some(ground);
-    let Added { network, opening, motion, .. } = added;
-    start_finish(world, entity, bake, Lines { network, opening, motion, covered, ground })?;
+    start_finish(world, entity, bake, Lines { added, record, covered, ground })?;
     bake.rounds += 1;
     if bake.rounds < MAX_ROUNDS {
         return Ok(());
@@ -148,12 +157,13 @@ fn again(world: &mut World, entity: Entity, bake: &mut Bake, finished: Finished)
 fn settle(world: &mut World, entity: Entity, kind: Baked, plan: Plan, textures: CrackTextures, finished: Finished) {
     let seconds = seconds(world, entity, kind);
     let is_outdated = plan.is_outdated;
-    let Finished { order, added, growth, cells, field, touched, look, replay, playback, .. } = finished;
+    let Finished { order, added, record, growth, frozen, cells, field, touched, look, replay, playback, .. } = finished;
     let ground = plan.ground(world, BaseAndMask { base: order.base, mask: order.mask }, look, textures);
     let mut active = Box::new(Active::new(ground, growth, field));
     (active.drawing.touched, active.cracks.cells, active.cracks.added, active.canvas.is_outdated) =
-        (touched, cells, Some(added), is_outdated);
+        (touched, cells, added, is_outdated);
     active.show_made(replay, seconds);
+    active.resume(record.as_deref(), frozen);
     install(world, entity, active);
     // It may show another part of its pictures, or they have changed.
     world.resource_mut::<Queues>().changed.push(entity);
@@ -168,20 +178,23 @@ fn replace(world: &mut World, entity: Entity, kind: Baked, mut active: Box<Activ
     drop_shards(world, entity, &mut active);
     let textures = active.canvas.textures.clone();
     textures.fill(world, &mut finished.pictures);
-    let Finished { order, added, growth, cells, field, touched, look, replay, playback, pictures, .. } = finished;
+    let Finished {
+        order, added, record, growth, frozen, cells, field, touched, look, replay, playback, pictures, ..
+    } = finished;
     // Steps that it has grown since are made up for.
-    active.playhead.due += f64::from(Past::of(&active).steps.saturating_sub(order.past.steps));
+    active.playhead.due += f64::from(active.cracks.growth.steps_made().saturating_sub(order.seen.steps));
     let before = (
         core::mem::replace(&mut active.cracks.growth, growth),
         core::mem::replace(&mut active.cracks.cells, cells),
         core::mem::replace(&mut active.drawing.field, field),
         core::mem::replace(&mut active.drawing.touched, touched),
         core::mem::replace(&mut active.canvas.look, look),
-        active.cracks.added.replace(added),
+        core::mem::replace(&mut active.cracks.added, added),
         pictures,
     );
-    let is_untouched = order.past.hits.is_empty();
+    let is_untouched = order.past.is_empty();
     let shown_before = active.show_made(replay, seconds.filter(|_| is_untouched));
+    active.resume(record.as_deref(), frozen);
     active.cracks.cells_reported = 1;
     active.fell_at = (0, 1);
     active.cracks.tips_from = 0;

@@ -3,19 +3,20 @@
 
 use super::map_job::{Lines, SLICE};
 use crate::CrackPreset;
-use crate::growth::CrackGrowth;
+use crate::growth::{CrackGrowth, Past};
 use crate::paint::LookTable;
 use crate::pattern::{CellTracker, CrackMask, Moment};
 use crate::plugin::api::textures::{MAPS, Maps};
-use crate::plugin::api::{CrackError, CrackSurface};
+use crate::plugin::api::{CrackError, CrackRecord, CrackSurface};
 use crate::plugin::draw::async_playback::AsyncPlayback;
 use crate::plugin::gpu::buffer::Stager;
 use crate::plugin::gpu::textures::{self, Picture};
 use crate::plugin::source::picture::BasePicture;
 use crate::plugin::surface::active::Active;
 use crate::plugin::surface::cracks::Added;
+use crate::plugin::surface::drawing::Frozen;
 use crate::plugin::surface::frame::{frame, look, profile};
-use crate::plugin::surface::regrow::{Past, grown_anew};
+use crate::plugin::surface::regrow::{Regrown, Regrowth, past};
 use crate::plugin::surface::stamp_network::stamp_all;
 use crate::plugin::surface::tile_set::Touched;
 use crate::plugin::surface::time::First;
@@ -31,8 +32,10 @@ pub(super) struct FinishInputs {
     pub(super) mask: Arc<CrackMask>,
     pub(super) rect: TexelRect,
     pub(super) maps: Maps,
+    /// What grows around what is added.
     pub(super) past: Past,
-    pub(super) hits: u32,
+    /// What had happened to the surface when this was ordered.
+    pub(super) seen: Seen,
     pub(super) first: First,
     pub(super) has_clock: bool,
     /// Whether the surface has not cracked yet.
@@ -42,9 +45,19 @@ pub(super) struct FinishInputs {
 
 impl FinishInputs {
     /// For a surface that has cracked.
-    pub(super) fn of(active: &Active, seconds: Option<f32>, stager: Option<Stager>) -> Option<Self> {
-        let past = Past::of(active);
-        let seconds = seconds.filter(|_| past.hits.is_empty());
+    pub(super) fn of(
+        active: &Active,
+        seconds: Option<f32>,
+        stager: Option<Stager>,
+        record: Option<&CrackRecord>,
+    ) -> Option<Self> {
+        let own = past(active);
+        let past = record.map_or(own.clone(), |record| record.past.followed_by(&own));
+        let seconds = seconds.filter(|_| past.is_empty());
+        let first = match record {
+            Some(record) => First::of(active.playhead.clock, record.time, None),
+            None => active.first(seconds),
+        };
         let [diffuse, normal, depth, emissive] = active.canvas.textures.all().map(|texture| texture.is_some());
         Some(Self {
             surface: active.surface.clone(),
@@ -54,8 +67,8 @@ impl FinishInputs {
             rect: active.canvas.views.get(active.canvas.view)?.rect,
             maps: Maps { diffuse, normal, depth, emissive },
             past,
-            hits: active.cracks.hits,
-            first: active.first(seconds),
+            seen: Seen::of(active),
+            first,
             has_clock: active.playhead.clock.is_some(),
             is_new: false,
             stager,
@@ -66,8 +79,7 @@ impl FinishInputs {
     pub(super) fn fits(&self, active: &Active) -> bool {
         let view = active.canvas.views.get(active.canvas.view);
         !self.is_new
-            && self.hits == active.cracks.hits
-            && self.past.hits.len() == active.cracks.growth.impacts().len()
+            && self.seen == (Seen { steps: self.seen.steps, ..Seen::of(active) })
             && Arc::ptr_eq(&self.base, &active.canvas.base)
             && Arc::ptr_eq(&self.mask, active.cracks.growth.mask())
             && view.is_some_and(|view| view.rect == self.rect)
@@ -77,19 +89,36 @@ impl FinishInputs {
     }
 }
 
+/// What had happened to a surface.
+#[derive(Default, PartialEq)]
+pub(super) struct Seen {
+    hits: u32,
+    impacts: usize,
+    /// Steps of growth.
+    pub(super) steps: u32,
+}
+
+impl Seen {
+    fn of(active: &Active) -> Self {
+        let growth = &active.cracks.growth;
+        Self { hits: active.cracks.hits, impacts: growth.impacts().len(), steps: growth.steps_made() }
+    }
+}
+
 /// The way there, as a machine that is stepped.
 pub(super) struct Finish {
     order: FinishInputs,
-    added: Added,
+    added: Option<Added>,
+    record: Option<Box<CrackRecord>>,
     covered: Option<f32>,
     stage: Stage,
 }
 
 enum Stage {
     Grow,
-    Draw(CrackGrowth, CellTracker),
+    Draw(Regrown, CellTracker),
     Paint {
-        growth: CrackGrowth,
+        grown: Regrown,
         cells: CellTracker,
         drawn: Box<Drawn>,
         texels: [Option<Vec<u8>>; MAPS],
@@ -108,9 +137,11 @@ struct Drawn {
 /// What a frame applies.
 pub(super) struct Finished {
     pub(super) order: FinishInputs,
-    pub(super) added: Added,
+    pub(super) added: Option<Added>,
+    pub(super) record: Option<Box<CrackRecord>>,
     pub(super) covered: Option<f32>,
     pub(super) growth: CrackGrowth,
+    pub(super) frozen: Option<Frozen>,
     pub(super) cells: CellTracker,
     pub(super) field: DepthField,
     pub(super) touched: Touched,
@@ -130,29 +161,31 @@ pub(super) enum FinishStep {
 
 impl Finish {
     pub(super) fn new(order: FinishInputs, lines: Lines) -> Self {
-        let Lines { network, opening, motion, covered, .. } = lines;
-        Self { order, added: Added { network, opening, motion, steps: 0 }, covered, stage: Stage::Grow }
+        let Lines { added, record, covered, .. } = lines;
+        Self { order, added, record, covered, stage: Stage::Grow }
     }
 
     /// A slice of the work.
     pub(super) fn step(self: Box<Self>) -> Result<FinishStep, CrackError> {
-        let Self { order, mut added, covered, stage } = *self;
+        let Self { order, mut added, record, covered, stage } = *self;
         let stage = match stage {
-            Stage::Grow => order.grow(&mut added)?,
-            Stage::Draw(growth, cells) => order.draw(growth, cells, &added)?,
-            Stage::Paint { growth, cells, drawn, mut texels, row } if row < order.rect.size().y => {
+            Stage::Grow => order.grow(added.as_mut())?,
+            Stage::Draw(grown, cells) => order.draw(grown, cells, added.as_ref())?,
+            Stage::Paint { grown, cells, drawn, mut texels, row } if row < order.rect.size().y => {
                 let row = order.paint(&drawn, &mut texels, row);
-                Stage::Paint { growth, cells, drawn, texels, row }
+                Stage::Paint { grown, cells, drawn, texels, row }
             }
-            Stage::Paint { growth, cells, drawn, texels, .. } => {
+            Stage::Paint { grown: Regrown { growth, frozen }, cells, drawn, texels, .. } => {
                 let Drawn { field, touched, look, replay } = *drawn;
                 let playback = replay.is_some().then(|| AsyncPlayback::new(&growth, &texels));
                 let pictures = textures::stage(texels, order.base.size, order.stager.as_ref());
                 return Ok(FinishStep::Done(Box::new(Finished {
                     order,
                     added,
+                    record,
                     covered,
                     growth,
+                    frozen,
                     cells,
                     field,
                     touched,
@@ -163,37 +196,41 @@ impl Finish {
                 })));
             }
         };
-        Ok(FinishStep::More(Box::new(Self { order, added, covered, stage })))
+        Ok(FinishStep::More(Box::new(Self { order, added, record, covered, stage })))
     }
 }
 
 impl FinishInputs {
-    fn grow(&self, added: &mut Added) -> Result<Stage, CrackError> {
-        let extent = frame(self.rect)?.extent();
+    fn grow(&self, added: Option<&mut Added>) -> Result<Stage, CrackError> {
+        let frame = frame(self.rect)?;
         let density = if self.surface.alpha_mask { self.base.density(self.rect) } else { None };
-        let (mask, seed) = (self.mask.clone(), self.surface.seed);
-        let mut growth = grown_anew(&self.preset, extent, seed, mask, density, Some(added), &self.past)?;
+        let (mask, seed, is_nearest) = (self.mask.clone(), self.surface.seed, self.base.is_nearest);
+        let regrowth = Regrowth { preset: &self.preset, frame, seed, is_nearest, mask, density };
+        let mut grown = regrowth.grow(added, &self.past)?;
         // All of it is drawn.
-        growth.take_changed(&mut Vec::new());
-        growth.take_markers(&mut Vec::new());
-        let mut cells = CellTracker::new(extent);
-        cells.update(growth.network());
-        Ok(Stage::Draw(growth, cells))
+        grown.growth.take_changed(&mut Vec::new());
+        grown.growth.take_markers(&mut Vec::new());
+        let mut cells = CellTracker::new(frame.extent());
+        cells.update(grown.growth.network());
+        Ok(Stage::Draw(grown, cells))
     }
 
-    fn draw(&self, growth: CrackGrowth, cells: CellTracker, added: &Added) -> Result<Stage, CrackError> {
-        let frame = frame(self.rect)?;
+    fn draw(&self, grown: Regrown, cells: CellTracker, added: Option<&Added>) -> Result<Stage, CrackError> {
+        let (frame, growth) = (frame(self.rect)?, &grown.growth);
         let (mut field, mut touched) = (DepthField::new(frame), Touched::new(frame.size()));
         field.set_forbidden(&self.mask);
         field.set_layers(self.preset.look.layer(self.surface.seed));
         let profile = profile(&self.preset, self.base.is_nearest);
         let replay = match self.first.moment(growth.timeline().end()) {
             None => {
-                stamp_all(&growth, &profile, &mut field, &mut touched);
+                if let Some(frozen) = &grown.frozen {
+                    frozen.draw(&mut field);
+                }
+                stamp_all(growth, &profile, &mut field, &mut touched);
                 None
             }
             Some(moment)
-                if let Some(on_the_way) = added.motion_at(moment, growth.params())
+                if let Some(on_the_way) = added.and_then(|added| added.motion_at(moment, growth.params()))
                     && on_the_way.draw(&profile, &mut field, &mut touched) =>
             {
                 Some((Replay::stale(frame.size(), profile), moment))
@@ -206,7 +243,7 @@ impl FinishInputs {
             }
         };
         let drawn = Box::new(Drawn { field, touched, look: look(&self.preset, frame, self.base.is_nearest)?, replay });
-        Ok(Stage::Paint { growth, cells, drawn, texels: textures::texels(self.maps, &self.base), row: 0 })
+        Ok(Stage::Paint { grown, cells, drawn, texels: textures::texels(self.maps, &self.base), row: 0 })
     }
 
     /// Paints some rows from `row` on; returns the next one.

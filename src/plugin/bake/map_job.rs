@@ -3,9 +3,10 @@
 use super::strands_job::StrandsOrder;
 use crate::Grid;
 use crate::pattern::Network;
-use crate::plugin::api::{CrackError, GuidedAppearance, GuidedCracks};
+use crate::plugin::api::{CrackError, CrackRecord, GuidedAppearance, GuidedCracks};
 use crate::plugin::source::mask;
 use crate::plugin::source::picture::{self, BasePicture, Space};
+use crate::plugin::surface::cracks::Added;
 use crate::plugin::surface::inputs::{BaseAndMask, SurfaceInputs};
 use crate::plugin::surface::motion::Motion;
 use crate::raster::TexelRect;
@@ -57,6 +58,7 @@ pub(super) struct MapJob {
 pub(super) enum CracksOrder {
     Guided(Box<GuidedCracks>),
     Strands(Box<StrandsOrder>),
+    Record(Box<CrackRecord>),
 }
 
 /// The surface that is to crack.
@@ -82,10 +84,9 @@ pub(super) enum Source {
 
 /// The cracks of a bake, and the surface if that was read for it.
 pub(super) struct Lines {
-    pub(super) network: Network,
-    pub(super) opening: u32,
-    /// If they move on the way there.
-    pub(super) motion: Option<Motion>,
+    /// `None` = only what a record has grows.
+    pub(super) added: Option<Added>,
+    pub(super) record: Option<Box<CrackRecord>>,
     pub(super) covered: Option<f32>,
     pub(super) ground: Option<BaseAndMask>,
 }
@@ -114,7 +115,12 @@ impl MapJob {
             CracksOrder::Guided(guided) => guided,
             CracksOrder::Strands(order) => {
                 let (network, opening) = order.lines(&self.copies, self.size)?;
-                return Ok(Some(Lines { network, opening, motion: None, covered: None, ground: self.ground() }));
+                let added = Some(Added { network, opening, steps: 0, motion: None });
+                return Ok(Some(Lines { added, record: None, covered: None, ground: self.ground() }));
+            }
+            CracksOrder::Record(record) => {
+                let record = Some(record.clone());
+                return Ok(Some(Lines { added: None, record, covered: None, ground: self.ground() }));
             }
         };
         let Some(map) = &mut self.map else {
@@ -132,7 +138,8 @@ impl MapJob {
         let (seams, motion) =
             motion(guided, map, seams).map_err(|error| CrackError::Bake { reason: error.to_string() })?;
         let (network, opening) = lines(&seams, guided.appearance);
-        Ok(Some(Lines { network, opening, motion, covered, ground: self.ground() }))
+        let added = Some(Added { network, opening, steps: 0, motion });
+        Ok(Some(Lines { added, record: None, covered, ground: self.ground() }))
     }
 
     /// What was read of the surface.

@@ -2,9 +2,9 @@
 
 use super::begin::begin;
 use super::commit::{commit, start_finish};
-use super::work::{Bake, BakeJob, Bakes, Outcome, RunningTask, Step, StepResult, Work};
+use super::work::{Bake, BakeJob, Baked, Bakes, Outcome, RunningTask, Step, StepResult, Work};
 use crate::plugin::api::error::EntityLabel;
-use crate::plugin::api::{BakeProgress, CrackBaked, CrackBudget, CrackError, CrackFailed};
+use crate::plugin::api::{BakeProgress, CrackBaked, CrackBudget, CrackError, CrackFailed, CrackRecord};
 use crate::plugin::jobs::background::guarded;
 use crate::plugin::jobs::copy::{self, CopyProgress};
 use crate::plugin::jobs::deferred::hold;
@@ -19,13 +19,13 @@ const SHARE: f32 = 0.9;
 
 /// Works on all bakes: starts those that can start, asks those on tasks, and makes slices of those that have none.
 pub(crate) fn bake_guided(world: &mut World) {
-    for (entity, result) in hold(world, work_on_bakes) {
-        end(world, entity, result);
+    for (entity, kind, result) in hold(world, work_on_bakes) {
+        end(world, entity, kind, result);
     }
 }
 
 /// Returns those that have ended.
-fn work_on_bakes(world: &mut World) -> Vec<(Entity, Result<Option<f32>, CrackError>)> {
+fn work_on_bakes(world: &mut World) -> Vec<(Entity, Baked, Result<Option<f32>, CrackError>)> {
     let timer = world.resource::<FrameClock>().start(world.resource::<CrackBudget>(), SHARE);
     let mut bakes = world.resource_mut::<Bakes>();
     bakes.cancelled = Some(EntityHashSet::default());
@@ -124,7 +124,7 @@ fn work_on_bakes(world: &mut World) -> Vec<(Entity, Result<Option<f32>, CrackErr
                 },
             }
         };
-        ended.push((*entity, result));
+        ended.push((*entity, bake.kind, result));
         false
     });
     // What was begun or cancelled meanwhile has the last word.
@@ -134,7 +134,7 @@ fn work_on_bakes(world: &mut World) -> Vec<(Entity, Result<Option<f32>, CrackErr
     list.retain(|(entity, _)| !cancelled.contains(entity) && newer.iter().all(|(other, _)| other != entity));
     list.extend(newer);
     bakes.list = list;
-    ended.retain(|(entity, _)| !cancelled.contains(entity));
+    ended.retain(|(entity, ..)| !cancelled.contains(entity));
     world.resource_mut::<FrameClock>().stop(&timer);
     ended
 }
@@ -146,10 +146,18 @@ fn report(world: &mut World, entity: Entity, progress: f32) {
 }
 
 /// Tells of the end of a bake.
-fn end(world: &mut World, entity: Entity, result: Result<Option<f32>, CrackError>) {
+fn end(world: &mut World, entity: Entity, kind: Baked, result: Result<Option<f32>, CrackError>) {
+    if result.is_ok() {
+        report(world, entity, 1.0);
+    }
+    if kind == Baked::Record
+        && let Ok(mut entity) = world.get_entity_mut(entity)
+    {
+        // It has been taken up, or is of no use.
+        entity.remove::<CrackRecord>();
+    }
     match result {
         Ok(covered) => {
-            report(world, entity, 1.0);
             world.trigger(CrackBaked { entity, covered });
         }
         Err(error) => {

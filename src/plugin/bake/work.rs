@@ -2,7 +2,7 @@
 
 use super::finish::{Finish, FinishStep, Finished};
 use super::map_job::{Lines, MAPPED, MapJob};
-use crate::plugin::api::{BakeProgress, CrackError, CrackStrands, CrackSurface, GuidedCracks};
+use crate::plugin::api::{BakeProgress, CrackError, CrackRecord, CrackStrands, CrackSurface, GuidedCracks};
 use crate::plugin::jobs::background::guarded;
 use crate::plugin::jobs::copy::PictureCopies;
 use crate::plugin::surface::plan::Plan;
@@ -29,9 +29,10 @@ pub(crate) struct Bakes {
 
 /// The component whose cracks are baked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Baked {
+pub(crate) enum Baked {
     Guided,
     Strands,
+    Record,
 }
 
 /// A bake that goes on.
@@ -219,12 +220,46 @@ pub(crate) fn watch_baked(guided: Fresh<GuidedCracks>, strands: Fresh<CrackStran
     }
 }
 
+/// Notes the records that are to be taken up, as soon as no other cracks are on their way to their surfaces.
+pub(crate) fn watch_records(records: Query<(Entity, Ref<CrackRecord>), With<CrackSurface>>, mut bakes: ResMut<Bakes>) {
+    for (entity, record) in &records {
+        let under_way = bakes.list.iter().find(|(baked, _)| *baked == entity).map(|(_, bake)| bake.kind);
+        match under_way {
+            Some(Baked::Guided | Baked::Strands) => {}
+            Some(Baked::Record) if !record.is_changed() => {}
+            Some(Baked::Record) | None => bakes.want(entity, Baked::Record),
+        }
+    }
+}
+
+/// A component from which cracks are baked.
+pub(crate) trait BakedComponent: Component {
+    /// Which of them.
+    const KIND: Baked;
+}
+
+impl BakedComponent for GuidedCracks {
+    const KIND: Baked = Baked::Guided;
+}
+
+impl BakedComponent for CrackStrands {
+    const KIND: Baked = Baked::Strands;
+}
+
+impl BakedComponent for CrackRecord {
+    const KIND: Baked = Baked::Record;
+}
+
 /// Cancels the bake of a component that goes. The cracks of a bake that is done stay.
-pub(crate) fn cancel_removed<T: Component>(
+pub(crate) fn cancel_removed<T: BakedComponent>(
     removed: On<Remove, T>,
     mut bakes: ResMut<Bakes>,
     mut progress: Query<&mut BakeProgress>,
 ) {
+    let is_of_another = |(baked, bake): &(Entity, Bake)| *baked == removed.entity && bake.kind != T::KIND;
+    if bakes.list.iter().any(is_of_another) {
+        return;
+    }
     bakes.cancel(removed.entity);
     if let Ok(mut progress) = progress.get_mut(removed.entity)
         && progress.0 < 1.0

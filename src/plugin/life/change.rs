@@ -19,7 +19,7 @@ use crate::plugin::surface::frame::{frame, look, profile};
 use crate::plugin::surface::plan::resolve_mask;
 use crate::plugin::surface::prepare::fail;
 use crate::plugin::surface::queues::Queues;
-use crate::plugin::surface::regrow::regrow;
+use crate::plugin::surface::regrow::{Regrown, regrow};
 use crate::plugin::surface::reread::draft;
 use crate::plugin::surface::stamp::stamp_anew;
 use crate::raster::DepthField;
@@ -206,7 +206,7 @@ fn update_picture(
     let frame = frame(draft.plan.rect)?;
     let look = look(&active.preset, frame, draft.base.is_nearest)?;
     recall(world, entity, active);
-    let regrown = regrow(active, frame, mask.clone())?;
+    let regrown = regrow(active, frame, mask.clone(), draft.base.is_nearest)?;
     active.canvas.textures = make_textures(world, &draft, Some(&active.canvas.textures))?;
     // Shards show the picture that was.
     drop_shards(world, entity, active);
@@ -215,8 +215,8 @@ fn update_picture(
     }
     active.canvas.is_outdated = false;
     active.canvas.read_at = world.resource::<FrameCount>().0;
-    if let Some(growth) = regrown {
-        active.drawing.frozen = None;
+    if let Some(Regrown { growth, frozen }) = regrown {
+        active.drawing.frozen = frozen;
         active.cracks.cells = CellTracker::new(frame.extent());
         active.cracks.cells.update(growth.network());
         active.cracks.cells_reported = active.cracks.cells.cells().len();

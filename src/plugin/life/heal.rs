@@ -1,6 +1,6 @@
 //! Healing, and what happens when a surface goes.
 
-use crate::plugin::api::{CrackState, CrackStats, CrackSurface, CrackTextures};
+use crate::plugin::api::{CrackRecord, CrackState, CrackStats, CrackSurface, CrackTextures};
 use crate::plugin::bake::work;
 use crate::plugin::carrier::kind::Found;
 use crate::plugin::carrier::kinds;
@@ -16,6 +16,7 @@ use crate::plugin::surface::queue::HitQueue;
 use bevy::prelude::*;
 
 pub(super) fn close(world: &mut World, entity: Entity, seconds: f32) {
+    give_up_record(world, entity);
     work::cancel(world, entity);
     let is_closing = active_mut(world, entity).is_some_and(|active| active.close(seconds));
     if is_closing {
@@ -28,9 +29,17 @@ pub(super) fn close(world: &mut World, entity: Entity, seconds: f32) {
 
 pub(super) fn heal(world: &mut World, entity: Entity) {
     // At once, wherever the list of bakes is; hits that come after this stay.
+    give_up_record(world, entity);
     work::cancel(world, entity);
     purge(world, entity);
     when_free(world, move |world| heal_now(world, entity));
+}
+
+/// A record that is still to be taken up goes with the cracks that are there.
+fn give_up_record(world: &mut World, entity: Entity) {
+    if let Ok(mut entity) = world.get_entity_mut(entity) {
+        entity.remove::<CrackRecord>();
+    }
 }
 
 fn heal_now(world: &mut World, entity: Entity) {

@@ -3,5 +3,6 @@
 pub(crate) mod change;
 pub(crate) mod commands;
 pub(crate) mod heal;
+pub(crate) mod record;
 pub(crate) mod script;
 pub(crate) mod watch;

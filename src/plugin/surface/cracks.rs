@@ -21,6 +21,7 @@ pub(crate) struct Cracks {
 }
 
 /// Cracks that have not grown: the result of a bake.
+#[derive(Clone)]
 pub(crate) struct Added {
     pub(crate) network: Network,
     /// See [`CrackGrowth::add_cracks`].

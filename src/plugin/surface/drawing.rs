@@ -3,6 +3,8 @@
 use super::cutouts::Holes;
 use super::tile_set::Touched;
 use crate::Grid;
+use crate::growth::CrackGrowth;
+use crate::pattern::CellTracker;
 use crate::raster::{DepthField, Profile};
 use bevy::prelude::*;
 use std::sync::Arc;
@@ -40,6 +42,26 @@ pub(crate) struct Frozen {
 }
 
 impl Frozen {
+    /// Removes all but the newest nodes of a growth that is drawn in `field`, and keeps the picture. `cells` are those of the growth
+    /// and, then, of what is left of it. Returns how many nodes were removed, too.
+    pub(crate) fn after(
+        before: Option<Self>,
+        growth: &mut CrackGrowth,
+        keep: u32,
+        field: &mut DepthField,
+        cells: &mut CellTracker,
+    ) -> (Self, u32) {
+        cells.update(growth.network());
+        let gone = growth.remove_oldest(keep);
+        field.freeze_layer(growth.network(), growth.timeline());
+        let (nodes, frozen_cells) = before.map_or((0, 0), |before| (before.nodes, before.cells));
+        let closed = frozen_cells + cells.closed();
+        *cells = CellTracker::new(field.frame.extent());
+        cells.update(growth.network());
+        let frozen = closed.saturating_sub(cells.closed());
+        (Self { depth: field.depth.clone(), nodes: nodes.saturating_add(gone), cells: frozen }, gone)
+    }
+
     /// Draws it into a field of any size.
     pub(crate) fn draw(&self, field: &mut DepthField) {
         let (from, to) = (self.depth.size(), field.depth.size());

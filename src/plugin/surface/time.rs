@@ -1,11 +1,14 @@
 //! How time passes for the cracks of a surface.
 
 use super::active::Active;
+use super::cracks::LastHit;
+use super::drawing::Frozen;
 use super::playhead::Playback;
 use super::stamp::stamp_anew;
 use crate::pattern::Moment;
-use crate::plugin::api::{CrackClock, CrackDrive};
+use crate::plugin::api::{CrackClock, CrackDrive, CrackRecord};
 use crate::raster::Replay;
+use bevy::math::Vec3;
 
 /// The most steps that can be due: after a long pause a surface does not make up for all of it.
 const MAX_DUE: f64 = 64.0;
@@ -210,6 +213,31 @@ impl Active {
             0.0
         };
         core::mem::replace(&mut self.playhead.playback, replay.map(|(replay, shown)| Playback { replay, want, shown }))
+    }
+
+    /// What has happened to it; `None` if that is too much to be kept.
+    pub(crate) fn record(&self) -> Option<CrackRecord> {
+        let past = self.cracks.growth.past()?;
+        let time = self.playhead.playback.as_ref().map_or(self.end() + self.playhead.due, |playback| playback.want);
+        Some(CrackRecord { version: CrackRecord::VERSION, seed: self.surface.seed, past, time })
+    }
+
+    /// Goes on where `record` ends, on cracks that were grown from it and show the picture of those that were removed.
+    pub(crate) fn resume(&mut self, record: Option<&CrackRecord>, frozen: Option<Frozen>) {
+        if self.playhead.playback.is_none() {
+            self.drawing.frozen = frozen;
+        }
+        let Some(record) = record else { return };
+        let end = self.end();
+        match &mut self.playhead.playback {
+            Some(playback) => playback.want = record.time,
+            None => self.playhead.due += (record.time - end).clamp(0.0, MAX_DUE),
+        }
+        self.cracks.hits = self.cracks.hits.saturating_add(record.hits().count() as u32);
+        if self.cracks.last_hit.is_none() {
+            let hit = |(pos, energy)| LastHit { pos, energy, direction: Vec3::ZERO };
+            self.cracks.last_hit = record.hits().next_back().map(hit);
+        }
     }
 
     /// What a network is to show first that takes the place of this one.
