@@ -165,12 +165,10 @@ impl Plugin for CrackPlugin {
                             life::watch::watch_surfaces,
                             life::watch::watch_pictures,
                             life::watch::watch_presets,
-                            (
-                                bake::work::watch_baked,
-                                bake::work::watch_records.run_if(any_with_component::<CrackRecord>),
-                            )
-                                .chain(),
-                        ),
+                            bake::work::watch_baked,
+                            bake::work::watch_records.run_if(any_with_component::<CrackRecord>),
+                        )
+                            .chain_ignore_deferred(),
                         life::change::update_changed.run_if(life::watch::any_changed),
                         hits::collect::collect_hits,
                         surface::prepare::prepare_surfaces.run_if(surface::prepare::any_preparing),
@@ -202,14 +200,21 @@ impl Plugin for CrackPlugin {
                 life::watch::watch::<MeshMaterial2d<ColorMaterial>>,
                 life::watch::watch::<MeshMaterial2d<CrackLitMaterial>>,
             )
+                .chain()
                 .in_set(Hit)
+                .after(bake::work::watch_records)
                 .before(life::change::update_changed),
         );
         #[cfg(feature = "3d")]
-        app.add_systems(
-            PostUpdate,
-            life::watch::watch::<MeshMaterial3d<StandardMaterial>>.in_set(Hit).before(life::change::update_changed),
-        );
+        {
+            let watch = life::watch::watch::<MeshMaterial3d<StandardMaterial>>
+                .in_set(Hit)
+                .after(bake::work::watch_records)
+                .before(life::change::update_changed);
+            #[cfg(feature = "2d")]
+            let watch = watch.after(life::watch::watch::<MeshMaterial2d<CrackLitMaterial>>);
+            app.add_systems(PostUpdate, watch);
+        }
     }
 
     fn finish(&self, app: &mut App) {

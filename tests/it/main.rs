@@ -3,6 +3,8 @@
 
 #![cfg(test)]
 
+#[cfg(all(feature = "2d", feature = "3d"))]
+mod apps;
 mod blend;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod blink;

@@ -11,6 +11,7 @@ use crate::support::*;
 use bevy::{
     asset::RenderAssetUsages,
     camera::RenderTarget,
+    ecs::system::RunSystemOnce,
     mesh::{Indices, PrimitiveTopology},
     prelude::*,
     render::render_resource::TextureFormat,
@@ -75,32 +76,103 @@ enum Show {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Op {
-    Spawn { slot: u8, carrier: Carrier, show: Show, preset: u8, seed: u8, anchored: bool },
+    Spawn {
+        slot: u8,
+        carrier: Carrier,
+        show: Show,
+        preset: u8,
+        seed: u8,
+        anchored: bool,
+    },
     Despawn(u8),
     RemoveSurface(u8),
-    InsertSurface { slot: u8, preset: u8, seed: u8 },
-    Clone { from: u8, to: u8 },
-    Hit { slot: u8, uv: [f32; 2], energy: f32 },
-    HitWorld { slot: u8, at: [f32; 3], energy: f32 },
+    InsertSurface {
+        slot: u8,
+        preset: u8,
+        seed: u8,
+    },
+    Clone {
+        from: u8,
+        to: u8,
+    },
+    Hit {
+        slot: u8,
+        uv: [f32; 2],
+        energy: f32,
+    },
+    HitWorld {
+        slot: u8,
+        at: [f32; 3],
+        energy: f32,
+    },
     Heal(u8),
-    Close { slot: u8, seconds: f32 },
+    Close {
+        slot: u8,
+        seconds: f32,
+    },
     Prepare(u8),
-    Preset { slot: u8, preset: u8, scale: f32 },
-    Picture { slot: u8, size: [u16; 2] },
+    Preset {
+        slot: u8,
+        preset: u8,
+        scale: f32,
+    },
+    Picture {
+        slot: u8,
+        size: [u16; 2],
+    },
     Change(u8),
-    Transform { slot: u8, scale: [f32; 3], turn: f32 },
-    Parent { slot: u8, parent: Option<u8> },
-    Clock { slot: u8, clock: Option<CrackClock> },
-    Guide { slot: u8, side: u8, gamma: f32, appearance: u8, seconds: f32 },
+    Transform {
+        slot: u8,
+        scale: [f32; 3],
+        turn: f32,
+    },
+    Parent {
+        slot: u8,
+        parent: Option<u8>,
+    },
+    Clock {
+        slot: u8,
+        clock: Option<CrackClock>,
+    },
+    Guide {
+        slot: u8,
+        side: u8,
+        gamma: f32,
+        appearance: u8,
+        seconds: f32,
+    },
     Unguide(u8),
-    Shatter { slot: u8, uv: Option<[f32; 2]>, reach: f32 },
-    Settings { slot: u8, when: u8, speed: f32, again: bool, fly: bool, seek: Option<f32> },
+    /// What has happened to one surface happens to another.
+    Restore {
+        from: u8,
+        to: u8,
+        is_healed: bool,
+    },
+    Shatter {
+        slot: u8,
+        uv: Option<[f32; 2]>,
+        reach: f32,
+    },
+    Settings {
+        slot: u8,
+        when: u8,
+        speed: f32,
+        again: bool,
+        fly: bool,
+        seek: Option<f32>,
+    },
     CrackShard(u8),
     DespawnShard(u8),
-    Budget { milliseconds: f32, max_shards: usize },
+    Budget {
+        milliseconds: f32,
+        max_shards: usize,
+    },
     Speed(f32),
     Frame(u16),
-    Resize { target: u8, size: [u16; 2] },
+    Resize {
+        target: u8,
+        size: [u16; 2],
+    },
 }
 
 /// What must be true of a surface.
@@ -454,7 +526,7 @@ impl Game {
                 known.expect = if known.is_surface { Expect::Anything } else { known.expect };
             }
             Op::Unguide(_) => {
-                commands.remove::<GuidedCracks>();
+                commands.remove::<(GuidedCracks, CrackRecord)>();
                 known.has_guide = false;
             }
             Op::Shatter { uv, reach, .. } => {
@@ -529,13 +601,29 @@ impl Game {
                 };
                 let entity = self.app.world_mut().entity_mut(entity).clone_and_spawn();
                 // It would bake anew, and shatter as the other one did.
-                self.app.world_mut().entity_mut(entity).remove::<(GuidedCracks, ShatterCracks)>();
+                self.app.world_mut().entity_mut(entity).remove::<(GuidedCracks, CrackRecord, ShatterCracks)>();
                 if let Some(old) = self.model.slots.remove(&to) {
                     self.app.world_mut().despawn(old.entity);
                 }
                 let known =
                     Known { entity, carrier, is_good, is_surface, has_guide: false, is_struck: false, shown, expect };
                 self.model.slots.insert(to, known);
+            }
+            Op::Restore { from, to, is_healed } => {
+                let (Some(from), Some(to)) = (self.model.slots.get(&from), self.model.slots.get(&to)) else { return };
+                let (from, to, is_surface) = (from.entity, to.entity, to.is_surface);
+                let record = move |records: CrackRecords| records.get(from);
+                let Some(record) = self.app.world_mut().run_system_once(record).expect("it runs") else { return };
+                let mut commands = self.app.world_mut().commands();
+                let mut commands = commands.entity(to);
+                if is_healed {
+                    commands.heal_cracks();
+                }
+                commands.insert(record);
+                for known in self.model.slots.values_mut().filter(|known| known.entity == to) {
+                    known.has_guide = true;
+                    known.expect = if is_surface { Expect::Anything } else { known.expect };
+                }
             }
             Op::CrackShard(number) | Op::DespawnShard(number) => {
                 let shards = self.shards();
@@ -693,7 +781,7 @@ fn operation(rng: &mut Rng) -> Op {
     let mut some = |low: f32, high: f32| if rng.unit() < 0.08 { wild } else { rng.range(low, high) };
     let [a, b, c] = [some(0.0, 1.0), some(0.0, 1.0), some(0.2, 4.0)];
     let size = [16 + (rng.next_u32() % 60) as u16, 16 + (rng.next_u32() % 60) as u16];
-    match rng.next_u32() % 40 {
+    match rng.next_u32() % 42 {
         0..5 => {
             let carrier = match rng.next_u32() % 12 {
                 0..4 => Carrier::Sprite,
@@ -757,6 +845,7 @@ fn operation(rng: &mut Rng) -> Op {
             let milliseconds = [0.0, 0.1, 2.0, 1e6, f32::NAN, -1.0][usize::from(number) % 6];
             Op::Budget { milliseconds, max_shards: usize::from(number) * 8 }
         }
+        39 | 40 => Op::Restore { from: slot, to: number % SLOTS, is_healed: !number.is_multiple_of(3) },
         38 => Op::Speed([0.0, 0.5, 1.0, 1.0, 8.0][usize::from(number) % 5]),
         _ if number.is_multiple_of(2) => Op::Frame([0, 1, 16, 20, 1000][usize::from(number) % 5]),
         _ => Op::Resize { target: number % 4, size: [u16::from(number), size[0]] },

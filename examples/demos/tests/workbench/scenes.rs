@@ -18,6 +18,7 @@ struct Exhibit {
     preset: &'static str,
     at: Vec2,
     size: Vec2,
+    mode: SpriteImageMode,
     seed: u64,
     script: CrackScript,
 }
@@ -25,7 +26,8 @@ struct Exhibit {
 impl Exhibit {
     fn new(name: &'static str, picture: &'static str, preset: &'static str, at: [f32; 2], size: [f32; 2]) -> Self {
         let (at, size) = (at.into(), size.into());
-        Self { name, picture, preset, at, size, seed: 1, script: CrackScript::default() }
+        let mode = SpriteImageMode::Auto;
+        Self { name, picture, preset, at, size, mode, seed: 1, script: CrackScript::default() }
     }
 
     /// Hits at these seconds and places, with this energy.
@@ -37,6 +39,18 @@ impl Exhibit {
 
     fn seed(mut self, seed: u64) -> Self {
         self.seed = seed;
+        self
+    }
+
+    /// Repeats the picture in tiles so many times as large as it is: stretched, its cracks would be stretched too.
+    fn tiled(mut self, scale: f32) -> Self {
+        self.mode = SpriteImageMode::Tiled { tile_x: true, tile_y: true, stretch_value: scale };
+        self
+    }
+
+    /// Keeps the edges of the picture as wide as they are, texels.
+    fn framed(mut self, edge: f32) -> Self {
+        self.mode = SpriteImageMode::Sliced(TextureSlicer { border: BorderRect::all(edge), ..default() });
         self
     }
 
@@ -52,6 +66,7 @@ impl Exhibit {
             Sprite {
                 image: server.load(format!("textures/{}.png", self.picture)),
                 custom_size: Some(self.size),
+                image_mode: self.mode,
                 ..default()
             },
             Transform::from_translation(self.at.extend(0.0)),
@@ -70,7 +85,7 @@ fn build(world: &mut World, server: &AssetServer, name: &str) {
                 let (x, after) = (-400.0 + 400.0 * f32::from(i), 0.5 * f32::from(i));
                 let hits =
                     [(0.6 + after, [0.4, 0.42], 1.0), (2.4 + after, [0.62, 0.6], 2.0), (4.2 + after, [0.5, 0.3], 4.0)];
-                Exhibit::new(preset, picture, preset, [x, 0.0], [370.0, 470.0])
+                Exhibit::new(preset, picture, preset, [x, 0.0], [380.0, 380.0])
                     .hit(&hits)
                     .seed(u64::from(i) + 3)
                     .spawn(world, server);
@@ -78,6 +93,7 @@ fn build(world: &mut World, server: &AssetServer, name: &str) {
         }
         "shop_window" => {
             Exhibit::new("pane", "glass_pane", "glass", [0.0, 0.0], [960.0, 540.0])
+                .framed(20.0)
                 .hit(&[(0.8, [0.42, 0.46], 3.0)])
                 .seed(5)
                 .shatter(2.0)
@@ -86,15 +102,18 @@ fn build(world: &mut World, server: &AssetServer, name: &str) {
         }
         "mud_flat" => {
             let hits = [(0.3, [0.3, 0.4], 1.0), (2.0, [0.72, 0.6], 1.0), (3.6, [0.5, 0.8], 0.6)];
-            Exhibit::new("flat", "mud", "mud", [0.0, 0.0], [1120.0, 620.0]).hit(&hits).seed(9).spawn(world, server);
+            let flat = Exhibit::new("flat", "mud", "mud", [0.0, 0.0], [1120.0, 620.0]).tiled(1.25);
+            flat.hit(&hits).seed(9).spawn(world, server);
         }
         "ice_lake" => {
             let hits = [(0.5, [0.35, 0.5], 2.0), (2.5, [0.7, 0.35], 4.0)];
-            Exhibit::new("lake", "ice", "ice", [0.0, 0.0], [1120.0, 620.0]).hit(&hits).seed(2).spawn(world, server);
+            let lake = Exhibit::new("lake", "ice", "ice", [0.0, 0.0], [1120.0, 620.0]).tiled(2.5);
+            lake.hit(&hits).seed(2).spawn(world, server);
         }
         "writing_on_the_wall" => {
             let guided = GuidedCracks::new(CrackGuide::text("HELLO"));
             Exhibit::new("wall", "plaster", "concrete", [0.0, 0.0], [1120.0, 480.0])
+                .tiled(2.0)
                 .spawn(world, server)
                 .insert(guided.with_appearance(GuidedAppearance::Front { from: Vec2::new(0.0, 0.5), seconds: 3.0 }));
         }
