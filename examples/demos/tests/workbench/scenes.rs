@@ -19,6 +19,7 @@ struct Exhibit {
     at: Vec2,
     size: Vec2,
     mode: SpriteImageMode,
+    resolution: CrackResolution,
     seed: u64,
     script: CrackScript,
 }
@@ -26,8 +27,8 @@ struct Exhibit {
 impl Exhibit {
     fn new(name: &'static str, picture: &'static str, preset: &'static str, at: [f32; 2], size: [f32; 2]) -> Self {
         let (at, size) = (at.into(), size.into());
-        let mode = SpriteImageMode::Auto;
-        Self { name, picture, preset, at, size, mode, seed: 1, script: CrackScript::default() }
+        let (mode, resolution) = (SpriteImageMode::Auto, CrackResolution::Picture);
+        Self { name, picture, preset, at, size, mode, resolution, seed: 1, script: CrackScript::default() }
     }
 
     /// Hits at these seconds and places, with this energy.
@@ -42,9 +43,11 @@ impl Exhibit {
         self
     }
 
-    /// Repeats the picture in tiles so many times as large as it is: stretched, its cracks would be stretched too.
+    /// Repeats the picture in tiles so many times as large as it is: stretched, its cracks would be stretched too. Cracks have a texel
+    /// for each of the window.
     fn tiled(mut self, scale: f32) -> Self {
         self.mode = SpriteImageMode::Tiled { tile_x: true, tile_y: true, stretch_value: scale };
+        self.resolution = CrackResolution::Fixed(self.size.as_uvec2());
         self
     }
 
@@ -70,7 +73,7 @@ impl Exhibit {
                 ..default()
             },
             Transform::from_translation(self.at.extend(0.0)),
-            CrackSurface::new(preset).with_seed(self.seed),
+            CrackSurface::new(preset).with_seed(self.seed).with_resolution(self.resolution),
             self.script,
         ))
     }
