@@ -10,6 +10,7 @@ use bevy_crack::{
 };
 use bevy_egui::egui;
 use egui_kittest::{Harness, kittest::Queryable};
+use std::path::Path;
 
 /// A panel and what it was asked for.
 struct Shown {
@@ -71,6 +72,9 @@ fn buttons_ask_for_what_they_say() {
         press(&mut harness, export.label());
         assert_eq!(harness.state_mut().asked.split_off(0), [EditorCommand::Export(export, "cracks".into())]);
     }
+    press(&mut harness, "Load cracks");
+    let asked = harness.state_mut().asked.split_off(0);
+    assert_eq!(asked, [EditorCommand::LoadRecord(Path::new("cracks").join(Export::RECORD))]);
     press(&mut harness, "Shatter");
     // The first is the header.
     harness.get_all_by_label("Shatter").last().expect("a button").click();
