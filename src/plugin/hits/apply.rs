@@ -47,6 +47,11 @@ pub(crate) fn apply_hits(world: &mut World) {
             make_others(world);
             break;
         }
+        // A hit comes after a change of settings that was made before it.
+        if world.resource::<Queues>().late.contains(&entity) {
+            world.resource_mut::<HitQueue>().park();
+            continue;
+        }
         // A hit comes after the markers of the one before it, all in their places.
         match prepare_some(world, entity) {
             Some(true) => {

@@ -3,12 +3,13 @@
 use crate::CrackPreset;
 use crate::pattern::CellTracker;
 use crate::plugin::api::error::EntityLabel;
-use crate::plugin::api::{CrackError, CrackState, CrackStatus, CrackSurface};
+use crate::plugin::api::{CrackBudget, CrackError, CrackState, CrackStatus, CrackSurface};
 use crate::plugin::carrier::kind::{Carrier, CarrierKind, Found, Shown};
 use crate::plugin::carrier::kinds;
 use crate::plugin::draw::async_playback::recall;
 use crate::plugin::gpu::memory::TextureMemory;
 use crate::plugin::jobs::deferred::hold;
+use crate::plugin::jobs::frame_time::{FrameClock, Timer};
 use crate::plugin::shards::broken::drop_shards;
 use crate::plugin::source::picture::FrameCount;
 use crate::plugin::source::preset;
@@ -22,24 +23,40 @@ use crate::plugin::surface::queues::Queues;
 use crate::plugin::surface::regrow::{Regrown, regrow};
 use crate::plugin::surface::reread::draft;
 use crate::plugin::surface::stamp::stamp_anew;
+use crate::plugin::surface::time::SLICE;
 use crate::raster::DepthField;
 use bevy::prelude::*;
 use std::sync::Arc;
 
-/// Applies what has changed. What is not loaded yet is looked at again in the next frame.
+/// Share of the frame's budget after which no further surface is drawn anew.
+const SHARE: f32 = 0.4;
+
+/// Applies what has changed. What is not loaded yet, and what there is no time for, is looked at again in the next frame.
 pub(crate) fn update_changed(world: &mut World) {
-    hold(world, apply_changes);
+    let timer = world.resource::<FrameClock>().start(world.resource::<CrackBudget>(), SHARE);
+    hold(world, |world| apply_changes(world, &timer));
+    world.resource_mut::<FrameClock>().stop(&timer);
 }
 
-fn apply_changes(world: &mut World) {
-    let mut changed = core::mem::take(&mut world.resource_mut::<Queues>().changed);
-    changed.sort_unstable();
+fn apply_changes(world: &mut World, timer: &Timer) {
+    let mut queues = world.resource_mut::<Queues>();
+    let (mut changed, late) = (core::mem::take(&mut queues.changed), core::mem::take(&mut queues.late));
+    // Those that have waited come first.
+    changed.sort_unstable_by_key(|entity| (!late.contains(entity), *entity));
     changed.dedup();
+    let mut has_drawn = false;
     changed.retain(|&entity| {
         let Some(mut active) = cracked::take(world, entity) else { return false };
-        let before = (active.canvas.base.clone(), active.canvas.textures.clone());
+        // The budget has time for one in every frame.
+        if has_drawn && timer.is_over() && is_costly(world, entity, &active) {
+            cracked::put_back(world, entity, active);
+            world.resource_mut::<Queues>().late.insert(entity);
+            return true;
+        }
+        let before = (active.canvas.base.clone(), active.canvas.textures.clone(), active.drawing.redrawn);
         let outcome =
             cracked::with_other_assets(world, entity, &mut active, |world, active| update(world, entity, active));
+        has_drawn |= active.drawing.redrawn != before.2;
         let is_growing = active.cracks.growth.is_growing();
         let has_new_textures = !Arc::ptr_eq(&before.0, &active.canvas.base) || before.1 != active.canvas.textures;
         cracked::put_back(world, entity, active);
@@ -66,6 +83,13 @@ fn apply_changes(world: &mut World) {
         }
     });
     world.resource_mut::<Queues>().changed.append(&mut changed);
+}
+
+/// Whether a surface may have to be drawn anew: it has other settings or another picture.
+fn is_costly(world: &World, entity: Entity, active: &Active) -> bool {
+    active.has_new_settings
+        || active.canvas.is_outdated
+        || world.get::<CrackSurface>(entity).is_some_and(|surface| *surface != active.surface)
 }
 
 /// A surface that failed over a picture that is whole again goes on.
@@ -118,7 +142,8 @@ fn update(world: &mut World, entity: Entity, active: &mut Active) -> Result<bool
     update_picture(world, entity, active, Some(kind), shown)
 }
 
-/// Applies other settings; a preset that is invalid is refused and the old one stays. `false` if it is not there yet.
+/// Applies other settings; a preset that is invalid is refused and the old one stays. `false` if it is not there yet, or if markers of the
+/// last hit are to be laid out before it, which may need more than one frame.
 fn update_settings(world: &mut World, entity: Entity, active: &mut Active) -> bool {
     if let Some(surface) = world.get::<CrackSurface>(entity)
         && *surface != active.surface
@@ -132,6 +157,11 @@ fn update_settings(world: &mut World, entity: Entity, active: &mut Active) -> bo
     }
     let preset = preset::resolve(world, &active.surface.preset);
     if matches!(preset, Ok(None)) {
+        return false;
+    }
+    let grows_otherwise = matches!(&preset, Ok(Some(preset)) if preset.growth != active.preset.growth && preset.growth.validate().is_ok());
+    if grows_otherwise && active.cracks.growth.is_preparing() && !active.cracks.growth.prepare_step(SLICE) {
+        world.resource_mut::<Queues>().late.insert(entity);
         return false;
     }
     active.has_new_settings = false;
@@ -247,4 +277,72 @@ fn update_picture(
     // The material is made again: one that exists keeps showing a texture of the old size.
     attach(world, entity, active);
     Ok(true)
+}
+
+#[cfg(all(test, feature = "2d"))]
+mod tests {
+    use super::*;
+    use crate::plugin::{
+        CrackHit,
+        headless::{app, blank},
+    };
+
+    /// Fault B5: a frame without time draws one surface anew when the preset of many changes, each has its turn, and a hit that comes
+    /// after the change grows by the new preset.
+    #[test]
+    fn b5_the_preset_of_many_surfaces_changes_within_the_budget() {
+        const SURFACES: usize = 12;
+        let mut app = app(CrackBudget { milliseconds: 1000.0, ..default() });
+        let preset = CrackPreset::CONCRETE.scaled(0.3);
+        let entities: Vec<Entity> = (0..SURFACES as u64)
+            .map(|seed| {
+                let image = app.world_mut().resource_mut::<Assets<Image>>().add(blank(UVec2::splat(32)));
+                let surface = CrackSurface::new(preset.clone()).with_seed(seed);
+                app.world_mut().spawn((Sprite::from_image(image), surface)).id()
+            })
+            .collect();
+        let hit_all = |app: &mut App| {
+            for entity in &entities {
+                app.world_mut().trigger(CrackHit::uv(*entity, Vec2::splat(0.5)));
+            }
+        };
+        let hits = |app: &App, entity: &Entity| active(app.world(), *entity).map_or(0, |active| active.cracks.hits);
+        let settled = |app: &App| {
+            let is_settled = |active: &Active| active.cracks.hits > 0 && !active.cracks.growth.is_growing();
+            entities.iter().all(|entity| active(app.world(), *entity).is_some_and(is_settled))
+        };
+        hit_all(&mut app);
+        for _ in 0..2000 {
+            app.update();
+            if settled(&app) {
+                break;
+            }
+        }
+        assert!(settled(&app), "they do not crack");
+
+        app.world_mut().resource_mut::<CrackBudget>().milliseconds = 0.0;
+        let other = CrackPreset::ICE.scaled(0.3);
+        for entity in &entities {
+            app.world_mut().get_mut::<CrackSurface>(*entity).expect("it is there").preset = other.clone().into();
+        }
+        hit_all(&mut app);
+        let mut frames = 0;
+        let changed = |app: &App, entity: &Entity| active(app.world(), *entity).is_some_and(|a| a.preset == other);
+        loop {
+            let before = entities.iter().filter(|entity| changed(&app, entity)).count();
+            app.update();
+            frames += 1;
+            let after = entities.iter().filter(|entity| changed(&app, entity)).count();
+            assert!(after - before <= 1, "{} surfaces in a frame without time", after - before);
+            for entity in &entities {
+                assert!(changed(&app, entity) || hits(&app, entity) == 1, "a hit came before the change");
+            }
+            if entities.iter().all(|entity| hits(&app, entity) == 2) {
+                break;
+            }
+            assert!(frames < 400, "some surface starves");
+        }
+        assert!(frames >= SURFACES, "{frames} frames");
+        assert!(app.world().resource::<Queues>().late.is_empty());
+    }
 }

@@ -23,12 +23,14 @@ pub(crate) struct Drawing {
     pub(crate) cutouts: Option<Holes>,
     /// How often it has been painted.
     pub(crate) painted: u64,
+    /// How often all of its cracks have been drawn anew.
+    pub(crate) redrawn: u64,
 }
 
 impl Drawing {
     pub(crate) fn new(field: DepthField, profile: Profile) -> Self {
         let touched = Touched::new(field.frame.size());
-        Self { field, profile, touched, frozen: None, carried: Vec::new(), cutouts: None, painted: 0 }
+        Self { field, profile, touched, frozen: None, carried: Vec::new(), cutouts: None, painted: 0, redrawn: 0 }
     }
 }
 

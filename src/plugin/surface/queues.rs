@@ -1,7 +1,7 @@
 //! [`Queues`]: surfaces that wait for their turn.
 
 use super::active::Turn;
-use bevy::prelude::*;
+use bevy::{ecs::entity::EntityHashSet, prelude::*};
 use std::collections::VecDeque;
 
 /// The surfaces that wait for something. Systems visit the queues, never all surfaces.
@@ -19,6 +19,8 @@ pub(crate) struct Queues {
     pub(crate) blending: VecDeque<Entity>,
     /// Surfaces whose components or pictures have changed.
     pub(crate) changed: Vec<Entity>,
+    /// Those among them that there was no time for in the last frame. Hits on them come after the change.
+    pub(crate) late: EntityHashSet,
 }
 
 impl Queues {

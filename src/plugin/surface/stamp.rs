@@ -82,6 +82,7 @@ impl Active {
 /// painting.
 pub(crate) fn stamp_anew(active: &mut Active) {
     let frame = active.drawing.field.frame;
+    active.drawing.redrawn += 1;
     active.drawing.field.clear();
     active.drawing.touched = Touched::new(frame.size());
     if let Some(frozen) = &active.drawing.frozen {
