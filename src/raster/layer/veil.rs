@@ -253,8 +253,8 @@ impl VeilField {
                     continue;
                 }
                 let (way, rest) = (s / end, 1.0 - s / end);
-                // Some sheets fade out, others have a visible far edge.
-                let pane = (0.5 + 1.6 * mix(kind)).clamp(0.0, 1.0);
+                // Most sheets fade out, some have a visible far edge.
+                let pane = (0.15 + 1.3 * mix(kind)).clamp(0.0, 0.8);
                 let fade = rest * (0.18 + 0.82 * rest * rest);
                 let border = ((end - s) * hang.length() * (1.0 / 1.5)).min(1.0);
                 let rim = (1.0 - ((end - s) * hang.length() - 1.5).abs() * 0.5).clamp(0.0, 1.0);
