@@ -13,6 +13,7 @@
 //! - [`voronoi`]: cracks that draw a picture, all at once.
 //! - [`blend`]: blends the relief of cracks into normal maps.
 //! - [`strands`]: cracks that follow a guidance field, made of small images.
+//! - [`relief`]: craters, rock walls and mountains from one contour line.
 //! - [`paint`]: turns a base picture and a depth field into diffuse, normal and depth textures.
 //! - [`preset`]: materials: how cracks grow, their cross-section and their look.
 //! - [`shatter`]: the pieces into which cracks cut a surface, and how they fall.
@@ -40,6 +41,7 @@ pub mod paint;
 pub mod pattern;
 pub mod preset;
 pub mod raster;
+pub mod relief;
 pub mod shatter;
 pub mod strands;
 pub mod voronoi;
