@@ -1,4 +1,4 @@
-//! `bake gallery`: every preset on its own picture, and one look more, at three moments, on one sheet.
+//! `bake gallery`: every preset on its own picture, and two looks more, at three moments, on one sheet.
 
 use crate::{own, sheet};
 use clap::Args;

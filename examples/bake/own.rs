@@ -3,9 +3,9 @@
 use bevy_crack::{CrackPreset, paint::Look};
 use std::path::{Path, PathBuf};
 
-/// The presets, and a look that none of them has: as many as fill a sheet.
+/// The presets, and looks that none of them has: as many as fill a sheet.
 pub(crate) fn exhibits() -> impl Iterator<Item = &'static str> {
-    CrackPreset::NAMES.into_iter().chain(["glowing"])
+    CrackPreset::NAMES.into_iter().chain(["mirror", "glowing"])
 }
 
 /// The preset of this name, or a look on concrete.
@@ -18,7 +18,7 @@ pub(crate) fn own_picture(preset: &str) -> PathBuf {
     let file = match preset {
         "glass" | "tempered_glass" | "laminated_glass" => "glass_pane",
         "brick" => "brick_red",
-        "plaster" | "clay" | "mud" | "glaze" | "ice" | "toon" => preset,
+        "plaster" | "clay" | "mud" | "glaze" | "ice" | "asphalt" | "marble" | "sand" | "toon" => preset,
         _ => "concrete_fine",
     };
     Path::new(crate::ASSETS).join("textures").join(file).with_extension("png")

@@ -21,8 +21,10 @@ use std::{error::Error, fs, path::Path};
 pub(crate) const ASSETS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets");
 
 /// Side of a pane in the world, and from the middle of one to the next.
-const SIDE: f32 = 204.0;
-const PITCH: Vec2 = Vec2::new(211.0, 270.0);
+const SIDE: f32 = 200.0;
+const PITCH: Vec2 = Vec2::new(210.0, 237.0);
+
+/// Most panes in a row.
 const COLUMNS: usize = 6;
 
 /// Hits on each pane in the scripted run.
@@ -53,12 +55,15 @@ fn write_sheet(out: &Path) -> Result<(), Box<dyn Error>> {
 fn setup(mut commands: Commands, assets: Res<AssetServer>) {
     commands.spawn(Camera2d);
     let size = Vec2::splat(SIDE);
-    let rows = own::exhibits().count().div_ceil(COLUMNS);
-    let middle = Vec2::new(COLUMNS as f32 - 1.0, rows as f32 - 1.0) / 2.0;
+    let count = own::exhibits().count();
+    let rows = count.div_ceil(COLUMNS);
     for (i, name) in own::exhibits().enumerate() {
         let Some(preset) = own::exhibit(name) else { continue };
-        let cell = Vec2::new((i % COLUMNS) as f32, (i / COLUMNS) as f32);
-        let at = (cell - middle) * PITCH * Vec2::new(1.0, -1.0);
+        // Rows of nearly as many panes, each in the middle.
+        let row = (i * rows + rows - 1) / count;
+        let (first, end) = ((row * count).div_euclid(rows), ((row + 1) * count).div_euclid(rows));
+        let cell = Vec2::new(i as f32 - 0.5 * (first + end - 1) as f32, row as f32 - 0.5 * (rows as f32 - 1.0));
+        let at = cell * PITCH * Vec2::new(1.0, -1.0) + Vec2::Y * 14.0;
         let file = |name: &str| own::own_picture(name).file_name().map(|file| Path::new("textures").join(file));
         let Some(picture) = file(name).map(|file| assets.load(file)) else { continue };
         if name.contains("glass")

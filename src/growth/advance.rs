@@ -302,7 +302,7 @@ impl CrackGrowth {
     }
 
     /// The roughest line between two places that touches no other; an error if even the straight one does.
-    fn free_line(
+    pub(super) fn free_line(
         &self,
         segment: SegmentId,
         ends: (u32, u32),

@@ -6,6 +6,9 @@ use super::{
     plan, rays,
 };
 
+/// The most points of the strands of a hit, with those of their primitives.
+const MOST_POINTS: u64 = 4 * crate::strands::MAX_STRAND_POINTS as u64;
+
 impl GrowthParams {
     /// The largest number of nodes that `markers` markers and `starts` starts can create: growth ends by itself
     /// within as many steps.
@@ -14,11 +17,14 @@ impl GrowthParams {
     /// marker is further than [`crack_radius`](Self::crack_radius) from the node that it attracts. With closed
     /// venation a marker attracts at most six nodes at once, for at most twice as many steps. With arrest a marker
     /// counts for each time that it can be given up, and every node can be a tip that runs on. With nucleation every
-    /// marker can be a start. Each node can fork.
+    /// marker can be a start. Each node can fork. Strands have a largest number of points.
     #[must_use]
     pub fn most_nodes(&self, markers: u64, starts: u64) -> u64 {
         let approaches = ((self.crack_radius / self.step_length).powi(2) / PROGRESS).ceil() as u64;
         let mut births = markers * (2 + approaches);
+        if self.strands().is_some() {
+            births += MOST_POINTS * starts;
+        }
         if self.venation == Venation::Closed {
             births = 6 * markers * u64::from(closed::patience(self));
         }

@@ -52,6 +52,9 @@ pub(super) const SPLIT_SIDE: u64 = 0xB5;
 pub(super) const MIXED_WIDTH: u64 = 0xA5;
 pub(super) const UNEVEN_WIDTH: u64 = 0x1D;
 
+/// The strands of a hit.
+pub(super) const STRANDS: u64 = 0x57D5;
+
 /// Where cracks start by nucleation.
 pub(super) const NUCLEATION: u64 = 0x0C;
 

@@ -59,6 +59,7 @@ impl CrackGrowth {
         self.widths.forget(&self.network.nodes);
         self.linker.forget(forgotten);
         self.rays.forget(forgotten);
+        self.strands.iter_mut().for_each(|strands| strands.forget(forgotten));
         self.field.ray_of.drain(..first.min(self.field.ray_of.len()));
         self.pull_of.drain(..first);
         self.courses.drain(..first);

@@ -93,6 +93,7 @@ impl CrackGrowth {
                 let crushes = self.crushes(center);
                 self.timeline.strike(index, crushes, before, after);
                 self.widen(index);
+                self.lay_out_strands(index, before, after);
                 let reach = self.reach(center, after);
                 self.populate(index, center, self.reach(center, before), reach);
                 if let Some(division) = &mut self.division {
@@ -124,7 +125,10 @@ impl CrackGrowth {
                 self.add_node(place, NO_PARENT, 0, index, 1.0);
             }
         }
-        if first == self.network.nodes.len() as u32 {
+        if self.params.strands().is_some() {
+            self.new_nodes = first..self.network.nodes.len() as u32;
+            self.lay_out_strands(index, 0.0, energy);
+        } else if first == self.network.nodes.len() as u32 {
             self.sprout(pos, index);
         } else if plan.is_some() {
             // The rim is joined below.
@@ -168,7 +172,7 @@ impl CrackGrowth {
     }
 
     /// The reach of a hit. It is larger where the border leaves less room.
-    fn reach(&self, pos: Vec2, energy: f32) -> f32 {
+    pub(super) fn reach(&self, pos: Vec2, energy: f32) -> f32 {
         let room = starts::room(pos, self.params.reach, self.network.extent());
         self.params.reach * energy.sqrt() * (1.0 + MORE_REACH * (1.0 - room))
     }
@@ -215,6 +219,9 @@ impl CrackGrowth {
     }
 
     fn populate(&mut self, impact: u32, center: Vec2, inner: f32, outer: f32) {
+        if self.params.strands().is_some() {
+            return;
+        }
         let extent = self.network.extent();
         // In masonry the centre is in the nearest joint.
         let center = self.masonry.as_ref().and_then(|masonry| masonry.nearest(center)).unwrap_or(center);

@@ -53,7 +53,7 @@ pub(super) fn lay_out(
     let cost = if mask.is_empty() { 1 } else { TRIES };
     let is_over = match params.markers {
         // Markers of rays are created with their plan.
-        MarkerLayout::Rays { .. } => true,
+        MarkerLayout::Rays { .. } | MarkerLayout::Strands { .. } => true,
         MarkerLayout::PseudoGrid { occupancy, jitter } => {
             let [columns, lines] = grid(params, region.extent).to_array();
             let cell = region.extent / Vec2::new(columns as f32, lines as f32);

@@ -69,6 +69,7 @@ mod starts;
 mod state;
 mod steer;
 mod step;
+mod strands;
 #[cfg(test)]
 mod tests;
 mod walls;

@@ -3,7 +3,7 @@
 mod text;
 mod vary;
 
-use crate::math::ops;
+use crate::{math::ops, strands::StrandParams};
 use glam::Vec2;
 
 /// How markers are laid out around a hit.
@@ -38,6 +38,18 @@ pub enum MarkerLayout {
         /// reach, most of them near the hit. They end at a ring if there are rings; the share
         /// [`open_ends`](GrowthParams::open_ends) of them ends freely.
         through: f32,
+    },
+    /// No markers: [strands](crate::strands) run out from the hit, with branches, along a field of directions that lead away
+    /// from it and are turned by noise (asphalt, marble, sand). They stop at older cracks if there is
+    /// [`arrest`](GrowthParams::arrest). A hit that is added to an earlier one adds the strands of its energy.
+    Strands {
+        /// Number of strands of a hit of energy 1, 1..=1024. It is proportional to the cube root of the energy; there are
+        /// fewer near the border.
+        count: u32,
+        /// Noise, inertia, branches and primitives. [`length`](StrandParams::length) is that of a strand at energy 1; it is
+        /// proportional to the root of the energy. Widths are those of the growth: `width`, `child_width` and `taper` are
+        /// not used.
+        strands: StrandParams,
     },
 }
 

@@ -87,7 +87,7 @@ pub(super) fn spacing(params: &GrowthParams, extent: Vec2) -> f32 {
     match params.markers {
         MarkerLayout::PseudoGrid { .. } => (extent / grid(params, extent).as_vec2()).max_element(),
         MarkerLayout::DartThrowing { spacing } => spacing,
-        MarkerLayout::Rays { .. } => 0.5 * params.crack_radius,
+        MarkerLayout::Rays { .. } | MarkerLayout::Strands { .. } => 0.5 * params.crack_radius,
     }
 }
 

@@ -14,6 +14,7 @@ use super::{
     past::Record,
     pull::Pull,
     rays::Rays,
+    strands::Course,
     width::Widths,
 };
 use crate::{
@@ -62,6 +63,8 @@ pub struct CrackGrowth {
     pub(super) widths: Widths,
     pub(super) linker: Linker,
     pub(super) rays: Rays,
+    /// Strands that have not grown to their ends.
+    pub(super) strands: Vec<Course>,
     pub(super) impacts: Vec<Impact>,
     /// The markers that the last hit has still to lay out.
     pub(super) layout: Option<Box<Layout>>,
@@ -125,6 +128,7 @@ impl CrackGrowth {
             widths: Widths::new(&params),
             linker: Linker::default(),
             rays: Rays::default(),
+            strands: Vec::new(),
             impacts: Vec::new(),
             layout: None,
             density: None,

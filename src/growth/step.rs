@@ -58,6 +58,10 @@ impl CrackGrowth {
             self.divide();
             return;
         }
+        if self.params.strands().is_some() {
+            self.advance_strands();
+            return;
+        }
         self.gather_pulls();
         self.aim();
         let first = self.network.nodes.len() as u32;

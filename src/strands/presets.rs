@@ -70,4 +70,31 @@ impl StrandParams {
         material: Material::Sand,
         ..Self::DEFAULT
     };
+
+    /// The same material at another scale: every length times `by`, clamped to its range. `by` is clamped to 0.01..=100;
+    /// NaN counts as 1.
+    ///
+    /// ```
+    /// use bevy_crack::strands::StrandParams;
+    ///
+    /// let near = StrandParams::MARBLE.scaled(2.0);
+    /// assert_eq!(near.length, 2.0 * StrandParams::MARBLE.length);
+    /// assert_eq!(near.validate(), Ok(()));
+    /// ```
+    #[must_use]
+    pub fn scaled(&self, by: f32) -> Self {
+        let by = if by.is_nan() { 1.0 } else { by.clamp(0.01, 100.0) };
+        Self {
+            frequency: (self.frequency / by).min(256.0),
+            child_frequency: (self.child_frequency / by).min(256.0),
+            length: (self.length * by).clamp(0.001, 64.0),
+            step: (self.step * by).clamp(0.0001, 0.05),
+            branch_cost: (self.branch_cost * by).clamp(0.005, 64.0),
+            repulsion: (self.repulsion * by).min(0.5),
+            width: (self.width * by).min(0.2),
+            tile: (self.tile * by).clamp(0.01, 1.0),
+            pace: (self.pace * by).clamp(0.0005, 1.0),
+            ..*self
+        }
+    }
 }

@@ -21,7 +21,10 @@ fn edit(preset: &mut CrackPreset, rng: &mut Rng) {
         6 => growth.arrest = 0.1 * value,
         7 => preset.profile.depth = value,
         8 => preset.steps_per_second = 100.0 * value,
-        _ => *preset = CrackPreset::named(CrackPreset::NAMES[rng.next_u32() as usize % 11]).unwrap_or_default(),
+        _ => {
+            *preset = CrackPreset::named(CrackPreset::NAMES[rng.next_u32() as usize % CrackPreset::NAMES.len()])
+                .unwrap_or_default()
+        }
     }
 }
 

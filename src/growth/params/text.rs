@@ -1,6 +1,7 @@
 //! The ranges of parameters, and setting parameters from text.
 
 use super::{GrowthParams, MarkerLayout, ParamError, StartLayout, Venation};
+use crate::strands::{StrandError, StrandParams};
 
 macro_rules! fields {
     ($($name:ident: $kind:ty = $min:expr, $max:expr;)*) => {
@@ -20,6 +21,18 @@ macro_rules! fields {
 
 fn parse<T: std::str::FromStr>(name: &str, text: &str) -> Result<T, ParamError> {
     text.trim().parse().map_err(|_| ParamError::Unreadable { name: name.to_owned(), text: text.to_owned() })
+}
+
+/// An error of the settings of strands as one of the growth; `asked` is the name that was to be set.
+fn of_strands(error: StrandError, asked: &str) -> ParamError {
+    match error {
+        StrandError::OutOfRange { name, value, min, max } => {
+            let [value, min, max] = [value, min, max].map(f64::from);
+            ParamError::OutOfRange { name, value, min, max }
+        }
+        StrandError::Unreadable { text, .. } => ParamError::Unreadable { name: asked.to_owned(), text },
+        _ => ParamError::Unknown { name: asked.to_owned() },
+    }
 }
 
 impl GrowthParams {
@@ -89,6 +102,10 @@ impl GrowthParams {
                 ("jitter", f64::from(jitter), 0.0, 1.0),
                 ("through", f64::from(through), 0.0, 1.0),
             ],
+            MarkerLayout::Strands { count, strands } => {
+                strands.validate().map_err(|error| of_strands(error, ""))?;
+                &[("strand_count", f64::from(count), 1.0, 1024.0)]
+            }
         };
         let starts: &[_] = match self.starts {
             StartLayout::Point => &[],
@@ -118,8 +135,9 @@ impl GrowthParams {
 
     /// Sets one parameter from text, by the name of its field or by the name in the paper (`D`).
     ///
-    /// These names are accepted in addition to the fields: `markers` (`grid`, `darts`, `rays`); `occupancy`,
-    /// `jitter`, `spacing`, `sectors`, `through` of the current layout; `venation` (`open`, `closed`, `dividing`);
+    /// These names are accepted in addition to the fields: `markers` (`grid`, `darts`, `rays`, `strands`); `occupancy`,
+    /// `jitter`, `spacing`, `sectors`, `through`, `strand_count` and `strands.` with a name of
+    /// [`StrandParams::set`](crate::strands::StrandParams::set), of the current layout; `venation` (`open`, `closed`, `dividing`);
     /// `starts` (`point`, `points`, `arms`, `ring`, `crushed`, `disc`); `start_count`, `start_radius`.
     ///
     /// ```
@@ -150,6 +168,7 @@ impl GrowthParams {
                     "grid" => MarkerLayout::PseudoGrid { occupancy: 0.7, jitter: 0.8 },
                     "darts" => MarkerLayout::DartThrowing { spacing: 0.04 },
                     "rays" => MarkerLayout::Rays { sectors: 14, jitter: 0.6, through: 0.8 },
+                    "strands" => MarkerLayout::Strands { count: 5, strands: StrandParams::ASPHALT },
                     _ => return Err(unreadable()),
                 }
             }
@@ -181,6 +200,11 @@ impl GrowthParams {
                 *sectors = parse(name, text)?;
             }
             ("through", MarkerLayout::Rays { through, .. }, _) => *through = parse(name, text)?,
+            ("strand_count", MarkerLayout::Strands { count, .. }, _) => *count = parse(name, text)?,
+            (_, MarkerLayout::Strands { strands, .. }, _) if name.starts_with("strands.") => {
+                let number = name.trim_start_matches("strands.");
+                strands.set(number, text).map_err(|error| of_strands(error, name))?;
+            }
             (
                 "start_count",
                 _,

@@ -42,6 +42,7 @@ impl GrowthParams {
             }
             MarkerLayout::DartThrowing { spacing } => length(spacing, 0.002, 1.0),
             MarkerLayout::Rays { .. } => {}
+            MarkerLayout::Strands { strands, .. } => *strands = strands.scaled(by),
         }
         match &mut scaled.starts {
             StartLayout::Point | StartLayout::Points { .. } | StartLayout::Arms { .. } => {}
@@ -85,6 +86,7 @@ impl GrowthParams {
             MarkerLayout::Rays { sectors, .. } => {
                 *sectors = count(*sectors, 1.0 / spacing, 360);
             }
+            MarkerLayout::Strands { .. } => {}
         }
         match &mut varied.starts {
             StartLayout::Point | StartLayout::Arms { .. } => {}

@@ -8,6 +8,7 @@ mod rays;
 mod rays_reference;
 mod reference;
 mod slices;
+mod strands;
 mod widths;
 
 use super::{CrackGrowth, GrowthParams, HitOutcome, MAX_ENERGY, MarkerLayout, Rejected, StartLayout, Venation};

@@ -144,7 +144,7 @@ impl VeilField {
             for pair in path.points().windows(2) {
                 let ends = [pair[0], pair[1]].map(|point| {
                     let half = (0.5 * point.width * self.frame.texels_per_unit()).clamp(0.0, MOST_HALF);
-                    (self.frame.to_texel(point.pos) + self.hang.clamp_length_max(share * half), half)
+                    (self.frame.to_texel(point.pos), self.hang.clamp_length_max(share * half), half)
                 });
                 bounds = bounds.union(self.stamp_floor(ends));
             }
@@ -173,21 +173,26 @@ impl VeilField {
         bounds
     }
 
-    /// The floor between two places with these half widths: the cover of each texel.
-    fn stamp_floor(&mut self, [(a, from), (b, to)]: [(Vec2, f32); 2]) -> TexelRect {
+    /// The floor between two places of a crack, each with how far it is moved there and its half width: the cover of each
+    /// texel.
+    fn stamp_floor(&mut self, [(a, moved, from), (b, moved_to, to)]: [(Vec2, Vec2, f32); 2]) -> TexelRect {
         if !a.is_finite() || !b.is_finite() || from.max(to) <= 0.0 {
             return TexelRect::default();
         }
         let (along, reach, limit) = (b - a, from.max(to) + 1.0, self.density.size().as_vec2());
-        let low = (a.min(b) - reach).floor().clamp(Vec2::ZERO, limit).as_uvec2();
-        let high = (a.max(b) + reach).ceil().clamp(Vec2::ZERO, limit).as_uvec2();
+        // A texel belongs to a place of the line that is not moved, however wide it is: so a wider floor covers all of a
+        // narrower one.
+        let (low, high) = ((a + moved).min(b + moved_to), (a + moved).max(b + moved_to));
+        let low = (low - reach).floor().clamp(Vec2::ZERO, limit).as_uvec2();
+        let high = (high + reach).ceil().clamp(Vec2::ZERO, limit).as_uvec2();
         let inv = 1.0 / along.length_squared().max(1.0e-12);
         for y in low.y..high.y {
             let row = self.density.row_mut(y as usize);
             for x in low.x..high.x {
                 let off = UVec2::new(x, y).as_vec2() + 0.5 - a;
                 let t = (off.dot(along) * inv).clamp(0.0, 1.0);
-                let inside = from + (to - from) * t + 0.5 - (off - along * t).length();
+                let middle = along * t + moved + (moved_to - moved) * t;
+                let inside = from + (to - from) * t + 0.5 - (off - middle).length();
                 let value = (255.0 * inside.clamp(0.0, 1.0) + 0.5) as u8;
                 let texel = &mut row[x as usize];
                 *texel = value.max(*texel);
@@ -356,6 +361,27 @@ impl VeilField {
 mod tests {
     use super::*;
     use crate::{math::Rng, pattern::PathPoint};
+
+    /// What is drawn while a crack widens is covered by what is drawn of it in the end.
+    #[test]
+    fn a_wider_floor_covers_a_narrower_one() {
+        let (frame, mut rng) = (SurfaceFrame::new(UVec2::splat(96)).unwrap(), Rng::new(9));
+        for case in 0..400 {
+            let mut place = || (Vec2::new(rng.unit(), rng.unit()), 0.1 * rng.unit(), 0.1 * rng.unit());
+            let ends = [place(), place()];
+            let stamp = |field: &mut VeilField, share: f32| {
+                let [from, to] = ends.map(|(pos, width, more)| PathPoint { pos, width: width + share * more });
+                field.stamp(&SegmentPath::straight(from, to));
+            };
+            let mut at_once = VeilField::floor([0.6, 0.03], frame);
+            stamp(&mut at_once, 1.0);
+            let mut by_and_by = VeilField::floor([0.6, 0.03], frame);
+            for share in [0.0, 0.2, 0.55, 1.0] {
+                stamp(&mut by_and_by, share);
+            }
+            assert!(at_once == by_and_by, "case {case}");
+        }
+    }
 
     /// All changes lie in the reported box, and the result is the same in one call and piece by piece.
     #[test]

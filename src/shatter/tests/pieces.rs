@@ -260,7 +260,8 @@ fn rims_fill_their_shard_and_show_the_same_picture() {
         let shards = if i < 390 {
             shatter(random_cuts(&mut rng), &random_params(&mut rng)).unwrap()
         } else {
-            let network = grown(&CrackPreset::named(CrackPreset::NAMES[i % 11]).unwrap(), 1, i as u64);
+            let network =
+                grown(&CrackPreset::named(CrackPreset::NAMES[i % CrackPreset::NAMES.len()]).unwrap(), 1, i as u64);
             shatter(Cuts::from_network(&network).unwrap(), &ShatterParams::DEFAULT).unwrap()
         };
         let width = [0.001, 0.01, 0.1][i % 3];

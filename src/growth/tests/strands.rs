@@ -1,0 +1,137 @@
+//! Hits whose cracks are strands.
+
+use crate::{
+    CrackPreset,
+    growth::{CrackGrowth, GrowthParams, HitOutcome, MarkerLayout, ParamError},
+    math::Rng,
+    pattern::PathPoint,
+    strands::StrandParams,
+};
+use glam::Vec2;
+
+const PRESETS: [CrackPreset; 3] = [CrackPreset::ASPHALT, CrackPreset::MARBLE, CrackPreset::SAND];
+
+fn length(growth: &CrackGrowth) -> f32 {
+    let network = growth.network();
+    let ends = network.segments().filter_map(|segment| network.ends(segment));
+    ends.map(|(a, b)| network.nodes()[a as usize].pos.distance(network.nodes()[b as usize].pos)).sum()
+}
+
+fn strands(params: &mut GrowthParams) -> (&mut u32, &mut StrandParams) {
+    match &mut params.markers {
+        MarkerLayout::Strands { count, strands } => (count, strands),
+        _ => panic!("not strands"),
+    }
+}
+
+/// Without branches, noise and neighbours every strand ends where its length does, all around the hit.
+#[test]
+fn strands_are_as_long_as_they_are_to_be() {
+    let mut params = GrowthParams { variety: 0.0, roughness: 0.0, ..CrackPreset::ASPHALT.growth };
+    let (_, settings) = strands(&mut params);
+    *settings = StrandParams { depth: 0, rotation: 0.0, sideways: 0.0, repulsion: 0.0, ..*settings };
+    for (energy, share) in [(0.25, 0.5), (1.0, 1.0), (1.5f32, 1.5f32.sqrt())] {
+        let mut growth = CrackGrowth::new(params.clone(), Vec2::splat(2.0), 3).unwrap();
+        growth.hit(Vec2::ONE, energy);
+        while growth.step().grew() {}
+        let nodes = growth.network().nodes();
+        let has_child = |node: usize| nodes.iter().any(|child| child.parent as usize == node);
+        let tips: Vec<Vec2> = (0..nodes.len()).filter(|&node| !has_child(node)).map(|node| nodes[node].pos).collect();
+        // Side lines of primitives have tips too.
+        let ends: Vec<Vec2> = tips.into_iter().filter(|tip| tip.distance(Vec2::ONE) > 0.348 * share).collect();
+        assert!(ends.len() >= 2, "energy {energy}: {ends:?}");
+        for end in ends {
+            let distance = end.distance(Vec2::ONE);
+            assert!((distance - 0.36 * share).abs() < 0.013, "energy {energy}: {distance}");
+        }
+    }
+}
+
+/// Whether the drawn lines of two pieces cross.
+fn crosses(one: &[PathPoint], other: &[PathPoint]) -> bool {
+    let side = |p: Vec2, q: Vec2, r: Vec2| (q - p).as_dvec2().perp_dot((r - p).as_dvec2());
+    let (a, b, c, d) = (one[0].pos, one[1].pos, other[0].pos, other[1].pos);
+    side(a, b, c) * side(a, b, d) < 0.0 && side(c, d, a) * side(c, d, b) < 0.0
+}
+
+#[test]
+fn strands_of_several_hits_never_cross() {
+    for (preset, seed) in PRESETS.iter().flat_map(|preset| (0..4).map(move |seed| (preset, seed))) {
+        let mut rng = Rng::new(seed).stream("hits");
+        let mut growth = CrackGrowth::new(preset.growth.clone(), Vec2::ONE, seed).unwrap();
+        for _ in 0..5 {
+            growth.hit(Vec2::new(rng.unit(), rng.unit()), 0.5 + rng.unit());
+            for _ in 0..rng.next_u32() % 60 {
+                growth.step();
+            }
+        }
+        while growth.step().grew() {}
+        let network = growth.network();
+        let paths: Vec<_> = network.segments().filter_map(|segment| network.path(segment)).collect();
+        for (i, one) in paths.iter().enumerate() {
+            for other in &paths[..i] {
+                let pairs = one.points().windows(2).flat_map(|a| other.points().windows(2).map(move |b| (a, b)));
+                for (a, b) in pairs {
+                    assert!(!crosses(a, b), "seed {seed}: {a:?} {b:?}");
+                }
+            }
+        }
+    }
+}
+
+/// A hit on a place that was hit before adds strands; none of the old ones moves.
+#[test]
+fn more_energy_adds_strands() {
+    for preset in PRESETS {
+        let mut growth = CrackGrowth::new(preset.growth.clone(), Vec2::splat(3.0), 1).unwrap();
+        assert_eq!(growth.hit(Vec2::splat(1.5), 1.0), HitOutcome::Started(0));
+        while growth.step().grew() {}
+        let before: Vec<Vec2> = growth.network().nodes().iter().map(|node| node.pos).collect();
+        let drawn = length(&growth);
+        assert_eq!(growth.hit(Vec2::splat(1.5), 7.0), HitOutcome::Merged(0));
+        while growth.step().grew() {}
+        let after = growth.network().nodes();
+        assert!(after.iter().zip(&before).all(|(node, pos)| node.pos == *pos));
+        assert!(length(&growth) > 1.3 * drawn, "{} {drawn}", length(&growth));
+    }
+}
+
+/// A hit on a strand starts strands from it.
+#[test]
+fn a_hit_on_a_strand_starts_from_it() {
+    for preset in PRESETS {
+        let mut growth = CrackGrowth::new(preset.growth.clone(), Vec2::ONE, 2).unwrap();
+        growth.hit(Vec2::splat(0.5), 1.0);
+        while growth.step().grew() {}
+        let nodes = growth.network().nodes();
+        let on = nodes.iter().max_by(|a, b| a.generation.cmp(&b.generation).then(a.birth.cmp(&b.birth))).unwrap().pos;
+        let count = nodes.len();
+        growth.hit(on, 1.0);
+        while growth.step().grew() {}
+        let new = &growth.network().nodes()[count..];
+        assert!(new.len() > 10 && new.iter().any(|node| (node.parent as usize) < count), "{on} {}", new.len());
+    }
+}
+
+#[test]
+fn settings_of_strands_are_checked_and_set_by_name() {
+    let mut params = CrackPreset::SAND.growth;
+    params.set("strands.rotation", "0.75").unwrap();
+    params.set("strand_count", "9").unwrap();
+    assert_eq!(*strands(&mut params).0, 9);
+    assert_eq!(strands(&mut params).1.rotation, 0.75);
+    assert!(
+        matches!(params.set("strands.rotation", "x"), Err(ParamError::Unreadable { name, .. }) if name == "strands.rotation")
+    );
+    assert!(matches!(params.set("strands.colour", "1"), Err(ParamError::Unknown { .. })));
+    strands(&mut params).1.inertia = f32::NAN;
+    assert!(matches!(params.validate(), Err(ParamError::OutOfRange { name: "inertia", .. })));
+    strands(&mut params).1.inertia = 0.5;
+    *strands(&mut params).0 = 0;
+    assert!(matches!(params.validate(), Err(ParamError::OutOfRange { name: "strand_count", .. })));
+    for by in [0.0, 0.01, 0.3, 7.0, 100.0, f32::INFINITY] {
+        for preset in PRESETS {
+            assert_eq!(preset.growth.scaled(by).validate(), Ok(()), "{by}");
+        }
+    }
+}
