@@ -4,5 +4,17 @@
 //! 1986, in Japanese).
 
 mod contours;
+mod heights;
+mod heights_bands;
+mod heights_error;
+mod heights_near;
+mod heights_params;
+mod heights_slope;
+#[cfg(test)]
+mod heights_tests;
+mod terrain_noise;
 
 pub use contours::{Contours, Ring};
+pub use heights::{HeightMap, MAX_LEVEL, MAX_RING_POINTS, heights};
+pub use heights_error::HeightError;
+pub use heights_params::HeightParams;
