@@ -8,6 +8,7 @@
 
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "a command-line tool")]
 
+mod birds_eye;
 mod blend;
 mod figures;
 mod figures_strands;
@@ -22,6 +23,7 @@ mod ocr;
 mod own;
 mod painting;
 mod pictures;
+mod relief;
 mod shatter;
 mod sheet;
 mod strands;
@@ -55,6 +57,8 @@ enum Method {
     Legible(legible::Options),
     /// Single cracks that follow a direction: primitives along a guidance field.
     Strands(Box<strands::Options>),
+    /// Craters, rock walls, islands and mountains from one contour line.
+    Relief(Box<relief::Options>),
     /// Shards: the pieces into which the cracks cut the picture.
     Shatter(Box<shatter::Options>),
 }
@@ -68,6 +72,7 @@ fn main() -> ExitCode {
         Method::FiguresStrands(options) => figures_strands::bake(&options),
         Method::Legible(options) => legible::bake(&options),
         Method::Strands(options) => strands::bake(&options),
+        Method::Relief(options) => relief::bake(&options),
         Method::Shatter(options) => shatter::bake(&options),
     };
     match done {

@@ -49,10 +49,6 @@ fn square(at: [f32; 2], start: [f32; 2], along: [f32; 2], inverse: f32) -> f32 {
 }
 
 impl Segments {
-    pub(super) fn is_empty(&self) -> bool {
-        self.len == 0
-    }
-
     fn clear(&mut self) {
         for list in [&mut self.x, &mut self.y, &mut self.along_x, &mut self.along_y, &mut self.inverse] {
             list.clear();

@@ -12,9 +12,14 @@ mod heights_params;
 mod heights_slope;
 #[cfg(test)]
 mod heights_tests;
+mod terrain;
+mod terrain_blur;
 mod terrain_noise;
+mod terrain_normals;
 
 pub use contours::{Contours, Ring};
 pub use heights::{HeightMap, MAX_LEVEL, MAX_RING_POINTS, heights};
 pub use heights_error::HeightError;
 pub use heights_params::HeightParams;
+pub use terrain::{Ground, Sea, TerrainColors, colors};
+pub use terrain_normals::normals;
