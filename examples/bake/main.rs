@@ -10,6 +10,7 @@
 
 mod birds_eye;
 mod blend;
+mod contour_lines;
 mod figures;
 mod figures_strands;
 mod gallery;
@@ -27,6 +28,7 @@ mod relief;
 mod shatter;
 mod sheet;
 mod strands;
+mod terrain;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;

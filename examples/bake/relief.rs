@@ -1,7 +1,10 @@
 //! `bake relief`: one contour in; all other contours, heights, pictures and a mesh out.
 
-use crate::birds_eye::{View, birds_eye};
-use crate::growth::{setting, size};
+use crate::{
+    birds_eye::{View, birds_eye},
+    growth::{setting, size},
+    terrain::Terrain,
+};
 use bevy_crack::{
     Grid,
     math::{Rng, ops},
@@ -19,6 +22,10 @@ pub(crate) struct Options {
     size: UVec2,
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    #[arg(long)]
+    dem: Option<PathBuf>,
+    #[arg(long, default_value_t = 12)]
+    levels: u16,
     /// rock, island or mountain
     #[arg(long, default_value = "island")]
     colors: String,
@@ -79,7 +86,15 @@ pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
         params.set(name, value)?;
     }
     let look = look(&options.colors)?;
-    let contours = mountain(16, 512, options.seed);
+    let mut contours = mountain(16, 512, options.seed);
+    let mut frame = frame;
+    if let Some(dem) = &options.dem {
+        let terrain = Terrain::read(dem)?;
+        let step;
+        (contours, step) = terrain.contours(options.levels);
+        params.step = step * 6.0;
+        frame = SurfaceFrame::new(terrain.frame.size() * 2)?;
+    }
     let clock = Instant::now();
     let map = HeightMap::new(&contours, &params, frame, options.seed)?;
     let heights = map.heights(1);

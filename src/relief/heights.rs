@@ -26,7 +26,7 @@ pub const MAX_LEVEL: i32 = 4096;
 const MOST_PLACE: f32 = 1e4;
 
 /// Sides of the tiles, each in one of the size before it, texels. The first is the height of a stripe.
-const SIDES: [usize; 4] = [HeightMap::STRIPE, 64, 16, TILE];
+const SIDES: [usize; 3] = [128, 32, 8];
 
 /// The height field of contour lines, made stripe by stripe.
 ///
@@ -236,6 +236,12 @@ impl HeightMap {
         index(low - 1)..index(high + 3)
     }
 
+    /// Whether no texel of a tile lies beside level `level`, an index, so that only distances beyond a band are needed.
+    fn is_beyond(&self, level: usize, [low, high]: [i32; 2]) -> bool {
+        let level = self.lowest + level as i32;
+        level < low || level > high + 1
+    }
+
     fn band(&self, code: i32) -> i32 {
         Band(code).lower().clamp(self.lowest - 1, self.lowest + self.levels.len() as i32 - 1)
     }
@@ -245,12 +251,20 @@ impl HeightMap {
         let side = SIDES[depth];
         let end = [(at[0] + side).min(area.width), (at[1] + side).min(area.n_rows)];
         let bands = work.range(self, depth, at, area);
-        let min = [at[0] as f32 + 0.5, (area.first + at[1]) as f32 + 0.5];
-        let bounds: Bounds = [min, [min[0] + (side - 1) as f32, min[1] + (side - 1) as f32]];
-        for level in self.needed(bands) {
+        let min = [at[0] as f32, (area.first + at[1]) as f32];
+        let bounds: Bounds = [min, [min[0] + side as f32, min[1] + side as f32]];
+        let is_leaf = depth + 1 == SIDES.len();
+        let needed = self.needed(bands);
+        work.corners.clear();
+        for level in needed.clone() {
             let (outer, inner) = work.lists.split_at_mut(depth);
             let from = outer.last().map_or(&self.levels[level], |lists| &lists[level]);
-            from.nearest_in(bounds, &mut work.room, &mut inner[0][level]);
+            let is_beyond = is_leaf && self.is_beyond(level, bands);
+            work.corners.push(if is_beyond {
+                from.corners(bounds, &mut work.room)
+            } else {
+                from.nearest_in(bounds, &mut work.room, &mut inner[0][level])
+            });
         }
         let Some(&inner) = SIDES.get(depth + 1) else {
             self.fill_leaf(at, end, bands, area, rows, work);
@@ -279,8 +293,9 @@ impl HeightMap {
             #[inline(always)]
             || {
                 work.near.clear();
-                for level in levels.clone() {
-                    work.near.push(lists[level].tile(place));
+                for (level, corners) in levels.clone().zip(&work.corners) {
+                    let squares = if self.is_beyond(level, bands) { [[0.0; TILE]; TILE] } else { lists[level].tile(place) };
+                    work.near.push((squares, corners.map(f32::sqrt)));
                 }
                 let n = end[0] - at[0];
                 for (row, y) in (at[1]..end[1]).enumerate() {
@@ -302,7 +317,7 @@ impl HeightMap {
         row: usize,
         [low, high]: [i32; 2],
         first: usize,
-        near: &[[Lane; TILE]],
+        near: &[([Lane; TILE], [f32; 4])],
     ) -> Lane {
         let band = codes.map(|code| Band(code).lower().max(low).min(high));
         let mut across = Across {
@@ -315,28 +330,27 @@ impl HeightMap {
             rise_under: [1.0; TILE],
             rise_over: [1.0; TILE],
         };
-        for (squares, level) in near.iter().zip(self.lowest + first as i32..) {
+        let down = (row as f32 + 0.5) / TILE as f32;
+        for ((squares, corners), level) in near.iter().zip(self.lowest + first as i32..) {
             let squares = &squares[row];
-            for i in 0..TILE {
-                let square = squares[i];
-                across.lower[i] = if band[i] == level + 1 { square } else { across.lower[i] };
-                across.low[i] = if band[i] == level { square } else { across.low[i] };
-                across.high[i] = if band[i] == level - 1 { square } else { across.high[i] };
-                across.higher[i] = if band[i] == level - 2 { square } else { across.higher[i] };
-            }
+            let left = corners[0] + (corners[2] - corners[0]) * down;
+            let right = corners[1] + (corners[3] - corners[1]) * down;
+            let beyond = RAMP.map(|share| left + (right - left) * share);
+            put(&mut across.lower, &band, level + 1, &beyond);
+            put(&mut across.low, &band, level, squares);
+            put(&mut across.high, &band, level - 1, squares);
+            put(&mut across.higher, &band, level - 2, &beyond);
         }
-        for distances in [&mut across.lower, &mut across.low, &mut across.high, &mut across.higher] {
-            *distances = distances.map(f32::sqrt);
+        for i in 0..TILE {
+            across.low[i] = across.low[i].sqrt();
+            across.high[i] = across.high[i].sqrt();
         }
         for level in low..=high {
             let heights = &self.heights[(level - self.lowest + 1) as usize..][..4];
-            for i in 0..TILE {
-                let is_here = band[i] == level;
-                across.base[i] = if is_here { heights[1] } else { across.base[i] };
-                across.rise_under[i] = if is_here { heights[1] - heights[0] } else { across.rise_under[i] };
-                across.rise[i] = if is_here { heights[2] - heights[1] } else { across.rise[i] };
-                across.rise_over[i] = if is_here { heights[3] - heights[2] } else { across.rise_over[i] };
-            }
+            put(&mut across.base, &band, level, &[heights[1]; TILE]);
+            put(&mut across.rise_under, &band, level, &[heights[1] - heights[0]; TILE]);
+            put(&mut across.rise, &band, level, &[heights[2] - heights[1]; TILE]);
+            put(&mut across.rise_over, &band, level, &[heights[3] - heights[2]; TILE]);
         }
         let mut out = across.between(self.distance);
         if codes.iter().any(|&code| !Band(code).has_upper()) {
@@ -400,6 +414,19 @@ impl HeightMap {
     }
 }
 
+/// Where the centers of a tile's texels lie across it.
+const RAMP: Lane = [0.0625, 0.1875, 0.3125, 0.4375, 0.5625, 0.6875, 0.8125, 0.9375];
+
+/// Writes values where the band is that of `level`.
+#[inline(always)]
+fn put(out: &mut Lane, band: &[i32; TILE], level: i32, values: &Lane) {
+    let mut merged = *out;
+    for i in 0..TILE {
+        merged[i] = if band[i] == level { values[i] } else { merged[i] };
+    }
+    *out = merged;
+}
+
 /// The texels of a stripe: its first row, its width and its number of rows.
 struct Area {
     first: usize,
@@ -417,7 +444,9 @@ struct Work {
     /// For each size of tiles and each level, the segments that can be nearest to a texel of the current tile.
     lists: [Vec<Segments>; SIDES.len()],
     /// Squares of the distances of a tile to the levels that it needs.
-    near: Vec<[Lane; TILE]>,
+    near: Vec<([Lane; TILE], [f32; 4])>,
+    /// Squares of the distances of the corners of the current tile.
+    corners: Vec<[f32; 4]>,
     room: Room,
 }
 

@@ -15,29 +15,29 @@ pub(super) const TILE: usize = 8;
 /// The square of a distance to nothing, square texels.
 pub(super) const FAR: f32 = 1e18;
 
-/// Line segments in texel space, in arrays padded to whole blocks by segments that are far away.
+/// Line segments in texel space, in blocks; the last block is filled up with segments that are far away.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Segments {
-    /// Starts.
-    x: Vec<f32>,
-    y: Vec<f32>,
-    /// From start to end.
-    along_x: Vec<f32>,
-    along_y: Vec<f32>,
-    /// 1 / the square of the length; 0 for points.
-    inverse: Vec<f32>,
+    blocks: Vec<Block>,
     len: usize,
 }
+
+/// For each segment of a block: x and y of the start, x and y from start to end, and 1 / the square of the length, or
+/// 0 for points.
+type Block = [[f32; LANES]; 5];
+
+/// A block of segments far away.
+const NOTHING: Block = [[1e9; LANES], [1e9; LANES], [0.0; LANES], [0.0; LANES], [0.0; LANES]];
 
 /// Memory for [`Segments::nearest_in`].
 #[derive(Debug, Default)]
 pub(super) struct Room {
     /// Squares of the distances to the four corners.
-    squares: [Vec<f32>; 4],
-    keep: Vec<f32>,
+    squares: [Vec<[f32; LANES]>; 4],
+    keep: Vec<[f32; LANES]>,
 }
 
-/// The least and the greatest position of a tile's texel centers.
+/// The top left and the bottom right of a tile, texels.
 pub(super) type Bounds = [[f32; 2]; 2];
 
 #[inline(always)]
@@ -48,11 +48,13 @@ fn square(at: [f32; 2], start: [f32; 2], along: [f32; 2], inverse: f32) -> f32 {
     x * x + y * y
 }
 
+fn corners([min, max]: Bounds) -> [[f32; 2]; 4] {
+    [min, [max[0], min[1]], [min[0], max[1]], max]
+}
+
 impl Segments {
     fn clear(&mut self) {
-        for list in [&mut self.x, &mut self.y, &mut self.along_x, &mut self.along_y, &mut self.inverse] {
-            list.clear();
-        }
+        self.blocks.clear();
         self.len = 0;
     }
 
@@ -63,22 +65,21 @@ impl Segments {
         self.add([a[0], a[1], along_x, along_y, if square > 1e-12 { 1.0 / square } else { 0.0 }]);
     }
 
-    fn add(&mut self, [x, y, along_x, along_y, inverse]: [f32; 5]) {
-        if self.len == self.x.len() {
-            let padded = self.len + LANES;
-            self.x.resize(padded, FAR.sqrt());
-            self.y.resize(padded, FAR.sqrt());
-            for list in [&mut self.along_x, &mut self.along_y, &mut self.inverse] {
-                list.resize(padded, 0.0);
+    fn add(&mut self, segment: [f32; 5]) {
+        if self.len == self.blocks.len() * LANES {
+            self.blocks.push(NOTHING);
+        }
+        if let Some(block) = self.blocks.last_mut() {
+            for (values, value) in block.iter_mut().zip(segment) {
+                values[self.len % LANES] = value;
             }
         }
-        let i = self.len;
-        (self.x[i], self.y[i], self.along_x[i], self.along_y[i], self.inverse[i]) = (x, y, along_x, along_y, inverse);
         self.len += 1;
     }
 
     fn get(&self, i: usize) -> [f32; 5] {
-        [self.x[i], self.y[i], self.along_x[i], self.along_y[i], self.inverse[i]]
+        let ([x, y, along_x, along_y, inverse], i) = (&self.blocks[i / LANES], i % LANES);
+        [x[i], y[i], along_x[i], along_y[i], inverse[i]]
     }
 
     /// The point of segment `i` that is nearest to `at`.
@@ -88,47 +89,61 @@ impl Segments {
         [x + share * along_x, y + share * along_y]
     }
 
-    /// Replaces `out` by those segments of which one is nearest to each place of a tile.
-    pub(super) fn nearest_in(&self, [min, max]: Bounds, room: &mut Room, out: &mut Self) {
+    /// Replaces `out` by those segments of which one is nearest to each place of a tile; returns the squares of the
+    /// distances of its corners.
+    pub(super) fn nearest_in(&self, bounds: Bounds, room: &mut Room, out: &mut Self) -> [f32; 4] {
         out.clear();
+        let least = self.corners(bounds, room);
         if self.len <= 2 {
             (0..self.len).for_each(|i| out.add(self.get(i)));
-            return;
+            return least;
         }
-        let corners = [min, [max[0], min[1]], [min[0], max[1]], max];
+        let corners = corners(bounds);
         let mut nearest = [0; 4];
-        for ((squares, corner), nearest) in room.squares.iter_mut().zip(corners).zip(&mut nearest) {
-            squares.resize(self.x.len(), 0.0);
-            let least = self.squares_at(corner, squares);
-            *nearest = squares.iter().position(|&square| square == least).unwrap_or(0);
+        for ((squares, least), nearest) in room.squares.iter().zip(least).zip(&mut nearest) {
+            *nearest = squares.as_flattened().iter().position(|&square| square == least).unwrap_or(0);
         }
         let points: [_; 4] = std::array::from_fn(|i| self.nearest_point(nearest[i], corners[i]));
         let bounds = points.map(|point| corners.map(|corner| square(corner, point, [0.0; 2], 0.0)));
         room.mark(&bounds);
         for i in nearest {
-            room.keep[i] = 1.0;
+            room.keep[i / LANES][i % LANES] = 1.0;
         }
-        for (i, &keep) in room.keep[..self.len].iter().enumerate() {
-            if keep > 0.0 {
-                out.add(self.get(i));
+        for (i, keep) in room.keep.iter().enumerate() {
+            for (lane, &keep) in keep.iter().enumerate() {
+                if keep > 0.0 && i * LANES + lane < self.len {
+                    out.add(self.get(i * LANES + lane));
+                }
             }
         }
+        least
+    }
+
+    /// Squares of the distances of a tile's corners to the nearest segment; `room` has those to all.
+    pub(super) fn corners(&self, bounds: Bounds, room: &mut Room) -> [f32; 4] {
+        let mut least = [FAR; 4];
+        for ((squares, corner), least) in room.squares.iter_mut().zip(corners(bounds)).zip(&mut least) {
+            squares.resize(self.blocks.len(), [0.0; LANES]);
+            *least = self.squares_at(corner, squares).min(FAR);
+        }
+        least
     }
 
     /// Squares of the distances of all segments to one place; returns the least.
-    fn squares_at(&self, at: [f32; 2], out: &mut [f32]) -> f32 {
+    fn squares_at(&self, at: [f32; 2], out: &mut [[f32; LANES]]) -> f32 {
         vectorized(
             #[inline(always)]
             || {
                 let mut least = [f32::MAX; LANES];
-                let n = out.len();
-                let lists = [&self.x[..n], &self.y[..n], &self.along_x[..n], &self.along_y[..n], &self.inverse[..n]];
-                for (block, out) in out.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
-                    let [x, y, along_x, along_y, inverse] = lists.map(|list| &list[block * LANES..(block + 1) * LANES]);
+                for ([x, y, along_x, along_y, inverse], out) in self.blocks.iter().zip(out) {
+                    let mut squares = [0.0; LANES];
                     for i in 0..LANES {
-                        out[i] = square(at, [x[i], y[i]], [along_x[i], along_y[i]], inverse[i]);
-                        least[i] = if out[i] < least[i] { out[i] } else { least[i] };
+                        squares[i] = square(at, [x[i], y[i]], [along_x[i], along_y[i]], inverse[i]);
                     }
+                    for i in 0..LANES {
+                        least[i] = if squares[i] < least[i] { squares[i] } else { least[i] };
+                    }
+                    *out = squares;
                 }
                 least.into_iter().fold(f32::MAX, f32::min)
             },
@@ -160,27 +175,25 @@ impl Room {
     /// distances of the points to the corners.
     fn mark(&mut self, bounds: &[[f32; 4]; 4]) {
         let n = self.squares[0].len();
-        self.keep.resize(n, 0.0);
-        let keep = &mut self.keep[..n];
-        let squares = self.squares.each_ref().map(|list| &list[..n]);
+        self.keep.clear();
+        self.keep.resize(n, [0.0; LANES]);
+        let [first, second, third, fourth] = &self.squares;
         vectorized(
             #[inline(always)]
             || {
-                for (block, keep) in keep.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
-                    let squares = squares.map(|list| &list[block * LANES..(block + 1) * LANES]);
-                    for (i, keep) in keep.iter_mut().enumerate() {
-                        let is_farther = |bound: &[f32; 4]| {
-                            (bound[0] <= squares[0][i])
-                                & (bound[1] <= squares[1][i])
-                                & (bound[2] <= squares[2][i])
-                                & (bound[3] <= squares[3][i])
-                        };
-                        let out = is_farther(&bounds[0])
-                            | is_farther(&bounds[1])
-                            | is_farther(&bounds[2])
-                            | is_farther(&bounds[3]);
-                        *keep = if out { 0.0 } else { 1.0 };
+                let squares = first.iter().zip(second).zip(third.iter().zip(fourth));
+                for (keep, ((first, second), (third, fourth))) in self.keep.iter_mut().zip(squares) {
+                    let mut kept = [1.0; LANES];
+                    for bound in bounds {
+                        for i in 0..LANES {
+                            let is_farther = (bound[0] <= first[i])
+                                & (bound[1] <= second[i])
+                                & (bound[2] <= third[i])
+                                & (bound[3] <= fourth[i]);
+                            kept[i] = if is_farther { 0.0 } else { kept[i] };
+                        }
                     }
+                    *keep = kept;
                 }
             },
         );
