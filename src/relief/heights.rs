@@ -14,7 +14,10 @@ use crate::{
     math::{Rng, hash_unit, vectorized},
     pattern::SurfaceFrame,
 };
-use std::thread;
+use std::{
+    sync::{Mutex, PoisonError},
+    thread,
+};
 
 /// Most points of all rings together.
 pub const MAX_RING_POINTS: usize = 1 << 22;
@@ -186,21 +189,21 @@ impl HeightMap {
     pub fn heights(&self, threads: usize) -> Grid<f32> {
         let mut grid = Grid::new(self.frame.size(), 0.0);
         let width = grid.width();
-        let mut parts: Vec<_> = (0..threads.clamp(1, self.stripes().max(1))).map(|_| Vec::new()).collect();
-        let n_parts = parts.len();
-        for (stripe, rows) in grid.as_mut_slice().chunks_mut(Self::STRIPE * width).enumerate() {
-            parts[stripe % n_parts].push((stripe, rows));
-        }
-        let fill = |part: Vec<(usize, &mut [f32])>| {
+        let stripes = Mutex::new(grid.as_mut_slice().chunks_mut(Self::STRIPE * width).enumerate());
+        let fill = || {
             let mut work = Work::default();
-            part.into_iter().for_each(|(stripe, rows)| self.fill_with(stripe, rows, &mut work));
+            loop {
+                let next = stripes.lock().unwrap_or_else(PoisonError::into_inner).next();
+                let Some((stripe, rows)) = next else { break };
+                self.fill_with(stripe, rows, &mut work);
+            }
         };
         thread::scope(|scope| {
-            let own = parts.pop();
-            for part in parts {
-                scope.spawn(move || fill(part));
+            for _ in 1..threads.min(self.stripes()) {
+                // Where there are no more threads, those that are there do the work.
+                let _ = thread::Builder::new().spawn_scoped(scope, fill);
             }
-            own.map(fill);
+            fill();
         });
         grid
     }
@@ -216,7 +219,7 @@ impl HeightMap {
         let first = stripe.saturating_mul(Self::STRIPE);
         let n_rows = height.saturating_sub(first).min(Self::STRIPE).min(rows.len() / width);
         let rows = &mut rows[..n_rows * width];
-        if self.levels.is_empty() {
+        if self.levels.is_empty() || n_rows == 0 {
             rows.fill(0.0);
             return;
         }

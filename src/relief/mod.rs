@@ -4,6 +4,8 @@
 //! 1986, in Japanese).
 
 mod contours;
+mod crater;
+mod export;
 mod heights;
 mod heights_bands;
 mod heights_error;
@@ -12,14 +14,17 @@ mod heights_params;
 mod heights_slope;
 #[cfg(test)]
 mod heights_tests;
+mod mesh;
 mod terrain;
 mod terrain_blur;
 mod terrain_noise;
 mod terrain_normals;
 
 pub use contours::{Contours, Ring};
+pub use crater::{Crater, CraterParams};
 pub use heights::{HeightMap, MAX_LEVEL, MAX_RING_POINTS, heights};
 pub use heights_error::HeightError;
 pub use heights_params::HeightParams;
+pub use mesh::{MAX_DETAIL, ReliefFrame, ReliefMesh};
 pub use terrain::{Ground, Sea, TerrainColors, colors};
 pub use terrain_normals::normals;
