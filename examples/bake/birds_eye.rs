@@ -22,13 +22,15 @@ pub(crate) struct View {
 
 impl View {
     pub(crate) const WIDE: Self =
-        Self { size: UVec2::new(1200, 675), around: 24.0, down: 27.0, distance: 1.55, sea: false };
+        Self { size: UVec2::new(1200, 675), around: 24.0, down: 27.0, distance: 1.35, sea: false };
+    /// Nearly from above: a wall seen from the front.
+    pub(crate) const FRONT: Self = Self { around: 0.0, down: 74.0, distance: 1.0, ..Self::WIDE };
 }
 
 /// Towards the sun: right, up, towards the bottom of the surface.
-const SUN: Vec3 = Vec3::new(-0.72, 0.55, 0.32);
-const SUNLIGHT: Vec3 = Vec3::new(1.25, 1.12, 0.92);
-const SKYLIGHT: Vec3 = Vec3::new(0.34, 0.42, 0.55);
+const SUN: Vec3 = Vec3::new(-0.78, 0.5, 0.22);
+const SUNLIGHT: Vec3 = Vec3::new(1.5, 1.32, 1.05);
+const SKYLIGHT: Vec3 = Vec3::new(0.26, 0.34, 0.47);
 const HAZE: Vec3 = Vec3::new(0.70, 0.77, 0.84);
 const ZENITH: Vec3 = Vec3::new(0.24, 0.42, 0.68);
 
@@ -136,7 +138,7 @@ impl Scene<'_> {
     }
 
     fn hazy(&self, color: Vec3, ray: Vec3, along: f32) -> Vec3 {
-        let clear = (-along * along * 0.085 * 1.44).exp2();
+        let clear = (-along * along * 0.025 * 1.44).exp2();
         self.sky(Vec3::new(ray.x, 0.02, ray.z).normalize()).lerp(color, clear)
     }
 

@@ -25,6 +25,8 @@ mod own;
 mod painting;
 mod pictures;
 mod relief;
+mod relief_terrain;
+mod seed_contours;
 mod shatter;
 mod sheet;
 mod strands;
@@ -61,6 +63,8 @@ enum Method {
     Strands(Box<strands::Options>),
     /// Craters, rock walls, islands and mountains from one contour line.
     Relief(Box<relief::Options>),
+    /// All contours of a mountain from one real contour, by each method, beside the real ones.
+    ReliefTerrain(relief_terrain::Options),
     /// Shards: the pieces into which the cracks cut the picture.
     Shatter(Box<shatter::Options>),
 }
@@ -75,6 +79,7 @@ fn main() -> ExitCode {
         Method::Legible(options) => legible::bake(&options),
         Method::Strands(options) => strands::bake(&options),
         Method::Relief(options) => relief::bake(&options),
+        Method::ReliefTerrain(options) => relief_terrain::bake(&options),
         Method::Shatter(options) => shatter::bake(&options),
     };
     match done {

@@ -3,64 +3,61 @@
 use crate::{
     birds_eye::{View, birds_eye},
     growth::{setting, size},
-    terrain::Terrain,
+    seed_contours::seed_contours,
 };
 use bevy_crack::{
     Grid,
-    math::{Rng, ops},
     pattern::SurfaceFrame,
-    relief::{Contours, HeightMap, HeightParams, Ring, TerrainColors, colors, normals},
+    relief::{Contours, HeightMap, HeightParams, ReliefFrame, ReliefMesh, ReliefParams, TerrainColors, colors, normals},
 };
 use clap::Args;
-use glam::{UVec2, Vec2};
+use glam::UVec2;
 use image::{ImageBuffer, Luma, RgbaImage};
-use std::{error::Error, fs, path::PathBuf, time::Instant};
+use std::{
+    error::Error,
+    fs,
+    path::{Path, PathBuf},
+    time::Instant,
+};
 
 #[derive(Args)]
 pub(crate) struct Options {
+    /// circle, island, wall, a JSON list of points, or a picture whose dark outlines are taken
+    #[arg(long, default_value = "island")]
+    seed_contour: String,
+    /// simple, midpoint, fourier or improved
+    #[arg(long, default_value = "improved")]
+    method: String,
+    /// miter, bevel, arc or round
+    #[arg(long)]
+    join: Option<String>,
     #[arg(long, value_parser = size, default_value = "1024x1024")]
     size: UVec2,
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// rock, island or mountain; by default what suits the seed contour
     #[arg(long)]
-    dem: Option<PathBuf>,
-    #[arg(long, default_value_t = 12)]
-    levels: u16,
-    /// rock, island or mountain
-    #[arg(long, default_value = "island")]
-    colors: String,
-    /// A parameter of the heights, as in `step=0.03`; may be given many times
+    colors: Option<String>,
+    /// A parameter of contours or heights, as in `distance=0.02`; may be given many times
     #[arg(long, value_parser = setting)]
     set: Vec<(String, String)>,
+    /// Level of detail of the mesh: one vertex for 2^detail texels
+    #[arg(long, default_value_t = 2)]
+    detail: u32,
     /// Folder to write to; made if it is not there
     #[arg(long, default_value = "out")]
     out: PathBuf,
 }
 
-/// Nested rings of an uneven mountain, all of one shape.
-fn mountain(levels: u16, points: u16, seed: u64) -> Contours {
-    let mut rng = Rng::new(seed);
-    let waves: Vec<_> = (1u8..60).map(|k| (f32::from(k), 0.6 * rng.signed() / f32::from(k).powf(1.1), rng.unit())).collect();
-    let corner = |i: u16, scale: f32| {
-        let angle = std::f32::consts::TAU * f32::from(i) / f32::from(points);
-        let wave = |&(k, size, phase): &(f32, f32, f32)| size * ops::cos(k * angle + std::f32::consts::TAU * phase);
-        Vec2::splat(0.5) + 0.27 * scale * (1.0 + waves.iter().map(wave).sum::<f32>()) * ops::unit(angle)
-    };
-    let ring = |level: u16| Ring {
-        points: (0..points).map(|i| corner(i, 1.0 - f32::from(level) / f32::from(levels))).collect(),
-        level: level.into(),
-    };
-    Contours { rings: (0..levels).map(ring).collect(), distance: 0.34 / f32::from(levels) }
-}
-
-fn save(path: PathBuf, texels: &Grid<[u8; 4]>) -> Result<(), Box<dyn Error>> {
+pub(crate) fn save(path: &Path, texels: &Grid<[u8; 4]>) -> Result<(), Box<dyn Error>> {
     let size = texels.size();
     let bytes = texels.as_slice().as_flattened().to_vec();
     RgbaImage::from_raw(size.x, size.y, bytes).ok_or("a picture of another size")?.save(path)?;
     Ok(())
 }
 
-fn save_heights(path: PathBuf, heights: &Grid<f32>) -> Result<(), Box<dyn Error>> {
+/// Heights as a 16-bit picture: black is the lowest, white the highest.
+fn save_heights(path: &Path, heights: &Grid<f32>) -> Result<(), Box<dyn Error>> {
     let (low, high) = heights.as_slice().iter().fold((f32::MAX, f32::MIN), |(l, h), &v| (l.min(v), h.max(v)));
     let gray = heights.as_slice().iter().map(|&v| ((v - low) / (high - low).max(1e-9) * 65535.0 + 0.5) as u16);
     let size = heights.size();
@@ -79,45 +76,70 @@ fn look(name: &str) -> Result<TerrainColors, String> {
     }
 }
 
+/// Settings that suit a seed contour, changed as the options tell.
+fn params(options: &Options) -> Result<(ReliefParams, HeightParams), Box<dyn Error>> {
+    let (mut rings, mut heights) = (ReliefParams::IMPROVED, HeightParams::DEFAULT);
+    if options.seed_contour == "wall" {
+        rings = ReliefParams { distance: 0.012, outward: 5, ..rings };
+        let rough = HeightParams { roughness: 0.7, cliffs: 0.45, variation: 0.7, noise_scale: 0.07, ..heights };
+        heights = HeightParams { step: 0.01, floor: 2.0, ..rough };
+    } else {
+        heights = HeightParams { step: 0.014, floor: 4.0, roughness: 0.35, ..heights };
+    }
+    rings.set("method", &options.method)?;
+    if let Some(join) = &options.join {
+        rings.set("join", join)?;
+    }
+    for (name, value) in &options.set {
+        if heights.set(name, value).is_err() {
+            rings.set(name, value)?;
+        }
+    }
+    Ok((rings, heights))
+}
+
+/// All pictures, texts and meshes of a height field.
+fn write(
+    options: &Options,
+    frame: &SurfaceFrame,
+    contours: &Contours,
+    heights: &Grid<f32>,
+) -> Result<(), Box<dyn Error>> {
+    let name = options.colors.as_deref().unwrap_or(if options.seed_contour == "wall" { "rock" } else { "island" });
+    let look = look(name)?;
+    let out = |name: &str| options.out.join(name);
+    fs::create_dir_all(&options.out)?;
+    fs::write(out("contours.svg"), contours.to_svg(frame.extent(), 1000.0))?;
+    fs::write(out("contours.json"), contours.to_json())?;
+    save_heights(&out("height.png"), heights)?;
+    save(&out("normal.png"), &normals(heights, frame))?;
+    for (file, light) in [("diffuse.png", look.light), ("shaded.png", 1.0)] {
+        save(&out(file), &colors(heights, frame, &TerrainColors { light, ..look }, options.seed)?)?;
+    }
+    let unlit = colors(heights, frame, &TerrainColors { light: 0.0, ..look }, options.seed)?;
+    let view = View { sea: look.sea.is_some(), ..if name == "rock" { View::FRONT } else { View::WIDE } };
+    birds_eye(heights, &unlit, frame, &view).save(out("birds_eye.png"))?;
+    let mesh = ReliefMesh::new(heights, &ReliefFrame::new(frame.extent()), options.detail)?;
+    fs::write(out("mesh.obj"), mesh.to_obj())?;
+    Ok(())
+}
+
 pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
     let frame = SurfaceFrame::new(options.size)?;
-    let mut params = HeightParams::DEFAULT;
-    for (name, value) in &options.set {
-        params.set(name, value)?;
-    }
-    let look = look(&options.colors)?;
-    let mut contours = mountain(16, 512, options.seed);
-    let mut frame = frame;
-    if let Some(dem) = &options.dem {
-        let terrain = Terrain::read(dem)?;
-        let step;
-        (contours, step) = terrain.contours(options.levels);
-        params.step = step * 6.0;
-        frame = SurfaceFrame::new(terrain.frame.size() * 2)?;
-    }
+    let (rings, params) = params(options)?;
+    let seeds = seed_contours(&options.seed_contour, frame.extent(), options.seed)?;
     let clock = Instant::now();
-    let map = HeightMap::new(&contours, &params, frame, options.seed)?;
-    let heights = map.heights(1);
+    let contours = Contours::generate(&rings, &seeds, options.seed)?;
+    let drawn = clock.elapsed();
+    let heights = HeightMap::new(&contours, &params, frame, options.seed)?.heights(1);
     let filled = clock.elapsed();
-    let normal = normals(&heights, &frame);
-    let shaded = clock.elapsed();
-    let diffuse = colors(&heights, &frame, &look, options.seed)?;
-    let colored = clock.elapsed();
-    fs::create_dir_all(&options.out)?;
-    save_heights(options.out.join("height.png"), &heights)?;
-    save(options.out.join("normal.png"), &normal)?;
-    save(options.out.join("diffuse.png"), &diffuse)?;
-    let lit = colors(&heights, &frame, &TerrainColors { light: 1.0, ..look }, options.seed)?;
-    save(options.out.join("shaded.png"), &lit)?;
-    let plain = colors(&heights, &frame, &TerrainColors { light: 0.0, ..look }, options.seed)?;
-    let view = View { sea: look.sea.is_some(), ..View::WIDE };
-    birds_eye(&heights, &plain, &frame, &view).save(options.out.join("birds_eye.png"))?;
+    write(options, &frame, &contours, &heights)?;
     println!(
-        "{} rings; heights in {:.1} ms, normals in {:.1} ms, colors in {:.1} ms",
+        "{} rings in {:.1} ms, heights in {:.1} ms; written to {}",
         contours.rings.len(),
-        filled.as_secs_f64() * 1e3,
-        (shaded - filled).as_secs_f64() * 1e3,
-        (colored - shaded).as_secs_f64() * 1e3,
+        drawn.as_secs_f64() * 1e3,
+        (filled - drawn).as_secs_f64() * 1e3,
+        options.out.display()
     );
     Ok(())
 }

@@ -20,7 +20,7 @@ use std::{
 };
 
 /// Most points of all rings together.
-pub const MAX_RING_POINTS: usize = 1 << 22;
+pub const MAX_HEIGHT_POINTS: usize = 1 << 22;
 
 /// Largest level, up or down.
 pub const MAX_LEVEL: i32 = 4096;
@@ -100,13 +100,13 @@ pub fn heights(
 }
 
 fn check(contours: &Contours) -> Result<(), HeightError> {
-    let (min, max) = (1e-5, 64.0);
+    let (min, max) = (1e-6, 1e6);
     if !(min..=max).contains(&contours.distance) {
         return Err(HeightError::OutOfRange { name: "distance", value: contours.distance, min, max });
     }
     let count = contours.rings.iter().map(|ring| ring.points.len()).sum();
-    if count > MAX_RING_POINTS {
-        return Err(HeightError::TooManyPoints { count, most: MAX_RING_POINTS });
+    if count > MAX_HEIGHT_POINTS {
+        return Err(HeightError::TooManyPoints { count, most: MAX_HEIGHT_POINTS });
     }
     for (i, ring) in contours.rings.iter().enumerate() {
         if ring.points.len() < 3 {
@@ -134,7 +134,7 @@ impl HeightMap {
     ///
     /// # Errors
     /// [`HeightError`] if a parameter, the distance of the contours, a ring or its level is out of range, or if there are more than
-    /// [`MAX_RING_POINTS`] points.
+    /// [`MAX_HEIGHT_POINTS`] points.
     pub fn new(
         contours: &Contours,
         params: &HeightParams,

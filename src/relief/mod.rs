@@ -22,7 +22,7 @@ mod terrain_normals;
 
 pub use contours::{Contours, Ring};
 pub use crater::{Crater, CraterParams};
-pub use heights::{HeightMap, MAX_LEVEL, MAX_RING_POINTS, heights};
+pub use heights::{HeightMap, MAX_LEVEL, MAX_HEIGHT_POINTS, heights};
 pub use heights_error::HeightError;
 pub use heights_params::HeightParams;
 pub use mesh::{MAX_DETAIL, ReliefFrame, ReliefMesh};

@@ -295,7 +295,7 @@ impl<'a> Painter<'a> {
         let color = ground + (self.rock(height, noise) - ground) * rock;
         let lit = (normal.dot(LIGHT) / LIGHT.z).max(0.0);
         // Twilight from above beside the sun.
-        let light = 1.0 + self.colors.light * (0.35 * normal.z + 0.65 * lit.min(1.5) - 1.0);
+        let light = 1.0 + self.colors.light * (0.42 * normal.z + 0.2 + 0.5 * lit.min(1.6) - 1.0);
         let grain = 1.0 + self.colors.variety * (0.07 * noise[1] + 0.075 * noise[2]);
         (color * (cavity * light * grain).max(0.0)).min(Vec3::splat(255.0))
     }
