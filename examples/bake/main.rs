@@ -8,7 +8,9 @@
 
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "a command-line tool")]
 
+mod birds_eye;
 mod blend;
+mod contour_lines;
 mod figures;
 mod figures_strands;
 mod gallery;
@@ -22,9 +24,13 @@ mod ocr;
 mod own;
 mod painting;
 mod pictures;
+mod relief;
+mod relief_terrain;
+mod seed_contours;
 mod shatter;
 mod sheet;
 mod strands;
+mod terrain;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -55,6 +61,10 @@ enum Method {
     Legible(legible::Options),
     /// Single cracks that follow a direction: primitives along a guidance field.
     Strands(Box<strands::Options>),
+    /// Craters, rock walls, islands and mountains from one contour line.
+    Relief(Box<relief::Options>),
+    /// All contours of a mountain from one real contour, by each method, beside the real ones.
+    ReliefTerrain(relief_terrain::Options),
     /// Shards: the pieces into which the cracks cut the picture.
     Shatter(Box<shatter::Options>),
 }
@@ -68,6 +78,8 @@ fn main() -> ExitCode {
         Method::FiguresStrands(options) => figures_strands::bake(&options),
         Method::Legible(options) => legible::bake(&options),
         Method::Strands(options) => strands::bake(&options),
+        Method::Relief(options) => relief::bake(&options),
+        Method::ReliefTerrain(options) => relief_terrain::bake(&options),
         Method::Shatter(options) => shatter::bake(&options),
     };
     match done {

@@ -1,0 +1,220 @@
+//! `bake relief-terrain`: from one real contour to the others, by every method, beside the real ones.
+
+use crate::{
+    birds_eye::{View, birds_eye},
+    terrain::{Terrain, length},
+};
+use bevy_crack::{
+    Grid,
+    pattern::SurfaceFrame,
+    relief::{Contours, HeightParams, Method, ReliefParams, Ring, TerrainColors, colors, heights},
+};
+use clap::Args;
+use glam::{UVec2, Vec2};
+use std::{collections::BTreeSet, error::Error, fs, path::PathBuf};
+
+#[derive(Args)]
+pub(crate) struct Options {
+    /// A 16-bit picture of heights with a JSON text of the same name beside it
+    #[arg(long)]
+    dem: PathBuf,
+    /// Number of contours over the whole height of the model
+    #[arg(long, default_value_t = 24)]
+    levels: u16,
+    /// Random seeds over which each method is averaged
+    #[arg(long, default_value_t = 4)]
+    seeds: u64,
+    /// Folder for bird's-eye pictures; made if it is not there
+    #[arg(long)]
+    out: Option<PathBuf>,
+}
+
+/// Side of the surface to which the region of the seed contour is fitted, texels.
+const SIDE: u32 = 512;
+
+fn is_inside(points: &[Vec2], at: Vec2) -> bool {
+    let sides = points.iter().zip(points.iter().cycle().skip(1));
+    let crosses = |(a, b): &(&Vec2, &Vec2)| {
+        (a.y > at.y) != (b.y > at.y) && at.x < a.x + (at.y - a.y) * (b.x - a.x) / (b.y - a.y)
+    };
+    sides.filter(crosses).count() % 2 == 1
+}
+
+fn bounds(points: &[Vec2]) -> [Vec2; 2] {
+    [Vec2::min, Vec2::max].map(|pick| points.iter().copied().reduce(pick).unwrap_or_default())
+}
+
+/// The seed contour as level 0, and the real contours inside of it, fitted to a square; heights from level to level in that unit.
+fn real(terrain: &Terrain, levels: u16) -> Option<(Contours, f32)> {
+    let (all, step) = terrain.contours(levels);
+    let extent = terrain.frame.extent();
+    let border = 1.5 / terrain.frame.texels_per_unit();
+    let is_whole = |ring: &&Ring| {
+        let [min, max] = bounds(&ring.points);
+        !ring.is_hole() && min.min_element() > border && (extent - max).min_element() > border
+    };
+    let depth = |ring: &Ring| {
+        let inside = all.rings.iter().filter(|other| other.level > ring.level && is_inside(&ring.points, other.points[0]));
+        inside.map(|other| other.level - ring.level).max().unwrap_or(0)
+    };
+    // The largest mountain with six contours above its foot.
+    let whole = all.rings.iter().filter(is_whole).filter(|ring| depth(ring) >= 6);
+    let seed = whole.max_by(|a, b| a.signed_area().total_cmp(&b.signed_area()))?;
+    let [min, max] = bounds(&seed.points);
+    let scale = 0.86 / (max - min).max_element();
+    let fitted = |ring: &Ring| Ring {
+        points: ring.points.iter().map(|&point| (point - 0.5 * (min + max)) * scale + 0.5).collect(),
+        level: ring.level - seed.level,
+    };
+    let is_part = |ring: &&Ring| {
+        ring.level == seed.level && ring.points == seed.points
+            || (ring.level > seed.level || ring.is_hole() && ring.level == seed.level)
+                && is_inside(&seed.points, ring.points[0])
+    };
+    let rings: Vec<_> = all.rings.iter().filter(is_part).map(fitted).collect();
+    let mut real = Contours { rings, distance: 0.02 };
+    real.distance = spacing(&real);
+    Some((real, step * scale))
+}
+
+fn area(contours: &Contours, level: i32) -> f32 {
+    contours.level(level).map(|ring| ring.signed_area() as f32).sum()
+}
+
+fn total_length(contours: &Contours, level: i32) -> f32 {
+    contours.level(level).map(|ring| length(&ring.points)).sum()
+}
+
+/// Mean distance between the levels: the area between two of them over their mean length.
+fn spacing(contours: &Contours) -> f32 {
+    let last = contours.levels().map_or(0, |(_, highest)| highest);
+    let between: f32 = (0..last).map(|k| area(contours, k) - area(contours, k + 1)).sum();
+    let lengths: f32 = (0..last).map(|k| 0.5 * (total_length(contours, k) + total_length(contours, k + 1))).sum();
+    between / lengths.max(1e-6)
+}
+
+/// Points on the rings of a level, a small step apart.
+fn samples(contours: &Contours, level: i32, step: f32) -> Vec<Vec2> {
+    let mut out = Vec::new();
+    for ring in contours.level(level) {
+        for (a, b) in ring.points.iter().zip(ring.points.iter().cycle().skip(1)) {
+            let n = (a.distance(*b) / step).ceil().max(1.0);
+            out.extend((0..n as u32).map(|i| a.lerp(*b, i as f32 / n)));
+        }
+    }
+    out
+}
+
+/// Mean distance from the points of one line to those of another.
+fn mean_distance(from: &[Vec2], to: &[Vec2]) -> f32 {
+    let nearest = |a: &Vec2| to.iter().map(|b| a.distance_squared(*b)).fold(f32::MAX, f32::min).sqrt();
+    from.iter().map(nearest).sum::<f32>() / from.len().max(1) as f32
+}
+
+/// Box-counting dimension of points, over boxes of 1/128 to 1/16.
+fn dimension(points: &[Vec2]) -> f64 {
+    let counts: Vec<_> = [128.0f32, 64.0, 32.0, 16.0]
+        .iter()
+        .map(|&n| {
+            let boxes: BTreeSet<_> = points.iter().map(|&point| (point * n).floor().as_ivec2().to_array()).collect();
+            (f64::from(n).ln(), (boxes.len().max(1) as f64).ln())
+        })
+        .collect();
+    let n = counts.len() as f64;
+    let [mean_x, mean_y] = [0, 1].map(|axis| counts.iter().map(|&(x, y)| if axis == 0 { x } else { y }).sum::<f64>() / n);
+    let top: f64 = counts.iter().map(|(x, y)| (x - mean_x) * (y - mean_y)).sum();
+    top / counts.iter().map(|(x, _)| (x - mean_x) * (x - mean_x)).sum::<f64>()
+}
+
+/// How near made contours come to the real ones.
+#[derive(Clone, Copy, Default)]
+struct Score {
+    /// Mean distance, both ways, in units of the distance between levels.
+    distance: f64,
+    /// Length of all made contours over that of the real ones.
+    length: f64,
+    /// Box-counting dimension.
+    dimension: f64,
+    /// Mean difference of heights inside the seed contour, in steps.
+    height: f64,
+}
+
+const STEP: f32 = 1.0 / 400.0;
+
+fn score(made: &Contours, real: &Contours, ground: [&Grid<f32>; 2], step: f32) -> Score {
+    let last = real.levels().map_or(0, |(_, highest)| highest);
+    let (mut distance, mut n_distances) = (0.0, 0.0);
+    let (mut lengths, mut dimensions) = ([0.0f32; 2], Vec::new());
+    for level in 1..=last {
+        let [a, b] = [made, real].map(|contours| samples(contours, level, STEP));
+        lengths = [lengths[0] + total_length(made, level), lengths[1] + total_length(real, level)];
+        if a.len() > 40 && b.len() > 40 {
+            distance += f64::from(0.5 * (mean_distance(&a, &b) + mean_distance(&b, &a)) / real.distance);
+            n_distances += 1.0;
+            dimensions.push(dimension(&a));
+        }
+    }
+    let differences = ground[0].as_slice().iter().zip(ground[1].as_slice()).filter(|(_, real)| **real > 0.0);
+    let (sum, n) = differences.fold((0.0, 0.0), |(sum, n), (a, b)| (sum + f64::from((a - b).abs() / step), n + 1.0));
+    Score {
+        distance: distance / f64::max(n_distances, 1.0),
+        length: f64::from(lengths[0] / lengths[1].max(1e-6)),
+        dimension: dimensions.iter().sum::<f64>() / dimensions.len().max(1) as f64,
+        height: sum / f64::max(n, 1.0),
+    }
+}
+
+fn name(method: Method) -> &'static str {
+    match method {
+        Method::Simple => "simple",
+        Method::Midpoint => "midpoint",
+        Method::Fourier => "fourier",
+        Method::Improved => "improved",
+    }
+}
+
+fn picture(options: &Options, contours: &Contours, step: f32, file: &str) -> Result<(), Box<dyn Error>> {
+    let Some(out) = &options.out else { return Ok(()) };
+    fs::create_dir_all(out)?;
+    let frame = SurfaceFrame::new(UVec2::splat(1024))?;
+    let params = HeightParams { step: 3.0 * step, floor: 1.5, ..HeightParams::DEFAULT };
+    let ground = heights(contours, &params, frame, 1)?;
+    let unlit = colors(&ground, &frame, &TerrainColors { light: 0.0, ..TerrainColors::MOUNTAIN }, 1)?;
+    birds_eye(&ground, &unlit, &frame, &View::WIDE).save(out.join(format!("{file}.png")))?;
+    fs::write(out.join(format!("{file}.svg")), contours.to_svg(Vec2::ONE, 1000.0))?;
+    Ok(())
+}
+
+pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
+    let terrain = Terrain::read(&options.dem)?;
+    let (real, step) = real(&terrain, options.levels).ok_or("no mountain with six closed contours")?;
+    let frame = SurfaceFrame::new(UVec2::splat(SIDE))?;
+    let params = HeightParams { step, floor: 0.0, ..HeightParams::DEFAULT };
+    let real_ground = heights(&real, &params, frame, 1)?;
+    let seeds: Vec<_> = real.level(0).filter(|ring| !ring.is_hole()).map(|ring| ring.points.clone()).collect();
+    let itself = score(&real, &real, [&real_ground; 2], step);
+    println!("{} rings, {:.0} m from level to level, {:.4} apart", real.rings.len(), step * terrain.metres_per_unit, real.distance);
+    println!("method    distance  length  dimension  height");
+    let row = |name: &str, it: Score| println!("{name:9} {:8.3} {:7.3} {:10.3} {:7.3}", it.distance, it.length, it.dimension, it.height);
+    row("real", itself);
+    picture(options, &real, step, "a_real")?;
+    for method in Method::ALL {
+        let rings = ReliefParams { method, distance: real.distance, ..ReliefParams::IMPROVED };
+        let mut mean = Score::default();
+        for seed in 1..=options.seeds {
+            let made = Contours::generate(&rings, &seeds, seed)?;
+            let ground = heights(&made, &params, frame, 1)?;
+            let it = score(&made, &real, [&ground, &real_ground], step);
+            let share = 1.0 / options.seeds as f64;
+            mean.distance += share * it.distance;
+            mean.length += share * it.length;
+            mean.dimension += share * it.dimension;
+            mean.height += share * it.height;
+            if seed == 1 {
+                picture(options, &made, step, &format!("{}_{}", if method == Method::Simple { "b" } else { "c" }, name(method)))?;
+            }
+        }
+        row(name(method), mean);
+    }
+    Ok(())
+}

@@ -1,0 +1,208 @@
+//! Fourier descriptors of closed lines, and what random phases make of them (section 4.2 of the paper).
+
+use super::error::ReliefError;
+use crate::math::Rng;
+use glam::{DVec2, Vec2};
+use std::f64::consts::TAU;
+
+/// The discrete Fourier transform of one length, a power of two, with the same bits on every machine.
+#[derive(Clone, Debug)]
+pub(super) struct Transform {
+    /// `exp(-2πi k / n)` for `k` below `n / 2`.
+    roots: Vec<DVec2>,
+    /// Where each value goes before the first step: its index with the bits reversed.
+    order: Vec<u32>,
+}
+
+fn times(a: DVec2, b: DVec2) -> DVec2 {
+    DVec2::new(a.x * b.x - a.y * b.y, a.x * b.y + a.y * b.x)
+}
+
+impl Transform {
+    /// For `samples` values, a power of two from 2 on.
+    pub(super) fn new(samples: u32) -> Self {
+        let bits = samples.trailing_zeros();
+        let root = |k: u32| {
+            let angle = -TAU * f64::from(k) / f64::from(samples);
+            DVec2::new(libm::cos(angle), libm::sin(angle))
+        };
+        let order = (0..samples).map(|i| i.reverse_bits() >> (32 - bits)).collect();
+        Self { roots: (0..samples / 2).map(root).collect(), order }
+    }
+
+    pub(super) fn samples(&self) -> usize {
+        self.order.len()
+    }
+
+    /// `Σ_j values(j) exp(-2πi j k / n)` for all `k`, without the factor `1 / n`.
+    fn forward(&self, values: &[DVec2]) -> Vec<DVec2> {
+        let mut out: Vec<DVec2> = self.order.iter().map(|&i| values[i as usize]).collect();
+        let mut half = 1;
+        while half < out.len() {
+            let stride = self.roots.len() / half;
+            for block in out.chunks_exact_mut(2 * half) {
+                let (low, high) = block.split_at_mut(half);
+                for ((a, b), root) in low.iter_mut().zip(high).zip(self.roots.iter().step_by(stride)) {
+                    let turned = times(*b, *root);
+                    (*a, *b) = (*a + turned, *a - turned);
+                }
+            }
+            half *= 2;
+        }
+        out
+    }
+
+    /// `Σ_k values(k) exp(2πi j k / n)` for all `j`.
+    fn backward(&self, values: &[DVec2]) -> Vec<DVec2> {
+        let mut out = self.forward(values);
+        out[1..].reverse();
+        out
+    }
+}
+
+/// A closed line as the Fourier transform of its directions: the P-type descriptors of Uesaka 1984.
+///
+/// The line is sampled at `n` points `z(j)` at equal distances `h` along it, as complex numbers. Its directions
+/// `w(j) = (z(j+1) - z(j)) / h` have the descriptors `c(k) = 1/n Σ_j w(j) exp(-2πi jk/n)`. Amplitudes `|c(k)|` say how
+/// rough the line is at `|k|` waves per round; phases say where.
+///
+/// ```
+/// use bevy_crack::{math::Rng, relief::Descriptors};
+/// use glam::Vec2;
+///
+/// let square = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(Vec2::from_array);
+/// let mut descriptors = Descriptors::new(&square, 1024)?;
+/// assert!(descriptors.points()[256].distance([1.0, 0.0].into()) < 1e-9);
+///
+/// // Another line, equally rough, which is the same for all waves below the 256th.
+/// let before = descriptors.clone();
+/// descriptors.scramble(256, &mut Rng::new(7));
+/// assert_eq!(before.harmonic(-255), descriptors.harmonic(-255));
+/// assert_ne!(before.harmonic(257), descriptors.harmonic(257));
+/// # Ok::<(), bevy_crack::relief::ReliefError>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Descriptors {
+    /// `c(k)`, negative `k` at `n + k`.
+    harmonics: Vec<DVec2>,
+    /// `h`.
+    spacing: f64,
+    /// `z(0)`.
+    start: DVec2,
+}
+
+impl Descriptors {
+    /// Samples a closed line and transforms it. The first sample is the first point.
+    ///
+    /// # Errors
+    /// [`ReliefError::TooFewPoints`] below three points, [`ReliefError::Point`] if one is not finite, [`ReliefError::NoArea`]
+    /// if all are the same, [`ReliefError::Samples`] if `samples` is no power of two in 16..=16384.
+    pub fn new(points: &[Vec2], samples: u32) -> Result<Self, ReliefError> {
+        if points.len() < 3 {
+            return Err(ReliefError::TooFewPoints { contour: 0, points: points.len() });
+        }
+        if let Some(point) = points.iter().position(|point| !point.is_finite()) {
+            let Vec2 { x, y } = points[point];
+            return Err(ReliefError::Point { contour: 0, point, x, y, most: f32::MAX });
+        }
+        if !samples.is_power_of_two() || !(16..=16384).contains(&samples) {
+            return Err(ReliefError::Samples { samples });
+        }
+        if points.iter().all(|point| *point == points[0]) {
+            return Err(ReliefError::NoArea);
+        }
+        let places: Vec<DVec2> = points.iter().map(|point| point.as_dvec2()).collect();
+        let sampled = Sampled::new(&places, samples as usize);
+        Ok(Self::of(&sampled.points, sampled.spacing, &Transform::new(samples)))
+    }
+
+    /// The descriptors of samples.
+    pub(super) fn of(samples: &[DVec2], spacing: f64, transform: &Transform) -> Self {
+        let count = samples.len();
+        let way = |j: usize| (samples[if j + 1 == count { 0 } else { j + 1 }] - samples[j]) / spacing;
+        let ways: Vec<DVec2> = (0..count).map(way).collect();
+        let mut harmonics = transform.forward(&ways);
+        harmonics.iter_mut().for_each(|c| *c /= count as f64);
+        // The line is closed.
+        harmonics[0] = DVec2::ZERO;
+        Self { harmonics, spacing, start: samples[0] }
+    }
+
+    /// `c(k)` as real and imaginary part, for any whole `k`; it repeats after `n`.
+    #[must_use]
+    pub fn harmonic(&self, k: i32) -> DVec2 {
+        self.harmonics[k.rem_euclid(self.harmonics.len() as i32) as usize]
+    }
+
+    /// Distance between samples along the line, `h`.
+    #[must_use]
+    pub const fn spacing(&self) -> f64 {
+        self.spacing
+    }
+
+    /// Draws new phases, uniform on the circle, for all harmonics with `|k| >= first_harmonic`.
+    ///
+    /// Amplitudes stay, and so do all other harmonics.
+    pub fn scramble(&mut self, first_harmonic: u32, rng: &mut Rng) {
+        let count = self.harmonics.len();
+        let first = first_harmonic.max(1) as usize;
+        for k in first..=count.saturating_sub(first) {
+            let angle = TAU * f64::from(rng.unit());
+            self.harmonics[k] = DVec2::new(libm::cos(angle), libm::sin(angle)) * self.harmonics[k].length();
+        }
+    }
+
+    /// The line's samples: `z(0)`, then `z(m) = z(0) + h Σ_(j<m) w(j)`.
+    #[must_use]
+    pub fn points(&self) -> Vec<DVec2> {
+        self.places(&Transform::new(self.harmonics.len() as u32))
+    }
+
+    pub(super) fn places(&self, transform: &Transform) -> Vec<DVec2> {
+        let ways = transform.backward(&self.harmonics);
+        let mut at = self.start;
+        let place = |way: DVec2| {
+            let here = at;
+            at += way * self.spacing;
+            here
+        };
+        ways.into_iter().map(place).collect()
+    }
+}
+
+/// A closed line at equal distances.
+pub(super) struct Sampled {
+    pub(super) points: Vec<DVec2>,
+    /// The distance along the line between samples.
+    pub(super) spacing: f64,
+    /// For each corner of the line, how many samples it has passed, with a fraction.
+    pub(super) passed: Vec<f64>,
+}
+
+impl Sampled {
+    /// `count` samples of a closed line that is longer than 0, from its first corner.
+    pub(super) fn new(line: &[DVec2], count: usize) -> Self {
+        let next = |i: usize| line[if i + 1 == line.len() { 0 } else { i + 1 }];
+        let mut ends = Vec::with_capacity(line.len());
+        let mut length = 0.0;
+        for (i, point) in line.iter().enumerate() {
+            length += point.distance(next(i));
+            ends.push(length);
+        }
+        let spacing = length / count as f64;
+        let mut edge = 0;
+        let sample = |j: usize| {
+            let at = spacing * j as f64;
+            while edge + 1 < line.len() && ends[edge] < at {
+                edge += 1;
+            }
+            let long = line[edge].distance(next(edge));
+            let rest = if long > 0.0 { ((ends[edge] - at) / long).clamp(0.0, 1.0) } else { 0.0 };
+            next(edge).lerp(line[edge], rest)
+        };
+        let points = (0..count).map(sample).collect();
+        let starts = std::iter::once(0.0).chain(ends.iter().copied());
+        let passed = starts.take(line.len()).map(|start| start / spacing).collect();
+        Self { points, spacing, passed }
+    }
+}

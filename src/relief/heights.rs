@@ -1,0 +1,494 @@
+//! Contour lines to a height field: [`HeightMap`], [`heights`].
+
+use super::{
+    contours::Contours,
+    heights_bands::{Band, Bands},
+    heights_error::HeightError,
+    heights_near::{Bounds, FAR, Room, Segments, TILE},
+    heights_params::HeightParams,
+    heights_slope::{Across, Lane},
+    terrain_noise::RowNoise,
+};
+use crate::{
+    Grid,
+    math::{Rng, hash_unit, vectorized},
+    pattern::SurfaceFrame,
+};
+use std::{
+    sync::{Mutex, PoisonError},
+    thread,
+};
+
+/// Most points of all rings together.
+pub const MAX_HEIGHT_POINTS: usize = 1 << 22;
+
+/// Largest level, up or down.
+pub const MAX_LEVEL: i32 = 4096;
+
+/// Largest coordinate of a ring, pattern units.
+const MOST_PLACE: f32 = 1e4;
+
+/// Sides of the tiles, each in one of the size before it, texels. The first is the height of a stripe.
+const SIDES: [usize; 3] = [128, 32, 8];
+
+/// The height field of contour lines, made stripe by stripe.
+///
+/// Every texel has exact distances to the nearest rings below and above it and to the next beyond each. Its height is a
+/// monotone cubic through the levels (Fritsch and Butland 1984), so a ring has exactly its height, the ground between two
+/// rings rises from one to the other, and slopes are continuous across rings. Ridges and valleys are where
+/// the nearest point of a ring changes: they run from corner to corner of the rings, as ridge lines do on maps.
+///
+/// Stripes do not depend on each other, so threads may share them; the bits are the same.
+///
+/// ```
+/// use bevy_crack::{pattern::SurfaceFrame, relief::{Contours, HeightMap, HeightParams, Ring}};
+///
+/// let square = |level, half| {
+///     let points = [[-half, -half], [half, -half], [half, half], [-half, half]];
+///     Ring { points: points.iter().map(|&[x, y]| [0.5 + x, 0.5 + y].into()).collect(), level }
+/// };
+/// let contours = Contours { rings: vec![square(0, 0.4), square(1, 0.2)], distance: 0.2 };
+/// let params = HeightParams { step: 0.1, floor: 0.0, ..HeightParams::DEFAULT };
+/// let map = HeightMap::new(&contours, &params, SurfaceFrame::new([100, 100].into())?, 7)?;
+/// let mut rows = vec![0.0; 100 * 100];
+/// map.fill_stripe(0, &mut rows);
+/// // Outside; half way from ring to ring; on the summit.
+/// assert_eq!(rows[50 * 100 + 5], 0.0);
+/// assert!((rows[50 * 100 + 20] - 0.05).abs() < 0.005);
+/// assert!((0.1..0.2).contains(&rows[50 * 100 + 50]));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct HeightMap {
+    frame: SurfaceFrame,
+    params: HeightParams,
+    bands: Bands,
+    /// Levels from the lowest to the highest.
+    levels: Vec<Segments>,
+    lowest: i32,
+    /// Heights of the levels from two below the lowest on, to two above the highest.
+    heights: Vec<f32>,
+    /// Distance between levels, texels.
+    distance: f32,
+    seed: u64,
+}
+
+/// The height field of contour lines over a surface, on this thread: see [`HeightMap`].
+///
+/// One value for each texel center, row by row; pattern units, up is positive. `seed` is that of the variation, the
+/// roughness and the cliffs.
+///
+/// # Errors
+/// Those of [`HeightMap::new`].
+///
+/// ```
+/// use bevy_crack::{pattern::SurfaceFrame, relief::{Contours, HeightParams, Ring, heights}};
+///
+/// let triangle = Ring { points: vec![[0.1, 0.9].into(), [0.5, 0.1].into(), [0.9, 0.9].into()], level: 0 };
+/// let contours = Contours { rings: vec![triangle], distance: 0.3 };
+/// let grid = heights(&contours, &HeightParams::DEFAULT, SurfaceFrame::new([64, 64].into())?, 1)?;
+/// assert!(grid.get(32, 40) > grid.get(32, 5));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn heights(
+    contours: &Contours,
+    params: &HeightParams,
+    frame: SurfaceFrame,
+    seed: u64,
+) -> Result<Grid<f32>, HeightError> {
+    Ok(HeightMap::new(contours, params, frame, seed)?.heights(1))
+}
+
+fn check(contours: &Contours) -> Result<(), HeightError> {
+    let (min, max) = (1e-6, 1e6);
+    if !(min..=max).contains(&contours.distance) {
+        return Err(HeightError::OutOfRange { name: "distance", value: contours.distance, min, max });
+    }
+    let count = contours.rings.iter().map(|ring| ring.points.len()).sum();
+    if count > MAX_HEIGHT_POINTS {
+        return Err(HeightError::TooManyPoints { count, most: MAX_HEIGHT_POINTS });
+    }
+    for (i, ring) in contours.rings.iter().enumerate() {
+        if ring.points.len() < 3 {
+            return Err(HeightError::FewPoints { ring: i, points: ring.points.len() });
+        }
+        if !(-MAX_LEVEL..=MAX_LEVEL).contains(&ring.level) {
+            return Err(HeightError::Level { ring: i, level: ring.level, most: MAX_LEVEL });
+        }
+        let is_far = |point: &glam::Vec2| !(point.is_finite() && point.abs().max_element() <= MOST_PLACE);
+        if let Some(point) = ring.points.iter().position(is_far) {
+            return Err(HeightError::Point { ring: i, point, most: MOST_PLACE });
+        }
+    }
+    Ok(())
+}
+
+impl HeightMap {
+    /// Rows of a stripe; the last one may have less.
+    pub const STRIPE: usize = 128;
+
+    /// Prepares the heights of contour lines over a surface.
+    ///
+    /// Rings are simple, do not cross each other and nest as [`Contours`] tells. Where they do not, heights are finite
+    /// and the same for the same values, but mean nothing. Without rings all heights are 0.
+    ///
+    /// # Errors
+    /// [`HeightError`] if a parameter, the distance of the contours, a ring or its level is out of range, or if there are more than
+    /// [`MAX_HEIGHT_POINTS`] points.
+    pub fn new(
+        contours: &Contours,
+        params: &HeightParams,
+        frame: SurfaceFrame,
+        seed: u64,
+    ) -> Result<Self, HeightError> {
+        params.validate()?;
+        check(contours)?;
+        let (lowest, highest) = contours.levels().unwrap_or((0, -1));
+        let mut levels = vec![Segments::default(); (highest - lowest + 1) as usize];
+        for ring in &contours.rings {
+            let segments = &mut levels[(ring.level - lowest) as usize];
+            let mut last = frame.to_texel(ring.points[ring.points.len() - 1]);
+            for &next in &ring.points {
+                let next = frame.to_texel(next);
+                segments.push(last.to_array(), next.to_array());
+                last = next;
+            }
+        }
+        let height = |level: i32| {
+            let deviation = params.variation * (hash_unit(seed, u64::from(level as u32)) - 0.5);
+            params.step * (level as f32 + if level == 0 { 0.0 } else { deviation })
+        };
+        Ok(Self {
+            frame,
+            params: *params,
+            bands: Bands::new(contours, frame.texels_per_unit()),
+            levels,
+            lowest,
+            heights: (lowest - 2..=highest + 3).map(height).collect(),
+            distance: contours.distance * frame.texels_per_unit(),
+            seed,
+        })
+    }
+
+    /// Height of a level, pattern units: `level * step`, and a deviation if
+    /// [`variation`](HeightParams::variation) is not 0. 0 for levels without a ring.
+    #[must_use]
+    pub fn level_height(&self, level: i32) -> f32 {
+        let has_rings = usize::try_from(level - self.lowest).is_ok_and(|level| level < self.levels.len());
+        if has_rings { self.heights[(level - self.lowest + 2) as usize] } else { 0.0 }
+    }
+
+    /// Number of stripes.
+    #[must_use]
+    pub fn stripes(&self) -> usize {
+        (self.frame.size().y as usize).div_ceil(Self::STRIPE)
+    }
+
+    /// The whole field, by up to `threads` threads.
+    #[must_use]
+    pub fn heights(&self, threads: usize) -> Grid<f32> {
+        let mut grid = Grid::new(self.frame.size(), 0.0);
+        let width = grid.width();
+        let stripes = Mutex::new(grid.as_mut_slice().chunks_mut(Self::STRIPE * width).enumerate());
+        let fill = || {
+            let mut work = Work::default();
+            loop {
+                let next = stripes.lock().unwrap_or_else(PoisonError::into_inner).next();
+                let Some((stripe, rows)) = next else { break };
+                self.fill_with(stripe, rows, &mut work);
+            }
+        };
+        thread::scope(|scope| {
+            for _ in 1..threads.min(self.stripes()) {
+                // Where there are no more threads, those that are there do the work.
+                let _ = thread::Builder::new().spawn_scoped(scope, fill);
+            }
+            fill();
+        });
+        grid
+    }
+
+    /// Writes the heights of stripe `stripe`: its rows, one after another. What `rows` has beyond the last row of the
+    /// surface is left as it is, and so are rows that do not fit.
+    pub fn fill_stripe(&self, stripe: usize, rows: &mut [f32]) {
+        self.fill_with(stripe, rows, &mut Work::default());
+    }
+
+    fn fill_with(&self, stripe: usize, rows: &mut [f32], work: &mut Work) {
+        let [width, height] = self.frame.size().to_array().map(|side| side as usize);
+        let first = stripe.saturating_mul(Self::STRIPE);
+        let n_rows = height.saturating_sub(first).min(Self::STRIPE).min(rows.len() / width);
+        let rows = &mut rows[..n_rows * width];
+        if self.levels.is_empty() || n_rows == 0 {
+            rows.fill(0.0);
+            return;
+        }
+        work.begin(self, first, width, n_rows);
+        let area = Area { first, width, n_rows };
+        for x in (0..width).step_by(SIDES[0]) {
+            self.fill_tile(0, [x, 0], &area, rows, work);
+        }
+        if self.params.terraces > 0.0 || self.params.cliffs > 0.0 || self.params.roughness > 0.0 {
+            self.reshape(&area, rows, work);
+        }
+    }
+
+    /// Levels whose distances the texels of a tile need, as indices of `levels`, and the lowest and highest band there.
+    fn needed(&self, [low, high]: [i32; 2]) -> std::ops::Range<usize> {
+        let index = |level: i32| (level - self.lowest).clamp(0, self.levels.len() as i32) as usize;
+        index(low - 1)..index(high + 3)
+    }
+
+    /// Whether no texel of a tile lies beside level `level`, an index, so that only distances beyond a band are needed.
+    fn is_beyond(&self, level: usize, [low, high]: [i32; 2]) -> bool {
+        let level = self.lowest + level as i32;
+        level < low || level > high + 1
+    }
+
+    fn band(&self, code: i32) -> i32 {
+        Band(code).lower().clamp(self.lowest - 1, self.lowest + self.levels.len() as i32 - 1)
+    }
+
+    /// Fills a tile of side `SIDES[depth]`, whose top left in the stripe is `at`, from the segments of the tile around it.
+    fn fill_tile(&self, depth: usize, at: [usize; 2], area: &Area, rows: &mut [f32], work: &mut Work) {
+        let side = SIDES[depth];
+        let end = [(at[0] + side).min(area.width), (at[1] + side).min(area.n_rows)];
+        let bands = work.range(self, depth, at, area);
+        let min = [at[0] as f32, (area.first + at[1]) as f32];
+        let bounds: Bounds = [min, [min[0] + side as f32, min[1] + side as f32]];
+        let is_leaf = depth + 1 == SIDES.len();
+        let needed = self.needed(bands);
+        work.corners.clear();
+        for level in needed.clone() {
+            let (outer, inner) = work.lists.split_at_mut(depth);
+            let from = outer.last().map_or(&self.levels[level], |lists| &lists[level]);
+            let is_beyond = is_leaf && self.is_beyond(level, bands);
+            work.corners.push(if is_beyond {
+                from.corners(bounds, &mut work.room)
+            } else {
+                from.nearest_in(bounds, &mut work.room, &mut inner[0][level])
+            });
+        }
+        let Some(&inner) = SIDES.get(depth + 1) else {
+            self.fill_leaf(at, end, bands, area, rows, work);
+            return;
+        };
+        for y in (at[1]..end[1]).step_by(inner) {
+            for x in (at[0]..end[0]).step_by(inner) {
+                self.fill_tile(depth + 1, [x, y], area, rows, work);
+            }
+        }
+    }
+
+    fn fill_leaf(
+        &self,
+        at: [usize; 2],
+        end: [usize; 2],
+        bands: [i32; 2],
+        area: &Area,
+        rows: &mut [f32],
+        work: &mut Work,
+    ) {
+        let levels = self.needed(bands);
+        let place = [at[0] as f32 + 0.5, (area.first + at[1]) as f32 + 0.5];
+        let lists = &work.lists[SIDES.len() - 1];
+        vectorized(
+            #[inline(always)]
+            || {
+                work.near.clear();
+                for (level, corners) in levels.clone().zip(&work.corners) {
+                    let squares = if self.is_beyond(level, bands) { [[0.0; TILE]; TILE] } else { lists[level].tile(place) };
+                    work.near.push((squares, corners.map(f32::sqrt)));
+                }
+                let n = end[0] - at[0];
+                for (row, y) in (at[1]..end[1]).enumerate() {
+                    let start = y * area.width + at[0];
+                    let mut codes = [work.codes[start]; TILE];
+                    codes[..n].copy_from_slice(&work.codes[start..start + n]);
+                    let heights = self.row(&codes, row, bands, levels.start, &work.near);
+                    rows[start..start + n].copy_from_slice(&heights[..n]);
+                }
+            },
+        );
+    }
+
+    /// Heights of a row of a tile, from the squares of its distances to the levels from `first` on.
+    #[inline(always)]
+    fn row(
+        &self,
+        codes: &[i32; TILE],
+        row: usize,
+        [low, high]: [i32; 2],
+        first: usize,
+        near: &[([Lane; TILE], [f32; 4])],
+    ) -> Lane {
+        let band = codes.map(|code| Band(code).lower().max(low).min(high));
+        let mut across = Across {
+            low: [FAR; TILE],
+            high: [FAR; TILE],
+            lower: [FAR; TILE],
+            higher: [FAR; TILE],
+            base: [0.0; TILE],
+            rise: [1.0; TILE],
+            rise_under: [1.0; TILE],
+            rise_over: [1.0; TILE],
+        };
+        let down = (row as f32 + 0.5) / TILE as f32;
+        for ((squares, corners), level) in near.iter().zip(self.lowest + first as i32..) {
+            let squares = &squares[row];
+            let left = corners[0] + (corners[2] - corners[0]) * down;
+            let right = corners[1] + (corners[3] - corners[1]) * down;
+            let beyond = RAMP.map(|share| left + (right - left) * share);
+            put(&mut across.lower, &band, level + 1, &beyond);
+            put(&mut across.low, &band, level, squares);
+            put(&mut across.high, &band, level - 1, squares);
+            put(&mut across.higher, &band, level - 2, &beyond);
+        }
+        for i in 0..TILE {
+            across.low[i] = across.low[i].sqrt();
+            across.high[i] = across.high[i].sqrt();
+        }
+        for level in low..=high {
+            let heights = &self.heights[(level - self.lowest + 1) as usize..][..4];
+            put(&mut across.base, &band, level, &[heights[1]; TILE]);
+            put(&mut across.rise_under, &band, level, &[heights[1] - heights[0]; TILE]);
+            put(&mut across.rise, &band, level, &[heights[2] - heights[1]; TILE]);
+            put(&mut across.rise_over, &band, level, &[heights[3] - heights[2]; TILE]);
+        }
+        let mut out = across.between(self.distance);
+        if codes.iter().any(|&code| !Band(code).has_upper()) {
+            let summit = across.summit(self.distance, self.params.summit);
+            for i in 0..TILE {
+                out[i] = if Band(codes[i]).has_upper() { out[i] } else { summit[i] };
+            }
+        }
+        if codes.iter().any(|&code| !Band(code).has_lower()) {
+            // A pit stays above the level below it.
+            let pit = self.params.floor.min(0.9);
+            let floor = self.params.floor * self.params.step;
+            let mut depth = [floor; TILE];
+            for i in 0..TILE {
+                depth[i] = if band[i] < self.lowest { floor } else { pit * across.rise[i] };
+            }
+            let floor = across.floor(self.distance, &depth);
+            for i in 0..TILE {
+                out[i] = if Band(codes[i]).has_lower() { out[i] } else { floor[i] };
+            }
+        }
+        out
+    }
+
+    /// Roughness, terraces and cliffs: they change where in its band a texel is, and keep rings where they are.
+    fn reshape(&self, area: &Area, rows: &mut [f32], work: &Work) {
+        let params = &self.params;
+        let scale = [params.noise_scale * self.frame.texels_per_unit(); 2];
+        let rng = Rng::new(self.seed);
+        let mut rough = RowNoise::new(area.width, scale, 5, 0.6, &mut rng.stream("relief roughness"));
+        let mut where_cliffs = RowNoise::new(area.width, scale, 3, 0.5, &mut rng.stream("relief cliffs"));
+        let mut noise = [vec![0.0; area.width], vec![0.0; area.width]];
+        for (y, row) in rows.chunks_exact_mut(area.width).enumerate() {
+            rough.fill_row(area.first + y, &mut noise[0]);
+            where_cliffs.fill_row(area.first + y, &mut noise[1]);
+            let codes = &work.codes[y * area.width..][..area.width];
+            for (x, (height, &code)) in row.iter_mut().zip(codes).enumerate() {
+                let band = self.band(code);
+                let heights = &self.heights[(band - self.lowest + 2) as usize..][..2];
+                if !Band(code).has_lower() {
+                    continue;
+                }
+                let rise = heights[1] - heights[0];
+                let share = ((*height - heights[0]) / rise).clamp(0.0, 1.0);
+                let share = share + params.roughness * noise[0][x].clamp(-1.0, 1.0) * share * (1.0 - share);
+                let cliff = ((params.cliffs * 2.4 - 1.2 + noise[1][x]) * 4.0).clamp(0.0, 1.0);
+                let amount = params.terraces.max(if params.cliffs > 0.0 { cliff } else { 0.0 });
+                let reshaped = share + (self.terrace(share) - share) * amount;
+                // A summit is all above its ring, so there is no wall at its far side.
+                let share = if Band(code).has_upper() { reshaped } else { share };
+                *height = heights[0] + rise * share;
+            }
+        }
+    }
+
+    /// Where on a terrace a share of the way is: flat, then a wall.
+    fn terrace(&self, share: f32) -> f32 {
+        let (tread, roundness) = (self.params.tread, self.params.roundness);
+        let wall = ((share - tread) / (1.0 - tread)).max(0.0);
+        wall + (wall * wall * (3.0 - 2.0 * wall) - wall) * roundness
+    }
+}
+
+/// Where the centers of a tile's texels lie across it.
+const RAMP: Lane = [0.0625, 0.1875, 0.3125, 0.4375, 0.5625, 0.6875, 0.8125, 0.9375];
+
+/// Writes values where the band is that of `level`.
+#[inline(always)]
+fn put(out: &mut Lane, band: &[i32; TILE], level: i32, values: &Lane) {
+    let mut merged = *out;
+    for i in 0..TILE {
+        merged[i] = if band[i] == level { values[i] } else { merged[i] };
+    }
+    *out = merged;
+}
+
+/// The texels of a stripe: its first row, its width and its number of rows.
+struct Area {
+    first: usize,
+    width: usize,
+    n_rows: usize,
+}
+
+/// Memory for stripes.
+#[derive(Default)]
+struct Work {
+    /// The band of each texel.
+    codes: Vec<i32>,
+    /// The lowest and the highest band of each tile, for each size of tiles.
+    ranges: [Vec<[i32; 2]>; SIDES.len()],
+    /// For each size of tiles and each level, the segments that can be nearest to a texel of the current tile.
+    lists: [Vec<Segments>; SIDES.len()],
+    /// Squares of the distances of a tile to the levels that it needs.
+    near: Vec<([Lane; TILE], [f32; 4])>,
+    /// Squares of the distances of the corners of the current tile.
+    corners: Vec<[f32; 4]>,
+    room: Room,
+}
+
+impl Work {
+    fn begin(&mut self, map: &HeightMap, first: usize, width: usize, n_rows: usize) {
+        self.codes.resize(width * n_rows, 0);
+        map.bands.fill(first, width, &mut self.codes);
+        for lists in &mut self.lists {
+            lists.resize_with(map.levels.len(), Segments::default);
+        }
+        for (side, ranges) in SIDES.iter().zip(&mut self.ranges) {
+            ranges.clear();
+            ranges.resize(width.div_ceil(*side) * n_rows.div_ceil(*side), [i32::MAX, i32::MIN]);
+        }
+        let leaf = SIDES.len() - 1;
+        let across = width.div_ceil(TILE);
+        for (y, row) in self.codes.chunks_exact(width).enumerate() {
+            let ranges = &mut self.ranges[leaf][y / TILE * across..][..across];
+            for (codes, range) in row.chunks(TILE).zip(ranges) {
+                for &code in codes {
+                    let band = map.band(code);
+                    *range = [range[0].min(band), range[1].max(band)];
+                }
+            }
+        }
+        for depth in (1..SIDES.len()).rev() {
+            let ratio = SIDES[depth - 1] / SIDES[depth];
+            let [inner, outer] = [depth, depth - 1].map(|depth| width.div_ceil(SIDES[depth]));
+            let (large, small) = self.ranges.split_at_mut(depth);
+            for (i, small) in small[0].iter().enumerate() {
+                let large = &mut large[depth - 1][i / inner / ratio * outer + i % inner / ratio];
+                *large = [large[0].min(small[0]), large[1].max(small[1])];
+            }
+        }
+    }
+
+    /// The lowest and the highest band in a tile.
+    fn range(&self, _: &HeightMap, depth: usize, at: [usize; 2], area: &Area) -> [i32; 2] {
+        let across = area.width.div_ceil(SIDES[depth]);
+        self.ranges[depth][at[1] / SIDES[depth] * across + at[0] / SIDES[depth]]
+    }
+}

@@ -1,0 +1,248 @@
+//! Cuts edges where they meet.
+
+use super::{
+    super::lattice::{Loop, Point, cross},
+    TooTangled,
+    bins::{Bins, Edge},
+    cleaned,
+};
+
+/// Edges after all cuts, and after each one the index of the next of its loop.
+#[derive(Debug, Default)]
+pub(super) struct Edges {
+    pub(super) edges: Vec<Edge>,
+    pub(super) next: Vec<u32>,
+    /// Whether the start of an edge is also a point of another edge than the one before it.
+    pub(super) is_node: Vec<bool>,
+    /// Which edges the last round has made.
+    fresh: Vec<bool>,
+}
+
+/// A new corner of an edge.
+type Cut = (u32, i64, Point);
+
+impl Edges {
+    fn new(loops: &[Loop]) -> Self {
+        let mut out = Self::default();
+        for points in loops {
+            let points = cleaned(points);
+            let first = out.edges.len() as u32;
+            for (i, &a) in points.iter().enumerate() {
+                let last = i + 1 == points.len();
+                out.edges.push(Edge { a, b: if last { points[0] } else { points[i + 1] } });
+                out.next.push(if last { first } else { first + i as u32 + 1 });
+            }
+        }
+        out.is_node = vec![false; out.edges.len()];
+        out.fresh = vec![true; out.edges.len()];
+        out
+    }
+
+    /// Replaces edges by their pieces.
+    fn split(&mut self, cuts: &[Cut]) {
+        let mut out = Self::default();
+        let many = self.edges.len() + cuts.len();
+        out.edges.reserve(many);
+        out.is_node.reserve(many);
+        out.next.reserve(many);
+        out.fresh.reserve(many);
+        // The new index of the first piece of each edge.
+        let mut firsts = Vec::with_capacity(self.edges.len());
+        let mut cuts = cuts.iter().peekable();
+        for (i, edge) in self.edges.iter().enumerate() {
+            firsts.push(out.edges.len() as u32);
+            let (mut a, mut is_node, mut is_cut) = (edge.a, self.is_node[i], false);
+            while let Some(&(_, _, point)) = cuts.next_if(|cut| cut.0 as usize == i) {
+                out.push(Edge { a, b: point }, is_node, true);
+                (a, is_node, is_cut) = (point, true, true);
+            }
+            out.push(Edge { a, b: edge.b }, is_node, is_cut);
+        }
+        for i in 0..self.edges.len() {
+            if let Some(last) = out.next.get_mut(firsts.get(i + 1).map_or(many, |&first| first as usize) - 1) {
+                *last = firsts[self.next[i] as usize];
+            }
+        }
+        *self = out;
+    }
+
+    fn push(&mut self, edge: Edge, is_node: bool, is_fresh: bool) {
+        self.edges.push(edge);
+        self.next.push(self.edges.len() as u32);
+        self.is_node.push(is_node);
+        self.fresh.push(is_fresh);
+    }
+}
+
+/// The edges of `loops`, cut so that they meet at their ends only.
+///
+/// A round cuts edges where they cross and where they pass through the square of side 1 around a corner. The corner, or the lattice
+/// point nearest to the crossing, becomes a point of both. It lies in the bounds of the edge, whose pieces therefore
+/// run in the same direction along x and along y; so rounds come to an end.
+pub(super) fn cut(loops: &[Loop], most: usize) -> Result<Edges, TooTangled> {
+    let mut edges = Edges::new(loops);
+    let mut cuts = Vec::new();
+    let most = edges.edges.len() + most;
+    while edges.fresh.contains(&true) {
+        cuts.clear();
+        find(&mut edges, &mut cuts, most)?;
+        if cuts.is_empty() {
+            break;
+        }
+        cuts.sort_unstable();
+        cuts.dedup();
+        if edges.edges.len() + cuts.len() > most {
+            return Err(TooTangled);
+        }
+        edges.split(&cuts);
+    }
+    Ok(edges)
+}
+
+/// Which edges lie in which cell: those of cell `c` are `items[starts[c]..starts[c + 1]]`.
+struct Members {
+    starts: Vec<u32>,
+    items: Vec<u32>,
+}
+
+/// All edges in those cells that have a fresh one.
+fn members(edges: &Edges, bins: &Bins) -> Members {
+    let mut has_fresh = vec![false; bins.len()];
+    for (edge, _) in edges.edges.iter().zip(&edges.fresh).filter(|(_, is_fresh)| **is_fresh) {
+        bins.cells(edge, |cell| has_fresh[cell as usize] = true);
+    }
+    let mut pairs = Vec::with_capacity(2 * edges.edges.len());
+    let mut starts = vec![0u32; bins.len() + 1];
+    for (i, edge) in edges.edges.iter().enumerate() {
+        bins.cells(edge, |cell| {
+            if has_fresh[cell as usize] {
+                starts[cell as usize + 1] += 1;
+                pairs.push((cell, i as u32));
+            }
+        });
+    }
+    for cell in 1..starts.len() {
+        starts[cell] += starts[cell - 1];
+    }
+    let mut at = starts.clone();
+    let mut items = vec![0; pairs.len()];
+    for (cell, edge) in pairs {
+        items[at[cell as usize] as usize] = edge;
+        at[cell as usize] += 1;
+    }
+    Members { starts, items }
+}
+
+/// Finds where edges must be cut, and marks the corners that they share.
+fn find(edges: &mut Edges, cuts: &mut Vec<Cut>, most: usize) -> Result<(), TooTangled> {
+    let bins = Bins::new(&edges.edges);
+    let members = members(edges, &bins);
+    let mut boxes = Vec::new();
+    for cell in members.starts.windows(2).filter(|cell| cell[1] - cell[0] > 1) {
+        let items = &members.items[cell[0] as usize..cell[1] as usize];
+        boxes.clear();
+        boxes.extend(items.iter().map(|&i| (edges.edges[i as usize].bounds(), i, edges.fresh[i as usize])));
+        for (k, &(near, e, is_fresh)) in boxes.iter().enumerate() {
+            for &(far, f, is_other_fresh) in &boxes[k + 1..] {
+                let apart = near[0] > far[2] || far[0] > near[2] || near[1] > far[3] || far[1] > near[3];
+                if !apart && (is_fresh || is_other_fresh) {
+                    meet(edges, e, f, cuts);
+                }
+            }
+        }
+        // Cells share edges, so a cut may be found several times.
+        if edges.edges.len() + cuts.len() > most + (most >> 1) {
+            cuts.sort_unstable();
+            cuts.dedup();
+            if edges.edges.len() + cuts.len() > most {
+                return Err(TooTangled);
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Whether the edge passes through the square of side 1 around `p`, which is none of its ends.
+fn passes(edge: &Edge, p: Point) -> bool {
+    let [x0, y0, x1, y1] = edge.bounds();
+    if p.x < x0 || p.x > x1 || p.y < y0 || p.y > y1 || p == edge.a || p == edge.b {
+        return false;
+    }
+    let along = edge.a.to(edge.b);
+    2 * cross(along, edge.a.to(p)).abs() < along[0].abs() + along[1].abs()
+}
+
+fn cut_at(edge: &Edge, index: u32, p: Point) -> Cut {
+    let [x, y] = edge.a.to(p);
+    (index, x.abs() + y.abs(), p)
+}
+
+/// Two edges whose bounds meet.
+fn meet(all: &mut Edges, i: u32, j: u32, cuts: &mut Vec<Cut>) {
+    let (e, f) = (all.edges[i as usize], all.edges[j as usize]);
+    let (next_i, next_j) = (all.next[i as usize], all.next[j as usize]);
+    if next_i == j || next_j == i {
+        let ((first, k), (second, l)) = if next_i == j { ((e, i), (f, j)) } else { ((f, j), (e, i)) };
+        follow(all, [&first, &second], [k, l], cuts);
+        return;
+    }
+    for (p, vertex) in [(f.a, j), (f.b, next_j)] {
+        if p == e.a || p == e.b {
+            all.is_node[vertex as usize] = true;
+            all.is_node[if p == e.a { i } else { next_i } as usize] = true;
+        } else if passes(&e, p) {
+            all.is_node[vertex as usize] = true;
+            cuts.push(cut_at(&e, i, p));
+        }
+    }
+    for (p, vertex) in [(e.a, i), (e.b, next_i)] {
+        if passes(&f, p) {
+            all.is_node[vertex as usize] = true;
+            cuts.push(cut_at(&f, j, p));
+        }
+    }
+    if let Some(p) = crossing(&e, &f) {
+        for (edge, index, next) in [(&e, i, next_i), (&f, j, next_j)] {
+            if p == edge.a || p == edge.b {
+                all.is_node[if p == edge.a { index } else { next } as usize] = true;
+            } else {
+                cuts.push(cut_at(edge, index, p));
+            }
+        }
+    }
+}
+
+/// Two edges of which one follows the other.
+fn follow(all: &mut Edges, [first, second]: [&Edge; 2], [i, j]: [u32; 2], cuts: &mut Vec<Cut>) {
+    let after = all.next[j as usize];
+    if first.a == second.b {
+        // There and back again.
+        [i, j, after].into_iter().for_each(|vertex| all.is_node[vertex as usize] = true);
+        return;
+    }
+    if passes(second, first.a) {
+        all.is_node[i as usize] = true;
+        cuts.push(cut_at(second, j, first.a));
+    }
+    if passes(first, second.b) {
+        all.is_node[after as usize] = true;
+        cuts.push(cut_at(first, i, second.b));
+    }
+}
+
+/// The lattice point nearest to the place where two edges cross, if they do.
+fn crossing(e: &Edge, f: &Edge) -> Option<Point> {
+    let (u, v) = (e.a.to(e.b), f.a.to(f.b));
+    let [a, b] = [f.a, f.b].map(|p| cross(u, e.a.to(p)));
+    let [c, d] = [e.a, e.b].map(|p| cross(v, f.a.to(p)));
+    if a.signum() * b.signum() >= 0 || c.signum() * d.signum() >= 0 {
+        return None;
+    }
+    // The share of `e` up to the crossing is c / (c - d).
+    let (part, whole) = if c > d { (c, c - d) } else { (-c, d - c) };
+    let along = |from: i32, step: i64| {
+        let (num, den) = (2 * i128::from(part) * i128::from(step) + i128::from(whole), 2 * i128::from(whole));
+        from + num.div_euclid(den) as i32
+    };
+    Some(Point::new(along(e.a.x, u[0]), along(e.a.y, u[1])))
+}

@@ -1,0 +1,51 @@
+//! Simple rings from loops that cross, touch and twist.
+//!
+//! All on a lattice of whole numbers, with exact predicates, in three steps: loops are cut where they meet, and what is
+//! cut is moved to lattice points, until no two pieces meet but at their ends ([`meet`], after the snap rounding of
+//! Hobby 1999); winding numbers go from piece to piece round the places where they meet ([`faces`]); the pieces
+//! between inside and outside are joined to rings. The paper (Misawa et al. 1986, section 4.4) knows no complete method.
+
+mod bins;
+mod chains;
+mod faces;
+mod meet;
+mod rings;
+
+use super::lattice::{Loop, Point, double_area};
+pub(super) use faces::Fill;
+
+/// Most cuts where loops meet.
+pub(super) const MAX_CUTS: usize = 1 << 22;
+
+/// Loops have more crossings than are computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct TooTangled;
+
+/// The region that `loops` enclose by the rule `fill`, as rings.
+///
+/// No ring meets itself. Two rings share single points at most and do not cross. Rings have the region on the side of
+/// positive turns, so those around it have a positive area and holes a negative one. Rings with twice an area below
+/// `least` are left out.
+///
+/// Fails if there are more than `most` cuts.
+pub(super) fn untangle(loops: &[Loop], fill: Fill, least: i128, most: usize) -> Result<Vec<Loop>, TooTangled> {
+    let edges = meet::cut(loops, most)?;
+    let mut chains = chains::chains(&edges);
+    faces::wind(&mut chains, &edges);
+    let mut rings = rings::trace(&chains, &edges, fill);
+    rings.retain(|ring: &Loop| ring.len() >= 3 && double_area(ring).abs() >= least.max(1));
+    Ok(rings)
+}
+
+/// A loop without points that repeat the one before; empty if fewer than three are left.
+fn cleaned(points: &[Point]) -> Loop {
+    let mut out: Loop = points.to_vec();
+    out.dedup();
+    while out.len() > 1 && out.first() == out.last() {
+        out.pop();
+    }
+    if out.len() < 3 {
+        out.clear();
+    }
+    out
+}
