@@ -119,7 +119,8 @@ impl Scene<'_> {
     /// How much of the sky is seen: what rises around a place hides it.
     fn skylit(&self, pos: Vec3) -> f32 {
         let mut open = 0.0;
-        let directions = [[1.0, 0.0], [0.7, 0.7], [0.0, 1.0], [-0.7, 0.7], [-1.0, 0.0], [-0.7, -0.7], [0.0, -1.0], [0.7, -0.7]];
+        let directions =
+            [[1.0, 0.0], [0.7, 0.7], [0.0, 1.0], [-0.7, 0.7], [-1.0, 0.0], [-0.7, -0.7], [0.0, -1.0], [0.7, -0.7]];
         for [x, z] in directions {
             let mut steepest = 0.0f32;
             for reach in [0.006, 0.014, 0.03, 0.06, 0.11] {

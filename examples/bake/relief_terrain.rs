@@ -34,9 +34,8 @@ const SIDE: u32 = 512;
 
 fn is_inside(points: &[Vec2], at: Vec2) -> bool {
     let sides = points.iter().zip(points.iter().cycle().skip(1));
-    let crosses = |(a, b): &(&Vec2, &Vec2)| {
-        (a.y > at.y) != (b.y > at.y) && at.x < a.x + (at.y - a.y) * (b.x - a.x) / (b.y - a.y)
-    };
+    let crosses =
+        |(a, b): &(&Vec2, &Vec2)| (a.y > at.y) != (b.y > at.y) && at.x < a.x + (at.y - a.y) * (b.x - a.x) / (b.y - a.y);
     sides.filter(crosses).count() % 2 == 1
 }
 
@@ -54,7 +53,8 @@ fn real(terrain: &Terrain, levels: u16) -> Option<(Contours, f32)> {
         !ring.is_hole() && min.min_element() > border && (extent - max).min_element() > border
     };
     let depth = |ring: &Ring| {
-        let inside = all.rings.iter().filter(|other| other.level > ring.level && is_inside(&ring.points, other.points[0]));
+        let inside =
+            all.rings.iter().filter(|other| other.level > ring.level && is_inside(&ring.points, other.points[0]));
         inside.map(|other| other.level - ring.level).max().unwrap_or(0)
     };
     // The largest mountain with six contours above its foot.
@@ -121,7 +121,8 @@ fn dimension(points: &[Vec2]) -> f64 {
         })
         .collect();
     let n = counts.len() as f64;
-    let [mean_x, mean_y] = [0, 1].map(|axis| counts.iter().map(|&(x, y)| if axis == 0 { x } else { y }).sum::<f64>() / n);
+    let [mean_x, mean_y] =
+        [0, 1].map(|axis| counts.iter().map(|&(x, y)| if axis == 0 { x } else { y }).sum::<f64>() / n);
     let top: f64 = counts.iter().map(|(x, y)| (x - mean_x) * (y - mean_y)).sum();
     top / counts.iter().map(|(x, _)| (x - mean_x) * (x - mean_x)).sum::<f64>()
 }
@@ -193,9 +194,16 @@ pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
     let real_ground = heights(&real, &params, frame, 1)?;
     let seeds: Vec<_> = real.level(0).filter(|ring| !ring.is_hole()).map(|ring| ring.points.clone()).collect();
     let itself = score(&real, &real, [&real_ground; 2], step);
-    println!("{} rings, {:.0} m from level to level, {:.4} apart", real.rings.len(), step * terrain.metres_per_unit, real.distance);
+    println!(
+        "{} rings, {:.0} m from level to level, {:.4} apart",
+        real.rings.len(),
+        step * terrain.metres_per_unit,
+        real.distance
+    );
     println!("method    distance  length  dimension  height");
-    let row = |name: &str, it: Score| println!("{name:9} {:8.3} {:7.3} {:10.3} {:7.3}", it.distance, it.length, it.dimension, it.height);
+    let row = |name: &str, it: Score| {
+        println!("{name:9} {:8.3} {:7.3} {:10.3} {:7.3}", it.distance, it.length, it.dimension, it.height)
+    };
     row("real", itself);
     picture(options, &real, step, "a_real")?;
     for method in Method::ALL {
@@ -211,7 +219,12 @@ pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
             mean.dimension += share * it.dimension;
             mean.height += share * it.height;
             if seed == 1 {
-                picture(options, &made, step, &format!("{}_{}", if method == Method::Simple { "b" } else { "c" }, name(method)))?;
+                picture(
+                    options,
+                    &made,
+                    step,
+                    &format!("{}_{}", if method == Method::Simple { "b" } else { "c" }, name(method)),
+                )?;
             }
         }
         row(name(method), mean);

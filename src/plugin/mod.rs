@@ -28,16 +28,18 @@ mod hits;
 pub(crate) mod inspect;
 mod jobs;
 mod life;
+mod relief;
 mod shards;
 mod source;
 mod surface;
 
 pub use api::{
     BakeProgress, CellClosed, CrackBaked, CrackBudget, CrackClock, CrackDrive, CrackError, CrackFailed, CrackFinished,
-    CrackGuide, CrackHit, CrackMaps, CrackMaskSource, CrackRecord, CrackResolution, CrackScript, CrackShards,
-    CrackState, CrackStats, CrackStatus, CrackStrands, CrackSurface, CrackSystems, CrackTextures, CrackTip,
-    CrackUploadStats, GravitySpace, GuideSource, GuidedAppearance, GuidedCracks, HitPoint, PresetSource, Reassembled,
-    ScriptedHit, Shard, ShardsError, ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen, Shattered, StrandField,
+    CrackGuide, CrackHit, CrackMaps, CrackMaskSource, CrackRecord, CrackRelief, CrackResolution, CrackScript,
+    CrackShards, CrackState, CrackStats, CrackStatus, CrackStrands, CrackSurface, CrackSystems, CrackTextures,
+    CrackTip, CrackUploadStats, GravitySpace, GuideSource, GuidedAppearance, GuidedCracks, HitPoint, PresetSource,
+    Reassembled, ReliefFailed, ReliefMade, ReliefProgress, ScriptedHit, Shard, ShardsError, ShatterCracks,
+    ShatterFailed, ShatterRequest, ShatterWhen, Shattered, StrandField,
 };
 #[cfg(feature = "2d")]
 pub use carrier::lit::{CrackLight2d, CrackLitMaterial, CrackLitUniform, MAX_LIGHTS};
@@ -57,10 +59,10 @@ pub mod prelude {
     pub use super::{
         BakeProgress, CellClosed, CrackBaked, CrackBudget, CrackClock, CrackCommandsExt, CrackDrive, CrackError,
         CrackFailed, CrackFinished, CrackGuide, CrackHit, CrackMaps, CrackMaskSource, CrackPlugin, CrackPlugins,
-        CrackRecord, CrackRecords, CrackResolution, CrackScript, CrackShards, CrackState, CrackStats, CrackStatus,
-        CrackStrands, CrackSurface, CrackSystems, CrackTextures, CrackTip, GravitySpace, GuideSource, GuidedAppearance,
-        GuidedCracks, HitPoint, PresetSource, Reassembled, ScriptedHit, Shard, ShatterCracks, ShatterFailed,
-        ShatterRequest, ShatterWhen, Shattered, StrandField,
+        CrackRecord, CrackRecords, CrackRelief, CrackResolution, CrackScript, CrackShards, CrackState, CrackStats,
+        CrackStatus, CrackStrands, CrackSurface, CrackSystems, CrackTextures, CrackTip, GravitySpace, GuideSource,
+        GuidedAppearance, GuidedCracks, HitPoint, PresetSource, Reassembled, ReliefFailed, ReliefMade, ReliefProgress,
+        ScriptedHit, Shard, ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen, Shattered, StrandField,
     };
     #[cfg(feature = "2d")]
     pub use super::{CrackLight2d, CrackLitMaterial};
@@ -96,6 +98,10 @@ impl Plugin for CrackPlugin {
             .register_type::<CrackRecord>()
             .register_type::<StrandField>()
             .register_type::<BakeProgress>()
+            .register_type::<CrackRelief>()
+            .register_type::<ReliefProgress>()
+            .register_type::<ReliefMade>()
+            .register_type::<ReliefFailed>()
             .register_type::<CrackBaked>()
             .register_type::<CrackTextures>()
             .register_type::<CrackHit>()
@@ -135,6 +141,7 @@ impl Plugin for CrackPlugin {
             .add_observer(bake::work::cancel_removed::<GuidedCracks>)
             .add_observer(bake::work::cancel_removed::<CrackStrands>)
             .add_observer(bake::work::cancel_removed::<CrackRecord>)
+            .add_observer(relief::system::cancel_removed)
             .add_observer(life::heal::disown_added)
             .add_observer(life::heal::heal_removed)
             .add_observer(life::heal::heal_closed)
@@ -162,6 +169,7 @@ impl Plugin for CrackPlugin {
                         (
                             jobs::frame_time::start_frame,
                             life::script::play_scripts,
+                            relief::system::watch_reliefs,
                             life::watch::watch_surfaces,
                             life::watch::watch_pictures,
                             life::watch::watch_presets,
@@ -180,6 +188,7 @@ impl Plugin for CrackPlugin {
                         draw::clock::follow_clocks,
                         draw::grow::grow_surfaces,
                         bake::system::bake_guided.run_if(bake::work::any_baking),
+                        relief::system::make_reliefs.run_if(relief::system::any_reliefs),
                     )
                         .chain()
                         .in_set(Grow),

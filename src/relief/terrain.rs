@@ -251,9 +251,8 @@ impl<'a> Painter<'a> {
         let low = if colors.sea.is_some() { 0.0 } else { low };
         let width = heights.width();
         let mut rng = Rng::new(seed).stream("terrain colors");
-        let mut noise = |scale: f32, octaves, persistence| {
-            RowNoise::new(width, [scale * unit; 2], octaves, persistence, &mut rng)
-        };
+        let mut noise =
+            |scale: f32, octaves, persistence| RowNoise::new(width, [scale * unit; 2], octaves, persistence, &mut rng);
         Self {
             heights,
             colors,

@@ -44,6 +44,8 @@ mod presets;
 mod random;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod records;
+#[cfg(all(feature = "2d", feature = "3d"))]
+mod reliefs;
 mod replay;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod saved;

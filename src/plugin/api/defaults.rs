@@ -3,7 +3,7 @@
 
 use super::{
     CellClosed, CrackBaked, CrackError, CrackFailed, CrackFinished, CrackHit, CrackShards, HitPoint, Reassembled,
-    Shard, Shattered,
+    ReliefFailed, ReliefMade, Shard, Shattered,
 };
 use crate::shatter::Shards;
 use bevy::prelude::*;
@@ -52,6 +52,18 @@ impl Default for CrackFailed {
 impl Default for CrackBaked {
     fn default() -> Self {
         Self { entity: NOBODY, covered: None }
+    }
+}
+
+impl Default for ReliefMade {
+    fn default() -> Self {
+        Self { entity: NOBODY }
+    }
+}
+
+impl Default for ReliefFailed {
+    fn default() -> Self {
+        Self { entity: NOBODY, error: CrackError::NothingToCrack }
     }
 }
 

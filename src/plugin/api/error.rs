@@ -129,6 +129,12 @@ pub enum CrackError {
         /// Why.
         reason: String,
     },
+    /// A [`CrackRelief`](super::CrackRelief) cannot be made.
+    #[error("its relief cannot be made: {reason}")]
+    Relief {
+        /// Why.
+        reason: String,
+    },
     /// Its textures could not be made.
     #[error("its textures could not be made: {reason}")]
     Textures {

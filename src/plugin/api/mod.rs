@@ -10,6 +10,7 @@ pub(crate) mod mask;
 pub(crate) mod preset;
 pub(crate) mod record;
 mod reflect;
+pub(crate) mod relief;
 pub(crate) mod script;
 pub(crate) mod shatter;
 pub(crate) mod state;
@@ -26,6 +27,7 @@ pub use hit::{CrackHit, HitPoint};
 pub use mask::CrackMaskSource;
 pub use preset::PresetSource;
 pub use record::CrackRecord;
+pub use relief::{CrackRelief, ReliefFailed, ReliefMade, ReliefProgress};
 pub use script::{CrackScript, ScriptedHit};
 pub use shatter::{
     CrackShards, GravitySpace, Reassembled, Shard, ShardsError, ShatterCracks, ShatterFailed, ShatterRequest,

@@ -2,17 +2,17 @@
 
 use super::begin::begin;
 use super::commit::{commit, start_finish};
-use super::work::{Bake, BakeJob, Baked, Bakes, Outcome, RunningTask, Step, StepResult, Work};
+use super::work::{Bake, BakeJob, Baked, Bakes, StepResult, Work};
 use crate::plugin::api::error::EntityLabel;
 use crate::plugin::api::{BakeProgress, CrackBaked, CrackBudget, CrackError, CrackFailed, CrackRecord};
 use crate::plugin::jobs::background::guarded;
 use crate::plugin::jobs::copy::{self, CopyProgress};
 use crate::plugin::jobs::deferred::hold;
 use crate::plugin::jobs::frame_time::FrameClock;
+use crate::plugin::jobs::stepped::{Outcome, RunningTask, Step, Stepped};
 use crate::plugin::jobs::threads::Threads;
 use crate::plugin::surface::queue::with_queue;
-use bevy::{ecs::entity::EntityHashSet, prelude::*, tasks::futures::check_ready};
-use std::sync::atomic::Ordering;
+use bevy::{ecs::entity::EntityHashSet, prelude::*};
 
 /// Share of the frame's budget after which no further slice is made.
 const SHARE: f32 = 0.9;
@@ -81,9 +81,9 @@ fn work_on_bakes(world: &mut World) -> Vec<(Entity, Baked, Result<Option<f32>, C
                         None => Work::Slices(job),
                     };
                 }
-                Work::Task(mut run) => match check_ready(&mut run.task) {
+                Work::Task(mut run) => match run.poll() {
                     None => {
-                        report(world, *entity, f32::from_bits(run.line.progress.load(Ordering::Relaxed)));
+                        report(world, *entity, run.progress());
                         bake.work = Work::Task(run);
                         return true;
                     }
@@ -102,7 +102,7 @@ fn work_on_bakes(world: &mut World) -> Vec<(Entity, Baked, Result<Option<f32>, C
                             report(world, *entity, job.progress());
                             bake.work = Work::Slices(job);
                         }
-                        Ok(Step::StepResult(made)) => match go_on(world, *entity, bake, made) {
+                        Ok(Step::Done(made)) => match go_on(world, *entity, bake, made) {
                             Ok(()) => room += 1,
                             Err(error) => break Err(error),
                         },

@@ -3,21 +3,10 @@
 use super::finish::{Finish, FinishStep, Finished};
 use super::map_job::{Lines, MAPPED, MapJob};
 use crate::plugin::api::{BakeProgress, CrackError, CrackRecord, CrackStrands, CrackSurface, GuidedCracks};
-use crate::plugin::jobs::background::guarded;
 use crate::plugin::jobs::copy::PictureCopies;
+use crate::plugin::jobs::stepped::{RunningTask, Step, Stepped};
 use crate::plugin::surface::plan::Plan;
-use bevy::{
-    ecs::entity::EntityHashSet,
-    prelude::*,
-    tasks::{AsyncComputeTaskPool, Task},
-};
-use std::{
-    sync::{
-        Arc,
-        atomic::{AtomicBool, AtomicU32, Ordering},
-    },
-    thread::{self, ThreadId},
-};
+use bevy::{ecs::entity::EntityHashSet, prelude::*};
 
 /// The bakes that go on, in order.
 #[derive(Resource, Default)]
@@ -52,7 +41,7 @@ pub(super) enum Work {
     Reading(PictureCopies, Box<MapJob>),
     /// Others come first.
     Ready(BakeJob),
-    Task(RunningTask),
+    Task(RunningTask<BakeJob>),
     Slices(BakeJob),
     /// Textures are on their way to the renderer, for this many frames.
     Uploading(Box<Finished>, u32),
@@ -115,59 +104,6 @@ pub(crate) fn cancel(world: &mut World, entity: Entity) {
     }
 }
 
-/// A task at work, which stops within a slice when this is dropped.
-pub(super) struct RunningTask {
-    pub(super) task: Task<Outcome>,
-    pub(super) line: Arc<TaskLink>,
-}
-
-/// What a task and its surface tell one another.
-pub(super) struct TaskLink {
-    cancelled: AtomicBool,
-    /// The bits of the progress.
-    pub(super) progress: AtomicU32,
-}
-
-impl Drop for RunningTask {
-    fn drop(&mut self) {
-        self.line.cancelled.store(true, Ordering::Relaxed);
-    }
-}
-
-/// What comes back from a task.
-pub(super) enum Outcome {
-    /// It runs where it was started, which would stand still meanwhile.
-    NoThread(BakeJob),
-    Ended(Result<StepResult, CrackError>),
-}
-
-impl RunningTask {
-    pub(super) fn start(pool: &AsyncComputeTaskPool, job: BakeJob) -> Self {
-        let progress = AtomicU32::new(job.progress().to_bits());
-        let line = Arc::new(TaskLink { cancelled: AtomicBool::new(false), progress });
-        let (lined, home) = (line.clone(), thread::current().id());
-        Self { task: pool.spawn(async move { work(job, &lined, home) }), line }
-    }
-}
-
-/// The work of a task.
-fn work(mut job: BakeJob, line: &TaskLink, home: ThreadId) -> Outcome {
-    if thread::current().id() == home {
-        return Outcome::NoThread(job);
-    }
-    loop {
-        if line.cancelled.load(Ordering::Relaxed) {
-            return Outcome::Ended(Err(CrackError::Bake { reason: "cancelled".into() }));
-        }
-        line.progress.store(job.progress().to_bits(), Ordering::Relaxed);
-        job = match guarded(|| job.step()) {
-            Ok(Step::More(job)) => job,
-            Ok(Step::StepResult(made)) => return Outcome::Ended(Ok(made)),
-            Err(error) => return Outcome::Ended(Err(error)),
-        };
-    }
-}
-
 /// The two parts of a bake, machines that are stepped: between them it is seen what has become of the surface.
 pub(super) enum BakeJob {
     Map(Box<MapJob>),
@@ -179,27 +115,23 @@ pub(super) enum StepResult {
     Surface(Box<Finished>),
 }
 
-pub(super) enum Step {
-    More(BakeJob),
-    StepResult(StepResult),
-}
+impl Stepped for BakeJob {
+    type Output = StepResult;
 
-impl BakeJob {
-    /// A slice of the work.
-    pub(super) fn step(self) -> Result<Step, CrackError> {
+    fn step(self) -> Result<Step<Self>, CrackError> {
         Ok(match self {
             Self::Map(mut map) => match map.step()? {
-                Some(lines) => Step::StepResult(StepResult::Lines(lines)),
+                Some(lines) => Step::Done(StepResult::Lines(lines)),
                 None => Step::More(Self::Map(map)),
             },
             Self::Finish(finish) => match finish.step()? {
                 FinishStep::More(finish) => Step::More(Self::Finish(finish)),
-                FinishStep::Done(finished) => Step::StepResult(StepResult::Surface(finished)),
+                FinishStep::Done(finished) => Step::Done(StepResult::Surface(finished)),
             },
         })
     }
 
-    pub(super) fn progress(&self) -> f32 {
+    fn progress(&self) -> f32 {
         match self {
             Self::Map(map) => map.progress,
             Self::Finish(_) => MAPPED,

@@ -1,7 +1,7 @@
 //! Meshes with a material as carriers.
 
 use super::kind::{Carrier, CarrierKind, Found, NextLook, Shown};
-use super::mesh::{aspect_of, check_for_tangents, closest, is_flat, place_of, wrap};
+use super::mesh::{aspect_of, check_for_tangents, closest, is_flat, lacks_tangents, place_of, wrap};
 use super::pipelines::{self, Shape};
 use super::plane::Plane;
 use super::shard_visual::{MaterialVisuals, ShardVisuals};
@@ -262,10 +262,6 @@ fn is_mesh_loading(world: &World, entity: Entity) -> bool {
     let server = world.get_resource::<AssetServer>();
     let state = server.zip(mesh_of(world, entity)).and_then(|(server, mesh)| server.get_load_state(mesh));
     matches!(state, Some(LoadState::NotLoaded | LoadState::Loading))
-}
-
-fn lacks_tangents(mesh: &Mesh) -> bool {
-    matches!(mesh.try_attribute_option(Mesh::ATTRIBUTE_TANGENT), Ok(None))
 }
 
 /// Normal and depth maps show nothing on a mesh without tangents: such a mesh is replaced by one that has them.

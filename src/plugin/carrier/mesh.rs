@@ -122,6 +122,11 @@ pub(crate) fn place_of(mesh: &Mesh, uv: Vec2) -> Option<(Vec3, Vec3)> {
     best.map(|(_, place)| place)
 }
 
+/// Whether normal maps show nothing on a mesh.
+pub(crate) fn lacks_tangents(mesh: &Mesh) -> bool {
+    matches!(mesh.try_attribute_option(Mesh::ATTRIBUTE_TANGENT), Ok(None))
+}
+
 /// The most triangles that may meet in one vertex of a mesh that tangents are made for: making them takes as long as their square.
 const MOST_AT_VERTEX: u32 = 4096;
 

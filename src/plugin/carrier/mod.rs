@@ -11,7 +11,7 @@ pub(crate) mod lit;
 #[cfg(any(feature = "2d", feature = "3d"))]
 mod material;
 #[cfg(any(feature = "2d", feature = "3d"))]
-mod mesh;
+pub(crate) mod mesh;
 pub(crate) mod pipelines;
 #[cfg(any(feature = "2d", feature = "3d"))]
 pub(crate) mod place;
@@ -19,7 +19,7 @@ pub(crate) mod plane;
 #[cfg_attr(not(any(feature = "2d", feature = "3d")), expect(dead_code, reason = "there are no kinds then"))]
 pub(crate) mod shard_visual;
 #[cfg_attr(not(any(feature = "2d", feature = "3d")), expect(dead_code, reason = "there are no kinds then"))]
-mod slot;
+pub(crate) mod slot;
 pub(crate) mod space;
 #[cfg(feature = "3d")]
 mod split;

@@ -4,4 +4,5 @@ pub(crate) mod background;
 pub(crate) mod copy;
 pub(crate) mod deferred;
 pub(crate) mod frame_time;
+pub(crate) mod stepped;
 pub(crate) mod threads;
