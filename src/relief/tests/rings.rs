@@ -61,6 +61,7 @@ fn rings_are_simple_and_nested_whatever_the_seed_contour() {
         let seed = shape(kind, points, &mut rng);
         let params = params(&mut rng);
         let what = format!("case {case}, {} of {points} points, {params:?}", KINDS[kind]);
+        eprintln!("{:?} {what}", std::time::SystemTime::now());
         match Contours::generate(&params, std::slice::from_ref(&seed), case) {
             Ok(contours) => assert_contours(&contours, least(&params) * f64::from(params.distance), &what),
             Err(ReliefError::NoArea) => assert!(kind > 3, "{what}: no area"),
