@@ -8,7 +8,9 @@ use crate::{
 use bevy_crack::{
     Grid,
     pattern::SurfaceFrame,
-    relief::{Contours, HeightMap, HeightParams, ReliefFrame, ReliefMesh, ReliefParams, TerrainColors, colors, normals},
+    relief::{
+        Contours, HeightMap, HeightParams, ReliefFrame, ReliefMesh, ReliefParams, TerrainColors, colors, normals,
+    },
 };
 use clap::Args;
 use glam::UVec2;

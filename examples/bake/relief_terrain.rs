@@ -7,7 +7,7 @@ use crate::{
 use bevy_crack::{
     Grid,
     pattern::SurfaceFrame,
-    relief::{Contours, HeightParams, Method, ReliefParams, Ring, TerrainColors, colors, heights},
+    relief::{Contours, HeightParams, Join, Method, ReliefParams, Ring, TerrainColors, colors, heights},
 };
 use clap::Args;
 use glam::{UVec2, Vec2};
@@ -19,7 +19,7 @@ pub(crate) struct Options {
     #[arg(long)]
     dem: PathBuf,
     /// Number of contours over the whole height of the model
-    #[arg(long, default_value_t = 24)]
+    #[arg(long, default_value_t = 40)]
     levels: u16,
     /// Random seeds over which each method is averaged
     #[arg(long, default_value_t = 4)]
@@ -34,9 +34,8 @@ const SIDE: u32 = 512;
 
 fn is_inside(points: &[Vec2], at: Vec2) -> bool {
     let sides = points.iter().zip(points.iter().cycle().skip(1));
-    let crosses = |(a, b): &(&Vec2, &Vec2)| {
-        (a.y > at.y) != (b.y > at.y) && at.x < a.x + (at.y - a.y) * (b.x - a.x) / (b.y - a.y)
-    };
+    let crosses =
+        |(a, b): &(&Vec2, &Vec2)| (a.y > at.y) != (b.y > at.y) && at.x < a.x + (at.y - a.y) * (b.x - a.x) / (b.y - a.y);
     sides.filter(crosses).count() % 2 == 1
 }
 
@@ -54,11 +53,12 @@ fn real(terrain: &Terrain, levels: u16) -> Option<(Contours, f32)> {
         !ring.is_hole() && min.min_element() > border && (extent - max).min_element() > border
     };
     let depth = |ring: &Ring| {
-        let inside = all.rings.iter().filter(|other| other.level > ring.level && is_inside(&ring.points, other.points[0]));
+        let inside =
+            all.rings.iter().filter(|other| other.level > ring.level && is_inside(&ring.points, other.points[0]));
         inside.map(|other| other.level - ring.level).max().unwrap_or(0)
     };
-    // The largest mountain with six contours above its foot.
-    let whole = all.rings.iter().filter(is_whole).filter(|ring| depth(ring) >= 6);
+    // The largest mountain with five contours above its foot.
+    let whole = all.rings.iter().filter(is_whole).filter(|ring| depth(ring) >= 5);
     let seed = whole.max_by(|a, b| a.signed_area().total_cmp(&b.signed_area()))?;
     let [min, max] = bounds(&seed.points);
     let scale = 0.86 / (max - min).max_element();
@@ -121,7 +121,8 @@ fn dimension(points: &[Vec2]) -> f64 {
         })
         .collect();
     let n = counts.len() as f64;
-    let [mean_x, mean_y] = [0, 1].map(|axis| counts.iter().map(|&(x, y)| if axis == 0 { x } else { y }).sum::<f64>() / n);
+    let [mean_x, mean_y] =
+        [0, 1].map(|axis| counts.iter().map(|&(x, y)| if axis == 0 { x } else { y }).sum::<f64>() / n);
     let top: f64 = counts.iter().map(|(x, y)| (x - mean_x) * (y - mean_y)).sum();
     top / counts.iter().map(|(x, _)| (x - mean_x) * (x - mean_x)).sum::<f64>()
 }
@@ -187,19 +188,29 @@ fn picture(options: &Options, contours: &Contours, step: f32, file: &str) -> Res
 
 pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
     let terrain = Terrain::read(&options.dem)?;
-    let (real, step) = real(&terrain, options.levels).ok_or("no mountain with six closed contours")?;
+    let (real, step) = real(&terrain, options.levels).ok_or("no mountain with five contours above its foot")?;
     let frame = SurfaceFrame::new(UVec2::splat(SIDE))?;
     let params = HeightParams { step, floor: 0.0, ..HeightParams::DEFAULT };
     let real_ground = heights(&real, &params, frame, 1)?;
     let seeds: Vec<_> = real.level(0).filter(|ring| !ring.is_hole()).map(|ring| ring.points.clone()).collect();
     let itself = score(&real, &real, [&real_ground; 2], step);
-    println!("{} rings, {:.0} m from level to level, {:.4} apart", real.rings.len(), step * terrain.metres_per_unit, real.distance);
+    println!(
+        "{} rings, {:.0} m from level to level, {:.4} apart",
+        real.rings.len(),
+        step * terrain.metres_per_unit,
+        real.distance
+    );
     println!("method    distance  length  dimension  height");
-    let row = |name: &str, it: Score| println!("{name:9} {:8.3} {:7.3} {:10.3} {:7.3}", it.distance, it.length, it.dimension, it.height);
+    let row = |name: &str, it: Score| {
+        println!("{name:9} {:8.3} {:7.3} {:10.3} {:7.3}", it.distance, it.length, it.dimension, it.height)
+    };
     row("real", itself);
     picture(options, &real, step, "a_real")?;
     for method in Method::ALL {
-        let rings = ReliefParams { method, distance: real.distance, ..ReliefParams::IMPROVED };
+        // The constants that the paper gives for each.
+        let factor = if method == Method::Improved { 3.0 } else { 1.4 };
+        let join = Join::Arc { factor };
+        let rings = ReliefParams { method, join, distance: real.distance, ..ReliefParams::IMPROVED };
         let mut mean = Score::default();
         for seed in 1..=options.seeds {
             let made = Contours::generate(&rings, &seeds, seed)?;
@@ -211,7 +222,12 @@ pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
             mean.dimension += share * it.dimension;
             mean.height += share * it.height;
             if seed == 1 {
-                picture(options, &made, step, &format!("{}_{}", if method == Method::Simple { "b" } else { "c" }, name(method)))?;
+                picture(
+                    options,
+                    &made,
+                    step,
+                    &format!("{}_{}", if method == Method::Simple { "b" } else { "c" }, name(method)),
+                )?;
             }
         }
         row(name(method), mean);

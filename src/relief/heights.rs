@@ -297,7 +297,8 @@ impl HeightMap {
             || {
                 work.near.clear();
                 for (level, corners) in levels.clone().zip(&work.corners) {
-                    let squares = if self.is_beyond(level, bands) { [[0.0; TILE]; TILE] } else { lists[level].tile(place) };
+                    let squares =
+                        if self.is_beyond(level, bands) { [[0.0; TILE]; TILE] } else { lists[level].tile(place) };
                     work.near.push((squares, corners.map(f32::sqrt)));
                 }
                 let n = end[0] - at[0];

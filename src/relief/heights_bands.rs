@@ -106,7 +106,9 @@ fn parents(rings: &[Boxed]) -> Vec<Option<usize>> {
         let around = of_level(rings_at).iter().filter(|&&j| rings[j].area >= 0.0);
         let holes = of_level(holes_at).iter().filter(|&&j| rings[j].area < 0.0);
         let larger = around.chain(holes).copied().filter(|&j| j != i && rings[j].area.abs() > inner.area.abs());
-        larger.filter(|&j| rings[j].encloses(point)).min_by(|&a, &b| rings[a].area.abs().total_cmp(&rings[b].area.abs()))
+        larger
+            .filter(|&j| rings[j].encloses(point))
+            .min_by(|&a, &b| rings[a].area.abs().total_cmp(&rings[b].area.abs()))
     };
     rings.iter().enumerate().map(parent).collect()
 }

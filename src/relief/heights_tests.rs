@@ -87,7 +87,10 @@ fn every_texel_lies_between_the_levels_around_it() {
             let band = lowest - 1 + count;
             let low = if band < lowest { map.level_height(lowest) - 2.0 * params.step } else { map.level_height(band) };
             let high = if band == highest { low + 2.0 * params.step } else { map.level_height(band + 1) };
-            assert!((low - 1e-6..=high + 1e-6).contains(&height), "seed {seed}, {texel}: {height} not in {low}..{high}");
+            assert!(
+                (low - 1e-6..=high + 1e-6).contains(&height),
+                "seed {seed}, {texel}: {height} not in {low}..{high}"
+            );
         }
     }
 }
@@ -204,7 +207,8 @@ fn hostile_input_is_refused_or_gives_finite_heights() {
             1 => Vec2::new((rng.next_u32() % 4) as f32, (rng.next_u32() % 4) as f32) / 3.0,
             _ => Vec2::new(rng.range(-3.0, 3.0), rng.range(-3.0, 3.0)),
         };
-        let mut ring = |i: u32| Ring { points: (0..3 + i % 9).map(|_| point()).collect(), level: (i * i % 5) as i32 - 2 };
+        let mut ring =
+            |i: u32| Ring { points: (0..3 + i % 9).map(|_| point()).collect(), level: (i * i % 5) as i32 - 2 };
         let contours = Contours { rings: (0..seed as u32 % 9).map(&mut ring).collect(), distance: 0.05 };
         let params = HeightParams { cliffs: 0.5, roughness: 1.0, ..HeightParams::DEFAULT };
         let heights = heights(&contours, &params, SurfaceFrame::new(size).unwrap(), seed).unwrap();

@@ -77,7 +77,9 @@ impl ReliefMesh {
             ("skirt", frame.skirt, 0.0, most),
             ("detail", detail as f32, 0.0, MAX_DETAIL as f32),
         ];
-        if let Some((name, value, min, max)) = ranges.into_iter().find(|(_, value, min, max)| !(*min..=*max).contains(value)) {
+        if let Some((name, value, min, max)) =
+            ranges.into_iter().find(|(_, value, min, max)| !(*min..=*max).contains(value))
+        {
             return Err(HeightError::OutOfRange { name, value, min, max });
         }
         let size = heights.size();

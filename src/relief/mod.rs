@@ -39,7 +39,7 @@ pub use crater::{Crater, CraterParams};
 pub use error::ReliefError;
 pub use fourier::Descriptors;
 pub use generate::{ContourJob, MAX_LEVEL_POINTS, MAX_RING_POINTS};
-pub use heights::{HeightMap, MAX_LEVEL, MAX_HEIGHT_POINTS, heights};
+pub use heights::{HeightMap, MAX_HEIGHT_POINTS, MAX_LEVEL, heights};
 pub use heights_error::HeightError;
 pub use heights_params::HeightParams;
 pub use mesh::{MAX_DETAIL, ReliefFrame, ReliefMesh};

@@ -104,7 +104,7 @@ impl TerrainColors {
             ground(0.68, [124, 116, 100]),
             ground(0.86, [240, 243, 247]),
         ],
-        transition: 0.05,
+        transition: 0.1,
         rock: [[122, 110, 97], [92, 86, 82]],
         steep: [0.85, 1.5],
         stratum: 0.02,
@@ -251,9 +251,8 @@ impl<'a> Painter<'a> {
         let low = if colors.sea.is_some() { 0.0 } else { low };
         let width = heights.width();
         let mut rng = Rng::new(seed).stream("terrain colors");
-        let mut noise = |scale: f32, octaves, persistence| {
-            RowNoise::new(width, [scale * unit; 2], octaves, persistence, &mut rng)
-        };
+        let mut noise =
+            |scale: f32, octaves, persistence| RowNoise::new(width, [scale * unit; 2], octaves, persistence, &mut rng);
         Self {
             heights,
             colors,
@@ -308,7 +307,7 @@ impl<'a> Painter<'a> {
         let mut color = rgb(self.colors.ground[0].color);
         for ground in &self.colors.ground[1..] {
             let half = 0.5 * self.colors.transition;
-            let moved = share + self.colors.variety * wander * (half + 0.06 * ground.from);
+            let moved = share + self.colors.variety * wander * (half + 0.13 * ground.from);
             color = color.lerp(rgb(ground.color), smoothstep(ground.from - half, ground.from + half, moved));
         }
         let tint = Vec3::new(1.0 + 0.05 * noise[0], 1.0, 1.0 - 0.05 * noise[0]);
