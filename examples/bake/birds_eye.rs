@@ -43,6 +43,8 @@ struct Scene<'a> {
     unit: f32,
     highest: f32,
     lowest: f32,
+    /// Mean color at the border, linear: that of all that lies outside.
+    outside: Vec3,
     sun: Vec3,
     sea: bool,
 }
@@ -155,13 +157,18 @@ impl Scene<'_> {
         }
     }
 
+    /// The color of a place, linear.
+    fn albedo(&self, pos: Vec3) -> Vec3 {
+        let texel = Vec2::new(pos.x, pos.z) * self.unit;
+        let out = (-texel).max(texel - self.colors.size().as_vec2()).max_element();
+        let color = sampled(self.colors, texel, linear);
+        color.lerp(self.outside, (out / (0.03 * self.unit)).clamp(0.0, 1.0))
+    }
+
     fn ground(&self, eye: Vec3, ray: Vec3, along: f32) -> Vec3 {
         let pos = eye + ray * along;
         let normal = self.normal(pos, 0.0006 * along);
-        let albedo = sampled(self.colors, Vec2::new(pos.x, pos.z) * self.unit, |[r, g, b, _]| {
-            Vec3::new(f32::from(r), f32::from(g), f32::from(b)) / 255.0
-        });
-        let albedo = albedo * albedo;
+        let albedo = self.albedo(pos);
         let sun = normal.dot(self.sun).max(0.0) * self.sunlit(pos + normal * (0.8 / self.unit));
         let sky = self.skylit(pos) * (0.6 + 0.4 * normal.y);
         let bounce = 0.12 * (1.0 - normal.y).max(0.0);
@@ -180,12 +187,14 @@ impl Scene<'_> {
         let back = (ray - normal * 2.0 * ray.dot(normal)).normalize();
         let mirror = 0.03 + 0.97 * (1.0 - (-ray.dot(normal)).clamp(0.0, 1.0)).powi(5);
         let shine = SUNLIGHT * 2.0 * back.dot(self.sun).max(0.0).powi(180);
-        let color = sampled(self.colors, Vec2::new(pos.x, pos.z) * self.unit, |[r, g, b, _]| {
-            Vec3::new(f32::from(r), f32::from(g), f32::from(b)) / 255.0
-        });
-        let seen = color * color * (0.45 + 0.75 * self.sunlit(pos + Vec3::Y * (0.5 / self.unit)));
+        let seen = self.albedo(pos) * (0.45 + 0.75 * self.sunlit(pos + Vec3::Y * (0.5 / self.unit)));
         self.hazy(seen.lerp(self.sky(back), 0.7 * mirror) + shine, ray, along)
     }
+}
+
+fn linear([r, g, b, _]: [u8; 4]) -> Vec3 {
+    let color = Vec3::new(f32::from(r), f32::from(g), f32::from(b)) / 255.0;
+    color * color
 }
 
 /// A curve of film: light to 0..=255, sRGB.
@@ -207,6 +216,7 @@ pub(crate) fn birds_eye(heights: &Grid<f32>, colors: &Grid<[u8; 4]>, frame: &Sur
         unit: frame.texels_per_unit(),
         highest: range(f32::max, f32::MIN),
         lowest: range(f32::min, f32::MAX),
+        outside: colors.row(0).iter().map(|&color| linear(color)).sum::<Vec3>() / colors.width() as f32,
         sun: SUN.normalize(),
         sea: view.sea,
     };

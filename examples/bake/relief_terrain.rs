@@ -202,7 +202,7 @@ pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
     );
     println!("method    distance  length  dimension  height");
     let row = |name: &str, it: Score| {
-        println!("{name:9} {:8.3} {:7.3} {:10.3} {:7.3}", it.distance, it.length, it.dimension, it.height)
+        println!("{name:9} {:8.3} {:7.3} {:10.3} {:7.3}", it.distance, it.length, it.dimension, it.height);
     };
     row("real", itself);
     picture(options, &real, step, "a_real")?;

@@ -331,7 +331,7 @@ impl<'a> Painter<'a> {
         let share = depth / (depth + sea.half);
         let color = rgb(sea.shallow).lerp(rgb(sea.deep), (share + 0.05 * noise[0]).clamp(0.0, 1.0));
         // Foam at the shore.
-        let foam = smoothstep(0.07, 0.0, share + 0.035 * noise[1]) * 0.55;
+        let foam = 0.55 * (1.0 - smoothstep(0.0, 0.07, share + 0.035 * noise[1]));
         color.lerp(Vec3::new(236.0, 242.0, 240.0), foam) * (1.0 + 0.02 * noise[1])
     }
 }
