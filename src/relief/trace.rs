@@ -74,8 +74,8 @@ impl Squares<'_> {
         if is_saddle {
             let sum: f32 = Self::corners(x, y).iter().map(|&[x, y]| self.value(x, y).unwrap_or(f32::MIN)).sum();
             let is_middle_high = 0.25 * sum >= self.threshold;
-            // Round the high corner, or round the low one.
-            return if is_middle_high { (side + 3) % 4 } else { (side + 1) % 4 };
+            // Round the low corner, or round the high one.
+            return if is_middle_high { (side + 1) % 4 } else { (side + 3) % 4 };
         }
         let is_cut = |side: Side| high[side] != high[(side + 1) % 4];
         (1..4).map(|turn| (side + turn) % 4).find(|&side| is_cut(side)).unwrap_or(side)
@@ -85,7 +85,7 @@ impl Squares<'_> {
     fn enters(&self, x: i64, y: i64, side: Side) -> bool {
         let corners = Self::corners(x, y);
         let [first, second] = [corners[side], corners[(side + 1) % 4]].map(|[x, y]| self.is_high(x, y));
-        !first && second
+        first && !second
     }
 
     /// Where a line passes a side of a square, in pattern space.
