@@ -1,11 +1,16 @@
-//! Heights, normals and colors of contour lines on one thread.
+//! Heights, normals, colors and meshes of contour lines, and craters, on one thread; heights beside the plain way in the
+//! same run.
 //!
 //! `cargo bench --no-default-features --bench heights`.
 
 use bevy_crack::{
+    Grid,
     math::{Rng, ops},
     pattern::SurfaceFrame,
-    relief::{Contours, HeightMap, HeightParams, Ring},
+    relief::{
+        Contours, Crater, CraterParams, HeightMap, HeightParams, ReliefFrame, ReliefMesh, Ring, TerrainColors, colors,
+        heights, normals,
+    },
 };
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use glam::{UVec2, Vec2};
@@ -45,5 +50,72 @@ fn fields(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, fields);
+fn to_segment(pos: Vec2, a: Vec2, b: Vec2) -> f32 {
+    let share = ((pos - a).dot(b - a) / a.distance_squared(b).max(1e-12)).clamp(0.0, 1.0);
+    pos.distance_squared(a.lerp(b, share))
+}
+
+/// Linear between the two nearest levels, each texel against every segment of every ring.
+fn naive(contours: &Contours, frame: &SurfaceFrame) -> Grid<f32> {
+    let mut grid = Grid::new(frame.size(), 0.0);
+    for y in 0..grid.height() {
+        for (x, out) in grid.row_mut(y).iter_mut().enumerate() {
+            let pos = frame.to_pos(Vec2::new(x as f32 + 0.5, y as f32 + 0.5));
+            let mut nearest = [(f32::MAX, 0); 2];
+            for ring in &contours.rings {
+                let sides = ring.points.iter().zip(ring.points.iter().cycle().skip(1));
+                let square = sides.map(|(a, b)| to_segment(pos, *a, *b)).fold(f32::MAX, f32::min);
+                if square < nearest[0].0 {
+                    nearest = [(square, ring.level), nearest[0]];
+                } else if square < nearest[1].0 {
+                    nearest[1] = (square, ring.level);
+                }
+            }
+            let [(first, low), (second, high)] = nearest;
+            let share = first.sqrt() / (first.sqrt() + second.sqrt());
+            *out = low as f32 + share * (high - low) as f32;
+        }
+    }
+    grid
+}
+
+/// Beside the plain way, on a small surface.
+fn beside_the_plain_way(c: &mut Criterion) {
+    let mut group = c.benchmark_group("heights at 128, 20 levels of 256 points");
+    group.sample_size(10);
+    let (contours, Ok(frame)) = (mountain(20, 256), SurfaceFrame::new(UVec2::splat(128))) else { return };
+    group.bench_function("all segments, linear", |b| b.iter(|| naive(black_box(&contours), &frame)));
+    group.bench_function("tiles, cubic", |b| {
+        b.iter(|| heights(black_box(&contours), &HeightParams::DEFAULT, frame, 1));
+    });
+    group.finish();
+}
+
+fn pictures(c: &mut Criterion) {
+    let mut group = c.benchmark_group("pictures of heights at 1024");
+    group.sample_size(20);
+    let Ok(frame) = SurfaceFrame::new(UVec2::splat(1024)) else { return };
+    let Ok(grid) = heights(&mountain(20, 256), &HeightParams::DEFAULT, frame, 1) else { return };
+    group.bench_function("normals", |b| b.iter(|| normals(black_box(&grid), &frame)));
+    group.bench_function("colors", |b| b.iter(|| colors(black_box(&grid), &frame, &TerrainColors::ROCK, 1)));
+    group.bench_function("mesh, one vertex for 4 x 4 texels", |b| {
+        b.iter(|| ReliefMesh::new(black_box(&grid), &ReliefFrame::new(Vec2::ONE), 2));
+    });
+    group.finish();
+}
+
+fn craters(c: &mut Criterion) {
+    let mut group = c.benchmark_group("craters");
+    let Ok(frame) = SurfaceFrame::new(UVec2::splat(1024)) else { return };
+    let make = |seed| Crater::new(Vec2::splat(0.5), &CraterParams::DEFAULT, seed);
+    group.bench_function("rings", |b| b.iter(|| make(black_box(7))));
+    let Ok(crater) = make(7) else { return };
+    let mut depths = Grid::new(UVec2::splat(128), 0u16);
+    group.bench_function("fill 128 x 128 texels", |b| {
+        b.iter(|| crater.fill(UVec2::splat(448), &frame, 1.0, black_box(&mut depths)));
+    });
+    group.finish();
+}
+
+criterion_group!(benches, fields, beside_the_plain_way, pictures, craters);
 criterion_main!(benches);

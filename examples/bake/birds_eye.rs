@@ -1,6 +1,6 @@
 //! A bird's-eye view of a height field: rays marched through it, with sun, shadows, light of the sky, haze and sea.
 
-use bevy_crack::{Grid, pattern::SurfaceFrame};
+use bevy_crack::{Grid, math::ops, pattern::SurfaceFrame};
 use glam::{UVec2, Vec2, Vec3};
 use image::{Rgba, RgbaImage};
 use std::thread;
@@ -31,7 +31,7 @@ impl View {
 const SUN: Vec3 = Vec3::new(-0.78, 0.5, 0.22);
 const SUNLIGHT: Vec3 = Vec3::new(1.5, 1.32, 1.05);
 const SKYLIGHT: Vec3 = Vec3::new(0.26, 0.34, 0.47);
-const HAZE: Vec3 = Vec3::new(0.70, 0.77, 0.84);
+const HAZE: Vec3 = Vec3::new(0.60, 0.70, 0.82);
 const ZENITH: Vec3 = Vec3::new(0.24, 0.42, 0.68);
 
 /// Rays for each texel of the picture, across and down.
@@ -43,6 +43,8 @@ struct Scene<'a> {
     unit: f32,
     highest: f32,
     lowest: f32,
+    /// Mean color at the border, linear: that of all that lies outside.
+    outside: Vec3,
     sun: Vec3,
     sea: bool,
 }
@@ -64,7 +66,7 @@ where
 
 impl Scene<'_> {
     fn height(&self, pos: Vec3) -> f32 {
-        sampled(self.heights, Vec2::new(pos.x, pos.z) * self.unit, |height| Vec3::splat(height)).x
+        sampled(self.heights, Vec2::new(pos.x, pos.z) * self.unit, Vec3::splat).x
     }
 
     fn normal(&self, pos: Vec3, reach: f32) -> Vec3 {
@@ -155,13 +157,18 @@ impl Scene<'_> {
         }
     }
 
+    /// The color of a place, linear.
+    fn albedo(&self, pos: Vec3) -> Vec3 {
+        let texel = Vec2::new(pos.x, pos.z) * self.unit;
+        let out = (-texel).max(texel - self.colors.size().as_vec2()).max_element();
+        let color = sampled(self.colors, texel, linear);
+        color.lerp(self.outside, (out / (0.03 * self.unit)).clamp(0.0, 1.0))
+    }
+
     fn ground(&self, eye: Vec3, ray: Vec3, along: f32) -> Vec3 {
         let pos = eye + ray * along;
         let normal = self.normal(pos, 0.0006 * along);
-        let albedo = sampled(self.colors, Vec2::new(pos.x, pos.z) * self.unit, |[r, g, b, _]| {
-            Vec3::new(f32::from(r), f32::from(g), f32::from(b)) / 255.0
-        });
-        let albedo = albedo * albedo;
+        let albedo = self.albedo(pos);
         let sun = normal.dot(self.sun).max(0.0) * self.sunlit(pos + normal * (0.8 / self.unit));
         let sky = self.skylit(pos) * (0.6 + 0.4 * normal.y);
         let bounce = 0.12 * (1.0 - normal.y).max(0.0);
@@ -170,7 +177,7 @@ impl Scene<'_> {
 
     fn water(&self, eye: Vec3, ray: Vec3, along: f32) -> Vec3 {
         let pos = eye + ray * along;
-        let wave = |k: f32, x: f32, z: f32| (pos.x * x * k + pos.z * z * k).sin();
+        let wave = |k: f32, x: f32, z: f32| ops::sin(pos.x * x * k + pos.z * z * k);
         let calm = 1.0 / (1.0 + 0.6 * along * along);
         let tilt = Vec2::new(
             wave(310.0, 1.0, 0.4) + wave(170.0, -0.3, 1.0) + wave(530.0, 0.8, -0.9),
@@ -180,12 +187,14 @@ impl Scene<'_> {
         let back = (ray - normal * 2.0 * ray.dot(normal)).normalize();
         let mirror = 0.03 + 0.97 * (1.0 - (-ray.dot(normal)).clamp(0.0, 1.0)).powi(5);
         let shine = SUNLIGHT * 2.0 * back.dot(self.sun).max(0.0).powi(180);
-        let color = sampled(self.colors, Vec2::new(pos.x, pos.z) * self.unit, |[r, g, b, _]| {
-            Vec3::new(f32::from(r), f32::from(g), f32::from(b)) / 255.0
-        });
-        let seen = color * color * (0.45 + 0.75 * self.sunlit(pos + Vec3::Y * (0.5 / self.unit)));
-        self.hazy(seen.lerp(self.sky(back), mirror) + shine, ray, along)
+        let seen = self.albedo(pos) * (0.45 + 0.75 * self.sunlit(pos + Vec3::Y * (0.5 / self.unit)));
+        self.hazy(seen.lerp(self.sky(back), 0.7 * mirror) + shine, ray, along)
     }
+}
+
+fn linear([r, g, b, _]: [u8; 4]) -> Vec3 {
+    let color = Vec3::new(f32::from(r), f32::from(g), f32::from(b)) / 255.0;
+    color * color
 }
 
 /// A curve of film: light to 0..=255, sRGB.
@@ -193,7 +202,7 @@ fn exposed(light: Vec3) -> [u8; 4] {
     let tone = |value: f32| {
         let value = value * 1.05;
         let film = value * (2.51 * value + 0.03) / (value * (2.43 * value + 0.59) + 0.14);
-        (film.clamp(0.0, 1.0).powf(1.0 / 2.2) * 255.0 + 0.5) as u8
+        (ops::powf(film.clamp(0.0, 1.0), 1.0 / 2.2) * 255.0 + 0.5) as u8
     };
     [tone(light.x), tone(light.y), tone(light.z), 255]
 }
@@ -207,6 +216,7 @@ pub(crate) fn birds_eye(heights: &Grid<f32>, colors: &Grid<[u8; 4]>, frame: &Sur
         unit: frame.texels_per_unit(),
         highest: range(f32::max, f32::MIN),
         lowest: range(f32::min, f32::MAX),
+        outside: colors.row(0).iter().map(|&color| linear(color)).sum::<Vec3>() / colors.width() as f32,
         sun: SUN.normalize(),
         sea: view.sea,
     };
@@ -214,7 +224,8 @@ pub(crate) fn birds_eye(heights: &Grid<f32>, colors: &Grid<[u8; 4]>, frame: &Sur
     let base = if view.sea { 0.0 } else { scene.lowest };
     let target = Vec3::new(0.5 * extent.x, base + 0.38 * (scene.highest - base), 0.5 * extent.y);
     let [around, down] = [view.around, view.down].map(f32::to_radians);
-    let back = Vec3::new(around.sin() * down.cos(), down.sin(), around.cos() * down.cos());
+    let ([side, front], [level, up]) = (ops::unit(around).to_array(), ops::unit(down).to_array());
+    let back = Vec3::new(front * level, up, side * level);
     let eye = target + back * view.distance;
     let right = Vec3::Y.cross(back).normalize();
     let up = back.cross(right);

@@ -12,6 +12,7 @@ mod birds_eye;
 mod blend;
 mod contour_lines;
 mod figures;
+mod figures_misawa;
 mod figures_strands;
 mod gallery;
 mod grounds;
@@ -53,6 +54,8 @@ enum Method {
     Gallery(gallery::Options),
     /// Cracks that draw a picture or a word, all at once.
     Guided(Box<guided::Options>),
+    /// The figures of the paper on contour generation, made again.
+    FiguresMisawa(figures_misawa::Options),
     /// The figures of the paper on image-guided fracture, made again.
     FiguresMould(figures::Options),
     /// The figures of the paper on primitives along a guidance field, made again.
@@ -74,6 +77,7 @@ fn main() -> ExitCode {
         Method::Gallery(options) => gallery::bake(&options),
         Method::Growth(options) => growth::bake(&options).map(drop),
         Method::Guided(options) => guided::bake(&options),
+        Method::FiguresMisawa(options) => figures_misawa::bake(&options),
         Method::FiguresMould(options) => figures::bake(&options),
         Method::FiguresStrands(options) => figures_strands::bake(&options),
         Method::Legible(options) => legible::bake(&options),

@@ -7,7 +7,7 @@ use crate::{
 use bevy_crack::{
     Grid,
     pattern::SurfaceFrame,
-    relief::{Contours, HeightParams, Method, ReliefParams, Ring, TerrainColors, colors, heights},
+    relief::{Contours, HeightParams, Join, Method, ReliefParams, Ring, TerrainColors, colors, heights},
 };
 use clap::Args;
 use glam::{UVec2, Vec2};
@@ -19,7 +19,7 @@ pub(crate) struct Options {
     #[arg(long)]
     dem: PathBuf,
     /// Number of contours over the whole height of the model
-    #[arg(long, default_value_t = 24)]
+    #[arg(long, default_value_t = 40)]
     levels: u16,
     /// Random seeds over which each method is averaged
     #[arg(long, default_value_t = 4)]
@@ -57,8 +57,8 @@ fn real(terrain: &Terrain, levels: u16) -> Option<(Contours, f32)> {
             all.rings.iter().filter(|other| other.level > ring.level && is_inside(&ring.points, other.points[0]));
         inside.map(|other| other.level - ring.level).max().unwrap_or(0)
     };
-    // The largest mountain with six contours above its foot.
-    let whole = all.rings.iter().filter(is_whole).filter(|ring| depth(ring) >= 6);
+    // The largest mountain with five contours above its foot.
+    let whole = all.rings.iter().filter(is_whole).filter(|ring| depth(ring) >= 5);
     let seed = whole.max_by(|a, b| a.signed_area().total_cmp(&b.signed_area()))?;
     let [min, max] = bounds(&seed.points);
     let scale = 0.86 / (max - min).max_element();
@@ -188,7 +188,7 @@ fn picture(options: &Options, contours: &Contours, step: f32, file: &str) -> Res
 
 pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
     let terrain = Terrain::read(&options.dem)?;
-    let (real, step) = real(&terrain, options.levels).ok_or("no mountain with six closed contours")?;
+    let (real, step) = real(&terrain, options.levels).ok_or("no mountain with five contours above its foot")?;
     let frame = SurfaceFrame::new(UVec2::splat(SIDE))?;
     let params = HeightParams { step, floor: 0.0, ..HeightParams::DEFAULT };
     let real_ground = heights(&real, &params, frame, 1)?;
@@ -202,12 +202,15 @@ pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
     );
     println!("method    distance  length  dimension  height");
     let row = |name: &str, it: Score| {
-        println!("{name:9} {:8.3} {:7.3} {:10.3} {:7.3}", it.distance, it.length, it.dimension, it.height)
+        println!("{name:9} {:8.3} {:7.3} {:10.3} {:7.3}", it.distance, it.length, it.dimension, it.height);
     };
     row("real", itself);
     picture(options, &real, step, "a_real")?;
     for method in Method::ALL {
-        let rings = ReliefParams { method, distance: real.distance, ..ReliefParams::IMPROVED };
+        // The constants that the paper gives for each.
+        let factor = if method == Method::Improved { 3.0 } else { 1.4 };
+        let join = Join::Arc { factor };
+        let rings = ReliefParams { method, join, distance: real.distance, ..ReliefParams::IMPROVED };
         let mut mean = Score::default();
         for seed in 1..=options.seeds {
             let made = Contours::generate(&rings, &seeds, seed)?;

@@ -28,10 +28,11 @@ mod tests {
     use crate::{
         Grid,
         blend::{NormalBlending, solve_poisson},
-        math::Rng,
+        math::{Rng, ops},
         paint::{BaseTexels, Look, LookTable, PaintTargets, paint_into},
         pattern::{CrackMask, PathPoint, SegmentPath, SurfaceFrame},
         raster::{DepthField, Profile, TexelRect, stamp_path},
+        relief::{Contours, HeightParams, Ring, heights, normals},
         voronoi::{VoronoiParams, voronoi_map},
     };
     use glam::{UVec2, Vec2};
@@ -130,6 +131,28 @@ mod tests {
                 let costs: Vec<_> =
                     (0..size.y).flat_map(|y| (0..size.x).map(move |x| (x, y))).map(|(x, y)| map.edges(x, y)).collect();
                 (lines, map.regions(), costs)
+            });
+            assert!(wide == plain, "seed {seed}");
+        }
+    }
+
+    #[test]
+    fn heights_are_the_same_without_wide_vectors() {
+        for seed in 0..4 {
+            let [wide, plain] = both(seed, |rng| {
+                let corners: Vec<_> = (0..40).map(|i| (i as f32 / 40.0, 0.8 + 0.4 * rng.unit())).collect();
+                let ring = |level: i32| {
+                    let radius = 0.4 - 0.09 * level as f32;
+                    let corner = |&(share, out): &(f32, f32)| {
+                        Vec2::splat(0.5) + radius * out * ops::unit(std::f32::consts::TAU * share)
+                    };
+                    Ring { points: corners.iter().map(corner).collect(), level }
+                };
+                let contours = Contours { rings: (0..4).map(ring).collect(), distance: 0.09 };
+                let frame = SurfaceFrame::new(UVec2::new(141, 93)).unwrap();
+                let heights = heights(&contours, &HeightParams::DEFAULT, frame, 1).unwrap();
+                let normals = normals(&heights, &frame);
+                (heights, normals)
             });
             assert!(wide == plain, "seed {seed}");
         }

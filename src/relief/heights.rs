@@ -43,7 +43,7 @@ const SIDES: [usize; 3] = [128, 32, 8];
 /// ```
 /// use bevy_crack::{pattern::SurfaceFrame, relief::{Contours, HeightMap, HeightParams, Ring}};
 ///
-/// let square = |level, half| {
+/// let square = |level, half: f32| {
 ///     let points = [[-half, -half], [half, -half], [half, half], [-half, half]];
 ///     Ring { points: points.iter().map(|&[x, y]| [0.5 + x, 0.5 + y].into()).collect(), level }
 /// };

@@ -1,11 +1,41 @@
 //! Relief from one contour: all other contour lines, then a height field.
 //!
 //! The method is that of Misawa, Chiba and Saito ("Simulation of Natural Scenes: Procedure Modeling for Mountains",
-//! 1986, in Japanese).
+//! 1986, in Japanese). A seed contour is shrunk by a distance, again and again, until nothing is left ([`Method::Simple`],
+//! section 3), and grown towards the foot of the mountain. Midpoints of long edges are displaced at random
+//! ([`Method::Midpoint`], section 4.1), or the high frequencies of a contour get random phases ([`Method::Fourier`],
+//! section 4.2, [`Descriptors`]), or both ([`Method::Improved`], section 4.3). [`Join`] says what becomes of corners
+//! (section 2).
+//!
+//! [`ReliefParams`] holds the settings, [`ContourJob`] makes the contours level by level, [`Contours`] holds them.
+//! All is computed on a lattice of whole numbers with exact predicates: every ring is simple, whatever the seeds and the parameters
+//! are, and every level lies within the one before. The paper removes twists and crossings by two methods that help
+//! in most cases (section 4.4); here winding numbers decide, which helps in all.
+//!
+//! [`heights`] makes a height field of contours ([`HeightMap`]), [`normals`] and [`colors`] its pictures, [`ReliefMesh`]
+//! its mesh. A [`Crater`] is what a hit knocks out, in terraces.
+//!
+//! This goes beyond the paper: several seeds, holes, seeds from [`outlines`] in a picture, distances that vary along a contour
+//! ([`ReliefParams::steepness`], [`ContourJob::with_factors`]), parameters that suit a seed ([`ReliefParams::estimate`]).
+//!
+//! ```
+//! use bevy_crack::relief::{Contours, ReliefParams};
+//! use glam::Vec2;
+//!
+//! // Two hills that have grown together.
+//! let hill = |x: f32| (0..60).map(move |i| Vec2::new(x, 0.5) + 0.2 * Vec2::from_angle(0.104_72 * i as f32)).collect();
+//! let params = ReliefParams { distance: 0.03, outward: 4, ..ReliefParams::SIMPLE };
+//! let contours = Contours::generate(&params, &[hill(0.25), hill(0.75)], 1)?;
+//! assert_eq!(contours.level(0).count(), 2);
+//! assert_eq!(contours.level(3).count(), 2);
+//! assert_eq!(contours.level(-4).count(), 1);
+//! # Ok::<(), bevy_crack::relief::ReliefError>(())
+//! ```
 
 mod contours;
 mod crater;
 mod error;
+mod estimate;
 mod export;
 mod fourier;
 mod generate;
@@ -34,6 +64,7 @@ mod terrain_noise;
 mod terrain_normals;
 #[cfg(test)]
 mod tests;
+mod trace;
 mod untangle;
 
 pub use contours::{Contours, Ring};
@@ -51,3 +82,4 @@ pub use seeds::{MAX_COORDINATE, MAX_SEEDS};
 pub use shapes::ReliefShape;
 pub use terrain::{Ground, Sea, TerrainColors, colors};
 pub use terrain_normals::normals;
+pub use trace::outlines;

@@ -11,11 +11,11 @@ use super::{
 /// Corners that deviate less than this share of the distance from a straight line are not moved for themselves.
 ///
 /// Larger is faster and makes rounder valleys; smaller keeps corners that make no difference one can see. A hundredth is
-/// what other libraries take. The second and the third are for lines so rough that their moved edges cross a million times.
+/// what other libraries take. The second and the third are for lines so rough that their moved edges cross very often.
 const TOLERANCES: [f64; 3] = [0.005, 0.02, 0.04];
 
 /// Most crossings of moved edges at the first two tolerances.
-const MAX_CROSSINGS: usize = 1 << 20;
+const MAX_CROSSINGS: usize = 1 << 18;
 
 /// Islands with an area below this share of the squared distance are not made.
 const LEAST_AREA: f64 = 0.001;

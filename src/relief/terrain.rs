@@ -104,7 +104,7 @@ impl TerrainColors {
             ground(0.68, [124, 116, 100]),
             ground(0.86, [240, 243, 247]),
         ],
-        transition: 0.05,
+        transition: 0.1,
         rock: [[122, 110, 97], [92, 86, 82]],
         steep: [0.85, 1.5],
         stratum: 0.02,
@@ -307,7 +307,7 @@ impl<'a> Painter<'a> {
         let mut color = rgb(self.colors.ground[0].color);
         for ground in &self.colors.ground[1..] {
             let half = 0.5 * self.colors.transition;
-            let moved = share + self.colors.variety * wander * (half + 0.06 * ground.from);
+            let moved = share + self.colors.variety * wander * (half + 0.13 * ground.from);
             color = color.lerp(rgb(ground.color), smoothstep(ground.from - half, ground.from + half, moved));
         }
         let tint = Vec3::new(1.0 + 0.05 * noise[0], 1.0, 1.0 - 0.05 * noise[0]);
@@ -331,7 +331,7 @@ impl<'a> Painter<'a> {
         let share = depth / (depth + sea.half);
         let color = rgb(sea.shallow).lerp(rgb(sea.deep), (share + 0.05 * noise[0]).clamp(0.0, 1.0));
         // Foam at the shore.
-        let foam = smoothstep(0.07, 0.0, share + 0.035 * noise[1]) * 0.55;
+        let foam = 0.55 * (1.0 - smoothstep(0.0, 0.07, share + 0.035 * noise[1]));
         color.lerp(Vec3::new(236.0, 242.0, 240.0), foam) * (1.0 + 0.02 * noise[1])
     }
 }

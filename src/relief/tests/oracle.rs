@@ -205,3 +205,16 @@ pub(super) fn distances(lines: &[Vec<Vec2>], side: u32) -> Vec<f64> {
     }
     out
 }
+
+/// Whether closed lines wind round a place.
+pub(super) fn is_inside(lines: &[Vec<Vec2>], p: Vec2) -> bool {
+    let mut winding = 0;
+    for line in lines {
+        for (a, b) in line.iter().zip(line.iter().cycle().skip(1)) {
+            let side = (*b - *a).perp_dot(p - *a);
+            winding += i32::from(a.y <= p.y && b.y > p.y && side > 0.0);
+            winding -= i32::from(b.y <= p.y && a.y > p.y && side < 0.0);
+        }
+    }
+    winding != 0
+}

@@ -29,7 +29,7 @@ pub(super) struct Bins {
 }
 
 impl Bins {
-    /// Cells about as large as an edge is long, but not many more than edges.
+    /// Some four times as many cells as edges, unless edges are so long that each would be in too many.
     pub(super) fn new(edges: &[Edge]) -> Self {
         let mut bounds = [i32::MAX, i32::MAX, i32::MIN, i32::MIN];
         let mut length = 0i64;
@@ -44,7 +44,7 @@ impl Bins {
         let mean = length as u64 / count.max(1);
         let cells = |shift: u32| (u64::from(width[0] >> shift) + 1) * (u64::from(width[1] >> shift) + 1);
         let mut shift = 2;
-        while (1 << shift) < mean || cells(shift) > 4 * count + 64 {
+        while (16 << shift) < mean || cells(shift) > 4 * count + 64 {
             shift += 1;
         }
         Self { low, shift, columns: (width[0] >> shift) + 1, rows: (width[1] >> shift) + 1 }
@@ -61,6 +61,11 @@ impl Bins {
 
     fn row(&self, y: i32) -> u32 {
         ((y - self.low.y).max(0) as u32 >> self.shift).min(self.rows - 1)
+    }
+
+    /// The cell of a point.
+    pub(super) fn cell(&self, p: Point) -> u32 {
+        self.row(p.y) * self.columns + self.column(p.x)
     }
 
     /// Calls `visit` for each cell that the edge reaches.

@@ -14,9 +14,10 @@ pub(super) struct Edges {
     pub(super) next: Vec<u32>,
     /// Whether the start of an edge is also a point of another edge than the one before it.
     pub(super) is_node: Vec<bool>,
-    /// Which edges the last round has made.
-    fresh: Vec<bool>,
 }
+
+/// Most pairs of edges that are looked at, for each cut that is allowed.
+const WORK: usize = 64;
 
 /// A new corner of an edge.
 type Cut = (u32, i64, Point);
@@ -34,7 +35,6 @@ impl Edges {
             }
         }
         out.is_node = vec![false; out.edges.len()];
-        out.fresh = vec![true; out.edges.len()];
         out
     }
 
@@ -45,18 +45,17 @@ impl Edges {
         out.edges.reserve(many);
         out.is_node.reserve(many);
         out.next.reserve(many);
-        out.fresh.reserve(many);
         // The new index of the first piece of each edge.
         let mut firsts = Vec::with_capacity(self.edges.len());
         let mut cuts = cuts.iter().peekable();
         for (i, edge) in self.edges.iter().enumerate() {
             firsts.push(out.edges.len() as u32);
-            let (mut a, mut is_node, mut is_cut) = (edge.a, self.is_node[i], false);
+            let (mut a, mut is_node) = (edge.a, self.is_node[i]);
             while let Some(&(_, _, point)) = cuts.next_if(|cut| cut.0 as usize == i) {
-                out.push(Edge { a, b: point }, is_node, true);
-                (a, is_node, is_cut) = (point, true, true);
+                out.push(Edge { a, b: point }, is_node);
+                (a, is_node) = (point, true);
             }
-            out.push(Edge { a, b: edge.b }, is_node, is_cut);
+            out.push(Edge { a, b: edge.b }, is_node);
         }
         for i in 0..self.edges.len() {
             if let Some(last) = out.next.get_mut(firsts.get(i + 1).map_or(many, |&first| first as usize) - 1) {
@@ -66,37 +65,74 @@ impl Edges {
         *self = out;
     }
 
-    fn push(&mut self, edge: Edge, is_node: bool, is_fresh: bool) {
+    fn push(&mut self, edge: Edge, is_node: bool) {
         self.edges.push(edge);
         self.next.push(self.edges.len() as u32);
         self.is_node.push(is_node);
-        self.fresh.push(is_fresh);
     }
+}
+
+/// Cuts of edges, and the lattice points nearest to crossings.
+#[derive(Default)]
+struct Cuts {
+    cuts: Vec<Cut>,
+    crossings: Vec<Point>,
 }
 
 /// The edges of `loops`, cut so that they meet at their ends only.
 ///
-/// A round cuts edges where they cross and where they pass through the square of side 1 around a corner. The corner, or the lattice
-/// point nearest to the crossing, becomes a point of both. It lies in the bounds of the edge, whose pieces therefore
-/// run in the same direction along x and along y; so rounds come to an end.
+/// This is snap rounding: around each corner, and each lattice point nearest to a crossing, is a square of side 1. Edges
+/// are cut where they pass through a square, and the cut goes to its centre. As the squares are taken by the edges as they
+/// were given, pieces do not cross (Hobby 1999, theorem 1).
 pub(super) fn cut(loops: &[Loop], most: usize) -> Result<Edges, TooTangled> {
     let mut edges = Edges::new(loops);
-    let mut cuts = Vec::new();
-    let most = edges.edges.len() + most;
-    while edges.fresh.contains(&true) {
-        cuts.clear();
-        find(&mut edges, &mut cuts, most)?;
-        if cuts.is_empty() {
-            break;
-        }
-        cuts.sort_unstable();
-        cuts.dedup();
-        if edges.edges.len() + cuts.len() > most {
-            return Err(TooTangled);
-        }
+    if edges.edges.is_empty() {
+        return Ok(edges);
+    }
+    let bins = Bins::new(&edges.edges);
+    let members = members(&edges, &bins);
+    let mut found = Cuts::default();
+    find(&mut edges, &members, &mut found, most)?;
+    let Cuts { mut cuts, mut crossings } = found;
+    crossings.sort_unstable();
+    crossings.dedup();
+    for &p in &crossings {
+        pass(&mut edges, members.of(bins.cell(p)), p, &mut cuts);
+    }
+    cuts.sort_unstable();
+    cuts.dedup();
+    if cuts.len() > most {
+        return Err(TooTangled);
+    }
+    if !cuts.is_empty() {
         edges.split(&cuts);
+        fold(&mut edges);
     }
     Ok(edges)
+}
+
+/// Cuts all edges of a cell that pass through the square around a crossing.
+fn pass(edges: &mut Edges, cell: &[u32], p: Point, cuts: &mut Vec<Cut>) {
+    for &i in cell {
+        let edge = edges.edges[i as usize];
+        if p == edge.a || p == edge.b {
+            let vertex = if p == edge.a { i } else { edges.next[i as usize] };
+            edges.is_node[vertex as usize] = true;
+        } else if passes(&edge, p) {
+            cuts.push(cut_at(&edge, i, p));
+        }
+    }
+}
+
+/// Marks pieces that go there and back again.
+fn fold(edges: &mut Edges) {
+    for i in 0..edges.edges.len() {
+        let next = edges.next[i] as usize;
+        if edges.edges[i].a == edges.edges[next].b {
+            let after = edges.next[next] as usize;
+            [i, next, after].into_iter().for_each(|vertex| edges.is_node[vertex] = true);
+        }
+    }
 }
 
 /// Which edges lie in which cell: those of cell `c` are `items[starts[c]..starts[c + 1]]`.
@@ -105,20 +141,19 @@ struct Members {
     items: Vec<u32>,
 }
 
-/// All edges in those cells that have a fresh one.
-fn members(edges: &Edges, bins: &Bins) -> Members {
-    let mut has_fresh = vec![false; bins.len()];
-    for (edge, _) in edges.edges.iter().zip(&edges.fresh).filter(|(_, is_fresh)| **is_fresh) {
-        bins.cells(edge, |cell| has_fresh[cell as usize] = true);
+impl Members {
+    fn of(&self, cell: u32) -> &[u32] {
+        &self.items[self.starts[cell as usize] as usize..self.starts[cell as usize + 1] as usize]
     }
+}
+
+fn members(edges: &Edges, bins: &Bins) -> Members {
     let mut pairs = Vec::with_capacity(2 * edges.edges.len());
     let mut starts = vec![0u32; bins.len() + 1];
     for (i, edge) in edges.edges.iter().enumerate() {
         bins.cells(edge, |cell| {
-            if has_fresh[cell as usize] {
-                starts[cell as usize + 1] += 1;
-                pairs.push((cell, i as u32));
-            }
+            starts[cell as usize + 1] += 1;
+            pairs.push((cell, i as u32));
         });
     }
     for cell in 1..starts.len() {
@@ -134,27 +169,31 @@ fn members(edges: &Edges, bins: &Bins) -> Members {
 }
 
 /// Finds where edges must be cut, and marks the corners that they share.
-fn find(edges: &mut Edges, cuts: &mut Vec<Cut>, most: usize) -> Result<(), TooTangled> {
-    let bins = Bins::new(&edges.edges);
-    let members = members(edges, &bins);
+fn find(edges: &mut Edges, members: &Members, found: &mut Cuts, most: usize) -> Result<(), TooTangled> {
     let mut boxes = Vec::new();
-    for cell in members.starts.windows(2).filter(|cell| cell[1] - cell[0] > 1) {
-        let items = &members.items[cell[0] as usize..cell[1] as usize];
+    let mut work = 0;
+    for cell in (0..members.starts.len() as u32 - 1).map(|cell| members.of(cell)).filter(|cell| cell.len() > 1) {
+        work += cell.len() * cell.len() / 2;
+        if work > most.saturating_mul(WORK) {
+            return Err(TooTangled);
+        }
         boxes.clear();
-        boxes.extend(items.iter().map(|&i| (edges.edges[i as usize].bounds(), i, edges.fresh[i as usize])));
-        for (k, &(near, e, is_fresh)) in boxes.iter().enumerate() {
-            for &(far, f, is_other_fresh) in &boxes[k + 1..] {
-                let apart = near[0] > far[2] || far[0] > near[2] || near[1] > far[3] || far[1] > near[3];
-                if !apart && (is_fresh || is_other_fresh) {
-                    meet(edges, e, f, cuts);
+        boxes.extend(cell.iter().map(|&i| (edges.edges[i as usize].bounds(), i)));
+        for (k, &(near, e)) in boxes.iter().enumerate() {
+            for &(far, f) in &boxes[k + 1..] {
+                let is_apart = near[0] > far[2] || far[0] > near[2] || near[1] > far[3] || far[1] > near[3];
+                if !is_apart {
+                    meet(edges, e, f, found);
                 }
             }
         }
         // Cells share edges, so a cut may be found several times.
-        if edges.edges.len() + cuts.len() > most + (most >> 1) {
-            cuts.sort_unstable();
-            cuts.dedup();
-            if edges.edges.len() + cuts.len() > most {
+        if found.cuts.len() > most + (most >> 1) {
+            found.cuts.sort_unstable();
+            found.cuts.dedup();
+            found.crossings.sort_unstable();
+            found.crossings.dedup();
+            if found.cuts.len() > most {
                 return Err(TooTangled);
             }
         }
@@ -163,13 +202,17 @@ fn find(edges: &mut Edges, cuts: &mut Vec<Cut>, most: usize) -> Result<(), TooTa
 }
 
 /// Whether the edge passes through the square of side 1 around `p`, which is none of its ends.
+///
+/// Of its border, the square has the sides towards smaller coordinates, and of its corners the one between them.
 fn passes(edge: &Edge, p: Point) -> bool {
     let [x0, y0, x1, y1] = edge.bounds();
     if p.x < x0 || p.x > x1 || p.y < y0 || p.y > y1 || p == edge.a || p == edge.b {
         return false;
     }
     let along = edge.a.to(edge.b);
-    2 * cross(along, edge.a.to(p)).abs() < along[0].abs() + along[1].abs()
+    let (side, most) = (2 * cross(along, edge.a.to(p)), along[0].abs() + along[1].abs());
+    let is_at_corner = || along[0].signum() * along[1].signum() < 0 && side == along[0] - along[1];
+    side.abs() < most || (side.abs() == most && is_at_corner())
 }
 
 fn cut_at(edge: &Edge, index: u32, p: Point) -> Cut {
@@ -178,7 +221,8 @@ fn cut_at(edge: &Edge, index: u32, p: Point) -> Cut {
 }
 
 /// Two edges whose bounds meet.
-fn meet(all: &mut Edges, i: u32, j: u32, cuts: &mut Vec<Cut>) {
+fn meet(all: &mut Edges, i: u32, j: u32, found: &mut Cuts) {
+    let cuts = &mut found.cuts;
     let (e, f) = (all.edges[i as usize], all.edges[j as usize]);
     let (next_i, next_j) = (all.next[i as usize], all.next[j as usize]);
     if next_i == j || next_j == i {
@@ -201,15 +245,7 @@ fn meet(all: &mut Edges, i: u32, j: u32, cuts: &mut Vec<Cut>) {
             cuts.push(cut_at(&f, j, p));
         }
     }
-    if let Some(p) = crossing(&e, &f) {
-        for (edge, index, next) in [(&e, i, next_i), (&f, j, next_j)] {
-            if p == edge.a || p == edge.b {
-                all.is_node[if p == edge.a { index } else { next } as usize] = true;
-            } else {
-                cuts.push(cut_at(edge, index, p));
-            }
-        }
-    }
+    found.crossings.extend(crossing(&e, &f));
 }
 
 /// Two edges of which one follows the other.
