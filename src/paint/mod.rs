@@ -34,6 +34,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod analogy;
 mod cel;
 mod diffuse;
 mod extras;
