@@ -12,7 +12,7 @@ use bevy_crack::{
 };
 use clap::Args;
 use glam::UVec2;
-use image::{ImageBuffer, ImageReader, Rgb, Rgba, RgbaImage, imageops};
+use image::{GrayImage, ImageBuffer, ImageReader, Luma, Rgb, Rgba, RgbaImage, imageops};
 use std::{
     error::Error,
     fs,
@@ -23,8 +23,11 @@ use std::{
 
 #[derive(Args)]
 pub(crate) struct Options {
+    /// A pair that ships: clay, concrete or paving; may be given many times
+    #[arg(long, required_unless_present = "photo", conflicts_with = "photo")]
+    pair: Vec<String>,
     /// A photograph of a cracked material, `A'`; may be given many times
-    #[arg(long, required = true)]
+    #[arg(long)]
     photo: Vec<PathBuf>,
     /// Its guide, `A`: white = crack; as many as photographs, by default the lines that stand out from them
     #[arg(long)]
@@ -41,6 +44,9 @@ pub(crate) struct Options {
     /// The photographs can be repeated without seams
     #[arg(long)]
     tileable_photo: bool,
+    /// Takes shading out of the photographs that changes over more than about so many texels
+    #[arg(long)]
+    flatten: Option<u32>,
     /// The pattern `B`: a picture, white = crack, or a folder that another command has written
     #[arg(long)]
     pattern: PathBuf,
@@ -69,7 +75,7 @@ fn shares(picture: &RgbaImage) -> Grid<f32> {
 }
 
 /// The texels of a picture.
-pub(crate) fn texels(picture: &RgbaImage) -> Grid<[u8; 4]> {
+fn texels(picture: &RgbaImage) -> Grid<[u8; 4]> {
     let values = picture.pixels().map(|texel| texel.0).collect();
     Grid::from_vec(picture.dimensions().into(), values).unwrap_or_else(|| Grid::new(UVec2::ZERO, [0; 4]))
 }
@@ -89,6 +95,32 @@ fn pattern(path: &Path, size: Option<UVec2>) -> Done<Grid<u16>> {
     Grid::from_vec(depth.dimensions().into(), depth.into_raw()).ok_or_else(|| "pattern size".into())
 }
 
+/// The file of a map of a pair that ships.
+fn shipped(name: &str, map: &str) -> PathBuf {
+    Path::new(crate::ASSETS).join("analogies").join(format!("{name}{map}.png"))
+}
+
+/// A pair that ships.
+pub(crate) fn shipped_pair(name: &str) -> Done<AnalogyPair> {
+    let photo = read_picture(&shipped(name, ""))?;
+    let guide = shares(&read_picture(&shipped(name, "_mask"))?);
+    let pair = AnalogyPair::new(photo.dimensions().into(), photo.as_raw(), guide)?;
+    // The photographs are textures for walls; the clay is drawn.
+    Ok(if name == "clay" { pair } else { pair.tileable() })
+}
+
+/// The guide of a pair and its photograph.
+pub(crate) fn panels(pair: &AnalogyPair, depth: f32) -> [RgbaImage; 2] {
+    let is_crack = |x, y| pair.cracks().get(x, y).is_some_and(|value| value > 0.0 && value >= depth);
+    [guide_picture(is_crack, pair.size()), picture(pair.picture())]
+}
+
+/// The pattern: white = crack.
+pub(crate) fn pattern_panel(depth: &Grid<u16>, params: &AnalogyParams) -> RgbaImage {
+    let least = ((params.depth * 65535.0) as u16).max(1);
+    guide_picture(|x, y| depth.get(x, y).is_some_and(|depth| depth >= least), depth.size())
+}
+
 /// The photograph, its guide beside it.
 fn pair(options: &Options, at: usize, photo: &RgbaImage) -> Done<AnalogyPair> {
     let (size, rgba) = (UVec2::from(photo.dimensions()), photo.as_raw());
@@ -97,19 +129,28 @@ fn pair(options: &Options, at: usize, photo: &RgbaImage) -> Done<AnalogyPair> {
         (None, Some(lightness)) => AnalogyPair::from_darkness(size, rgba, lightness)?,
         (None, None) => AnalogyPair::from_lines(size, rgba)?,
     };
-    Ok(if options.tileable_photo { pair.tileable() } else { pair })
+    let pair = if options.tileable_photo { pair.tileable() } else { pair };
+    Ok(match options.flatten {
+        Some(radius) => pair.flattened(radius)?,
+        None => pair,
+    })
 }
 
 /// Cracks, white on black.
-pub(crate) fn guide_picture(is_crack: impl Fn(u32, u32) -> bool, size: UVec2) -> RgbaImage {
+fn guide_picture(is_crack: impl Fn(u32, u32) -> bool, size: UVec2) -> RgbaImage {
     RgbaImage::from_fn(size.x, size.y, |x, y| {
         let light = if is_crack(x, y) { 255 } else { 0 };
         Rgba([light, light, light, 255])
     })
 }
 
+fn grey(values: &Grid<u8>) -> GrayImage {
+    let size = values.size();
+    GrayImage::from_fn(size.x, size.y, |x, y| Luma([values.get(x, y).unwrap_or(0)]))
+}
+
 /// Panels side by side.
-pub(crate) fn row(panels: &[RgbaImage]) -> RgbaImage {
+fn row(panels: &[RgbaImage]) -> RgbaImage {
     let width = panels.iter().map(|panel| panel.width() + GAP).sum::<u32>() + GAP;
     let height = panels.iter().map(RgbaImage::height).max().unwrap_or(0) + 2 * GAP;
     let mut sheet = RgbaImage::from_pixel(width, height, Rgba([120, 130, 150, 255]));
@@ -142,8 +183,10 @@ pub(crate) fn bake(options: &Options) -> Done<()> {
     for (name, value) in &options.set {
         params.set(name, value)?;
     }
-    let photos = options.photo.iter().map(|path| read_picture(path)).collect::<Done<Vec<_>>>()?;
-    let pairs = photos.iter().enumerate().map(|(at, photo)| pair(options, at, photo)).collect::<Done<Vec<_>>>()?;
+    let mut pairs = options.pair.iter().map(|name| shipped_pair(name)).collect::<Done<Vec<_>>>()?;
+    for (at, path) in options.photo.iter().enumerate() {
+        pairs.push(pair(options, at, &read_picture(path)?)?);
+    }
     let depth = pattern(&options.pattern, options.size)?;
 
     let clock = Instant::now();
@@ -156,8 +199,12 @@ pub(crate) fn bake(options: &Options) -> Done<()> {
     fs::create_dir_all(&options.out)?;
     let colors = picture(&analogy.colors());
     colors.save(options.out.join("diffuse.png"))?;
-    carry(&analogy, &options.height, &pairs, &options.out.join("height.png"))?;
-    carry(&analogy, &options.normal, &pairs, &options.out.join("normal.png"))?;
+    for (files, map) in [(&options.height, "height"), (&options.normal, "normal")] {
+        let own: Vec<_> = options.pair.iter().map(|name| shipped(name, &format!("_{map}"))).collect();
+        let own = if own.iter().all(|file| file.exists()) { own } else { Vec::new() };
+        let files = if options.pair.is_empty() { files } else { &own };
+        carry(&analogy, files, &pairs, &options.out.join(format!("{map}.png")))?;
+    }
     let size = analogy.size();
     let sources = ImageBuffer::<Rgb<u16>, _>::from_fn(size.x, size.y, |x, y| {
         let TexelSource { pair, texel: [u, v] } =
@@ -165,21 +212,21 @@ pub(crate) fn bake(options: &Options) -> Done<()> {
         Rgb([u, v, pair])
     });
     sources.save(options.out.join("sources.png"))?;
-    let least = ((params.depth * 65535.0) as u16).max(1);
-    let mut panels = Vec::new();
-    for (photo, pair) in photos.iter().zip(&pairs) {
-        let is_crack = |x, y| pair.cracks().get(x, y).is_some_and(|value| value > 0.0 && value >= params.depth);
-        panels.extend([guide_picture(is_crack, pair.size()), photo.clone()]);
+    for (at, guide) in (0..pairs.len()).filter_map(|at| analogy.examples().ramp(at)).enumerate() {
+        grey(&guide).save(options.out.join(format!("guide_a{at}.png")))?;
     }
-    panels.extend([guide_picture(|x, y| depth.get(x, y).is_some_and(|depth| depth >= least), size), colors]);
-    row(&panels).save(options.out.join("sheet.png"))?;
+    grey(&analogy.ramp()).save(options.out.join("guide_b.png"))?;
+    let mut all: Vec<_> = pairs.iter().flat_map(|pair| panels(pair, params.depth)).collect();
+    all.extend([pattern_panel(&depth, &params), colors]);
+    row(&all).save(options.out.join("sheet.png"))?;
     let area = TexelRect::whole(size).area() as f64;
     println!(
-        "{} pairs in {:.1} ms, {size} texels in {:.1} ms ({:.2} us each); written to {}",
+        "{} pairs in {:.1} ms, {size} texels in {:.1} ms ({:.2} us each), guides agree at {:.2} %; written to {}",
         pairs.len(),
         prepared.as_secs_f64() * 1e3,
         made.as_secs_f64() * 1e3,
         made.as_secs_f64() * 1e6 / area,
+        100.0 * analogy.agreement(26),
         options.out.display()
     );
     Ok(())

@@ -19,6 +19,9 @@ pub(super) const PAD: u32 = 6;
 /// The most texels that a list of places of equal guide values holds.
 const MOST_LISTED: usize = 1 << 17;
 
+/// One in how many texels of cracks count as the deepest.
+const DEEP_SHARE: usize = 12;
+
 /// A texel of the atlas: its row in the upper 16 bits, its column in the lower ones.
 pub(super) type Place = u32;
 
@@ -58,6 +61,27 @@ pub(super) struct Atlas {
     starts: Vec<u32>,
     /// For each value the nearest one that occurs.
     occurring: Vec<u8>,
+    /// The smallest value of the ramp: all that is deeper inside of cracks is alike.
+    pub(super) deepest: u8,
+}
+
+/// The ramp of a photograph.
+fn pair_ramp(pair: &AnalogyPair, params: &AnalogyParams) -> Vec<u8> {
+    let size = pair.size();
+    let is_crack = |x, y| pair.is_crack(x, y, params.depth);
+    ramp::ramp(size, TexelRect::whole(size), params.reach, pair.is_tileable(), is_crack)
+}
+
+/// The value of the ramp below which a few of the texels of cracks lie. Wider cracks than those of the photographs would be made
+/// of these few texels over and over if they were not alike to others.
+fn deepest(ramps: &[Vec<u8>]) -> u8 {
+    let mut counts = [0_usize; 256];
+    ramps.iter().flatten().for_each(|&value| counts[usize::from(value)] += 1);
+    let cracks: usize = counts[..128].iter().sum();
+    let mut left = cracks / DEEP_SHARE;
+    (0_u8..127)
+        .find(|&value| left.checked_sub(counts[usize::from(value)]).map(|rest| left = rest).is_none())
+        .unwrap_or(127)
 }
 
 /// Columns and rows of an atlas of photographs of these sizes.
@@ -84,8 +108,8 @@ impl Atlas {
         }
         let texels = vec![[0; 4]; stride * rows];
         let extras = vec![0; stride * rows * channels];
-        let (listed, starts, occurring) = (Vec::new(), vec![0; 257], vec![0; 256]);
-        Self { stride, texels, extras, channels, sheets, sheet_of_row, listed, starts, occurring }
+        let (listed, starts, occurring, deepest) = (Vec::new(), vec![0; 257], vec![0; 256], 0);
+        Self { stride, texels, extras, channels, sheets, sheet_of_row, listed, starts, occurring, deepest }
     }
 
     /// The level of full size.
@@ -94,10 +118,11 @@ impl Atlas {
         let wraps: Vec<_> = pairs.iter().map(AnalogyPair::is_tileable).collect();
         let given = pairs.first().map_or(0, |pair| pair.channels().len());
         let mut atlas = Self::empty(&sizes, &wraps, channels(params, given));
-        for (pair, sheet) in pairs.iter().zip(atlas.sheets.clone()) {
+        let ramps: Vec<_> = pairs.iter().map(|pair| pair_ramp(pair, params)).collect();
+        atlas.deepest = deepest(&ramps);
+        for ((pair, sheet), mut ramp) in pairs.iter().zip(atlas.sheets.clone()).zip(ramps) {
             let size = pair.size();
-            let is_crack = |x, y| pair.is_crack(x, y, params.depth);
-            let ramp = ramp::ramp(size, TexelRect::whole(size), params.reach, sheet.wraps, is_crack);
+            ramp.iter_mut().for_each(|value| *value = atlas.deepest.max(*value));
             let given: Vec<_> = pair.channels().iter().map(ramp::bytes).collect();
             let at = |texel: IVec2| texel.clamp(IVec2::ZERO, size.as_ivec2() - 1).as_uvec2();
             let index = |texel: UVec2| (texel.y * size.x + texel.x) as usize;

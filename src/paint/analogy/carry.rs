@@ -43,6 +43,25 @@ impl Analogy {
         }
     }
 
+    /// The guide `B`: 255 at [`AnalogyParams::reach`](super::AnalogyParams::reach) or more from all cracks, 128 at their edges, 0
+    /// that deep inside. As of the last work that was begun.
+    #[must_use]
+    pub fn ramp(&self) -> Grid<u8> {
+        let ramp = self.full().texels.iter().map(|texel| texel[3]).collect();
+        Grid::from_vec(self.size(), ramp).unwrap_or_else(|| Grid::new(self.size(), 255))
+    }
+
+    /// The share of texels whose guide differs by less than `tolerance` (of 255) from that of their source, 0..=1.
+    #[must_use]
+    pub fn agreement(&self, tolerance: u8) -> f32 {
+        let level = self.full();
+        let agrees = |(texel, &place): (&[u8; 4], &u32)| {
+            self.examples().ramp_at(place).is_some_and(|ramp| ramp.abs_diff(texel[3]) < tolerance)
+        };
+        let count = level.texels.iter().zip(&level.places).filter(|&pair| agrees(pair)).count();
+        count as f32 / level.texels.len() as f32
+    }
+
     /// The colour of a texel, RGBA8, sRGB; zero where nothing has been made yet, and outside of the surface.
     #[must_use]
     pub fn color(&self, x: u32, y: u32) -> [u8; 4] {

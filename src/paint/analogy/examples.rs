@@ -63,6 +63,19 @@ impl Examples {
         self.pictures.iter().map(Grid::size)
     }
 
+    /// The guide `A` of a pair, as [`Analogy::ramp`](super::Analogy::ramp); `None` if there is no such pair.
+    #[must_use]
+    pub fn ramp(&self, pair: usize) -> Option<Grid<u8>> {
+        let (atlas, sheet) = (&self.atlases[0], self.atlases[0].sheets.get(pair)?);
+        let all = (0..sheet.size.y).flat_map(|y| (0..sheet.size.x).map(move |x| UVec2::new(x, y)));
+        Grid::from_vec(sheet.size, all.map(|texel| atlas.texels[atlas.index(sheet.place(texel))][3]).collect())
+    }
+
+    /// The guide at a place.
+    pub(super) fn ramp_at(&self, place: Place) -> Option<u8> {
+        (place != NOWHERE).then(|| self.atlases[0].texels[self.atlases[0].index(place)][3])
+    }
+
     /// The texel of a photograph, RGBA8.
     pub(super) fn color(&self, place: Place) -> [u8; 4] {
         let (pair, texel) = self.texel(place);

@@ -60,13 +60,14 @@ impl GuideWork {
     }
 
     /// Computes a band of the ramp; returns its texels, none if all is done.
-    pub(super) fn step(&mut self, level: &mut Level, cracks: &[bool], reach: u32) -> Option<u64> {
+    pub(super) fn step(&mut self, level: &mut Level, cracks: &[bool], examples: &Examples) -> Option<u64> {
         let band = self.bands.pop_front()?;
         let size = level.size;
         let is_crack = |x: u32, y: u32| cracks[(y * size.x + x) as usize];
-        let ramp = ramp::ramp(size, band, reach, level.wraps, is_crack);
+        let ramp = ramp::ramp(size, band, examples.params.reach, level.wraps, is_crack);
+        let deepest = examples.atlases.first().map_or(0, |atlas| atlas.deepest);
         for (y, row) in (band.min.y..band.max.y).zip(ramp.chunks_exact(band.size().x as usize)) {
-            for (x, &value) in (band.min.x..).zip(row) {
+            for (x, value) in (band.min.x..).zip(row.iter().map(|&value| value.max(deepest))) {
                 let texel = &mut level.texels[(y * size.x + x) as usize];
                 if texel[3] != value {
                     texel[3] = value;

@@ -14,6 +14,7 @@ mod atlas;
 mod carry;
 mod error;
 mod examples;
+mod flatten;
 mod guide;
 mod level;
 mod pair;
@@ -22,6 +23,8 @@ mod ramp;
 mod region;
 mod search;
 mod state;
+#[cfg(test)]
+mod tests;
 mod work;
 
 pub use carry::TexelSource;

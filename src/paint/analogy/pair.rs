@@ -1,6 +1,6 @@
 //! [`AnalogyPair`]: a photograph of a cracked material and the guide that tells where its cracks are.
 
-use super::error::AnalogyError;
+use super::{error::AnalogyError, flatten::flatten};
 use crate::{Grid, pattern::CrackMask};
 use glam::UVec2;
 
@@ -103,6 +103,21 @@ impl AnalogyPair {
     pub const fn tileable(mut self) -> Self {
         self.is_tileable = true;
         self
+    }
+
+    /// Takes slow shading out of the photograph, such as that of uneven light, which would turn into patches: from each texel the mean
+    /// of those within about `radius` texels around it, plus the mean of all. Call it after [`tileable`](Self::tileable).
+    ///
+    /// What is copied then is the photograph without its shading, [`picture`](Self::picture).
+    ///
+    /// # Errors
+    /// [`AnalogyError::OutOfRange`] if `radius` is not in 4..=512.
+    pub fn flattened(mut self, radius: u32) -> Result<Self, AnalogyError> {
+        if !(4..=512).contains(&radius) {
+            return Err(AnalogyError::OutOfRange { name: "radius", value: radius as f32, min: 4.0, max: 512.0 });
+        }
+        self.picture = flatten(&self.picture, radius, self.is_tileable);
+        Ok(self)
     }
 
     /// Size of the photograph, texels.

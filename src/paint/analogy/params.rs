@@ -69,8 +69,8 @@ params! {
     reach: u32 = 12, 2.0, 60.0;
     /// Depth from which a texel is crack, 0..=1; default 0.25.
     depth: f32 = 0.25, 0.0, 1.0;
-    /// Weight of the guide against that of the three colours together, 0..=5; default 1.5. At 0 cracks go anywhere.
-    guide: f32 = 1.5, 0.0, 5.0;
+    /// Weight of the guide against that of the three colours together, 0..=5; default 3. At 0 cracks go anywhere.
+    guide: f32 = 3.0, 0.0, 5.0;
     /// Weight of the direction away from the crack, and of further channels, each against the guide; 0..=4; default 0.
     /// Raise it for photographs with light from one side. Further channels count by [`extra`](Self::extra).
     orientation: f32 = 0.0, 0.0, 4.0;

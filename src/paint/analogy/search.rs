@@ -19,11 +19,17 @@ const MIDDLE: f32 = 8.0;
 /// Mean squared difference of bytes that cannot be seen, below which nothing else is searched for.
 const ALIKE: u32 = 6;
 
+/// Largest weight of a further channel.
+const MOST_EXTRA: u32 = 8000;
+
 /// Mean squared difference of bytes that one more copy of the same place counts as.
 const AGAIN: u32 = 24;
 
 /// Copies of one place beyond which more do not count.
 const MOST_AGAIN: u32 = 16;
+
+/// Difference of guides, of 255, below which the inside of a piece stays as it is.
+const GUIDE_FITS: u8 = 8;
 
 /// Room for candidates of one texel: itself, eight neighbours, random ones.
 const MOST: usize = 24;
@@ -63,7 +69,8 @@ impl Weights {
                 guides += guide as u32;
             }
         }
-        let extra = |weight: f32| (weight * guides as f32) as u32;
+        // Sums over all channels rarely reach what 32 bits hold, and then all places are equally bad.
+        let extra = |weight: f32| ((weight * guides as f32) as u32).min(MOST_EXTRA);
         let mut extras = vec![extra(params.extra); given];
         if params.orientation > 0.0 {
             extras.extend([extra(params.orientation); 2]);
@@ -117,11 +124,18 @@ impl Search<'_> {
     pub(super) fn improve(&self, level: &mut Level, texel: UVec2) {
         let index = level.index(texel);
         let current = level.places[index];
+        let (offers, count) = self.offers(level, texel, current);
+        if count == 0 && level.uses.is_empty() && self.guide_fits(level, index) {
+            // Inside of a piece that is copied as a whole.
+            return;
+        }
         let around = level.around(texel);
         let mut best = Best { tried: [NOWHERE; MOST], count: 0, place: current, cost: u32::MAX };
         self.consider(&mut best, &around, &self.weights.rows, level, index, current, 0);
         if best.cost > 0 {
-            self.continue_neighbours(&mut best, &around, &self.weights.rows, level, texel);
+            for &place in &offers[..count] {
+                self.consider(&mut best, &around, &self.weights.rows, level, index, place, 0);
+            }
         }
         if best.cost > self.weights.alike {
             self.guess(&mut best, &around, &self.weights.rows, level, index);
@@ -132,7 +146,8 @@ impl Search<'_> {
         }
     }
 
-    /// Finds a place for a texel whose neighbours may have none yet: these count by their guides alone. `first` is tried first.
+    /// Finds a place for a texel whose neighbours may have none yet: these count by their guides alone. `first` is tried
+    /// first.
     pub(super) fn begin(&self, level: &mut Level, texel: UVec2, first: Option<Place>) {
         let index = level.index(texel);
         let around = level.around(texel);
@@ -145,11 +160,14 @@ impl Search<'_> {
                 }
             }
         }
-        let mut best = Best { tried: [NOWHERE; MOST], count: 0, place: NOWHERE, cost: u32::MAX };
-        if let Some(place) = first {
+        let first = first.or_else(|| self.atlas.alike(level.texels[index][3], mix(self.seed ^ !(index as u64)) as u32));
+        let Some(first) = first else { return };
+        let mut best = Best { tried: [NOWHERE; MOST], count: 0, place: first, cost: u32::MAX };
+        self.consider(&mut best, &around, &weights, level, index, first, 0);
+        let (offers, count) = self.offers(level, texel, first);
+        for &place in &offers[..count] {
             self.consider(&mut best, &around, &weights, level, index, place, 0);
         }
-        self.continue_neighbours(&mut best, &around, &weights, level, texel);
         if best.cost > 0 {
             self.guess(&mut best, &around, &weights, level, index);
         }
@@ -157,21 +175,33 @@ impl Search<'_> {
         level.is_new[index] = true;
     }
 
+    /// The places that continue those of the neighbours, each once, but for `current`.
     #[inline(always)]
-    fn continue_neighbours(&self, best: &mut Best, around: &Around, weights: &Around, level: &Level, texel: UVec2) {
+    fn offers(&self, level: &Level, texel: UVec2, current: Place) -> ([Place; NEIGHBOURS.len()], usize) {
+        let (mut offers, mut count) = ([NOWHERE; NEIGHBOURS.len()], 0);
         for by in NEIGHBOURS.map(IVec2::from) {
             let Some(neighbour) = level.neighbour(texel, by) else { continue };
             let place = level.places[level.index(neighbour)];
             if place == NOWHERE {
                 continue;
             }
-            if let Some(place) = self.atlas.moved(place, -by) {
-                self.consider(best, around, weights, level, level.index(texel), place, 0);
+            let Some(place) = self.atlas.moved(place, -by) else { continue };
+            if place != current && !offers[..count].contains(&place) {
+                offers[count] = place;
+                count += 1;
             }
         }
+        (offers, count)
     }
 
-    /// Random places of the same guide value, then others around the best place.
+    /// Whether the guide of a texel is nearly that of its place.
+    #[inline(always)]
+    fn guide_fits(&self, level: &Level, index: usize) -> bool {
+        let found = self.atlas.texels[self.atlas.index(level.places[index])][3];
+        level.channels == 0 && found.abs_diff(level.texels[index][3]) < GUIDE_FITS
+    }
+
+    /// Random places of the same guide value.
     #[inline(always)]
     fn guess(&self, best: &mut Best, around: &Around, weights: &Around, level: &Level, index: usize) {
         let ramp = level.texels[index][3];

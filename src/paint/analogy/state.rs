@@ -73,7 +73,7 @@ impl Analogy {
     /// A surface with these depths (0 = untouched, 65535 = the deepest), as of
     /// [`DepthField::depth`](crate::raster::DepthField::depth), and as many further channels as the pairs have.
     ///
-    /// Nothing is made before [`step`](Self::step) or [`finish`](Self::finish). Takes 18 bytes for each texel.
+    /// Nothing is made before [`step`](Self::step) or [`finish`](Self::finish). Takes about 14 bytes for each texel.
     ///
     /// # Errors
     /// [`AnalogyError`] if a side is 0 or above [`MAX_SURFACE_SIDE`], or if the channels differ in number or size or have a value

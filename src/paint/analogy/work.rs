@@ -59,7 +59,7 @@ impl Work {
     ) -> Option<u64> {
         if let Some(guide) = &mut self.guide {
             let full = levels.first_mut()?;
-            if let Some(visited) = guide.step(full, cracks, examples.params.reach) {
+            if let Some(visited) = guide.step(full, cracks, examples) {
                 self.done += visited;
                 return Some(visited);
             }
