@@ -1,5 +1,5 @@
-//! Image analogies on one thread: whole surfaces, photographs of several sizes, one more crack on a finished surface; and the plain
-//! way, which compares every texel with all of the photograph, on a small picture.
+//! Image analogies on one thread: whole surfaces, photographs of several sizes, one more crack on a finished surface;
+//! and the plain way, which compares every texel with all of the photograph, on a small picture.
 //!
 //! `cargo bench --no-default-features --bench analogy`.
 
@@ -50,7 +50,7 @@ fn surfaces(c: &mut Criterion) {
         let (Some(examples), Some(depth)) = (prepared(384), pattern(side)) else { return };
         group.throughput(Throughput::Elements(u64::from(side * side)));
         group.bench_function(BenchmarkId::new("surface of side", side), |b| {
-            b.iter(|| made(&examples, black_box(&depth)))
+            b.iter(|| made(&examples, black_box(&depth)));
         });
     }
     for side in [192, 384, 768, 1536] {
@@ -81,7 +81,7 @@ fn changes(c: &mut Criterion) {
             b.iter_batched_ref(
                 || whole.clone(),
                 |wall| {
-                    let done = wall.update(&depth, rect);
+                    let done = wall.update(&depth, &[rect]);
                     wall.finish();
                     done
                 },

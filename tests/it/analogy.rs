@@ -108,33 +108,36 @@ fn maps_are_carried_with_the_colours() {
 /// A wall whose picture is the first pair, hit and cracked step by step.
 #[test]
 fn a_growing_crack_leaves_the_rest_as_it_is() {
-    let ground = pair("concrete");
     let size = UVec2::splat(320);
-    let crop = image::imageops::crop_imm(&picture("clay"), 0, 0, 320, 320).to_image();
+    let clay = picture("../textures/clay");
+    let crop = image::imageops::crop_imm(&clay, 90, 120, 320, 320).to_image();
     // The wall's own picture, without cracks; the cracks come from the second pair.
     let base = AnalogyPair::new(size, crop.as_raw(), Grid::new(size, 0.0)).unwrap();
-    let examples = Arc::new(Examples::new(&[base, ground, pair("clay")], &AnalogyParams::DEFAULT).unwrap());
+    let examples = Arc::new(Examples::new(&[base, pair("clay")], &AnalogyParams::DEFAULT).unwrap());
     let frame = SurfaceFrame::new(size).unwrap();
-    let mut growth = CrackGrowth::new(CrackPreset::CONCRETE.growth.clone(), frame.extent(), 5).unwrap();
-    growth.hit(Vec2::splat(0.5), 3.0);
+    let mut growth = CrackGrowth::new(CrackPreset::MUD.growth.clone(), frame.extent(), 5).unwrap();
+    growth.hit(Vec2::new(0.3, 0.4), 2.0);
     let mut field = DepthField::new(frame);
     let mut wall = Analogy::new(examples, &field.depth, &[], 9).unwrap();
     wall.finish();
     assert!(wall.colors().as_slice().as_flattened() == crop.as_raw(), "without cracks it is the picture");
-    let (mut steps, mut changed_texels, mut visited) = (0, 0, 0);
-    while steps < 100 && growth.step().grew() {
+    let (mut steps, mut changed_texels, mut visited) = (0_u64, 0, 0);
+    while steps < 100 {
+        if !growth.step().grew() {
+            growth.hit(Vec2::new(0.7, 0.6), 3.0);
+            continue;
+        }
         steps += 1;
         let before = (field.depth.clone(), wall.sources());
         for path in growth.network().segments().filter_map(|segment| growth.network().path(segment)) {
-            stamp_path(&mut field, &CrackPreset::CONCRETE.profile, &path);
+            stamp_path(&mut field, &CrackPreset::MUD.profile, &path);
         }
         let rects: Vec<TexelRect> = (0..size.y)
             .flat_map(|y| (0..size.x).map(move |x| UVec2::new(x, y)))
             .filter(|at| field.depth.get(at.x, at.y) != before.0.get(at.x, at.y))
             .map(|min| TexelRect { min, max: min + 1 })
             .collect();
-        let Some(rect) = rects.iter().copied().reduce(TexelRect::union) else { continue };
-        wall.update(&field.depth, rect).unwrap();
+        wall.update(&field.depth, &rects).unwrap();
         wall.take_changed();
         wall.finish();
         visited += wall.take_changed().iter().map(TexelRect::area).sum::<u64>();
@@ -154,7 +157,9 @@ fn a_growing_crack_leaves_the_rest_as_it_is() {
         );
     }
     println!("{steps} steps: {changed_texels} texels of the cracks, {visited} texels made");
-    assert!(steps > 20 && changed_texels > 500);
+    assert!(changed_texels > 5000);
+    // Less than the whole surface each time.
+    assert!(visited < steps * u64::from(size.element_product()) / 3, "{visited}");
     // A run at once from the same end draws the same cracks.
     assert!(wall.agreement(26) > 0.985, "{}", wall.agreement(26));
     if let Some(folder) = std::env::var_os("CRACK_PICTURES") {

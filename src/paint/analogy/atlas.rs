@@ -72,8 +72,8 @@ fn pair_ramp(pair: &AnalogyPair, params: &AnalogyParams) -> Vec<u8> {
     ramp::ramp(size, TexelRect::whole(size), params.reach, pair.is_tileable(), is_crack)
 }
 
-/// The value of the ramp below which a few of the texels of cracks lie. Wider cracks than those of the photographs would be made
-/// of these few texels over and over if they were not alike to others.
+/// The value of the ramp below which a few of the texels of cracks lie. Wider cracks than those of the photographs
+/// would be made of these few texels over and over if they were not alike to others.
 fn deepest(ramps: &[Vec<u8>]) -> u8 {
     let mut counts = [0_usize; 256];
     ramps.iter().flatten().for_each(|&value| counts[usize::from(value)] += 1);

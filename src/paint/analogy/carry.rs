@@ -43,8 +43,8 @@ impl Analogy {
         }
     }
 
-    /// The guide `B`: 255 at [`AnalogyParams::reach`](super::AnalogyParams::reach) or more from all cracks, 128 at their edges, 0
-    /// that deep inside. As of the last work that was begun.
+    /// The guide `B`: 255 at [`AnalogyParams::reach`](super::AnalogyParams::reach) or more from all cracks, 128 at
+    /// their edges, 0 that deep inside. As of the last work that was begun.
     #[must_use]
     pub fn ramp(&self) -> Grid<u8> {
         let ramp = self.full().texels.iter().map(|texel| texel[3]).collect();
@@ -80,8 +80,8 @@ impl Analogy {
         colors
     }
 
-    /// Writes the colours in a rectangle into the RGBA8 texels of an image of the surface's size. A slice that is shorter
-    /// is left unchanged.
+    /// Writes the colours in a rectangle into the RGBA8 texels of an image of the surface's size. A slice that is
+    /// shorter is left unchanged.
     pub fn paint_into(&self, rect: TexelRect, rgba: &mut [u8]) {
         let rect = rect.intersect(TexelRect::whole(self.size()));
         let texels = rgba.as_chunks_mut::<4>().0;
@@ -97,8 +97,8 @@ impl Analogy {
         }
     }
 
-    /// Another map that belongs to the photographs, such as heights or normals, copied from the same texels. `maps` has one
-    /// for each pair; texels that have not been made get `nothing`.
+    /// Another map that belongs to the photographs, such as heights or normals, copied from the same texels. `maps` has
+    /// one for each pair; texels that have not been made get `nothing`.
     ///
     /// # Errors
     /// [`AnalogyError`] if there is not one map for each pair, or one has another size than its photograph.

@@ -6,8 +6,8 @@ use glam::{UVec2, Vec2Swizzles};
 /// Box filters one after the other: three come close to a Gaussian.
 const ROUNDS: usize = 3;
 
-/// The photograph less what changes slowly, plus its mean: the colour of each texel less the mean of those up to about `radius`
-/// around it. Alpha stays as it is.
+/// The photograph less what changes slowly, plus its mean: the colour of each texel less the mean of those up to about
+/// `radius` around it. Alpha stays as it is.
 pub(super) fn flatten(picture: &Grid<[u8; 4]>, radius: u32, wraps: bool) -> Grid<[u8; 4]> {
     let (size, mut out) = (picture.size(), picture.clone());
     for channel in 0..3 {

@@ -11,16 +11,19 @@ use crate::raster::TexelRect;
 use glam::{IVec2, UVec2};
 use std::collections::VecDeque;
 
-/// Rows of the ramp that are computed at once.
-const BAND: u32 = 64;
+/// The ramp is computed in runs of tiles of `2^LOG_TILE` texels a side.
+const LOG_TILE: u32 = 5;
 
 /// New cracks in a rectangle.
 #[derive(Clone, Debug)]
-pub(super) struct Change {
+pub(super) struct NewCracks {
     pub(super) rect: TexelRect,
     /// Of the rectangle, row after row.
     pub(super) is_crack: Vec<bool>,
 }
+
+/// What one call takes over.
+pub(super) type Change = Vec<NewCracks>;
 
 /// Work on the guide for one change.
 #[derive(Clone, Debug)]
@@ -32,26 +35,18 @@ pub(super) struct GuideWork {
 impl GuideWork {
     /// Writes the new cracks. The ramp can change up to `reach` texels around them.
     pub(super) fn new(change: &Change, cracks: &mut [bool], size: UVec2, examples: &Examples) -> Self {
-        let width = change.rect.size().x as usize;
-        let rows = (change.rect.min.y..change.rect.max.y).map(|y| Span {
-            y,
-            start: change.rect.min.x,
-            end: change.rect.max.x,
-        });
-        for (span, row) in rows.clone().zip(change.is_crack.chunks_exact(width.max(1))) {
-            let start = (span.y * size.x + span.start) as usize;
-            cracks[start..start + width].copy_from_slice(row);
-        }
-        let params = &examples.params;
-        let around = Region::new(rows.collect()).grown(params.reach, size, params.is_tileable);
-        let mut bands = VecDeque::new();
-        for rect in around.rects() {
-            for y in (rect.min.y..rect.max.y).step_by(BAND as usize) {
-                let (min, max) = (UVec2::new(rect.min.x, y), UVec2::new(rect.max.x, (y + BAND).min(rect.max.y)));
-                bands.push_back(TexelRect { min, max });
+        let mut spans = Vec::new();
+        for NewCracks { rect, is_crack } in change {
+            let width = rect.size().x as usize;
+            for (y, row) in (rect.min.y..rect.max.y).zip(is_crack.chunks_exact(width.max(1))) {
+                let start = (y * size.x + rect.min.x) as usize;
+                cracks[start..start + width].copy_from_slice(row);
+                spans.push(Span { y, start: rect.min.x, end: rect.max.x });
             }
         }
-        Self { bands, changed: Vec::new() }
+        let params = &examples.params;
+        let around = Region::new(spans).grown(params.reach, size, params.is_tileable);
+        Self { bands: around.tiles(LOG_TILE, size).into(), changed: Vec::new() }
     }
 
     /// Texels of the ramp that are left.

@@ -18,8 +18,8 @@ pub(super) struct Level {
     pub(super) places: Vec<Place>,
     /// Whether the place of a texel is another one than before the work in progress.
     pub(super) is_new: Vec<bool>,
-    /// How often each texel of the atlas has been copied; empty on the large levels, which take over what the small ones
-    /// have chosen.
+    /// How often each texel of the atlas has been copied; empty on the large levels, which take over what the small
+    /// ones have chosen.
     pub(super) uses: Vec<u16>,
 }
 

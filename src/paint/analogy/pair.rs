@@ -86,8 +86,8 @@ impl AnalogyPair {
     /// dry. All pairs of an analogy and its surface must have the same channels.
     ///
     /// # Errors
-    /// [`AnalogyError`] if the channel has another size than the photograph, a value that is not finite, or if there are
-    /// [`MAX_CHANNELS`] already.
+    /// [`AnalogyError`] if the channel has another size than the photograph, a value that is not finite, or if there
+    /// are [`MAX_CHANNELS`] already.
     pub fn with_channel(mut self, channel: Grid<f32>) -> Result<Self, AnalogyError> {
         check_channel("channel", &channel, self.size())?;
         let count = self.channels.len() + 1;
@@ -105,8 +105,9 @@ impl AnalogyPair {
         self
     }
 
-    /// Takes slow shading out of the photograph, such as that of uneven light, which would turn into patches: from each texel the mean
-    /// of those within about `radius` texels around it, plus the mean of all. Call it after [`tileable`](Self::tileable).
+    /// Takes slow shading out of the photograph, such as that of uneven light, which would turn into patches: from each
+    /// texel the mean of those within about `radius` texels around it, plus the mean of all. Call it after
+    /// [`tileable`](Self::tileable).
     ///
     /// What is copied then is the photograph without its shading, [`picture`](Self::picture).
     ///

@@ -21,8 +21,8 @@ macro_rules! params {
         #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
         pub struct AnalogyParams {
             $($(#[doc = $doc])* pub $name: $kind,)*
-            /// Whether the result continues from its right border to its left one and from its lower border to its upper
-            /// one, so that it can be repeated without seams; cracks should do the same. Default false.
+            /// Whether the result continues from its right border to its left one and from its lower border to its
+            /// upper one, so that it can be repeated without seams; cracks should do the same. Default false.
             pub is_tileable: bool,
         }
 
@@ -45,8 +45,8 @@ macro_rules! params {
             /// Sets the number `name` from text, as in `reach` and `12`.
             ///
             /// # Errors
-            /// [`AnalogyError::Unknown`] if there is no such number, [`AnalogyError::Unreadable`] if the text is not its
-            /// value, [`AnalogyError::OutOfRange`] if it is out of its range; nothing changes then.
+            /// [`AnalogyError::Unknown`] if there is no such number, [`AnalogyError::Unreadable`] if the text is not
+            /// its value, [`AnalogyError::OutOfRange`] if it is out of its range; nothing changes then.
             pub fn set(&mut self, name: &str, text: &str) -> Result<(), AnalogyError> {
                 let unreadable = || AnalogyError::Unreadable { name: name.into(), text: text.into() };
                 let mut changed = *self;
@@ -79,8 +79,8 @@ params! {
     /// How much better a place must match than one that continues a neighbour, as a share: `κ` of Hertzmann et al.,
     /// section 3.2. 0..=4; default 0.4. Larger values copy larger pieces.
     coherence: f32 = 0.4, 0.0, 4.0;
-    /// How much places that have been copied before are avoided on the small levels, 0..=8; default 1. Larger values repeat less
-    /// and have more seams.
+    /// How much places that have been copied before are avoided on the small levels, 0..=8; default 1. Larger values
+    /// repeat less and have more seams.
     variety: f32 = 1.0, 0.0, 8.0;
     /// Levels of the pyramids, each half the size of the one before. 1..=8; default 5.
     levels: u32 = 5, 1.0, 8.0;

@@ -1,7 +1,8 @@
 //! The guide: a ramp of the signed distance to the edge of the nearest crack.
 //!
-//! A mask of crack or not says nothing about most texels, and a search that sees only a few texels around has nothing to go by.
-//! The ramp tells every texel within reach how far it is from a crack, and its slope tells in which direction.
+//! A mask of crack or not says nothing about most texels, and a search that sees only a few texels around has nothing
+//! to go by. The ramp tells every texel within reach how far it is from a crack, and its slope tells in which
+//! direction.
 
 use crate::{
     Grid,
@@ -16,8 +17,8 @@ const EDGE: f32 = 127.5;
 
 /// The ramp of the texels in `rect` of a surface of `size`: 0 = `reach` inside a crack, 255 = `reach` away from all.
 ///
-/// `is_crack` is asked for texels of the surface only. Beyond its borders there is no crack, or what lies at the opposite
-/// border if it `wraps`.
+/// `is_crack` is asked for texels of the surface only. Beyond its borders there is no crack, or what lies at the
+/// opposite border if it `wraps`.
 pub(super) fn ramp(
     size: UVec2,
     rect: TexelRect,
@@ -64,8 +65,8 @@ pub(super) fn ramp(
     out
 }
 
-/// The direction in which the ramp rises, as two bytes around 128: its slope over three texels, of unit length; 128, 128 where it is
-/// level.
+/// The direction in which the ramp rises, as two bytes around 128: its slope over three texels, of unit length; 128,
+/// 128 where it is level.
 pub(super) fn orientation(ramp: impl Fn(IVec2) -> u8, at: IVec2) -> [u8; 2] {
     let value = |dx, dy| f32::from(ramp(at + IVec2::new(dx, dy)));
     let across = value(1, -1) - value(-1, -1) + 2.0 * (value(1, 0) - value(-1, 0)) + value(1, 1) - value(-1, 1);

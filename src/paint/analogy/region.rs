@@ -76,18 +76,18 @@ impl Region {
         Self::new(spans)
     }
 
-    /// Rectangles that cover the region without overlap: for each run of rows, the texels between its first and its
-    /// last column.
-    pub(super) fn rects(&self) -> Vec<TexelRect> {
-        let mut rects: Vec<TexelRect> = Vec::new();
-        for span in &self.0 {
-            let row = TexelRect { min: UVec2::new(span.start, span.y), max: UVec2::new(span.end, span.y + 1) };
-            match rects.last_mut() {
-                Some(last) if last.max.y == span.y + 1 || last.max.y == span.y => *last = last.union(row),
-                _ => rects.push(row),
-            }
+    /// Rectangles that cover the region without overlap: runs of tiles of `2^log_side` texels a side, cut at the border
+    /// of `size`.
+    pub(super) fn tiles(&self, log_side: u32, size: UVec2) -> Vec<TexelRect> {
+        let mut tiles = self.clone();
+        for _ in 0..log_side {
+            tiles = tiles.halved();
         }
-        rects
+        let rect = |span: &Span| {
+            let (min, max) = (UVec2::new(span.start, span.y) << log_side, UVec2::new(span.end, span.y + 1) << log_side);
+            TexelRect { min, max: max.min(size) }
+        };
+        tiles.0.iter().map(rect).collect()
     }
 }
 
@@ -133,7 +133,7 @@ mod tests {
             let covers =
                 |&(x, y): &(u32, u32)| all(size).any(|(u, v)| (u / 2, v / 2) == (x, y) && has(u.into(), v.into()));
             assert_eq!(set(&region.halved()), all(half).filter(covers).collect::<Vec<_>>());
-            let rects = grown.rects();
+            let rects = grown.tiles(rng.next_u32() % 4, size);
             for (x, y) in want {
                 let at = UVec2::new(x, y);
                 let hits = rects.iter().filter(|rect| at.cmpge(rect.min).all() && at.cmplt(rect.max).all()).count();

@@ -1,8 +1,8 @@
 //! The search for the place that fits a texel best.
 //!
-//! Candidates are the places that continue those of the neighbours (Ashikhmin 2001; "coherence match" in Hertzmann et al. 2001,
-//! section 3.2), and a few random places of the same guide value. PatchMatch (Barnes et al. 2009) shows that so few are enough:
-//! a good place that one texel has found spreads to its neighbours in the same pass.
+//! Candidates are the places that continue those of the neighbours (Ashikhmin 2001; "coherence match" in Hertzmann et
+//! al. 2001, section 3.2), and a few random places of the same guide value. Barnes et al. 2009 show that so few are
+//! enough: a good place that one texel has found spreads to its neighbours in the same pass.
 
 use super::{
     atlas::{Atlas, NOWHERE, Place, RADIUS, ROW, SIDE},
@@ -146,8 +146,8 @@ impl Search<'_> {
         }
     }
 
-    /// Finds a place for a texel whose neighbours may have none yet: these count by their guides alone. `first` is tried
-    /// first.
+    /// Finds a place for a texel whose neighbours may have none yet: these count by their guides alone. `first` is
+    /// tried first.
     pub(super) fn begin(&self, level: &mut Level, texel: UVec2, first: Option<Place>) {
         let index = level.index(texel);
         let around = level.around(texel);
@@ -251,7 +251,8 @@ impl Search<'_> {
         })
     }
 
-    /// The weighted squared difference of the texels around a place to those wanted; any value from `limit` on if it is not below.
+    /// The weighted squared difference of the texels around a place to those wanted; any value from `limit` on if it is
+    /// not below.
     #[inline(always)]
     fn difference(&self, around: &Around, weights: &Around, place: Place, mut sum: u32, limit: u32) -> u32 {
         let mut at = self.atlas.index(place) - RADIUS * (self.atlas.stride + 1);

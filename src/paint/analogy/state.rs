@@ -3,7 +3,7 @@
 use super::{
     error::AnalogyError,
     examples::Examples,
-    guide::{Change, GuideWork, shrink},
+    guide::{Change, GuideWork, NewCracks, shrink},
     level::Level,
     pair::{MAX_CHANNELS, check_channel, check_size},
     ramp,
@@ -20,17 +20,21 @@ pub const MAX_SURFACE_SIDE: u32 = 8192;
 /// Shortest side of the smallest level of a surface, texels.
 const LEAST_SIDE: u32 = 4;
 
+/// Changes are told in runs of tiles of `2^LOG_TILE` texels a side.
+const LOG_TILE: u32 = 4;
+
 /// The first level on which it is counted how often each texel has been copied.
 const FIRST_COUNTED: usize = 2;
 
 /// A surface `B'` for which `A : A' :: B : B'` holds (Hertzmann et al. 2001; Mould 2005, section 5.1).
 ///
-/// Every texel is a copy of one of the photographs. The first call makes the whole surface; [`update`](Self::update) makes
-/// what lies near new cracks and leaves all else as it is. Work is done by [`step`](Self::step), in parts of any size, which do
-/// not change the result: it depends on examples, seed, and the rectangles and depths of the updates in their order.
+/// Every texel is a copy of one of the photographs. The first call makes the whole surface; [`update`](Self::update)
+/// makes what lies near new cracks and leaves all else as it is. Work is done by [`step`](Self::step), in parts of any
+/// size, which do not change the result: it depends on examples, seed, and the rectangles and depths of the updates in
+/// their order.
 ///
-/// Differs from the papers: the guide is a ramp of the distance to the crack, not the mask itself; the search for nearest
-/// neighbours is by coherence and random places instead of a tree; texels are made in several passes, each of
+/// Differs from the papers: the guide is a ramp of the distance to the crack, not the mask itself; the search for
+/// nearest neighbours is by coherence and random places instead of a tree; texels are made in several passes, each of
 /// which sees all neighbours, instead of in one.
 ///
 /// ```
@@ -49,7 +53,7 @@ const FIRST_COUNTED: usize = 2;
 /// let mut wall = Analogy::new(examples, &depth, &[], 7)?;
 /// wall.finish();
 /// depth.row_mut(9).fill(u16::MAX);
-/// wall.update(&depth, TexelRect { min: [0, 9].into(), max: [40, 10].into() })?;
+/// wall.update(&depth, &[TexelRect { min: [0, 9].into(), max: [40, 10].into() }])?;
 /// while wall.step(1000) {}
 /// assert_eq!(wall.color(30, 9), [10, 10, 10, 255]);
 /// assert_eq!(wall.color(30, 20), [200, 200, 200, 255]);
@@ -76,8 +80,8 @@ impl Analogy {
     /// Nothing is made before [`step`](Self::step) or [`finish`](Self::finish). Takes about 14 bytes for each texel.
     ///
     /// # Errors
-    /// [`AnalogyError`] if a side is 0 or above [`MAX_SURFACE_SIDE`], or if the channels differ in number or size or have a value
-    /// that is not finite.
+    /// [`AnalogyError`] if a side is 0 or above [`MAX_SURFACE_SIDE`], or if the channels differ in number or size or
+    /// have a value that is not finite.
     pub fn new(
         examples: Arc<Examples>,
         depth: &Grid<u16>,
@@ -107,36 +111,41 @@ impl Analogy {
         let is_crack = vec![false; size.element_product() as usize];
         let (queue, work, changed) = (VecDeque::new(), None, Vec::new());
         let mut analogy = Self { examples, levels, is_crack, seed, queue, work, is_begun: false, changed };
-        analogy.update(depth, TexelRect::whole(size))?;
+        analogy.update(depth, &[TexelRect::whole(size)])?;
         Ok(analogy)
     }
 
-    /// Takes over new depths inside a rectangle, which is clipped to the surface.
+    /// Takes over new depths inside rectangles, which are clipped to the surface.
     ///
-    /// The work is queued. What one call takes over is made together, after what earlier calls took over; so few calls with
-    /// larger rectangles take less time than many. Depths outside the rectangle must not have changed, or are
+    /// The work is queued. What one call takes over is made together, after what earlier calls took over; so few calls
+    /// with more rectangles take less time than many. Depths outside of the rectangles must not have changed, or are
     /// taken over by a later call.
     ///
     /// # Errors
     /// [`AnalogyError::SizesDiffer`] if `depth` does not have the size of the surface.
-    pub fn update(&mut self, depth: &Grid<u16>, changed: TexelRect) -> Result<(), AnalogyError> {
+    pub fn update(&mut self, depth: &Grid<u16>, changed: &[TexelRect]) -> Result<(), AnalogyError> {
         check_size("depth", depth.size(), self.size())?;
-        let rect = changed.intersect(TexelRect::whole(self.size()));
-        if rect.is_empty() {
-            return Ok(());
-        }
         let least = ((self.examples.params.depth * 65535.0) as u16).max(1);
-        let columns = rect.min.x as usize..rect.max.x as usize;
-        let rows = (rect.min.y..rect.max.y).map(|y| &depth.row(y as usize)[columns.clone()]);
-        let is_crack = rows.flatten().map(|&depth| depth >= least).collect();
-        self.queue.push_back(Change { rect, is_crack });
+        let whole = TexelRect::whole(self.size());
+        let rects = changed.iter().map(|rect| rect.intersect(whole)).filter(|rect| !rect.is_empty());
+        let change: Change = rects
+            .map(|rect| {
+                let columns = rect.min.x as usize..rect.max.x as usize;
+                let rows = (rect.min.y..rect.max.y).flat_map(|y| &depth.row(y as usize)[columns.clone()]);
+                NewCracks { rect, is_crack: rows.map(|&depth| depth >= least).collect() }
+            })
+            .collect();
+        if !change.is_empty() {
+            self.queue.push_back(change);
+        }
         Ok(())
     }
 
     /// Does some of the work that is queued: parts of up to a row until at least `texels` texels have been visited.
     /// Returns whether any is left.
     ///
-    /// Each texel is visited a few times; a visit takes about a quarter of a microsecond.
+    /// Each texel is visited a few times; a visit takes about a quarter of a microsecond. Who no longer wants the
+    /// result stops calling this and drops the surface; who wants it later goes on later.
     pub fn step(&mut self, texels: u64) -> bool {
         let mut visited = 0;
         while visited < texels {
@@ -150,7 +159,7 @@ impl Analogy {
             match work.step(&mut self.levels, &self.is_crack, &self.examples, self.seed) {
                 Some(count) => visited += count,
                 None => {
-                    self.changed.extend(work.region().rects());
+                    self.changed.extend(work.region().tiles(LOG_TILE, self.levels[0].size));
                     self.work = None;
                 }
             }

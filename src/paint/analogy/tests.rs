@@ -63,31 +63,29 @@ fn any_params(rng: &mut Rng) -> AnalogyParams {
     }
 }
 
+fn any_pair(rng: &mut Rng, channels: u32) -> AnalogyPair {
+    let size = UVec2::new(16 + rng.next_u32() % 30, 16 + rng.next_u32() % 30);
+    let plain = pair(rng, size);
+    let pair = (0..channels).fold(plain, |pair, _| pair.with_channel(any_channel(rng, size)).unwrap());
+    if rng.unit() < 0.5 { pair.tileable() } else { pair }
+}
+
 fn any_channel(rng: &mut Rng, size: UVec2) -> Grid<f32> {
     let values = (0..size.element_product()).map(|_| rng.unit()).collect();
     Grid::from_vec(size, values).unwrap()
 }
 
-/// For random pairs, surfaces and parameters: every texel is a copy of a texel, updates change nothing outside of their window, and the
-/// size of the steps does not matter.
+/// For random pairs, surfaces and parameters: every texel is a copy of a texel, updates change nothing outside of their
+/// window, and the size of the steps does not matter.
 #[test]
 fn all_parameters_give_copies_and_local_updates() {
     for case in 0..cases(150) {
         let mut rng = Rng::new(case).stream("analogies");
         let params = any_params(&mut rng);
-        let channels = (rng.next_u32() % 3) as usize;
-        let pairs: Vec<_> = (0..1 + rng.next_u32() % 2)
-            .map(|_| {
-                let size = UVec2::new(16 + rng.next_u32() % 30, 16 + rng.next_u32() % 30);
-                let mut pair = pair(&mut rng, size);
-                for _ in 0..channels {
-                    pair = pair.with_channel(any_channel(&mut rng, size)).unwrap();
-                }
-                if rng.unit() < 0.5 { pair.tileable() } else { pair }
-            })
-            .collect();
+        let channel_count = rng.next_u32() % 3;
+        let pairs: Vec<_> = (0..1 + rng.next_u32() % 2).map(|_| any_pair(&mut rng, channel_count)).collect();
         let size = UVec2::new(1 + rng.next_u32() % 60, 1 + rng.next_u32() % 60);
-        let channels: Vec<_> = (0..channels).map(|_| any_channel(&mut rng, size)).collect();
+        let channels: Vec<_> = (0..channel_count).map(|_| any_channel(&mut rng, size)).collect();
         let examples = Arc::new(Examples::new(&pairs, &params).unwrap());
         let mut depth = Grid::new(size, 0);
         let mut wall = Analogy::new(examples, &depth, &channels, case).unwrap();
@@ -97,30 +95,40 @@ fn all_parameters_give_copies_and_local_updates() {
         for _ in 0..2 {
             let before = wall.sources();
             let rect = any_change(&mut rng, &mut depth);
-            wall.update(&depth, rect).unwrap();
-            other.update(&depth, rect).unwrap();
+            wall.update(&depth, &[rect]).unwrap();
+            other.update(&depth, &[rect]).unwrap();
             wall.finish();
-            let far = |(x, y): (u32, u32)| {
-                let off = |at: u32, low: u32, high: u32, side: u32| {
-                    let plain = low.saturating_sub(at).max((at + 1).saturating_sub(high));
-                    let around = (at + side + 1).saturating_sub(high + if at < low { 0 } else { side });
-                    let before = (low + side).saturating_sub(at);
-                    if params.is_tileable { plain.min(around).min(before) } else { plain }
-                };
-                off(x, rect.min.x, rect.max.x, size.x).max(off(y, rect.min.y, rect.max.y, size.y)) > wall.window()
-            };
-            for (x, y) in (0..size.y).flat_map(|y| (0..size.x).map(move |x| (x, y))).filter(|&at| far(at)) {
-                assert_eq!(Some(wall.source(x, y).unwrap()), before.get(x, y), "case {case}: {x}, {y} of {rect:?}");
+            let is_far = |at: &UVec2| distance(*at, rect, size, params.is_tileable) > wall.window();
+            for at in texels(size).filter(is_far) {
+                assert_eq!(wall.source(at.x, at.y), before.get(at.x, at.y), "case {case}: {at} of {rect:?}");
             }
         }
         while other.step(1 + u64::from(rng.next_u32() % 300)) {}
         assert!(wall.sources() == other.sources(), "case {case}: the size of steps matters");
-        for (x, y) in (0..size.y).flat_map(|y| (0..size.x).map(move |x| (x, y))) {
-            let source = wall.source(x, y).unwrap();
+        for at in texels(size) {
+            let source = wall.source(at.x, at.y).unwrap();
             let [u, v] = source.texel.map(u32::from);
-            assert_eq!(Some(wall.color(x, y)), pairs[usize::from(source.pair)].picture().get(u, v), "case {case}");
+            assert_eq!(
+                Some(wall.color(at.x, at.y)),
+                pairs[usize::from(source.pair)].picture().get(u, v),
+                "case {case}"
+            );
         }
     }
+}
+
+fn texels(size: UVec2) -> impl Iterator<Item = UVec2> {
+    (0..size.y).flat_map(move |y| (0..size.x).map(move |x| UVec2::new(x, y)))
+}
+
+/// Columns or rows from a texel to a rectangle, whichever are more.
+fn distance(texel: UVec2, rect: TexelRect, size: UVec2, wraps: bool) -> u32 {
+    let axis = |at: u32, low: u32, high: u32, side: u32| {
+        let apart = |at: i64| (i64::from(low) - at).max(at + 1 - i64::from(high)).max(0) as u32;
+        let (at, side) = (i64::from(at), i64::from(side));
+        if wraps { apart(at).min(apart(at - side)).min(apart(at + side)) } else { apart(at) }
+    };
+    axis(texel.x, rect.min.x, rect.max.x, size.x).max(axis(texel.y, rect.min.y, rect.max.y, size.y))
 }
 
 /// Draws a short crack; returns where.
@@ -214,13 +222,13 @@ fn most_texels_have_the_best_place_that_continues_a_neighbour() {
             let near = 8.0 / (1.0 + f64::from(by.length_squared()) / 6.0);
             let wanted = level.texels[level.index(level.inside(texel + by))];
             let at = (atlas.index(place) as i64 + i64::from(by.y) * atlas.stride as i64 + i64::from(by.x)) as usize;
-            for channel in 0..4 {
+            for (channel, &wanted) in wanted.iter().enumerate() {
                 let weight = match channel {
                     3 => (3.0 * f64::from(params.guide) * near).round(),
                     _ if by == IVec2::ZERO => 0.0,
                     _ => near.round().max(1.0),
                 };
-                let off = f64::from(atlas.texels[at][channel]) - f64::from(wanted[channel]);
+                let off = f64::from(atlas.texels[at][channel]) - f64::from(wanted);
                 sum += weight * off * off;
             }
         }
@@ -252,19 +260,18 @@ fn a_change_costs_what_changes() {
         wall.finish();
         wall.take_changed();
         depth.row_mut(60)[60..80].fill(65535);
-        wall.update(&depth, TexelRect { min: UVec2::splat(60), max: UVec2::new(80, 61) }).unwrap();
+        wall.update(&depth, &[TexelRect { min: UVec2::splat(60), max: UVec2::new(80, 61) }]).unwrap();
         let mut calls = 0_u64;
         // A call does at least one row of a pass.
         while wall.step(1) {
             calls += 1;
         }
         let area: u64 = wall.take_changed().iter().map(TexelRect::area).sum();
+        // What is told is rounded to tiles of 16 texels.
+        assert!(area <= (20 + 2 * 17 + 30) * (1 + 2 * 17 + 30), "{area}");
         (calls, area)
     };
-    let small = visits(128);
-    assert_eq!(small, visits(512));
-    let reach = u64::from(AnalogyParams::DEFAULT.reach + AnalogyParams::DEFAULT.margin);
-    assert!(small.1 <= (20 + 2 * reach) * (1 + 2 * reach), "{small:?}");
+    assert_eq!(visits(128), visits(512));
 }
 
 /// A slope is taken out, texture and alpha stay.
@@ -296,83 +303,117 @@ fn slow_shading_is_taken_out() {
     }
 }
 
-#[test]
-fn bad_input_is_refused() {
-    let mut rng = Rng::new(1);
+/// A good pair of 20 x 20 texels, and a picture of that size.
+fn good() -> (UVec2, AnalogyPair, Vec<u8>) {
     let size = UVec2::splat(20);
-    let good = pair(&mut rng, size);
-    let (rgba, guide) = (vec![90; 1600], cracks(&mut rng, size, 2));
-    let refused =
-        |size: [u32; 2], rgba: &[u8], guide: Grid<f32>| AnalogyPair::new(size.into(), rgba, guide).unwrap_err();
+    (size, pair(&mut Rng::new(1), size), vec![90; 1600])
+}
+
+#[test]
+fn pictures_and_guides_that_do_not_fit_are_refused() {
+    let (size, good, rgba) = good();
+    let guide = good.cracks().clone();
+    let refused = |size: [u32; 2], rgba: &[u8], guide| AnalogyPair::new(size.into(), rgba, guide).unwrap_err();
     let (width, height) = (20, 20);
     assert_eq!(refused([20, 20], &rgba[4..], guide.clone()), AnalogyError::PictureSize { width, height, bytes: 1596 });
     let other = Grid::new(UVec2::new(20, 21), 0.0);
     assert!(matches!(refused([20, 20], &rgba, other), AnalogyError::SizesDiffer { name: "cracks", height: 21, .. }));
-    // Before memory is taken, and before the guide is looked at.
-    let small = Grid::new(UVec2::ONE, 0.0);
-    for side in [0, 1, 15, 8193, 20_000, u32::MAX] {
-        let error = refused([side, side], &[], small.clone());
-        assert!(matches!(error, AnalogyError::ExampleSize { least: 16, most: 8192, .. }), "{side}: {error}");
-    }
     let mut guide = guide;
     guide.row_mut(7)[3] = f32::NAN;
     assert_eq!(refused([20, 20], &rgba, guide), AnalogyError::NotFinite { name: "cracks", x: 3, y: 7 });
-    assert!(matches!(good.clone().with_channel(small), Err(AnalogyError::SizesDiffer { name: "channel", .. })));
     assert_eq!(AnalogyPair::from_lines(size, &rgba), Err(AnalogyError::NoLines));
-    assert!(AnalogyPair::from_darkness(size, &rgba, f32::NAN).is_err());
-    let mut full = good.clone();
-    for _ in 0..6 {
-        full = full.with_channel(Grid::new(size, 0.5)).unwrap();
+    for lightness in [-0.1, 1.1, f32::NAN] {
+        let error = AnalogyPair::from_darkness(size, &rgba, lightness);
+        assert!(matches!(error, Err(AnalogyError::OutOfRange { name: "lightness", .. })));
     }
-    assert!(matches!(
-        full.with_channel(Grid::new(size, 0.5)),
-        Err(AnalogyError::ChannelCount { count: 7, most: 6, .. })
-    ));
+}
 
+/// Before memory is taken, and before the guide is looked at.
+#[test]
+fn photographs_of_a_wrong_size_are_refused() {
+    for side in [0, 1, 15, 8193, 20_000, u32::MAX] {
+        let size = UVec2::splat(side);
+        let errors = [
+            AnalogyPair::new(size, &[], Grid::new(UVec2::ONE, 0.0)),
+            AnalogyPair::from_lines(size, &[]),
+            AnalogyPair::from_darkness(size, &[], 0.2),
+        ];
+        let (width, height) = (side, side);
+        for error in errors {
+            assert_eq!(error, Err(AnalogyError::ExampleSize { width, height, least: 16, most: 8192 }));
+        }
+    }
+}
+
+#[test]
+fn channels_that_do_not_fit_are_refused() {
+    let (size, good, _) = good();
+    let small = Grid::new(UVec2::ONE, 0.0);
+    assert!(matches!(good.clone().with_channel(small), Err(AnalogyError::SizesDiffer { name: "channel", .. })));
+    let channel = || Grid::new(size, 0.5);
+    let with_one = good.clone().with_channel(channel()).unwrap();
+    let full = (0..6).try_fold(good.clone(), |pair, _| pair.with_channel(channel())).unwrap();
+    let error = full.with_channel(channel()).unwrap_err();
+    assert!(matches!(error, AnalogyError::ChannelCount { count: 7, most: 6, .. }));
+    let error = Examples::new(&[good.clone(), with_one.clone()], &AnalogyParams::DEFAULT).unwrap_err();
+    assert!(matches!(error, AnalogyError::ChannelCount { count: 1, expected: 0, .. }));
+    let examples = |pair| Arc::new(Examples::new(&[pair], &AnalogyParams::DEFAULT).unwrap());
+    let depth = Grid::new(UVec2::splat(9), 0);
+    let wall = |examples, value| Analogy::new(examples, &depth, &[Grid::new(UVec2::splat(9), value)], 1).unwrap_err();
+    assert!(matches!(wall(examples(good), 0.0), AnalogyError::ChannelCount { count: 1, expected: 0, .. }));
+    let error = wall(examples(with_one), f32::INFINITY);
+    assert_eq!(error, AnalogyError::NotFinite { name: "channel", x: 0, y: 0 });
+}
+
+#[test]
+fn pairs_without_cracks_or_without_ground_are_refused() {
+    let (size, good, rgba) = good();
     let params = AnalogyParams::DEFAULT;
-    let examples = |pairs: &[AnalogyPair]| Examples::new(pairs, &params).unwrap_err();
+    let refused = |pairs: &[AnalogyPair]| Examples::new(pairs, &params).unwrap_err();
     let with = |value| AnalogyPair::new(size, &rgba, Grid::new(size, value)).unwrap();
-    assert_eq!(examples(&[with(0.0)]), AnalogyError::NoCrack { depth: 0.25 });
-    assert_eq!(examples(&[with(1.0)]), AnalogyError::AllCrack { depth: 0.25 });
-    assert_eq!(examples(&[]), AnalogyError::PairCount { count: 0, most: 16 });
-    assert_eq!(examples(&vec![good.clone(); 17]), AnalogyError::PairCount { count: 17, most: 16 });
-    let channel = good.clone().with_channel(Grid::new(size, 0.5)).unwrap();
-    assert!(matches!(
-        examples(&[good.clone(), channel.clone()]),
-        AnalogyError::ChannelCount { count: 1, expected: 0, .. }
-    ));
+    assert_eq!(refused(&[with(0.0)]), AnalogyError::NoCrack { depth: 0.25 });
+    assert_eq!(refused(&[with(1.0)]), AnalogyError::AllCrack { depth: 0.25 });
+    assert_eq!(refused(&[]), AnalogyError::PairCount { count: 0, most: 16 });
+    assert_eq!(refused(&vec![good.clone(); 17]), AnalogyError::PairCount { count: 17, most: 16 });
+    assert!(Examples::new(&[with(0.0), good], &params).is_ok(), "an uncracked picture beside a cracked one is allowed");
+}
+
+#[test]
+fn parameters_out_of_range_are_named() {
     for name in
         ["reach", "depth", "guide", "orientation", "coherence", "variety", "levels", "passes", "tries", "margin"]
     {
-        let mut params = params;
-        assert!(matches!(
-            params.set(name, "1e9"),
-            Err(AnalogyError::OutOfRange { .. } | AnalogyError::Unreadable { .. })
-        ));
-        assert!(params.set(name, "x").is_err() && params.set(name, "NaN").is_err());
+        let mut params = AnalogyParams::DEFAULT;
+        for text in ["1000", "-1", "x", "NaN"] {
+            let error = params.set(name, text).unwrap_err();
+            assert!(error.to_string().contains(&format!("`{name}`")), "{error}");
+        }
         assert_eq!(params, AnalogyParams::DEFAULT);
     }
-    // An uncracked picture beside a cracked one is allowed.
-    let examples = Arc::new(Examples::new(&[with(0.0), good], &params).unwrap());
-    let wall = |size: [u32; 2], channels: &[Grid<f32>]| {
-        Analogy::new(examples.clone(), &Grid::new(size.into(), 0), channels, 1).map(|_| ())
-    };
-    assert!(matches!(wall([0, 5], &[]), Err(AnalogyError::SurfaceSize { .. })));
-    assert!(matches!(wall([8193, 1], &[]), Err(AnalogyError::SurfaceSize { width: 8193, most: 8192, .. })));
-    assert!(matches!(wall([9, 9], &[Grid::new(UVec2::splat(9), 0.0)]), Err(AnalogyError::ChannelCount { .. })));
-    let with_channel = Arc::new(Examples::new(&[channel], &params).unwrap());
+    let unknown = AnalogyParams::DEFAULT.clone().set("speed", "1");
+    assert_eq!(unknown, Err(AnalogyError::Unknown { name: "speed".into() }));
+    let bad = AnalogyParams { coherence: f32::NAN, ..AnalogyParams::DEFAULT };
+    assert!(matches!(Examples::new(&[good().1], &bad), Err(AnalogyError::OutOfRange { name: "coherence", .. })));
+}
+
+#[test]
+fn surfaces_and_maps_of_a_wrong_size_are_refused() {
+    let examples = Arc::new(Examples::new(&[good().1], &AnalogyParams::DEFAULT).unwrap());
+    for [width, height] in [[0, 5], [5, 0], [8193, 1]] {
+        let error = Analogy::new(examples.clone(), &Grid::new(UVec2::new(width, height), 0), &[], 1).unwrap_err();
+        assert_eq!(error, AnalogyError::SurfaceSize { width, height, most: 8192 });
+    }
     let depth = Grid::new(UVec2::splat(9), 0);
-    let wrong = Analogy::new(with_channel, &depth, &[Grid::new(UVec2::splat(9), f32::INFINITY)], 1);
-    assert!(matches!(wrong, Err(AnalogyError::NotFinite { name: "channel", x: 0, y: 0 })));
     let mut wall = Analogy::new(examples, &depth, &[], 1).unwrap();
-    let refused = wall.update(&Grid::new(UVec2::splat(8), 0), TexelRect::whole(UVec2::splat(8)));
+    let small = Grid::new(UVec2::splat(8), 0);
+    let refused = wall.update(&small, &[TexelRect::whole(UVec2::splat(8))]);
     assert!(matches!(refused, Err(AnalogyError::SizesDiffer { name: "depth", .. })));
-    assert!(wall.carry(&[&depth], 0).is_err(), "one map for two pairs");
-    assert!(wall.carry(&[&depth, &depth], 0).is_err(), "maps of another size");
+    assert!(wall.carry(&[&depth, &depth], 0).is_err(), "two maps for one pair");
+    assert!(wall.carry(&[&depth], 0).is_err(), "a map of another size");
     // All crack, and rectangles beyond the border.
     let all = Grid::new(UVec2::splat(9), u16::MAX);
-    wall.update(&all, TexelRect { min: UVec2::ZERO, max: UVec2::MAX }).unwrap();
-    wall.update(&all, TexelRect { min: UVec2::splat(40), max: UVec2::MAX }).unwrap();
+    wall.update(&all, &[TexelRect { min: UVec2::ZERO, max: UVec2::MAX }, TexelRect::default()]).unwrap();
+    wall.update(&all, &[TexelRect { min: UVec2::splat(40), max: UVec2::MAX }]).unwrap();
     wall.finish();
     assert!(!wall.is_busy() && wall.progress() == 1.0);
 }
