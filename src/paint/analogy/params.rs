@@ -67,12 +67,12 @@ params! {
     /// Distance from a crack up to which the guide tells where a texel is, texels. Farther away all places are alike to
     /// it. 2..=60; default 12. Larger values carry stains and worn edges along, and leave fewer places to choose from.
     reach: u32 = 12, 2.0, 60.0;
-    /// Depth from which a texel is crack, 0..=1; default 0.25.
-    depth: f32 = 0.25, 0.0, 1.0;
+    /// Depth from which a texel is crack, 0..=1; default 0.15, so that thin cracks have few gaps.
+    depth: f32 = 0.15, 0.0, 1.0;
     /// Weight of the guide against that of the three colours together, 0..=5; default 3. At 0 cracks go anywhere.
     guide: f32 = 3.0, 0.0, 5.0;
-    /// Weight of the direction away from the crack, and of further channels, each against the guide; 0..=4; default 0.
-    /// Raise it for photographs with light from one side. Further channels count by [`extra`](Self::extra).
+    /// Weight of the direction away from the crack against the guide, 0..=4; default 0. Raise it for photographs with
+    /// light from one side.
     orientation: f32 = 0.0, 0.0, 4.0;
     /// Weight of each further channel against the guide, 0..=4; default 1.
     extra: f32 = 1.0, 0.0, 4.0;

@@ -256,19 +256,23 @@ impl Search<'_> {
     #[inline(always)]
     fn difference(&self, around: &Around, weights: &Around, place: Place, mut sum: u32, limit: u32) -> u32 {
         let mut at = self.atlas.index(place) - RADIUS * (self.atlas.stride + 1);
-        for (row, weights) in around.iter().zip(weights) {
-            let texels = self.atlas.texels[at..at + ROW].as_flattened();
+        // Few checks of the limit: each needs the sum of all lanes.
+        for rows in [0..3, 3..SIDE] {
             let mut part = 0_i32;
-            for ((&found, &wanted), &weight) in texels.iter().zip(row).zip(weights) {
-                let off = i16::from(found).wrapping_sub(wanted);
-                // 28 products of 15 and 8 bits cannot overflow.
-                part = part.wrapping_add(i32::from(off.wrapping_mul(weight)).wrapping_mul(i32::from(off)));
+            for (row, weights) in around[rows.clone()].iter().zip(&weights[rows]) {
+                let texels = self.atlas.texels[at..at + ROW].as_flattened();
+                for ((&found, &wanted), &weight) in texels.iter().zip(row).zip(weights) {
+                    let off = i16::from(found).wrapping_sub(wanted);
+                    // 112 products of 15 and 8 bits cannot overflow.
+                    let term = i32::from(off.wrapping_mul(weight)).wrapping_mul(i32::from(off));
+                    part = part.wrapping_add(term);
+                }
+                at += self.atlas.stride;
             }
             sum = sum.saturating_add(part as u32);
             if sum >= limit {
                 return sum;
             }
-            at += self.atlas.stride;
         }
         sum
     }

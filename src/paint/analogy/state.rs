@@ -141,7 +141,9 @@ impl Analogy {
         Ok(())
     }
 
-    /// Does some of the work that is queued: parts of up to a row until at least `texels` texels have been visited.
+    /// Does some of the work that is queued: parts of up to a row, until at least `texels` texels have been visited.
+    /// One part of each change, which takes its guide to the smaller levels, is as large as the change.
+    ///
     /// Returns whether any is left.
     ///
     /// Each texel is visited a few times; a visit takes about a quarter of a microsecond. Who no longer wants the

@@ -274,6 +274,45 @@ fn a_change_costs_what_changes() {
     assert_eq!(visits(128), visits(512));
 }
 
+/// Red on the left of a crack, blue on its right: with the orientation texels come from the side on which they lie, and
+/// with a channel from where it says.
+#[test]
+fn orientation_and_channels_choose_the_side() {
+    let size = UVec2::new(64, 64);
+    let photo: Vec<u8> = texels(size)
+        .flat_map(|at| match at.x {
+            30..33 => [9, 9, 9, 255],
+            0..30 => [200, 60, 60, 255],
+            _ => [60, 60, 200, 255],
+        })
+        .collect();
+    let pair = AnalogyPair::from_darkness(size, &photo, 0.1).unwrap();
+    let mut depth = Grid::new(UVec2::new(80, 40), 0);
+    for y in 0..40 {
+        depth.row_mut(y)[50..53].fill(u16::MAX);
+    }
+    // The share of texels near the crack, on either side, that are red.
+    let red = |params: AnalogyParams, pair: AnalogyPair, channels: &[Grid<f32>]| {
+        let mut wall = Analogy::new(Arc::new(Examples::new(&[pair], &params).unwrap()), &depth, channels, 1).unwrap();
+        wall.finish();
+        [41..49, 54..62].map(|columns: std::ops::Range<u32>| {
+            let all = columns.flat_map(|x| (0..40).map(move |y| (x, y)));
+            all.filter(|&(x, y)| wall.color(x, y)[0] > 100).count() as f32 / 320.0
+        })
+    };
+    let params = AnalogyParams { orientation: 2.0, ..AnalogyParams::DEFAULT };
+    let [left, right] = red(params, pair.clone(), &[]);
+    assert!(left > 0.95 && right < 0.05, "{left} {right}");
+    // The channel is 1 where the photograph is red; wanted on the upper half of both sides.
+    let channel = |size: UVec2, is_one: fn(UVec2) -> bool| {
+        Grid::from_vec(size, texels(size).map(|at| if is_one(at) { 1.0 } else { 0.0 }).collect()).unwrap()
+    };
+    let pair = pair.with_channel(channel(size, |at| at.x < 31)).unwrap();
+    let wanted = channel(UVec2::new(80, 40), |at| at.y < 20);
+    let shares = red(AnalogyParams { extra: 4.0, ..AnalogyParams::DEFAULT }, pair, &[wanted]);
+    assert!(shares.iter().all(|share| (0.45..0.55).contains(share)), "{shares:?}");
+}
+
 /// A slope is taken out, texture and alpha stay.
 #[test]
 fn slow_shading_is_taken_out() {
@@ -371,8 +410,8 @@ fn pairs_without_cracks_or_without_ground_are_refused() {
     let params = AnalogyParams::DEFAULT;
     let refused = |pairs: &[AnalogyPair]| Examples::new(pairs, &params).unwrap_err();
     let with = |value| AnalogyPair::new(size, &rgba, Grid::new(size, value)).unwrap();
-    assert_eq!(refused(&[with(0.0)]), AnalogyError::NoCrack { depth: 0.25 });
-    assert_eq!(refused(&[with(1.0)]), AnalogyError::AllCrack { depth: 0.25 });
+    assert_eq!(refused(&[with(0.0)]), AnalogyError::NoCrack { depth: 0.15 });
+    assert_eq!(refused(&[with(1.0)]), AnalogyError::AllCrack { depth: 0.15 });
     assert_eq!(refused(&[]), AnalogyError::PairCount { count: 0, most: 16 });
     assert_eq!(refused(&vec![good.clone(); 17]), AnalogyError::PairCount { count: 17, most: 16 });
     assert!(Examples::new(&[with(0.0), good], &params).is_ok(), "an uncracked picture beside a cracked one is allowed");
