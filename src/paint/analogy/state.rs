@@ -41,14 +41,14 @@ const FIRST_COUNTED: usize = 2;
 /// use bevy_crack::{Grid, paint::analogy::{Analogy, AnalogyPair, AnalogyParams, Examples}, raster::TexelRect};
 /// use std::sync::Arc;
 ///
-/// // A photograph: bright, with a dark crack down column 20.
+/// // A photograph: bright, with a dark crack down column 20 and one across it, in row 20.
 /// let size = [40, 40].into();
-/// let shade = |x: u32| if x == 20 { 10 } else { 200 };
-/// let photo: Vec<u8> = (0..1600).flat_map(|i| [shade(i % 40), shade(i % 40), shade(i % 40), 255]).collect();
+/// let shade = |i: u32| if i % 40 == 20 || i / 40 == 20 { 10 } else { 200 };
+/// let photo: Vec<u8> = (0..1600).flat_map(|i| [shade(i), shade(i), shade(i), 255]).collect();
 /// let pair = AnalogyPair::from_darkness(size, &photo, 0.3)?;
 /// let examples = Arc::new(Examples::new(&[pair], &AnalogyParams::DEFAULT)?);
 ///
-/// // A surface with no crack yet, then one across it, in row 9.
+/// // A surface with no crack yet, then one in row 9.
 /// let mut depth = Grid::new(size, 0);
 /// let mut wall = Analogy::new(examples, &depth, &[], 7)?;
 /// wall.finish();
