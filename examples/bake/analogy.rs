@@ -226,7 +226,7 @@ pub(crate) fn bake(options: &Options) -> Done<()> {
         prepared.as_secs_f64() * 1e3,
         made.as_secs_f64() * 1e3,
         made.as_secs_f64() * 1e6 / area,
-        100.0 * analogy.agreement(26),
+        100.0 * analogy.agreement(0.1),
         options.out.display()
     );
     Ok(())

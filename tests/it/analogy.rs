@@ -67,7 +67,7 @@ fn cracks_are_where_the_pattern_has_them() {
         for sites in [12, 60] {
             let mut wall = Analogy::new(examples(name), &seams(UVec2::new(260, 200), sites), &[], 1).unwrap();
             wall.finish();
-            let agreement = wall.agreement(26);
+            let agreement = wall.agreement(0.1);
             assert!(agreement > 0.985, "{name}, {sites} sites: {agreement}");
         }
     }
@@ -161,7 +161,7 @@ fn a_growing_crack_leaves_the_rest_as_it_is() {
     // Less than the whole surface each time.
     assert!(visited < steps * u64::from(size.element_product()) / 3, "{visited}");
     // A run at once from the same end draws the same cracks.
-    assert!(wall.agreement(26) > 0.985, "{}", wall.agreement(26));
+    assert!(wall.agreement(0.1) > 0.985, "{}", wall.agreement(0.1));
     if let Some(folder) = std::env::var_os("CRACK_PICTURES") {
         let colors = wall.colors().as_slice().as_flattened().to_vec();
         RgbaImage::from_raw(size.x, size.y, colors)

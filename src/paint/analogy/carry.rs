@@ -1,6 +1,6 @@
 //! What an analogy gives: colours, other maps of the photographs, and where each texel comes from.
 
-use super::{error::AnalogyError, pair::check_size, state::Analogy};
+use super::{error::AnalogyError, pair::check_size, ramp::distance, state::Analogy};
 use crate::{Grid, raster::TexelRect};
 use glam::UVec2;
 
@@ -51,12 +51,14 @@ impl Analogy {
         Grid::from_vec(self.size(), ramp).unwrap_or_else(|| Grid::new(self.size(), 255))
     }
 
-    /// The share of texels whose guide differs by less than `tolerance` (of 255) from that of their source, 0..=1.
+    /// The share of texels whose distance from the edge of a crack differs by less than `tolerance` from that of their
+    /// source, 0..=1. Distances are as in the guide: within the reach, and of `tolerance` 1 from one end to the other.
     #[must_use]
-    pub fn agreement(&self, tolerance: u8) -> f32 {
+    pub fn agreement(&self, tolerance: f32) -> f32 {
         let level = self.full();
         let agrees = |(texel, &place): (&[u8; 4], &u32)| {
-            self.examples().ramp_at(place).is_some_and(|ramp| ramp.abs_diff(texel[3]) < tolerance)
+            let found = self.examples().ramp_at(place).map(distance);
+            found.is_some_and(|found| (found - distance(texel[3])).abs() < 2.0 * tolerance)
         };
         let count = level.texels.iter().zip(&level.places).filter(|&pair| agrees(pair)).count();
         count as f32 / level.texels.len() as f32

@@ -2,7 +2,7 @@
 //!
 //! A mask of crack or not says nothing about most texels, and a search that sees only a few texels around has nothing
 //! to go by. The ramp tells every texel within reach how far it is from a crack, and its slope tells in which
-//! direction.
+//! direction. It rises with the root of the distance: steepest at the edge, where one texel more or less is seen.
 
 use crate::{
     Grid,
@@ -12,7 +12,7 @@ use crate::{
 };
 use glam::{IVec2, UVec2};
 
-/// Value of the ramp on the edge of a crack; below it is crack.
+/// Value of the ramp at the edge of a crack; below it is crack.
 const EDGE: f32 = 127.5;
 
 /// The ramp of the texels in `rect` of a surface of `size`: 0 = `reach` inside a crack, 255 = `reach` away from all.
@@ -59,10 +59,17 @@ pub(super) fn ramp(
         // Half a texel less: from the edge, not from the nearest centre on the other side of it.
         out.extend(away.iter().zip(inside).map(|(&away, &inside)| {
             let distance = if away > 0.0 { away - 0.5 } else { 0.5 - inside };
-            (EDGE + EDGE * (distance / reach as f32).clamp(-1.0, 1.0)) as u8
+            let share = (distance.abs() / reach as f32).min(1.0).sqrt();
+            (EDGE + EDGE * share.copysign(distance)) as u8
         }));
     }
     out
+}
+
+/// The distance from the edge that a value of the ramp stands for, in reaches; below zero inside of a crack.
+pub(super) fn distance(value: u8) -> f32 {
+    let share = (f32::from(value) - EDGE) / EDGE;
+    share * share.abs()
 }
 
 /// The direction in which the ramp rises, as two bytes around 128: its slope over three texels, of unit length; 128,

@@ -166,7 +166,8 @@ fn ramps_are_distances() {
             let offsets = (-far..=far).flat_map(|y| (-far..=far).map(move |x| IVec2::new(x, y)));
             let least = offsets.filter(|&by| at(texel + by) != own).map(|by| by.length_squared()).min();
             let distance = least.map_or(f32::INFINITY, |square| (square as f32).sqrt() - 0.5);
-            let want = 127.5 + 127.5 * (if own { -distance } else { distance } / reach as f32).clamp(-1.0, 1.0);
+            let share = (distance / reach as f32).min(1.0).sqrt();
+            let want = 127.5 + 127.5 * if own { -share } else { share };
             // What is out of reach counts as `reach` away, and what is exactly at it may count as either.
             let slack = if distance + 0.5 >= reach as f32 { 127.5 * 0.5 / reach as f32 + 1.0 } else { 1.0 };
             assert!((f32::from(got) - want).abs() <= slack, "{got}, not {want}: {texel} of {size}, reach {reach}");
