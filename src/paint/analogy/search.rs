@@ -40,6 +40,8 @@ const NEIGHBOURS: [[i32; 2]; 8] = [[-1, 0], [0, -1], [1, 0], [0, 1], [-1, -1], [
 #[derive(Clone, Debug)]
 pub(super) struct Weights {
     rows: Around,
+    /// Those of the guide alone.
+    guide: Around,
     /// Of each further channel of the texel itself.
     extras: Vec<u32>,
     /// Cost of a difference that cannot be seen.
@@ -75,8 +77,11 @@ impl Weights {
         if params.orientation > 0.0 {
             extras.extend([extra(params.orientation); 2]);
         }
+        let mut guide = rows;
+        guide.iter_mut().flat_map(|row| row.as_chunks_mut::<4>().0).for_each(|weight| weight[..3].fill(0));
         Self {
             rows,
+            guide,
             extras,
             alike: ALIKE * total,
             alone: (256.0 * params.coherence) as u32,
@@ -173,6 +178,27 @@ impl Search<'_> {
         }
         level.put(index, best.place, self.atlas);
         level.is_new[index] = true;
+    }
+
+    /// By how much a place should be moved so that its guide fits that of a texel best, by up to one texel each way.
+    ///
+    /// A place of a smaller level is known to two texels only. Colours would hold a crack that is one texel off where
+    /// it is, because it agrees with itself.
+    pub(super) fn alignment(&self, level: &Level, texel: UVec2, place: Place) -> IVec2 {
+        let around = level.around(texel);
+        let mut best = (self.difference(&around, &self.weights.guide, place, 0, u32::MAX), IVec2::ZERO);
+        if best.0 == 0 {
+            return IVec2::ZERO;
+        }
+        for by in NEIGHBOURS.map(IVec2::from) {
+            if let Some(place) = self.atlas.moved(place, by) {
+                let cost = self.difference(&around, &self.weights.guide, place, 0, best.0);
+                if cost < best.0 {
+                    best = (cost, by);
+                }
+            }
+        }
+        best.1
     }
 
     /// The places that continue those of the neighbours, each once, but for `current`.

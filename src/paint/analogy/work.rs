@@ -9,7 +9,7 @@ use super::{
     search::Search,
 };
 use crate::math::{mix, vectorized};
-use glam::UVec2;
+use glam::{IVec2, UVec2};
 
 /// Levels that are made anew where a guide has changed: a new crack is first put in at a quarter of the size.
 const LEVELS_OF_A_CHANGE: usize = 3;
@@ -151,7 +151,7 @@ impl Work {
             }
         } else if self.pass == 0 {
             if let (Some(coarser), Some(above)) = (coarser.first(), examples.atlases.get(self.level + 1)) {
-                take_over(span, level, coarser, atlas, above);
+                take_over(span, level, coarser, &search, above);
             }
         } else {
             let is_backward = self.is_backward();
@@ -168,17 +168,26 @@ impl Work {
     }
 }
 
-/// Gives texels the places that those of the coarser level have, where these are new.
-fn take_over(span: Span, level: &mut Level, coarser: &Level, atlas: &Atlas, above: &Atlas) {
+/// Gives texels the places that those of the coarser level have, where these are new: two by two, moved to where the
+/// guide fits.
+fn take_over(span: Span, level: &mut Level, coarser: &Level, search: &Search<'_>, above: &Atlas) {
+    let atlas = search.atlas;
+    let mut last = (u32::MAX, IVec2::ZERO);
     for x in span.start..span.end {
         let texel = UVec2::new(x, span.y);
         let parent = coarser.index(texel / 2);
-        if coarser.is_new[parent] {
-            let (pair, from) = above.texel(coarser.places[parent]);
-            let place = atlas.sheets[pair].place(2 * from + texel % 2);
-            let index = level.index(texel);
-            level.is_new[index] = level.places[index] != place;
-            level.put(index, place, atlas);
+        if !coarser.is_new[parent] {
+            continue;
         }
+        let (pair, from) = above.texel(coarser.places[parent]);
+        let sheet = atlas.sheets[pair];
+        if last.0 != x / 2 {
+            last = (x / 2, search.alignment(level, texel / 2 * 2, sheet.place(2 * from)));
+        }
+        let place = sheet.place(2 * from + texel % 2);
+        let place = atlas.moved(place, last.1).unwrap_or(place);
+        let index = level.index(texel);
+        level.is_new[index] = level.places[index] != place;
+        level.put(index, place, atlas);
     }
 }
