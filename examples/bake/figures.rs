@@ -1,11 +1,13 @@
-//! `bake figures-mould`: the figures of Mould 2005 made again, but for those that need image analogies (6 and 7).
+//! `bake figures-mould`: the figures of Mould 2005 made again.
 
 use crate::{
+    analogy::{panels, pattern_panel, picture, shipped_pair},
     guided::regions,
     maps::{Paint, base_picture},
     ocr::{PROFILE, SIDE, deep},
 };
 use bevy_crack::{
+    paint::analogy::{Analogy, AnalogyParams, Examples},
     pattern::SurfaceFrame,
     raster::{DepthField, Profile},
     voronoi::{FONT, Front, Guide, Seams, SiteLayout, VoronoiBake, VoronoiMap, VoronoiParams, draw_text},
@@ -13,7 +15,7 @@ use bevy_crack::{
 use clap::Args;
 use glam::{UVec2, Vec2};
 use image::{Rgba, RgbaImage, imageops};
-use std::{error::Error, fs, path::PathBuf};
+use std::{error::Error, fs, path::PathBuf, sync::Arc};
 
 #[derive(Args)]
 pub(crate) struct Options {
@@ -72,6 +74,18 @@ impl Studio {
         let mut field = DepthField::new(self.frame);
         seams.stamp(&mut field, &Profile { wall: 0.0, full_width: 1.0e-4, ..PROFILE });
         self.on_white(&field)
+    }
+
+    /// A pair that ships and the same for cracks along the seams: A, A', B, B'.
+    fn analogy(&self, name: &str, seams: &Seams) -> Done<[RgbaImage; 4]> {
+        let (pair, params) = (shipped_pair(name)?, AnalogyParams::DEFAULT);
+        let mut field = DepthField::new(self.frame);
+        seams.stamp(&mut field, &PROFILE);
+        let [guide, photo] = panels(&pair, params.depth);
+        let examples = Arc::new(Examples::new(&[pair], &params)?);
+        let mut analogy = Analogy::new(examples, &field.depth, &[], self.seed)?;
+        analogy.finish();
+        Ok([guide, photo, pattern_panel(&field.depth, &params), picture(&analogy.colors())])
     }
 
     fn painted(&self, look: &str, stamp: impl FnOnce(&mut DepthField)) -> Done<RgbaImage> {
@@ -157,6 +171,17 @@ pub(crate) fn bake(options: &Options) -> Done<()> {
     let (_, impact) = square.map(VoronoiParams { layout: impact, ..usual.clone() }, &[])?;
     sheet(&[vec![square.cracks(&mud), square.cracks(&impact)]]).save(out.join("fig_05_layouts.png"))?;
 
+    // 6: A : A' :: B : B' for pavement.
+    sheet(&[square.analogy("paving", &tiles)?.to_vec()]).save(out.join("fig_06_analogy.png"))?;
+
+    // 7: textures on cracks that draw something: stone and clay, in place of the paper's stone and ice.
+    let mut rows = Vec::new();
+    for (pair, word) in [("concrete", "CHESS"), ("clay", "SMILE")] {
+        let (_, seams) = square.map(astride.clone(), &[square.word(word)?])?;
+        rows.push(square.analogy(pair, &seams)?.to_vec());
+    }
+    sheet(&rows).save(out.join("fig_07_materials.png"))?;
+
     // 8: modulation, dark as in the paper and bright.
     let (_, cracked) = square.map(astride.clone(), &[square.word("ICE")?])?;
     let stamp = |field: &mut DepthField| cracked.stamp(field, &PROFILE);
@@ -197,7 +222,7 @@ pub(crate) fn bake(options: &Options) -> Done<()> {
     let mut field = DepthField::new(square.frame);
     cracked.stamp(&mut field, &PROFILE);
     deep(&field).ok_or("mask size")?.save(out.join("fig_08_deep.png"))?;
-    println!("figures 1 to 5 and 8 to 11 are in {}", out.display());
+    println!("figures 1 to 11 are in {}", out.display());
     Ok(())
 }
 

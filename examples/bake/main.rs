@@ -8,6 +8,7 @@
 
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "a command-line tool")]
 
+mod analogy;
 mod birds_eye;
 mod blend;
 mod contour_lines;
@@ -48,6 +49,8 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Method {
+    /// Cracks in the material of a photograph, by image analogies.
+    Analogy(Box<analogy::Options>),
     /// Cracks that grow from hits, by space colonization.
     Growth(Box<growth::Options>),
     /// Every preset on its own picture, at three moments, on one sheet.
@@ -74,6 +77,7 @@ enum Method {
 
 fn main() -> ExitCode {
     let done = match Arguments::parse().method {
+        Method::Analogy(options) => analogy::bake(&options),
         Method::Gallery(options) => gallery::bake(&options),
         Method::Growth(options) => growth::bake(&options).map(drop),
         Method::Guided(options) => guided::bake(&options),

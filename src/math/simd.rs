@@ -29,14 +29,18 @@ mod tests {
         Grid,
         blend::{NormalBlending, solve_poisson},
         math::{Rng, ops},
-        paint::{BaseTexels, Look, LookTable, PaintTargets, paint_into},
+        paint::{
+            BaseTexels, Look, LookTable, PaintTargets,
+            analogy::{Analogy, AnalogyPair, AnalogyParams, Examples},
+            paint_into,
+        },
         pattern::{CrackMask, PathPoint, SegmentPath, SurfaceFrame},
         raster::{DepthField, Profile, TexelRect, stamp_path},
         relief::{Contours, HeightParams, Ring, heights, normals},
         voronoi::{VoronoiParams, voronoi_map},
     };
     use glam::{UVec2, Vec2};
-    use std::{cell::Cell, ops::ControlFlow};
+    use std::{cell::Cell, ops::ControlFlow, sync::Arc};
 
     std::thread_local! {
         /// Whether work is done as on a processor without wide vectors.
@@ -111,6 +115,24 @@ mod tests {
                 grid
             });
             assert!(wide == plain, "{size}");
+        }
+    }
+
+    #[test]
+    fn analogies_are_the_same_without_wide_vectors() {
+        let size = UVec2::new(40, 33);
+        for seed in 0..4 {
+            let [wide, plain] = both(seed, |rng| {
+                let rgba: Vec<u8> = (0..4 * 40 * 33).map(|_| rng.next_u32() as u8).collect();
+                let pair = AnalogyPair::from_darkness(size, &rgba, 0.3).unwrap();
+                let examples = Arc::new(Examples::new(&[pair], &AnalogyParams::DEFAULT).unwrap());
+                let mut depth = Grid::new(size, 0);
+                depth.as_mut_slice().iter_mut().for_each(|depth| *depth = (rng.next_u32() % 9000) as u16 * 2);
+                let mut analogy = Analogy::new(examples, &depth, &[], seed).unwrap();
+                analogy.finish();
+                analogy.sources()
+            });
+            assert!(wide == plain, "seed {seed}");
         }
     }
 

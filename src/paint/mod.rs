@@ -8,6 +8,8 @@
 //! Normals of a look that blends by Poisson depend on one thing more: the slopes that [`correct_normals`] has solved for
 //! all of the cracks.
 //!
+//! [`analogy`] makes surfaces in the material of a photograph instead.
+//!
 //! ```
 //! use bevy_crack::{
 //!     paint::{BaseTexels, Look, LookTable, PaintTargets, paint_into},
@@ -34,6 +36,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod analogy;
 mod cel;
 mod diffuse;
 mod extras;

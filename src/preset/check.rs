@@ -105,6 +105,8 @@ fn growth_error(error: ParamError) -> PresetError {
                 "occupancy" | "jitter" | "spacing" | "sectors" | "through" => {
                     format!("growth.markers.{name}")
                 }
+                name if name.starts_with("strands.") => format!("growth.markers.{name}"),
+                "strand_count" => "growth.markers.count".into(),
                 "start_count" => "growth.starts.count".into(),
                 "start_radius" => "growth.starts.radius".into(),
                 _ => format!("growth.{name}"),

@@ -61,6 +61,12 @@ macro_rules! params {
                 }
             }
 
+            /// The first number that is out of its range, with its name behind `strands.` and its range.
+            pub(crate) fn out_of_range(&self) -> Option<(&'static str, f32, f32, f32)> {
+                let ranges = [$((concat!("strands.", stringify!($name)), self.$name as f32, $min, $max)),*];
+                ranges.into_iter().find(|(_, value, min, max)| !(*min..=*max).contains(value))
+            }
+
             /// Sets the number `name` from text, as in `inertia` and `0.5`.
             ///
             /// # Errors

@@ -3,6 +3,7 @@
 
 #![cfg(test)]
 
+mod analogy;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod apps;
 mod blend;

@@ -117,27 +117,21 @@ fn every_number_is_checked() {
     for (name, preset) in constants() {
         let text = preset.to_ron().unwrap();
         let mut checked = 0;
-        let (mut section, mut group) = ("", "");
+        // What is open at each depth.
+        let mut open = [""; 6];
         for line in text.lines() {
             let trimmed = line.trim();
             let depth = (line.len() - line.trim_start().len()) / 4;
             let Some((field, value)) = trimmed.split_once(": ") else { continue };
-            if depth == 1 {
-                section = if value == "(" { field } else { "" };
-            }
-            if depth == 2 {
-                group = if value.ends_with(['(', '[']) { field } else { "" };
-            }
+            open[depth..].fill("");
+            open[depth] = if value.ends_with(['(', '[']) { field } else { "" };
             let value = value.trim_end_matches(',');
             // Whole numbers cannot be NaN in a file.
             if !value.contains('.') || value.parse::<f32>().is_err() {
                 continue;
             }
-            let full = match (section, depth) {
-                ("", _) => field.to_owned(),
-                (_, 2) => format!("{section}.{field}"),
-                _ => format!("{section}.{group}.{field}"),
-            };
+            let groups = open[..depth].iter().filter(|name| !name.is_empty());
+            let full: String = groups.flat_map(|name| [*name, "."]).chain([field]).collect();
             let broken = text.replacen(line, &line.replace(value, "NaN"), 1);
             // The same line may stand above under another name.
             if text.find(line) == Some(line.as_ptr() as usize - text.as_ptr() as usize) {

@@ -23,12 +23,11 @@ fn parse<T: std::str::FromStr>(name: &str, text: &str) -> Result<T, ParamError> 
     text.trim().parse().map_err(|_| ParamError::Unreadable { name: name.to_owned(), text: text.to_owned() })
 }
 
-/// An error of the settings of strands as one of the growth; `asked` is the name that was to be set.
+/// An error of setting a number of strands as one of the growth; `asked` is the name that was to be set.
 fn of_strands(error: StrandError, asked: &str) -> ParamError {
     match error {
-        StrandError::OutOfRange { name, value, min, max } => {
-            let [value, min, max] = [value, min, max].map(f64::from);
-            ParamError::OutOfRange { name, value, min, max }
+        StrandError::OutOfRange { value, .. } => {
+            ParamError::Unreadable { name: asked.to_owned(), text: value.to_string() }
         }
         StrandError::Unreadable { text, .. } => ParamError::Unreadable { name: asked.to_owned(), text },
         _ => ParamError::Unknown { name: asked.to_owned() },
@@ -103,7 +102,10 @@ impl GrowthParams {
                 ("through", f64::from(through), 0.0, 1.0),
             ],
             MarkerLayout::Strands { count, strands } => {
-                strands.validate().map_err(|error| of_strands(error, ""))?;
+                if let Some((name, value, min, max)) = strands.out_of_range() {
+                    let [value, min, max] = [value, min, max].map(f64::from);
+                    return Err(ParamError::OutOfRange { name, value, min, max });
+                }
                 &[("strand_count", f64::from(count), 1.0, 1024.0)]
             }
         };

@@ -125,7 +125,7 @@ fn settings_of_strands_are_checked_and_set_by_name() {
     );
     assert!(matches!(params.set("strands.colour", "1"), Err(ParamError::Unknown { .. })));
     strands(&mut params).1.inertia = f32::NAN;
-    assert!(matches!(params.validate(), Err(ParamError::OutOfRange { name: "inertia", .. })));
+    assert!(matches!(params.validate(), Err(ParamError::OutOfRange { name: "strands.inertia", .. })));
     strands(&mut params).1.inertia = 0.5;
     *strands(&mut params).0 = 0;
     assert!(matches!(params.validate(), Err(ParamError::OutOfRange { name: "strand_count", .. })));
