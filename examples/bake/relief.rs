@@ -9,7 +9,8 @@ use bevy_crack::{
     Grid,
     pattern::SurfaceFrame,
     relief::{
-        Contours, HeightMap, HeightParams, ReliefFrame, ReliefMesh, ReliefParams, TerrainColors, colors, normals,
+        Contours, HeightMap, HeightParams, ReliefFrame, ReliefMesh, ReliefParams, ReliefSettings, TerrainColors,
+        colors, normals,
     },
 };
 use clap::Args;
@@ -80,14 +81,8 @@ fn look(name: &str) -> Result<TerrainColors, String> {
 
 /// Settings that suit a seed contour, changed as the options tell.
 fn params(options: &Options) -> Result<(ReliefParams, HeightParams), Box<dyn Error>> {
-    let (mut rings, mut heights) = (ReliefParams::IMPROVED, HeightParams::DEFAULT);
-    if options.seed_contour == "wall" {
-        rings = ReliefParams { distance: 0.012, outward: 5, ..rings };
-        let rough = HeightParams { roughness: 0.7, cliffs: 0.45, variation: 0.7, noise_scale: 0.07, ..heights };
-        heights = HeightParams { step: 0.01, floor: 2.0, ..rough };
-    } else {
-        heights = HeightParams { step: 0.014, floor: 4.0, roughness: 0.35, ..heights };
-    }
+    let settings = if options.seed_contour == "wall" { ReliefSettings::rock_wall() } else { ReliefSettings::island() };
+    let (mut rings, mut heights) = (settings.contours, settings.heights);
     rings.set("method", &options.method)?;
     if let Some(join) = &options.join {
         rings.set("join", join)?;

@@ -69,6 +69,7 @@ mod starts;
 mod state;
 mod steer;
 mod step;
+mod strand_paths;
 mod strands;
 #[cfg(test)]
 mod tests;

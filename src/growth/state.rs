@@ -14,7 +14,7 @@ use super::{
     past::Record,
     pull::Pull,
     rays::Rays,
-    strands::Course,
+    strand_paths::StrandPaths,
     width::Widths,
 };
 use crate::{
@@ -64,7 +64,7 @@ pub struct CrackGrowth {
     pub(super) linker: Linker,
     pub(super) rays: Rays,
     /// Strands that have not grown to their ends.
-    pub(super) strands: Vec<Course>,
+    pub(super) strands: Vec<StrandPaths>,
     pub(super) impacts: Vec<Impact>,
     /// The markers that the last hit has still to lay out.
     pub(super) layout: Option<Box<Layout>>,

@@ -5,6 +5,7 @@ use super::{
     params::{GrowthParams, MarkerLayout},
     starts,
     state::CrackGrowth,
+    strand_paths::{Order, StrandPaths},
 };
 use crate::{
     math::{mix, ops},
@@ -28,10 +29,6 @@ const CROWDED: f32 = 4.0;
 /// A hit on an older crack starts from its nearest node within this distance, pattern units.
 const BESIDE: f32 = 0.1;
 
-/// Lines of at most this many points that leave a longer one grow this many steps later.
-const SHORT: u32 = 12;
-const LATER: u32 = 6;
-
 /// Most tries to find strands that have room.
 const TRIES: u32 = 12;
 
@@ -52,105 +49,6 @@ const APART: f32 = 0.766;
 
 /// Ends at this share of the reach of a hit run on when it is hit again.
 const FAR: f32 = 0.6;
-
-/// What strands are laid out from.
-struct Order {
-    impact: u32,
-    center: Vec2,
-    reach: f32,
-    /// See [`Course`].
-    roots: Vec<(Vec2, u32)>,
-    least: f32,
-    rounds: u32,
-    seed: u64,
-}
-
-/// Paths that were laid out, as far as they have grown.
-#[derive(Clone, Debug)]
-pub(super) struct Course {
-    impact: u32,
-    /// Where strands start, and the node there.
-    roots: Vec<(Vec2, u32)>,
-    paths: Network,
-    /// The points in the order in which they grow, each after a number of steps.
-    order: Vec<(u32, u32)>,
-    /// How many of them have grown.
-    grown: usize,
-    /// For each point: its node, or [`NO_PARENT`] if it has not grown or the way is blocked.
-    nodes: Vec<u32>,
-    /// Steps made since the hit.
-    steps: u32,
-    /// How long all strands of the impact should be at least, pattern units, and how often more may be laid out for that.
-    least: f32,
-    rounds: u32,
-}
-
-impl Course {
-    fn new(order: &Order, paths: Network) -> Self {
-        let nodes = vec![NO_PARENT; paths.nodes.len()];
-        let Order { impact, least, rounds, .. } = *order;
-        Self {
-            impact,
-            roots: order.roots.clone(),
-            order: in_order(&paths),
-            paths,
-            grown: 0,
-            nodes,
-            steps: 0,
-            least,
-            rounds,
-        }
-    }
-
-    const fn is_over(&self) -> bool {
-        self.grown >= self.order.len()
-    }
-
-    /// The next point that is to grow by now.
-    fn next(&mut self) -> Option<u32> {
-        let &(_, point) = self.order.get(self.grown).filter(|(step, _)| *step <= self.steps)?;
-        self.grown += 1;
-        Some(point)
-    }
-
-    /// The first `count` nodes of the growth have been removed: nothing grows from those any more.
-    pub(super) fn forget(&mut self, count: u32) {
-        let roots = self.roots.iter_mut().map(|(_, node)| node);
-        for node in self.nodes.iter_mut().chain(roots).filter(|node| **node != NO_PARENT) {
-            *node = node.checked_sub(count).unwrap_or(NO_PARENT);
-        }
-    }
-
-    /// The node from which a strand starts that begins at `pos`.
-    fn root(&self, pos: Vec2) -> u32 {
-        let distance = |root: &&(Vec2, u32)| root.0.distance_squared(pos);
-        let nearest = self.roots.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)));
-        nearest.map_or(NO_PARENT, |(_, node)| *node)
-    }
-}
-
-/// The order in which points grow: short side lines come a little later than the line that they leave, which is not to stop at them.
-fn in_order(paths: &Network) -> Vec<(u32, u32)> {
-    let nodes = &paths.nodes;
-    // Number of points of the longest line from each point on. Parents come before their children.
-    let mut longest = vec![1u32; nodes.len()];
-    for (i, node) in nodes.iter().enumerate().rev() {
-        if let Some(parent) = longest.get(node.parent as usize).copied() {
-            longest[node.parent as usize] = parent.max(longest[i] + 1);
-        }
-    }
-    let mut is_side = vec![false; nodes.len()];
-    let mut order = Vec::with_capacity(nodes.len());
-    for (i, node) in nodes.iter().enumerate() {
-        if node.parent != NO_PARENT {
-            let parent = node.parent as usize;
-            is_side[i] = is_side[parent] || longest[i] <= SHORT && longest[i] + 1 < longest[parent];
-        }
-        order.push((node.birth.saturating_add(if is_side[i] { LATER } else { 0 }), i as u32));
-    }
-    order.sort_unstable();
-    order
-}
 
 impl GrowthParams {
     /// The number of strands of a hit of energy 1, and their settings; `None` if cracks follow markers.
@@ -257,7 +155,7 @@ impl CrackGrowth {
             .map(|(way, (pos, _))| StrandStart { pos: *pos, direction: Some(way) })
             .collect();
         if let Some(paths) = run_out(&params, (order.center, &starts), order.least, self.network.extent(), order.seed) {
-            self.strands.push(Course::new(order, paths));
+            self.strands.push(StrandPaths::new(order, paths));
         }
     }
 
@@ -270,18 +168,18 @@ impl CrackGrowth {
     }
 
     /// Lays out more strands for an impact whose strands have all been blocked or have run off the surface.
-    fn lay_out_more(&mut self, course: &Course) {
-        let impact = course.impact;
-        let Some(hit) = self.impacts.get(impact as usize).filter(|_| course.rounds > 0) else { return };
+    fn lay_out_more(&mut self, paths: &StrandPaths) {
+        let impact = paths.impact;
+        let Some(hit) = self.impacts.get(impact as usize).filter(|_| paths.rounds > 0) else { return };
         let of_impact = self.network.nodes.iter().filter(|node| node.impact == impact);
         let parts = of_impact.filter_map(|node| Some((node, self.network.nodes.get(node.parent as usize)?)));
         let length: f32 = parts.map(|(node, parent)| node.pos.distance(parent.pos)).sum();
-        if length >= course.least {
+        if length >= paths.least {
             return;
         }
-        let rounds = course.rounds - 1;
+        let rounds = paths.rounds - 1;
         let seed = mix(self.seed ^ draws::STRANDS ^ u64::from(impact) << 16 ^ u64::from(1 + rounds) << 48);
-        let (center, least) = (hit.pos, course.least);
+        let (center, least) = (hit.pos, paths.least);
         let reach = self.reach(center, hit.energy);
         let order = Order { impact, center, reach, roots: Vec::new(), least, rounds, seed };
         // Ends may be walled in, and so may the hit be, between its own cracks and the border.
@@ -348,21 +246,21 @@ impl CrackGrowth {
         let first = self.network.nodes.len() as u32;
         self.timeline.begin(self.steps.saturating_add(1));
         self.steps = self.steps.saturating_add(1);
-        for mut course in std::mem::take(&mut self.strands) {
-            course.steps = course.steps.saturating_add(1);
+        for mut paths in std::mem::take(&mut self.strands) {
+            paths.steps = paths.steps.saturating_add(1);
             while self.room() > 0
-                && let Some(point) = course.next()
+                && let Some(point) = paths.next()
             {
-                let node = self.follow(&course, point);
-                course.nodes[point as usize] = node;
+                let node = self.follow(&paths, point);
+                paths.nodes[point as usize] = node;
             }
             if self.room() == 0 {
                 continue;
             }
-            if course.is_over() {
-                self.lay_out_more(&course);
+            if paths.is_over() {
+                self.lay_out_more(&paths);
             } else {
-                self.strands.push(course);
+                self.strands.push(paths);
             }
         }
         self.new_nodes = first..self.network.nodes.len() as u32;
@@ -379,14 +277,14 @@ impl CrackGrowth {
     }
 
     /// The node of the next point of a path.
-    fn follow(&mut self, course: &Course, point: u32) -> u32 {
-        let Node { pos, parent, .. } = course.paths.nodes[point as usize];
+    fn follow(&mut self, paths: &StrandPaths, point: u32) -> u32 {
+        let Node { pos, parent, .. } = paths.paths.nodes[point as usize];
         if parent == NO_PARENT {
-            return course.root(pos);
+            return paths.root(pos);
         }
-        let (from, length) = (course.nodes[parent as usize], self.params.step_length);
+        let (from, length) = (paths.nodes[parent as usize], self.params.step_length);
         let Some(last) = self.network.nodes.get(from as usize).map(|node| node.pos) else { return NO_PARENT };
-        let begin = course.roots.iter().map(|(root, _)| root.distance(pos)).fold(f32::INFINITY, f32::min);
+        let begin = paths.roots.iter().map(|(root, _)| root.distance(pos)).fold(f32::INFINITY, f32::min);
         let is_passed = |growth: &Self| {
             let child = SegmentId::Branch(growth.network.nodes.len() as u32);
             let is_near = begin < CROWDED * length || last.distance(pos) < PATIENT * length;
@@ -395,6 +293,6 @@ impl CrackGrowth {
         if last.distance(pos) < CLOSE * length || is_passed(self) {
             return from;
         }
-        self.extend_of(course.impact, from, pos, false).unwrap_or(NO_PARENT)
+        self.extend_of(paths.impact, from, pos, false).unwrap_or(NO_PARENT)
     }
 }

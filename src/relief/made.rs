@@ -59,7 +59,7 @@ impl ReliefSettings {
     #[must_use]
     pub fn rock_wall() -> Self {
         let rough =
-            HeightParams { roughness: 0.7, cliffs: 0.45, variation: 0.7, noise_scale: 0.07, ..HeightParams::DEFAULT };
+            HeightParams { roughness: 0.6, cliffs: 0.12, variation: 0.7, noise_scale: 0.12, ..HeightParams::DEFAULT };
         Self {
             shape: ReliefShape::Wall,
             contours: ReliefParams { distance: 0.012, outward: 5, ..ReliefParams::IMPROVED },

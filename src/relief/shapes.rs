@@ -17,7 +17,7 @@ use std::f32::consts::TAU;
 #[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum ReliefShape {
-    /// Blocks of rock in layers, with gaps between them.
+    /// Blocks of rock of several sizes, with gaps between them.
     #[default]
     Wall,
     /// One coast line around the middle, uneven at all sizes.
@@ -30,7 +30,9 @@ pub enum ReliefShape {
 
 /// A closed line around `center`, uneven at all sizes.
 fn blob(center: Vec2, radius: f32, points: u16, uneven: f32, rng: &mut Rng) -> Vec<Vec2> {
-    let waves: Vec<_> = (2u8..120).map(|k| (f32::from(k), uneven * rng.signed() / f32::from(k), rng.unit())).collect();
+    let size = |k: f32| 1.0 / (k * ops::powf(k, 0.2));
+    let waves: Vec<_> =
+        (2u8..120).map(|k| (f32::from(k), uneven * rng.signed() * size(f32::from(k)), rng.unit())).collect();
     let corner = |i: u16| {
         let angle = TAU * f32::from(i) / f32::from(points);
         let wave = |&(k, size, phase): &(f32, f32, f32)| size * ops::cos(k * angle + TAU * phase);
@@ -40,51 +42,60 @@ fn blob(center: Vec2, radius: f32, points: u16, uneven: f32, rng: &mut Rng) -> V
     (0..points).map(corner).collect()
 }
 
-/// Where a wall is split, pattern units: the least height of a layer of blocks and how much more there may be, the same for the widths
-/// of blocks, and the gap between blocks.
-const LAYER: [f32; 2] = [0.16, 0.22];
-const BLOCK: [f32; 2] = [0.18, 0.5];
-const GAP: f32 = 0.009;
+/// How far the middles of neighboring blocks are from each other at least, pattern units; the largest blocks are as far again.
+const APART: f32 = 0.16;
 
-/// Blocks in layers, wider than high, with gaps between them; some are cut through at a slant.
+/// How much wider than high blocks are.
+const FLAT: f32 = 1.55;
+
+/// Half of the gap between blocks, pattern units.
+const GAP: f32 = 0.006;
+
+/// The part of a polygon on the side of `place` of the line halfway to `other`, less a gap.
+fn cut(polygon: &[Vec2], place: Vec2, other: Vec2) -> Vec<Vec2> {
+    let way = (other - place).normalize_or_zero();
+    let most = 0.5 * place.distance(other) - GAP;
+    let out = |point: Vec2| (point - place).dot(way) - most;
+    let next = polygon.iter().cycle().skip(1);
+    let sides = polygon.iter().zip(next).flat_map(|(&from, &to)| {
+        let (a, b) = (out(from), out(to));
+        let kept = (a <= 0.0).then_some(from);
+        let crossing = ((a <= 0.0) != (b <= 0.0)).then(|| from + (to - from) * (a / (a - b)));
+        [kept, crossing]
+    });
+    sides.flatten().collect()
+}
+
+/// Blocks of several sizes, wider than high and somewhat aslant, with gaps between them: the cells of random places.
 fn wall(extent: Vec2, rng: &mut Rng) -> Vec<Vec<Vec2>> {
-    let mut blocks = Vec::new();
-    let edges = |length: f32, [least, more]: [f32; 2], rng: &mut Rng| {
-        let mut edges = vec![-0.5 * least * rng.unit()];
-        while edges[edges.len() - 1] < length {
-            edges.push(edges[edges.len() - 1] + least + more * rng.unit() * rng.unit());
-        }
-        edges
-    };
-    let layers = edges(extent.y, LAYER, rng);
-    // How far a bed between two layers lies from its place: it is not level.
-    let beds: Vec<_> = layers.iter().map(|_| [0.02 * rng.signed(), 0.05 * rng.signed(), TAU * rng.unit()]).collect();
-    let bed = |i: usize, x: f32| {
-        let [slope, size, phase] = beds[i];
-        layers[i] + slope * x + 0.3 * size * ops::cos(5.0 * x + phase)
-    };
-    for layer in 0..layers.len() - 1 {
-        let columns = edges(extent.x, BLOCK, rng);
-        let tilts: Vec<_> = columns.iter().map(|_| 0.07 * rng.signed()).collect();
-        for column in 0..columns.len() - 1 {
-            let corner = |c: usize, l: usize| {
-                let side = if l == layer { -0.5 } else { 0.5 };
-                let x = columns[c] + side * tilts[c];
-                Vec2::new(x, bed(l, x))
-            };
-            let (c, l) = (column, layer);
-            let corners = [corner(c, l), corner(c + 1, l), corner(c + 1, l + 1), corner(c, l + 1)];
-            let middle = 0.25 * corners.iter().sum::<Vec2>();
-            // Corners of blocks break off.
-            let inward = |corner: Vec2, rng: &mut Rng| {
-                let way = middle - corner;
-                corner + way.normalize_or_zero() * (GAP * 1.4 + 0.02 * rng.unit() * rng.unit())
-            };
-            let corners = corners.map(|corner| inward(corner, rng));
-            blocks.push(rough(&corners, rng));
+    // In a space in which blocks are as wide as high.
+    let slant = 0.25 * rng.signed();
+    let flatten = |place: Vec2| Vec2::new(place.x / FLAT, place.y + slant * place.x);
+    let back = |flat: Vec2| Vec2::new(flat.x * FLAT, flat.y - slant * flat.x * FLAT);
+    let mut places: Vec<(Vec2, f32)> = Vec::new();
+    for _ in 0..2000 {
+        let place = Vec2::new(rng.range(-0.3, 1.3), rng.range(-0.3, 1.3)) * extent;
+        let (flat, room) = (flatten(place), APART * (1.0 + rng.unit() * rng.unit()));
+        if places.iter().all(|(other, least)| other.distance(flat) >= 0.5 * (room + least)) {
+            places.push((flat, room));
         }
     }
-    blocks
+    let far = 4.0 * extent.max_element();
+    let all = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|corner| Vec2::from(corner) * far);
+    let cells = places.iter().map(|&(place, _)| {
+        let others = places.iter().map(|(other, _)| *other).filter(|other| *other != place);
+        others.fold(all.to_vec(), |cell, other| cut(&cell, place, other))
+    });
+    let cells: Vec<_> = cells.filter(|cell| cell.len() > 2).collect();
+    let is_near = |cell: &&Vec<Vec2>| {
+        let near = |point: &Vec2| point.cmpgt(-0.2 * extent).all() && point.cmplt(1.2 * extent).all();
+        cell.iter().map(|flat| back(*flat)).any(|point| near(&point)) && cell.iter().all(|point| point.length() < far)
+    };
+    cells
+        .iter()
+        .filter(is_near)
+        .map(|cell| rough(&cell.iter().map(|flat| back(*flat)).collect::<Vec<_>>(), rng))
+        .collect()
 }
 
 /// A closed line through corners whose sides are uneven, by midpoint displacement.
