@@ -192,7 +192,7 @@ impl Corner {
 }
 
 /// All corners of a loop, and the lengths of the edges after them.
-fn corners(points: &[Point], way: Way, pace: &Pace) -> (Vec<Corner>, Vec<f64>) {
+fn corners(points: &[Point], way: Way, pace: impl Fn(Point) -> f64) -> (Vec<Corner>, Vec<f64>) {
     let mut lengths = Vec::with_capacity(points.len());
     let ways: Vec<[f64; 2]> = edges(points)
         .map(|(a, b)| {
@@ -208,9 +208,7 @@ fn corners(points: &[Point], way: Way, pace: &Pace) -> (Vec<Corner>, Vec<f64>) {
         before = after;
         let [u, v] = ways;
         let turn = [(u[0] * v[1] - u[1] * v[0]) * sign, u[0] * v[0] + u[1] * v[1]];
-        let outward = [u[1] + v[1], -u[0] - v[0]];
-        let length = (outward[0] * outward[0] + outward[1] * outward[1]).sqrt().max(1e-9);
-        let distance = pace.at(point, [outward[0] / length, outward[1] / length]);
+        let distance = pace(point);
         let trim = if turn[0] > 0.0 { distance * turn[0] / (1.0 + turn[1]).max(1e-12) } else { 0.0 };
         Corner { point, ways, turn, distance, sign, trim }
     };
@@ -225,7 +223,7 @@ fn moved(points: &[Point], way: Way, join: Join, pace: &Pace) -> Loop {
     if points.len() < 3 {
         return Loop::new();
     }
-    let (corners, lengths) = corners(points, way, pace);
+    let (corners, lengths) = corners(points, way, pace.on(points));
     let count = corners.len();
     let mut is_trimmed: Vec<bool> = corners.iter().map(|corner| corner.trim > 0.0).collect();
     for (i, &length) in lengths.iter().enumerate() {

@@ -17,7 +17,7 @@ pub(super) struct Edges {
 }
 
 /// Most pairs of edges that are looked at, for each cut that is allowed.
-const WORK: usize = 64;
+const WORK: usize = 128;
 
 /// A new corner of an edge.
 type Cut = (u32, i64, Point);

@@ -15,7 +15,7 @@ use super::lattice::{Loop, Point, double_area};
 pub(super) use faces::Fill;
 
 /// Most cuts where loops meet.
-pub(super) const MAX_CUTS: usize = 1 << 21;
+pub(super) const MAX_CUTS: usize = 1 << 22;
 
 /// Loops have more crossings than are computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
