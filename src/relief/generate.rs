@@ -12,7 +12,7 @@ use super::{
     scramble::Scramble,
     seeds::{Seeds, limits},
     simplify::working_copy,
-    untangle::{Fill, MAX_CUTS, untangle},
+    untangle::{Fill, MAX_CUTS, untangle, untangled},
 };
 use crate::{Grid, math::Rng};
 use glam::Vec2;
@@ -94,6 +94,15 @@ fn count(rings: &[Loop]) -> usize {
     rings.iter().map(Vec::len).sum()
 }
 
+/// The shortest mean edge for which midpoints are displaced: finer ones are lost again.
+///
+/// Moving a line takes away what is much smaller than the distance, and samples of a line cannot hold what is smaller than they are.
+fn finest_edge(params: &ReliefParams, rings: &[Loop], distance: f64) -> f64 {
+    let longest = rings.iter().map(|ring| perimeter(ring)).fold(0.0, f64::max);
+    let samples = if params.method.scrambles() { longest / f64::from(params.samples) } else { 0.0 };
+    samples.max(0.25 * distance)
+}
+
 impl ContourJob {
     /// A job for the contours around all `seeds` together, closed lines in pattern space, and the random `seed`.
     ///
@@ -134,9 +143,7 @@ impl ContourJob {
         let step = f64::from(params.distance) * f64::from(pace) * (f64::from(params.join.reach()) + 1.0);
         let Seeds { lattice, rings, mean_edge } = Seeds::new(seeds, step * f64::from(params.outward))?;
         let distance = f64::from(params.distance) * lattice.steps();
-        // Samples of a contour cannot hold what is finer than they are.
-        let finest = rings.iter().map(|ring| perimeter(ring)).fold(0.0, f64::max) / f64::from(params.samples);
-        let mean_edge = if params.method.scrambles() { mean_edge.max(finest) } else { mean_edge };
+        let longest = 2.0 * mean_edge.max(finest_edge(params, &rings, distance));
         let stage = if params.inward > 0 { Stage::Inward } else { Stage::Outward };
         let mut out = Self {
             params: *params,
@@ -144,7 +151,7 @@ impl ContourJob {
             pace: Pace::new(distance, params.steepness, params.steep_angle),
             transform: Transform::new(params.samples),
             rng: Rng::new(seed),
-            longest: 2.0 * mean_edge,
+            longest,
             current: rings.clone(),
             areas: [area(&rings); 2],
             seeds: rings,
@@ -238,11 +245,11 @@ impl ContourJob {
         let mut rings = if method == Method::Improved {
             let mut displaced = from.clone();
             self.displace(&mut displaced, &mut rng.stream("midpoints"))?;
-            let displaced = untangle(&displaced, POSITIVE, least, MAX_CUTS).map_err(tangled)?;
-            // Midpoints can bridge what is narrow, so the level itself keeps its distance too.
+            let (displaced, is_same) = untangled(&displaced, POSITIVE, least, MAX_CUTS).map_err(tangled)?;
             let pace = Pace::even(self.room_of_phases() + KEPT * self.pace.least());
-            let kept = Move { join: Join::Round, pace: &pace, ..plain };
-            offset(&[Move { rings: &displaced, ..plain }, kept], way)
+            let moves = [Move { rings: &displaced, ..plain }, Move { join: Join::Round, pace: &pace, ..plain }];
+            // Where midpoints have bridged what is narrow, the level itself must keep its distance too.
+            offset(if is_same { &moves[..1] } else { &moves }, way)
         } else {
             offset(&[plain], way)
         }

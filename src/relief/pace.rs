@@ -60,6 +60,11 @@ impl Pace {
         Ok(())
     }
 
+    /// A share of every distance.
+    pub(super) fn share(&self, share: f64) -> Self {
+        Self { distance: self.distance * share, ..self.clone() }
+    }
+
     /// Whether the distance is the same everywhere.
     pub(super) fn is_even(&self) -> bool {
         self.image.is_none() && self.steepness == 0.0

@@ -15,7 +15,7 @@ use super::lattice::{Loop, Point, double_area};
 pub(super) use faces::Fill;
 
 /// Most cuts where loops meet.
-pub(super) const MAX_CUTS: usize = 1 << 22;
+pub(super) const MAX_CUTS: usize = 1 << 21;
 
 /// Loops have more crossings than are computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,12 +29,23 @@ pub(super) struct TooTangled;
 ///
 /// Fails if there are more than `most` cuts.
 pub(super) fn untangle(loops: &[Loop], fill: Fill, least: i128, most: usize) -> Result<Vec<Loop>, TooTangled> {
+    Ok(untangled(loops, fill, least, most)?.0)
+}
+
+/// As [`untangle`], and whether the rings are the loops as they came: none met itself or another one, none was left out.
+pub(super) fn untangled(
+    loops: &[Loop],
+    fill: Fill,
+    least: i128,
+    most: usize,
+) -> Result<(Vec<Loop>, bool), TooTangled> {
     let edges = meet::cut(loops, most)?;
     let mut chains = chains::chains(&edges);
     faces::wind(&mut chains, &edges);
     let mut rings = rings::trace(&chains, &edges, fill);
     rings.retain(|ring: &Loop| ring.len() >= 3 && double_area(ring).abs() >= least.max(1));
-    Ok(rings)
+    let is_same = chains.nodes.is_empty() && rings.len() == loops.len();
+    Ok((rings, is_same))
 }
 
 /// A loop without points that repeat the one before; empty if fewer than three are left.
