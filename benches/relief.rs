@@ -24,7 +24,7 @@ fn polygon(corners: u32) -> Vec<Vec2> {
         state ^= state << 13;
         state ^= state >> 7;
         state ^= state << 17;
-        (state >> 11) as f64 / (1u64 << 53) as f64 * 6.28
+        (state >> 11) as f64 / (1u64 << 53) as f64 * 628.0 / 100.0
     });
     (0..corners)
         .map(|i| {

@@ -145,9 +145,8 @@ pub(crate) fn bake(options: &Options) -> Done<()> {
     let arc = |factor| simple(Join::Arc { factor });
     save(&[simple(Join::Miter)?, simple(Join::Bevel)?, arc(1.2)?], out.join("fig_09_simple.png"))?;
     save(&[arc(1.4)?, arc(1.6)?], out.join("fig_10_arcs.png"))?;
-    let midpoint = |degrees: f32| {
-        studio.panel(ReliefParams { max_angle: degrees.to_radians(), ..ReliefParams::MIDPOINT })
-    };
+    let midpoint =
+        |degrees: f32| studio.panel(ReliefParams { max_angle: degrees.to_radians(), ..ReliefParams::MIDPOINT });
     save(&[midpoint(10.0)?, midpoint(20.0)?, midpoint(30.0)?], out.join("fig_12_midpoints.png"))?;
     phases(&studio, out)?;
     save(&[studio.panel(ReliefParams::FOURIER)?], out.join("fig_15_fourier.png"))?;

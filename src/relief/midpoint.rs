@@ -51,7 +51,8 @@ impl Displacement {
     ///
     /// Steep displacements make halves that are longer than their edge, and would not come to an end.
     fn halvings(&self, length: f64) -> u32 {
-        (1..).take_while(|&halvings| length > self.longest * f64::from(1 << halvings.min(30))).count().min(30) as u32 + 2
+        (1..).take_while(|&halvings| length > self.longest * f64::from(1 << halvings.min(30))).count().min(30) as u32
+            + 2
     }
 
     /// The midpoint of an edge that is long.

@@ -84,11 +84,8 @@ fn in_two_steps(moves: &[Move<'_>], way: Way, tolerance: f64) -> Result<Vec<Loop
     };
     let rings = moves.iter().map(small).collect::<Result<Vec<_>, _>>()?;
     let paces: Vec<Pace> = moves.iter().map(|one| one.pace.share(1.0 - FIRST_STEP)).collect();
-    let rest: Vec<Move<'_>> = moves
-        .iter()
-        .zip(rings.iter().zip(&paces))
-        .map(|(one, (rings, pace))| Move { rings, pace, ..*one })
-        .collect();
+    let rest: Vec<Move<'_>> =
+        moves.iter().zip(rings.iter().zip(&paces)).map(|(one, (rings, pace))| Move { rings, pace, ..*one }).collect();
     moved_together(&rest, way, tolerance, MAX_CUTS)
 }
 

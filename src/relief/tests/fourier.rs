@@ -45,11 +45,8 @@ fn harmonics_are_the_sums_of_the_paper() {
 fn samples_come_back() {
     for (line, _) in lines(60) {
         let descriptors = Descriptors::new(&line, 1024).unwrap();
-        let length: f64 = line
-            .iter()
-            .zip(line.iter().cycle().skip(1))
-            .map(|(a, b)| a.as_dvec2().distance(b.as_dvec2()))
-            .sum();
+        let length: f64 =
+            line.iter().zip(line.iter().cycle().skip(1)).map(|(a, b)| a.as_dvec2().distance(b.as_dvec2())).sum();
         assert!((descriptors.spacing() * 1024.0 - length).abs() < 1e-9 * length);
         let points = descriptors.points();
         assert!(points[0].distance(line[0].as_dvec2()) < 1e-12);

@@ -137,7 +137,11 @@ fn overlapping_seeds_are_one_region_and_opposite_ones_leave_holes() {
 #[test]
 fn sizes_and_places_scale() {
     let seed = shape(1, 100, &mut Rng::new(9));
-    let usual = Contours::generate(&ReliefParams { distance: 0.03125, ..ReliefParams::DEFAULT }, std::slice::from_ref(&seed), 4);
+    let usual = Contours::generate(
+        &ReliefParams { distance: 0.03125, ..ReliefParams::DEFAULT },
+        std::slice::from_ref(&seed),
+        4,
+    );
     let usual = usual.unwrap();
     for scale in [1.0 / 1024.0, 1024.0, 262_144.0] {
         let params = ReliefParams { distance: 0.03125 * scale, ..ReliefParams::DEFAULT };
@@ -155,7 +159,8 @@ fn sizes_and_places_scale() {
 #[test]
 fn images_of_factors_and_heights_are_checked() {
     let seeds = [square(0.0, 1.0)];
-    let job = |factors: Grid<f32>, extent: Vec2| ContourJob::with_factors(&SIMPLE, &seeds, 1, factors, extent).map(drop);
+    let job =
+        |factors: Grid<f32>, extent: Vec2| ContourJob::with_factors(&SIMPLE, &seeds, 1, factors, extent).map(drop);
     let mut factors = Grid::new(UVec2::new(3, 2), 1.0);
     assert_eq!(job(factors.clone(), Vec2::new(1.5, 1.0)), Ok(()));
     assert!(matches!(job(factors.clone(), Vec2::ZERO), Err(ReliefError::Image { .. })));

@@ -164,8 +164,7 @@ fn round_rings_are_level_sets_of_the_distance() {
         let mut rng = Rng::new(case).stream("levels");
         let seed: Vec<Vec2> = shape(case as usize % KINDS.len(), 60, &mut rng);
         let seed: Vec<Vec2> = seed.iter().map(|point| 16.0 + *point * 64.0).collect();
-        let params =
-            ReliefParams { join: Join::Round, distance: 2.0, inward, outward, ..ReliefParams::SIMPLE };
+        let params = ReliefParams { join: Join::Round, distance: 2.0, inward, outward, ..ReliefParams::SIMPLE };
         let contours = Contours::generate(&params, &[seed], case).unwrap();
         let rings = |level: i32| contours.level(level).map(|ring| ring.points.clone()).collect::<Vec<_>>();
         let field = distances(&rings(0), SIDE);

@@ -33,12 +33,7 @@ pub(super) fn untangle(loops: &[Loop], fill: Fill, least: i128, most: usize) -> 
 }
 
 /// As [`untangle`], and whether the rings are the loops as they came: none met itself or another one, none was left out.
-pub(super) fn untangled(
-    loops: &[Loop],
-    fill: Fill,
-    least: i128,
-    most: usize,
-) -> Result<(Vec<Loop>, bool), TooTangled> {
+pub(super) fn untangled(loops: &[Loop], fill: Fill, least: i128, most: usize) -> Result<(Vec<Loop>, bool), TooTangled> {
     let edges = meet::cut(loops, most)?;
     let mut chains = chains::chains(&edges);
     faces::wind(&mut chains, &edges);

@@ -34,12 +34,7 @@ pub(super) fn trace(chains: &Chains, edges: &Edges, fill: Fill) -> Vec<Loop> {
 }
 
 /// The corners of a chain without the last one, in the given direction.
-fn line<'a>(
-    chains: &'a Chains,
-    edges: &'a Edges,
-    chain: usize,
-    is_forward: bool,
-) -> impl Iterator<Item = Point> + 'a {
+fn line<'a>(chains: &'a Chains, edges: &'a Edges, chain: usize, is_forward: bool) -> impl Iterator<Item = Point> + 'a {
     let chain = &chains.chains[chain];
     let mut points: Vec<Point> = chain.points(edges).collect();
     if !is_forward {
