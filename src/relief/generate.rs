@@ -24,10 +24,13 @@ pub const MAX_LEVEL_POINTS: usize = 1 << 20;
 pub const MAX_RING_POINTS: usize = 1 << 23;
 
 /// Displaced contours keep this share of the distance from the contour before, beyond what displacements take.
-const GAP: f64 = 0.2;
+const GAP: f64 = 0.25;
 
 /// The share of the distance that is kept before phases are drawn, beyond what these may take.
-const KEPT: f64 = 0.15;
+const KEPT: f64 = 0.24;
+
+/// Corners within this share of the distance from a straight line do not matter for what is kept.
+const KEPT_TOLERANCE: f64 = 0.05;
 
 /// Windings of a region whose border may be twisted.
 const POSITIVE: Fill = Fill::AtLeast(1);
@@ -36,7 +39,10 @@ const POSITIVE: Fill = Fill::AtLeast(1);
 const LEAST_DISPLACED_AREA: f64 = 0.01;
 
 /// Corners that may be dropped from a displaced contour lie within this share of the distance from a straight line.
-const DROPPED: [f64; 2] = [0.001, 0.03];
+const DROPPED: [f64; 2] = [0.001, 0.1];
+
+/// Corners that samples may miss lie within this share of the distance from the line between samples.
+const MISSED: f64 = 0.03;
 
 /// What a job does next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -241,13 +247,15 @@ impl ContourJob {
         let least = least_area(self.pace.least(), LEAST_DISPLACED_AREA);
         let rng = self.rng.stream("contours").substream(u64::from(level as u32));
         let from = std::mem::take(&mut self.current);
-        let plain = Move { rings: &from, join: self.params.join, pace: &self.pace };
+        let plain = Move { rings: &from, join: self.params.join, pace: &self.pace, tolerance: 0.0 };
         let mut rings = if method == Method::Improved {
             let mut displaced = from.clone();
             self.displace(&mut displaced, &mut rng.stream("midpoints"))?;
             let (displaced, is_same) = untangled(&displaced, POSITIVE, least, MAX_CUTS).map_err(tangled)?;
             let pace = Pace::even(self.room_of_phases() + KEPT * self.pace.least());
-            let moves = [Move { rings: &displaced, ..plain }, Move { join: Join::Round, pace: &pace, ..plain }];
+            let tolerance = KEPT_TOLERANCE * self.pace.least();
+            let kept = Move { join: Join::Round, pace: &pace, tolerance, ..plain };
+            let moves = [Move { rings: &displaced, ..plain }, kept];
             // Where midpoints have bridged what is narrow, the level itself must keep its distance too.
             offset(if is_same { &moves[..1] } else { &moves }, way)
         } else {
@@ -301,7 +309,7 @@ impl ContourJob {
         let scramble = Scramble {
             transform: &self.transform,
             first_harmonic: self.params.first_harmonic,
-            tolerance: DROPPED[1] * self.pace.least(),
+            tolerance: MISSED * self.pace.least(),
             within: self.room_of_phases(),
         };
         for ring in rings {

@@ -58,6 +58,8 @@ pub(super) struct Move<'a> {
     pub(super) rings: &'a [Loop],
     pub(super) join: Join,
     pub(super) pace: &'a Pace,
+    /// Corners that deviate less than this from a straight line are not moved for themselves, lattice steps.
+    pub(super) tolerance: f64,
 }
 
 /// The regions within rings, shrunk or grown: what all have in common if they shrink, and all together if they grow.
@@ -93,9 +95,9 @@ fn in_two_steps(moves: &[Move<'_>], way: Way, tolerance: f64) -> Result<Vec<Loop
 fn moved_together(moves: &[Move<'_>], way: Way, tolerance: f64, most: usize) -> Result<Vec<Loop>, TooTangled> {
     let Some(finest) = moves.iter().map(|one| one.pace.least()).reduce(f64::min) else { return Ok(Vec::new()) };
     let fill = Fill::AtLeast(if way == Way::Inward { moves.len() as i32 } else { 1 });
-    let one = |Move { rings, join, pace }: &Move<'_>| {
+    let one = |Move { rings, join, pace, tolerance: own }: &Move<'_>| {
         let one = |ring: &Loop| {
-            let copy = working_copy(ring, tolerance * finest);
+            let copy = working_copy(ring, own.max(tolerance * finest));
             let copy = if pace.is_even() { copy } else { divided(&copy, 2.0 * pace.least()) };
             moved(&copy, way, *join, pace)
         };

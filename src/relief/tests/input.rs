@@ -212,7 +212,7 @@ fn estimates_fit_every_seed() {
             Ok(params) => {
                 assert_eq!(params.validate(), Ok(()));
                 let contours = Contours::generate(&params, &[seed], case).unwrap();
-                assert_contours(&contours, 0.04 * f64::from(params.distance), &format!("estimate {case}"));
+                assert_contours(&contours, 0.03 * f64::from(params.distance), &format!("estimate {case}"));
                 assert!(contours.levels().unwrap().1 >= 2, "case {case}: {params:?}");
             }
             Err(error) => assert_eq!(error, ReliefError::NoArea),
