@@ -236,3 +236,32 @@ fn improved_contours_stay_rough() {
     let [simple, improved] = [ReliefParams::SIMPLE, ReliefParams::IMPROVED].map(|params| turns(&params));
     assert!(improved > 1.5 * simple, "simple {simple}, improved {improved}");
 }
+
+/// What lines wind round is inside, whatever they do; what they do not is outside.
+#[test]
+fn seeds_enclose_what_they_wind_round() {
+    for case in 0..200 {
+        let mut rng = Rng::new(case).stream("winding");
+        let points = count(&mut rng, 300.0);
+        let lines: Vec<Vec<Vec2>> = (0..1 + rng.next_u32() % 3)
+            .map(|i| shape((case as usize + i as usize) % KINDS.len(), points, &mut rng))
+            .collect();
+        let params = ReliefParams { inward: 0, ..ReliefParams::SIMPLE };
+        let Ok(contours) = Contours::generate(&params, &lines, case) else { continue };
+        assert_contours(&contours, 0.0, "seeds");
+        let rings: Vec<Vec<Vec2>> = contours.rings.iter().map(|ring| ring.points.clone()).collect();
+        for _ in 0..60 {
+            let p = Vec2::new(rng.range(-1.0, 2.0), rng.range(-1.0, 2.0));
+            let near = |line: &Vec<Vec2>| {
+                line.iter().zip(line.iter().cycle().skip(1)).any(|(a, b)| {
+                    let way = *b - *a;
+                    let share = ((p - *a).dot(way) / way.length_squared().max(1e-12)).clamp(0.0, 1.0);
+                    p.distance(*a + way * share) < 1e-5
+                })
+            };
+            if !lines.iter().any(near) {
+                assert_eq!(is_inside(&lines, p), is_inside(&rings, p), "case {case} at {p}");
+            }
+        }
+    }
+}

@@ -11,15 +11,12 @@ mod faces;
 mod meet;
 mod rings;
 
-use super::lattice::{Loop, Point, double_area};
+use super::lattice::{Loop, double_area};
 pub(super) use faces::Fill;
+pub(super) use meet::TooTangled;
 
 /// Most cuts where loops meet.
 pub(super) const MAX_CUTS: usize = 1 << 21;
-
-/// Loops have more crossings than are computed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct TooTangled;
 
 /// The region that `loops` enclose by the rule `fill`, as rings.
 ///
@@ -41,17 +38,4 @@ pub(super) fn untangled(loops: &[Loop], fill: Fill, least: i128, most: usize) ->
     rings.retain(|ring: &Loop| ring.len() >= 3 && double_area(ring).abs() >= least.max(1));
     let is_same = chains.nodes.is_empty() && rings.len() == loops.len();
     Ok((rings, is_same))
-}
-
-/// A loop without points that repeat the one before; empty if fewer than three are left.
-fn cleaned(points: &[Point]) -> Loop {
-    let mut out: Loop = points.to_vec();
-    out.dedup();
-    while out.len() > 1 && out.first() == out.last() {
-        out.pop();
-    }
-    if out.len() < 3 {
-        out.clear();
-    }
-    out
 }
