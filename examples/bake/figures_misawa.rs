@@ -39,7 +39,7 @@ fn mountain(seed: u64) -> Vec<Vec2> {
     let shift = rng.unit() * TAU;
     let waves: Vec<[f32; 3]> = [3.0, 5.0, 8.0, 13.0, 21.0]
         .into_iter()
-        .map(|k: f32| [k, rng.unit() * TAU, 0.42 / ops::powf(k, 0.95) * rng.range(0.75, 1.25)])
+        .map(|k: f32| [k, rng.unit() * TAU, 0.75 / ops::powf(k, 1.05) * rng.range(0.75, 1.25)])
         .collect();
     (0..CORNERS)
         .map(|i| {
@@ -48,7 +48,7 @@ fn mountain(seed: u64) -> Vec<Vec2> {
             let uneven = turn + 0.25 * ops::sin(2.0 * turn + shift);
             let spurs: f32 =
                 waves.iter().map(|[k, at, size]| size * (ops::sin(0.5 * (k * uneven + at)).abs() - 0.64)).sum();
-            let radius = 0.35 * (1.0 + spurs + 0.02 * rng.signed());
+            let radius = 0.36 * (1.0 + spurs + 0.012 * rng.signed());
             Vec2::splat(0.5) + ops::unit(turn) * radius * Vec2::new(1.18, 0.95)
         })
         .collect()
@@ -188,6 +188,7 @@ fn phases(studio: &Studio, out: &std::path::Path) -> Done<()> {
 /// Parameters from the seed, a steep side, both ways from a contour in the middle, several seeds.
 fn beyond(studio: &Studio, out: &std::path::Path) -> Done<()> {
     let estimated = ReliefParams::estimate(&studio.contour)?;
+    println!("estimated from the seed: {estimated:?}");
     let steep = ReliefParams { steepness: 0.6, steep_angle: -0.6, ..ReliefParams::IMPROVED };
     let small = |scale: f32, x: f32, y: f32| -> Vec<Vec2> {
         studio.contour.iter().map(|point| (*point - 0.5) * scale + Vec2::new(x, y)).collect()

@@ -108,6 +108,7 @@ fn erosion(ring: &Loop) -> f64 {
         -libm::atan2(cross(u, v) as f64, dot(u, v) as f64)
     });
     // Sharp corners weigh more.
-    let (sum, weight) = turns.filter(|turn| *turn > LEAST).fold((0.0, 0.0), |(s, w), turn| (s + turn * turn, w + turn));
+    let (sum, weight) =
+        turns.filter(|turn| *turn > LEAST).fold((0.0, 0.0), |(s, w), turn| (s + turn * turn * turn, w + turn * turn));
     if weight > 0.0 { 1.0 / libm::cos(0.5 * sum / weight).max(0.1) } else { 1.0 }
 }

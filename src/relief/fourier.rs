@@ -148,7 +148,8 @@ impl Descriptors {
         let first = first_harmonic.max(1) as usize;
         for k in first..=count.saturating_sub(first) {
             let angle = TAU * f64::from(rng.unit());
-            self.harmonics[k] = DVec2::new(libm::cos(angle), libm::sin(angle)) * self.harmonics[k].length();
+            let (sin, cos) = libm::sincos(angle);
+            self.harmonics[k] = DVec2::new(cos, sin) * self.harmonics[k].length();
         }
     }
 

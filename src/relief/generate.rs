@@ -12,7 +12,7 @@ use super::{
     scramble::Scramble,
     seeds::{Seeds, limits},
     simplify::working_copy,
-    untangle::{Fill, MAX_CUTS, untangle},
+    untangle::{Fill, MAX_CUTS, untangle, untangled},
 };
 use crate::{Grid, math::Rng};
 use glam::Vec2;
@@ -24,10 +24,13 @@ pub const MAX_LEVEL_POINTS: usize = 1 << 20;
 pub const MAX_RING_POINTS: usize = 1 << 23;
 
 /// Displaced contours keep this share of the distance from the contour before, beyond what displacements take.
-const GAP: f64 = 0.2;
+const GAP: f64 = 0.25;
 
 /// The share of the distance that is kept before phases are drawn, beyond what these may take.
-const KEPT: f64 = 0.15;
+const KEPT: f64 = 0.24;
+
+/// Corners within this share of the distance from a straight line do not matter for what is kept.
+const KEPT_TOLERANCE: f64 = 0.05;
 
 /// Windings of a region whose border may be twisted.
 const POSITIVE: Fill = Fill::AtLeast(1);
@@ -36,7 +39,10 @@ const POSITIVE: Fill = Fill::AtLeast(1);
 const LEAST_DISPLACED_AREA: f64 = 0.01;
 
 /// Corners that may be dropped from a displaced contour lie within this share of the distance from a straight line.
-const DROPPED: [f64; 2] = [0.001, 0.03];
+const DROPPED: [f64; 2] = [0.001, 0.1];
+
+/// Corners that samples may miss lie within this share of the distance from the line between samples.
+const MISSED: f64 = 0.03;
 
 /// What a job does next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -94,6 +100,15 @@ fn count(rings: &[Loop]) -> usize {
     rings.iter().map(Vec::len).sum()
 }
 
+/// The shortest mean edge for which midpoints are displaced: finer ones are lost again.
+///
+/// Moving a line takes away what is much smaller than the distance, and samples of a line cannot hold what is smaller than they are.
+fn finest_edge(params: &ReliefParams, rings: &[Loop], distance: f64) -> f64 {
+    let longest = rings.iter().map(|ring| perimeter(ring)).fold(0.0, f64::max);
+    let samples = if params.method.scrambles() { longest / f64::from(params.samples) } else { 0.0 };
+    samples.max(0.25 * distance)
+}
+
 impl ContourJob {
     /// A job for the contours around all `seeds` together, closed lines in pattern space, and the random `seed`.
     ///
@@ -134,9 +149,7 @@ impl ContourJob {
         let step = f64::from(params.distance) * f64::from(pace) * (f64::from(params.join.reach()) + 1.0);
         let Seeds { lattice, rings, mean_edge } = Seeds::new(seeds, step * f64::from(params.outward))?;
         let distance = f64::from(params.distance) * lattice.steps();
-        // Samples of a contour cannot hold what is finer than they are.
-        let finest = rings.iter().map(|ring| perimeter(ring)).fold(0.0, f64::max) / f64::from(params.samples);
-        let mean_edge = if params.method.scrambles() { mean_edge.max(finest) } else { mean_edge };
+        let longest = 2.0 * mean_edge.max(finest_edge(params, &rings, distance));
         let stage = if params.inward > 0 { Stage::Inward } else { Stage::Outward };
         let mut out = Self {
             params: *params,
@@ -144,7 +157,7 @@ impl ContourJob {
             pace: Pace::new(distance, params.steepness, params.steep_angle),
             transform: Transform::new(params.samples),
             rng: Rng::new(seed),
-            longest: 2.0 * mean_edge,
+            longest,
             current: rings.clone(),
             areas: [area(&rings); 2],
             seeds: rings,
@@ -234,15 +247,17 @@ impl ContourJob {
         let least = least_area(self.pace.least(), LEAST_DISPLACED_AREA);
         let rng = self.rng.stream("contours").substream(u64::from(level as u32));
         let from = std::mem::take(&mut self.current);
-        let plain = Move { rings: &from, join: self.params.join, pace: &self.pace };
+        let plain = Move { rings: &from, join: self.params.join, pace: &self.pace, tolerance: 0.0 };
         let mut rings = if method == Method::Improved {
             let mut displaced = from.clone();
             self.displace(&mut displaced, &mut rng.stream("midpoints"))?;
-            let displaced = untangle(&displaced, POSITIVE, least, MAX_CUTS).map_err(tangled)?;
-            // Midpoints can bridge what is narrow, so the level itself keeps its distance too.
+            let (displaced, is_same) = untangled(&displaced, POSITIVE, least, MAX_CUTS).map_err(tangled)?;
             let pace = Pace::even(self.room_of_phases() + KEPT * self.pace.least());
-            let kept = Move { join: Join::Round, pace: &pace, ..plain };
-            offset(&[Move { rings: &displaced, ..plain }, kept], way)
+            let tolerance = KEPT_TOLERANCE * self.pace.least();
+            let kept = Move { join: Join::Round, pace: &pace, tolerance, ..plain };
+            let moves = [Move { rings: &displaced, ..plain }, kept];
+            // Where midpoints have bridged what is narrow, the level itself must keep its distance too.
+            offset(if is_same { &moves[..1] } else { &moves }, way)
         } else {
             offset(&[plain], way)
         }
@@ -294,7 +309,7 @@ impl ContourJob {
         let scramble = Scramble {
             transform: &self.transform,
             first_harmonic: self.params.first_harmonic,
-            tolerance: DROPPED[1] * self.pace.least(),
+            tolerance: MISSED * self.pace.least(),
             within: self.room_of_phases(),
         };
         for ring in rings {

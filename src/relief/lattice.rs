@@ -20,7 +20,12 @@ impl Point {
     /// The lattice point nearest to a place. Places beyond all that a lattice holds go to its border.
     pub(super) fn round(x: f64, y: f64) -> Self {
         const FARTHEST: f64 = (1 << 28) as f64;
-        let whole = |v: f64| (v + 0.5).floor().clamp(-FARTHEST, FARTHEST) as i32;
+        let whole = |v: f64| {
+            let v = (v + 0.5).clamp(-FARTHEST, FARTHEST);
+            // The largest whole number up to it; `floor` is a call on old processors.
+            let cut = v as i32;
+            cut - i32::from(f64::from(cut) > v)
+        };
         Self { x: whole(x), y: whole(y) }
     }
 

@@ -17,6 +17,9 @@ const TOLERANCES: [f64; 3] = [0.005, 0.02, 0.04];
 /// Most crossings of moved edges at the first two tolerances.
 const MAX_CROSSINGS: usize = 1 << 18;
 
+/// The share of the distance that rough lines move first.
+const FIRST_STEP: f64 = 0.0625;
+
 /// Islands with an area below this share of the squared distance are not made.
 const LEAST_AREA: f64 = 0.001;
 
@@ -55,6 +58,8 @@ pub(super) struct Move<'a> {
     pub(super) rings: &'a [Loop],
     pub(super) join: Join,
     pub(super) pace: &'a Pace,
+    /// Corners that deviate less than this from a straight line are not moved for themselves, lattice steps.
+    pub(super) tolerance: f64,
 }
 
 /// The regions within rings, shrunk or grown: what all have in common if they shrink, and all together if they grow.
@@ -64,22 +69,42 @@ pub(super) struct Move<'a> {
 /// grows). So what is left of the region has a winding number of one, and all that is passed over has none above zero.
 /// Where `n` regions shrink, what is left of all of them has the sum `n`, and no other place has.
 pub(super) fn offset(moves: &[Move<'_>], way: Way) -> Result<Vec<Loop>, TooTangled> {
+    let [fine, medium, coarse] = TOLERANCES;
+    moved_together(moves, way, fine, MAX_CROSSINGS)
+        .or_else(|_| moved_together(moves, way, medium, MAX_CROSSINGS))
+        .or_else(|_| in_two_steps(moves, way, coarse))
+}
+
+/// For rough lines: a small step takes away what is narrow, and with it most of the crossings of the large one.
+///
+/// The small step has extended edges, which leave corners as they are for the join of the large one.
+fn in_two_steps(moves: &[Move<'_>], way: Way, tolerance: f64) -> Result<Vec<Loop>, TooTangled> {
+    let small = |one: &Move<'_>| {
+        let pace = one.pace.share(FIRST_STEP);
+        let one = Move { join: Join::Miter, pace: &pace, ..*one };
+        moved_together(&[one], way, tolerance, MAX_CUTS)
+    };
+    let rings = moves.iter().map(small).collect::<Result<Vec<_>, _>>()?;
+    let paces: Vec<Pace> = moves.iter().map(|one| one.pace.share(1.0 - FIRST_STEP)).collect();
+    let rest: Vec<Move<'_>> =
+        moves.iter().zip(rings.iter().zip(&paces)).map(|(one, (rings, pace))| Move { rings, pace, ..*one }).collect();
+    moved_together(&rest, way, tolerance, MAX_CUTS)
+}
+
+/// [`offset`] with corners that deviate by less than `tolerance` dropped, and at most so many cuts.
+fn moved_together(moves: &[Move<'_>], way: Way, tolerance: f64, most: usize) -> Result<Vec<Loop>, TooTangled> {
     let Some(finest) = moves.iter().map(|one| one.pace.least()).reduce(f64::min) else { return Ok(Vec::new()) };
     let fill = Fill::AtLeast(if way == Way::Inward { moves.len() as i32 } else { 1 });
-    let with = |tolerance: f64, most: usize| {
-        let one = |Move { rings, join, pace }: &Move<'_>| {
-            let one = |ring: &Loop| {
-                let copy = working_copy(ring, tolerance * finest);
-                let copy = if pace.is_even() { copy } else { divided(&copy, 2.0 * pace.least()) };
-                moved(&copy, way, *join, pace)
-            };
-            rings.iter().map(one).collect::<Vec<_>>()
+    let one = |Move { rings, join, pace, tolerance: own }: &Move<'_>| {
+        let one = |ring: &Loop| {
+            let copy = working_copy(ring, own.max(tolerance * finest));
+            let copy = if pace.is_even() { copy } else { divided(&copy, 2.0 * pace.least()) };
+            moved(&copy, way, *join, pace)
         };
-        let loops: Vec<Loop> = moves.iter().flat_map(one).collect();
-        untangle(&loops, fill, least_area(finest, LEAST_AREA), most)
+        rings.iter().map(one).collect::<Vec<_>>()
     };
-    let [fine, medium, coarse] = TOLERANCES;
-    with(fine, MAX_CROSSINGS).or_else(|_| with(medium, MAX_CROSSINGS)).or_else(|_| with(coarse, MAX_CUTS))
+    let loops: Vec<Loop> = moves.iter().flat_map(one).collect();
+    untangle(&loops, fill, least_area(finest, LEAST_AREA), most)
 }
 
 /// A loop with edges of at most `longest`, or as near to it as 256 pieces of an edge allow.
@@ -192,7 +217,7 @@ impl Corner {
 }
 
 /// All corners of a loop, and the lengths of the edges after them.
-fn corners(points: &[Point], way: Way, pace: &Pace) -> (Vec<Corner>, Vec<f64>) {
+fn corners(points: &[Point], way: Way, pace: impl Fn(Point) -> f64) -> (Vec<Corner>, Vec<f64>) {
     let mut lengths = Vec::with_capacity(points.len());
     let ways: Vec<[f64; 2]> = edges(points)
         .map(|(a, b)| {
@@ -208,9 +233,7 @@ fn corners(points: &[Point], way: Way, pace: &Pace) -> (Vec<Corner>, Vec<f64>) {
         before = after;
         let [u, v] = ways;
         let turn = [(u[0] * v[1] - u[1] * v[0]) * sign, u[0] * v[0] + u[1] * v[1]];
-        let outward = [u[1] + v[1], -u[0] - v[0]];
-        let length = (outward[0] * outward[0] + outward[1] * outward[1]).sqrt().max(1e-9);
-        let distance = pace.at(point, [outward[0] / length, outward[1] / length]);
+        let distance = pace(point);
         let trim = if turn[0] > 0.0 { distance * turn[0] / (1.0 + turn[1]).max(1e-12) } else { 0.0 };
         Corner { point, ways, turn, distance, sign, trim }
     };
@@ -225,7 +248,7 @@ fn moved(points: &[Point], way: Way, join: Join, pace: &Pace) -> Loop {
     if points.len() < 3 {
         return Loop::new();
     }
-    let (corners, lengths) = corners(points, way, pace);
+    let (corners, lengths) = corners(points, way, pace.on(points));
     let count = corners.len();
     let mut is_trimmed: Vec<bool> = corners.iter().map(|corner| corner.trim > 0.0).collect();
     for (i, &length) in lengths.iter().enumerate() {

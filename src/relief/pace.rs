@@ -60,6 +60,11 @@ impl Pace {
         Ok(())
     }
 
+    /// A share of every distance.
+    pub(super) fn share(&self, share: f64) -> Self {
+        Self { distance: self.distance * share, ..self.clone() }
+    }
+
     /// Whether the distance is the same everywhere.
     pub(super) fn is_even(&self) -> bool {
         self.image.is_none() && self.steepness == 0.0
@@ -70,13 +75,27 @@ impl Pace {
         self.distance * (1.0 - self.steepness) * self.image.as_ref().map_or(1.0, |image| image.least)
     }
 
-    /// The distance at a point of a contour whose outside lies in the direction `outward`, a unit vector.
-    pub(super) fn at(&self, point: Point, outward: [f64; 2]) -> f64 {
-        if self.is_even() {
-            return self.distance;
+    /// How far a point lies on the steep side.
+    fn side(&self, point: Point) -> f64 {
+        let [x, y] = point.place();
+        x * self.steep[0] + y * self.steep[1]
+    }
+
+    /// The distances at the points of a ring.
+    pub(super) fn on<'a>(&'a self, ring: &[Point]) -> impl Fn(Point) -> f64 + 'a {
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        if self.steepness > 0.0 {
+            ring.iter().for_each(|point| (low, high) = (low.min(self.side(*point)), high.max(self.side(*point))));
         }
-        let side = 1.0 - self.steepness * (outward[0] * self.steep[0] + outward[1] * self.steep[1]);
-        self.distance * side * self.image.as_ref().map_or(1.0, |image| image.at(point))
+        move |point| {
+            if self.is_even() {
+                return self.distance;
+            }
+            // From -1 at one end of the ring to 1 at the other.
+            let side = if high > low { (2.0 * self.side(point) - low - high) / (high - low) } else { 0.0 };
+            let factor = 1.0 - self.steepness * side.clamp(-1.0, 1.0);
+            self.distance * factor * self.image.as_ref().map_or(1.0, |image| image.at(point))
+        }
     }
 }
 

@@ -172,8 +172,8 @@ params! {
     inward: u32 = 4096, 0.0, 4096.0;
     /// Number of contours to make outward, which is downhill. 0..=256; default 0.
     outward: u32 = 0, 0.0, 256.0;
-    /// How much nearer contours are on the side of `steep_angle`: 0 = on no side, 0.8 = at a fifth of the distance there
-    /// and at 1.8 times on the other side. 0..=0.8; default 0.
+    /// How much nearer contours are on the side of `steep_angle`: 0 = not at all, 0.8 = at a fifth of the distance where
+    /// a ring reaches farthest to that side, and at 1.8 times at its other end, evenly between. 0..=0.8; default 0.
     steepness: f32 = 0.0, 0.0, 0.8;
     /// Direction of the steep side, radians from the x axis towards y, which points down. -7..=7; default 0.
     steep_angle: f32 = 0.0, -7.0, 7.0;

@@ -3,7 +3,7 @@
 use super::{
     error::ReliefError,
     lattice::{Lattice, Loop, edges},
-    untangle::{Fill, MAX_CUTS, untangle},
+    untangle::{Fill, untangle},
 };
 use glam::Vec2;
 
@@ -15,6 +15,9 @@ pub const MAX_COORDINATE: f32 = 1e6;
 
 /// Smallest size of all seed contours together, pattern units.
 const LEAST_SIZE: f32 = 1e-6;
+
+/// Most cuts where seed contours cross.
+const MAX_SEED_CUTS: usize = 1 << 19;
 
 /// Checks numbers.
 pub(super) fn limits(seeds: &[Vec<Vec2>], most: usize) -> Result<(), ReliefError> {
@@ -60,7 +63,7 @@ impl Seeds {
             seeds.iter().map(|points| points.iter().map(|&point| lattice.point(point)).collect()).collect();
         let lengths = loops.iter().flat_map(|points| edges(points)).map(|(a, b)| a.distance(b)).filter(|&l| l > 0.0);
         let (count, length) = lengths.fold((0.0, 0.0), |(count, sum), length| (count + 1.0, sum + length));
-        let rings = untangle(&loops, Fill::NonZero, 1, MAX_CUTS).map_err(|_| ReliefError::Tangled { level: 0 })?;
+        let rings = untangle(&loops, Fill::NonZero, 1, MAX_SEED_CUTS).map_err(|_| ReliefError::Tangled { level: 0 })?;
         if rings.is_empty() {
             return Err(ReliefError::NoArea);
         }

@@ -15,11 +15,13 @@ pub(super) fn simplified(points: &[Point], tolerance: f64) -> Loop {
     let mut last = points[first];
     for i in 1..=count {
         let point = points[(first + i) % count];
-        if !wedge.holds(point) {
+        let mut way = wedge.to(point);
+        if !wedge.holds(way) {
             out.push(last);
             wedge = Wedge::new(last);
+            way = wedge.to(point);
         }
-        wedge.narrow(point, tolerance);
+        wedge.narrow(way, tolerance);
         last = point;
     }
     out
@@ -43,6 +45,7 @@ impl Wedge {
         Self { from: from.place(), borders: None, far: 0.0 }
     }
 
+    /// The way to a point, and its length.
     fn to(&self, point: Point) -> ([f64; 2], f64) {
         let [x, y] = point.place();
         let way = [x - self.from[0], y - self.from[1]];
@@ -50,8 +53,7 @@ impl Wedge {
     }
 
     /// Whether a line to the point passes all corners so far, and does not turn back.
-    fn holds(&self, point: Point) -> bool {
-        let (way, far) = self.to(point);
+    fn holds(&self, (way, far): ([f64; 2], f64)) -> bool {
         let is_between = |[low, high]: [[f64; 2]; 2]| {
             let along = [low[0] + high[0], low[1] + high[1]];
             cross(low, way) >= 0.0 && cross(way, high) >= 0.0 && along[0] * way[0] + along[1] * way[1] > 0.0
@@ -60,8 +62,7 @@ impl Wedge {
     }
 
     /// Leaves the directions that pass the point within `tolerance`.
-    fn narrow(&mut self, point: Point, tolerance: f64) {
-        let (way, far) = self.to(point);
+    fn narrow(&mut self, (way, far): ([f64; 2], f64), tolerance: f64) {
         self.far = self.far.max(far);
         if far <= tolerance {
             return;

@@ -2,10 +2,12 @@
 
 use super::{
     super::lattice::{Loop, Point, cross},
-    TooTangled,
     bins::{Bins, Edge},
-    cleaned,
 };
+
+/// Loops have more crossings than are computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in super::super) struct TooTangled;
 
 /// Edges after all cuts, and after each one the index of the next of its loop.
 #[derive(Debug, Default)]
@@ -17,10 +19,23 @@ pub(super) struct Edges {
 }
 
 /// Most pairs of edges that are looked at, for each cut that is allowed.
-const WORK: usize = 64;
+const WORK: usize = 128;
 
 /// A new corner of an edge.
 type Cut = (u32, i64, Point);
+
+/// A loop without points that repeat the one before; empty if fewer than three are left.
+fn cleaned(points: &[Point]) -> Loop {
+    let mut out: Loop = points.to_vec();
+    out.dedup();
+    while out.len() > 1 && out.first() == out.last() {
+        out.pop();
+    }
+    if out.len() < 3 {
+        out.clear();
+    }
+    out
+}
 
 impl Edges {
     fn new(loops: &[Loop]) -> Self {

@@ -11,15 +11,12 @@ mod faces;
 mod meet;
 mod rings;
 
-use super::lattice::{Loop, Point, double_area};
+use super::lattice::{Loop, double_area};
 pub(super) use faces::Fill;
+pub(super) use meet::TooTangled;
 
 /// Most cuts where loops meet.
 pub(super) const MAX_CUTS: usize = 1 << 21;
-
-/// Loops have more crossings than are computed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct TooTangled;
 
 /// The region that `loops` enclose by the rule `fill`, as rings.
 ///
@@ -29,23 +26,16 @@ pub(super) struct TooTangled;
 ///
 /// Fails if there are more than `most` cuts.
 pub(super) fn untangle(loops: &[Loop], fill: Fill, least: i128, most: usize) -> Result<Vec<Loop>, TooTangled> {
+    Ok(untangled(loops, fill, least, most)?.0)
+}
+
+/// As [`untangle`], and whether the rings are the loops as they came: none met itself or another one, none was left out.
+pub(super) fn untangled(loops: &[Loop], fill: Fill, least: i128, most: usize) -> Result<(Vec<Loop>, bool), TooTangled> {
     let edges = meet::cut(loops, most)?;
     let mut chains = chains::chains(&edges);
     faces::wind(&mut chains, &edges);
     let mut rings = rings::trace(&chains, &edges, fill);
     rings.retain(|ring: &Loop| ring.len() >= 3 && double_area(ring).abs() >= least.max(1));
-    Ok(rings)
-}
-
-/// A loop without points that repeat the one before; empty if fewer than three are left.
-fn cleaned(points: &[Point]) -> Loop {
-    let mut out: Loop = points.to_vec();
-    out.dedup();
-    while out.len() > 1 && out.first() == out.last() {
-        out.pop();
-    }
-    if out.len() < 3 {
-        out.clear();
-    }
-    out
+    let is_same = chains.nodes.is_empty() && rings.len() == loops.len();
+    Ok((rings, is_same))
 }
