@@ -8,12 +8,12 @@
 //!
 //! - [`math`] and [`Grid`]: portable arithmetic, seeded random streams, the one 2D buffer.
 //! - [`pattern`]: networks of cracks, surface frames, masks and timelines: the types that the other modules share.
-//! - [`growth`]: cracks by space colonization, step by step.
 //! - [`raster`]: draws networks into a depth field.
+//! - [`strands`]: cracks that follow a guidance field, made of small images.
+//! - [`growth`]: cracks by space colonization, step by step.
 //! - [`voronoi`]: cracks that draw a picture, all at once.
 //! - [`blend`]: blends the relief of cracks into normal maps.
-//! - [`strands`]: cracks that follow a guidance field, made of small images.
-//! - [`relief`]: craters, rock walls and mountains from one contour line.
+//! - [`relief`]: rock walls, islands and mountains from one contour line.
 //! - [`paint`]: turns a base picture and a depth field into diffuse, normal and depth textures.
 //! - [`preset`]: materials: how cracks grow, their cross-section and their look.
 //! - [`shatter`]: the pieces into which cracks cut a surface, and how they fall.
@@ -67,11 +67,13 @@ pub struct ReadmeExamples;
 
 /// The examples of the pages in `docs`, compiled.
 #[cfg(all(doctest, feature = "2d", feature = "3d"))]
+#[doc = include_str!("../docs/analogies.md")]
 #[doc = include_str!("../docs/determinism_and_networking.md")]
 #[doc = include_str!("../docs/guided_cracks.md")]
 #[doc = include_str!("../docs/performance_and_memory.md")]
 #[doc = include_str!("../docs/pitfalls.md")]
 #[doc = include_str!("../docs/presets.md")]
+#[doc = include_str!("../docs/relief.md")]
 #[doc = include_str!("../docs/shattering.md")]
 #[doc = include_str!("../docs/sprites.md")]
 #[doc = include_str!("../docs/strands.md")]
