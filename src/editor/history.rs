@@ -1,6 +1,6 @@
 //! Undo and redo: the settings of a surface before each change.
 
-use crate::plugin::{CrackClock, CrackStrands, CrackSurface, GuidedCracks, ShatterCracks};
+use crate::plugin::{CrackClock, CrackRelief, CrackStrands, CrackSurface, GuidedCracks, ShatterCracks};
 use bevy::prelude::Entity;
 
 /// The most changes that can be taken back.
@@ -12,6 +12,7 @@ pub(super) struct Settings {
     pub(super) surface: CrackSurface,
     pub(super) guided: Option<GuidedCracks>,
     pub(super) strands: Option<CrackStrands>,
+    pub(super) relief: Option<CrackRelief>,
     pub(super) shatter: Option<ShatterCracks>,
     pub(super) clock: Option<CrackClock>,
 }

@@ -1,7 +1,7 @@
 //! The workbench: a panel of egui over any running game or scene (feature `editor`).
 //!
 //! Add [`CrackEditorPlugin`] to an app that draws cracks. A click on a surface hits it and shows its settings: every field of its preset
-//! as a slider, with the range and the text of its documentation, the time of its cracks, shattering, guided cracks and strands, what is
+//! as a slider, with the range and the text of its documentation, the time of its cracks, shattering, guided cracks, strands and reliefs, what is
 //! drawn over it, its textures, what it costs, and files to save to. F1 hides the panel; hidden it costs nothing. Clicks and keys on the
 //! panel do not reach the game: neither `Pointer` events nor `ButtonInput`.
 //!

@@ -1,7 +1,8 @@
 //! What the panel knows of the surface that is chosen: values that it shows and changes. No part of it is in the world.
 
 use crate::plugin::{
-    BakeProgress, CrackClock, CrackState, CrackStrands, CrackSurface, GuidedCracks, ShatterCracks, ShatterRequest,
+    BakeProgress, CrackClock, CrackRelief, CrackState, CrackStrands, CrackSurface, GuidedCracks, ShatterCracks,
+    ShatterRequest,
 };
 use bevy::prelude::*;
 use bevy_egui::egui::TextureId;
@@ -24,6 +25,10 @@ pub struct Subject {
     pub guided: Option<GuidedCracks>,
     /// Its strands.
     pub strands: Option<CrackStrands>,
+    /// Its relief.
+    pub relief: Option<CrackRelief>,
+    /// How far the relief is, 0..=1.
+    pub relief_progress: f32,
     /// How far a bake is; read only.
     pub progress: Option<BakeProgress>,
     /// How it shatters.

@@ -10,8 +10,9 @@ use super::{
 use crate::{
     CrackPreset,
     plugin::{
-        BakeProgress, CrackClock, CrackCommandsExt, CrackHit, CrackShards, CrackState, CrackStrands, CrackSurface,
-        CrackTextures, CrackUploadStats, GuidedCracks, PresetSource, Shard, ShatterCracks, inspect,
+        BakeProgress, CrackClock, CrackCommandsExt, CrackHit, CrackRelief, CrackShards, CrackState, CrackStrands,
+        CrackSurface, CrackTextures, CrackUploadStats, GuidedCracks, PresetSource, ReliefProgress, Shard,
+        ShatterCracks, inspect,
     },
 };
 use bevy::{
@@ -96,6 +97,8 @@ fn gather(world: &mut World, entity: Entity) -> Option<Subject> {
         clock: of.get::<CrackClock>().copied(),
         guided: of.get::<GuidedCracks>().cloned(),
         strands: of.get::<CrackStrands>().cloned(),
+        relief: of.get::<CrackRelief>().cloned(),
+        relief_progress: of.get::<ReliefProgress>().map_or(0.0, |progress| progress.0),
         progress: of.get::<BakeProgress>().cloned(),
         shatter: of.get::<ShatterCracks>().cloned(),
         shards,
@@ -139,6 +142,7 @@ fn settings(subject: &Subject) -> Settings {
         surface: subject.surface.clone(),
         guided: subject.guided.clone(),
         strands: subject.strands.clone(),
+        relief: subject.relief.clone(),
         shatter: subject.shatter.clone(),
         clock: subject.clock,
     }
@@ -151,6 +155,7 @@ fn settings_of(world: &World, entity: Entity) -> Option<Settings> {
         surface: of.get::<CrackSurface>()?.clone(),
         guided: of.get().cloned(),
         strands: of.get().cloned(),
+        relief: of.get().cloned(),
         shatter: of.get().cloned(),
         clock: of.get().copied(),
     })
@@ -158,10 +163,11 @@ fn settings_of(world: &World, entity: Entity) -> Option<Settings> {
 
 /// Puts settings on a surface: only what has changed.
 fn put(world: &mut World, entity: Entity, before: &Settings, after: Settings) {
-    let Settings { surface, guided, strands, shatter, clock } = after;
+    let Settings { surface, guided, strands, relief, shatter, clock } = after;
     put_one(world, entity, Some(&before.surface), Some(surface));
     put_one(world, entity, before.guided.as_ref(), guided);
     put_one(world, entity, before.strands.as_ref(), strands);
+    put_one(world, entity, before.relief.as_ref(), relief);
     put_one(world, entity, before.shatter.as_ref(), shatter);
     put_one(world, entity, before.clock.as_ref(), clock);
 }

@@ -1,9 +1,9 @@
-//! The state of cracks, and cracks that are baked: guided ones and strands.
+//! The state of cracks, and what is baked: guided cracks, strands, reliefs.
 
 use super::settings::Panel;
 use crate::{
     editor::{form, subject::Subject},
-    plugin::{CrackGuide, CrackState, CrackStatus, CrackStrands, GuideSource, GuidedCracks, HitPoint},
+    plugin::{CrackGuide, CrackRelief, CrackState, CrackStatus, CrackStrands, GuideSource, GuidedCracks, HitPoint},
 };
 use bevy::math::Vec2;
 use bevy_egui::egui::{self, Ui};
@@ -52,7 +52,7 @@ pub(super) fn show_guided(ui: &mut Ui, panel: &mut Panel, subject: &mut Subject)
             subject.guided = Some(panel.guided.clone());
         },
         |subject| subject.guided = None,
-        subject.guided.is_some(),
+        (subject.guided.is_some(), baked(subject)),
     );
 }
 
@@ -80,8 +80,39 @@ pub(super) fn show_strands(ui: &mut Ui, panel: &mut Panel, subject: &mut Subject
             subject.strands = Some(panel.strands.clone());
         },
         |subject| subject.strands = None,
-        subject.strands.is_some(),
+        (subject.strands.is_some(), baked(subject)),
     );
+}
+
+pub(super) fn show_relief(ui: &mut Ui, panel: &mut Panel, subject: &mut Subject) {
+    ui.horizontal(|ui| {
+        let kinds: [(&str, fn() -> CrackRelief); 3] =
+            [("Rock", CrackRelief::rock_wall), ("Island", CrackRelief::island), ("Mountain", CrackRelief::mountain)];
+        for (name, kind) in kinds {
+            if ui.button(name).clicked() {
+                panel.relief = CrackRelief { settings: kind().settings, ..panel.relief.clone() };
+            }
+        }
+    });
+    form::show_fields(ui, &mut panel.relief, &vec![&CrackRelief::default()]);
+    bake_buttons(
+        ui,
+        &panel.relief.validate().map_err(|error| error.to_string()),
+        subject,
+        |subject| {
+            if subject.relief.as_ref() == Some(&panel.relief) {
+                panel.relief.seed = panel.relief.seed.wrapping_add(1);
+            }
+            subject.relief = Some(panel.relief.clone());
+        },
+        |subject| subject.relief = None,
+        (subject.relief.is_some(), subject.relief_progress),
+    );
+}
+
+/// How far the baked cracks of a surface are.
+fn baked(subject: &Subject) -> f32 {
+    subject.progress.as_ref().map_or(0.0, |progress| progress.0)
 }
 
 /// Starts a bake, shows how far it is, and cancels it.
@@ -91,12 +122,11 @@ fn bake_buttons(
     subject: &mut Subject,
     bake: impl FnOnce(&mut Subject),
     cancel: impl FnOnce(&mut Subject),
-    is_there: bool,
+    (is_there, progress): (bool, f32),
 ) {
     if let Err(error) = check {
         ui.colored_label(ui.visuals().warn_fg_color, error);
     }
-    let progress = subject.progress.as_ref().map_or(0.0, |progress| progress.0);
     ui.horizontal(|ui| {
         if ui.add_enabled(check.is_ok(), egui::Button::new("Bake")).clicked() {
             bake(subject);

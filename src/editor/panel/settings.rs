@@ -1,6 +1,6 @@
 //! [`Panel`]: what the panel remembers.
 
-use crate::plugin::{CrackGuide, CrackStrands, GuidedCracks};
+use crate::plugin::{CrackGuide, CrackRelief, CrackStrands, GuidedCracks};
 
 /// What the panel remembers: tools, overlays and drafts. The settings of surfaces are in their components alone.
 #[derive(Clone, Debug)]
@@ -23,6 +23,8 @@ pub struct Panel {
     pub text: String,
     /// Strands that are not baked yet.
     pub strands: CrackStrands,
+    /// The relief that is to be made.
+    pub relief: CrackRelief,
     /// What went wrong or well last.
     pub message: String,
     /// Whether there is something to undo, and to redo.
@@ -58,6 +60,7 @@ impl Default for Panel {
             guided: GuidedCracks::new(CrackGuide::text("CRACK")),
             text: "CRACK".into(),
             strands: CrackStrands::default(),
+            relief: CrackRelief::default(),
             message: String::new(),
             can_undo: (false, false),
         }
