@@ -214,7 +214,8 @@ impl Corner {
 
     /// The corners of a line around the circle.
     fn round(&self, out: &mut Loop) {
-        let angle = libm::atan2(-self.turn[0], self.turn[1]);
+        // The sine of edges that go there and back may be a zero of either sign.
+        let angle = libm::atan2(self.turn[0].abs(), self.turn[1]);
         let pieces = (angle / ROUND_TURN).ceil().max(1.0);
         let step = angle / pieces;
         let radius = self.distance / libm::cos(0.5 * step);
