@@ -22,7 +22,8 @@ impl ReliefParams {
     ///
     /// - *Distance*: a tenth of the contour's mean half width, twice its area divided by its length.
     /// - *Roughness*: the angles at which corners stand out from the line between their neighbours are the angles of
-    ///   midpoints, from the lower quartile to one and a half of the upper; the 90th percentile of how far they stand out, twice, is the largest displacement.
+    ///   midpoints, from the lower quartile to one and a half of the upper; the 90th percentile of how far they stand
+    ///   out, twice, is the largest displacement.
     /// - *Spectrum*: phases change where all higher frequencies together have a twentieth of the power of the contour's
     ///   directions.
     /// - *Erosion*: corners of valleys up to the mean turn of those of the seed stay corners, so `factor` is where extended
@@ -40,7 +41,8 @@ impl ReliefParams {
     /// ```
     ///
     /// # Errors
-    /// [`ReliefError::TooFewPoints`], [`ReliefError::TooManyPoints`], [`ReliefError::Point`], [`ReliefError::NoArea`], [`ReliefError::Tangled`].
+    /// [`ReliefError::TooFewPoints`], [`ReliefError::TooManyPoints`], [`ReliefError::Point`], [`ReliefError::NoArea`],
+    /// [`ReliefError::Tangled`].
     pub fn estimate(contour: &[Vec2]) -> Result<Self, ReliefError> {
         let contours = [contour.to_vec()];
         limits(&contours, super::generate::MAX_LEVEL_POINTS)?;

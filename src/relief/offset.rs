@@ -20,6 +20,12 @@ const MAX_CROSSINGS: usize = 1 << 18;
 /// The share of the distance that rough lines move first.
 const FIRST_STEP: f64 = 0.0625;
 
+/// Most steps before the last one.
+const FIRST_STEPS: u32 = 3;
+
+/// The smallest step, lattice steps.
+const SHORTEST_STEP: f64 = 64.0;
+
 /// Islands with an area below this share of the squared distance are not made.
 const LEAST_AREA: f64 = 0.001;
 
@@ -72,17 +78,22 @@ pub(super) fn offset(moves: &[Move<'_>], way: Way) -> Result<Vec<Loop>, TooTangl
     let [fine, medium, coarse] = TOLERANCES;
     moved_together(moves, way, fine, MAX_CROSSINGS)
         .or_else(|_| moved_together(moves, way, medium, MAX_CROSSINGS))
-        .or_else(|_| in_two_steps(moves, way, coarse))
+        .or_else(|_| in_two_steps(moves, way, coarse, FIRST_STEPS))
 }
 
 /// For rough lines: a small step takes away what is narrow, and with it most of the crossings of the large one.
 ///
 /// The small step has extended edges, which leave corners as they are for the join of the large one.
-fn in_two_steps(moves: &[Move<'_>], way: Way, tolerance: f64) -> Result<Vec<Loop>, TooTangled> {
+///
+/// The small step may need a smaller one before it, up to a number of `steps`.
+fn in_two_steps(moves: &[Move<'_>], way: Way, tolerance: f64, steps: u32) -> Result<Vec<Loop>, TooTangled> {
     let small = |one: &Move<'_>| {
         let pace = one.pace.share(FIRST_STEP);
-        let one = Move { join: Join::Miter, pace: &pace, ..*one };
-        moved_together(&[one], way, tolerance, MAX_CUTS)
+        let one = [Move { join: Join::Miter, pace: &pace, ..*one }];
+        if steps < 2 || pace.least() * FIRST_STEP < SHORTEST_STEP {
+            return moved_together(&one, way, tolerance, MAX_CUTS);
+        }
+        moved_together(&one, way, tolerance, MAX_CROSSINGS).or_else(|_| in_two_steps(&one, way, tolerance, steps - 1))
     };
     let rings = moves.iter().map(small).collect::<Result<Vec<_>, _>>()?;
     let paces: Vec<Pace> = moves.iter().map(|one| one.pace.share(1.0 - FIRST_STEP)).collect();
@@ -203,7 +214,8 @@ impl Corner {
 
     /// The corners of a line around the circle.
     fn round(&self, out: &mut Loop) {
-        let angle = libm::atan2(-self.turn[0], self.turn[1]);
+        // The sine of edges that go there and back may be a zero of either sign.
+        let angle = libm::atan2(self.turn[0].abs(), self.turn[1]);
         let pieces = (angle / ROUND_TURN).ceil().max(1.0);
         let step = angle / pieces;
         let radius = self.distance / libm::cos(0.5 * step);

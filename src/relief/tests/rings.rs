@@ -33,7 +33,8 @@ fn params(rng: &mut Rng) -> ReliefParams {
         long_edges: rng.unit(),
         inward: 1 + rng.next_u32() % 12,
         outward: rng.next_u32() % 4,
-        ..ReliefParams::DEFAULT
+        steepness: if rng.next_u32().is_multiple_of(4) { rng.range(0.0, 0.8) } else { 0.0 },
+        steep_angle: rng.range(-7.0, 7.0),
     }
 }
 
@@ -47,7 +48,10 @@ fn least(params: &ReliefParams, points: u32) -> f64 {
         Join::Arc { .. } => 0.7,
         Join::Bevel => 0.49,
     };
-    if params.method == Method::Simple { join - slack } else { 0.03 }
+    // Where the distance varies, moved edges are not quite parallel.
+    let slack = if params.steepness > 0.0 { slack + 0.1 } else { slack };
+    let least = if params.method == Method::Simple { join - slack } else { 0.03 };
+    least * f64::from(1.0 - params.steepness)
 }
 
 fn cases(usual: u64) -> u64 {
@@ -266,5 +270,26 @@ fn seeds_enclose_what_they_wind_round() {
                 assert_eq!(is_inside(&lines, p), is_inside(&rings, p), "case {case} at {p}");
             }
         }
+    }
+}
+
+/// A simplified contour can have an edge that goes there and back; a round join once went to the wrong side there.
+#[test]
+fn round_joins_go_round_the_ends_of_lines() {
+    let mut rng = Rng::new(1396).stream("contours");
+    let points = count(&mut rng, 5000.0);
+    let seed = shape(6, points, &mut rng);
+    for steepness in [0.0, 0.3, 0.565_952_96] {
+        let params = ReliefParams {
+            join: Join::Round,
+            distance: 0.019_949_593,
+            steepness,
+            steep_angle: 0.199_151_04,
+            inward: 0,
+            outward: 1,
+            ..ReliefParams::SIMPLE
+        };
+        let contours = Contours::generate(&params, std::slice::from_ref(&seed), 1).unwrap();
+        assert_contours(&contours, 0.85 * f64::from(params.distance * (1.0 - steepness)), "there and back");
     }
 }

@@ -94,6 +94,15 @@ struct Cuts {
     crossings: Vec<Point>,
 }
 
+impl Cuts {
+    fn dedup(&mut self) {
+        self.cuts.sort_unstable();
+        self.cuts.dedup();
+        self.crossings.sort_unstable();
+        self.crossings.dedup();
+    }
+}
+
 /// The edges of `loops`, cut so that they meet at their ends only.
 ///
 /// This is snap rounding: around each corner, and each lattice point nearest to a crossing, is a square of side 1. Edges
@@ -108,17 +117,16 @@ pub(super) fn cut(loops: &[Loop], most: usize) -> Result<Edges, TooTangled> {
     let members = members(&edges, &bins);
     let mut found = Cuts::default();
     find(&mut edges, &members, &mut found, most)?;
-    let Cuts { mut cuts, mut crossings } = found;
-    crossings.sort_unstable();
-    crossings.dedup();
+    found.dedup();
+    let Cuts { mut cuts, crossings } = found;
+    if cuts.len() + 2 * crossings.len() > most {
+        return Err(TooTangled);
+    }
     for &p in &crossings {
         pass(&mut edges, members.of(bins.cell(p)), p, &mut cuts);
     }
     cuts.sort_unstable();
     cuts.dedup();
-    if cuts.len() > most {
-        return Err(TooTangled);
-    }
     if !cuts.is_empty() {
         edges.split(&cuts);
         fold(&mut edges);
@@ -202,13 +210,10 @@ fn find(edges: &mut Edges, members: &Members, found: &mut Cuts, most: usize) -> 
                 }
             }
         }
-        // Cells share edges, so a cut may be found several times.
-        if found.cuts.len() > most + (most >> 1) {
-            found.cuts.sort_unstable();
-            found.cuts.dedup();
-            found.crossings.sort_unstable();
-            found.crossings.dedup();
-            if found.cuts.len() > most {
+        // Cells share edges, so a cut may be found several times. A crossing makes two cuts.
+        if found.cuts.len() + 2 * found.crossings.len() > 2 * most {
+            found.dedup();
+            if found.cuts.len() + 2 * found.crossings.len() > most {
                 return Err(TooTangled);
             }
         }
