@@ -243,7 +243,7 @@ impl CrackGrowth {
 
     /// One step of a growth whose hits lay out strands.
     pub(super) fn advance_strands(&mut self) {
-        let first = self.network.nodes.len() as u32;
+        let (first, links) = (self.network.nodes.len() as u32, self.network.links.len());
         self.timeline.begin(self.steps.saturating_add(1));
         self.steps = self.steps.saturating_add(1);
         for mut paths in std::mem::take(&mut self.strands) {
@@ -264,15 +264,16 @@ impl CrackGrowth {
             }
         }
         self.new_nodes = first..self.network.nodes.len() as u32;
-        if self.new_nodes.is_empty() {
-            self.steps -= 1;
-        }
+        self.join_newborn();
         if self.strands.is_empty() {
             self.steps_left = 0;
         }
         if self.steps_left == 0 {
             self.strands.clear();
             self.widen_with(|widths, nodes, widened| widths.settle(nodes, widened));
+        } else if self.new_nodes.is_empty() && self.network.links.len() == links {
+            // Nothing has changed: the next step takes its place.
+            self.steps -= 1;
         }
     }
 

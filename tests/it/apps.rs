@@ -23,7 +23,7 @@ fn edit(preset: &mut CrackPreset, rng: &mut Rng) {
         8 => preset.steps_per_second = 100.0 * value,
         _ => {
             *preset = CrackPreset::named(CrackPreset::NAMES[rng.next_u32() as usize % CrackPreset::NAMES.len()])
-                .unwrap_or_default()
+                .unwrap_or_default();
         }
     }
 }

@@ -244,7 +244,7 @@ fn the_end_is_the_finished_network() {
 #[test]
 fn widths_are_those_of_the_growth() {
     let mut rng = Rng::new(8);
-    for preset in presets() {
+    for (number, preset) in presets().enumerate() {
         let mut scene = Scene::new(preset, UVec2::new(100, 100), 4);
         let mut widths: Vec<Vec<f32>> = vec![Vec::new()];
         for _ in 0..2 {
@@ -264,7 +264,7 @@ fn widths_are_those_of_the_growth() {
                 let segment = SegmentId::Branch(node);
                 let is_there = timeline.path_at(network, segment, Moment::after(step)).is_some();
                 let is_born = network.ends(segment).is_some() && network.nodes()[node as usize].birth <= step;
-                assert_eq!(is_there, is_born, "node {node} after {step}");
+                assert_eq!(is_there, is_born, "preset {number}: node {node} after {step}");
             }
         }
         assert_eq!(timeline.born(0, timeline.end()), 0..network.nodes().len() as u32);
