@@ -194,6 +194,8 @@ impl CrackGrowth {
                 && !self.mask.is_forbidden(place / self.network.extent());
             if is_free {
                 self.nucleated += 1;
+                // A step in which nothing else grows counts as well.
+                self.steps = self.steps.max(self.timeline.now());
                 self.add_node(place, NO_PARENT, 0, impact, 1.0);
             }
         }

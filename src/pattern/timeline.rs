@@ -183,6 +183,11 @@ impl Timeline {
         self.now = self.now.max(step);
     }
 
+    /// The step of the next entries.
+    pub(crate) const fn now(&self) -> u32 {
+        self.now
+    }
+
     pub(crate) fn reserve(&mut self, nodes: usize) {
         self.nodes.reserve(nodes);
         self.widenings.reserve(2 * nodes);
