@@ -34,7 +34,7 @@ fn setup(mut commands: Commands, mut meshes: ResMut<Assets<Mesh>>, mut materials
         Hdr,
         // Needs no lookup table.
         Tonemapping::AcesFitted,
-        AmbientLight { brightness: 260.0, color: Color::srgb(0.72, 0.84, 1.0), ..default() },
+        AmbientLight { brightness: 700.0, color: Color::srgb(0.72, 0.84, 1.0), ..default() },
         Transform::default(),
     ));
     commands
@@ -52,7 +52,7 @@ fn setup(mut commands: Commands, mut meshes: ResMut<Assets<Mesh>>, mut materials
         .observe(hit_on_press);
     commands.spawn((
         Lamp,
-        DirectionalLight { color: Color::srgb(1.0, 0.93, 0.82), illuminance: 9000.0, ..default() },
+        DirectionalLight { color: Color::srgb(1.0, 0.93, 0.82), illuminance: 6000.0, ..default() },
         Transform::default(),
     ));
 }
@@ -73,14 +73,14 @@ fn make_anew(mut relief: Single<&mut CrackRelief, With<Wall>>, keys: Res<ButtonI
 
 fn sway(time: Res<Time>, mut camera: Single<&mut Transform, With<Camera3d>>) {
     let t = time.elapsed_secs();
-    let eye = Vec3::new(0.9 * ops::sin(0.35 * t), 0.2 * ops::sin(0.27 * t), 4.6);
+    let eye = Vec3::new(0.5 * ops::sin(0.35 * t), 0.2 * ops::sin(0.27 * t), 3.7);
     **camera = Transform::from_translation(eye).looking_at(Vec3::ZERO, Vec3::Y);
 }
 
 /// The sun goes over the wall, low enough to show its relief.
 fn move_lamp(time: Res<Time>, mut lamp: Single<&mut Transform, With<Lamp>>) {
     let angle = 0.7 + 0.5 * ops::sin(0.3 * time.elapsed_secs());
-    let from = Vec3::new(-3.0 * ops::cos(angle), 3.0 * ops::sin(angle) + 0.6, 1.9);
+    let from = Vec3::new(-3.0 * ops::cos(angle), 3.0 * ops::sin(angle) + 0.6, 2.8);
     **lamp = Transform::from_translation(from).looking_at(Vec3::ZERO, Vec3::Y);
 }
 

@@ -7,7 +7,11 @@ use crate::plugin::carrier::slot::{CrackMaterial, MaterialSlot, typed};
 use crate::plugin::surface::cracked::active;
 #[cfg(feature = "3d")]
 use crate::relief::{ReliefFrame, ReliefMesh};
-use crate::{Grid, relief::Relief};
+use crate::{
+    Grid,
+    pattern::SurfaceFrame,
+    relief::{Relief, normals},
+};
 use bevy::{
     asset::RenderAssetUsages,
     image::Image,
@@ -32,10 +36,13 @@ struct Pictures {
 /// Has the entity show a relief.
 pub(super) fn show(world: &mut World, entity: Entity, relief: Relief) -> Result<(), CrackError> {
     let Some(wish) = world.get::<CrackRelief>(entity).cloned() else { return Ok(()) };
+    // A relief that stands out more, or less, has other slopes.
+    let frame = SurfaceFrame::new(wish.size).ok().filter(|_| wish.displacement > 0.0 && wish.displacement != 1.0);
+    let steeper = frame.map(|frame| normals(&scaled(&relief.heights, wish.displacement), &frame));
     let mut images = world.get_resource_mut::<Assets<Image>>().ok_or(CrackError::NoImages)?;
     let pictures = Pictures {
         diffuse: images.add(image(&relief.diffuse, TextureFormat::Rgba8UnormSrgb)),
-        normal: images.add(image(&relief.normal, TextureFormat::Rgba8Unorm)),
+        normal: images.add(image(&steeper.unwrap_or_else(|| relief.normal.clone()), TextureFormat::Rgba8Unorm)),
     };
     if !give(world, entity, &pictures, &wish, &relief) {
         return Err(CrackError::NothingToCrack);
@@ -119,7 +126,8 @@ fn give_mesh(world: &mut World, entity: Entity, wish: &CrackRelief, relief: &Rel
         let turn = if is_ground { Quat::from_rotation_x(-core::f32::consts::FRAC_PI_2) } else { Quat::IDENTITY };
         Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::default())
             .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, made.positions)
-            .with_inserted_attribute(Mesh::ATTRIBUTE_NORMAL, made.normals)
+            // The slopes are in the normal map.
+            .with_inserted_attribute(Mesh::ATTRIBUTE_NORMAL, vec![[0.0, 0.0, 1.0]; made.normals.len()])
             .with_inserted_attribute(Mesh::ATTRIBUTE_UV_0, made.uvs)
             .with_inserted_indices(Indices::U32(made.indices))
             .transformed_by(Transform::from_rotation(turn).with_translation(Vec3::from(bounds.center)))
@@ -138,7 +146,6 @@ fn give_mesh(world: &mut World, entity: Entity, wish: &CrackRelief, relief: &Rel
     }
 }
 
-#[cfg(feature = "3d")]
 fn scaled(heights: &Grid<f32>, by: f32) -> Grid<f32> {
     let mut scaled = heights.clone();
     scaled.as_mut_slice().iter_mut().for_each(|height| *height *= by);
