@@ -6,8 +6,8 @@ use super::{
     plan, rays,
 };
 
-/// The most points of the strands of a hit, with those of their primitives.
-const MOST_POINTS: u64 = 4 * crate::strands::MAX_STRAND_POINTS as u64;
+/// The most points of the strands of a hit, with those of their primitives, in all rounds.
+const MOST_POINTS: u64 = 1 << 22;
 
 impl GrowthParams {
     /// The largest number of nodes that `markers` markers and `starts` starts can create: growth ends by itself

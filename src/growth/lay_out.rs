@@ -38,10 +38,13 @@ impl CrackGrowth {
     }
 
     /// Continues to lay out the markers of a hit that was [begun](Self::begin_hit), at up to about `places` places.
-    /// Returns whether some are left.
+    /// Returns whether some are left. [Strands](super::MarkerLayout::Strands) are laid out one try at a time.
     ///
     /// The positions of markers do not depend on the slices. All other methods complete the layout first.
     pub fn continue_hit(&mut self, places: u32) -> bool {
+        if self.try_strands() {
+            return true;
+        }
         let Some(mut layout) = self.layout.take() else { return false };
         layout.cursor.left = places;
         if layout.room.is_none() && self.lay_out_markers(&mut layout) {
@@ -128,14 +131,14 @@ impl CrackGrowth {
 
     /// Whether [`prepare_step`](Self::prepare_step) has begun and is not done. A hit would complete it at once.
     #[cfg_attr(not(feature = "bevy"), expect(dead_code, reason = "surfaces of the plugin are hit"))]
-    pub(crate) const fn is_preparing(&self) -> bool {
-        self.layout.is_some() || self.field.is_settling()
+    pub(crate) fn is_preparing(&self) -> bool {
+        self.is_laying_out() || self.field.is_settling()
     }
 
-    /// Whether markers of a hit are still to be laid out.
+    /// Whether markers or strands of a hit are still to be laid out.
     #[must_use]
-    pub const fn is_laying_out(&self) -> bool {
-        self.layout.is_some()
+    pub fn is_laying_out(&self) -> bool {
+        self.layout.is_some() || !self.orders.is_empty()
     }
 
     /// Lays out the remaining markers, and settles them if settling has begun.

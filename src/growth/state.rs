@@ -14,7 +14,7 @@ use super::{
     past::Record,
     pull::Pull,
     rays::Rays,
-    strand_paths::StrandPaths,
+    strand_paths::{Order, StrandPaths},
     width::Widths,
 };
 use crate::{
@@ -22,7 +22,7 @@ use crate::{
     pattern::{CrackMask, Network, Node, SegmentId, Timeline},
 };
 use glam::Vec2;
-use std::{ops::Range, sync::Arc};
+use std::{collections::VecDeque, ops::Range, sync::Arc};
 
 /// Number of markers in each state: the other numbers add up to `total`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -63,6 +63,8 @@ pub struct CrackGrowth {
     pub(super) widths: Widths,
     pub(super) linker: Linker,
     pub(super) rays: Rays,
+    /// Strands that are to be laid out.
+    pub(super) orders: VecDeque<Order>,
     /// Strands that have not grown to their ends.
     pub(super) strands: Vec<StrandPaths>,
     pub(super) impacts: Vec<Impact>,
@@ -128,6 +130,7 @@ impl CrackGrowth {
             widths: Widths::new(&params),
             linker: Linker::default(),
             rays: Rays::default(),
+            orders: VecDeque::new(),
             strands: Vec::new(),
             impacts: Vec::new(),
             layout: None,

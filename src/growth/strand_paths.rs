@@ -1,15 +1,22 @@
-//! Paths of strands that were laid out and grow step by step: [`StrandPaths`].
+//! Strands that are to be laid out ([`Order`]), and their paths, which grow step by step ([`StrandPaths`]).
 
-use crate::pattern::{NO_PARENT, Network};
+use crate::{
+    math::mix,
+    pattern::{NO_PARENT, Network},
+    strands::{Directions, Material, Primitive, StrandParams, StrandStart, Strands},
+};
 use glam::Vec2;
+use std::sync::LazyLock;
 
 /// Lines of at most this many points that leave a longer one grow this many steps later.
 const SHORT: u32 = 12;
 const LATER: u32 = 6;
 
-/// What strands are laid out from.
+/// Strands that are to be laid out: some tries, one after the other, of which the best is taken.
+#[derive(Clone, Debug)]
 pub(super) struct Order {
     pub(super) impact: u32,
+    /// The point from which they lead away.
     pub(super) center: Vec2,
     pub(super) reach: f32,
     /// See [`StrandPaths`].
@@ -17,6 +24,92 @@ pub(super) struct Order {
     pub(super) least: f32,
     pub(super) rounds: u32,
     pub(super) seed: u64,
+    pub(super) params: StrandParams,
+    pub(super) starts: Vec<StrandStart>,
+    /// Number of tries made, of their points, and the longest strands so far.
+    pub(super) tries: u32,
+    pub(super) points: usize,
+    pub(super) best: Option<(f32, Network)>,
+}
+
+/// Most tries to find strands that have room.
+const TRIES: u32 = 12;
+
+/// Most points of the strands of one try, and most primitives along them; no more tries are made once this many points were made.
+pub(super) const MOST_POINTS: usize = 1 << 15;
+const MOST_PRIMITIVES: usize = 1024;
+
+/// The primitives of each material, for single strands and for nets. They are made when they are first used: their images are traced.
+static LIBRARIES: [[LazyLock<Vec<Primitive>>; 2]; Material::ALL.len()] = {
+    macro_rules! library {
+        ($material:ident) => {
+            [LazyLock::new(|| Material::$material.primitives()), LazyLock::new(|| Material::$material.nets())]
+        };
+    }
+    // In the order of `Material`.
+    [library!(Asphalt), library!(Marble), library!(Sand), library!(Glass), library!(Clay)]
+};
+
+impl Order {
+    pub(super) fn new(impact: u32, center: Vec2, reach: f32, params: StrandParams, seed: u64) -> Self {
+        Self {
+            impact,
+            center,
+            reach,
+            roots: Vec::new(),
+            least: 0.0,
+            rounds: 0,
+            seed,
+            params,
+            starts: Vec::new(),
+            tries: 0,
+            points: 0,
+            best: None,
+        }
+    }
+
+    /// Makes one try. Returns whether it was the last.
+    ///
+    /// Near the border strands may run off the surface at once. Then others are tried that noise turns less and that are longer,
+    /// until they are as long as they should be.
+    pub(super) fn make_try(&mut self, extent: Vec2) -> bool {
+        let less = self.tries as f32 / TRIES as f32;
+        let length = (self.params.length * (1.0 + 1.5 * less)).min(64.0);
+        let params = StrandParams { rotation: self.params.rotation * (1.0 - less), length, ..self.params };
+        let most = MOST_POINTS.min(MOST_PRIMITIVES * params.tile_steps() as usize);
+        let library = &LIBRARIES[params.material as usize][usize::from(params.lanes > 1)];
+        let field = Directions::Radial { center: self.center };
+        let seed = mix(self.seed ^ u64::from(self.tries) << 32);
+        let strands = Strands::within(&params, field, &self.starts, extent, seed, most);
+        // There is no error: the parameters have been checked, and the starts are on the surface.
+        let Ok(network) = strands.and_then(|strands| strands.network(library)) else { return true };
+        let room = length_inside(&network);
+        self.tries += 1;
+        self.points += network.nodes.len();
+        if self.best.as_ref().is_none_or(|(most, _)| room > *most) {
+            self.best = Some((room, network));
+        }
+        room >= self.least || self.tries >= TRIES || self.points >= MOST_POINTS
+    }
+
+    /// The best of its tries.
+    pub(super) fn finish(mut self) -> Option<StrandPaths> {
+        let (_, network) = self.best.take()?;
+        Some(StrandPaths::new(self, network))
+    }
+}
+
+/// The length of paths up to where they meet the border.
+fn length_inside(paths: &Network) -> f32 {
+    let mut is_in = Vec::with_capacity(paths.nodes.len());
+    let mut length = 0.0;
+    for node in &paths.nodes {
+        let on_border = (node.pos.cmpeq(Vec2::ZERO) | node.pos.cmpeq(paths.extent())).any();
+        let from = paths.nodes.get(node.parent as usize).filter(|_| is_in[node.parent as usize]);
+        length += from.map_or(0.0, |from| from.pos.distance(node.pos));
+        is_in.push(node.parent == NO_PARENT || from.is_some() && !on_border);
+    }
+    length
 }
 
 /// Paths that were laid out, as far as they have grown.
@@ -25,7 +118,7 @@ pub(super) struct StrandPaths {
     pub(super) impact: u32,
     /// Where strands start, and the node there.
     pub(super) roots: Vec<(Vec2, u32)>,
-    pub(super) paths: Network,
+    pub(super) network: Network,
     /// The points in the order in which they grow, each after a number of steps.
     order: Vec<(u32, u32)>,
     /// How many of them have grown.
@@ -40,20 +133,11 @@ pub(super) struct StrandPaths {
 }
 
 impl StrandPaths {
-    pub(super) fn new(order: &Order, paths: Network) -> Self {
-        let nodes = vec![NO_PARENT; paths.nodes.len()];
-        let Order { impact, least, rounds, .. } = *order;
-        Self {
-            impact,
-            roots: order.roots.clone(),
-            order: in_order(&paths),
-            paths,
-            grown: 0,
-            nodes,
-            steps: 0,
-            least,
-            rounds,
-        }
+    fn new(order: Order, network: Network) -> Self {
+        let nodes = vec![NO_PARENT; network.nodes.len()];
+        let Order { impact, roots, least, rounds, .. } = order;
+        let order = in_order(&network);
+        Self { impact, roots, order, network, grown: 0, nodes, steps: 0, least, rounds }
     }
 
     pub(super) const fn is_over(&self) -> bool {

@@ -1,4 +1,5 @@
-//! Strands that run out from a hit ([`MarkerLayout::Strands`]): their paths are laid out at the hit and grow step by step.
+//! Strands that run out from a hit ([`MarkerLayout::Strands`]): their paths are laid out at the hit, in slices, and
+//! grow step by step.
 
 use super::{
     draws,
@@ -9,15 +10,10 @@ use super::{
 };
 use crate::{
     math::{mix, ops},
-    pattern::{NO_PARENT, Network, Node, SegmentId},
-    strands::{Directions, Material, Primitive, StrandParams, StrandStart, Strands},
+    pattern::{NO_PARENT, Node, SegmentId},
+    strands::{StrandParams, StrandStart},
 };
 use glam::Vec2;
-use std::sync::LazyLock;
-
-/// The primitives of each material, for single strands and for nets. They are made once: their images are traced.
-static LIBRARIES: LazyLock<[[Vec<Primitive>; 2]; Material::ALL.len()]> =
-    LazyLock::new(|| Material::ALL.map(|material| [material.primitives(), material.nets()]));
 
 /// Points of a path closer than this to the last node are left out, segment lengths.
 const CLOSE: f32 = 0.4;
@@ -28,9 +24,6 @@ const CROWDED: f32 = 4.0;
 
 /// A hit on an older crack starts from its nearest node within this distance, pattern units.
 const BESIDE: f32 = 0.1;
-
-/// Most tries to find strands that have room.
-const TRIES: u32 = 12;
 
 /// Strands should be this many times as long together as if none was blocked, by the number of their children: none, one, two.
 const ENOUGH: [f32; 3] = [0.7, 1.35, 2.4];
@@ -71,50 +64,6 @@ fn apart(old: &[Vec2], all: Vec<Vec2>) -> Vec<Vec2> {
     kept.split_off(old.len())
 }
 
-/// Strands away from `center`; `None` if there are no starts. With
-/// their branches they should be `usual` long, pattern units. Near
-/// the border they may run off the surface at once: then others are tried that noise turns less, which are longer, and the best are taken.
-fn run_out(
-    params: &StrandParams,
-    (center, starts): (Vec2, &[StrandStart]),
-    usual: f32,
-    extent: Vec2,
-    seed: u64,
-) -> Option<Network> {
-    let library = &LIBRARIES[params.material as usize][usize::from(params.lanes > 1)];
-    let mut best: Option<(f32, Network)> = None;
-    for number in 0..if starts.is_empty() { 0 } else { TRIES } {
-        let less = number as f32 / TRIES as f32;
-        let length = (params.length * (1.0 + 1.5 * less)).min(64.0);
-        let params = StrandParams { rotation: params.rotation * (1.0 - less), length, ..*params };
-        let field = Directions::Radial { center };
-        let strands = Strands::new(&params, field, starts, extent, mix(seed ^ u64::from(number) << 32));
-        // There is no error: the parameters have been checked, and the starts are on the surface.
-        let paths = strands.and_then(|strands| strands.network(library)).ok()?;
-        let room = length_inside(&paths);
-        if best.as_ref().is_none_or(|(most, _)| room > *most) {
-            best = Some((room, paths));
-        }
-        if room >= usual {
-            break;
-        }
-    }
-    best.map(|(_, paths)| paths)
-}
-
-/// The length of paths up to where they meet the border.
-fn length_inside(paths: &Network) -> f32 {
-    let mut is_in = Vec::with_capacity(paths.nodes.len());
-    let mut length = 0.0;
-    for node in &paths.nodes {
-        let on_border = (node.pos.cmpeq(Vec2::ZERO) | node.pos.cmpeq(paths.extent())).any();
-        let from = paths.nodes.get(node.parent as usize).filter(|_| is_in[node.parent as usize]);
-        length += from.map_or(0.0, |from| from.pos.distance(node.pos));
-        is_in.push(node.parent == NO_PARENT || from.is_some() && !on_border);
-    }
-    length
-}
-
 impl CrackGrowth {
     /// Lays out the strands by which the energy of an impact rises from `before` to `energy`: new ones from the hit, and more of
     /// those that have ended.
@@ -134,37 +83,41 @@ impl CrackGrowth {
             * count as f32
             * ops::powf(energy, 5.0 / 6.0)
             * params.length;
-        let order =
-            Order { impact, center, reach: reaches[1], roots: vec![(center, root)], least, rounds: ROUNDS, seed };
-        self.lay_out(&order, new);
+        let order = Order { least, rounds: ROUNDS, ..Order::new(impact, center, reaches[1], *params, seed) };
+        self.lay_out(Order { roots: vec![(center, root)], ..order.clone() }, new);
         if before > 0.0 {
             let (reach, seed) = (reaches[1] - reaches[0], seed ^ 1);
-            self.run_on_from_ends(Order { reach, roots: Vec::new(), seed, ..order }, FAR * reaches[0]);
+            self.run_on_from_ends(Order { reach, seed, ..order }, FAR * reaches[0]);
         }
     }
 
-    /// Lays out strands from the roots, the first in these directions.
-    fn lay_out(&mut self, order: &Order, ways: Vec<Vec2>) {
-        let Some((_, params)) = self.params.strands() else { return };
-        let length = (params.length * order.reach / self.params.reach).clamp(0.001, 64.0);
-        let params = StrandParams { length, ..*params };
-        let roots = order.roots.iter().cycle();
-        let starts: Vec<_> = ways
-            .into_iter()
-            .zip(roots)
-            .map(|(way, (pos, _))| StrandStart { pos: *pos, direction: Some(way) })
-            .collect();
-        if let Some(paths) = run_out(&params, (order.center, &starts), order.least, self.network.extent(), order.seed) {
-            self.strands.push(StrandPaths::new(order, paths));
+    /// Has strands laid out that start from the roots in these directions, in turns.
+    fn lay_out(&mut self, mut order: Order, ways: Vec<Vec2>) {
+        order.params.length = (order.params.length * order.reach / self.params.reach).clamp(0.001, 64.0);
+        let starts = ways.into_iter().zip(order.roots.iter().cycle());
+        order.starts = starts.map(|(way, (pos, _))| StrandStart { pos: *pos, direction: Some(way) }).collect();
+        if !order.starts.is_empty() {
+            self.orders.push_back(order);
         }
     }
 
-    /// Lays out strands from the free ends of an impact that are this far from it; returns whether there are any.
+    /// Makes one try of the first strands that are to be laid out. Returns whether there are any left.
+    pub(super) fn try_strands(&mut self) -> bool {
+        if let Some(order) = self.orders.front_mut()
+            && order.make_try(self.network.extent())
+        {
+            self.strands.extend(self.orders.pop_front().and_then(Order::finish));
+        }
+        !self.orders.is_empty()
+    }
+
+    /// Has strands laid out from the free ends of an impact that are this far from it; returns whether there are any.
     fn run_on_from_ends(&mut self, mut order: Order, distance: f32) -> bool {
         order.roots = self.far_ends(order.impact, order.center, distance);
-        let ways: Vec<_> = order.roots.iter().map(|(_, node)| self.heading_of(*node)).collect();
-        self.lay_out(&order, ways);
-        !order.roots.is_empty()
+        let (any, ways) =
+            (!order.roots.is_empty(), order.roots.iter().map(|(_, node)| self.heading_of(*node)).collect());
+        self.lay_out(order, ways);
+        any
     }
 
     /// Lays out more strands for an impact whose strands have all been blocked or have run off the surface.
@@ -181,13 +134,14 @@ impl CrackGrowth {
         let seed = mix(self.seed ^ draws::STRANDS ^ u64::from(impact) << 16 ^ u64::from(1 + rounds) << 48);
         let (center, least) = (hit.pos, paths.least);
         let reach = self.reach(center, hit.energy);
-        let order = Order { impact, center, reach, roots: Vec::new(), least, rounds, seed };
+        let Some((_, params)) = self.params.strands() else { return };
+        let order = Order { least, rounds, ..Order::new(impact, center, reach, *params, seed) };
         // Ends may be walled in, and so may the hit be, between its own cracks and the border.
-        let is_from_ends = rounds % 2 == 1 && self.run_on_from_ends(Order { roots: Vec::new(), ..order }, 0.0);
+        let is_from_ends = rounds % 2 == 1 && self.run_on_from_ends(order.clone(), 0.0);
         let root = if rounds < ROUNDS / 2 { self.start_beside(impact, center) } else { self.node_beside(center) };
         if let Some(root) = root.filter(|_| !is_from_ends) {
             let ways = starts::arms(1, (center, 1.0), reach, self.network.extent(), seed);
-            self.lay_out(&Order { roots: vec![(self.inside(root), root)], ..order }, ways);
+            self.lay_out(Order { roots: vec![(self.inside(root), root)], ..order }, ways);
         }
     }
 
@@ -227,12 +181,13 @@ impl CrackGrowth {
     /// The free ends of an impact that are furthest from it, and at least this far.
     fn far_ends(&self, impact: u32, center: Vec2, distance: f32) -> Vec<(Vec2, u32)> {
         let nodes = (0u32..).zip(&self.network.nodes);
-        let is_joined = |node: u32| self.network.links.iter().any(|link| link.a == node || link.b == node);
+        let mut joined: Vec<u32> = self.network.links.iter().flat_map(|link| [link.a, link.b]).collect();
+        joined.sort_unstable();
         let extent = self.network.extent();
         let mut ends: Vec<_> = nodes
             .filter(|(_, node)| node.impact == impact && node.pos.distance(center) >= distance)
             .filter(|(_, node)| !(node.pos.cmpeq(Vec2::ZERO) | node.pos.cmpeq(extent)).any())
-            .filter(|(index, _)| self.child_of(*index) == NO_PARENT && !is_joined(*index))
+            .filter(|(index, _)| self.child_of(*index) == NO_PARENT && joined.binary_search(index).is_err())
             .map(|(index, node)| (node.pos, index))
             .collect();
         let far = |(pos, _): &(Vec2, u32)| pos.distance_squared(center);
@@ -243,6 +198,7 @@ impl CrackGrowth {
 
     /// One step of a growth whose hits lay out strands.
     pub(super) fn advance_strands(&mut self) {
+        while self.try_strands() {}
         let (first, links) = (self.network.nodes.len() as u32, self.network.links.len());
         self.timeline.begin(self.steps.saturating_add(1));
         self.steps = self.steps.saturating_add(1);
@@ -265,11 +221,12 @@ impl CrackGrowth {
         }
         self.new_nodes = first..self.network.nodes.len() as u32;
         self.join_newborn();
-        if self.strands.is_empty() {
+        if self.strands.is_empty() && self.orders.is_empty() {
             self.steps_left = 0;
         }
         if self.steps_left == 0 {
             self.strands.clear();
+            self.orders.clear();
             self.widen_with(|widths, nodes, widened| widths.settle(nodes, widened));
         } else if self.new_nodes.is_empty() && self.network.links.len() == links {
             // Nothing has changed: the next step takes its place.
@@ -279,7 +236,7 @@ impl CrackGrowth {
 
     /// The node of the next point of a path.
     fn follow(&mut self, paths: &StrandPaths, point: u32) -> u32 {
-        let Node { pos, parent, .. } = paths.paths.nodes[point as usize];
+        let Node { pos, parent, .. } = paths.network.nodes[point as usize];
         if parent == NO_PARENT {
             return paths.root(pos);
         }

@@ -123,6 +123,8 @@ pub(super) struct Paths {
     joints: Vec<Vec<(u32, Vec2)>>,
     tips: Vec<Tip>,
     points: usize,
+    /// The most points of all strands together.
+    most: usize,
     pub(super) strands: Vec<Strand>,
 }
 
@@ -133,6 +135,7 @@ impl Paths {
         starts: &[StrandStart],
         extent: Vec2,
         seed: u64,
+        most: usize,
     ) -> Result<Self, StrandError> {
         params.validate()?;
         let field = GuidanceField::new(directions, params.frequency, params.rotation, extent, seed)?;
@@ -160,6 +163,7 @@ impl Paths {
             joints: Vec::new(),
             tips: Vec::new(),
             points: 0,
+            most,
             strands: Vec::new(),
         };
         let length = (params.length / params.step).round() as u32;
@@ -229,7 +233,7 @@ impl Paths {
     fn advance(&mut self, tip: &mut Tip) -> bool {
         let index = tip.strand as usize;
         // Another tip has met it head on.
-        if self.strands[index].end != StrandEnd::Length || tip.left == 0 || self.points >= MAX_STRAND_POINTS {
+        if self.strands[index].end != StrandEnd::Length || tip.left == 0 || self.points >= self.most {
             return false;
         }
         let depth = self.strands[index].depth as usize;

@@ -135,7 +135,7 @@ params! {
 
 impl StrandParams {
     /// Number of steps from joint to joint.
-    pub(super) fn tile_steps(&self) -> u32 {
+    pub(crate) fn tile_steps(&self) -> u32 {
         ((self.tile / self.step).round() as u32).max(1)
     }
 }

@@ -5,7 +5,7 @@ use super::{
     course::Course,
     error::StrandError,
     field::Directions,
-    grow::{Paths, Strand, StrandStart},
+    grow::{MAX_STRAND_POINTS, Paths, Strand, StrandStart},
     params::StrandParams,
     primitive::Primitive,
 };
@@ -48,7 +48,19 @@ impl Strands {
         extent: Vec2,
         seed: u64,
     ) -> Result<Self, StrandError> {
-        let mut paths = Paths::new(params, directions, starts, extent, seed)?;
+        Self::within(params, directions, starts, extent, seed, MAX_STRAND_POINTS)
+    }
+
+    /// The same with at most about so many points: strands that would need more end there.
+    pub(crate) fn within(
+        params: &StrandParams,
+        directions: Directions,
+        starts: &[StrandStart],
+        extent: Vec2,
+        seed: u64,
+        most: usize,
+    ) -> Result<Self, StrandError> {
+        let mut paths = Paths::new(params, directions, starts, extent, seed, most)?;
         paths.finish();
         let strands = paths.strands;
         let mut courses: Vec<Course> = Vec::with_capacity(strands.len());

@@ -135,3 +135,74 @@ fn settings_of_strands_are_checked_and_set_by_name() {
         }
     }
 }
+
+/// Whatever the settings, a hit makes no more than so many points, and its growth ends.
+#[test]
+fn wild_settings_of_strands_are_bounded() {
+    for case in 0..12u64 {
+        let mut rng = Rng::new(case).stream("wild");
+        let mut params = PRESETS[case as usize % 3].growth.clone();
+        let (count, settings) = strands(&mut params);
+        *count = 1 + rng.next_u32() % 1024;
+        *settings = StrandParams {
+            length: [64.0, 4.0, 0.001][case as usize % 3],
+            step: [0.0001, 0.001, 0.05][rng.next_u32() as usize % 3],
+            tile: [0.01, 0.1, 1.0][rng.next_u32() as usize % 3],
+            branch_cost: [0.005, 0.2][rng.next_u32() as usize % 2],
+            depth: rng.next_u32() % 4,
+            child_length: rng.unit(),
+            repulsion: 0.1 * rng.unit() * rng.unit(),
+            lanes: 1 + rng.next_u32() % 3,
+            pace: [0.0005, 0.02, 1.0][rng.next_u32() as usize % 3],
+            ..*settings
+        };
+        params.step_length = 0.03;
+        params.num_iterations = 100_000;
+        params.max_nodes = 1500;
+        params.validate().unwrap();
+        let mut growth = CrackGrowth::new(params, Vec2::new(1.0, 1.0 + rng.unit()), case).unwrap();
+        for _ in 0..2 {
+            growth.begin_hit(Vec2::new(rng.unit(), rng.unit()), 16.0 * rng.unit());
+            let mut slices = 0;
+            while growth.continue_hit(1) {
+                slices += 1;
+            }
+            assert!(slices < 40, "case {case}: {slices} slices");
+            assert!(
+                growth.strands.iter().map(|paths| paths.network.nodes.len()).sum::<usize>() < 1 << 20,
+                "case {case}"
+            );
+            while growth.step().grew() {}
+        }
+        assert!(!growth.is_growing() && growth.network().nodes().len() <= 1500, "case {case}");
+    }
+}
+
+/// A hit is laid out in slices, and the cracks are those of a hit at once.
+#[test]
+fn slices_do_not_change_the_strands() {
+    for (preset, seed) in PRESETS.iter().flat_map(|preset| (0..3).map(move |seed| (preset, seed))) {
+        let grow = |in_slices: bool| {
+            let mut growth = CrackGrowth::new(preset.growth.clone(), Vec2::ONE, seed).unwrap();
+            let mut slices = 0;
+            for (at, energy) in [(Vec2::new(0.02, 0.9), 4.0), (Vec2::new(0.5, 0.4), 1.0), (Vec2::new(0.5, 0.4), 3.0)] {
+                growth.begin_hit(at, energy);
+                while in_slices && growth.continue_hit(64) {
+                    assert!(growth.is_laying_out());
+                    slices += 1;
+                }
+                for _ in 0..30 {
+                    while in_slices && !growth.prepare_step(64) {
+                        slices += 1;
+                    }
+                    growth.step();
+                }
+            }
+            while growth.step().grew() {}
+            (growth.network().nodes().to_vec(), slices)
+        };
+        let ((sliced, slices), (at_once, _)) = (grow(true), grow(false));
+        assert_eq!(sliced, at_once, "seed {seed}");
+        assert!(slices > 4, "{slices} slices");
+    }
+}
