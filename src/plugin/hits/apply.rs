@@ -90,11 +90,11 @@ pub(crate) fn apply_hits(world: &mut World) {
 
 /// Goes on with the markers of a surface that have no places yet; `None` if all have, `false` if they are being laid out, which comes first.
 fn prepare_some(world: &mut World, entity: Entity) -> Option<bool> {
-    let growth = &mut active_mut(world, entity)?.cracks.growth;
-    growth.is_preparing().then(|| {
-        let has_places = !growth.is_laying_out();
+    let active = active_mut(world, entity)?;
+    active.cracks.growth.is_preparing().then(|| {
+        let has_places = !active.turn.is_laying_out;
         if has_places {
-            growth.prepare_step(time::SLICE);
+            active.cracks.growth.prepare_step(time::SLICE);
         }
         has_places
     })
@@ -107,7 +107,8 @@ fn lay_out(world: &mut World, timer: &Timer) -> bool {
     {
         let is_left = active_mut(world, entity).is_some_and(|active| {
             has_worked |= active.cracks.growth.is_laying_out();
-            active.cracks.growth.continue_hit(SLICE)
+            active.turn.is_laying_out = active.cracks.growth.continue_hit(SLICE);
+            active.turn.is_laying_out
         });
         if !is_left {
             world.resource_mut::<Queues>().laying_out.pop_front();
@@ -221,8 +222,8 @@ fn apply(world: &mut World, entity: Entity, hit: QueuedHit, timer: &Timer) -> Re
         active.note_hit();
         let turned = active.turn_forwards();
         with_queues(world, entity, |queues, turn| {
-            if is_left && !queues.laying_out.contains(&entity) {
-                queues.laying_out.push_back(entity);
+            if is_left {
+                queues.lay_out(entity, turn);
             }
             queues.start_growing(entity, turn);
             // The nodes it starts with show at once.

@@ -46,6 +46,8 @@ pub(crate) struct Active {
 pub(crate) struct Turn {
     /// Whether it is in a growing queue: it grows, or its time passes.
     pub(crate) is_growing: bool,
+    /// Whether it is in the queue of those whose last hit is laid out: its growth waits for that.
+    pub(crate) is_laying_out: bool,
     /// Whether it is in the dirty queue.
     pub(crate) is_dirty: bool,
     /// Whether a frame had no time to paint it: its growth waits for that.

@@ -11,7 +11,7 @@ pub(crate) struct Queues {
     pub(crate) growing: VecDeque<Entity>,
     /// Surfaces that will grow when others have ended.
     pub(crate) held: VecDeque<Entity>,
-    /// Surfaces whose last hit has markers to lay out, in order; and some that are done.
+    /// Surfaces whose last hit has markers or strands to lay out, each once, in order.
     pub(crate) laying_out: VecDeque<Entity>,
     /// Surfaces to paint, each once, in turns.
     pub(crate) dirty: VecDeque<Entity>,
@@ -37,6 +37,13 @@ impl Queues {
         }
     }
 
+    /// Has the last hit of a surface laid out.
+    pub(crate) fn lay_out(&mut self, entity: Entity, turn: &mut Turn) {
+        if !core::mem::replace(&mut turn.is_laying_out, true) {
+            self.laying_out.push_back(entity);
+        }
+    }
+
     /// Has a surface painted.
     pub(crate) fn mark_dirty(&mut self, entity: Entity, turn: &mut Turn) {
         if !core::mem::replace(&mut turn.is_dirty, true) {
@@ -56,6 +63,9 @@ impl Queues {
         if turn.is_growing {
             self.growing.retain(|other| *other != entity);
             self.held.retain(|other| *other != entity);
+        }
+        if turn.is_laying_out {
+            self.laying_out.retain(|other| *other != entity);
         }
         if turn.is_dirty {
             self.dirty.retain(|other| *other != entity);

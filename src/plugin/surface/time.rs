@@ -117,10 +117,11 @@ impl Active {
             (Ruler::Closing(_), _) => false,
             _ => self.playhead.due >= 1.0,
         };
-        is_due && self.cracks.growth.is_growing() && !self.cracks.growth.is_laying_out()
+        is_due && self.cracks.growth.is_growing() && !self.turn.is_laying_out
     }
 
-    /// Makes a step of growth if one is due and the markers of the last hits have been settled, which may need more than one turn.
+    /// Makes a step of growth if one is due and its preparations are done, which may need more than one turn: markers of the last hits are
+    /// settled, more strands of them are laid out.
     pub(crate) fn step_if_due(&mut self) -> bool {
         if !self.is_due() || !self.cracks.growth.prepare_step(SLICE) {
             return false;
