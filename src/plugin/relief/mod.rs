@@ -2,3 +2,4 @@
 
 mod show;
 pub(crate) mod system;
+mod work;

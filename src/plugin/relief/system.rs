@@ -1,13 +1,14 @@
 //! Reliefs that are being made.
 
 use super::show::show;
+use super::work::{Made, Rectangle, ReliefWork};
 use crate::plugin::api::error::EntityLabel;
 use crate::plugin::api::{CrackBudget, CrackError, CrackRelief, ReliefFailed, ReliefMade, ReliefProgress};
+use crate::plugin::carrier::{kind::Found, kinds};
 use crate::plugin::jobs::background::guarded;
-use crate::plugin::jobs::frame_time::FrameClock;
-use crate::plugin::jobs::stepped::{Outcome, RunningTask, Step, Stepped};
+use crate::plugin::jobs::frame_time::{FrameClock, Timer};
+use crate::plugin::jobs::stepped::{Outcome as TaskOutcome, RunningTask, Step, Stepped};
 use crate::plugin::jobs::threads::Threads;
-use crate::relief::{Relief, ReliefJob};
 use bevy::prelude::*;
 
 /// Share of the frame's budget after which no further slice is made.
@@ -19,24 +20,18 @@ const SHARE: f32 = 0.9;
 pub(crate) struct ReliefInProgress(Work);
 
 enum Work {
+    /// It has not begun: there is no room for it, or its mesh or material is not there yet.
     Wanted,
-    Task(RunningTask<ReliefJob>),
-    Slices(Box<ReliefJob>),
+    Task(RunningTask<ReliefWork>),
+    Slices(Box<ReliefWork>),
 }
 
-impl Stepped for ReliefJob {
-    type Output = Box<Relief>;
-
-    fn step(mut self) -> Result<Step<Self>, CrackError> {
-        Ok(match Self::step(&mut self)? {
-            Some(relief) => Step::Done(Box::new(relief)),
-            None => Step::More(self),
-        })
-    }
-
-    fn progress(&self) -> f32 {
-        Self::progress(self)
-    }
+/// What comes of working on a relief in a frame.
+enum Outcome {
+    /// It goes on; this much is done.
+    Going(Work, f32),
+    Made(Box<Made>),
+    Failed(CrackError),
 }
 
 /// Begins reliefs that are new or have changed.
@@ -91,59 +86,95 @@ pub(crate) fn make_reliefs(world: &mut World, mut found: Local<Vec<Entity>>) {
     let mut room = pool.map_or(1, |pool| pool.thread_num().max(1)).saturating_sub(busy);
     for &entity in found.iter() {
         let Some(mut making) = world.get_mut::<ReliefInProgress>(entity) else { continue };
-        let work = core::mem::replace(&mut making.0, Work::Wanted);
-        let (work, progress) = match work {
-            Work::Wanted if room == 0 => (Ok(Err(Work::Wanted)), 0.0),
-            Work::Wanted => {
-                room -= 1;
-                (begin(world, entity).map(Err), 0.0)
-            }
+        let outcome = match core::mem::replace(&mut making.0, Work::Wanted) {
+            Work::Wanted if room == 0 => Outcome::Going(Work::Wanted, 0.0),
+            Work::Wanted => match begin(world, entity) {
+                Ok(work) => {
+                    room -= usize::from(!matches!(work, Work::Wanted));
+                    Outcome::Going(work, 0.0)
+                }
+                Err(error) => Outcome::Failed(error),
+            },
             Work::Task(mut task) => match task.poll() {
                 None => {
                     let progress = task.progress();
-                    (Ok(Err(Work::Task(task))), progress)
+                    Outcome::Going(Work::Task(task), progress)
                 }
-                Some(Outcome::NoThread(job)) => {
+                Some(TaskOutcome::NoThread(work)) => {
                     world.resource_mut::<Threads>().are_missing = true;
-                    (Ok(Err(Work::Slices(Box::new(job)))), 0.0)
+                    Outcome::Going(Work::Slices(Box::new(work)), 0.0)
                 }
-                Some(Outcome::Ended(result)) => (result.map(Ok), 1.0),
+                Some(TaskOutcome::Ended(Ok(made))) => Outcome::Made(made),
+                Some(TaskOutcome::Ended(Err(error))) => Outcome::Failed(error),
             },
-            Work::Slices(mut job) => loop {
-                let progress = Stepped::progress(&*job);
-                match guarded(|| Stepped::step(*job)) {
-                    Ok(Step::More(more)) if timer.is_over() => break (Ok(Err(Work::Slices(Box::new(more)))), progress),
-                    Ok(Step::More(more)) => job = Box::new(more),
-                    Ok(Step::Done(relief)) => break (Ok(Ok(relief)), 1.0),
-                    Err(error) => break (Err(error), 0.0),
-                }
-            },
+            Work::Slices(work) => make_slices(*work, &timer),
         };
-        match work {
-            Ok(Err(work)) => {
+        match outcome {
+            Outcome::Going(work, progress) => {
                 if let Some(mut making) = world.get_mut::<ReliefInProgress>(entity) {
                     making.0 = work;
                 }
                 report(world, entity, progress);
             }
-            Ok(Ok(relief)) => {
-                let shown = show(world, entity, *relief);
+            Outcome::Made(made) => {
+                let shown = show(world, entity, *made);
                 end(world, entity, shown);
             }
-            Err(error) => end(world, entity, Err(error)),
+            Outcome::Failed(error) => end(world, entity, Err(error)),
         }
     }
     world.resource_mut::<FrameClock>().stop(&timer);
 }
 
+/// Steps of the work, one at least, until the time is over.
+fn make_slices(mut work: ReliefWork, timer: &Timer) -> Outcome {
+    loop {
+        match guarded(|| work.step()) {
+            Ok(Step::More(more)) if timer.is_over() => {
+                let progress = more.progress();
+                return Outcome::Going(Work::Slices(Box::new(more)), progress);
+            }
+            Ok(Step::More(more)) => work = more,
+            Ok(Step::Done(made)) => return Outcome::Made(made),
+            Err(error) => return Outcome::Failed(error),
+        }
+    }
+}
+
+/// Begins a relief, unless its mesh or material is not there yet.
 fn begin(world: &mut World, entity: Entity) -> Result<Work, CrackError> {
-    let relief = world.get::<CrackRelief>(entity).ok_or(CrackError::NothingToCrack)?;
-    relief.validate()?;
-    let job = ReliefJob::new(relief.settings.clone(), relief.size, relief.seed)?;
+    let wish = world.get::<CrackRelief>(entity).ok_or(CrackError::NothingToCrack)?;
+    wish.validate()?;
+    match kinds::inspect(world, entity).1 {
+        Found::Waiting => return Ok(Work::Wanted),
+        // What cannot crack may have a relief: one that is not loaded, or shown in a way of its own.
+        Found::Unusable(error) if matches!(error, CrackError::NothingToCrack | CrackError::Tilemap) => {
+            return Err(error);
+        }
+        Found::Unusable(_) | Found::Shown(_) | Found::Other => {}
+    }
+    let work = ReliefWork::new(wish, (wish.displacement > 0.0).then(|| rectangle(world, entity)).flatten())?;
     Ok(match world.resource::<Threads>().pool() {
-        Some(pool) => Work::Task(RunningTask::start(pool, job)),
-        None => Work::Slices(Box::new(job)),
+        Some(pool) => Work::Task(RunningTask::start(pool, work)),
+        None => Work::Slices(Box::new(work)),
     })
+}
+
+/// The rectangle of a 3D mesh.
+#[cfg(feature = "3d")]
+fn rectangle(world: &World, entity: Entity) -> Option<Rectangle> {
+    use bevy::camera::primitives::MeshAabb;
+    let mesh = &world.get::<Mesh3d>(entity)?.0;
+    let bounds = world.get_resource::<Assets<Mesh>>()?.get(mesh)?.compute_aabb()?;
+    let half = Vec3::from(bounds.half_extents);
+    let is_ground = half.y < half.z;
+    let size = 2.0 * if is_ground { Vec2::new(half.x, half.z) } else { half.truncate() };
+    Some(Rectangle { center: Vec3::from(bounds.center), size, is_ground })
+}
+
+#[cfg(not(feature = "3d"))]
+fn rectangle(_: &World, _: Entity) -> Option<Rectangle> {
+    None
 }
 
 fn report(world: &mut World, entity: Entity, share: f32) {
