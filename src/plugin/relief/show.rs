@@ -27,10 +27,7 @@ pub(super) fn show(world: &mut World, entity: Entity, made: Made) -> Result<(), 
 }
 
 /// Gives the pictures and the mesh to what the entity has; `false` if that is nothing that shows pictures.
-#[cfg_attr(
-    not(all(feature = "2d", feature = "3d")),
-    expect(unused_variables, reason = "what is not there shows nothing")
-)]
+#[cfg_attr(not(feature = "3d"), expect(unused_variables, reason = "what is not there shows nothing"))]
 fn give(
     world: &mut World,
     entity: Entity,

@@ -16,6 +16,7 @@ use bevy::{
 
 /// Where a rectangle lies in a mesh's own space.
 #[derive(Clone, Copy)]
+#[cfg_attr(not(feature = "3d"), expect(dead_code, reason = "only 3D meshes stand out"))]
 pub(super) struct Rectangle {
     pub(super) center: Vec3,
     pub(super) size: Vec2,
@@ -24,7 +25,6 @@ pub(super) struct Rectangle {
 }
 
 /// The pictures of a relief, and its mesh if it stands out.
-#[cfg_attr(not(any(feature = "2d", feature = "3d")), expect(dead_code, reason = "nothing shows them then"))]
 pub(super) struct Made {
     pub(super) diffuse: Image,
     pub(super) normal: Image,
