@@ -62,4 +62,4 @@ pub use modulate::{Modulation, modulate};
 pub use range::LookError;
 pub use shades::Shades;
 pub use table::LookTable;
-pub use texel::{BaseTexels, PaintTargets, correct_normals, paint_into, paint_rects};
+pub use texel::{BaseTexels, PaintTargets, ShownCracks, correct_normals, paint_into, paint_new, paint_rects};

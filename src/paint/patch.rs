@@ -1,5 +1,6 @@
 //! The depths of a patch of texels, and their slopes.
 
+use super::texel::ShownCracks;
 use crate::{Grid, raster::TexelRect};
 use glam::UVec2;
 use std::ops::Range;
@@ -99,6 +100,23 @@ impl<const ROOM: usize> Patch<ROOM> {
             touched = touched || to.iter().fold(0, |any, &depth| any | depth) != 0;
         }
         touched
+    }
+
+    /// Takes out the cracks that the base shows already; returns `false` if none are left. `rect` as in [`load`](Self::load).
+    pub(super) fn leave_out(&mut self, shown: &ShownCracks<'_>, rect: TexelRect) -> bool {
+        let (min, max) = (rect.min.as_usizevec2(), rect.max.as_usizevec2());
+        let mut any = 0;
+        for (depths, y) in self.depth.chunks_exact_mut(self.stride).zip(min.y..max.y + 2) {
+            let row = shown.depth.row(y.saturating_sub(1).min(shown.depth.height() - 1));
+            for (depth, x) in depths.iter_mut().zip(min.x..) {
+                let before = row[x.saturating_sub(1).min(row.len() - 1)];
+                if before >= shown.least || *depth <= before {
+                    *depth = 0;
+                }
+                any |= *depth;
+            }
+        }
+        any != 0
     }
 
     /// Finds touched texels and the slopes by Sobel's operator. A wall that descends to the right leans to the right.

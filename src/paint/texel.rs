@@ -15,6 +15,7 @@ use super::{
     shades::reduce_shades,
 };
 use crate::{
+    Grid,
     blend::{BlendError, NormalBlending, solve_correction},
     math::vectorized,
     raster::{DepthField, SlopeCorrection, TexelRect},
@@ -44,6 +45,15 @@ pub struct PaintTargets<'a> {
     pub normal: Option<&'a mut [u8]>,
     /// R8 depth, 255 = bottom.
     pub depth: Option<&'a mut [u8]>,
+}
+
+/// The cracks that a base shows already, as one made by an [`Analogy`](super::analogy::Analogy) does.
+#[derive(Clone, Copy, Debug)]
+pub struct ShownCracks<'a> {
+    /// Their depths, of the size of the field.
+    pub depth: &'a Grid<u16>,
+    /// Depth from which the base shows a crack.
+    pub least: u16,
 }
 
 /// The normal of a flat surface.
@@ -79,10 +89,64 @@ pub fn paint_into(
     paint_rects(base, field, look, &[rect], origin, targets);
 }
 
+/// Like [`paint_rects`] over a base that shows cracks already: of the field only what is deeper there, and was less
+/// than a crack, is painted, so that new cracks show until the base has them as well. Crushed zones, plates and veils
+/// are painted as ever. `shown` that does not have the size of the field counts as nothing.
+///
+/// ```
+/// use bevy_crack::{
+///     Grid,
+///     paint::{BaseTexels, Look, LookTable, PaintTargets, ShownCracks, paint_new},
+///     pattern::SurfaceFrame,
+///     raster::{DepthField, TexelRect},
+/// };
+/// use glam::UVec2;
+///
+/// let size = UVec2::splat(16);
+/// let mut field = DepthField::new(SurfaceFrame::new(size)?);
+/// field.depth.row_mut(3).fill(60_000);
+/// let mut shown = Grid::new(size, 0);
+/// shown.row_mut(3)[..8].fill(60_000);
+/// let look = LookTable::new(&Look::GROOVE, field.frame.texels_per_unit())?;
+/// let base = BaseTexels { size, diffuse: &[200; 4 * 256], normal: None, depth: None };
+/// let mut painted = vec![0; 4 * 256];
+/// let mut targets = PaintTargets { diffuse: Some(&mut painted), normal: None, depth: None };
+/// let shown = ShownCracks { depth: &shown, least: 10_000 };
+/// paint_new(base, shown, &field, &look, &[TexelRect::whole(size)], UVec2::ZERO, &mut targets);
+/// let texel = |x: usize| painted[4 * (3 * 16 + x)];
+/// assert_eq!(texel(2), 200, "the base shows that crack");
+/// assert!(texel(12) < 200, "this one is new");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn paint_new(
+    base: BaseTexels<'_>,
+    shown: ShownCracks<'_>,
+    field: &DepthField,
+    look: &LookTable,
+    rects: &[TexelRect],
+    origin: UVec2,
+    targets: &mut PaintTargets<'_>,
+) {
+    let shown = Some(shown).filter(|shown| shown.depth.size() == field.depth.size());
+    paint_over(base, shown, field, look, rects, origin, targets);
+}
+
 /// Like [`paint_into`] for several rectangles. It takes less time where they are small and the memory is not in the
 /// cache.
 pub fn paint_rects(
     base: BaseTexels<'_>,
+    field: &DepthField,
+    look: &LookTable,
+    rects: &[TexelRect],
+    origin: UVec2,
+    targets: &mut PaintTargets<'_>,
+) {
+    paint_over(base, None, field, look, rects, origin, targets);
+}
+
+fn paint_over(
+    base: BaseTexels<'_>,
+    shown: Option<ShownCracks<'_>>,
     field: &DepthField,
     look: &LookTable,
     rects: &[TexelRect],
@@ -108,7 +172,12 @@ pub fn paint_rects(
         frame: Frame { base: diffuse, stride: base.size.x as usize, origin, size: visible },
         field,
         look,
-        correction: field.correction().map(Arc::as_ref).filter(|_| look.normals == NormalBlending::Poisson),
+        shown,
+        // It is that of all cracks.
+        correction: field
+            .correction()
+            .map(Arc::as_ref)
+            .filter(|_| look.normals == NormalBlending::Poisson && shown.is_none()),
         normal,
         depth: base.depth,
         diffuse_out,
@@ -191,6 +260,8 @@ struct Job<'a> {
     frame: Frame<'a>,
     field: &'a DepthField,
     look: &'a LookTable,
+    /// Cracks that are not painted.
+    shown: Option<ShownCracks<'a>>,
     /// Slopes that are added to the base, where it is untouched as well.
     correction: Option<&'a SlopeCorrection>,
     normal: Option<&'a [Rgba]>,
@@ -221,7 +292,10 @@ impl Job<'_> {
             for x in (rect.min.x..rect.max.x).step_by(WIDE) {
                 let min = UVec2::new(x, y);
                 let part = TexelRect { min, max: (min + UVec2::new(width, height)).min(rect.max) };
-                let is_touched = patch.load(&self.field.depth, part);
+                let mut is_touched = patch.load(&self.field.depth, part);
+                if let Some(shown) = self.shown.filter(|_| is_touched) {
+                    is_touched = patch.leave_out(&shown, part);
+                }
                 let extras = extras.as_mut().filter(|extras| extras.touches(part));
                 if is_touched || extras.is_some() {
                     self.paint_patch(patch, extras, part);

@@ -167,7 +167,7 @@ impl Film {
         let mut maps = [const { None }; MAPS];
         maps[0] = Some(&mut *texels);
         let shown = TexelRect::whole(self.seen.size());
-        textures::paint(&self.base, field, &self.look, &[shown], self.seen.min, maps);
+        textures::paint(&self.base, None, field, &self.look, &[shown], self.seen.min, maps);
         let row = 4 * self.seen.size().x as usize;
         let rows = texels.chunks_exact(4 * self.base.size.x as usize);
         let rows = rows.skip(self.seen.min.y as usize).take(self.seen.size().y as usize);

@@ -34,12 +34,13 @@ mod source;
 mod surface;
 
 pub use api::{
-    BakeProgress, CellClosed, CrackBaked, CrackBudget, CrackClock, CrackDrive, CrackError, CrackFailed, CrackFinished,
-    CrackGuide, CrackHit, CrackMaps, CrackMaskSource, CrackRecord, CrackRelief, CrackResolution, CrackScript,
-    CrackShards, CrackState, CrackStats, CrackStatus, CrackStrands, CrackSurface, CrackSystems, CrackTextures,
-    CrackTip, CrackUploadStats, GravitySpace, GuideSource, GuidedAppearance, GuidedCracks, HitPoint, PresetSource,
-    Reassembled, ReliefFailed, ReliefMade, ReliefProgress, ScriptedHit, Shard, ShardsError, ShatterCracks,
-    ShatterFailed, ShatterRequest, ShatterWhen, Shattered, StrandField,
+    AnalogyExamples, AnalogyFailed, AnalogyMade, AnalogyProgress, BakeProgress, CellClosed, CrackAnalogy, CrackBaked,
+    CrackBudget, CrackClock, CrackDrive, CrackError, CrackFailed, CrackFinished, CrackGuide, CrackHit, CrackMaps,
+    CrackMaskSource, CrackRecord, CrackRelief, CrackResolution, CrackScript, CrackShards, CrackState, CrackStats,
+    CrackStatus, CrackStrands, CrackSurface, CrackSystems, CrackTextures, CrackTip, CrackUploadStats, GravitySpace,
+    GuideSource, GuidedAppearance, GuidedCracks, HitPoint, PresetSource, Reassembled, ReliefFailed, ReliefMade,
+    ReliefProgress, ScriptedHit, Shard, ShardsError, ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen,
+    Shattered, StrandField,
 };
 #[cfg(feature = "2d")]
 pub use carrier::lit::{CrackLight2d, CrackLitMaterial, CrackLitUniform, MAX_LIGHTS};
@@ -57,12 +58,13 @@ use bevy::{
 /// What a game names.
 pub mod prelude {
     pub use super::{
-        BakeProgress, CellClosed, CrackBaked, CrackBudget, CrackClock, CrackCommandsExt, CrackDrive, CrackError,
-        CrackFailed, CrackFinished, CrackGuide, CrackHit, CrackMaps, CrackMaskSource, CrackPlugin, CrackPlugins,
-        CrackRecord, CrackRecords, CrackRelief, CrackResolution, CrackScript, CrackShards, CrackState, CrackStats,
-        CrackStatus, CrackStrands, CrackSurface, CrackSystems, CrackTextures, CrackTip, GravitySpace, GuideSource,
-        GuidedAppearance, GuidedCracks, HitPoint, PresetSource, Reassembled, ReliefFailed, ReliefMade, ReliefProgress,
-        ScriptedHit, Shard, ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen, Shattered, StrandField,
+        AnalogyExamples, AnalogyFailed, AnalogyMade, AnalogyProgress, BakeProgress, CellClosed, CrackAnalogy,
+        CrackBaked, CrackBudget, CrackClock, CrackCommandsExt, CrackDrive, CrackError, CrackFailed, CrackFinished,
+        CrackGuide, CrackHit, CrackMaps, CrackMaskSource, CrackPlugin, CrackPlugins, CrackRecord, CrackRecords,
+        CrackRelief, CrackResolution, CrackScript, CrackShards, CrackState, CrackStats, CrackStatus, CrackStrands,
+        CrackSurface, CrackSystems, CrackTextures, CrackTip, GravitySpace, GuideSource, GuidedAppearance, GuidedCracks,
+        HitPoint, PresetSource, Reassembled, ReliefFailed, ReliefMade, ReliefProgress, ScriptedHit, Shard,
+        ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen, Shattered, StrandField,
     };
     #[cfg(feature = "2d")]
     pub use super::{CrackLight2d, CrackLitMaterial};
@@ -98,6 +100,10 @@ impl Plugin for CrackPlugin {
             .register_type::<CrackRecord>()
             .register_type::<StrandField>()
             .register_type::<BakeProgress>()
+            .register_type::<CrackAnalogy>()
+            .register_type::<AnalogyProgress>()
+            .register_type::<AnalogyMade>()
+            .register_type::<AnalogyFailed>()
             .register_type::<CrackRelief>()
             .register_type::<ReliefProgress>()
             .register_type::<ReliefMade>()
@@ -142,6 +148,8 @@ impl Plugin for CrackPlugin {
             .add_observer(bake::work::cancel_removed::<CrackStrands>)
             .add_observer(bake::work::cancel_removed::<CrackRecord>)
             .add_observer(relief::system::cancel_removed)
+            .add_observer(draw::analogy::prepare_added)
+            .add_observer(draw::analogy::drop_removed)
             .add_observer(life::heal::disown_added)
             .add_observer(life::heal::heal_removed)
             .add_observer(life::heal::heal_closed)
@@ -192,7 +200,12 @@ impl Plugin for CrackPlugin {
                     )
                         .chain()
                         .in_set(Grow),
-                    (draw::async_playback::play_async, draw::blend::blend_normals, draw::paint::paint_surfaces)
+                    (
+                        draw::async_playback::play_async,
+                        draw::blend::blend_normals,
+                        draw::paint::paint_surfaces,
+                        draw::analogy::make_analogies,
+                    )
                         .chain()
                         .in_set(Paint),
                     (gpu::uploads::drop_unwanted, jobs::frame_time::end_frame).chain().in_set(Upload),
@@ -229,6 +242,7 @@ impl Plugin for CrackPlugin {
     fn finish(&self, app: &mut App) {
         app.insert_resource(source::picture::NearestByDefault::of(app));
         source::preset::add_assets(app);
+        source::analogy::add_assets(app);
         gpu::fetch::connect(app);
         carrier::pipelines::connect(app);
         #[cfg(feature = "2d")]

@@ -3,6 +3,8 @@
 
 #![cfg(test)]
 
+#[cfg(all(feature = "2d", feature = "3d"))]
+mod analogies;
 mod analogy;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod apps;

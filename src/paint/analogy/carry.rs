@@ -51,6 +51,14 @@ impl Analogy {
         Grid::from_vec(self.size(), ramp).unwrap_or_else(|| Grid::new(self.size(), 255))
     }
 
+    /// Whether a crack is nearer to a texel than [`AnalogyParams::reach`](super::AnalogyParams::reach), or the texel is
+    /// in one. As of the last work that was begun; false outside of the surface.
+    #[must_use]
+    pub fn is_near_crack(&self, x: u32, y: u32) -> bool {
+        let (level, texel) = (self.full(), UVec2::new(x, y));
+        texel.cmplt(level.size).all() && level.texels[level.index(texel)][3] < 255
+    }
+
     /// The share of texels whose distance from the edge of a crack differs by less than `tolerance` from that of their
     /// source, 0..=1. Distances are as in the guide: within the reach, and of `tolerance` 1 from one end to the other.
     #[must_use]
@@ -123,7 +131,7 @@ impl Analogy {
         check_size("out", out.size(), self.size())?;
         let sizes: Vec<UVec2> = self.examples().sizes().collect();
         if maps.len() != sizes.len() {
-            return Err(AnalogyError::PairCount { count: maps.len(), most: sizes.len() });
+            return Err(AnalogyError::MapCount { count: maps.len(), expected: sizes.len() });
         }
         for (map, size) in maps.iter().zip(sizes) {
             check_size("map", map.size(), size)?;

@@ -109,6 +109,14 @@ pub enum AnalogyError {
         /// Largest number allowed.
         most: usize,
     },
+    /// There is not one map for each photograph.
+    #[error("{count} maps for {expected} photographs, must be one for each")]
+    MapCount {
+        /// Number of maps.
+        count: usize,
+        /// Number of photographs.
+        expected: usize,
+    },
     /// All photographs together have too many texels.
     #[error("the photographs have {texels} texels, at most {most} are allowed")]
     TooManyTexels {

@@ -2,8 +2,8 @@
 //! that does not exist, so that an event without an entity is about nothing.
 
 use super::{
-    CellClosed, CrackBaked, CrackError, CrackFailed, CrackFinished, CrackHit, CrackShards, HitPoint, Reassembled,
-    ReliefFailed, ReliefMade, Shard, Shattered,
+    AnalogyFailed, AnalogyMade, CellClosed, CrackBaked, CrackError, CrackFailed, CrackFinished, CrackHit, CrackShards,
+    HitPoint, Reassembled, ReliefFailed, ReliefMade, Shard, Shattered,
 };
 use crate::shatter::Shards;
 use bevy::prelude::*;
@@ -62,6 +62,18 @@ impl Default for ReliefMade {
 }
 
 impl Default for ReliefFailed {
+    fn default() -> Self {
+        Self { entity: NOBODY, error: CrackError::NothingToCrack }
+    }
+}
+
+impl Default for AnalogyMade {
+    fn default() -> Self {
+        Self { entity: NOBODY }
+    }
+}
+
+impl Default for AnalogyFailed {
     fn default() -> Self {
         Self { entity: NOBODY, error: CrackError::NothingToCrack }
     }

@@ -135,6 +135,12 @@ pub enum CrackError {
         /// Why.
         reason: String,
     },
+    /// A [`CrackAnalogy`](super::CrackAnalogy) cannot be made.
+    #[error("its cracks cannot be those of photographs: {reason}")]
+    Analogy {
+        /// Why.
+        reason: String,
+    },
     /// Its textures could not be made.
     #[error("its textures could not be made: {reason}")]
     Textures {

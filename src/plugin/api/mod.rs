@@ -1,5 +1,6 @@
 //! Everything that a game sees: components, events, resources. Types, no systems.
 
+pub(crate) mod analogy;
 pub(crate) mod budget;
 pub(crate) mod clock;
 mod defaults;
@@ -19,6 +20,7 @@ pub(crate) mod surface;
 pub(crate) mod systems;
 pub(crate) mod textures;
 
+pub use analogy::{AnalogyExamples, AnalogyFailed, AnalogyMade, AnalogyProgress, CrackAnalogy};
 pub use budget::{CrackBudget, CrackStats, CrackUploadStats};
 pub use clock::{CrackClock, CrackDrive};
 pub use error::CrackError;

@@ -101,6 +101,7 @@ macro_rules! written {
 }
 
 written!(
+    super::CrackAnalogy,
     super::CrackSurface,
     super::CrackStrands,
     super::PresetSource,

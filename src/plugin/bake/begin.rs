@@ -1,12 +1,13 @@
 //! What a bake needs: it is looked for in the frames until all of it is there.
 
-use super::map_job::{BakeSurface, CracksOrder, MAX_SIDE, MapJob, Source};
+use super::map_job::{BakeSurface, CracksOrder, MapJob, Source};
 use super::strands_job::StrandsOrder;
 use super::work::{Bake, Baked, Work};
 use crate::plugin::api::{CrackError, CrackRecord, CrackStrands, CrackSurface, GuideSource, GuidedCracks};
 use crate::plugin::jobs::copy::PictureCopies;
 use crate::plugin::jobs::threads::Threads;
 use crate::plugin::source::picture;
+use crate::plugin::source::png::MAX_SIDE;
 use crate::plugin::surface::cracked::active;
 use crate::plugin::surface::inputs::Copies;
 use crate::plugin::surface::plan::Plan;

@@ -199,8 +199,10 @@ fn replace(world: &mut World, entity: Entity, kind: Baked, mut active: Box<Activ
     active.fell_at = (0, 1);
     active.cracks.tips_from = 0;
     active.mark_all();
-    // All that is shown is painted.
-    if let Some(view) = active.canvas.views.get_mut(active.canvas.view) {
+    // All that is shown is painted, as without an analogy.
+    if active.canvas.analogy.is_none()
+        && let Some(view) = active.canvas.views.get_mut(active.canvas.view)
+    {
         view.dirty.clear();
     }
     cracked::put_back(world, entity, active);

@@ -252,7 +252,7 @@ impl FinishInputs {
         let end = size.y.min(row + (SLICE / size.x).max(1));
         let band = TexelRect { min: UVec2::new(0, row), max: UVec2::new(size.x, end) };
         let texels = texels.each_mut().map(Option::as_deref_mut);
-        textures::paint(&self.base, &drawn.field, &drawn.look, &[band], self.rect.min, texels);
+        textures::paint(&self.base, None, &drawn.field, &drawn.look, &[band], self.rect.min, texels);
         end
     }
 }

@@ -6,26 +6,17 @@ use crate::pattern::Network;
 use crate::plugin::api::{CrackError, CrackRecord, GuidedAppearance, GuidedCracks};
 use crate::plugin::source::mask;
 use crate::plugin::source::picture::{self, BasePicture, Space};
+use crate::plugin::source::png;
 use crate::plugin::surface::cracks::Added;
 use crate::plugin::surface::inputs::{BaseAndMask, SurfaceInputs};
 use crate::plugin::surface::motion::Motion;
 use crate::raster::TexelRect;
 use crate::voronoi::{self, Guide, SeamMotion, Seams, VoronoiBake, VoronoiError, VoronoiMap};
-use bevy::{
-    asset::RenderAssetUsages,
-    image::{CompressedImageFormats, ImageSampler, ImageType},
-    prelude::*,
-};
+use bevy::prelude::*;
 use std::{sync::Arc, vec};
 
 /// Texels of a slice: well below a millisecond.
 pub(super) const SLICE: u32 = 1 << 14;
-
-/// Longest side of a guide, texels.
-pub(super) const MAX_SIDE: u32 = 8192;
-
-/// The most bytes of a guide.
-const MAX_BYTES: u64 = 256 << 20;
 
 /// Steps in which the cracks of a front open behind its tip.
 const FRONT_OPENING: u32 = 12;
@@ -167,7 +158,7 @@ impl MapJob {
             }
             Source::Image(index) => self.copies.get(index).ok_or("it was not read")?,
             Source::Png(file) => {
-                decoded = decode(&file)?;
+                decoded = png::decode(&file)?;
                 &decoded
             }
         };
@@ -210,20 +201,4 @@ fn lines(seams: &Seams, appearance: GuidedAppearance) -> (Network, u32) {
         GuidedAppearance::Front { .. } | GuidedAppearance::Widen { .. } => WIDE_OPENING,
     };
     (network, opening)
-}
-
-/// A PNG file as an image; what is too large is refused before memory is taken.
-fn decode(file: &[u8]) -> Result<Image, String> {
-    // Signature, length of the header, its name; width, height, bits, kind of colour.
-    let header = file.strip_prefix(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR").and_then(|rest| rest.first_chunk::<10>());
-    let &[a, b, c, d, e, f, g, h, bits, _] = header.ok_or("it is no PNG file")?;
-    let (width, height) = (u32::from_be_bytes([a, b, c, d]), u32::from_be_bytes([e, f, g, h]));
-    let texel = 4 * u64::from(bits.div_ceil(8));
-    if width.max(height) > MAX_SIDE || u64::from(width) * u64::from(height) * texel > MAX_BYTES {
-        return Err(format!("{width} x {height} texels are beyond the limit of {MAX_SIDE} a side and 256 MiB"));
-    }
-    let (kind, sampler) = (ImageType::MimeType("image/png"), ImageSampler::Default);
-    let usage = RenderAssetUsages::MAIN_WORLD;
-    Image::from_buffer(file, kind, CompressedImageFormats::NONE, true, sampler, usage)
-        .map_err(|error| error.to_string().lines().next().unwrap_or_default().to_owned())
 }

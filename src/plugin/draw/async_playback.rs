@@ -132,6 +132,7 @@ impl AsyncPlayback {
             timeline,
             moment,
             base: canvas.base.clone(),
+            analogy: canvas.analogy.clone(),
             look: canvas.look.clone(),
             maps: canvas.textures.all().map(|texture| texture.is_some()),
             rect: view.rect,
@@ -162,7 +163,7 @@ impl AsyncPlayback {
         }
         let Some(mut back) = back else { return };
         if !changed.is_empty() {
-            active.canvas.revision += 1;
+            active.canvas.note_depths(&changed);
             let pictures = active.canvas.textures.all().into_iter().zip(&mut back.texels).zip(staged);
             for ((texture, texels), staged) in pictures {
                 // Without an asset event, which would upload the whole image.

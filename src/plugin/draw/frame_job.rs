@@ -7,6 +7,7 @@ use crate::plugin::api::textures::MAPS;
 use crate::plugin::gpu::buffer::{Staged, Stager};
 use crate::plugin::gpu::textures;
 use crate::plugin::gpu::textures::TextureKind;
+use crate::plugin::source::analogy::AnalogyPicture;
 use crate::plugin::source::picture::BasePicture;
 use crate::plugin::surface::motion::MotionFrame;
 use crate::plugin::surface::tile_set::Touched;
@@ -51,6 +52,7 @@ pub(crate) struct FrameJob {
     pub(crate) timeline: Arc<TimelineSnapshot>,
     pub(crate) moment: Moment,
     pub(crate) base: Arc<BasePicture>,
+    pub(crate) analogy: Option<Arc<AnalogyPicture>>,
     pub(crate) look: LookTable,
     /// Which textures there are, and the part of them that is shown.
     pub(crate) maps: [bool; MAPS],
@@ -174,7 +176,7 @@ impl FrameJob {
     fn paint(&mut self, rects: &[TexelRect]) {
         let Some(back) = &mut self.back else { return };
         let texels = back.texels.each_mut().map(Option::as_deref_mut);
-        textures::paint(&self.base, &self.field, &self.look, rects, self.rect.min, texels);
+        textures::paint(&self.base, self.analogy.as_deref(), &self.field, &self.look, rects, self.rect.min, texels);
     }
 
     /// Brings what has changed to where the renderer can read it.

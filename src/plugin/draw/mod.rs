@@ -1,5 +1,6 @@
 //! Each frame: growth, time, painting.
 
+pub(crate) mod analogy;
 pub(crate) mod async_playback;
 pub(crate) mod blend;
 pub(crate) mod clock;

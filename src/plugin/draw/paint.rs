@@ -9,6 +9,7 @@ use crate::plugin::gpu::textures;
 use crate::plugin::gpu::uploads::Uploads;
 use crate::plugin::jobs::frame_time::{FrameClock, Timer, par_for_each};
 use crate::plugin::surface::active::Active;
+use crate::plugin::surface::canvas::Canvas;
 use crate::plugin::surface::cracked::{CrackedSurfaces, batch};
 use crate::plugin::surface::queues::Queues;
 use crate::plugin::surface::stamp::{Scratch, stamp};
@@ -179,7 +180,8 @@ impl Texels {
         rects.iter_mut().for_each(|rect| *rect = rect.intersect(shown));
         rects.retain(|rect| !rect.is_empty());
         let texels = self.0.each_mut().map(Option::as_deref_mut);
-        textures::paint(&active.canvas.base, &active.drawing.field, &active.canvas.look, rects, origin, texels);
+        let Canvas { base, analogy, look, .. } = &active.canvas;
+        textures::paint(base, analogy.as_deref(), &active.drawing.field, look, rects, origin, texels);
         for rect in rects.drain(..) {
             if let (Some(holes), [Some(diffuse), ..]) = (&active.drawing.cutouts, &mut self.0) {
                 holes.cut_out(diffuse, size, origin, rect);

@@ -1,9 +1,10 @@
 //! The kinds of textures that a surface has, and their texels.
 
-use crate::paint::{LookTable, PaintTargets, paint_glow, paint_rects};
+use crate::paint::{BaseTexels, LookTable, PaintTargets, paint_glow, paint_new, paint_rects};
 use crate::plugin::api::textures::{CrackTextures, MAPS, Maps};
 use crate::plugin::gpu::buffer::{Staged, Stager};
 use crate::plugin::gpu::uploads::Uploads;
+use crate::plugin::source::analogy::AnalogyPicture;
 use crate::plugin::source::picture::BasePicture;
 use crate::raster::{DepthField, TexelRect};
 use bevy::{
@@ -48,9 +49,11 @@ pub(crate) const EMISSIVE: TextureKind = TextureKind {
 /// In the order of [`CrackTextures`].
 pub(crate) const KINDS: [TextureKind; MAPS] = [DIFFUSE, NORMAL, DEPTH, EMISSIVE];
 
-/// Paints some rectangles of the field, whose top left is at `origin`, in all textures there are; texels in the order of [`KINDS`].
+/// Paints some rectangles of the field, whose top left is at `origin`, in all textures there are; texels in the order of [`KINDS`]. If there
+/// is an analogy, its picture is in the place of the base, and has most of the cracks.
 pub(crate) fn paint(
     base: &BasePicture,
+    analogy: Option<&AnalogyPicture>,
     field: &DepthField,
     look: &LookTable,
     rects: &[TexelRect],
@@ -58,7 +61,19 @@ pub(crate) fn paint(
     texels: [Option<&mut [u8]>; MAPS],
 ) {
     let [diffuse, normal, depth, emissive] = texels;
-    paint_rects(base.texels(), field, look, rects, origin, &mut PaintTargets { diffuse, normal, depth });
+    match analogy {
+        None => paint_rects(base.texels(), field, look, rects, origin, &mut PaintTargets { diffuse, normal, depth }),
+        Some(made) => {
+            let (carried, normal) = if made.normal.is_some() { (normal, None) } else { (None, normal) };
+            let over = BaseTexels { diffuse: &made.diffuse, normal: made.normal.as_deref(), ..base.texels() };
+            let mut targets = PaintTargets { diffuse, normal: carried, depth: None };
+            paint_new(over, made.shown(), field, look, rects, origin, &mut targets);
+            if normal.is_some() || depth.is_some() {
+                let mut targets = PaintTargets { diffuse: None, normal, depth };
+                paint_rects(base.texels(), field, look, rects, origin, &mut targets);
+            }
+        }
+    }
     if let Some(emissive) = emissive {
         paint_glow(None, base.size, field, look, rects, origin, emissive);
     }

@@ -1,6 +1,8 @@
 //! Jobs that are done step by step: by a background task, or in slices of frames.
 
 use super::background::guarded;
+use super::frame_time::Timer;
+use super::threads::Threads;
 use crate::plugin::api::CrackError;
 use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 use std::{
@@ -87,5 +89,58 @@ fn run<J: Stepped>(mut job: J, link: &TaskLink, home: ThreadId) -> Outcome<J> {
             Ok(Step::Done(output)) => return Outcome::Ended(Ok(output)),
             Err(error) => return Outcome::Ended(Err(error)),
         };
+    }
+}
+
+/// Work that a task does, or slices of frames where there are no threads.
+pub(crate) enum Running<J: Stepped> {
+    Task(RunningTask<J>),
+    Slices(Box<J>),
+}
+
+/// How far it is.
+pub(crate) enum News<J: Stepped> {
+    /// It goes on; this much is done, 0..=1.
+    Going(Running<J>, f32),
+    Ended(Result<J::Output, CrackError>),
+}
+
+impl<J: Stepped> Running<J> {
+    pub(crate) fn start(threads: &Threads, job: J) -> Self {
+        match threads.pool() {
+            Some(pool) => Self::Task(RunningTask::start(pool, job)),
+            None => Self::Slices(Box::new(job)),
+        }
+    }
+
+    /// Looks after it; makes slices until the time is over, one at least.
+    pub(crate) fn look(self, threads: &mut Threads, timer: &Timer) -> News<J> {
+        match self {
+            Self::Task(mut task) => match task.poll() {
+                None => {
+                    let progress = task.progress();
+                    News::Going(Self::Task(task), progress)
+                }
+                Some(Outcome::NoThread(job)) => {
+                    threads.are_missing = true;
+                    News::Going(Self::Slices(Box::new(job)), 0.0)
+                }
+                Some(Outcome::Ended(result)) => News::Ended(result),
+            },
+            Self::Slices(job) => {
+                let mut job = *job;
+                loop {
+                    match guarded(|| job.step()) {
+                        Ok(Step::More(more)) if timer.is_over() => {
+                            let progress = more.progress();
+                            return News::Going(Self::Slices(Box::new(more)), progress);
+                        }
+                        Ok(Step::More(more)) => job = more,
+                        Ok(Step::Done(output)) => return News::Ended(Ok(output)),
+                        Err(error) => return News::Ended(Err(error)),
+                    }
+                }
+            }
+        }
     }
 }

@@ -270,6 +270,7 @@ fn update_picture(
         active.drawing.field.set_layers(active.preset.look.layer(active.surface.seed));
         stamp_anew(active);
     }
+    active.drop_analogy();
     active.canvas.views.clear();
     active.show(draft.plan.rect);
     active.carrier.shown = shown;

@@ -1,6 +1,6 @@
 //! Healing, and what happens when a surface goes.
 
-use crate::plugin::api::{CrackRecord, CrackState, CrackStats, CrackSurface, CrackTextures};
+use crate::plugin::api::{AnalogyProgress, CrackRecord, CrackState, CrackStats, CrackSurface, CrackTextures};
 use crate::plugin::bake::work;
 use crate::plugin::carrier::kind::Found;
 use crate::plugin::carrier::kinds;
@@ -67,6 +67,9 @@ fn forget(world: &mut World, entity: Entity) {
     cancel_requests(world, entity);
     let Some(mut active) = cracked::remove(world, entity) else { return };
     drop_shards(world, entity, &mut active);
+    if let Some(mut progress) = world.get_mut::<AnalogyProgress>(entity) {
+        progress.set_if_neq(AnalogyProgress(0.0));
+    }
     active.carrier.kind.detach(world, entity, &active.carrier);
     if let Ok(mut entity) = world.get_entity_mut(entity) {
         entity.remove::<(CrackTextures, AsyncPlayback)>();

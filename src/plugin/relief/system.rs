@@ -5,9 +5,8 @@ use super::work::{Made, Rectangle, ReliefWork};
 use crate::plugin::api::error::EntityLabel;
 use crate::plugin::api::{CrackBudget, CrackError, CrackRelief, ReliefFailed, ReliefMade, ReliefProgress};
 use crate::plugin::carrier::{kind::Found, kinds};
-use crate::plugin::jobs::background::guarded;
-use crate::plugin::jobs::frame_time::{FrameClock, Timer};
-use crate::plugin::jobs::stepped::{Outcome as TaskOutcome, RunningTask, Step, Stepped};
+use crate::plugin::jobs::frame_time::FrameClock;
+use crate::plugin::jobs::stepped::{News, Running};
 use crate::plugin::jobs::threads::Threads;
 use bevy::prelude::*;
 
@@ -22,8 +21,7 @@ pub(crate) struct ReliefInProgress(Work);
 enum Work {
     /// It has not begun: there is no room for it, or its mesh or material is not there yet.
     Wanted,
-    Task(RunningTask<ReliefWork>),
-    Slices(Box<ReliefWork>),
+    Running(Running<ReliefWork>),
 }
 
 /// What comes of working on a relief in a frame.
@@ -80,7 +78,7 @@ pub(crate) fn make_reliefs(world: &mut World, mut found: Local<Vec<Entity>>) {
     found.sort_unstable();
     let pool = world.resource::<Threads>().pool();
     let running = |world: &World, entity: &Entity| {
-        matches!(world.get::<ReliefInProgress>(*entity), Some(ReliefInProgress(Work::Task(_))))
+        matches!(world.get::<ReliefInProgress>(*entity), Some(ReliefInProgress(Work::Running(Running::Task(_)))))
     };
     let busy = found.iter().filter(|entity| running(world, entity)).count();
     let mut room = pool.map_or(1, |pool| pool.thread_num().max(1)).saturating_sub(busy);
@@ -95,19 +93,11 @@ pub(crate) fn make_reliefs(world: &mut World, mut found: Local<Vec<Entity>>) {
                 }
                 Err(error) => Outcome::Failed(error),
             },
-            Work::Task(mut task) => match task.poll() {
-                None => {
-                    let progress = task.progress();
-                    Outcome::Going(Work::Task(task), progress)
-                }
-                Some(TaskOutcome::NoThread(work)) => {
-                    world.resource_mut::<Threads>().are_missing = true;
-                    Outcome::Going(Work::Slices(Box::new(work)), 0.0)
-                }
-                Some(TaskOutcome::Ended(Ok(made))) => Outcome::Made(made),
-                Some(TaskOutcome::Ended(Err(error))) => Outcome::Failed(error),
+            Work::Running(running) => match running.look(&mut world.resource_mut::<Threads>(), &timer) {
+                News::Going(running, progress) => Outcome::Going(Work::Running(running), progress),
+                News::Ended(Ok(made)) => Outcome::Made(made),
+                News::Ended(Err(error)) => Outcome::Failed(error),
             },
-            Work::Slices(work) => make_slices(*work, &timer),
         };
         match outcome {
             Outcome::Going(work, progress) => {
@@ -126,21 +116,6 @@ pub(crate) fn make_reliefs(world: &mut World, mut found: Local<Vec<Entity>>) {
     world.resource_mut::<FrameClock>().stop(&timer);
 }
 
-/// Steps of the work, one at least, until the time is over.
-fn make_slices(mut work: ReliefWork, timer: &Timer) -> Outcome {
-    loop {
-        match guarded(|| work.step()) {
-            Ok(Step::More(more)) if timer.is_over() => {
-                let progress = more.progress();
-                return Outcome::Going(Work::Slices(Box::new(more)), progress);
-            }
-            Ok(Step::More(more)) => work = more,
-            Ok(Step::Done(made)) => return Outcome::Made(made),
-            Err(error) => return Outcome::Failed(error),
-        }
-    }
-}
-
 /// Begins a relief, unless its mesh or material is not there yet.
 fn begin(world: &mut World, entity: Entity) -> Result<Work, CrackError> {
     let wish = world.get::<CrackRelief>(entity).ok_or(CrackError::NothingToCrack)?;
@@ -154,10 +129,7 @@ fn begin(world: &mut World, entity: Entity) -> Result<Work, CrackError> {
         Found::Unusable(_) | Found::Shown(_) | Found::Other => {}
     }
     let work = ReliefWork::new(wish, (wish.displacement > 0.0).then(|| rectangle(world, entity)).flatten())?;
-    Ok(match world.resource::<Threads>().pool() {
-        Some(pool) => Work::Task(RunningTask::start(pool, work)),
-        None => Work::Slices(Box::new(work)),
-    })
+    Ok(Work::Running(Running::start(world.resource::<Threads>(), work)))
 }
 
 /// The rectangle of a 3D mesh.

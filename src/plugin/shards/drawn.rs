@@ -5,17 +5,20 @@ use crate::plugin::api::textures::MAPS;
 use crate::plugin::gpu::textures::{self, TextureKind};
 use crate::plugin::gpu::uploads::Uploads;
 use crate::plugin::jobs::background::drop_in_background;
+use crate::plugin::source::analogy::AnalogyPicture;
 use crate::plugin::source::picture::BasePicture;
 use crate::plugin::surface::active::Active;
 use crate::plugin::surface::stamp::stamp_hairlines;
 use crate::raster::{DepthField, DirtyTiles, Profile, TexelRect};
 use bevy::prelude::*;
+use std::sync::Arc;
 
 /// What lines are drawn with in the background.
 pub(super) struct Sketch {
     field: DepthField,
     profile: Profile,
     look: LookTable,
+    analogy: Option<Arc<AnalogyPicture>>,
     width: f32,
     /// Which textures there are.
     maps: [bool; MAPS],
@@ -31,6 +34,7 @@ impl Sketch {
             field: active.drawing.field.clone(),
             profile: active.drawing.profile,
             look: active.canvas.look.clone(),
+            analogy: active.canvas.analogy.clone(),
             width: active.hair(),
             maps: textures.all().map(|texture| texture.is_some()),
             view: active.canvas.views.get(active.canvas.view)?.rect,
@@ -51,7 +55,7 @@ impl Sketch {
         let mut room = || kinds.next().filter(|(_, is)| *is).map(|(kind, _)| vec![0; base.area() * kind.texel()]);
         let mut maps = [(); MAPS].map(|()| room());
         let texels = maps.each_mut().map(Option::as_deref_mut);
-        textures::paint(base, &self.field, &self.look, &rects, self.view.min, texels);
+        textures::paint(base, self.analogy.as_deref(), &self.field, &self.look, &rects, self.view.min, texels);
         Drawn { sketch: self, rects, maps }
     }
 }
@@ -79,6 +83,7 @@ impl Drawn {
         for (_, view) in active.canvas.views.iter_mut().enumerate().filter(|(index, _)| *index != shown) {
             rects.iter().for_each(|rect| view.dirty.mark(*rect));
         }
+        rects.iter().for_each(|rect| active.canvas.new_depths.mark(*rect));
         world.resource_scope(|world, mut images: Mut<Assets<Image>>| {
             let mut uploads = world.resource_mut::<Uploads>();
             for ((texture, map), kind) in active.canvas.textures.all().into_iter().zip(&maps).zip(&textures::KINDS) {

@@ -1,5 +1,6 @@
 //! [`Active`]: a surface that has been hit.
 
+use super::analogy::AnalogyState;
 use super::blending::Blending;
 use super::canvas::Canvas;
 use super::cracks::Cracks;
@@ -13,7 +14,7 @@ use crate::plugin::api::textures::CrackTextures;
 use crate::plugin::carrier::kind::Carrier;
 use crate::plugin::gpu::memory::TextureBytes;
 use crate::plugin::source::picture::BasePicture;
-use crate::raster::{DepthField, TexelRect};
+use crate::raster::{DepthField, DirtyTiles, TexelRect};
 use crate::{CrackPreset, Grid};
 use bevy::{asset::UntypedAssetId, prelude::*};
 use std::sync::Arc;
@@ -31,6 +32,7 @@ pub(crate) struct Active {
     pub(crate) canvas: Canvas,
     pub(crate) playhead: Playhead,
     pub(crate) blending: Blending,
+    pub(crate) analogy: AnalogyState,
     pub(crate) carrier: Carrier,
     pub(crate) turn: Turn,
     /// Bytes of its textures.
@@ -82,6 +84,8 @@ impl Active {
         let mut canvas = Canvas {
             look,
             base,
+            analogy: None,
+            new_depths: DirtyTiles::default(),
             textures,
             views: Vec::new(),
             view: 0,
@@ -99,6 +103,7 @@ impl Active {
             canvas,
             playhead: Playhead::new(preset.steps_per_second),
             blending: Blending::default(),
+            analogy: AnalogyState::default(),
             carrier,
             turn: Turn::default(),
             bytes,

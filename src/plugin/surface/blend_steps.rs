@@ -109,7 +109,7 @@ impl Active {
 }
 
 /// The first rows of a rectangle, as many as have no more than `most` texels but one at least, and the others.
-fn split(rect: TexelRect, most: u64) -> (TexelRect, Option<TexelRect>) {
+pub(super) fn split(rect: TexelRect, most: u64) -> (TexelRect, Option<TexelRect>) {
     let rows = (most / u64::from(rect.size().x.max(1))).max(1);
     let y = u32::try_from(rows).map_or(rect.max.y, |rows| rect.min.y.saturating_add(rows).min(rect.max.y));
     let [mut first, mut rest] = [rect; 2];

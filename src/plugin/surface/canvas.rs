@@ -2,6 +2,7 @@
 
 use crate::paint::LookTable;
 use crate::plugin::api::textures::CrackTextures;
+use crate::plugin::source::analogy::AnalogyPicture;
 use crate::plugin::source::picture::BasePicture;
 use crate::raster::{DirtyTiles, TexelRect};
 use bevy::prelude::*;
@@ -14,6 +15,10 @@ const MAX_VIEWS: usize = 256;
 pub(crate) struct Canvas {
     pub(crate) look: LookTable,
     pub(crate) base: Arc<BasePicture>,
+    /// Its cracks as those of photographs.
+    pub(crate) analogy: Option<Arc<AnalogyPicture>>,
+    /// Texels of the field whose depths an analogy has not taken over; nothing without one.
+    pub(crate) new_depths: DirtyTiles,
     pub(crate) textures: CrackTextures,
     pub(crate) views: Vec<View>,
     /// Index of the view that is shown.
@@ -46,8 +51,13 @@ impl Canvas {
     /// Marks texels of a field of `size` as changed, in all views.
     pub(crate) fn mark(&mut self, rect: TexelRect, size: UVec2) {
         // A normal depends on the texels around it.
-        let rect = rect.grow(1, size);
-        self.mark_normals(rect);
+        self.mark_normals(rect.grow(1, size));
+        self.note_depths(&[rect]);
+    }
+
+    /// Notes that depths have changed, of what is painted.
+    pub(crate) fn note_depths(&mut self, rects: &[TexelRect]) {
+        rects.iter().for_each(|rect| self.new_depths.mark(*rect));
         self.revision += 1;
     }
 

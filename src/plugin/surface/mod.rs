@@ -1,6 +1,8 @@
 //! A surface that cracks: what it is made of, how it is made, how its time passes.
 
 pub(crate) mod active;
+pub(crate) mod analogy;
+mod analogy_work;
 mod blend_steps;
 pub(crate) mod blending;
 pub(crate) mod canvas;
