@@ -1,5 +1,6 @@
 //! Undo and redo: the settings of a surface before each change.
 
+use super::subject::AnalogyChoice;
 use crate::plugin::{CrackClock, CrackRelief, CrackStrands, CrackSurface, GuidedCracks, ShatterCracks};
 use bevy::prelude::Entity;
 
@@ -13,6 +14,7 @@ pub(super) struct Settings {
     pub(super) guided: Option<GuidedCracks>,
     pub(super) strands: Option<CrackStrands>,
     pub(super) relief: Option<CrackRelief>,
+    pub(super) analogy: Option<AnalogyChoice>,
     pub(super) shatter: Option<ShatterCracks>,
     pub(super) clock: Option<CrackClock>,
 }

@@ -35,7 +35,7 @@ mod world;
 
 pub use panel::{Overlays, Panel};
 pub use state::CrackEditor;
-pub use subject::{Costs, EditorCommand, Export, Subject};
+pub use subject::{AnalogyChoice, Costs, EditorCommand, Export, Subject};
 
 use bevy::{picking::mesh_picking::MeshPickingPlugin, prelude::*};
 use bevy_egui::{EguiGlobalSettings, EguiPlugin, EguiPrimaryContextPass};

@@ -29,6 +29,10 @@ pub struct Subject {
     pub relief: Option<CrackRelief>,
     /// How far the relief is, 0..=1.
     pub relief_progress: f32,
+    /// The photographs that its cracks are like.
+    pub analogy: Option<AnalogyChoice>,
+    /// How far its analogy is, 0..=1; read only.
+    pub analogy_progress: f32,
     /// How far a bake is; read only.
     pub progress: Option<BakeProgress>,
     /// How it shatters.
@@ -37,6 +41,17 @@ pub struct Subject {
     pub shards: Option<(u32, u32, u32)>,
     /// Its textures, by name; read only.
     pub textures: Vec<(&'static str, TextureId, UVec2)>,
+}
+
+/// A [`CrackAnalogy`](crate::plugin::CrackAnalogy) as values.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct AnalogyChoice {
+    /// Path of the file of its examples; empty if they come from none.
+    pub file: String,
+    /// Whether the surface keeps its own picture.
+    pub keeps_picture: bool,
+    /// Seed of the search.
+    pub seed: u64,
 }
 
 /// What all cracks cost in the last frame; read only.

@@ -5,14 +5,14 @@ use super::{
     history::Settings,
     overlay,
     state::CrackEditor,
-    subject::{Costs, EditorCommand, Subject},
+    subject::{AnalogyChoice, Costs, EditorCommand, Subject},
 };
 use crate::{
     CrackPreset,
     plugin::{
-        BakeProgress, CrackClock, CrackCommandsExt, CrackHit, CrackRelief, CrackShards, CrackState, CrackStrands,
-        CrackSurface, CrackTextures, CrackUploadStats, GuidedCracks, PresetSource, ReliefProgress, Shard,
-        ShatterCracks, inspect,
+        AnalogyProgress, BakeProgress, CrackAnalogy, CrackClock, CrackCommandsExt, CrackHit, CrackRelief, CrackShards,
+        CrackState, CrackStrands, CrackSurface, CrackTextures, CrackUploadStats, GuidedCracks, PresetSource,
+        ReliefProgress, Shard, ShatterCracks, inspect,
     },
 };
 use bevy::{
@@ -99,11 +99,34 @@ fn gather(world: &mut World, entity: Entity) -> Option<Subject> {
         strands: of.get::<CrackStrands>().cloned(),
         relief: of.get::<CrackRelief>().cloned(),
         relief_progress: of.get::<ReliefProgress>().map_or(0.0, |progress| progress.0),
+        analogy: analogy_of(world, entity),
+        analogy_progress: of.get::<AnalogyProgress>().map_or(0.0, |progress| progress.0),
         progress: of.get::<BakeProgress>().cloned(),
         shatter: of.get::<ShatterCracks>().cloned(),
         shards,
         textures: show_textures(world, &textures),
     })
+}
+
+/// The analogy of a surface as values.
+fn analogy_of(world: &World, entity: Entity) -> Option<AnalogyChoice> {
+    let CrackAnalogy { examples, keeps_picture, seed } = world.get::<CrackAnalogy>(entity)?;
+    let file = examples.path().map(ToString::to_string).unwrap_or_default();
+    Some(AnalogyChoice { file, keeps_picture: *keeps_picture, seed: *seed })
+}
+
+/// Gives a surface another analogy.
+fn put_analogy(world: &mut World, entity: Entity, choice: Option<AnalogyChoice>) {
+    let analogy = choice.and_then(|AnalogyChoice { file, keeps_picture, seed }| {
+        let known = world.get::<CrackAnalogy>(entity).filter(|_| file.is_empty()).map(|known| known.examples.clone());
+        let load = || Some(world.get_resource::<AssetServer>()?.load(file.trim().to_owned()));
+        Some(CrackAnalogy { examples: known.or_else(load)?, keeps_picture, seed })
+    });
+    let Ok(mut to) = world.get_entity_mut(entity) else { return };
+    match analogy {
+        Some(analogy) => _ = to.insert(analogy),
+        None => _ = to.remove::<CrackAnalogy>(),
+    }
 }
 
 /// Lets egui show the textures of a surface.
@@ -143,6 +166,7 @@ fn settings(subject: &Subject) -> Settings {
         guided: subject.guided.clone(),
         strands: subject.strands.clone(),
         relief: subject.relief.clone(),
+        analogy: subject.analogy.clone(),
         shatter: subject.shatter.clone(),
         clock: subject.clock,
     }
@@ -156,6 +180,7 @@ fn settings_of(world: &World, entity: Entity) -> Option<Settings> {
         guided: of.get().cloned(),
         strands: of.get().cloned(),
         relief: of.get().cloned(),
+        analogy: analogy_of(world, entity),
         shatter: of.get().cloned(),
         clock: of.get().copied(),
     })
@@ -163,7 +188,10 @@ fn settings_of(world: &World, entity: Entity) -> Option<Settings> {
 
 /// Puts settings on a surface: only what has changed.
 fn put(world: &mut World, entity: Entity, before: &Settings, after: Settings) {
-    let Settings { surface, guided, strands, relief, shatter, clock } = after;
+    let Settings { surface, guided, strands, relief, analogy, shatter, clock } = after;
+    if before.analogy != analogy {
+        put_analogy(world, entity, analogy);
+    }
     put_one(world, entity, Some(&before.surface), Some(surface));
     put_one(world, entity, before.guided.as_ref(), guided);
     put_one(world, entity, before.strands.as_ref(), strands);

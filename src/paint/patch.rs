@@ -1,12 +1,20 @@
 //! The depths of a patch of texels, and their slopes.
 
-use super::texel::ShownCracks;
 use crate::{Grid, raster::TexelRect};
 use glam::UVec2;
 use std::ops::Range;
 
 /// Texels whose colours are computed at once, or copied if all are untouched.
 pub(super) const BLOCK: usize = 8;
+
+/// The cracks that a base shows already, as one made by an [`Analogy`](super::analogy::Analogy) does.
+#[derive(Clone, Copy, Debug)]
+pub struct ShownCracks<'a> {
+    /// Their depths, of the size of the field.
+    pub depth: &'a Grid<u16>,
+    /// Depth from which the base shows a crack.
+    pub least: u16,
+}
 
 /// The height of the surface where rims curl up: how far down it is at depths 0, 256, .. 65536, linear between.
 #[derive(Clone, Debug, PartialEq)]

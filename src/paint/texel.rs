@@ -10,12 +10,11 @@ use super::{
     LookTable,
     diffuse::{Frame, diffuse_patch},
     extras::Extras,
-    patch::{BLOCK, Patch},
+    patch::{BLOCK, Patch, ShownCracks},
     rows::{Rgba, corrected_row, depth_row, flat_row, level_row, tilted_row, whiteout_row},
     shades::reduce_shades,
 };
 use crate::{
-    Grid,
     blend::{BlendError, NormalBlending, solve_correction},
     math::vectorized,
     raster::{DepthField, SlopeCorrection, TexelRect},
@@ -45,15 +44,6 @@ pub struct PaintTargets<'a> {
     pub normal: Option<&'a mut [u8]>,
     /// R8 depth, 255 = bottom.
     pub depth: Option<&'a mut [u8]>,
-}
-
-/// The cracks that a base shows already, as one made by an [`Analogy`](super::analogy::Analogy) does.
-#[derive(Clone, Copy, Debug)]
-pub struct ShownCracks<'a> {
-    /// Their depths, of the size of the field.
-    pub depth: &'a Grid<u16>,
-    /// Depth from which the base shows a crack.
-    pub least: u16,
 }
 
 /// The normal of a flat surface.

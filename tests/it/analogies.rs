@@ -4,6 +4,7 @@ use crate::support::*;
 use bevy::{asset::RenderAssetUsages, prelude::*, render::render_resource::TextureFormat};
 use bevy_crack::{
     Grid,
+    math::Rng,
     paint::{
         Look,
         analogy::{AnalogyPair, AnalogyParams},
@@ -382,4 +383,54 @@ fn pictures_change_under_an_analogy() {
         let strange = texels.clone().filter(|(shown, own)| shown != own && shown[2] != TAG).count();
         strange == 0 && texels.filter(|(shown, _)| shown[1] == 10).count() > 100
     });
+}
+
+/// Surfaces with analogies are hit, healed, shattered, despawned, given other pictures, analogies and clocks, in any order: nothing
+/// panics, and nothing is left of them.
+#[test]
+fn s9_whatever_happens_to_analogies() {
+    let mut app = watch(app());
+    let images = [picture(SIZE), picture(UVec2::new(40, 70)), solid(UVec2::new(64, 64), [9, 90, 200, 255])];
+    let images = images.map(|image| add(&mut app, image));
+    let examples = [examples(), examples().with_normals(vec![Grid::new(UVec2::splat(64), [128; 4])]).unwrap()];
+    let examples = examples.map(|examples| add(&mut app, examples));
+    let count = |app: &App| app.world().resource::<Assets<Image>>().len();
+    let (before, mut rng) = (count(&app), Rng::new(23));
+    let mut surfaces = Vec::new();
+    for frame in 0..1200 {
+        let mut pick = |n: usize| (rng.next_u32() as usize) % n;
+        let analogy =
+            |n: usize| CrackAnalogy { examples: examples[n % 2].clone(), keeps_picture: n % 4 < 2, seed: n as u64 % 3 };
+        if surfaces.len() < 6 {
+            let image = images[pick(3)].clone();
+            let surface = CrackSurface::new(if pick(2) == 0 { preset() } else { CrackPreset::GLASS.scaled(0.5) });
+            surfaces.push(app.world_mut().spawn((Sprite::from_image(image), surface, analogy(pick(12)))).id());
+        }
+        let (at, entity) = (pick(surfaces.len()), surfaces[pick(surfaces.len())]);
+        match pick(14) {
+            0..5 => {
+                let uv = Vec2::new(pick(100) as f32, pick(100) as f32) / 100.0;
+                hit(&mut app, CrackHit::uv(entity, uv).with_energy(0.5 + pick(4) as f32));
+            }
+            5 => _ = app.world_mut().commands().entity(entity).heal_cracks(),
+            6 => _ = app.world_mut().commands().entity(entity).close_cracks(0.2),
+            7 => _ = app.world_mut().commands().entity(entity).shatter_cracks(ShatterRequest::EVERYTHING),
+            8 => app.world_mut().get_mut::<Sprite>(entity).unwrap().image = images[pick(3)].clone(),
+            9 => _ = app.world_mut().entity_mut(entity).insert(analogy(pick(12))),
+            10 => _ = app.world_mut().entity_mut(entity).remove::<CrackAnalogy>(),
+            11 => _ = app.world_mut().entity_mut(entity).insert(CrackClock::speed([1.0, -1.0, 0.0][pick(3)])),
+            12 => _ = app.world_mut().entity_mut(entity).remove::<CrackClock>(),
+            _ => _ = app.world_mut().despawn(surfaces.swap_remove(at)),
+        }
+        step(&mut app);
+        if frame % 16 == 0 {
+            std::thread::sleep(Duration::from_millis(2));
+        }
+    }
+    assert!(told(&app).made.len() > 50, "{} were made", told(&app).made.len());
+    assert_eq!(told(&app).failed, []);
+    for entity in surfaces {
+        app.world_mut().despawn(entity);
+    }
+    wait(&mut app, "all to go", |app| count(app) == before);
 }

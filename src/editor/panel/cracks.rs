@@ -110,6 +110,37 @@ pub(super) fn show_relief(ui: &mut Ui, panel: &mut Panel, subject: &mut Subject)
     );
 }
 
+pub(super) fn show_analogy(ui: &mut Ui, panel: &mut Panel, subject: &mut Subject) {
+    let choice = &mut panel.analogy;
+    ui.horizontal(|ui| {
+        ui.label("File").on_hover_text("A file `*.analogy.ron` in the assets, beside its photographs");
+        ui.add(egui::TextEdit::singleline(&mut choice.file).desired_width(220.0));
+    });
+    ui.checkbox(&mut choice.keeps_picture, "Keep the picture").on_hover_text(
+        "Away from its cracks the surface keeps its own picture; else it takes the material of the photographs",
+    );
+    ui.horizontal(|ui| {
+        ui.label("Seed");
+        ui.add(egui::DragValue::new(&mut choice.seed));
+    });
+    bake_buttons(
+        ui,
+        &if choice.file.trim().is_empty() { Err("A file is missing".to_owned()) } else { Ok(()) },
+        subject,
+        |subject| {
+            if subject.analogy.as_ref() == Some(choice) {
+                choice.seed = choice.seed.wrapping_add(1);
+            }
+            subject.analogy = Some(choice.clone());
+        },
+        |subject| subject.analogy = None,
+        (subject.analogy.is_some(), subject.analogy_progress),
+    );
+    if subject.analogy.is_some() && ui.button("Remove").clicked() {
+        subject.analogy = None;
+    }
+}
+
 /// How far the baked cracks of a surface are.
 fn baked(subject: &Subject) -> f32 {
     subject.progress.as_ref().map_or(0.0, |progress| progress.0)

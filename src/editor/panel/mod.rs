@@ -96,6 +96,7 @@ impl Panel {
         section(ui, "Guided cracks", false, |ui| cracks::show_guided(ui, self, subject));
         section(ui, "Strands", false, |ui| cracks::show_strands(ui, self, subject));
         section(ui, "Relief", false, |ui| cracks::show_relief(ui, self, subject));
+        section(ui, "Photographs", false, |ui| cracks::show_analogy(ui, self, subject));
         section(ui, "Overlays", false, |ui| views::show_overlays(ui, &mut self.overlays));
         section(ui, "Textures", false, |ui| views::show_textures(ui, &subject.textures));
         section(ui, "Save and export", false, |ui| files::show(ui, self, asked));

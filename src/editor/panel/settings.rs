@@ -1,5 +1,6 @@
 //! [`Panel`]: what the panel remembers.
 
+use crate::editor::subject::AnalogyChoice;
 use crate::plugin::{CrackGuide, CrackRelief, CrackStrands, GuidedCracks};
 
 /// What the panel remembers: tools, overlays and drafts. The settings of surfaces are in their components alone.
@@ -25,6 +26,8 @@ pub struct Panel {
     pub strands: CrackStrands,
     /// The relief that is to be made.
     pub relief: CrackRelief,
+    /// The photographs that cracks are to be like.
+    pub analogy: AnalogyChoice,
     /// What went wrong or well last.
     pub message: String,
     /// Whether there is something to undo, and to redo.
@@ -61,6 +64,7 @@ impl Default for Panel {
             text: "CRACK".into(),
             strands: CrackStrands::default(),
             relief: CrackRelief::default(),
+            analogy: AnalogyChoice { file: "analogies/clay.analogy.ron".into(), keeps_picture: true, seed: 0 },
             message: String::new(),
             can_undo: (false, false),
         }

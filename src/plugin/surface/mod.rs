@@ -2,6 +2,7 @@
 
 pub(crate) mod active;
 pub(crate) mod analogy;
+mod analogy_steps;
 mod analogy_work;
 mod blend_steps;
 pub(crate) mod blending;

@@ -3,7 +3,7 @@
 use crate::{app, state, wait_for};
 use bevy::prelude::*;
 use bevy_crack::{
-    editor::{Costs, CrackEditor, CrackEditorPlugin, EditorCommand, Export, Panel, Subject},
+    editor::{AnalogyChoice, Costs, CrackEditor, CrackEditorPlugin, EditorCommand, Export, Panel, Subject},
     growth::MarkerLayout,
     plugin::{CrackDrive, PresetSource},
     prelude::*,
@@ -143,6 +143,22 @@ fn guided_cracks_are_baked_and_cancelled() {
     assert_ne!(harness.state().subject.guided.as_ref(), Some(&guided));
     press(&mut harness, "Cancel");
     assert_eq!(harness.state().subject.guided, None);
+}
+
+#[test]
+fn photographs_are_chosen_and_removed() {
+    let mut harness = harness();
+    press(&mut harness, "Photographs");
+    press(&mut harness, "Keep the picture");
+    press(&mut harness, "Bake");
+    let choice = harness.state().subject.analogy.clone().expect("a choice");
+    let file = format!("analogies/clay.{}", AnalogyExamples::EXTENSION);
+    assert_eq!(choice, AnalogyChoice { file, keeps_picture: false, seed: 0 });
+    // Once more: another seed, so that it is made again.
+    press(&mut harness, "Bake");
+    assert_eq!(harness.state().subject.analogy, Some(AnalogyChoice { seed: 1, ..choice }));
+    press(&mut harness, "Remove");
+    assert_eq!(harness.state().subject.analogy, None);
 }
 
 #[test]
