@@ -1,16 +1,18 @@
-//! Strands on one thread at 2048 x 2048: one and ten, from the field to stamped cracks, and a whole field image beside
+//! Strands on one thread at 2048 x 2048: one and ten, from the field to painted cracks, and a whole field image beside
 //! the plain way in the same run.
 //!
 //! `cargo bench --no-default-features --bench strands`.
 
 use bevy_crack::{
     Grid,
+    blend::NormalBlending,
     math::{Rng, ops},
+    paint::{BaseTexels, Look, LookTable, PaintTargets, correct_normals, paint_rects},
     pattern::SurfaceFrame,
-    raster::{DepthField, Profile, stamp_path},
+    raster::{DepthField, DirtyTiles, Profile, stamp_path},
     strands::{Directions, GuidanceField, Material, StrandParams, StrandStart, Strands},
 };
-use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use criterion::{BatchSize, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use glam::{UVec2, Vec2};
 use noise::{NoiseFn, Perlin};
 use std::hint::black_box;
@@ -55,6 +57,57 @@ fn strands(c: &mut Criterion) {
     group.finish();
 }
 
+/// From the directions to the painted picture: paths, network, stamps, diffuse and normals, and the normals of the touched
+/// rectangle made one with those of the surface by Poisson's equation.
+fn all_of_it(c: &mut Criterion) {
+    let mut group = c.benchmark_group("from directions to texels at 2048");
+    group.sample_size(10);
+    let size = UVec2::splat(SIDE);
+    let Ok(frame) = SurfaceFrame::new(size) else { return };
+    let look = Look { normals: NormalBlending::Poisson, ..Look::GROOVE };
+    let Ok(look) = LookTable::new(&look, frame.texels_per_unit()) else { return };
+    let (params, primitives) = (params(), Material::Asphalt.primitives());
+    let profile = Profile { full_width: 0.008, ..Profile::DEFAULT };
+    let mut rng = Rng::new(6);
+    let mut texel = || [110 + (rng.next_u32() % 36) as u8, 110 + (rng.next_u32() % 36) as u8, 240, 255];
+    let (diffuse, normal): (Vec<u8>, Vec<u8>) =
+        ([130; 4].repeat((SIDE * SIDE) as usize), (0..SIDE * SIDE).flat_map(|_| texel()).collect());
+    let base = BaseTexels { size, diffuse: &diffuse, normal: Some(&normal), depth: None };
+    let (mut out, mut normals) = (diffuse.clone(), normal.clone());
+    for (count, blends) in [(1, false), (1, true), (10, false), (10, true)] {
+        let starts = starts(count);
+        let mut run = |mut field: DepthField| {
+            let network = Strands::new(&params, EAST, black_box(&starts), frame.extent(), 1)?.network(&primitives)?;
+            let mut dirty = DirtyTiles::new(size);
+            for path in network.segments().filter_map(|segment| network.path(segment)) {
+                dirty.mark(stamp_path(&mut field, &profile, &path).grow(1, size));
+            }
+            let mut rects = Vec::new();
+            dirty.take_rects(&mut rects);
+            let mut targets = PaintTargets { diffuse: Some(&mut out), normal: Some(&mut normals), depth: None };
+            paint_rects(base, &field, &look, &rects, UVec2::ZERO, &mut targets);
+            if blends {
+                let changed = correct_normals(base, &mut field, UVec2::ZERO)?;
+                let mut targets = PaintTargets { diffuse: None, normal: Some(&mut normals), depth: None };
+                paint_rects(base, &field, &look, &changed, UVec2::ZERO, &mut targets);
+            }
+            Ok::<_, Box<dyn std::error::Error>>(field)
+        };
+        let name = if blends { "with Poisson blending" } else { "without" };
+        group.bench_function(BenchmarkId::new(name, count), |b| {
+            // A surface that has been touched before: its memory is there.
+            let fresh = || {
+                let mut field = DepthField::new(frame);
+                field.depth.as_mut_slice().fill(1);
+                field.depth.as_mut_slice().fill(0);
+                field
+            };
+            b.iter_batched(fresh, &mut run, BatchSize::PerIteration);
+        });
+    }
+    group.finish();
+}
+
 /// The field of every texel, one by one.
 fn texel_by_texel(frequency: f64, rotation: f32) -> Grid<[u8; 4]> {
     let perlin = Perlin::new(1);
@@ -87,5 +140,5 @@ fn pictures(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, strands, pictures);
+criterion_group!(benches, strands, all_of_it, pictures);
 criterion_main!(benches);

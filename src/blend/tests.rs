@@ -241,6 +241,52 @@ fn blended_patches_are_those_of_a_direct_solve() {
     }
 }
 
+/// Along the border of a patch normals jump less than where slopes are added or normals blended by whiteout.
+#[test]
+fn the_seam_of_a_blended_patch_is_the_smallest() {
+    let mut rng = Rng::new(9);
+    for case in 0..40 {
+        let part = UVec2::new(20 + rng.next_u32() % 60, 20 + rng.next_u32() % 60);
+        let (size, origin) = (part + 9, UVec2::new(4, 5));
+        // A wavy surface, and a relief that leans, with bumps, up to its borders.
+        let [a, b, lean] = [rng.range(0.05, 0.2), rng.range(0.05, 0.2), rng.range(0.1, 0.6)];
+        let wave = |x: u32, y: u32| [0.3 * (a * x as f32).sin(), 0.3 * (b * y as f32).cos()];
+        let texel = |i: u32| {
+            let bytes = bytes_of(wave(i % size.x, i / size.x).map(f64::from));
+            [bytes[0], bytes[1], bytes[2], 255.0].map(|value| value.round() as u8)
+        };
+        let base: Vec<u8> = (0..size.element_product()).flat_map(texel).collect();
+        let mut height = Grid::new(part, 0.0);
+        for y in 0..part.y {
+            for (x, height) in (0..part.x).zip(height.row_mut(y as usize)) {
+                *height = lean * x as f32 + 2.0 * (0.5 * y as f32 + a * x as f32).sin();
+            }
+        }
+        let energies = [NormalBlending::Plain, NormalBlending::Whiteout, NormalBlending::Poisson].map(|blending| {
+            let mut blended = base.clone();
+            let patch = ReliefPatch { height: &height, cover: None, origin };
+            let rect = blend_relief(&mut blended, size, &patch, blending).unwrap();
+            let jump = |a: UVec2, b: UVec2| {
+                let at = |of: &[u8], texel: UVec2, k: usize| {
+                    (f64::from(of[4 * (texel.y * size.x + texel.x) as usize + k]) - 127.5) / 127.5
+                };
+                let change = |k| at(&blended, a, k) - at(&blended, b, k) - (at(&base, a, k) - at(&base, b, k));
+                (0..3).map(change).map(|v: f64| v * v).sum::<f64>()
+            };
+            let (low, high) = (rect.min, rect.max - 1);
+            let rows = (low.y..=high.y).flat_map(|y| {
+                [(UVec2::new(low.x, y), UVec2::new(low.x - 1, y)), (UVec2::new(high.x, y), UVec2::new(high.x + 1, y))]
+            });
+            let columns = (low.x..=high.x).flat_map(|x| {
+                [(UVec2::new(x, low.y), UVec2::new(x, low.y - 1)), (UVec2::new(x, high.y), UVec2::new(x, high.y + 1))]
+            });
+            rows.chain(columns).map(|(a, b)| jump(a, b)).sum::<f64>()
+        });
+        let [plain, whiteout, poisson] = energies;
+        assert!(poisson < 0.5 * plain.min(whiteout), "case {case}: {energies:?}");
+    }
+}
+
 /// Depths of some strokes, and the normals of a base.
 fn cracked(rng: &mut Rng, size: UVec2, map: UVec2) -> (Grid<u16>, Vec<u8>) {
     let mut depth = Grid::new(size, 0u16);
