@@ -5,7 +5,7 @@
 //! app is taken off. "10,000 ...": a frame with cracked surfaces of 32 x 32 that have come to an end, in turns with one with
 //! plain sprites. "a first hit": on a surface with a picture of its own. "... first hits": on surfaces that show the same picture. "only ...": parts of the first that no program could do without. `baking`: what of each frame the crate's systems
 //! take while guided cracks are baked, 60 frames a second, from the first frame to ten after the last crack; `front`, `widen`: while they
-//! appear within a second. `shards/*`: what
+//! appear within a second. "With an analogy": while cracks grow that are shown as those of a photograph. `shards/*`: what
 //! the crate's own systems take of the main thread in the three frames in which a pane becomes 500 shards for the first time, 60 a second
 //! (beside three in which nothing happens), in the one in which as many are shown once more, and in each in which 5,000 fly. With a Vulkan driver (software will do) uploads are part
 //! of it; without, it says so.
@@ -30,7 +30,11 @@ use bevy::{
 use bevy_crack::{
     Grid,
     growth::CrackGrowth,
-    paint::{BaseTexels, LookTable, PaintTargets, paint_into},
+    paint::{
+        BaseTexels, LookTable, PaintTargets,
+        analogy::{AnalogyPair, AnalogyParams},
+        paint_into,
+    },
     pattern::SurfaceFrame,
     plugin::CrackUploadStats,
     prelude::*,
@@ -772,6 +776,53 @@ fn frame(c: &mut Criterion) {
     finished();
 }
 
+/// What a frame takes while three hits grow, with and without an analogy, 60 frames a second under the default budget.
+fn analogies(_: &mut Criterion) {
+    let texel = |i: u32| {
+        let is_crack = (i % 256).abs_diff(100) < 3 || (i / 256).abs_diff(60) < 4;
+        if is_crack { [60, 50, 40, 255] } else { [150 + (i * 7 % 23) as u8, 148, 140, 255] }
+    };
+    let photo: Vec<u8> = (0..256 * 256).flat_map(texel).collect();
+    let pair = AnalogyPair::from_darkness(UVec2::splat(256), &photo, 0.3).expect("it has cracks");
+    let examples = AnalogyExamples::new(vec![pair], &AnalogyParams::DEFAULT).expect("they are valid");
+    for side in [512, 1024, 2048] {
+        for (name, has_analogy) in [("without an analogy", false), ("with an analogy", true)] {
+            let mut app = app();
+            measure_systems(&mut app);
+            Run::InARow.arrange(&mut app);
+            app.insert_resource(CrackBudget { max_texture_bytes: 1 << 34, ..default() });
+            let wall = with_sprites(&mut app, 1, side, false)[0];
+            let examples = app.world_mut().resource_mut::<Assets<AnalogyExamples>>().add(examples.clone());
+            let mut entity = app.world_mut().entity_mut(wall);
+            entity.insert(CrackSurface::new(CrackPreset::CONCRETE));
+            if has_analogy {
+                entity.insert(CrackAnalogy::new(examples));
+            }
+            let mut step = |app: &mut App, frames: &mut Frames| {
+                app.insert_resource(OurSystems::default());
+                let frame = time_of(|| app.update());
+                let OurSystems(_, time, cpu) = app.world().resource();
+                frames.push([*time, *cpu]);
+                std::thread::sleep((Duration::from_secs(1) / 60).saturating_sub(frame));
+            };
+            let mut making = Vec::new();
+            while has_analogy && app.world().get::<AnalogyProgress>(wall) != Some(&AnalogyProgress(1.0)) {
+                step(&mut app, &mut making);
+            }
+            let mut growing = Vec::new();
+            for i in 0..3 {
+                let at = Vec2::new(0.3 + 0.2 * i as f32, 0.6 - 0.15 * i as f32);
+                app.world_mut().trigger(CrackHit::uv(wall, at).with_energy(2.0));
+                (0..60).for_each(|_| step(&mut app, &mut growing));
+            }
+            println!("growing {side} x {side} {name}, systems: {}", percentiles(&growing, Run::InARow));
+            if has_analogy {
+                println!("its first picture: {}", percentiles(&making, Run::InARow));
+            }
+        }
+    }
+}
+
 /// Frames with cracked surfaces, which are at rest, in turns with frames of plain sprites.
 fn finished() {
     let mut apps = [many(true), many(false)];
@@ -789,5 +840,5 @@ fn finished() {
     }
 }
 
-criterion_group!(benches, shards, frame);
+criterion_group!(benches, analogies, shards, frame);
 criterion_main!(benches);

@@ -24,6 +24,7 @@ const NAMES: [&str; 3] = ["concrete", "clay", "paving"];
 fn preset(number: usize) -> CrackPreset {
     match number {
         1 => CrackPreset::CLAY,
+        2 => CrackPreset::MUD,
         _ => CrackPreset::CONCRETE.scaled(0.8),
     }
 }

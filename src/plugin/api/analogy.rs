@@ -159,7 +159,7 @@ impl AnalogyExamples {
     /// Those of [`Examples::new`].
     ///
     /// ```
-    /// use bevy_crack::{AnalogyExamples, paint::analogy::{AnalogyPair, AnalogyParams}};
+    /// use bevy_crack::{paint::analogy::{AnalogyPair, AnalogyParams}, plugin::AnalogyExamples};
     ///
     /// let photo: Vec<u8> = (0..1024).flat_map(|i| if i % 32 == 12 { [20, 20, 20, 255] } else { [200, 200, 200, 255] }).collect();
     /// let pair = AnalogyPair::from_darkness([32, 32].into(), &photo, 0.2)?;

@@ -20,7 +20,7 @@ pub(crate) struct AnalogyPicture {
     pub(crate) diffuse: Vec<u8>,
     /// RGBA8, linear, of the whole image; `None` = the normals come from the cracks.
     pub(crate) normal: Option<Vec<u8>>,
-    /// The depths of the cracks that it has, of the part of the image that is shown.
+    /// The depths of the cracks that it has, and of texels beside them; of the part of the image that is shown.
     pub(crate) depth: Grid<u16>,
     /// Depth from which it has a crack.
     pub(crate) least: u16,

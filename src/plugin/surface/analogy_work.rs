@@ -13,6 +13,9 @@ use std::{any::Any, sync::Arc};
 const SLICE: u64 = 1 << 12;
 const PATCH: u64 = 1 << 14;
 
+/// So many texels beside a crack count as cracked: one that widens is not painted as a new one along its edges.
+const EDGE: u32 = 2;
+
 /// What an analogy is made from.
 #[derive(Clone)]
 pub(crate) struct AnalogyWish {
@@ -106,7 +109,8 @@ impl AnalogyWork {
 
     fn finish(self, mut analogy: Box<Analogy>) -> Made {
         let mut tiles = DirtyTiles::new(analogy.size());
-        analogy.take_changed().iter().chain(&self.changed).for_each(|rect| tiles.mark(*rect));
+        analogy.take_changed().iter().for_each(|rect| tiles.mark(*rect));
+        self.changed.iter().for_each(|rect| tiles.mark(rect.grow(EDGE, analogy.size())));
         let mut rects = Vec::new();
         tiles.take_rects(&mut rects);
         let patches = rects.into_iter().flat_map(bands).filter_map(|rect| self.patch(&analogy, rect)).collect();
@@ -129,10 +133,9 @@ impl AnalogyWork {
                 diffuse.extend(if is_made { [red, green, blue, own[3]] } else { *own });
             }
             is_own &= diffuse.get(start..) == Some(base);
-            let depths = self.depth.row(y as usize).get(rect.min.x as usize..rect.max.x as usize).unwrap_or_default();
-            is_own &= depths.iter().all(|depth| *depth == 0);
-            depth.extend_from_slice(depths);
+            depth.extend((rect.min.x..rect.max.x).map(|x| deepest(&self.depth, x, y)));
         }
+        is_own &= depth.iter().all(|depth| *depth == 0);
         if is_own && !self.tells_all {
             return None;
         }
@@ -165,6 +168,13 @@ impl AnalogyWork {
         }
         normals
     }
+}
+
+/// The greatest depth around a texel.
+fn deepest(depth: &Grid<u16>, x: u32, y: u32) -> u16 {
+    let around = |at: u32, most: usize| at.saturating_sub(EDGE) as usize..most.min((at + EDGE) as usize + 1);
+    let rows = around(y, depth.height()).map(|y| &depth.row(y)[around(x, depth.width())]);
+    rows.flatten().copied().max().unwrap_or(0)
 }
 
 /// The texels of a rectangle that a crack may have changed. All others are those of the surface's own picture, also where
