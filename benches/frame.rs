@@ -798,7 +798,7 @@ fn analogies(_: &mut Criterion) {
             if has_analogy {
                 entity.insert(CrackAnalogy::new(examples));
             }
-            let mut step = |app: &mut App, frames: &mut Frames| {
+            let step = |app: &mut App, frames: &mut Frames| {
                 app.insert_resource(OurSystems::default());
                 let frame = time_of(|| app.update());
                 let OurSystems(_, time, cpu) = app.world().resource();

@@ -1,5 +1,8 @@
 use super::{BlendError, NormalBlending, ReliefPatch, blend_relief, cover, slope_of, solve_correction, solve_poisson};
-use crate::{Grid, math::Rng};
+use crate::{
+    Grid,
+    math::{Rng, ops},
+};
 use glam::UVec2;
 
 /// The solution of the five-point equation by elimination in f64, without pivots (the matrix is definite): the direct
@@ -250,7 +253,7 @@ fn the_seam_of_a_blended_patch_is_the_smallest() {
         let (size, origin) = (part + 9, UVec2::new(4, 5));
         // A wavy surface, and a relief that leans, with bumps, up to its borders.
         let [a, b, lean] = [rng.range(0.05, 0.2), rng.range(0.05, 0.2), rng.range(0.1, 0.6)];
-        let wave = |x: u32, y: u32| [0.3 * (a * x as f32).sin(), 0.3 * (b * y as f32).cos()];
+        let wave = |x: u32, y: u32| [0.3 * ops::sin(a * x as f32), 0.3 * ops::cos(b * y as f32)];
         let texel = |i: u32| {
             let bytes = bytes_of(wave(i % size.x, i / size.x).map(f64::from));
             [bytes[0], bytes[1], bytes[2], 255.0].map(|value| value.round() as u8)
@@ -259,7 +262,7 @@ fn the_seam_of_a_blended_patch_is_the_smallest() {
         let mut height = Grid::new(part, 0.0);
         for y in 0..part.y {
             for (x, height) in (0..part.x).zip(height.row_mut(y as usize)) {
-                *height = lean * x as f32 + 2.0 * (0.5 * y as f32 + a * x as f32).sin();
+                *height = lean * x as f32 + 2.0 * ops::sin(0.5 * y as f32 + a * x as f32);
             }
         }
         let energies = [NormalBlending::Plain, NormalBlending::Whiteout, NormalBlending::Poisson].map(|blending| {

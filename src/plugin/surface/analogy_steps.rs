@@ -7,7 +7,6 @@ use super::blend_steps::split;
 use crate::Grid;
 use crate::plugin::api::{AnalogyExamples, CrackAnalogy, CrackError};
 use crate::plugin::jobs::stepped::{News, Running};
-use crate::plugin::source::analogy::AnalogyPicture;
 use crate::raster::{DirtyTiles, TexelRect};
 use bevy::prelude::*;
 use std::sync::Arc;
@@ -82,7 +81,10 @@ impl Active {
                     }
                 }
                 News::Ended(Ok(made)) => {
-                    let Made { analogy, depth, mut patches } = *made;
+                    let Made { analogy, depth, mut patches, picture } = *made;
+                    if let Some(picture) = picture {
+                        self.canvas.analogy = Some(Arc::new(picture));
+                    }
                     self.analogy.made = Some((Some(analogy), depth));
                     patches.reverse();
                     self.analogy.stage = Stage::Show(patches);
@@ -135,33 +137,27 @@ impl Active {
             self.analogy.stage = Stage::Copy(left, done);
             return;
         }
-        let tells_all = !wish.keeps_picture || analogy.is_some() || self.canvas.analogy.is_some();
-        let work = AnalogyWork::new(wish.clone(), analogy, seen, done, tells_all);
+        let work = AnalogyWork::new(wish.clone(), analogy, seen, done, self.canvas.analogy.is_some());
         self.analogy.stage = Stage::Work(Running::start(tools.threads, work));
     }
 
     /// Takes some of what was made over into the picture.
     fn take_patches(&mut self, wish: &AnalogyWish, mut patches: Vec<MadePatch>) -> AnalogyNews {
-        let picture = self.canvas.analogy.take().unwrap_or_else(|| Arc::new(untouched(wish)));
-        let mut picture = match Arc::try_unwrap(picture) {
-            Ok(picture) => picture,
-            // A task that paints has it.
-            Err(shared) => {
-                self.canvas.analogy = Some(shared);
-                self.analogy.stage = Stage::Show(patches);
-                return AnalogyNews::Nothing;
-            }
+        // Unless a task that paints has it.
+        let Some(picture) = self.canvas.analogy.as_mut().and_then(Arc::get_mut) else {
+            self.analogy.stage = Stage::Show(patches);
+            return AnalogyNews::Nothing;
         };
-        let mut area = 0;
+        let (mut area, mut shown) = (0, Vec::new());
         while area < SHOWN
             && let Some(patch) = patches.pop()
         {
             area += patch.rect.area();
             picture.put(&patch, wish);
             // A normal depends on the texels around it.
-            self.canvas.mark_normals(patch.rect.grow(1, wish.rect.size()));
+            shown.push(patch.rect.grow(1, wish.rect.size()));
         }
-        self.canvas.analogy = Some(Arc::new(picture));
+        shown.into_iter().for_each(|rect| self.canvas.mark_normals(rect));
         if !patches.is_empty() {
             self.analogy.stage = Stage::Show(patches);
             return AnalogyNews::Nothing;
@@ -169,40 +165,6 @@ impl Active {
         match core::mem::replace(&mut self.analogy.is_shown, true) {
             true => AnalogyNews::Nothing,
             false => AnalogyNews::Made,
-        }
-    }
-}
-
-/// The picture of a surface that has no cracks of photographs yet.
-fn untouched(wish: &AnalogyWish) -> AnalogyPicture {
-    let (base, params) = (&wish.base, wish.examples.params());
-    let normal = || base.normal.clone().unwrap_or_else(|| [128, 128, 255, 255].repeat(base.area()));
-    AnalogyPicture {
-        diffuse: base.diffuse.clone(),
-        normal: wish.has_normals().then(normal),
-        depth: Grid::new(wish.rect.size(), 0),
-        least: ((params.depth * 65535.0) as u16).max(1),
-    }
-}
-
-impl AnalogyPicture {
-    /// Takes a patch over.
-    fn put(&mut self, patch: &MadePatch, wish: &AnalogyWish) {
-        let (rect, width) = (patch.rect, patch.rect.size().x as usize);
-        let own = self.normal.as_mut();
-        let maps = [Some((&mut self.diffuse, &patch.diffuse)), own.map(|normal| (normal, &patch.normal))];
-        for (to, from) in maps.into_iter().flatten() {
-            for (from, y) in from.chunks_exact(4 * width).zip(rect.min.y..) {
-                let at = wish.rect.min + UVec2::new(rect.min.x, y);
-                let start = 4 * (at.y as usize * wish.base.size.x as usize + at.x as usize);
-                if let Some(to) = to.get_mut(start..start + from.len()) {
-                    to.copy_from_slice(from);
-                }
-            }
-        }
-        for (from, y) in patch.depth.chunks_exact(width).zip(rect.min.y as usize..) {
-            let to = &mut self.depth.row_mut(y)[rect.min.x as usize..rect.max.x as usize];
-            to.copy_from_slice(from);
         }
     }
 }

@@ -4,6 +4,7 @@ use crate::Grid;
 use crate::paint::analogy::{Analogy, AnalogyError};
 use crate::plugin::api::{AnalogyExamples, CrackError};
 use crate::plugin::jobs::stepped::{Step, Stepped};
+use crate::plugin::source::analogy::AnalogyPicture;
 use crate::plugin::source::picture::BasePicture;
 use crate::raster::{DirtyTiles, TexelRect};
 use bevy::prelude::*;
@@ -81,6 +82,8 @@ pub(super) struct Made {
     /// The depths that it has taken over.
     pub(super) depth: Grid<u16>,
     pub(super) patches: Vec<MadePatch>,
+    /// The whole picture, if there was none, with what is in the patches.
+    pub(super) picture: Option<AnalogyPicture>,
 }
 
 /// The making of an analogy, or of what is new of it.
@@ -91,8 +94,8 @@ pub(super) struct AnalogyWork {
     /// Where depths have changed.
     changed: Vec<TexelRect>,
     has_begun: bool,
-    /// Whether texels are told that are those of the surface's own picture.
-    tells_all: bool,
+    /// Whether the surface has a picture that shows an analogy.
+    has_picture: bool,
 }
 
 impl AnalogyWork {
@@ -102,9 +105,9 @@ impl AnalogyWork {
         analogy: Option<Box<Analogy>>,
         depth: Grid<u16>,
         changed: Vec<TexelRect>,
-        tells_all: bool,
+        has_picture: bool,
     ) -> Self {
-        Self { wish, analogy, depth, changed, has_begun: false, tells_all }
+        Self { wish, analogy, depth, changed, has_begun: false, has_picture }
     }
 
     fn finish(self, mut analogy: Box<Analogy>) -> Made {
@@ -113,8 +116,13 @@ impl AnalogyWork {
         self.changed.iter().for_each(|rect| tiles.mark(rect.grow(EDGE, analogy.size())));
         let mut rects = Vec::new();
         tiles.take_rects(&mut rects);
-        let patches = rects.into_iter().flat_map(bands).filter_map(|rect| self.patch(&analogy, rect)).collect();
-        Made { analogy, depth: self.depth, patches }
+        let patches: Vec<_> = rects.into_iter().flat_map(bands).filter_map(|rect| self.patch(&analogy, rect)).collect();
+        let picture = (!self.has_picture).then(|| {
+            let mut picture = untouched(&self.wish);
+            patches.iter().for_each(|patch| picture.put(patch, &self.wish));
+            picture
+        });
+        Made { analogy, depth: self.depth, patches, picture }
     }
 
     /// `None` if it is as the surface's own picture and need not be told.
@@ -136,7 +144,8 @@ impl AnalogyWork {
             depth.extend((rect.min.x..rect.max.x).map(|x| deepest(&self.depth, x, y)));
         }
         is_own &= depth.iter().all(|depth| *depth == 0);
-        if is_own && !self.tells_all {
+        // Texels that are those of the surface's own picture are there.
+        if is_own && !self.has_picture {
             return None;
         }
         let normal = if self.wish.has_normals() { self.normals(analogy, rect, near.as_ref()) } else { Vec::new() };
@@ -167,6 +176,40 @@ impl AnalogyWork {
             normals.extend(normal.unwrap_or(FLAT));
         }
         normals
+    }
+}
+
+/// The picture of a surface that has no cracks of photographs yet.
+fn untouched(wish: &AnalogyWish) -> AnalogyPicture {
+    let (base, params) = (&wish.base, wish.examples.params());
+    let normal = || base.normal.clone().unwrap_or_else(|| [128, 128, 255, 255].repeat(base.area()));
+    AnalogyPicture {
+        diffuse: base.diffuse.clone(),
+        normal: wish.has_normals().then(normal),
+        depth: Grid::new(wish.rect.size(), 0),
+        least: ((params.depth * 65535.0) as u16).max(1),
+    }
+}
+
+impl AnalogyPicture {
+    /// Takes a patch over.
+    pub(super) fn put(&mut self, patch: &MadePatch, wish: &AnalogyWish) {
+        let (rect, width) = (patch.rect, patch.rect.size().x as usize);
+        let own = self.normal.as_mut();
+        let maps = [Some((&mut self.diffuse, &patch.diffuse)), own.map(|normal| (normal, &patch.normal))];
+        for (to, from) in maps.into_iter().flatten() {
+            for (from, y) in from.chunks_exact(4 * width).zip(rect.min.y..) {
+                let at = wish.rect.min + UVec2::new(rect.min.x, y);
+                let start = 4 * (at.y as usize * wish.base.size.x as usize + at.x as usize);
+                if let Some(to) = to.get_mut(start..start + from.len()) {
+                    to.copy_from_slice(from);
+                }
+            }
+        }
+        for (from, y) in patch.depth.chunks_exact(width).zip(rect.min.y as usize..) {
+            let to = &mut self.depth.row_mut(y)[rect.min.x as usize..rect.max.x as usize];
+            to.copy_from_slice(from);
+        }
     }
 }
 
