@@ -84,9 +84,14 @@ pub(crate) fn picture(texels: &Grid<[u8; 4]>) -> RgbaImage {
     RgbaImage::from_fn(texels.size().x, texels.size().y, |x, y| Rgba(texels.get(x, y).unwrap_or_default()))
 }
 
-/// The depths of a pattern: `depth.png` of a folder, or how light a picture is.
+/// The depths of a pattern: `depth.png` of a folder, `cracks.png` if there are craters, or how light a picture is. Photographs of
+/// cracks have no craters to copy.
 fn pattern(path: &Path, size: Option<UVec2>) -> Done<Grid<u16>> {
-    let file = if path.is_dir() { path.join("depth.png") } else { path.into() };
+    let file = match path.join("cracks.png") {
+        cracks if path.is_dir() && cracks.exists() => cracks,
+        _ if path.is_dir() => path.join("depth.png"),
+        _ => path.into(),
+    };
     read_picture(&file)?; // Checks the size before memory is taken for 16 bits.
     let mut depth = ImageReader::open(&file)?.with_guessed_format()?.decode()?.to_luma16();
     if let Some(size) = size.filter(|size| UVec2::from(depth.dimensions()) != *size) {

@@ -65,7 +65,7 @@ pub(crate) fn mask(field: &DepthField) -> GrayImage {
 }
 
 /// Writes `diffuse.png`, `normal.png`, `depth.png` (16 bit) and `mask.png` to a folder, which is made if it is not there. The depth is that of the
-/// cracks or of `craters` (8 bit), whichever is deeper.
+/// cracks or of `craters` (8 bit), whichever is deeper; if there are craters, the cracks alone are `cracks.png` (16 bit).
 pub(crate) fn write_maps(
     folder: &Path,
     [diffuse, normal]: &[RgbaImage; 2],
@@ -76,6 +76,14 @@ pub(crate) fn write_maps(
     diffuse.save(folder.join("diffuse.png"))?;
     normal.save(folder.join("normal.png"))?;
     let (size, mut texels) = (field.frame.size(), field.depth.as_slice().to_vec());
+    let gray = |texels: Vec<u16>| ImageBuffer::<Luma<u16>, _>::from_raw(size.x, size.y, texels).ok_or("depth size");
+    let cracks = folder.join("cracks.png");
+    if craters.iter().any(|crater| *crater > 0) {
+        gray(texels.clone())?.save(cracks)?;
+    } else if cracks.exists() {
+        // Of other cracks that were written here before.
+        fs::remove_file(cracks)?;
+    }
     for (texel, &crater) in texels.iter_mut().zip(craters) {
         let crater = 257 * u16::from(crater);
         // A crack alone is half a step off in eight bits.
@@ -83,8 +91,7 @@ pub(crate) fn write_maps(
             *texel = crater;
         }
     }
-    let depth = ImageBuffer::<Luma<u16>, _>::from_raw(size.x, size.y, texels).ok_or("depth size")?;
-    depth.save(folder.join("depth.png"))?;
+    gray(texels)?.save(folder.join("depth.png"))?;
     mask(field).save(folder.join("mask.png"))?;
     Ok(())
 }
