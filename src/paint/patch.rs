@@ -10,9 +10,10 @@ pub(super) const BLOCK: usize = 8;
 /// The cracks that a base shows already, as one made by an [`Analogy`](super::analogy::Analogy) does.
 #[derive(Clone, Copy, Debug)]
 pub struct ShownCracks<'a> {
-    /// Their depths, of the size of the field.
+    /// Their depths, of the size of the field: 0 = untouched, 65535 = the deepest, as of
+    /// [`DepthField::depth`](crate::raster::DepthField::depth).
     pub depth: &'a Grid<u16>,
-    /// Depth from which the base shows a crack.
+    /// Depth from which the base shows a crack, 0..=65535.
     pub least: u16,
 }
 

@@ -100,6 +100,7 @@ impl AssetLoader for ExamplesLoader {
         (): &(),
         context: &mut LoadContext<'_>,
     ) -> Result<AnalogyExamples, LoadError> {
+        // One byte more than allowed tells that the file is too large.
         let mut bytes = Vec::new();
         reader.take(MAX_FILE + 1).read_to_end(&mut bytes).await?;
         if bytes.len() as u64 > MAX_FILE {
