@@ -142,6 +142,7 @@ impl CrackGrowth {
             let narrow = if is_last { NARROW } else { 1.0 };
             let finest = narrow * params.loaded(generation, 0.0, f32::INFINITY);
             let fronts: Vec<f32> = (0..impacts.len() as u32).map(|impact| self.front(impact)).collect();
+            let patches = params.patches(self.seed);
             let mut nearest = f32::INFINITY;
             self.field.each_beyond(finest * finest, |marker, id, pos, near_sq, impact| {
                 let (Some(hit), Some(&front)) = (impacts.get(impact as usize), fronts.get(impact as usize)) else {
@@ -153,8 +154,12 @@ impl CrackGrowth {
                 }
                 let from_hit = from_hit_sq.sqrt();
                 let reach = division.begun.get(impact as usize).map_or(f32::INFINITY, |begun| begun.1);
-                let patch = params.patch(pos, self.seed);
-                let loaded = narrow * (params.loaded(generation, from_hit, reach) * patch);
+                // A patch is a factor of 1 or more: most markers are too near even without it.
+                let least = params.loaded(generation, from_hit, reach);
+                if near_sq <= (narrow * least) * (narrow * least) {
+                    return;
+                }
+                let loaded = narrow * (least * patches.at(pos));
                 if near_sq > loaded * loaded {
                     nearest = nearest.min(from_hit - front);
                     found.push(Candidate { marker, id, impact, pos, near_sq, from_hit });
@@ -191,7 +196,7 @@ impl CrackGrowth {
         let near_sq = self.field.near_sq(candidate.marker);
         let Some(division) = &self.division else { return };
         let reach = division.begun.get(candidate.impact as usize).map_or(f32::INFINITY, |begun| begun.1);
-        let patch = self.params.patch(candidate.pos, self.seed);
+        let patch = self.params.patches(self.seed).at(candidate.pos);
         let loaded = self.params.loaded(division.generation, candidate.from_hit, reach) * patch;
         if near_sq < STILL * STILL * candidate.near_sq || self.room() < 3 {
             return;

@@ -154,6 +154,27 @@ impl Division {
     }
 }
 
+/// Waves with lengths of a few kill distances, in all directions.
+pub(super) struct Patches {
+    /// Direction, in waves per kill distance, and phase.
+    waves: [(Vec2, f32); 5],
+    kill_distance: f32,
+    patchiness: f32,
+}
+
+impl Patches {
+    /// Factor of a distance at a place, at least 1.
+    pub(super) fn at(&self, pos: Vec2) -> f32 {
+        if self.patchiness <= 0.0 {
+            return 1.0;
+        }
+        let wave = |(way, phase): &(Vec2, f32)| ops::cos(way.dot(pos) / self.kill_distance + phase);
+        let sum: f32 = self.waves.iter().map(wave).sum();
+        let share = (0.5 + 0.33 * sum).clamp(0.0, 1.0);
+        1.0 + self.patchiness * share * share
+    }
+}
+
 impl GrowthParams {
     /// Distance from all cracks that a marker must have so that a crack of this generation can start at it.
     pub(super) fn loaded(&self, generation: u8, from_hit: f32, reach: f32) -> f32 {
@@ -162,19 +183,15 @@ impl GrowthParams {
         self.kill_distance * coarser * further / (1.0 + self.focus * self.near_hit(from_hit))
     }
 
-    /// Factor of that distance at a place, at least 1.
-    pub(super) fn patch(&self, pos: Vec2, seed: u64) -> f32 {
-        if self.patchiness <= 0.0 {
-            return 1.0;
-        }
-        // Waves with lengths of a few kill distances, in all directions.
+    /// How that distance varies from place to place.
+    pub(super) fn patches(&self, seed: u64) -> Patches {
         let wave = |k: u64| {
             let way = ops::unit(2.0 * PI * hash_unit(seed ^ draws::PATCH_WAY, k)) * (PATCHES / (1.0 + 0.35 * k as f32));
-            ops::unit(way.dot(pos) / self.kill_distance + 2.0 * PI * hash_unit(seed ^ draws::PATCH_PHASE, k)).x
+            (way, 2.0 * PI * hash_unit(seed ^ draws::PATCH_PHASE, k))
         };
-        let sum: f32 = (0..5).map(wave).sum();
-        let share = (0.5 + 0.33 * sum).clamp(0.0, 1.0);
-        1.0 + self.patchiness * share * share
+        let waves =
+            if self.patchiness > 0.0 { std::array::from_fn(|k| wave(k as u64)) } else { [(Vec2::ZERO, 0.0); 5] };
+        Patches { waves, kill_distance: self.kill_distance, patchiness: self.patchiness }
     }
 
     /// 1 at the hit, 0 where it no longer affects domains.
