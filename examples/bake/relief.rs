@@ -10,7 +10,7 @@ use bevy_crack::{
     pattern::SurfaceFrame,
     relief::{
         Contours, HeightMap, HeightParams, ReliefFrame, ReliefMesh, ReliefParams, ReliefSettings, TerrainColors,
-        colors, normals,
+        Weathering, colors, normals, weathered,
     },
 };
 use clap::Args;
@@ -80,7 +80,7 @@ fn look(name: &str) -> Result<TerrainColors, String> {
 }
 
 /// Settings that suit a seed contour, changed as the options tell.
-fn params(options: &Options) -> Result<(ReliefParams, HeightParams), Box<dyn Error>> {
+fn params(options: &Options) -> Result<(ReliefParams, HeightParams, Weathering), Box<dyn Error>> {
     let settings = if options.seed_contour == "wall" { ReliefSettings::rock_wall() } else { ReliefSettings::island() };
     let (mut rings, mut heights) = (settings.contours, settings.heights);
     rings.set("method", &options.method)?;
@@ -92,7 +92,7 @@ fn params(options: &Options) -> Result<(ReliefParams, HeightParams), Box<dyn Err
             rings.set(name, value)?;
         }
     }
-    Ok((rings, heights))
+    Ok((rings, heights, settings.weathering))
 }
 
 /// All pictures, texts and meshes of a height field.
@@ -123,19 +123,22 @@ fn write(
 
 pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
     let frame = SurfaceFrame::new(options.size)?;
-    let (rings, params) = params(options)?;
+    let (rings, params, weathering) = params(options)?;
     let seeds = seed_contours(&options.seed_contour, frame.extent(), options.seed)?;
     let clock = Instant::now();
     let contours = Contours::generate(&rings, &seeds, options.seed)?;
     let drawn = clock.elapsed();
     let heights = HeightMap::new(&contours, &params, frame, options.seed)?.heights(1);
     let filled = clock.elapsed();
+    let heights = weathered(&heights, &frame, &weathering, options.seed)?;
+    let worn = clock.elapsed();
     write(options, &frame, &contours, &heights)?;
     println!(
-        "{} rings in {:.1} ms, heights in {:.1} ms; written to {}",
+        "{} rings in {:.1} ms, heights in {:.1} ms, weather in {:.1} ms; written to {}",
         contours.rings.len(),
         drawn.as_secs_f64() * 1e3,
         (filled - drawn).as_secs_f64() * 1e3,
+        (worn - filled).as_secs_f64() * 1e3,
         options.out.display()
     );
     Ok(())

@@ -156,7 +156,10 @@ impl HeightMap {
         }
         let height = |level: i32| {
             let deviation = params.variation * (hash_unit(seed, u64::from(level as u32)) - 0.5);
-            params.step * (level as f32 + if level == 0 { 0.0 } else { deviation })
+            let kept = 1.0 - params.taper;
+            let (rise, last) =
+                (0..level).fold((level.min(0) as f32, 1.0), |(rise, step), _| (rise + step, step * kept));
+            params.step * (rise + if level == 0 { 0.0 } else { last * deviation })
         };
         Ok(Self {
             frame,
@@ -170,8 +173,8 @@ impl HeightMap {
         })
     }
 
-    /// Height of a level, pattern units: `level * step`, and a deviation if
-    /// [`variation`](HeightParams::variation) is not 0. 0 for levels without a ring.
+    /// Height of a level, pattern units: `level * step`, less above 0 if [`taper`](HeightParams::taper) is not 0, and a
+    /// deviation if [`variation`](HeightParams::variation) is not 0. 0 for levels without a ring.
     #[must_use]
     pub fn level_height(&self, level: i32) -> f32 {
         let has_rings = usize::try_from(level - self.lowest).is_ok_and(|level| level < self.levels.len());

@@ -64,6 +64,9 @@ params! {
     step = 0.03, 0.0001, 4.0;
     /// How much the heights of levels deviate from even steps, as a share of the step. 0..=0.9; default 0.
     variation = 0.0, 0.0, 0.9;
+    /// How much lower each step above level 0 is than the one below it, as a share of that: 0 = all are equal. The higher, the
+    /// flatter the top. 0..=0.95; default 0.
+    taper = 0.0, 0.0, 0.95;
     /// How round summits are: 0 = they rise to a point or an edge, 1 = they level out. 0..=1; default 0.5.
     summit = 0.5, 0.0, 1.0;
     /// How far the ground falls outside of the lowest level, in steps; it levels out. 0 = flat. 0..=64; default 1.

@@ -11,6 +11,7 @@ use super::{
     shapes::ReliefShape,
     terrain::{TerrainColors, colors},
     terrain_normals::normals,
+    weather::{WeatherJob, Weathering},
 };
 use crate::{
     Grid,
@@ -35,6 +36,9 @@ pub struct ReliefSettings {
     pub contours: ReliefParams,
     /// How contours become heights.
     pub heights: HeightParams,
+    /// What weather makes of the heights; default of a file that does not name it: nothing.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub weathering: Weathering,
     /// How heights become colors.
     pub colors: TerrainColors,
 }
@@ -58,12 +62,12 @@ impl ReliefSettings {
     /// A wall of rock, seen from the front.
     #[must_use]
     pub fn rock_wall() -> Self {
-        let rough =
-            HeightParams { roughness: 0.6, cliffs: 0.12, variation: 0.7, noise_scale: 0.12, ..HeightParams::DEFAULT };
+        let rough = HeightParams { roughness: 0.2, variation: 0.7, noise_scale: 0.12, ..HeightParams::DEFAULT };
         Self {
             shape: ReliefShape::Wall,
             contours: ReliefParams { distance: 0.012, outward: 5, ..ReliefParams::IMPROVED },
-            heights: HeightParams { step: 0.01, floor: 2.0, ..rough },
+            heights: HeightParams { step: 0.014, taper: 0.2, floor: 2.0, ..rough },
+            weathering: Weathering::ROCK,
             colors: TerrainColors::ROCK,
         }
     }
@@ -75,6 +79,7 @@ impl ReliefSettings {
             shape: ReliefShape::Island,
             contours: ReliefParams::IMPROVED,
             heights: HeightParams { step: 0.014, floor: 4.0, roughness: 0.35, ..HeightParams::DEFAULT },
+            weathering: Weathering::LAND,
             colors: TerrainColors::ISLAND,
         }
     }
@@ -92,6 +97,7 @@ impl ReliefSettings {
     pub fn validate(&self) -> Result<(), ReliefJobError> {
         self.contours.validate()?;
         self.heights.validate()?;
+        self.weathering.validate()?;
         Ok(self.colors.validate()?)
     }
 }
@@ -105,7 +111,7 @@ impl Default for ReliefSettings {
 /// A relief: contours, heights and what they look like.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Relief {
-    /// The contour lines.
+    /// The contour lines, as they were before the weather.
     pub contours: Contours,
     /// Heights, pattern units; one for each texel.
     pub heights: Grid<f32>,
@@ -133,6 +139,7 @@ impl Relief {
 enum Stage {
     Contours(Box<ContourJob>),
     Heights { contours: Contours, map: Box<HeightMap>, heights: Grid<f32>, stripe: usize },
+    Weather { contours: Contours, job: Box<WeatherJob> },
     Normals { contours: Contours, heights: Grid<f32> },
     Colors { contours: Contours, heights: Grid<f32>, normal: Grid<[u8; 4]> },
     Done,
@@ -163,8 +170,8 @@ pub struct ReliefJob {
     stage: Stage,
 }
 
-/// Shares of the progress at which contours and heights are done, and normals.
-const PROGRESS: [f32; 3] = [0.5, 0.8, 0.85];
+/// Shares of the progress at which contours, heights, weather and normals are done.
+const PROGRESS: [f32; 4] = [0.2, 0.35, 0.9, 0.93];
 
 impl ReliefJob {
     /// A job for a relief of `size` texels.
@@ -202,7 +209,15 @@ impl ReliefJob {
                 if stripe + 1 < map.stripes() {
                     Stage::Heights { contours, map, heights, stripe: stripe + 1 }
                 } else {
-                    Stage::Normals { contours, heights }
+                    let job = WeatherJob::new(heights, frame, self.settings.weathering, seed);
+                    Stage::Weather { contours, job: Box::new(job) }
+                }
+            }
+            Stage::Weather { contours, mut job } => {
+                if job.step() {
+                    Stage::Weather { contours, job }
+                } else {
+                    Stage::Normals { contours, heights: job.heights }
                 }
             }
             Stage::Normals { contours, heights } => {
@@ -221,13 +236,14 @@ impl ReliefJob {
     /// How much is done, 0..=1.
     #[must_use]
     pub fn progress(&self) -> f32 {
-        let [contours, heights, normals] = PROGRESS;
+        let [contours, heights, weather, normals] = PROGRESS;
         match &self.stage {
             Stage::Contours(job) => contours * job.progress(),
             Stage::Heights { map, stripe, .. } => {
                 contours + (heights - contours) * *stripe as f32 / map.stripes().max(1) as f32
             }
-            Stage::Normals { .. } => heights,
+            Stage::Weather { job, .. } => heights + (weather - heights) * job.progress(),
+            Stage::Normals { .. } => weather,
             Stage::Colors { .. } => normals,
             Stage::Done => 1.0,
         }

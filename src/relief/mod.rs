@@ -15,7 +15,7 @@
 //! [`heights`] makes a height field of contours ([`HeightMap`]), [`normals`] and [`colors`] its pictures, [`ReliefMesh`]
 //! its mesh. A [`Crater`] is what a hit knocks out, in terraces.
 //!
-//! This goes beyond the paper: several seeds, holes, seeds from [`outlines`] in a picture, distances that vary along a contour
+//! This goes beyond the paper: [`weathered`] ground, several seeds, holes, seeds from [`outlines`] in a picture, distances that vary along a contour
 //! ([`ReliefParams::steepness`], [`ContourJob::with_factors`]), parameters that suit a seed ([`ReliefParams::estimate`]).
 //!
 //! ```
@@ -62,10 +62,12 @@ mod terrain;
 mod terrain_blur;
 mod terrain_noise;
 mod terrain_normals;
+mod terrain_wear;
 #[cfg(test)]
 mod tests;
 mod trace;
 mod untangle;
+mod weather;
 
 pub use contours::{Contours, Ring};
 pub use crater::{Crater, CraterParams};
@@ -83,3 +85,4 @@ pub use shapes::ReliefShape;
 pub use terrain::{Ground, Sea, TerrainColors, colors};
 pub use terrain_normals::normals;
 pub use trace::outlines;
+pub use weather::{Weathering, weathered};

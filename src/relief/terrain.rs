@@ -89,7 +89,7 @@ impl TerrainColors {
         steep: [0.5, 1.6],
         stratum: 0.022,
         strata: 0.6,
-        cavity: 0.7,
+        cavity: 0.9,
         variety: 0.6,
         light: 0.35,
     };

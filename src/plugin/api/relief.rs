@@ -31,7 +31,7 @@ use bevy::prelude::*;
 #[reflect(Component, Default, Clone, Debug, PartialEq)]
 #[require(ReliefProgress)]
 pub struct CrackRelief {
-    /// Shape, contours, heights and colors; default [`ReliefSettings::rock_wall`].
+    /// Shape, contours, heights, weather and colors; default [`ReliefSettings::rock_wall`].
     pub settings: ReliefSettings,
     /// Size of the textures, texels, 16..=4096 a side; default 1024 x 1024. It should have the proportions of the surface.
     pub size: UVec2,
