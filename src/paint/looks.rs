@@ -15,6 +15,8 @@ impl Look {
             stop(0.75, [0.97, 0.99, 1.0], 0.85),
             stop(1.0, [0.98, 1.0, 1.0], 0.95),
         ]),
+        glint: 0.42,
+        sparkle: 0.5,
         directionality: 0.8,
         facets: Some(Facets {
             tone: 0.11,
@@ -93,7 +95,8 @@ impl Look {
 
     /// Laminated glass: a milky disc, lines whose brightness varies along them, plates that stay in place.
     pub const LAMINATED_GLASS: Self = Self {
-        sparkle: 0.5,
+        glint: 0.45,
+        sparkle: 0.55,
         directionality: 0.8,
         facets: Some(Facets {
             tone: 0.06,
@@ -109,7 +112,7 @@ impl Look {
             ragged: 0.9,
             soft: 0.6,
             depth: 0.0,
-            rough: 0.0022,
+            rough: 0.0014,
             grain: 0.0045,
             color: [0.95, 0.98, 0.99],
             pale: 1.0,
@@ -481,7 +484,7 @@ impl Look {
         relief: 0.024,
         curl: 0.08,
         curl_depth: 0.08,
-        full_rim: 0.02,
+        full_rim: 0.034,
         facets: Some(Facets { tone: 0.08, tilt: 0.05, concavity: 0.18, fade: 0.38, ..Facets::DEFAULT }),
         crushed: Some(CrushedZone {
             radius: 0.036,
@@ -513,16 +516,16 @@ impl Look {
             stop(0.50, [0.22, 0.17, 0.14], 0.65),
             stop(1.0, [0.12, 0.09, 0.07], 0.88),
         ]),
-        glint: 1.1,
-        gloss: 1.0,
+        glint: 0.3,
+        gloss: 0.5,
         grain: 0.08,
         sparkle: 0.5,
         directionality: 0.45,
-        relief: 0.0014,
+        relief: 0.0008,
         facets: Some(Facets {
             tone: 0.004,
             tilt: 0.03,
-            reflection: 0.32,
+            reflection: 0.2,
             bright_share: 0.3,
             reflection_color: [1.0; 3],
             similarity: 1.0,
@@ -531,14 +534,14 @@ impl Look {
             ..Facets::DEFAULT
         }),
         crushed: Some(CrushedZone {
-            radius: 0.018,
-            ragged: 0.9,
-            depth: 0.008,
+            radius: 0.02,
+            ragged: 0.6,
+            depth: 0.0075,
             rough: 0.0004,
             grain: 0.006,
-            color: [0.90, 0.83, 0.73],
-            pale: 0.85,
-            speckle: 0.12,
+            color: [0.84, 0.77, 0.67],
+            pale: 0.8,
+            speckle: 0.25,
             dust: 0.0,
             chips: 0.1,
             reach: 2.6,
@@ -546,7 +549,7 @@ impl Look {
             flakes: 1,
             tint: 0.35,
             bare: 0.95,
-            jag: 0.0008,
+            jag: 0.0,
             ..CrushedZone::DEFAULT
         }),
         ..Self::GROOVE

@@ -25,6 +25,9 @@ const SHADE: f32 = 0.5;
 
 const DEEP_SHADE: f32 = 0.62;
 
+/// Strength of the shadow of the step down to the basin, as a share of that of the edge.
+const STEP_SHADE: f32 = 0.6;
+
 /// Strength of the shadow at this distance from the edge that casts it.
 fn sink(within: f32, soft: f32) -> f32 {
     (0.5 - within / soft).clamp(0.0, 1.0)
@@ -126,11 +129,13 @@ impl Shape<'_> {
         if let Some(basin) = &broken.basin {
             let within =
                 basin.within(off) - 2.0 * self.jag * (0.5 + 0.5 * bump(draws::BASIN_EDGE, (3.0 * self.jag).max(2.0)));
-            sunk = (within / (1.5 * WALL * self.depth).max(1.0)).clamp(0.0, 1.0);
+            let share = (within / (2.5 * WALL * self.depth).max(2.0)).clamp(0.0, 1.0);
+            sunk = share * share * (3.0 - 2.0 * share);
             down += (1.0 - SHELF) * sunk;
             if within > 0.0 {
                 let length = long * (1.0 - SHELF) * self.depth;
-                shadow = shadow.max(sink(basin.within(off + TO_LIGHT * length), soft));
+                // The step is lower and rounder than the edge.
+                shadow = shadow.max(STEP_SHADE * sink(basin.within(off + TO_LIGHT * length), 1.5 * soft));
             }
         }
         let fold = |k: u32, size: f32| {
@@ -199,7 +204,7 @@ impl Shape<'_> {
         }
         let inside = (within + 0.5).clamp(0.0, 1.0);
         if inside < 1.0 && *ink <= 0.0 {
-            let shadow = (outline.within(off + TO_LIGHT * (0.45 * size)) + 0.5).clamp(0.0, 1.0);
+            let shadow = (outline.within(off + TO_LIGHT * (0.35 * size)) + 0.5).clamp(0.0, 1.0);
             place.dark = place.dark.max(SHADE * shadow * (1.0 - inside));
         }
         if inside > 0.0 {

@@ -133,7 +133,7 @@ impl Broken {
                 let centre = way.normalize_or(Vec2::Y) * far;
                 let outline =
                     Outline::new(centre, size, 4 + (2.0 * pick(k, 12)) as u32, 0, 0.6, mix_in(seed, 0x200 + k));
-                Chip { outline, tone: 0.3 * pick(k, 13) - 0.18, ink: crushed.outline * unit }
+                Chip { outline, tone: 0.34 * pick(k, 13) - 0.08, ink: crushed.outline * unit }
             })
             .collect();
         let pit = (crushed.pit > 0.0).then(|| {

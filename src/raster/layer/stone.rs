@@ -90,7 +90,7 @@ impl Stone {
                 return Some(if pick(9) < 0.14 {
                     Self { height: -0.5 * rise, tone: -0.22 }
                 } else {
-                    Self { height: 0.55 * rise, tone: 0.16 + 1.7 * own * own.abs() - 0.3 * far * far * far }
+                    Self { height: 0.55 * rise, tone: 0.13 + 1.2 * own * own.abs() - 0.3 * far * far * far }
                 });
             }
         }
