@@ -70,7 +70,7 @@ impl Plugin for CrackEditorPlugin {
         app.insert_resource(CrackEditor { is_open: self.is_open, key: self.key, ..default() })
             .add_observer(pointer::press)
             .add_observer(pointer::release)
-            .add_systems(Update, toggle)
+            .add_systems(Update, (toggle, pointer::make_pickable.run_if(is_open)))
             .add_systems(PostUpdate, overlay::note_dirty.after(crate::plugin::CrackSystems::Paint).run_if(is_open))
             .add_systems(EguiPrimaryContextPass, world::show_panel.run_if(is_open));
     }

@@ -7,6 +7,16 @@ use bevy::prelude::*;
 /// A press that moves less is no aim, logical pixels.
 const STILL: f32 = 8.0;
 
+/// The engine picks only those sprites that say so.
+pub(super) fn make_pickable(
+    mut commands: Commands,
+    sprites: Query<Entity, (With<CrackSurface>, With<Sprite>, Without<Pickable>)>,
+) {
+    for sprite in &sprites {
+        commands.entity(sprite).try_insert(Pickable::default());
+    }
+}
+
 pub(super) fn press(
     press: On<Pointer<Press>>,
     surfaces: Query<(), With<CrackSurface>>,
