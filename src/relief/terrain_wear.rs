@@ -97,8 +97,8 @@ impl Gullies {
     }
 }
 
-/// Sizes of scoops.
-const SCOOPS: [f32; 3] = [1.0, 0.42, 0.17];
+/// Sizes of scoops, in units of the largest.
+const SCOOPS: [f32; 2] = [1.0, 0.42];
 
 /// How much wider than high scoops are.
 const FLAT: f32 = 1.35;
