@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     Grid,
-    math::{Rng, hash_unit, vectorized},
+    math::{Rng, hash_unit, ops, vectorized},
     pattern::SurfaceFrame,
 };
 use std::{
@@ -156,10 +156,9 @@ impl HeightMap {
         }
         let height = |level: i32| {
             let deviation = params.variation * (hash_unit(seed, u64::from(level as u32)) - 0.5);
-            let kept = 1.0 - params.taper;
-            let (rise, last) =
-                (0..level).fold((level.min(0) as f32, 1.0), |(rise, step), _| (rise + step, step * kept));
-            params.step * (rise + if level == 0 { 0.0 } else { last * deviation })
+            let step = if level > 0 { ops::powf(1.0 - params.taper, level as f32) } else { 1.0 };
+            let rise = if level > 0 && params.taper > 0.0 { (1.0 - step) / params.taper } else { level as f32 };
+            params.step * (rise + if level == 0 { 0.0 } else { step * deviation })
         };
         Ok(Self {
             frame,

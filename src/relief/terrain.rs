@@ -234,7 +234,7 @@ struct Painter<'a> {
     noise: [Vec<f32>; 3],
 }
 
-fn smoothstep(from: f32, to: f32, value: f32) -> f32 {
+pub(super) fn smoothstep(from: f32, to: f32, value: f32) -> f32 {
     let share = ((value - from) / (to - from).max(1e-6)).clamp(0.0, 1.0);
     share * share * (3.0 - 2.0 * share)
 }

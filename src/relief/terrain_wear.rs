@@ -1,6 +1,6 @@
 //! How single places of a height field wear: [`Gullies`], [`Scoops`].
 
-use super::weather::Weathering;
+use super::terrain::smoothstep;
 use crate::math::mix;
 use glam::Vec2;
 use std::f32::consts::TAU;
@@ -20,11 +20,6 @@ fn wave(turns: f32) -> [f32; 2] {
         arc + 0.225 * (arc * arc.abs() - arc)
     };
     [sine(turns), sine(turns + 0.25)]
-}
-
-fn smoothstep(from: f32, to: f32, value: f32) -> f32 {
-    let share = ((value - from) / (to - from)).clamp(0.0, 1.0);
-    share * share * (3.0 - 2.0 * share)
 }
 
 /// Distance of a site from the border of its cell, in cells: what is not in the nine cells around a place is further away
@@ -60,9 +55,9 @@ pub(super) struct Gullies {
 }
 
 impl Gullies {
-    pub(super) fn new(weathering: &Weathering, seed: u64) -> Self {
-        let width = weathering.gully_width;
-        Self { seed: mix(seed ^ 0x6011), depth: weathering.gullies * width, width }
+    /// Gullies of this depth, as a share of the width of the widest.
+    pub(super) fn new(depth: f32, width: f32, seed: u64) -> Self {
+        Self { seed: mix(seed ^ 0x6011), depth: depth * width, width }
     }
 
     /// What is worn off at a place, zero or less.
@@ -114,8 +109,9 @@ pub(super) struct Scoops {
 }
 
 impl Scoops {
-    pub(super) fn new(weathering: &Weathering, seed: u64) -> Self {
-        Self { seed: mix(seed ^ 0x5C00), chips: weathering.chips, size: weathering.chip_size }
+    /// Scoops of this depth, as a share of the size of the largest.
+    pub(super) fn new(chips: f32, size: f32, seed: u64) -> Self {
+        Self { seed: mix(seed ^ 0x5C00), chips, size }
     }
 
     /// What has broken off at a place, zero or less; `uneven` moves edges aside a little, -1..=1.
@@ -155,8 +151,7 @@ mod tests {
     /// No step is higher than a slope makes it, at the borders of cells either.
     #[test]
     fn ground_is_continuous() {
-        let weathering = Weathering { gullies: 0.5, chips: 0.5, ..Weathering::ROCK };
-        let (gullies, scoops) = (Gullies::new(&weathering, 3), Scoops::new(&weathering, 3));
+        let (gullies, scoops) = (Gullies::new(0.5, 0.05, 3), Scoops::new(0.5, 0.17, 3));
         let mut rng = Rng::new(5);
         for _ in 0..20_000 {
             let pos = Vec2::new(rng.range(-1.0, 2.0), rng.range(-1.0, 2.0));

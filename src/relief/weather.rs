@@ -202,7 +202,9 @@ impl WeatherJob {
             Stage::Wear { broad, mut noise, row } => {
                 let end = (row + rows).min(height);
                 let mut slopes = Slopes::new(&broad, frame);
-                let (gullies, scoops) = (Gullies::new(weathering, *seed), Scoops::new(weathering, *seed));
+                let Weathering { gullies, gully_width, chips, chip_size, .. } = *weathering;
+                let (gullies, scoops) =
+                    (Gullies::new(gullies, gully_width, *seed), Scoops::new(chips, chip_size, *seed));
                 let mut grain = vec![0.0; width];
                 for y in row..end {
                     slopes.read(y);
