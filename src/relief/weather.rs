@@ -237,3 +237,20 @@ fn sample(heights: &Grid<f32>, at: Vec2) -> f32 {
     });
     above + (below - above) * share.y
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_out_of_range_are_named() {
+        let frame = SurfaceFrame::new([8, 8].into()).unwrap();
+        let heights = Grid::new([8, 8].into(), 0.5);
+        let with = |weathering| weathered(&heights, &frame, &weathering, 1).unwrap_err().to_string();
+        assert!(with(Weathering { bend: f32::NAN, ..Weathering::NONE }).contains("`bend`"));
+        assert!(with(Weathering { gully_width: 0.0, ..Weathering::LAND }).contains("`gully_width`"));
+        assert!(with(Weathering { chips: 2.0, ..Weathering::ROCK }).contains("`chips`"));
+        let broken = Grid::new([8, 8].into(), f32::INFINITY);
+        assert!(weathered(&broken, &frame, &Weathering::ROCK, 1).is_err());
+    }
+}
