@@ -210,6 +210,7 @@ fn clocks_and_baked_cracks() {
 /// Normals come along with the colours where the photograph has them.
 #[test]
 fn normals_are_carried_over() {
+    const FLAT: [u8; 4] = [128, 128, 255, 255];
     const LEANING: [u8; 4] = [201, 128, 230, 255];
     let mut app = watch(app());
     let normals = Grid::new(UVec2::splat(64), LEANING);
@@ -221,17 +222,21 @@ fn normals_are_carried_over() {
     let entity = app.world_mut().spawn((Sprite::from_image(image.clone()), surface, CrackAnalogy::new(examples))).id();
     wait_for_news(&mut app);
     let normal = get::<CrackTextures>(&app, entity).normal.unwrap();
-    assert!(texels(&app, &normal).as_chunks::<4>().0.iter().all(|texel| *texel == [128, 128, 255, 255]));
+    assert!(texels(&app, &normal).as_chunks::<4>().0.iter().all(|texel| *texel == FLAT));
     hit(&mut app, center(entity).with_energy(2.0));
     settle(&mut app, entity);
     let own = texels(&app, &image);
-    wait(&mut app, "its cracks", |app| count(app, entity, &own).0 == 0);
-    let (shown, normals) = (shown(&app, entity), texels(&app, &normal));
-    for ((shown, own), normal) in shown.as_chunks::<4>().0.iter().zip(own.as_chunks::<4>().0).zip(normals.as_chunks().0)
-    {
-        let expected = if shown == own { [128, 128, 255, 255] } else { LEANING };
-        assert_eq!(*normal, expected, "of {shown:?}");
-    }
+    // A groove too shallow to change a colour still tilts its normal, so the colours may be done first.
+    let strange = |app: &App| {
+        let (shown, normals) = (shown(app, entity), texels(app, &normal));
+        let (shown, own) = (shown.as_chunks::<4>().0, own.as_chunks::<4>().0);
+        let expected = shown.iter().zip(own).map(|(shown, own)| if shown == own { FLAT } else { LEANING });
+        normals.as_chunks().0.iter().zip(expected).filter(|(normal, expected)| *normal != expected).count()
+    };
+    wait(&mut app, "its cracks and normals", |app| count(app, entity, &own).0 == 0 && strange(app) == 0);
+    assert!(count(&app, entity, &own).1 > 100);
+    steps(&mut app, 20);
+    assert_eq!(strange(&app), 0, "it stays so");
 }
 
 /// The examples that ship can be loaded, and are what the command line copies from.
