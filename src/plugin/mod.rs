@@ -21,6 +21,8 @@ mod bake;
 mod carrier;
 mod draw;
 mod gpu;
+#[cfg(feature = "2d")]
+mod group;
 #[cfg(all(test, feature = "2d"))]
 mod headless;
 mod hits;
@@ -42,6 +44,8 @@ pub use api::{
     ReliefProgress, ScriptedHit, Shard, ShardsError, ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen,
     Shattered, StrandField,
 };
+#[cfg(feature = "2d")]
+pub use api::{CrackGroup, CrackMemberOf};
 #[cfg(feature = "2d")]
 pub use carrier::lit::{CrackLight2d, CrackLitMaterial, CrackLitUniform, MAX_LIGHTS};
 #[cfg(any(feature = "2d", feature = "3d"))]
@@ -67,7 +71,7 @@ pub mod prelude {
         ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen, Shattered, StrandField,
     };
     #[cfg(feature = "2d")]
-    pub use super::{CrackLight2d, CrackLitMaterial};
+    pub use super::{CrackGroup, CrackLight2d, CrackLitMaterial, CrackMemberOf};
     #[cfg(any(feature = "2d", feature = "3d"))]
     pub use super::{CrackPlace, CrackPlaces};
     pub use crate::preset::CrackPreset;
@@ -214,6 +218,21 @@ impl Plugin for CrackPlugin {
         // What a sprite shows changes by hits, by bakes and when cracks have closed, and then the engine cuts it into parts.
         #[cfg(feature = "2d")]
         app.configure_sets(PostUpdate, (Hit, Grow).before(bevy::sprite_render::SpriteSystems::ComputeSlices));
+        #[cfg(feature = "2d")]
+        app.register_type::<CrackMemberOf>()
+            .register_type::<CrackGroup>()
+            .init_resource::<group::system::GroupChanges>()
+            .add_observer(group::hide::show_leaving)
+            .add_systems(
+                PostUpdate,
+                (group::system::watch_members, group::system::make_walls)
+                    .chain()
+                    .run_if(group::system::any_groups)
+                    .in_set(Hit)
+                    .after(hits::collect::collect_hits)
+                    .before(surface::prepare::prepare_surfaces)
+                    .before(bevy::camera::visibility::VisibilitySystems::CheckVisibility),
+            );
         #[cfg(feature = "2d")]
         app.add_systems(
             PostUpdate,

@@ -23,6 +23,8 @@ mod freeze;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod gpu;
 #[cfg(all(feature = "2d", feature = "3d"))]
+mod groups;
+#[cfg(all(feature = "2d", feature = "3d"))]
 mod guided;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod hits;

@@ -16,10 +16,17 @@ pub enum CrackError {
     NothingToCrack,
     /// It is a chunk of a tilemap, whose tiles share the texels of their tileset.
     #[error(
-        "it is a `TilemapChunk`, whose tiles share the texels of their tileset: take the tile out of its `TilemapChunkTileData` \
-         and put a `Sprite` (or a `Mesh2d`) of it in its place, at `TilemapChunk::calculate_tile_transform`, with the `CrackSurface`"
+        "it is a `TilemapChunk`, whose tiles share the texels of their tileset: make it a member of a group (`CrackMemberOf`) that \
+         has the `CrackSurface`; or, for one tile, take it out of its `TilemapChunkTileData` and put a `Sprite` (or a `Mesh2d`) of it \
+         in its place, at `TilemapChunk::calculate_tile_transform`, with the `CrackSurface`"
     )]
     Tilemap,
+    /// The members of its group cannot be put together.
+    #[error("its group cannot be shown as one picture: {reason}")]
+    Group {
+        /// What is in the way.
+        reason: String,
+    },
     /// There is no place for images.
     #[error("there are no image assets: add `AssetPlugin` and `ImagePlugin`")]
     NoImages,

@@ -5,6 +5,8 @@ pub(crate) mod budget;
 pub(crate) mod clock;
 mod defaults;
 pub(crate) mod error;
+#[cfg(feature = "2d")]
+pub(crate) mod group;
 pub(crate) mod guided;
 pub(crate) mod hit;
 pub(crate) mod mask;
@@ -24,6 +26,8 @@ pub use analogy::{AnalogyExamples, AnalogyFailed, AnalogyMade, AnalogyProgress, 
 pub use budget::{CrackBudget, CrackStats, CrackUploadStats};
 pub use clock::{CrackClock, CrackDrive};
 pub use error::CrackError;
+#[cfg(feature = "2d")]
+pub use group::{CrackGroup, CrackMemberOf};
 pub use guided::{BakeProgress, CrackBaked, CrackGuide, GuideSource, GuidedAppearance, GuidedCracks};
 pub use hit::{CrackHit, HitPoint};
 pub use mask::CrackMaskSource;

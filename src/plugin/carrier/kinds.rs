@@ -7,6 +7,8 @@ use super::lit::CrackLitMaterial;
 use super::material::MaterialKind;
 #[cfg(feature = "2d")]
 use super::sprite::SpriteKind;
+#[cfg(feature = "2d")]
+use crate::plugin::api::CrackGroup;
 use crate::plugin::api::error::CrackError;
 use bevy::prelude::*;
 #[cfg(feature = "2d")]
@@ -31,6 +33,11 @@ pub(crate) fn inspect(world: &World, entity: Entity) -> (Option<&'static dyn Car
             Found::Other => {}
             found => return (Some(kind), found),
         }
+    }
+    // Its picture is yet to be made.
+    #[cfg(feature = "2d")]
+    if world.get::<CrackGroup>(entity).is_some() {
+        return (None, Found::Waiting);
     }
     #[cfg(feature = "2d")]
     if world.get::<TilemapChunk>(entity).is_some() {

@@ -1,10 +1,16 @@
 //! Hits of a frame are queued.
 
+#[cfg(feature = "2d")]
+use crate::plugin::api::CrackMemberOf;
 use crate::plugin::api::error::EntityLabel;
 use crate::plugin::api::{CrackBudget, CrackHit, CrackStats, CrackSurface, HitPoint};
+#[cfg(feature = "2d")]
+use crate::plugin::carrier::place::CrackPlaces;
 use crate::plugin::carrier::space;
 use crate::plugin::jobs::frame_time::FrameClock;
 use crate::plugin::surface::queue::{HitQueue, QueuedHit};
+#[cfg(feature = "2d")]
+use bevy::ecs::system::SystemParam;
 use bevy::{ecs::query::QueryEntityError, prelude::*};
 
 /// Keeps a hit sent as an event for [`collect_hits`].
@@ -21,6 +27,7 @@ pub(crate) fn collect_hits(
     mut clock: ResMut<FrameClock>,
     surfaces: Query<Option<&GlobalTransform>, With<CrackSurface>>,
     names: Query<&Name>,
+    #[cfg(feature = "2d")] members: Members,
 ) {
     if queue.inbox.is_empty() && messages.is_empty() {
         return;
@@ -30,6 +37,8 @@ pub(crate) fn collect_hits(
     let mut inbox = core::mem::take(&mut queue.inbox);
     for hit in inbox.iter().chain(messages.read()) {
         stats.sent += 1;
+        #[cfg(feature = "2d")]
+        let hit = &members.of_group(hit);
         let at = match surfaces.get(hit.entity) {
             Ok(transform) => localize(hit, transform),
             Err(QueryEntityError::NotSpawned(_)) => {
@@ -53,6 +62,29 @@ pub(crate) fn collect_hits(
     inbox.clear();
     queue.inbox = inbox;
     clock.stop(&timer);
+}
+
+/// Members of groups.
+#[cfg(feature = "2d")]
+#[derive(SystemParam)]
+pub(crate) struct Members<'w, 's> {
+    members: Query<'w, 's, (&'static CrackMemberOf, Option<&'static GlobalTransform>), Without<CrackSurface>>,
+    places: CrackPlaces<'w, 's>,
+}
+
+#[cfg(feature = "2d")]
+impl Members<'_, '_> {
+    /// A hit on a member is one on its group, in the same place of the world.
+    fn of_group(&self, hit: &CrackHit) -> CrackHit {
+        let Ok((CrackMemberOf(group), transform)) = self.members.get(hit.entity) else { return *hit };
+        let world = match hit.at {
+            HitPoint::World(point) => Some(point),
+            HitPoint::Local(point) => transform.map(|transform| transform.transform_point(point)),
+            HitPoint::Uv(uv) => self.places.at(hit.entity, uv).map(|place| place.position),
+        };
+        // What has no place is refused as a point that is no number.
+        CrackHit { entity: *group, at: HitPoint::World(world.unwrap_or(Vec3::NAN)), ..*hit }
+    }
 }
 
 /// World points become local ones at once: the surface may move before the hit's turn comes.

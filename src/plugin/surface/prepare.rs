@@ -64,6 +64,12 @@ impl Preparations {
         self.wanted.push_back(entity);
     }
 
+    /// Whether a surface is to be made, though nothing hits it.
+    #[cfg(feature = "2d")]
+    pub(crate) fn is_wanted(&self, entity: Entity) -> bool {
+        self.wanted.contains(&entity)
+    }
+
     /// What was read of the picture before this frame has changed.
     pub(crate) fn forget_picture(&mut self, picture: AssetId<Image>, frame: u64) {
         for (_, Preparation { plan, stage, .. }) in &mut self.list {

@@ -1,0 +1,337 @@
+//! When the picture of a group is made, and shown in place of its members.
+
+use super::hide::{hide, show};
+use super::members::Members;
+use super::wall::{WallFrame, WallWork};
+use crate::plugin::api::error::EntityLabel;
+use crate::plugin::api::{
+    CrackAnalogy, CrackBudget, CrackError, CrackGroup, CrackMemberOf, CrackRecord, CrackStrands, CrackSurface,
+    CrackTextures, GuidedCracks,
+};
+use crate::plugin::jobs::background::PATIENCE;
+use crate::plugin::jobs::copy::{CopyProgress, MAX_BYTES, PictureCopies};
+use crate::plugin::jobs::frame_time::{FrameClock, Timer};
+use crate::plugin::jobs::stepped::{News, Running};
+use crate::plugin::jobs::threads::Threads;
+use crate::plugin::surface::prepare::{self, Preparations};
+use crate::plugin::surface::queue::HitQueue;
+use bevy::{
+    asset::RenderAssetUsages,
+    camera::visibility::RenderLayers,
+    ecs::entity::EntityHashSet,
+    platform::time::Instant,
+    prelude::*,
+    render::render_resource::{Extent3d, TextureDimension, TextureFormat},
+    sprite::Anchor,
+};
+
+/// Share of the frame's budget after which no further slice is made.
+const SHARE: f32 = 0.9;
+
+/// Frames after which members are hidden that the group shows: by then it is drawn.
+const SHOWN_FOR: u32 = 3;
+
+/// Members that are hidden, or shown again, in a frame.
+const MAX_MEMBERS: usize = 512;
+
+/// Frames between two pictures of a group whose members change.
+const PAUSE: u32 = 8;
+
+/// Groups of which some member has changed.
+#[derive(Resource, Default)]
+pub(crate) struct GroupChanges(EntityHashSet);
+
+/// The picture of a group.
+#[derive(Component, Default)]
+#[component(clone_behavior = Ignore)]
+pub(crate) struct Wall {
+    stage: Stage,
+    /// Where it lies. It stays until the group is healed.
+    frame: Option<WallFrame>,
+    picture: Handle<Image>,
+    /// What it shows.
+    shown: Members,
+    /// Members that have left it.
+    gone: EntityHashSet,
+    /// Members that lie within it, and how many of them are hidden.
+    within: Vec<Entity>,
+    hidden: usize,
+    /// For how many frames it has been cracked.
+    frames: u32,
+    /// Whether members have changed since it was made.
+    is_stale: bool,
+    /// For how many frames it is not made again.
+    pause: u32,
+    has_warned: bool,
+}
+
+#[derive(Default)]
+enum Stage {
+    /// Nothing is being made.
+    #[default]
+    Rest,
+    /// Pictures of members are copied.
+    Copying {
+        copies: PictureCopies,
+        members: Box<Members>,
+        since: Instant,
+    },
+    Making(Running<WallWork>, Box<Members>),
+}
+
+/// Whether there is any group.
+pub(crate) fn any_groups(groups: Query<(), Or<(With<CrackGroup>, With<Wall>)>>) -> bool {
+    !groups.is_empty()
+}
+
+/// What a member may show, and how.
+type ChangedMember = Or<(
+    Changed<CrackMemberOf>,
+    Changed<GlobalTransform>,
+    Changed<Sprite>,
+    Changed<Anchor>,
+    Changed<bevy::sprite_render::TilemapChunk>,
+    Changed<bevy::sprite_render::TilemapChunkTileData>,
+)>;
+
+/// Notes groups of which some member has changed.
+pub(crate) fn watch_members(
+    changed: Query<&CrackMemberOf, ChangedMember>,
+    groups: Query<Entity, (Changed<CrackGroup>, With<Wall>)>,
+    walls: Query<(Entity, &Wall)>,
+    images: Option<MessageReader<AssetEvent<Image>>>,
+    mut changes: ResMut<GroupChanges>,
+) {
+    let images = images.into_iter().flat_map(|mut images| images.read().copied().collect::<Vec<_>>());
+    if walls.is_empty() {
+        images.for_each(drop);
+        return;
+    }
+    changes.0.extend(changed.iter().map(|member| member.0).filter(|group| walls.contains(*group)));
+    changes.0.extend(&groups);
+    for event in images {
+        if let AssetEvent::Modified { id } | AssetEvent::Added { id } = event {
+            let shows = |(_, wall): &(Entity, &Wall)| wall.shown.pictures.iter().any(|picture| picture.id() == id);
+            changes.0.extend(walls.iter().filter(shows).map(|(group, _)| group));
+        }
+    }
+}
+
+/// Goes on with all groups.
+pub(crate) fn make_walls(world: &mut World, mut found: Local<Vec<Entity>>) {
+    let timer = world.resource::<FrameClock>().start(world.resource::<CrackBudget>(), SHARE);
+    let mut groups = world.query_filtered::<Entity, Or<(With<CrackGroup>, With<Wall>)>>();
+    found.clear();
+    found.extend(groups.iter(world));
+    found.sort_unstable();
+    let changes = core::mem::take(&mut world.resource_mut::<GroupChanges>().0);
+    let mut left = MAX_BYTES;
+    for &group in found.iter() {
+        let wanted = is_wanted(world, group);
+        let wall = world.get_mut::<Wall>(group).map(|mut wall| core::mem::take(&mut *wall));
+        if wall.is_none() && !wanted {
+            continue;
+        }
+        let mut wall = wall.unwrap_or_default();
+        wall.is_stale |= changes.contains(&group);
+        match wall.go_on(world, group, wanted, &timer, &mut left) {
+            Ok(true) => match world.get_mut::<Wall>(group) {
+                Some(mut place) => *place = wall,
+                None => _ = world.get_entity_mut(group).map(|mut group| _ = group.insert(wall)),
+            },
+            Ok(false) => _ = world.get_entity_mut(group).map(|mut group| _ = group.remove::<Wall>()),
+            Err(error) => {
+                // What it shows stays until its cracks are healed.
+                wall.stage = Stage::Rest;
+                if let Some(mut place) = world.get_mut::<Wall>(group) {
+                    *place = wall;
+                }
+                prepare::fail(world, group, error);
+            }
+        }
+    }
+    world.resource_mut::<FrameClock>().stop(&timer);
+}
+
+/// Whether something waits for the picture of a group.
+fn is_wanted(world: &World, group: Entity) -> bool {
+    let Ok(entity) = world.get_entity(group) else { return false };
+    entity.contains::<CrackSurface>()
+        && (world.resource::<HitQueue>().first(group).is_some()
+            || world.resource::<Preparations>().is_wanted(group)
+            || entity.contains::<GuidedCracks>()
+            || entity.contains::<CrackStrands>()
+            || entity.contains::<CrackRecord>()
+            || entity.contains::<CrackAnalogy>())
+}
+
+impl Wall {
+    /// Whether there is a picture.
+    fn is_there(&self) -> bool {
+        self.picture != Handle::default()
+    }
+
+    /// A frame's work; whether there is anything to remember.
+    fn go_on(
+        &mut self,
+        world: &mut World,
+        group: Entity,
+        wanted: bool,
+        timer: &Timer,
+        left: &mut usize,
+    ) -> Result<bool, CrackError> {
+        let has_cracked = world.get::<CrackTextures>(group).is_some();
+        if !has_cracked && !wanted {
+            self.stage = Stage::Rest;
+            return Ok(!self.take_down(world, group));
+        }
+        self.pause = self.pause.saturating_sub(1);
+        self.stage = match core::mem::take(&mut self.stage) {
+            Stage::Rest if !self.is_there() => self.begin(world, group)?,
+            Stage::Rest if self.is_stale && self.pause == 0 => self.begin_again(world, group)?,
+            Stage::Rest => Stage::Rest,
+            Stage::Copying { copies, members, since } => self.copy(world, copies, members, since, left),
+            Stage::Making(running, members) => {
+                match world.resource_scope(|_, mut threads: Mut<Threads>| running.look(&mut threads, timer)) {
+                    News::Going(running, _) => Stage::Making(running, members),
+                    News::Ended(texels) => {
+                        self.put_up(world, group, texels?, *members);
+                        Stage::Rest
+                    }
+                }
+            }
+        };
+        self.frames = if has_cracked { self.frames.saturating_add(1) } else { 0 };
+        if self.frames > SHOWN_FOR {
+            let next = self.within.iter().skip(self.hidden).take(MAX_MEMBERS);
+            let next: Vec<Entity> = next.copied().collect();
+            self.hidden += next.len();
+            next.into_iter().for_each(|member| hide(world, member));
+        }
+        Ok(true)
+    }
+
+    /// The first picture.
+    fn begin(&mut self, world: &World, group: Entity) -> Result<Stage, CrackError> {
+        let failed = |reason: &str| CrackError::Group { reason: reason.into() };
+        if world.get::<Sprite>(group).is_some() {
+            return Err(failed("the group has a sprite of its own"));
+        }
+        self.is_stale = false;
+        let Some(members) = Members::of(world, group, &self.gone)? else { return Ok(Stage::Rest) };
+        let frame = WallFrame::around(&members.tiles());
+        self.frame = frame;
+        if frame.is_none() {
+            return Err(failed(members.left_out.unwrap_or("none of its members shows anything")));
+        }
+        self.warn_of(world, group, members.left_out);
+        Ok(start_copying(world, members))
+    }
+
+    /// Another picture, if other members, or the same, show something else.
+    fn begin_again(&mut self, world: &mut World, group: Entity) -> Result<Stage, CrackError> {
+        let Some(members) = Members::of(world, group, &self.gone)? else { return Ok(Stage::Rest) };
+        self.is_stale = false;
+        let moved = members.moved(&self.shown);
+        if !moved.is_empty() {
+            self.gone.extend(&moved);
+            self.is_stale = true;
+            return Ok(Stage::Rest);
+        }
+        Ok(if members.shows_the_same(&self.shown) { Stage::Rest } else { start_copying(world, members) })
+    }
+
+    fn copy(
+        &self,
+        world: &World,
+        mut copies: PictureCopies,
+        members: Box<Members>,
+        since: Instant,
+        left: &mut usize,
+    ) -> Stage {
+        let (Some(images), Some(frame)) = (world.get_resource::<Assets<Image>>(), self.frame) else {
+            return Stage::Rest;
+        };
+        if since.elapsed() >= PATIENCE {
+            copies.wait_no_more();
+        }
+        match copies.step(images, left) {
+            CopyProgress::More => Stage::Copying { copies, members, since },
+            CopyProgress::Changed => Stage::Rest,
+            CopyProgress::Done => {
+                let work = WallWork::new(frame, members.within(&frame).0, copies.finish());
+                Stage::Making(Running::start(world.resource::<Threads>(), work), members)
+            }
+        }
+    }
+
+    /// Shows a picture that was made.
+    fn put_up(&mut self, world: &mut World, group: Entity, texels: Vec<u8>, members: Members) {
+        let Some(frame) = self.frame else { return };
+        let (_, within) = members.within(&frame);
+        if within.len() < members.list.len() {
+            self.warn_of(world, group, Some("it lies outside of the rectangle that has cracked"));
+        }
+        let Some(mut images) = world.get_resource_mut::<Assets<Image>>() else { return };
+        let size = Extent3d { width: frame.size.x, height: frame.size.y, depth_or_array_layers: 1 };
+        let usage = RenderAssetUsages::default();
+        let mut image = Image::new(size, TextureDimension::D2, texels, TextureFormat::Rgba8UnormSrgb, usage);
+        image.sampler = members.sampler.clone();
+        if self.is_there() {
+            let is_other = images.get(&self.picture).is_none_or(|before| before.data != image.data);
+            if is_other {
+                _ = images.insert(&self.picture, image);
+            }
+        } else {
+            self.picture = images.add(image);
+            let extent = frame.extent();
+            let sprite = Sprite { image: self.picture.clone(), custom_size: Some(extent), ..Sprite::default() };
+            if let Ok(mut group) = world.get_entity_mut(group) {
+                group.insert((sprite, Anchor(-frame.center() / extent)));
+                if let Some(layers) = members.layers.clone().filter(|_| !group.contains::<RenderLayers>()) {
+                    group.insert(layers);
+                }
+            }
+        }
+        let stay: EntityHashSet = within.iter().copied().collect();
+        for member in self.within.iter().filter(|member| !stay.contains(*member)) {
+            show(world, *member);
+        }
+        (self.within, self.hidden) = (within, 0);
+        (self.shown, self.pause) = (members, PAUSE);
+    }
+
+    /// Shows members again, some in each frame, and then nothing of the group; whether that is done.
+    fn take_down(&mut self, world: &mut World, group: Entity) -> bool {
+        let stay = self.hidden.saturating_sub(MAX_MEMBERS);
+        let next = self.within.iter().take(self.hidden).skip(stay);
+        next.for_each(|member| show(world, *member));
+        self.hidden = stay;
+        if stay == 0
+            && self.is_there()
+            && let Ok(mut group) = world.get_entity_mut(group)
+            && group.get::<Sprite>().is_some_and(|sprite| sprite.image == self.picture)
+        {
+            group.remove::<(Sprite, Anchor)>();
+        }
+        stay == 0
+    }
+
+    /// Says once why members are left out.
+    fn warn_of(&mut self, world: &World, group: Entity, reason: Option<&str>) {
+        if let Some(reason) = reason
+            && !core::mem::replace(&mut self.has_warned, true)
+        {
+            warn!("a member of the group {} is left out: {reason}", EntityLabel::of(world, group));
+        }
+    }
+}
+
+/// Begins to copy the pictures of members.
+fn start_copying(world: &World, members: Members) -> Stage {
+    let has_threads = world.resource::<Threads>().pool().is_some();
+    let images = world.get_resource::<Assets<Image>>();
+    let copies = images.and_then(|images| PictureCopies::new(members.pictures.clone(), images, has_threads));
+    let members = Box::new(members);
+    copies.map_or(Stage::Rest, |copies| Stage::Copying { copies, members, since: Instant::now() })
+}
