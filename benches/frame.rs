@@ -30,6 +30,7 @@ use bevy::{
 use bevy_crack::{
     Grid,
     growth::CrackGrowth,
+    math::Rng,
     paint::{
         BaseTexels, LookTable, PaintTargets,
         analogy::{AnalogyPair, AnalogyParams},
@@ -823,6 +824,55 @@ fn analogies(_: &mut Criterion) {
     }
 }
 
+/// A level of 10,000 tiles of 16 x 16 texels that is one group, at rest, made ready for its first hit, and hit 100 times a second.
+fn groups(_: &mut Criterion) {
+    for (name, is_group) in [("10,000 tiles in a group", true), ("10,000 plain tiles", false)] {
+        let mut app = app();
+        measure_systems(&mut app);
+        Run::InARow.arrange(&mut app);
+        app.insert_resource(CrackBudget::default());
+        let image = app.world_mut().resource_mut::<Assets<Image>>().add(picture(16));
+        let surface = CrackSurface::new(CrackPreset::CONCRETE.scaled(0.1));
+        let group = app.world_mut().spawn(surface).id();
+        for i in 0..10_000 {
+            let place = Transform::from_xyz(16.0 * (i % 100) as f32, 16.0 * (i / 100) as f32, 0.0);
+            let mut tile = app.world_mut().spawn((Sprite::from_image(image.clone()), place));
+            if is_group {
+                tile.insert(CrackMemberOf(group));
+            }
+        }
+        let step = |app: &mut App, frames: &mut Frames| {
+            app.insert_resource(OurSystems::default());
+            let frame = time_of(|| app.update());
+            let OurSystems(_, time, cpu) = app.world().resource();
+            frames.push([*time, *cpu]);
+            std::thread::sleep((Duration::from_secs(1) / 60).saturating_sub(frame));
+        };
+        let [mut idle, mut first, mut hits] = [Frames::new(), Frames::new(), Frames::new()];
+        (0..10).for_each(|_| step(&mut app, &mut Vec::new()));
+        (0..100).for_each(|_| step(&mut app, &mut idle));
+        println!("{name}, idle, systems: {}", percentiles(&idle, Run::InARow));
+        if !is_group {
+            continue;
+        }
+        let mut rng = Rng::new(5);
+        let mut hit = |app: &mut App| {
+            let at = Vec3::new(rng.range(0.0, 1580.0), rng.range(0.0, 1580.0), 0.0);
+            app.world_mut().trigger(CrackHit::world(group, at).with_energy(0.5));
+        };
+        hit(&mut app);
+        while app.world().get::<CrackState>(group).is_none_or(|state| state.hits == 0) {
+            step(&mut app, &mut first);
+        }
+        println!("{name}, until the first hit, systems: {}", percentiles(&first, Run::InARow));
+        for i in 0..600 {
+            (0..if i % 3 == 0 { 1 } else { 2 }).for_each(|_| hit(&mut app));
+            step(&mut app, &mut hits);
+        }
+        println!("{name}, 100 hits a second, systems: {}", percentiles(&hits, Run::InARow));
+    }
+}
+
 /// Frames with cracked surfaces, which are at rest, in turns with frames of plain sprites.
 fn finished() {
     let mut apps = [many(true), many(false)];
@@ -840,5 +890,5 @@ fn finished() {
     }
 }
 
-criterion_group!(benches, analogies, shards, frame);
+criterion_group!(benches, analogies, shards, frame, groups);
 criterion_main!(benches);

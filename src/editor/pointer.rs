@@ -1,16 +1,19 @@
 //! Clicks on surfaces: they choose and hit them.
 
 use super::state::{Aim, CrackEditor};
-use crate::plugin::{CrackHit, CrackSurface, inspect};
+use crate::plugin::{CrackHit, CrackMemberOf, CrackSurface, inspect};
 use bevy::prelude::*;
 
 /// A press that moves less is no aim, logical pixels.
 const STILL: f32 = 8.0;
 
+/// What shows a surface, or a part of one.
+type OfSurface = Or<(With<CrackSurface>, With<CrackMemberOf>)>;
+
 /// The engine picks only those sprites that say so.
 pub(super) fn make_pickable(
     mut commands: Commands,
-    sprites: Query<Entity, (With<CrackSurface>, With<Sprite>, Without<Pickable>)>,
+    sprites: Query<Entity, (OfSurface, With<Sprite>, Without<Pickable>)>,
 ) {
     for sprite in &sprites {
         commands.entity(sprite).try_insert(Pickable::default());
@@ -20,15 +23,17 @@ pub(super) fn make_pickable(
 pub(super) fn press(
     press: On<Pointer<Press>>,
     surfaces: Query<(), With<CrackSurface>>,
+    members: Query<&CrackMemberOf>,
     mut editor: ResMut<CrackEditor>,
 ) {
+    let entity = members.get(press.entity).map_or(press.entity, |member| member.0);
     // The event goes on to parents and the window.
-    if !editor.is_open || press.button != PointerButton::Primary || !surfaces.contains(press.entity) {
+    if !editor.is_open || press.button != PointerButton::Primary || !surfaces.contains(entity) {
         return;
     }
     let from = press.pointer_location.position;
-    editor.aim = press.hit.position.map(|point| Aim { surface: press.entity, point, from });
-    editor.chosen = Some(press.entity);
+    editor.aim = press.hit.position.map(|point| Aim { surface: entity, point, from });
+    editor.chosen = Some(entity);
 }
 
 pub(super) fn release(release: On<Pointer<Release>>, mut editor: ResMut<CrackEditor>, mut commands: Commands) {
