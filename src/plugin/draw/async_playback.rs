@@ -15,7 +15,7 @@ use crate::plugin::surface::active::Active;
 use crate::plugin::surface::cracked::{Cracked, active_mut};
 use crate::plugin::surface::queues::Queues;
 use crate::plugin::surface::tile_set::Touched;
-use crate::raster::{DepthField, DirtyTiles, Replay, ReplayChanges};
+use crate::raster::{DepthField, DirtyTiles, Replay, ReplayChanges, TexelRect};
 use bevy::{
     ecs::{entity_disabling::Disabled, query::Allow},
     platform::time::Instant,
@@ -27,10 +27,15 @@ use std::{sync::Arc, time::Duration};
 /// How long a task may wait for a thread before its work is done in slices of frames.
 const PATIENCE: Duration = Duration::from_millis(50);
 
+/// Nodes, and texels, of a surface that is drawn again in a frame.
+const MAX_NODES: usize = 1024;
+const MAX_TEXELS: u64 = 512 * 512;
+
 /// Frames after which memory is given back if time stands still.
 const IDLE: u32 = 60;
 
-/// What shows the times of a surface with baked cracks. Removed when its end is shown and nothing can turn time back.
+/// What shows the times of a surface with baked cracks, and draws other surfaces again of which much is to be drawn. Removed when that is done,
+/// or the end is shown and nothing can turn time back.
 ///
 /// While a job runs, the field, the touched tiles and the replay of the surface are with it, and the surface counts as dirty without being in
 /// the queue.
@@ -189,7 +194,11 @@ impl AsyncPlayback {
 
 /// Whether a task can make the times of a surface: nothing else is to paint its textures.
 fn can_be_async(active: &Active) -> bool {
-    active.playhead.playback.is_some() && active.drawing.cutouts.is_none() && active.canvas.views.len() == 1
+    active.playhead.playback.is_some() && has_one_view(active)
+}
+
+fn has_one_view(active: &Active) -> bool {
+    active.drawing.cutouts.is_none() && active.canvas.views.len() == 1
 }
 
 /// Whether the field has to be drawn again. That of cracks that move is drawn for each moment.
@@ -256,6 +265,24 @@ pub(crate) fn start(world: &mut World, entity: Entity, playback: Option<AsyncPla
     }
 }
 
+/// Has all of a surface drawn again that shows something else in the same places: by a task, until which it shows what it showed, if it
+/// takes longer than a frame has. `false` if that cannot be.
+pub(crate) fn redraw(world: &mut World, entity: Entity, active: &mut Active) -> bool {
+    let budget = world.resource::<CrackBudget>();
+    let is_little = active.cracks.growth.network().nodes().len() <= MAX_NODES
+        && TexelRect::whole(active.drawing.field.frame.size()).area() <= MAX_TEXELS;
+    let is_whole = active.drawing.frozen.is_none() && active.drawing.carried.is_empty();
+    if is_little || budget.is_unlimited() || !is_whole || !has_one_view(active) {
+        return false;
+    }
+    let Ok(mut entity) = world.get_entity_mut(entity) else { return false };
+    active.draw_later();
+    if !entity.contains::<AsyncPlayback>() {
+        entity.insert(AsyncPlayback::default());
+    }
+    true
+}
+
 /// Shows what tasks have made of surfaces with baked cracks, and has made what they are to show now.
 pub(crate) fn play_async(
     mut commands: Commands,
@@ -274,7 +301,7 @@ pub(crate) fn play_async(
     let has_threads = threads.pool().is_some();
     for (entity, mut playback, mut cracked) in &mut playing {
         let Some(active) = cracked.get_mut() else { continue };
-        let mut is_new = true;
+        let (mut is_new, mut is_over) = (true, false);
         loop {
             if let Some(job) = playback.job.take() {
                 let before = active.playhead.playback.as_ref().map(|playback| playback.shown);
@@ -295,6 +322,15 @@ pub(crate) fn play_async(
             let is_stale = is_stale || shows_stale(active);
             let is_wanted = active.is_behind() || is_stale;
             let is_due = !budget.is_unlimited() && !active.turn.is_to_shatter;
+            // Cracks that were not baked are shown by the frames, unless all of them are to be drawn.
+            let is_baked = active.cracks.added.is_some();
+            if !is_baked && !shows_stale(active) {
+                if is_wanted {
+                    queues.mark_dirty(entity, &mut active.turn);
+                }
+                is_over = true;
+                break;
+            }
             if !(is_due && can_be_async(active)) {
                 playback.rest();
                 if !budget.is_unlimited()
@@ -326,7 +362,7 @@ pub(crate) fn play_async(
                 break;
             }
         }
-        if active.playhead.playback.is_none() {
+        if is_over || active.playhead.playback.is_none() {
             drop_in_background(core::mem::take(&mut *playback));
             commands.entity(entity).try_remove::<AsyncPlayback>();
         }

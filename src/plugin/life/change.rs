@@ -6,7 +6,7 @@ use crate::plugin::api::error::EntityLabel;
 use crate::plugin::api::{CrackBudget, CrackError, CrackState, CrackStatus, CrackSurface};
 use crate::plugin::carrier::kind::{Carrier, CarrierKind, Found, Shown};
 use crate::plugin::carrier::kinds;
-use crate::plugin::draw::async_playback::recall;
+use crate::plugin::draw::async_playback::{self, recall};
 use crate::plugin::gpu::memory::TextureMemory;
 use crate::plugin::jobs::deferred::hold;
 use crate::plugin::jobs::frame_time::{FrameClock, Timer};
@@ -193,7 +193,9 @@ fn update_preset(
     if active.drawing.profile != profile || *active.drawing.field.plan() != plan {
         active.drawing.profile = profile;
         active.drawing.field.set_layers(plan);
-        stamp_anew(active);
+        if !async_playback::redraw(world, entity, active) {
+            stamp_anew(active);
+        }
     }
     active.playhead.rate = preset.steps_per_second;
     active.preset = preset;
@@ -285,8 +287,10 @@ mod tests {
     use super::*;
     use crate::plugin::{
         CrackHit,
-        headless::{app, blank},
+        headless::{app, blank, shown},
     };
+    use bevy::time::TimeUpdateStrategy;
+    use core::time::Duration;
 
     /// Fault B5: a frame without time draws one surface anew when the preset of many changes, each has its turn, and a hit that comes
     /// after the change grows by the new preset.
@@ -319,7 +323,7 @@ mod tests {
             if settled(&app) {
                 break;
             }
-            std::thread::sleep(core::time::Duration::from_millis(1));
+            std::thread::sleep(Duration::from_millis(1));
         }
         assert!(settled(&app), "they do not crack");
 
@@ -347,5 +351,60 @@ mod tests {
         }
         assert!(frames >= SURFACES, "{frames} frames");
         assert!(app.world().resource::<Queues>().late.is_empty());
+    }
+
+    /// Fault B5: a large surface with other settings is drawn again by a task, or in slices of frames. It shows what it showed until then, and
+    /// what it would show if a frame had drawn it.
+    #[test]
+    fn b5_a_large_surface_is_drawn_again_beside_the_frames() {
+        let other =
+            CrackPreset { profile: CrackPreset::MUD.profile, look: CrackPreset::MUD.look, ..CrackPreset::CONCRETE };
+        let change = |budget: CrackBudget, no_threads: bool| {
+            let mut app = app(CrackBudget { milliseconds: 1e6, ..default() });
+            app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(20)));
+            let image = app.world_mut().resource_mut::<Assets<Image>>().add(blank(UVec2::new(600, 500)));
+            let surface = CrackSurface::new(CrackPreset::CONCRETE).with_seed(4);
+            let entity = app.world_mut().spawn((Sprite::from_image(image), surface)).id();
+            for i in 0..4 {
+                let at = Vec2::new(0.2 + 0.2 * i as f32, 0.5);
+                app.world_mut().trigger(CrackHit::uv(entity, at).with_energy(3.0));
+            }
+            let is_done = |app: &App| {
+                let state = app.world().get::<CrackState>(entity);
+                state.is_some_and(|state| state.hits == 4 && state.status == CrackStatus::Done)
+            };
+            for _ in 0..2000 {
+                app.update();
+                if is_done(&app) {
+                    break;
+                }
+            }
+            assert!(is_done(&app), "it does not crack");
+            app.insert_resource(budget);
+            app.world_mut().resource_mut::<crate::plugin::jobs::threads::Threads>().are_missing = no_threads;
+            app.world_mut().get_mut::<CrackSurface>(entity).expect("it is there").preset = other.clone().into();
+            let mut pictures = vec![shown(&app, entity)];
+            for _ in 0..400 {
+                app.update();
+                let now = shown(&app, entity);
+                if pictures.last() != Some(&now) {
+                    pictures.push(now);
+                }
+                std::thread::sleep(Duration::from_millis(1));
+            }
+            assert!(is_done(&app) && app.world().get::<async_playback::AsyncPlayback>(entity).is_none());
+            assert!(active(app.world(), entity).is_some_and(|active| active.playhead.playback.is_none()));
+            // It cracks on as all others.
+            app.world_mut().trigger(CrackHit::uv(entity, Vec2::new(0.5, 0.2)));
+            (0..300).for_each(|_| app.update());
+            (pictures, shown(&app, entity))
+        };
+        let (in_a_frame, after) = change(CrackBudget { milliseconds: 1e6, ..default() }, false);
+        assert_eq!(in_a_frame.len(), 2);
+        for no_threads in [false, true] {
+            let (beside, after_beside) = change(CrackBudget { milliseconds: 0.0, ..default() }, no_threads);
+            assert!(beside == in_a_frame, "{} pictures", beside.len());
+            assert!(after_beside == after);
+        }
     }
 }

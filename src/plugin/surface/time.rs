@@ -166,6 +166,18 @@ impl Active {
         })
     }
 
+    /// Has all that it shows drawn again, when it is next drawn.
+    pub(crate) fn draw_later(&mut self) {
+        let (due, had_playback) = (self.playhead.due, self.playhead.playback.is_some());
+        let (size, profile) = (self.drawing.field.frame.size(), self.drawing.profile);
+        let playback = self.open_playback();
+        playback.replay = Replay::stale(size, profile);
+        if !had_playback {
+            playback.want += due;
+        }
+        self.drawing.redrawn += 1;
+    }
+
     /// Goes by `clock` from now on, jumping if it says so.
     pub(crate) fn follow(&mut self, clock: &mut CrackClock) {
         self.stand_still();
