@@ -31,32 +31,29 @@ impl Drainage {
         let mut flood = Flood { width, height, filled: values.to_vec(), rank: vec![OPEN; values.len()] };
         let mut into: Vec<u32> = (0..values.len() as u32).collect();
         let mut order = Vec::with_capacity(values.len());
-        let (mut queue, mut entered) = (BinaryHeap::new(), vec![false; values.len()]);
-        let mut count = 0u32;
+        // The sea is lower than all else, so it needs no queue.
+        for (cell, _) in (0..).zip(values).filter(|(_, height)| **height <= 0.0) {
+            flood.reach(cell, &mut order);
+        }
+        let mut queue =
+            Queue { heap: BinaryHeap::new(), entered: flood.rank.iter().map(|rank| *rank != OPEN).collect(), count: 0 };
         for (i, &value) in values.iter().enumerate() {
-            let (x, y) = (i % width, i / width);
-            if value <= 0.0 || x == 0 || y == 0 || x + 1 == width || y + 1 == height {
-                entered[i] = true;
-                queue.push(Reverse((key(value), count, i as u32)));
-                count += 1;
+            if i % width == 0 || i % width + 1 == width || i < width || i / width + 1 == height {
+                queue.enter(i, value);
             }
         }
-        let outlets = entered.clone();
-        while let Some(Reverse((_, _, cell))) = queue.pop() {
+        let outlets = queue.entered.clone();
+        let sea = order.clone();
+        for cell in sea {
+            flood.spread(cell as usize, &mut queue);
+        }
+        while let Some(Reverse((_, _, cell))) = queue.heap.pop() {
             let i = cell as usize;
-            flood.rank[i] = order.len() as u32;
-            order.push(cell);
+            flood.reach(cell, &mut order);
             if !outlets[i] {
                 into[i] = flood.downhill(i);
             }
-            for (next, _) in flood.around(i) {
-                if !entered[next] {
-                    entered[next] = true;
-                    flood.filled[next] = flood.filled[next].max(flood.filled[i]);
-                    queue.push(Reverse((key(flood.filled[next]), count, next as u32)));
-                    count += 1;
-                }
-            }
+            flood.spread(i, &mut queue);
         }
         Self { order, into, width }
     }
@@ -84,6 +81,24 @@ impl Drainage {
     }
 }
 
+/// Cells that the flood comes to, the lowest first, and those of a height in turn.
+struct Queue {
+    heap: BinaryHeap<Reverse<(u32, u32, u32)>>,
+    /// Which cells are or were in it, or need not be.
+    entered: Vec<bool>,
+    count: u32,
+}
+
+impl Queue {
+    fn enter(&mut self, i: usize, height: f32) {
+        if !self.entered[i] {
+            self.entered[i] = true;
+            self.heap.push(Reverse((key(height), self.count, i as u32)));
+            self.count += 1;
+        }
+    }
+}
+
 /// The state of a flood.
 struct Flood {
     width: usize,
@@ -94,6 +109,21 @@ struct Flood {
 }
 
 impl Flood {
+    fn reach(&mut self, cell: u32, order: &mut Vec<u32>) {
+        self.rank[cell as usize] = order.len() as u32;
+        order.push(cell);
+    }
+
+    /// Enters the cells around a cell, no lower than it.
+    fn spread(&mut self, i: usize, queue: &mut Queue) {
+        for (next, _) in self.around(i) {
+            if !queue.entered[next] {
+                self.filled[next] = self.filled[next].max(self.filled[i]);
+                queue.enter(next, self.filled[next]);
+            }
+        }
+    }
+
     /// The cells around a cell, and their distances in cells.
     fn around(&self, i: usize) -> impl Iterator<Item = (usize, f32)> + use<> {
         let (x, y) = (i % self.width, i / self.width);

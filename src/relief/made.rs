@@ -78,7 +78,7 @@ impl ReliefSettings {
     pub fn island() -> Self {
         Self {
             shape: ReliefShape::Island,
-            contours: ReliefParams { steepness: 0.4, steep_angle: -2.2, ..ReliefParams::IMPROVED },
+            contours: ReliefParams { steepness: 0.6, steep_angle: -2.2, ..ReliefParams::IMPROVED },
             heights: HeightParams { step: 0.014, floor: 4.0, roughness: 0.35, ..HeightParams::DEFAULT },
             weathering: Weathering::LAND,
             colors: TerrainColors::ISLAND,

@@ -102,6 +102,13 @@ impl Stones {
     }
 }
 
+impl Stones {
+    /// The stone at a texel of the surface.
+    pub(super) fn at(&self, x: usize, y: usize) -> Option<&Stone> {
+        self.list.get((self.labels.row(y)[x] as usize).checked_sub(1)?)
+    }
+}
+
 impl Sum {
     fn add(&mut self, place: [u32; 2], height: f32) {
         self.texels += 1;

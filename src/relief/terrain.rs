@@ -70,7 +70,7 @@ pub struct Woods {
 pub struct Rivers {
     /// sRGB.
     pub color: [u8; 3],
-    /// Ground whose water makes a river, square pattern units. 0.0001..=256.
+    /// Ground whose water makes a river at its mouth, square pattern units. 0.0001..=256.
     pub gather: f32,
     /// Width of the widest, pattern units. 0.0001..=1.
     pub width: f32,
@@ -148,11 +148,11 @@ impl TerrainColors {
         steep: [0.5, 1.6],
         stratum: 0.022,
         strata: 0.6,
-        cavity: 0.9,
+        cavity: 0.75,
         variety: 0.6,
         stones: Some(StoneColors { gap: [62, 53, 44], tone: 0.6 }),
         stains: Some(Patches { color: [132, 86, 54], share: 0.3 }),
-        lichen: Some(Patches { color: [158, 160, 134], share: 0.2 }),
+        lichen: Some(Patches { color: [158, 160, 134], share: 0.16 }),
         woods: None,
         rivers: None,
         light: 0.35,
@@ -179,7 +179,7 @@ impl TerrainColors {
         stains: None,
         lichen: None,
         woods: Some(Woods { color: [50, 76, 40], spread: 0.76, top: 0.62, crown: 0.0055 }),
-        rivers: Some(Rivers { color: [60, 106, 128], gather: 0.015, width: 0.008 }),
+        rivers: Some(Rivers { color: [60, 106, 128], gather: 0.02, width: 0.0048 }),
         light: 0.35,
     };
 

@@ -120,7 +120,7 @@ impl<'a> Painter<'a> {
             noise([0.25; 2], 6, 0.62),
             noise([0.035; 2], 4, 0.75),
             noise([0.012; 2], 3, 0.8),
-            noise([0.035, 0.3], if colors.stains.is_some() { 4 } else { 0 }, 0.62),
+            noise([0.035, 0.3], if colors.stains.is_some() { 3 } else { 0 }, 0.62),
         ];
         let measure = colors.rivers.map(|rivers| Measure { gather: rivers.gather, width: rivers.width });
         let is_wet = colors.woods.is_some() || colors.rivers.is_some();
@@ -231,22 +231,36 @@ impl<'a> Painter<'a> {
 
     /// The surface of a stone, or what lies beside it.
     fn stone(&self, stones: &StoneColors, place: &Place, ground: Vec3, steep: f32) -> Vec3 {
-        let label = self.stones.as_ref().map_or(0, |stones| stones.labels.row(place.y)[place.x]);
-        let list = self.stones.as_ref().map_or(&[][..], |stones| &stones.list);
-        let seed = (label as usize).checked_sub(1).and_then(|i| list.get(i)).map_or(0, |stone| stone.seed);
-        let mut color = ground.lerp(self.rock(place, seed), 0.35 + 0.4 * steep);
-        if seed != 0 {
-            let [light, warm, ..] = unit_draws(seed ^ 0x70_4E);
+        let share = smoothstep(STONE[0], STONE[1], place.height + 0.003 * place.noise[1]);
+        let gap = || self.gap(stones, place, ground);
+        let face = || self.face(stones, place, ground, steep);
+        if share <= 0.0 {
+            gap()
+        } else if share < 1.0 {
+            gap().lerp(face(), share)
+        } else {
+            face()
+        }
+    }
+
+    /// What lies in a gap: earth and loose pieces of the same rock.
+    fn gap(&self, stones: &StoneColors, place: &Place, ground: Vec3) -> Vec3 {
+        let speckled = 1.0 + 0.2 * self.colors.variety * place.noise[2] + 0.2 * place.noise[1];
+        let piece = ground.lerp(self.rock(place, 0), 0.5) * 0.7;
+        rgb(stones.gap).lerp(piece, smoothstep(-0.1, 0.5, place.edge[0])) * speckled.max(0.2)
+    }
+
+    /// The surface of a stone.
+    fn face(&self, stones: &StoneColors, place: &Place, ground: Vec3, steep: f32) -> Vec3 {
+        let stone = self.stones.as_ref().and_then(|stones| stones.at(place.x, place.y));
+        let mut color = ground.lerp(self.rock(place, stone.map_or(0, |stone| stone.seed)), 0.35 + 0.4 * steep);
+        if let Some(stone) = stone {
+            let [light, warm, ..] = unit_draws(stone.seed ^ 0x70_4E);
             let warm = stones.tone * 0.22 * (warm - 0.5);
             color *= 1.0 + stones.tone * 0.75 * (light - 0.5);
             color *= Vec3::new(1.0 + warm, 1.0 + 0.15 * warm, 1.0 - warm);
         }
-        color = self.patches(color, place);
-        let speckled = 1.0 + 0.2 * self.colors.variety * place.noise[2] + 0.2 * place.noise[1];
-        // Loose pieces are of the same rock.
-        let piece = ground.lerp(self.rock(place, 0), 0.5) * 0.7;
-        let gap = rgb(stones.gap).lerp(piece, smoothstep(-0.1, 0.5, place.edge[0])) * speckled.max(0.2);
-        gap.lerp(color, smoothstep(STONE[0], STONE[1], place.height + 0.003 * place.noise[1]))
+        self.patches(color, place)
     }
 
     /// Stains and lichen on rock.

@@ -4,7 +4,7 @@ use super::{drainage::Drainage, terrain_blur::blurred, terrain_check::smoothstep
 use crate::{Grid, math::Rng, pattern::SurfaceFrame};
 use glam::UVec2;
 
-/// Cells of the lattice along the shorter side of a surface, at most.
+/// Cells of the lattice along the shorter side of a surface, about.
 const CELLS: u32 = 176;
 
 /// Most cells of the lattice along the longer side.
@@ -15,6 +15,9 @@ const ROUNDS: u32 = 20;
 
 /// How much ground rises in a round, as a share of its height at first.
 const RISE: f32 = 0.1;
+
+/// Heights at first, as shares of those of the contours.
+const START: [f32; 2] = [0.25, 0.45];
 
 /// How fast rivers cut: height per round, for the water of one square unit and a slope of 1.
 const CUT: f32 = 0.42;
@@ -33,7 +36,7 @@ const AROUND: f32 = 0.045;
 
 /// Texels along a side of a cell of the lattice.
 pub(super) fn block(size: UVec2) -> u32 {
-    (size.min_element() / CELLS).max(size.max_element().div_ceil(MOST)).max(1)
+    ((2 * size.min_element() + CELLS) / (2 * CELLS)).max(size.max_element().div_ceil(MOST)).max(1)
 }
 
 /// The coarse lattice of a height field: means of blocks of texels.
@@ -75,7 +78,7 @@ impl Valleys {
         let mut rng = Rng::new(seed).stream("valleys");
         let mut now = first.clone();
         for height in now.as_mut_slice() {
-            *height *= 0.25 + 0.2 * rng.unit();
+            *height *= START[0] + (START[1] - START[0]) * rng.unit();
         }
         Self { first, now, cell, round: 0 }
     }
@@ -187,6 +190,68 @@ impl Fine {
         for (x, out) in self.row.iter_mut().enumerate() {
             let (columns, shares) = four((x as f32 + 0.5) * self.scale, self.column.len());
             *out = (0..4).map(|i| self.column[columns[i]] * shares[i]).sum();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::relief::{Weathering, weathered};
+
+    fn cone(size: [u32; 2]) -> (Grid<f32>, SurfaceFrame) {
+        let frame = SurfaceFrame::new(size.into()).unwrap();
+        let height = |i: u32| {
+            let pos = frame.to_pos(UVec2::new(i % size[0], i / size[0]).as_vec2() + 0.5);
+            0.3 - 0.7 * pos.distance(0.5 * frame.extent())
+        };
+        (Grid::from_vec(size.into(), (0..size[0] * size[1]).map(height).collect()).unwrap(), frame)
+    }
+
+    /// The even slope of a cone gets valleys: ground at the same distance from its top differs more than before.
+    #[test]
+    fn rivers_wear_valleys() {
+        let (heights, frame) = cone([220, 220]);
+        let valleys = Weathering { valleys: 1.0, ..Weathering::NONE };
+        let worn = weathered(&heights, &frame, &valleys, 5).unwrap();
+        let around = |grid: &Grid<f32>| {
+            let ring =
+                grid.as_slice().iter().zip(heights.as_slice()).filter(|(_, height)| (0.14..0.15).contains(*height));
+            let ring: Vec<_> = ring.map(|(value, _)| *value).collect();
+            ring.iter().copied().fold(f32::MIN, f32::max) - ring.iter().copied().fold(f32::MAX, f32::min)
+        };
+        assert!(around(&heights) < 0.011 && around(&worn) > 0.05, "{}", around(&worn));
+        // The sea and the shore stay.
+        let both = || worn.as_slice().iter().zip(heights.as_slice());
+        assert!(both().all(|(worn, height)| (*height > 0.0) == (*worn > 0.0) && (*height > 0.0 || worn == height)));
+        assert_eq!(worn, weathered(&heights, &frame, &valleys, 5).unwrap());
+        assert_ne!(worn, weathered(&heights, &frame, &valleys, 6).unwrap());
+    }
+
+    /// Surfaces of all shapes and heights can be worn.
+    #[test]
+    fn nothing_is_too_small_or_too_high() {
+        for size in [[1, 1], [1, 9], [64, 1], [2, 2], [300, 5]] {
+            let (mut heights, frame) = cone(size);
+            for scale in [1.0, -1.0, 1e4] {
+                heights.as_mut_slice().iter_mut().for_each(|height| *height *= scale);
+                for weathering in [Weathering::LAND, Weathering::ROCK] {
+                    let worn = weathered(&heights, &frame, &weathering, 1).unwrap();
+                    assert!(worn.as_slice().iter().all(|height| height.is_finite()), "{size:?} {scale}");
+                }
+            }
+        }
+    }
+
+    /// Coarse values that are the same everywhere stay so between cells.
+    #[test]
+    fn fine_rows_keep_constants() {
+        let size = UVec2::new(400, 360);
+        let cells = size.map(|side| side.div_ceil(block(size)));
+        let mut fine = Fine::new(Grid::new(cells, 0.75), size);
+        for y in [0, 1, 200, 359] {
+            fine.read(y);
+            assert!(fine.row.iter().all(|value| (value - 0.75).abs() < 1e-5));
         }
     }
 }

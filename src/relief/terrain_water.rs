@@ -14,8 +14,11 @@ const SPREAD: usize = 1;
 /// Rounds in which the corners of rivers are cut.
 const ROUNDS: usize = 3;
 
+/// What a source gathers, as a share of what makes a river at its mouth.
+const SOURCE: f32 = 0.18;
+
 /// How far the points of rivers are moved aside, cells.
-const WINDING: f32 = 1.1;
+const WINDING: f32 = 0.8;
 
 /// The water on the ground, from the drainage of its heights.
 pub(super) struct Water {
@@ -65,35 +68,41 @@ impl Course<'_> {
         block(self.frame.size()) as f32
     }
 
-    /// Draws every river from its source down to a larger one, or to the sea.
+    /// What the mouth of each cell's river gathers, cells.
+    fn mouths(&self) -> Vec<f32> {
+        let mut mouths = vec![0.0; self.gathered.len()];
+        for &at in &self.drainage.order {
+            let (i, into) = (at as usize, self.drainage.into[at as usize]);
+            let is_mouth = into == at || self.drainage.into[into as usize] == into;
+            mouths[i] = if is_mouth { self.gathered[i] } else { mouths[into as usize] };
+        }
+        mouths
+    }
+
+    /// Draws every river from its sources down to a larger one, or to the sea.
     fn draw(&self, out: &mut Grid<f32>) {
         let cell = self.cell() / self.frame.texels_per_unit();
         let least = (self.measure.gather / (cell * cell)).max(2.0);
-        let is_river = |i: usize| self.gathered[i] >= least && self.ground.as_slice()[i] > 0.0;
-        let mut largest = vec![0.0f32; self.gathered.len()];
+        let mouths = self.mouths();
+        let is_river = |i: usize| {
+            let is_land = self.drainage.into[i] as usize != i && self.ground.as_slice()[i] > 0.0;
+            is_land && mouths[i] >= least && self.gathered[i] >= SOURCE * least
+        };
+        let mut has_source = vec![false; self.gathered.len()];
         let mut is_done = vec![false; self.gathered.len()];
         for (i, &into) in self.drainage.into.iter().enumerate() {
-            if is_river(i) && into as usize != i {
-                largest[into as usize] = largest[into as usize].max(self.gathered[i]);
-            }
+            has_source[into as usize] |= is_river(i);
         }
         for &source in self.drainage.order.iter().rev() {
             let mut at = source as usize;
-            if !is_river(at) || largest[at] > 0.0 || is_done[at] {
+            if !is_river(at) || has_source[at] {
                 continue;
             }
             let mut line = vec![self.point(at, least)];
-            loop {
-                let into = self.drainage.into[at] as usize;
-                let is_end = into == at || !is_river(into) || is_done[into];
+            while is_river(at) && !is_done[at] {
                 is_done[at] = true;
-                if into != at {
-                    line.push(self.point(into, least));
-                }
-                if is_end {
-                    break;
-                }
-                at = into;
+                at = self.drainage.into[at] as usize;
+                line.push(self.point(at, least));
             }
             self.wind(&mut line);
             for _ in 0..ROUNDS {
@@ -118,7 +127,7 @@ impl Course<'_> {
         let width = self.ground.width();
         let place = Vec2::new((i % width) as f32 + 0.5, (i / width) as f32 + 0.5) * self.cell();
         let share = (self.gathered[i] / least).sqrt();
-        (place, self.measure.width * self.frame.texels_per_unit() * (0.3 * share).min(1.0))
+        (place, self.measure.width * self.frame.texels_per_unit() * (0.7 * share).min(1.0))
     }
 }
 

@@ -40,7 +40,7 @@ pub(super) fn around(seed: u64, place: Vec2) -> impl Iterator<Item = (Vec2, [f32
 }
 
 /// Sizes of gullies, each half as wide as the one before.
-const GULLIES: u32 = 4;
+const GULLIES: u32 = 3;
 
 /// How far a site counts, in cells.
 const REACH: f32 = 1.0 + MARGIN;

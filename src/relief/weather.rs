@@ -275,7 +275,7 @@ impl WeatherJob {
                 let is_open = end < self.heights.height();
                 if is_open { Stage::Carve { valleys, headlands, row: end } } else { self.cut() }
             }
-            Stage::Cut { faces, row } => {
+            Stage::Cut { mut faces, row } => {
                 let end = end(row);
                 for y in row..end {
                     faces.cut_row(y, self.heights.row_mut(y));
