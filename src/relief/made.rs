@@ -88,7 +88,8 @@ impl ReliefSettings {
     /// A mountain, seen from above.
     #[must_use]
     pub fn mountain() -> Self {
-        Self { colors: TerrainColors::MOUNTAIN, ..Self::island() }
+        let weathering = Weathering { coast: 0.0, ..Weathering::LAND };
+        Self { colors: TerrainColors::MOUNTAIN, weathering, ..Self::island() }
     }
 
     /// Checks every number against its range.

@@ -195,7 +195,7 @@ impl TerrainColors {
         ],
         transition: 0.08,
         rock: [[112, 104, 97], [82, 79, 79]],
-        steep: [0.8, 1.5],
+        steep: [1.0, 1.8],
         stratum: 0.018,
         strata: 0.45,
         cavity: 0.6,
@@ -247,5 +247,30 @@ impl TerrainColors {
 impl Default for TerrainColors {
     fn default() -> Self {
         Self::ROCK
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_out_of_range_are_named() {
+        let with = |change: fn(&mut TerrainColors)| {
+            let patches = Some(Patches { color: [9; 3], share: 0.5 });
+            let mut colors = TerrainColors { stains: patches, lichen: patches, ..TerrainColors::ISLAND };
+            colors.stones = TerrainColors::ROCK.stones;
+            assert_eq!(colors.validate(), Ok(()));
+            change(&mut colors);
+            colors.validate().unwrap_err().to_string()
+        };
+        assert!(with(|colors| colors.stones.as_mut().unwrap().tone = f32::NAN).contains("`stones.tone`"));
+        assert!(with(|colors| colors.stains.as_mut().unwrap().share = 1.5).contains("`stains.share`"));
+        assert!(with(|colors| colors.lichen.as_mut().unwrap().share = -0.1).contains("`lichen.share`"));
+        assert!(with(|colors| colors.woods.as_mut().unwrap().spread = f32::INFINITY).contains("`woods.spread`"));
+        assert!(with(|colors| colors.woods.as_mut().unwrap().top = f32::NAN).contains("`woods.top`"));
+        assert!(with(|colors| colors.woods.as_mut().unwrap().crown = 0.0).contains("`woods.crown`"));
+        assert!(with(|colors| colors.rivers.as_mut().unwrap().gather = 0.0).contains("`rivers.gather`"));
+        assert!(with(|colors| colors.rivers.as_mut().unwrap().width = f32::NAN).contains("`rivers.width`"));
     }
 }

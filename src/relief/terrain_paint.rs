@@ -328,7 +328,11 @@ impl<'a> Painter<'a> {
         let noise = place.noise;
         let low = self.colors.ground[1].from;
         let high = smoothstep(woods.top * 0.7, woods.top * 1.1, place.share + 0.06 * noise[1]);
-        let shore = 1.0 - smoothstep(low, 3.0 * low, place.share + 0.01 * noise[1]);
+        let shore = if self.colors.sea.is_some() {
+            1.0 - smoothstep(low, 3.0 * low, place.share + 0.01 * noise[1])
+        } else {
+            0.0
+        };
         let bare = 1.3 * high + 1.4 * shore + 1.3 * smoothstep(1.05, 1.8, place.slope);
         let lush = 1.6 * (woods.spread - 0.5) + 1.3 * (place.moist - 0.42) + 0.55 * noise[0] + 0.3 * noise[1];
         let hollow = -0.3 * (place.edge[1] + 0.5 * place.edge[0]);
@@ -360,5 +364,62 @@ impl<'a> Painter<'a> {
         // Foam at the shore.
         let foam = 0.6 * (1.0 - smoothstep(0.0, 0.06, -place.height / sea.half + 0.035 * noise[1]));
         color.lerp(Vec3::new(236.0, 242.0, 240.0), foam) * (1.0 + 0.02 * noise[1])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn mean(picture: &Grid<[u8; 4]>, columns: std::ops::Range<usize>) -> Vec3 {
+        let texels = (0..picture.height()).flat_map(|y| &picture.row(y)[columns.clone()]);
+        texels.map(|&[r, g, b, _]| rgb([r, g, b])).sum::<Vec3>() / (columns.len() * picture.height()) as f32
+    }
+
+    /// Two flat stones have colors of their own, the gap between them is darker.
+    #[test]
+    fn stones_differ_and_gaps_are_dark() {
+        let size = [200, 100];
+        let frame = SurfaceFrame::new(size.into()).unwrap();
+        let heights = (0..size[0] * size[1]).map(|i| if (90..110).contains(&(i % size[0])) { -0.01 } else { 0.05 });
+        let heights = Grid::from_vec(size.into(), heights.collect()).unwrap();
+        let even = TerrainColors { variety: 0.0, strata: 0.0, stains: None, lichen: None, ..TerrainColors::ROCK };
+        let paint = |tone: f32| {
+            let stones = even.stones.map(|stones| StoneColors { tone, ..stones });
+            colors(&heights, &frame, &TerrainColors { stones, ..even }, 4).unwrap()
+        };
+        let differ = |picture: &Grid<[u8; 4]>| mean(picture, 10..70).distance(mean(picture, 130..190));
+        let (plain, toned) = (paint(0.0), paint(1.0));
+        assert!(differ(&plain) < 8.0 && differ(&toned) > 12.0, "{} {}", differ(&plain), differ(&toned));
+        let gap = mean(&toned, 95..105).element_sum();
+        assert!(gap < 0.7 * mean(&toned, 10..70).element_sum() && gap < 0.7 * mean(&toned, 130..190).element_sum());
+        assert_eq!(toned, paint(1.0));
+    }
+
+    /// In a valley there are woods and a river; on its sides, which are steep, there are none.
+    #[test]
+    fn woods_and_rivers_lie_in_valleys() {
+        let size = [240, 240];
+        let frame = SurfaceFrame::new(size.into()).unwrap();
+        let height = |i: u32| {
+            let (x, y) = ((i % size[0]) as f32 / 240.0, (i / size[0]) as f32 / 240.0);
+            0.02 + 0.05 * x + (2.2 * ((y - 0.5).abs() - 0.1)).max(0.0)
+        };
+        let heights = Grid::from_vec(size.into(), (0..size[0] * size[1]).map(height).collect()).unwrap();
+        let bare = TerrainColors::ISLAND.woods.map(|woods| Woods { spread: 0.0, ..woods });
+        let plain = TerrainColors { sea: None, woods: bare, rivers: None, variety: 0.0, ..TerrainColors::ISLAND };
+        let woods = TerrainColors { woods: TerrainColors::ISLAND.woods, ..plain };
+        let rivers = TerrainColors { rivers: TerrainColors::ISLAND.rivers, ..plain };
+        let paint = |look: &TerrainColors| colors(&heights, &frame, look, 4).unwrap();
+        let (before, woods, rivers) = (paint(&plain), paint(&woods), paint(&rivers));
+        let changed = |picture: &Grid<[u8; 4]>, rows: std::ops::Range<usize>| {
+            let far = |y: usize, x: usize| {
+                let green = |grid: &Grid<[u8; 4]>| i32::from(grid.row(y)[x][0]);
+                (green(picture) - green(&before)).abs() > 12
+            };
+            rows.map(|y| (40..200).filter(|x| far(y, *x)).count()).sum::<usize>()
+        };
+        assert!(changed(&woods, 105..135) > 1000 && changed(&woods, 10..50) == 0, "{}", changed(&woods, 105..135));
+        assert!((20..2000).contains(&changed(&rivers, 95..145)) && changed(&rivers, 10..50) == 0);
     }
 }

@@ -75,8 +75,16 @@ impl Weathering {
     };
 
     /// Rock that breaks in flat faces, with loose pieces in its gaps.
-    pub const ROCK: Self =
-        Self { bend: 0.006, faces: 1.0, chips: 0.025, chip_size: 0.09, rubble: 0.02, grain: 0.0007, ..Self::NONE };
+    pub const ROCK: Self = Self {
+        bend: 0.012,
+        bend_size: 0.3,
+        faces: 1.0,
+        chips: 0.025,
+        chip_size: 0.09,
+        rubble: 0.02,
+        grain: 0.0007,
+        ..Self::NONE
+    };
 
     /// Land with soil on it: valleys, gullies and ridges.
     pub const LAND: Self = Self {
@@ -86,7 +94,7 @@ impl Weathering {
         coast: 1.0,
         gullies: 0.2,
         gully_width: 0.035,
-        grain: 0.0005,
+        grain: 0.0008,
         ..Self::NONE
     };
 
@@ -382,6 +390,10 @@ mod tests {
         assert!(with(Weathering { bend: f32::NAN, ..Weathering::NONE }).contains("`bend`"));
         assert!(with(Weathering { gully_width: 0.0, ..Weathering::LAND }).contains("`gully_width`"));
         assert!(with(Weathering { chips: 2.0, ..Weathering::ROCK }).contains("`chips`"));
+        assert!(with(Weathering { valleys: f32::NAN, ..Weathering::LAND }).contains("`valleys`"));
+        assert!(with(Weathering { coast: -0.1, ..Weathering::LAND }).contains("`coast`"));
+        assert!(with(Weathering { faces: f32::NAN, ..Weathering::ROCK }).contains("`faces`"));
+        assert!(with(Weathering { rubble: 0.6, ..Weathering::ROCK }).contains("`rubble`"));
         let broken = Grid::new([8, 8].into(), f32::INFINITY);
         assert!(weathered(&broken, &frame, &Weathering::ROCK, 1).is_err());
     }
