@@ -25,6 +25,9 @@ pub const MAX_HEIGHT_POINTS: usize = 1 << 22;
 /// Largest level, up or down.
 pub const MAX_LEVEL: i32 = 4096;
 
+/// How much higher a level is than the one below it at least, however much steps taper, in steps: slopes divide by it.
+const LEAST_STEP: f32 = 1e-4;
+
 /// Largest coordinate of a ring, pattern units.
 const MOST_PLACE: f32 = 1e4;
 
@@ -157,7 +160,11 @@ impl HeightMap {
         let height = |level: i32| {
             let deviation = params.variation * (hash_unit(seed, u64::from(level as u32)) - 0.5);
             let step = if level > 0 { ops::powf(1.0 - params.taper, level as f32) } else { 1.0 };
-            let rise = if level > 0 && params.taper > 0.0 { (1.0 - step) / params.taper } else { level as f32 };
+            let rise = if level > 0 && params.taper > 0.0 {
+                (1.0 - step) / params.taper + LEAST_STEP * level as f32
+            } else {
+                level as f32
+            };
             params.step * (rise + if level == 0 { 0.0 } else { step * deviation })
         };
         Ok(Self {

@@ -63,6 +63,18 @@ fn texels(grid: &Grid<f32>) -> impl Iterator<Item = (UVec2, f32)> {
 }
 
 #[test]
+fn steps_that_taper_to_nothing_still_rise() {
+    let rings = (0..60).map(|level| circle(Vec2::splat(0.5), 0.45 - 0.007 * level as f32, level)).collect();
+    let contours = Contours { rings, distance: 0.007 };
+    for (taper, roughness) in [(0.5, 0.3), (0.95, 0.0), (0.95, 1.0)] {
+        let params = HeightParams { taper, roughness, variation: 0.9, ..HeightParams::DEFAULT };
+        let map = HeightMap::new(&contours, &params, frame(90), 1).unwrap();
+        assert!((0..59).all(|level| map.level_height(level + 1) > map.level_height(level)));
+        assert!(texels(&map.heights(1)).all(|(_, height)| height.is_finite()));
+    }
+}
+
+#[test]
 fn every_texel_lies_between_the_levels_around_it() {
     for seed in 0..12 {
         let mut rng = Rng::new(seed);

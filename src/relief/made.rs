@@ -9,8 +9,9 @@ use super::{
     heights_params::HeightParams,
     params::ReliefParams,
     shapes::ReliefShape,
-    terrain::{TerrainColors, colors},
+    terrain::TerrainColors,
     terrain_normals::normals,
+    terrain_paint::colors,
     weather::{WeatherJob, Weathering},
 };
 use crate::{
@@ -65,8 +66,8 @@ impl ReliefSettings {
         let rough = HeightParams { roughness: 0.2, variation: 0.7, noise_scale: 0.12, ..HeightParams::DEFAULT };
         Self {
             shape: ReliefShape::Wall,
-            contours: ReliefParams { distance: 0.012, outward: 5, ..ReliefParams::IMPROVED },
-            heights: HeightParams { step: 0.014, taper: 0.2, floor: 2.0, ..rough },
+            contours: ReliefParams { distance: 0.012, displacement: 0.15, outward: 2, ..ReliefParams::IMPROVED },
+            heights: HeightParams { step: 0.03, taper: 0.5, floor: 2.0, ..rough },
             weathering: Weathering::ROCK,
             colors: TerrainColors::ROCK,
         }
@@ -77,7 +78,7 @@ impl ReliefSettings {
     pub fn island() -> Self {
         Self {
             shape: ReliefShape::Island,
-            contours: ReliefParams::IMPROVED,
+            contours: ReliefParams { steepness: 0.6, steep_angle: -2.2, ..ReliefParams::IMPROVED },
             heights: HeightParams { step: 0.014, floor: 4.0, roughness: 0.35, ..HeightParams::DEFAULT },
             weathering: Weathering::LAND,
             colors: TerrainColors::ISLAND,
@@ -87,7 +88,8 @@ impl ReliefSettings {
     /// A mountain, seen from above.
     #[must_use]
     pub fn mountain() -> Self {
-        Self { colors: TerrainColors::MOUNTAIN, ..Self::island() }
+        let weathering = Weathering { coast: 0.0, ..Weathering::LAND };
+        Self { colors: TerrainColors::MOUNTAIN, weathering, ..Self::island() }
     }
 
     /// Checks every number against its range.

@@ -1,6 +1,6 @@
 //! Meshes of height fields, as plain arrays: [`ReliefMesh`].
 
-use super::{heights_error::HeightError, terrain::check_heights};
+use super::{heights_error::HeightError, terrain_check::check_heights};
 use crate::Grid;
 use glam::Vec2;
 

@@ -34,6 +34,7 @@
 
 mod contours;
 mod crater;
+mod drainage;
 mod error;
 mod estimate;
 mod export;
@@ -57,11 +58,19 @@ mod params;
 mod scramble;
 mod seeds;
 mod shapes;
+mod shapes_island;
+mod shapes_wall;
 mod simplify;
+mod stones;
 mod terrain;
 mod terrain_blur;
+mod terrain_check;
+mod terrain_faces;
 mod terrain_noise;
 mod terrain_normals;
+mod terrain_paint;
+mod terrain_valleys;
+mod terrain_water;
 mod terrain_wear;
 #[cfg(test)]
 mod tests;
@@ -82,7 +91,8 @@ pub use mesh::{MAX_DETAIL, ReliefFrame, ReliefMesh};
 pub use params::{Join, MITER_LIMIT, Method, ReliefParams};
 pub use seeds::{MAX_COORDINATE, MAX_SEEDS};
 pub use shapes::ReliefShape;
-pub use terrain::{Ground, Sea, TerrainColors, colors};
+pub use terrain::{Ground, Patches, Rivers, Sea, StoneColors, TerrainColors, Woods};
 pub use terrain_normals::normals;
+pub use terrain_paint::colors;
 pub use trace::outlines;
 pub use weather::{Weathering, weathered};

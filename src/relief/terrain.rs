@@ -1,12 +1,6 @@
-//! Colors of height fields: [`TerrainColors`], [`colors`].
+//! Settings of the colors of height fields: [`TerrainColors`].
 
-use super::{heights_error::HeightError, terrain_blur::blurred, terrain_noise::RowNoise, terrain_normals::Slopes};
-use crate::{
-    Grid,
-    math::Rng,
-    pattern::{MAX_SIDE, SurfaceFrame},
-};
-use glam::Vec3;
+use super::heights_error::HeightError;
 
 /// Ground that is not steep, from a height on up to that of the next one.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,6 +24,56 @@ pub struct Sea {
     pub deep: [u8; 3],
     /// Depth at which the color is half way to `deep`, pattern units. 0.0001..=16.
     pub half: f32,
+}
+
+/// Stones with gaps between them: parts above height 0 that hang together.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct StoneColors {
+    /// sRGB of what lies in the gaps.
+    pub gap: [u8; 3],
+    /// How much colors change from stone to stone. 0..=1.
+    pub tone: f32,
+}
+
+/// A color that covers part of rock.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Patches {
+    /// sRGB.
+    pub color: [u8; 3],
+    /// Share of the rock that it covers, about. 0..=1.
+    pub share: f32,
+}
+
+/// Woods: dark crowns, in moist hollows first.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Woods {
+    /// sRGB.
+    pub color: [u8; 3],
+    /// How far they spread: 0 = nowhere, 1 = over all ground that is neither too high nor too steep. 0..=1.
+    pub spread: f32,
+    /// Where they end, as a share of the way from the sea or the lowest height to the highest. 0..=1.
+    pub top: f32,
+    /// Size of a crown, pattern units. 0.0005..=1.
+    pub crown: f32,
+}
+
+/// Rivers, from the drainage of the ground.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Rivers {
+    /// sRGB.
+    pub color: [u8; 3],
+    /// Ground whose water makes a river at its mouth, square pattern units. 0.0001..=256.
+    pub gather: f32,
+    /// Width of the widest, pattern units. 0.0001..=1.
+    pub width: f32,
 }
 
 /// What the ground looks like, by its height, slope and shape.
@@ -65,6 +109,21 @@ pub struct TerrainColors {
     pub cavity: f32,
     /// How much colors vary from place to place. 0..=1.
     pub variety: f32,
+    /// Stones with gaps between them, if there are any; default none.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub stones: Option<StoneColors>,
+    /// Stains that run down, as of iron; default none.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub stains: Option<Patches>,
+    /// Lichen; default none.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub lichen: Option<Patches>,
+    /// Woods; default none.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub woods: Option<Woods>,
+    /// Rivers; default none.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub rivers: Option<Rivers>,
     /// How much light from the top left and shade are part of the colors: 0 for surfaces that the game lights. 0..=1.
     pub light: f32,
 }
@@ -78,39 +137,49 @@ impl TerrainColors {
     pub const ROCK: Self = Self {
         sea: None,
         ground: [
-            ground(0.0, [104, 96, 87]),
-            ground(0.3, [124, 114, 101]),
-            ground(0.55, [138, 127, 112]),
-            ground(0.8, [151, 141, 126]),
-            ground(1.0, [163, 154, 140]),
+            ground(0.0, [96, 88, 79]),
+            ground(0.3, [120, 111, 99]),
+            ground(0.55, [134, 125, 112]),
+            ground(0.8, [146, 137, 123]),
+            ground(1.0, [154, 146, 133]),
         ],
         transition: 0.2,
-        rock: [[118, 104, 90], [94, 87, 81]],
+        rock: [[138, 121, 101], [104, 100, 96]],
         steep: [0.5, 1.6],
         stratum: 0.022,
         strata: 0.6,
-        cavity: 0.9,
+        cavity: 0.75,
         variety: 0.6,
+        stones: Some(StoneColors { gap: [62, 53, 44], tone: 0.6 }),
+        stains: Some(Patches { color: [132, 86, 54], share: 0.3 }),
+        lichen: Some(Patches { color: [158, 160, 134], share: 0.16 }),
+        woods: None,
+        rivers: None,
         light: 0.35,
     };
 
-    /// An island: sea, beach, grass, woods, rock and snow.
+    /// An island: sea, beach, meadows, woods, rivers, rock and snow.
     pub const ISLAND: Self = Self {
-        sea: Some(Sea { shallow: [86, 168, 170], deep: [16, 58, 98], half: 0.02 }),
+        sea: Some(Sea { shallow: [92, 178, 172], deep: [10, 44, 84], half: 0.016 }),
         ground: [
-            ground(0.0, [214, 196, 150]),
-            ground(0.045, [116, 136, 66]),
-            ground(0.3, [72, 100, 50]),
-            ground(0.68, [124, 116, 100]),
-            ground(0.86, [240, 243, 247]),
+            ground(0.0, [216, 199, 156]),
+            ground(0.012, [118, 132, 70]),
+            ground(0.36, [122, 124, 76]),
+            ground(0.6, [134, 127, 104]),
+            ground(0.73, [240, 243, 247]),
         ],
         transition: 0.1,
-        rock: [[122, 110, 97], [92, 86, 82]],
-        steep: [0.85, 1.5],
+        rock: [[128, 116, 102], [96, 90, 85]],
+        steep: [1.1, 1.9],
         stratum: 0.02,
         strata: 0.4,
         cavity: 0.55,
         variety: 0.7,
+        stones: None,
+        stains: None,
+        lichen: None,
+        woods: Some(Woods { color: [50, 76, 40], spread: 0.76, top: 0.62, crown: 0.0055 }),
+        rivers: Some(Rivers { color: [60, 106, 128], gather: 0.02, width: 0.0048 }),
         light: 0.35,
     };
 
@@ -126,11 +195,16 @@ impl TerrainColors {
         ],
         transition: 0.08,
         rock: [[112, 104, 97], [82, 79, 79]],
-        steep: [0.8, 1.5],
+        steep: [1.0, 1.8],
         stratum: 0.018,
         strata: 0.45,
         cavity: 0.6,
         variety: 0.65,
+        stones: None,
+        stains: None,
+        lichen: None,
+        woods: Some(Woods { color: [48, 68, 40], spread: 0.45, top: 0.45, crown: 0.007 }),
+        rivers: None,
         light: 0.35,
     };
 
@@ -151,6 +225,18 @@ impl TerrainColors {
         ];
         ranges.extend(self.ground.map(|ground| ("ground", ground.from, 0.0, 1.0)));
         ranges.extend(self.sea.map(|sea| ("sea", sea.half, 0.0001, 16.0)));
+        ranges.extend(self.stones.map(|stones| ("stones.tone", stones.tone, 0.0, 1.0)));
+        ranges.extend(self.stains.map(|stains| ("stains.share", stains.share, 0.0, 1.0)));
+        ranges.extend(self.lichen.map(|lichen| ("lichen.share", lichen.share, 0.0, 1.0)));
+        if let Some(woods) = self.woods {
+            ranges.push(("woods.spread", woods.spread, 0.0, 1.0));
+            ranges.push(("woods.top", woods.top, 0.0, 1.0));
+            ranges.push(("woods.crown", woods.crown, 0.0005, 1.0));
+        }
+        if let Some(rivers) = self.rivers {
+            ranges.push(("rivers.gather", rivers.gather, 0.0001, 256.0));
+            ranges.push(("rivers.width", rivers.width, 0.0001, 1.0));
+        }
         match ranges.into_iter().find(|(_, value, min, max)| !(*min..=*max).contains(value)) {
             Some((name, value, min, max)) => Err(HeightError::OutOfRange { name, value, min, max }),
             None => Ok(()),
@@ -164,174 +250,27 @@ impl Default for TerrainColors {
     }
 }
 
-/// Largest height, pattern units.
-const MOST_HEIGHT: f32 = 1e6;
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-/// Checks that heights are finite and neither too many nor too few.
-pub(super) fn check_heights(heights: &Grid<f32>, least: u32) -> Result<(), HeightError> {
-    let size = heights.size();
-    if size.min_element() < least || size.max_element() > MAX_SIDE {
-        return Err(HeightError::Size { width: size.x, height: size.y, least, most: MAX_SIDE });
-    }
-    let is_wrong = |height: &f32| !(-MOST_HEIGHT..=MOST_HEIGHT).contains(height);
-    match heights.as_slice().iter().position(is_wrong) {
-        Some(i) => Err(HeightError::Height { x: i as u32 % size.x, y: i as u32 / size.x }),
-        None => Ok(()),
-    }
-}
-
-/// The colors of a height field: `[red, green, blue, 255]`, sRGB.
-///
-/// Heights are in pattern units, of texels as `frame` tells. `seed` is that of the variety.
-///
-/// # Errors
-/// [`HeightError`] if a number of `colors` is out of range, or a height is not finite.
-///
-/// ```
-/// use bevy_crack::{Grid, pattern::SurfaceFrame, relief::{TerrainColors, colors}};
-///
-/// // Sea on the left, land on the right.
-/// let frame = SurfaceFrame::new([64, 64].into())?;
-/// let shore = (0..64 * 64).map(|i| (i % 64) as f32 / 320.0 - 0.1).collect();
-/// let heights = Grid::from_vec([64, 64].into(), shore).unwrap();
-/// let picture = colors(&heights, &frame, &TerrainColors::ISLAND, 1)?;
-/// let [red, _, blue, _] = picture.get(2, 30).unwrap();
-/// assert!(blue > red);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-pub fn colors(
-    heights: &Grid<f32>,
-    frame: &SurfaceFrame,
-    colors: &TerrainColors,
-    seed: u64,
-) -> Result<Grid<[u8; 4]>, HeightError> {
-    colors.validate()?;
-    check_heights(heights, 1)?;
-    let mut painter = Painter::new(heights, frame, colors, seed);
-    let mut out = Grid::new(heights.size(), [0, 0, 0, 255]);
-    for y in 0..heights.height() {
-        painter.paint_row(y, out.row_mut(y));
-    }
-    Ok(out)
-}
-
-/// Radii of the two blurs that tell hollows from edges, pattern units.
-const RADII: [f32; 2] = [0.004, 0.022];
-
-/// Where the light comes from: left, up, towards the viewer.
-const LIGHT: Vec3 = Vec3::new(-0.48, -0.52, 0.706);
-
-/// The colors of one row after another.
-struct Painter<'a> {
-    heights: &'a Grid<f32>,
-    colors: &'a TerrainColors,
-    slopes: Slopes<'a>,
-    /// The height field, blurred by [`RADII`].
-    blurs: [Grid<f32>; 2],
-    /// Lowest and highest height, the lowest not below the sea.
-    range: [f32; 2],
-    noises: [RowNoise; 3],
-    noise: [Vec<f32>; 3],
-}
-
-pub(super) fn smoothstep(from: f32, to: f32, value: f32) -> f32 {
-    let share = ((value - from) / (to - from).max(1e-6)).clamp(0.0, 1.0);
-    share * share * (3.0 - 2.0 * share)
-}
-
-fn rgb(color: [u8; 3]) -> Vec3 {
-    Vec3::from_array(color.map(f32::from))
-}
-
-impl<'a> Painter<'a> {
-    fn new(heights: &'a Grid<f32>, frame: &SurfaceFrame, colors: &'a TerrainColors, seed: u64) -> Self {
-        let unit = frame.texels_per_unit();
-        let (low, high) =
-            heights.as_slice().iter().fold((f32::MAX, f32::MIN), |(low, high), &h| (low.min(h), high.max(h)));
-        let low = if colors.sea.is_some() { 0.0 } else { low };
-        let width = heights.width();
-        let mut rng = Rng::new(seed).stream("terrain colors");
-        let mut noise =
-            |scale: f32, octaves, persistence| RowNoise::new(width, [scale * unit; 2], octaves, persistence, &mut rng);
-        Self {
-            heights,
-            colors,
-            slopes: Slopes::new(heights, frame),
-            blurs: RADII.map(|radius| blurred(heights, (radius * unit).round() as usize)),
-            range: [low, high.max(low + 1e-6)],
-            noises: [noise(0.25, 6, 0.62), noise(0.035, 4, 0.75), noise(0.012, 3, 0.8)],
-            noise: std::array::from_fn(|_| vec![0.0; width]),
-        }
-    }
-
-    fn paint_row(&mut self, y: usize, out: &mut [[u8; 4]]) {
-        self.slopes.read(y);
-        for (noise, row) in self.noises.iter_mut().zip(&mut self.noise) {
-            noise.fill_row(y, row);
-        }
-        for (x, out) in out.iter_mut().enumerate() {
-            let color = self.color(x, y);
-            let [r, g, b] = color.to_array().map(|value| (value + 0.5) as u8);
-            *out = [r, g, b, 255];
-        }
-    }
-
-    /// The color of a texel, 0..=255.
-    fn color(&self, x: usize, y: usize) -> Vec3 {
-        let height = self.heights.row(y)[x];
-        let noise: [f32; 3] = std::array::from_fn(|i| self.noise[i][x]);
-        let (right, down) = (self.slopes.right[x], self.slopes.down[x]);
-        let [fine, wide] =
-            std::array::from_fn(|i| ((height - self.blurs[i].row(y)[x]) / RADII[i] * 1.6).clamp(-1.0, 1.0));
-        let cavity = 1.0 + self.colors.cavity * (0.28 * fine + 0.3 * wide);
-        let normal = Vec3::new(-right, -down, 1.0).normalize();
-        if let Some(sea) = self.colors.sea.filter(|_| height < 0.0) {
-            return self.sea(&sea, -height, noise);
-        }
-        let steep = (right * right + down * down).sqrt() * (1.0 + 0.25 * self.colors.variety * noise[1]);
-        let rock = smoothstep(self.colors.steep[0], self.colors.steep[1], steep);
-        let ground = self.ground(height, fine + wide, noise);
-        let color = ground + (self.rock(height, noise) - ground) * rock;
-        let lit = (normal.dot(LIGHT) / LIGHT.z).max(0.0);
-        // Twilight from above beside the sun.
-        let light = 1.0 + self.colors.light * (0.42 * normal.z + 0.2 + 0.5 * lit.min(1.6) - 1.0);
-        let grain = 1.0 + self.colors.variety * (0.07 * noise[1] + 0.075 * noise[2]);
-        (color * (cavity * light * grain).max(0.0)).min(Vec3::splat(255.0))
-    }
-
-    fn ground(&self, height: f32, edge: f32, noise: [f32; 3]) -> Vec3 {
-        let [low, high] = self.range;
-        let share = (height - low) / (high - low);
-        // Borders between two kinds wander with the noise, and the upper kind lies in hollows first, as snow does.
-        let wander = 0.6 * noise[0] + 0.35 * noise[1] - 0.25 * edge;
-        let mut color = rgb(self.colors.ground[0].color);
-        for ground in &self.colors.ground[1..] {
-            let half = 0.5 * self.colors.transition;
-            let moved = share + self.colors.variety * wander * (half + 0.13 * ground.from);
-            color = color.lerp(rgb(ground.color), smoothstep(ground.from - half, ground.from + half, moved));
-        }
-        let tint = Vec3::new(1.0 + 0.05 * noise[0], 1.0, 1.0 - 0.05 * noise[0]);
-        let patches = 1.0 + self.colors.variety * (0.1 * noise[0] + 0.06 * noise[1]);
-        color * tint * patches
-    }
-
-    /// The color of rock: strata bend with the noise.
-    fn rock(&self, height: f32, noise: [f32; 3]) -> Vec3 {
-        let [first, second] = self.colors.rock.map(rgb);
-        let place = height / self.colors.stratum + 1.3 * noise[0] + 0.25 * noise[1];
-        let kind = |layer: f32| crate::math::hash_unit(0x57A7A, u64::from(layer as i32 as u32));
-        let (layer, inside) = (place.floor(), place - place.floor());
-        let share = kind(layer) + (kind(layer + 1.0) - kind(layer)) * smoothstep(0.55, 1.0, inside);
-        let share = 0.5 + self.colors.strata * (share - 0.5) + 0.2 * self.colors.variety * noise[0];
-        let seam = 1.0 - 0.22 * self.colors.strata * smoothstep(0.8, 0.97, inside) * smoothstep(-0.3, 0.4, noise[1]);
-        first.lerp(second, share.clamp(0.0, 1.0)) * seam
-    }
-
-    fn sea(&self, sea: &Sea, depth: f32, noise: [f32; 3]) -> Vec3 {
-        let share = depth / (depth + sea.half);
-        let color = rgb(sea.shallow).lerp(rgb(sea.deep), (share + 0.05 * noise[0]).clamp(0.0, 1.0));
-        // Foam at the shore.
-        let foam = 0.55 * (1.0 - smoothstep(0.0, 0.07, share + 0.035 * noise[1]));
-        color.lerp(Vec3::new(236.0, 242.0, 240.0), foam) * (1.0 + 0.02 * noise[1])
+    #[test]
+    fn numbers_out_of_range_are_named() {
+        let with = |change: fn(&mut TerrainColors)| {
+            let patches = Some(Patches { color: [9; 3], share: 0.5 });
+            let mut colors = TerrainColors { stains: patches, lichen: patches, ..TerrainColors::ISLAND };
+            colors.stones = TerrainColors::ROCK.stones;
+            assert_eq!(colors.validate(), Ok(()));
+            change(&mut colors);
+            colors.validate().unwrap_err().to_string()
+        };
+        assert!(with(|colors| colors.stones.as_mut().unwrap().tone = f32::NAN).contains("`stones.tone`"));
+        assert!(with(|colors| colors.stains.as_mut().unwrap().share = 1.5).contains("`stains.share`"));
+        assert!(with(|colors| colors.lichen.as_mut().unwrap().share = -0.1).contains("`lichen.share`"));
+        assert!(with(|colors| colors.woods.as_mut().unwrap().spread = f32::INFINITY).contains("`woods.spread`"));
+        assert!(with(|colors| colors.woods.as_mut().unwrap().top = f32::NAN).contains("`woods.top`"));
+        assert!(with(|colors| colors.woods.as_mut().unwrap().crown = 0.0).contains("`woods.crown`"));
+        assert!(with(|colors| colors.rivers.as_mut().unwrap().gather = 0.0).contains("`rivers.gather`"));
+        assert!(with(|colors| colors.rivers.as_mut().unwrap().width = f32::NAN).contains("`rivers.width`"));
     }
 }

@@ -1,6 +1,6 @@
-//! How single places of a height field wear: [`Gullies`], [`Scoops`].
+//! How single places of a height field wear: [`Gullies`], [`shore`].
 
-use super::terrain::smoothstep;
+use super::terrain_check::smoothstep;
 use crate::math::mix;
 use glam::Vec2;
 use std::f32::consts::TAU;
@@ -27,7 +27,7 @@ fn wave(turns: f32) -> [f32; 2] {
 const MARGIN: f32 = 0.15;
 
 /// The cells around a place of a lattice, each with the offset from its random site, in cells, and its random numbers.
-fn around(seed: u64, place: Vec2) -> impl Iterator<Item = (Vec2, [f32; 4])> {
+pub(super) fn around(seed: u64, place: Vec2) -> impl Iterator<Item = (Vec2, [f32; 4])> {
     let corner = place.floor();
     let [left, top] = corner.as_ivec2().to_array();
     let inside = place - corner;
@@ -40,7 +40,7 @@ fn around(seed: u64, place: Vec2) -> impl Iterator<Item = (Vec2, [f32; 4])> {
 }
 
 /// Sizes of gullies, each half as wide as the one before.
-const GULLIES: u32 = 4;
+const GULLIES: u32 = 3;
 
 /// How far a site counts, in cells.
 const REACH: f32 = 1.0 + MARGIN;
@@ -92,46 +92,60 @@ impl Gullies {
     }
 }
 
-/// Sizes of scoops, in units of the largest.
-const SCOOPS: [f32; 2] = [1.0, 0.42];
+/// Sizes of loose pieces, in units of the largest.
+const PIECES: [f32; 3] = [1.0, 0.62, 0.36];
 
-/// How much wider than high scoops are.
-const FLAT: f32 = 1.35;
-
-/// Height above the deepest scoop at which the surface is whole, in scoop sizes.
-const WHOLE: f32 = 0.55;
-
-/// Scoops: hollow faces, each with a direction of its own, that meet in sharp edges, as where stone has been broken.
-pub(super) struct Scoops {
-    seed: u64,
-    chips: f32,
-    size: f32,
+/// Loose pieces with flat faces that lie where the ground is below height 0: the height of their surface, or of the
+/// ground above it.
+pub(super) fn rubble(seed: u64, largest: f32, pos: Vec2, height: f32) -> f32 {
+    let most = 0.3 * largest;
+    if largest <= 0.0 || height > most {
+        return height;
+    }
+    let mut highest = height;
+    for (kind, share) in (0u64..).zip(PIECES) {
+        let size = share * largest;
+        for (off, [a, b, c, d]) in around(mix(seed ^ 0x2B_B1 ^ kind << 8), pos / size) {
+            // Some cells are empty.
+            if d > 0.75 {
+                continue;
+            }
+            // A four-sided piece that is turned and tilted.
+            let [sine, cosine] = wave(a);
+            let turned = Vec2::new(cosine * off.x + sine * off.y, cosine * off.y - sine * off.x).abs();
+            let half = Vec2::new(0.3 + 0.2 * b, 0.22 + 0.22 * c);
+            let inside = (half - turned).min_element().min(0.8 * (half.element_sum() - turned.element_sum()) - 0.12);
+            let tilt = Vec2::new(b - 0.5, c - 0.5).dot(off);
+            if inside > 0.0 {
+                highest = highest.max(size * ((1.6 * inside).min(0.22) + 0.5 * tilt + 0.3 * d - 0.3));
+            }
+        }
+    }
+    height.max(highest.min(most))
 }
 
-impl Scoops {
-    /// Scoops of this depth, as a share of the size of the largest.
-    pub(super) fn new(chips: f32, size: f32, seed: u64) -> Self {
-        Self { seed: mix(seed ^ 0x5C00), chips, size }
-    }
+/// Where a thin layer has broken off, from noise: 0..=1, with sharp edges.
+pub(super) fn flakes(noise: f32) -> f32 {
+    smoothstep(0.34, 0.4, noise)
+}
 
-    /// What has broken off at a place, zero or less; `uneven` moves edges aside a little, -1..=1.
-    pub(super) fn depth(&self, pos: Vec2, uneven: f32) -> f32 {
-        if self.chips <= 0.0 {
-            return 0.0;
-        }
-        let mut broken = 0.0;
-        for (octave, share) in SCOOPS.into_iter().enumerate() {
-            let size = share * self.size;
-            let place = Vec2::new(pos.x / FLAT, pos.y) / size + 0.06 * uneven;
-            let face = around(self.seed ^ (octave as u64) << 8, place).map(|(off, [a, b, c, d])| {
-                let tilt = Vec2::new(c - 0.5, d - 0.5);
-                // Beyond a cell no face is lower than the whole surface: what lies further away does not matter.
-                0.35 * (a + b - a * b) + 0.8 * tilt.dot(off) + off.length_squared()
-            });
-            broken += self.chips * size * (face.fold(WHOLE, f32::min) - WHOLE);
-        }
-        broken
+/// Height up to which the coast is shaped, pattern units.
+const SHORE: f32 = 0.03;
+
+/// Height of the highest cliffs, pattern units.
+const CLIFF: f32 = 0.02;
+
+/// A height after valleys have changed it by `carved` and the sea has shaped its coast: a cliff on headlands (1), level
+/// ground in bays (0). The shore stays where it is.
+pub(super) fn shore(height: f32, carved: f32, headland: f32, coast: f32) -> f32 {
+    if height <= 0.0 {
+        // The ground off bays is shallow.
+        return height * (1.0 - 0.45 * coast * (1.0 - headland));
     }
+    let height = (height + carved * smoothstep(0.0, 0.5 * SHORE, height)).max(0.3 * height);
+    let level = height * (0.3 + 0.7 * smoothstep(0.0, SHORE, height));
+    let cliff = height + CLIFF * smoothstep(0.0, 0.25 * SHORE, height);
+    height + coast * (level + (cliff - level) * headland - height)
 }
 
 #[cfg(test)]
@@ -151,18 +165,14 @@ mod tests {
     /// No step is higher than a slope makes it, at the borders of cells either.
     #[test]
     fn ground_is_continuous() {
-        let (gullies, scoops) = (Gullies::new(0.5, 0.05, 3), Scoops::new(0.5, 0.17, 3));
+        let gullies = Gullies::new(0.5, 0.05, 3);
         let mut rng = Rng::new(5);
         for _ in 0..20_000 {
             let pos = Vec2::new(rng.range(-1.0, 2.0), rng.range(-1.0, 2.0));
             let slope = Vec2::new(rng.signed(), rng.signed());
             let near = pos + Vec2::new(2e-5, 1e-5);
-            for (here, there) in [
-                (gullies.depth(pos, slope, 1.0), gullies.depth(near, slope, 1.0)),
-                (scoops.depth(pos, 0.0), scoops.depth(near, 0.0)),
-            ] {
-                assert!(here <= 1e-4 && (here - there).abs() < 2e-3, "{here} and {there} at {pos}");
-            }
+            let (here, there) = (gullies.depth(pos, slope, 1.0), gullies.depth(near, slope, 1.0));
+            assert!(here <= 1e-4 && (here - there).abs() < 2e-3, "{here} and {there} at {pos}");
         }
     }
 }

@@ -2,14 +2,17 @@
 
 use super::{
     heights_error::HeightError,
-    terrain::check_heights,
     terrain_blur::blurred,
+    terrain_check::check_heights,
+    terrain_faces::Faces,
     terrain_noise::RowNoise,
     terrain_normals::Slopes,
-    terrain_wear::{Gullies, Scoops},
+    terrain_valleys::{Fine, Valleys, headlands},
+    terrain_wear::{Gullies, flakes, rubble, shore},
 };
 use crate::{Grid, math::Rng, pattern::SurfaceFrame};
 use glam::Vec2;
+use std::ops::Range;
 
 /// What weather makes of ground that contours have shaped: lines bend, water wears gullies into slopes, pieces break
 /// off.
@@ -31,30 +34,69 @@ pub struct Weathering {
     pub bend: f32,
     /// Size of the largest bends. 0.005..=4; default 0.15.
     pub bend_size: f32,
+    /// How much rivers shape the land above height 0: 0 = not at all, 1 = valleys branch up to sharp ridges. 0..=1;
+    /// default 0.
+    pub valleys: f32,
+    /// How much the shore at height 0 differs from place to place: cliffs on headlands, level ground in bays. 0..=1;
+    /// default 0.
+    pub coast: f32,
     /// Depth of the gullies that water wears into slopes above height 0, as a share of their width. They run downhill
     /// and branch. 0..=1; default 0.
     pub gullies: f32,
     /// Width of the widest gullies. 0.002..=1; default 0.05.
     pub gully_width: f32,
-    /// Depth of the scoops that pieces leave which break off, as a share of their size. 0..=1; default 0.
+    /// How much stones, which are parts above height 0 with gaps around them, are cut to bodies with flat faces and sharp
+    /// edges. 0..=1; default 0.
+    pub faces: f32,
+    /// Thickness of the layers that flake off, as a share of their size. 0..=1; default 0.
     pub chips: f32,
-    /// Size of the largest scoops. 0.002..=1; default 0.1.
+    /// Size of the largest flakes. 0.002..=1; default 0.1.
     pub chip_size: f32,
+    /// Size of the loose pieces that lie in gaps, below height 0. 0..=0.5; default 0.
+    pub rubble: f32,
     /// Height of the finest roughness. 0..=0.1; default 0.
     pub grain: f32,
 }
 
 impl Weathering {
     /// The default: heights stay as they are.
-    pub const NONE: Self =
-        Self { bend: 0.0, bend_size: 0.15, gullies: 0.0, gully_width: 0.05, chips: 0.0, chip_size: 0.1, grain: 0.0 };
+    pub const NONE: Self = Self {
+        bend: 0.0,
+        bend_size: 0.15,
+        valleys: 0.0,
+        coast: 0.0,
+        gullies: 0.0,
+        gully_width: 0.05,
+        faces: 0.0,
+        chips: 0.0,
+        chip_size: 0.1,
+        rubble: 0.0,
+        grain: 0.0,
+    };
 
-    /// Rock that breaks in scoops.
-    pub const ROCK: Self = Self { bend: 0.014, chips: 0.3, chip_size: 0.17, grain: 0.0008, ..Self::NONE };
+    /// Rock that breaks in flat faces, with loose pieces in its gaps.
+    pub const ROCK: Self = Self {
+        bend: 0.012,
+        bend_size: 0.3,
+        faces: 1.0,
+        chips: 0.025,
+        chip_size: 0.09,
+        rubble: 0.02,
+        grain: 0.0007,
+        ..Self::NONE
+    };
 
-    /// Land with soil on it: gullies and ridges.
-    pub const LAND: Self =
-        Self { bend: 0.02, bend_size: 0.2, gullies: 0.3, gully_width: 0.07, grain: 0.0006, ..Self::NONE };
+    /// Land with soil on it: valleys, gullies and ridges.
+    pub const LAND: Self = Self {
+        bend: 0.02,
+        bend_size: 0.2,
+        valleys: 1.0,
+        coast: 1.0,
+        gullies: 0.2,
+        gully_width: 0.035,
+        grain: 0.0008,
+        ..Self::NONE
+    };
 
     /// Checks every number against its range.
     ///
@@ -64,10 +106,14 @@ impl Weathering {
         let ranges = [
             ("bend", self.bend, 0.0, 0.2),
             ("bend_size", self.bend_size, 0.005, 4.0),
+            ("valleys", self.valleys, 0.0, 1.0),
+            ("coast", self.coast, 0.0, 1.0),
             ("gullies", self.gullies, 0.0, 1.0),
             ("gully_width", self.gully_width, 0.002, 1.0),
+            ("faces", self.faces, 0.0, 1.0),
             ("chips", self.chips, 0.0, 1.0),
             ("chip_size", self.chip_size, 0.002, 1.0),
+            ("rubble", self.rubble, 0.0, 0.5),
             ("grain", self.grain, 0.0, 0.1),
         ];
         match ranges.into_iter().find(|(_, value, min, max)| !(*min..=*max).contains(value)) {
@@ -135,12 +181,25 @@ enum Stage {
         noises: Box<[RowNoise; 2]>,
         row: usize,
     },
+    /// Rivers are at work.
+    Valleys(Box<Valleys>),
+    /// Valleys and the coast are brought to the heights, beginning at a row.
+    Carve {
+        valleys: Option<Box<Fine>>,
+        headlands: Box<Fine>,
+        row: usize,
+    },
+    /// Stones are cut, beginning at a row.
+    Cut {
+        faces: Box<Faces>,
+        row: usize,
+    },
     /// The broad slopes are measured.
     Measure,
     /// Everything else, beginning at a row.
     Wear {
         broad: Grid<f32>,
-        noise: Box<RowNoise>,
+        noises: Box<[RowNoise; 2]>,
         row: usize,
     },
     Done,
@@ -149,17 +208,42 @@ enum Stage {
 impl WeatherJob {
     /// Numbers and heights have been checked.
     pub(super) fn new(heights: Grid<f32>, frame: SurfaceFrame, weathering: Weathering, seed: u64) -> Self {
-        let stage = if weathering == Weathering::NONE {
-            Stage::Done
-        } else if weathering.bend > 0.0 {
-            let scale = weathering.bend_size * frame.texels_per_unit();
-            let mut rng = Rng::new(seed).stream("bends");
-            let mut noise = || RowNoise::new(heights.width(), [scale; 2], 5, 0.55, &mut rng);
-            Stage::Bend { from: heights.clone(), noises: Box::new([noise(), noise()]), row: 0 }
+        let mut job = Self { heights, frame, weathering, seed, stage: Stage::Done };
+        if weathering != Weathering::NONE {
+            job.stage = if weathering.bend > 0.0 { job.bend() } else { job.valleys() };
+        }
+        job
+    }
+
+    fn bend(&self) -> Stage {
+        let scale = self.weathering.bend_size * self.frame.texels_per_unit();
+        let mut rng = Rng::new(self.seed).stream("bends");
+        let mut noise = || RowNoise::new(self.heights.width(), [scale; 2], 5, 0.55, &mut rng);
+        Stage::Bend { from: self.heights.clone(), noises: Box::new([noise(), noise()]), row: 0 }
+    }
+
+    fn valleys(&self) -> Stage {
+        if self.weathering.valleys > 0.0 {
+            Stage::Valleys(Box::new(Valleys::new(&self.heights, &self.frame, self.seed)))
         } else {
-            Stage::Measure
-        };
-        Self { heights, frame, weathering, seed, stage }
+            self.carve(None)
+        }
+    }
+
+    fn carve(&self, valleys: Option<Grid<f32>>) -> Stage {
+        if valleys.is_none() && self.weathering.coast <= 0.0 {
+            return self.cut();
+        }
+        let size = self.heights.size();
+        let headlands = Box::new(Fine::new(headlands(&self.heights, &self.frame), size));
+        Stage::Carve { valleys: valleys.map(|grid| Box::new(Fine::new(grid, size))), headlands, row: 0 }
+    }
+
+    fn cut(&self) -> Stage {
+        if self.weathering.faces <= 0.0 {
+            return Stage::Measure;
+        }
+        Stage::Cut { faces: Box::new(Faces::new(&self.heights, &self.frame, self.weathering.faces, self.seed)), row: 0 }
     }
 
     /// How much is done, 0..=1.
@@ -167,60 +251,116 @@ impl WeatherJob {
         let share = |row: usize| row as f32 / self.heights.height().max(1) as f32;
         match &self.stage {
             Stage::Bend { row, .. } => 0.1 * share(*row),
-            Stage::Measure => 0.1,
-            Stage::Wear { row, .. } => 0.15 + 0.85 * share(*row),
+            Stage::Valleys(valleys) => 0.1 + 0.4 * valleys.progress(),
+            Stage::Carve { row, .. } => 0.5 + 0.03 * share(*row),
+            Stage::Cut { row, .. } => 0.53 + 0.02 * share(*row),
+            Stage::Measure => 0.55,
+            Stage::Wear { row, .. } => 0.6 + 0.4 * share(*row),
             Stage::Done => 1.0,
         }
     }
 
     /// Some rows; `false` when all is done.
     pub(super) fn step(&mut self) -> bool {
-        let Self { heights, frame, weathering, seed, .. } = self;
-        let (width, height) = (heights.width(), heights.height());
-        let rows = (TEXELS / width.max(1)).max(1);
+        let rows = (TEXELS / self.heights.width().max(1)).max(1);
+        let end = |row: usize| (row + rows).min(self.heights.height());
         self.stage = match std::mem::replace(&mut self.stage, Stage::Done) {
             Stage::Bend { from, mut noises, row } => {
-                let end = (row + rows).min(height);
-                let far = weathering.bend * frame.texels_per_unit();
-                let mut aside = [vec![0.0; width], vec![0.0; width]];
-                for y in row..end {
-                    for (noise, aside) in noises.iter_mut().zip(&mut aside) {
-                        noise.fill_row(y, aside);
-                    }
-                    for (x, out) in heights.row_mut(y).iter_mut().enumerate() {
-                        *out = sample(&from, Vec2::new(x as f32 + far * aside[0][x], y as f32 + far * aside[1][x]));
-                    }
-                }
-                if end < height { Stage::Bend { from, noises, row: end } } else { Stage::Measure }
+                let end = end(row);
+                self.bend_rows(&from, &mut noises, row..end);
+                if end < self.heights.height() { Stage::Bend { from, noises, row: end } } else { self.valleys() }
             }
-            Stage::Measure => {
-                let radius = 0.25 * weathering.gully_width * frame.texels_per_unit();
-                let mut rng = Rng::new(*seed).stream("grain");
-                let noise = RowNoise::new(width, [0.012 * frame.texels_per_unit(); 2], 4, 0.75, &mut rng);
-                Stage::Wear { broad: blurred(heights, radius.round() as usize), noise: Box::new(noise), row: 0 }
-            }
-            Stage::Wear { broad, mut noise, row } => {
-                let end = (row + rows).min(height);
-                let mut slopes = Slopes::new(&broad, frame);
-                let Weathering { gullies, gully_width, chips, chip_size, .. } = *weathering;
-                let (gullies, scoops) =
-                    (Gullies::new(gullies, gully_width, *seed), Scoops::new(chips, chip_size, *seed));
-                let mut grain = vec![0.0; width];
-                for y in row..end {
-                    slopes.read(y);
-                    noise.fill_row(y, &mut grain);
-                    for (x, out) in heights.row_mut(y).iter_mut().enumerate() {
-                        let pos = frame.to_pos(Vec2::new(x as f32 + 0.5, y as f32 + 0.5));
-                        let slope = Vec2::new(slopes.right[x], slopes.down[x]);
-                        *out +=
-                            gullies.depth(pos, slope, *out) + scoops.depth(pos, grain[x]) + weathering.grain * grain[x];
-                    }
+            Stage::Valleys(mut valleys) => {
+                if valleys.step() {
+                    Stage::Valleys(valleys)
+                } else {
+                    self.carve(Some(valleys.finish(self.weathering.valleys)))
                 }
-                if end < height { Stage::Wear { broad, noise, row: end } } else { Stage::Done }
+            }
+            Stage::Carve { mut valleys, mut headlands, row } => {
+                let end = end(row);
+                self.carve_rows(valleys.as_deref_mut(), &mut headlands, row..end);
+                let is_open = end < self.heights.height();
+                if is_open { Stage::Carve { valleys, headlands, row: end } } else { self.cut() }
+            }
+            Stage::Cut { mut faces, row } => {
+                let end = end(row);
+                for y in row..end {
+                    faces.cut_row(y, self.heights.row_mut(y));
+                }
+                if end < self.heights.height() { Stage::Cut { faces, row: end } } else { Stage::Measure }
+            }
+            Stage::Measure => self.measured(),
+            Stage::Wear { broad, mut noises, row } => {
+                let end = end(row);
+                self.wear_rows(&broad, &mut noises, row..end);
+                if end < self.heights.height() { Stage::Wear { broad, noises, row: end } } else { Stage::Done }
             }
             Stage::Done => Stage::Done,
         };
         !matches!(self.stage, Stage::Done)
+    }
+
+    /// What comes after the broad slopes are measured.
+    fn measured(&self) -> Stage {
+        let (unit, width, weathering) = (self.frame.texels_per_unit(), self.heights.width(), &self.weathering);
+        let rng = Rng::new(self.seed);
+        let grain = RowNoise::new(width, [0.012 * unit; 2], 4, 0.75, &mut rng.stream("grain"));
+        let octaves = if weathering.chips > 0.0 { 6 } else { 0 };
+        let flakes = RowNoise::new(width, [weathering.chip_size * unit; 2], octaves, 0.55, &mut rng.stream("flakes"));
+        let broad = blurred(&self.heights, (0.25 * weathering.gully_width * unit).round() as usize);
+        Stage::Wear { broad, noises: Box::new([grain, flakes]), row: 0 }
+    }
+
+    fn bend_rows(&mut self, from: &Grid<f32>, noises: &mut [RowNoise; 2], rows: Range<usize>) {
+        let far = self.weathering.bend * self.frame.texels_per_unit();
+        let width = self.heights.width();
+        let mut aside = [vec![0.0; width], vec![0.0; width]];
+        for y in rows {
+            for (noise, aside) in noises.iter_mut().zip(&mut aside) {
+                noise.fill_row(y, aside);
+            }
+            for (x, out) in self.heights.row_mut(y).iter_mut().enumerate() {
+                *out = sample(from, Vec2::new(x as f32 + far * aside[0][x], y as f32 + far * aside[1][x]));
+            }
+        }
+    }
+
+    fn carve_rows(&mut self, mut valleys: Option<&mut Fine>, headlands: &mut Fine, rows: Range<usize>) {
+        for y in rows {
+            headlands.read(y);
+            if let Some(valleys) = &mut valleys {
+                valleys.read(y);
+            }
+            for (x, out) in self.heights.row_mut(y).iter_mut().enumerate() {
+                let carved = valleys.as_ref().map_or(0.0, |valleys| valleys.row[x]);
+                *out = shore(*out, carved, headlands.row[x], self.weathering.coast);
+            }
+        }
+    }
+
+    fn wear_rows(&mut self, broad: &Grid<f32>, noises: &mut [RowNoise; 2], rows: Range<usize>) {
+        let mut slopes = Slopes::new(broad, &self.frame);
+        let Weathering { gullies, gully_width, chips, chip_size, grain, .. } = self.weathering;
+        let gullies = Gullies::new(gullies, gully_width, self.seed);
+        let mut rows_of_noise = [vec![0.0; self.heights.width()], vec![0.0; self.heights.width()]];
+        for y in rows {
+            slopes.read(y);
+            for (noise, row) in noises.iter_mut().zip(&mut rows_of_noise) {
+                noise.fill_row(y, row);
+            }
+            let [rough, layers] = &rows_of_noise;
+            for (x, out) in self.heights.row_mut(y).iter_mut().enumerate() {
+                let pos = self.frame.to_pos(Vec2::new(x as f32 + 0.5, y as f32 + 0.5));
+                let slope = Vec2::new(slopes.right[x], slopes.down[x]);
+                *out += gullies.depth(pos, slope, *out) + grain * rough[x];
+                if *out > 0.0 {
+                    // Flakes end before a stone does.
+                    *out = (*out - chips * chip_size * flakes(layers[x])).max(0.5 * *out);
+                }
+                *out = rubble(self.seed, self.weathering.rubble, pos, *out);
+            }
+        }
     }
 }
 
@@ -250,6 +390,10 @@ mod tests {
         assert!(with(Weathering { bend: f32::NAN, ..Weathering::NONE }).contains("`bend`"));
         assert!(with(Weathering { gully_width: 0.0, ..Weathering::LAND }).contains("`gully_width`"));
         assert!(with(Weathering { chips: 2.0, ..Weathering::ROCK }).contains("`chips`"));
+        assert!(with(Weathering { valleys: f32::NAN, ..Weathering::LAND }).contains("`valleys`"));
+        assert!(with(Weathering { coast: -0.1, ..Weathering::LAND }).contains("`coast`"));
+        assert!(with(Weathering { faces: f32::NAN, ..Weathering::ROCK }).contains("`faces`"));
+        assert!(with(Weathering { rubble: 0.6, ..Weathering::ROCK }).contains("`rubble`"));
         let broken = Grid::new([8, 8].into(), f32::INFINITY);
         assert!(weathered(&broken, &frame, &Weathering::ROCK, 1).is_err());
     }

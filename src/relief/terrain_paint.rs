@@ -1,0 +1,425 @@
+//! The colors of height fields: [`colors`].
+
+use super::{
+    heights_error::HeightError,
+    stones::Stones,
+    terrain::{Patches, Sea, StoneColors, TerrainColors, Woods},
+    terrain_blur::blurred,
+    terrain_check::{check_heights, smoothstep},
+    terrain_noise::RowNoise,
+    terrain_normals::Slopes,
+    terrain_water::{Measure, Water},
+    terrain_wear::around,
+};
+use crate::{
+    Grid,
+    math::{Rng, mix},
+    pattern::SurfaceFrame,
+};
+use glam::{Vec2, Vec3};
+
+/// The colors of a height field: `[red, green, blue, 255]`, sRGB.
+///
+/// Heights are in pattern units, of texels as `frame` tells. `seed` is that of the variety.
+///
+/// # Errors
+/// [`HeightError`] if a number of `colors` is out of range, or a height is not finite.
+///
+/// ```
+/// use bevy_crack::{Grid, pattern::SurfaceFrame, relief::{TerrainColors, colors}};
+///
+/// // Sea on the left, land on the right.
+/// let frame = SurfaceFrame::new([64, 64].into())?;
+/// let shore = (0..64 * 64).map(|i| (i % 64) as f32 / 320.0 - 0.1).collect();
+/// let heights = Grid::from_vec([64, 64].into(), shore).unwrap();
+/// let picture = colors(&heights, &frame, &TerrainColors::ISLAND, 1)?;
+/// let [red, _, blue, _] = picture.get(2, 30).unwrap();
+/// assert!(blue > red);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn colors(
+    heights: &Grid<f32>,
+    frame: &SurfaceFrame,
+    colors: &TerrainColors,
+    seed: u64,
+) -> Result<Grid<[u8; 4]>, HeightError> {
+    colors.validate()?;
+    check_heights(heights, 1)?;
+    let mut painter = Painter::new(heights, frame, colors, seed);
+    let mut out = Grid::new(heights.size(), [0, 0, 0, 255]);
+    for y in 0..heights.height() {
+        painter.paint_row(y, out.row_mut(y));
+    }
+    Ok(out)
+}
+
+/// Radii of the two blurs that tell hollows from edges, pattern units.
+const RADII: [f32; 2] = [0.004, 0.022];
+
+/// Where the light comes from: left, up, towards the viewer.
+const LIGHT: Vec3 = Vec3::new(-0.48, -0.52, 0.706);
+
+/// Height from which on a stone is a stone, and at which its surface begins to show beside what lies in gaps, pattern
+/// units.
+const STONE: [f32; 2] = [0.002, 0.009];
+
+/// The colors of one row after another.
+struct Painter<'a> {
+    heights: &'a Grid<f32>,
+    colors: &'a TerrainColors,
+    frame: &'a SurfaceFrame,
+    slopes: Slopes<'a>,
+    /// The height field, blurred by [`RADII`].
+    blurs: [Grid<f32>; 2],
+    /// Lowest and highest height, the lowest not below the sea.
+    range: [f32; 2],
+    noises: [RowNoise; 4],
+    noise: [Vec<f32>; 4],
+    stones: Option<Stones>,
+    water: Option<Water>,
+    seed: u64,
+}
+
+/// What is known of a texel.
+struct Place {
+    x: usize,
+    y: usize,
+    pos: Vec2,
+    height: f32,
+    /// Share of the way from the lowest to the highest.
+    share: f32,
+    /// Noise of large, middle and small features, and of streaks that run down.
+    noise: [f32; 4],
+    /// How far it stands out from its near and wide surroundings, -1..=1.
+    edge: [f32; 2],
+    slope: f32,
+    moist: f32,
+}
+
+fn rgb(color: [u8; 3]) -> Vec3 {
+    Vec3::from_array(color.map(f32::from))
+}
+
+fn unit_draws(seed: u64) -> [f32; 4] {
+    let bits = mix(seed);
+    [0, 16, 32, 48].map(|shift| f32::from((bits >> shift) as u16) * (1.0 / 65_536.0))
+}
+
+impl<'a> Painter<'a> {
+    fn new(heights: &'a Grid<f32>, frame: &'a SurfaceFrame, colors: &'a TerrainColors, seed: u64) -> Self {
+        let unit = frame.texels_per_unit();
+        let (low, high) =
+            heights.as_slice().iter().fold((f32::MAX, f32::MIN), |(low, high), &h| (low.min(h), high.max(h)));
+        let low = if colors.sea.is_some() { 0.0 } else { low };
+        let width = heights.width();
+        let mut rng = Rng::new(seed).stream("terrain colors");
+        let mut noise = |scale: [f32; 2], octaves, persistence| {
+            RowNoise::new(width, scale.map(|scale| scale * unit), octaves, persistence, &mut rng)
+        };
+        let noises = [
+            noise([0.25; 2], 6, 0.62),
+            noise([0.035; 2], 4, 0.75),
+            noise([0.012; 2], 3, 0.8),
+            noise([0.035, 0.3], if colors.stains.is_some() { 3 } else { 0 }, 0.62),
+        ];
+        let measure = colors.rivers.map(|rivers| Measure { gather: rivers.gather, width: rivers.width });
+        let is_wet = colors.woods.is_some() || colors.rivers.is_some();
+        Self {
+            heights,
+            colors,
+            frame,
+            slopes: Slopes::new(heights, frame),
+            blurs: RADII.map(|radius| blurred(heights, (radius * unit).round() as usize)),
+            range: [low, high.max(low + 1e-6)],
+            noises,
+            noise: std::array::from_fn(|_| vec![0.0; width]),
+            stones: colors.stones.map(|_| Stones::new(heights, frame, STONE[0], seed)),
+            water: is_wet.then(|| Water::new(heights, frame, measure)),
+            seed: mix(seed ^ 0xC0105),
+        }
+    }
+
+    fn paint_row(&mut self, y: usize, out: &mut [[u8; 4]]) {
+        self.slopes.read(y);
+        for (noise, row) in self.noises.iter_mut().zip(&mut self.noise) {
+            noise.fill_row(y, row);
+        }
+        if let Some(water) = &mut self.water {
+            water.moisture.read(y);
+        }
+        for (x, out) in out.iter_mut().enumerate() {
+            let color = self.color(&self.place(x, y));
+            let [r, g, b] = color.to_array().map(|value| (value + 0.5) as u8);
+            *out = [r, g, b, 255];
+        }
+    }
+
+    fn place(&self, x: usize, y: usize) -> Place {
+        let height = self.heights.row(y)[x];
+        let [right, down] = [self.slopes.right[x], self.slopes.down[x]];
+        Place {
+            x,
+            y,
+            pos: self.frame.to_pos(Vec2::new(x as f32 + 0.5, y as f32 + 0.5)),
+            height,
+            share: (height - self.range[0]) / (self.range[1] - self.range[0]),
+            noise: std::array::from_fn(|i| self.noise[i][x]),
+            edge: std::array::from_fn(|i| ((height - self.blurs[i].row(y)[x]) / RADII[i] * 1.6).clamp(-1.0, 1.0)),
+            slope: (right * right + down * down).sqrt(),
+            moist: self.water.as_ref().map_or(0.0, |water| water.moisture.row[x]),
+        }
+    }
+
+    /// The color of a texel, 0..=255.
+    fn color(&self, place: &Place) -> Vec3 {
+        if let Some(sea) = self.colors.sea.filter(|_| place.height < 0.0) {
+            return self.sea(&sea, place);
+        }
+        let (variety, noise) = (self.colors.variety, place.noise);
+        let mut color = self.dry(place);
+        let mut shade = self.shade(place);
+        if self.colors.stones.is_some() {
+            // Little light falls into gaps.
+            let open = smoothstep(-STONE[1], STONE[1], place.height);
+            shade = shade.min(1.15) + (shade - shade.min(1.15)) * open;
+            shade = shade.max(0.5 * (1.0 - open));
+        }
+        let mut grain = 1.0 + variety * (0.07 * noise[1] + 0.075 * noise[2]);
+        if let Some((woods, share)) = self.woods(place).filter(|(_, share)| *share > 0.0) {
+            let (crown, light) = self.crown(&woods, place);
+            color = color.lerp(crown, share);
+            shade *= 1.0 + share * (light - 1.0);
+            grain += (1.0 - grain) * share;
+        }
+        if let (Some(rivers), Some(water)) = (&self.colors.rivers, self.water.as_ref().and_then(|w| w.rivers.as_ref()))
+        {
+            let share = water.row(place.y)[place.x];
+            color = color.lerp(rgb(rivers.color), share);
+            shade += (1.0 - shade) * 0.7 * share;
+        }
+        (color * (shade * grain).max(0.0)).min(Vec3::splat(255.0))
+    }
+
+    /// Light and shade.
+    fn shade(&self, place: &Place) -> f32 {
+        let (right, down) = (self.slopes.right[place.x], self.slopes.down[place.x]);
+        let cavity = 1.0 + self.colors.cavity * (0.28 * place.edge[0] + 0.3 * place.edge[1]);
+        let normal = Vec3::new(-right, -down, 1.0).normalize();
+        let lit = (normal.dot(LIGHT) / LIGHT.z).max(0.0);
+        // Twilight from above beside the sun.
+        cavity * (1.0 + self.colors.light * (0.42 * normal.z + 0.2 + 0.5 * lit.min(1.6) - 1.0))
+    }
+
+    /// Ground and rock.
+    fn dry(&self, place: &Place) -> Vec3 {
+        let [ground, snow] = self.ground(place);
+        let steep = place.slope * (1.0 + 0.25 * self.colors.variety * place.noise[1]);
+        // Sand and snow lie on less and on more than other ground.
+        let low = 1.0 - smoothstep(0.5, 1.3, place.share / self.colors.ground[1].from.max(1e-3));
+        let steep = if self.colors.sea.is_some() { steep * (1.0 + 1.2 * low) - 0.35 * snow.x } else { steep };
+        let rock = smoothstep(self.colors.steep[0], self.colors.steep[1], steep);
+        let Some(stones) = self.colors.stones else {
+            // Scree lies below rock.
+            let high = smoothstep(0.2, 0.5, place.share + 0.1 * place.noise[0]);
+            let loose =
+                high * smoothstep(0.7 * self.colors.steep[0], self.colors.steep[0], steep + 0.2 * place.noise[1]);
+            let bare = self.rock(place, 0);
+            return ground.lerp(bare * (1.12 + 0.1 * place.noise[2]), 0.6 * loose).lerp(bare, rock);
+        };
+        self.stone(&stones, place, ground, rock)
+    }
+
+    /// The surface of a stone, or what lies beside it.
+    fn stone(&self, stones: &StoneColors, place: &Place, ground: Vec3, steep: f32) -> Vec3 {
+        let share = smoothstep(STONE[0], STONE[1], place.height + 0.003 * place.noise[1]);
+        let gap = || self.gap(stones, place, ground);
+        let face = || self.face(stones, place, ground, steep);
+        if share <= 0.0 {
+            gap()
+        } else if share < 1.0 {
+            gap().lerp(face(), share)
+        } else {
+            face()
+        }
+    }
+
+    /// What lies in a gap: earth and loose pieces of the same rock.
+    fn gap(&self, stones: &StoneColors, place: &Place, ground: Vec3) -> Vec3 {
+        let speckled = 1.0 + 0.2 * self.colors.variety * place.noise[2] + 0.2 * place.noise[1];
+        let piece = ground.lerp(self.rock(place, 0), 0.5) * 0.7;
+        rgb(stones.gap).lerp(piece, smoothstep(-0.1, 0.5, place.edge[0])) * speckled.max(0.2)
+    }
+
+    /// The surface of a stone.
+    fn face(&self, stones: &StoneColors, place: &Place, ground: Vec3, steep: f32) -> Vec3 {
+        let stone = self.stones.as_ref().and_then(|stones| stones.at(place.x, place.y));
+        let mut color = ground.lerp(self.rock(place, stone.map_or(0, |stone| stone.seed)), 0.35 + 0.4 * steep);
+        if let Some(stone) = stone {
+            let [light, warm, ..] = unit_draws(stone.seed ^ 0x70_4E);
+            let warm = stones.tone * 0.22 * (warm - 0.5);
+            color *= 1.0 + stones.tone * 0.75 * (light - 0.5);
+            color *= Vec3::new(1.0 + warm, 1.0 + 0.15 * warm, 1.0 - warm);
+        }
+        self.patches(color, place)
+    }
+
+    /// Stains and lichen on rock.
+    fn patches(&self, color: Vec3, place: &Place) -> Vec3 {
+        let noise = place.noise;
+        let cover = |patches: &Patches, value: f32, soft: f32| {
+            let from = 0.75 - 1.3 * patches.share;
+            if patches.share > 0.0 { smoothstep(from, from + soft, value) } else { 0.0 }
+        };
+        let mut color = color;
+        if let Some(stains) = &self.colors.stains {
+            let share = cover(stains, 0.9 * noise[3] + 0.55 * noise[0] + 0.1 * noise[1], 0.55);
+            // They darken what they cover.
+            color = color.lerp(rgb(stains.color) * (color.element_sum() / 400.0), 0.5 * share);
+        }
+        if let Some(lichen) = &self.colors.lichen {
+            let value = 0.75 * noise[1] - 0.55 * noise[0] + 0.3 * noise[2] + 0.25 * place.edge[1];
+            color = color.lerp(rgb(lichen.color), 0.6 * cover(lichen, value, 0.12));
+        }
+        color
+    }
+
+    /// The color of the ground, and how far it is the uppermost kind.
+    fn ground(&self, place: &Place) -> [Vec3; 2] {
+        let noise = place.noise;
+        // Borders between two kinds wander with the noise, and the upper kind lies in hollows first, as snow does.
+        let wander = 0.6 * noise[0] + 0.35 * noise[1] - 0.25 * (place.edge[0] + place.edge[1]);
+        let (mut color, mut last) = (rgb(self.colors.ground[0].color), 0.0);
+        for ground in &self.colors.ground[1..] {
+            let half = (0.5 * self.colors.transition).min(0.35 * ground.from);
+            let moved = place.share + self.colors.variety * wander * (0.3 * half + 0.16 * ground.from);
+            last = smoothstep(ground.from - half, ground.from + half, moved);
+            color = color.lerp(rgb(ground.color), last);
+        }
+        let tint = Vec3::new(1.0 + 0.05 * noise[0], 1.0, 1.0 - 0.05 * noise[0]);
+        // Ground that water runs to is greener, ridges are dry.
+        let dry = if self.water.is_some() { (1.0 - last) * (0.45 - place.moist) } else { 0.0 };
+        let tint = tint * Vec3::new(1.0 + 0.4 * dry, 1.0 + 0.1 * dry, 1.0);
+        let patches = 1.0 + self.colors.variety * (0.1 * noise[0] + 0.06 * noise[1]);
+        [color * tint * patches, Vec3::splat(last)]
+    }
+
+    /// The color of rock: strata bend with the noise. Those of stones lie as each stone does.
+    fn rock(&self, place: &Place, stone: u64) -> Vec3 {
+        let [first, second] = self.colors.rock.map(rgb);
+        let noise = place.noise;
+        let [tilt, shift, ..] = unit_draws(stone);
+        let across = place.pos.y + (tilt - 0.5) * place.pos.x;
+        let along = if self.colors.stones.is_some() { across + 16.0 * shift } else { place.height };
+        let layers = along / self.colors.stratum + 1.3 * noise[0] + 0.25 * noise[1];
+        let kind = |layer: f32| crate::math::hash_unit(0x57A7A, u64::from(layer as i32 as u32));
+        let (layer, inside) = (layers.floor(), layers - layers.floor());
+        let share = kind(layer) + (kind(layer + 1.0) - kind(layer)) * smoothstep(0.55, 1.0, inside);
+        let share = 0.5 + self.colors.strata * (share - 0.5) + 0.2 * self.colors.variety * noise[0];
+        let seam = 1.0 - 0.22 * self.colors.strata * smoothstep(0.8, 0.97, inside) * smoothstep(-0.3, 0.4, noise[1]);
+        first.lerp(second, share.clamp(0.0, 1.0)) * seam
+    }
+
+    /// How far woods cover a place.
+    fn woods(&self, place: &Place) -> Option<(Woods, f32)> {
+        let woods = self.colors.woods?;
+        if woods.spread <= 0.0 {
+            return None;
+        }
+        let noise = place.noise;
+        let low = self.colors.ground[1].from;
+        let high = smoothstep(woods.top * 0.7, woods.top * 1.1, place.share + 0.06 * noise[1]);
+        let shore = if self.colors.sea.is_some() {
+            1.0 - smoothstep(low, 3.0 * low, place.share + 0.01 * noise[1])
+        } else {
+            0.0
+        };
+        let bare = 1.3 * high + 1.4 * shore + 1.3 * smoothstep(1.05, 1.8, place.slope);
+        let lush = 1.6 * (woods.spread - 0.5) + 1.3 * (place.moist - 0.42) + 0.55 * noise[0] + 0.3 * noise[1];
+        let hollow = -0.3 * (place.edge[1] + 0.5 * place.edge[0]);
+        Some((woods, smoothstep(-0.02, 0.07, lush + hollow + 0.08 * noise[2] - bare)))
+    }
+
+    /// Color and light of the crown at a place.
+    fn crown(&self, woods: &Woods, place: &Place) -> (Vec3, f32) {
+        let at = place.pos / woods.crown;
+        let near = around(self.seed, at).min_by(|a, b| a.0.length_squared().total_cmp(&b.0.length_squared()));
+        let (off, [.., tone, hue]) = near.unwrap_or((Vec2::ZERO, [0.5; 4]));
+        let far = off.length_squared().min(1.0);
+        let side = off.dot(Vec2::new(LIGHT.x, LIGHT.y));
+        let color = rgb(woods.color) * (0.8 + 0.4 * tone + 0.15 * place.noise[0]);
+        let color = color * Vec3::new(0.9 + 0.28 * hue, 1.0, 0.95);
+        (color, (1.08 - 0.5 * far) * (1.0 + 0.5 * side))
+    }
+
+    fn sea(&self, sea: &Sea, place: &Place) -> Vec3 {
+        let noise = place.noise;
+        // What is seen of the ground through water is blurred.
+        let blurred = -self.blurs[1].row(place.y)[place.x];
+        let depth = (0.35 * -place.height + 0.65 * blurred.max(0.0)) * (1.0 + 0.25 * noise[0] + 0.12 * noise[1]);
+        let share = depth * depth / (depth * depth + sea.half * sea.half);
+        let sand = rgb(self.colors.ground[0].color);
+        let shallow = rgb(sea.shallow);
+        let ground = sand.lerp(shallow, smoothstep(0.0, 0.3, -place.height / sea.half + 0.04 * noise[1]) * 0.75 + 0.25);
+        let color = ground.lerp(rgb(sea.deep), share.clamp(0.0, 1.0));
+        // Foam at the shore.
+        let foam = 0.6 * (1.0 - smoothstep(0.0, 0.06, -place.height / sea.half + 0.035 * noise[1]));
+        color.lerp(Vec3::new(236.0, 242.0, 240.0), foam) * (1.0 + 0.02 * noise[1])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn mean(picture: &Grid<[u8; 4]>, columns: std::ops::Range<usize>) -> Vec3 {
+        let texels = (0..picture.height()).flat_map(|y| &picture.row(y)[columns.clone()]);
+        texels.map(|&[r, g, b, _]| rgb([r, g, b])).sum::<Vec3>() / (columns.len() * picture.height()) as f32
+    }
+
+    /// Two flat stones have colors of their own, the gap between them is darker.
+    #[test]
+    fn stones_differ_and_gaps_are_dark() {
+        let size = [200, 100];
+        let frame = SurfaceFrame::new(size.into()).unwrap();
+        let heights = (0..size[0] * size[1]).map(|i| if (90..110).contains(&(i % size[0])) { -0.01 } else { 0.05 });
+        let heights = Grid::from_vec(size.into(), heights.collect()).unwrap();
+        let even = TerrainColors { variety: 0.0, strata: 0.0, stains: None, lichen: None, ..TerrainColors::ROCK };
+        let paint = |tone: f32| {
+            let stones = even.stones.map(|stones| StoneColors { tone, ..stones });
+            colors(&heights, &frame, &TerrainColors { stones, ..even }, 4).unwrap()
+        };
+        let differ = |picture: &Grid<[u8; 4]>| mean(picture, 10..70).distance(mean(picture, 130..190));
+        let (plain, toned) = (paint(0.0), paint(1.0));
+        assert!(differ(&plain) < 8.0 && differ(&toned) > 12.0, "{} {}", differ(&plain), differ(&toned));
+        let gap = mean(&toned, 95..105).element_sum();
+        assert!(gap < 0.7 * mean(&toned, 10..70).element_sum() && gap < 0.7 * mean(&toned, 130..190).element_sum());
+        assert_eq!(toned, paint(1.0));
+    }
+
+    /// In a valley there are woods and a river; on its sides, which are steep, there are none.
+    #[test]
+    fn woods_and_rivers_lie_in_valleys() {
+        let size = [240, 240];
+        let frame = SurfaceFrame::new(size.into()).unwrap();
+        let height = |i: u32| {
+            let (x, y) = ((i % size[0]) as f32 / 240.0, (i / size[0]) as f32 / 240.0);
+            0.02 + 0.05 * x + (2.2 * ((y - 0.5).abs() - 0.1)).max(0.0)
+        };
+        let heights = Grid::from_vec(size.into(), (0..size[0] * size[1]).map(height).collect()).unwrap();
+        let bare = TerrainColors::ISLAND.woods.map(|woods| Woods { spread: 0.0, ..woods });
+        let plain = TerrainColors { sea: None, woods: bare, rivers: None, variety: 0.0, ..TerrainColors::ISLAND };
+        let woods = TerrainColors { woods: TerrainColors::ISLAND.woods, ..plain };
+        let rivers = TerrainColors { rivers: TerrainColors::ISLAND.rivers, ..plain };
+        let paint = |look: &TerrainColors| colors(&heights, &frame, look, 4).unwrap();
+        let (before, woods, rivers) = (paint(&plain), paint(&woods), paint(&rivers));
+        let changed = |picture: &Grid<[u8; 4]>, rows: std::ops::Range<usize>| {
+            let far = |y: usize, x: usize| {
+                let green = |grid: &Grid<[u8; 4]>| i32::from(grid.row(y)[x][0]);
+                (green(picture) - green(&before)).abs() > 12
+            };
+            rows.map(|y| (40..200).filter(|x| far(y, *x)).count()).sum::<usize>()
+        };
+        assert!(changed(&woods, 105..135) > 1000 && changed(&woods, 10..50) == 0, "{}", changed(&woods, 105..135));
+        assert!((20..2000).contains(&changed(&rivers, 95..145)) && changed(&rivers, 10..50) == 0);
+    }
+}

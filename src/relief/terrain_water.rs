@@ -1,0 +1,182 @@
+//! Where ground is moist and where rivers run: [`Water`].
+
+use super::{
+    drainage::Drainage,
+    terrain_blur::blurred,
+    terrain_valleys::{Fine, block, coarse},
+};
+use crate::{Grid, math::hash_unit, pattern::SurfaceFrame};
+use glam::Vec2;
+
+/// Radius over which moisture spreads, cells.
+const SPREAD: usize = 1;
+
+/// Rounds in which the corners of rivers are cut.
+const ROUNDS: usize = 3;
+
+/// What a source gathers, as a share of what makes a river at its mouth.
+const SOURCE: f32 = 0.18;
+
+/// How far the points of rivers are moved aside, cells.
+const WINDING: f32 = 0.8;
+
+/// The water on the ground, from the drainage of its heights.
+pub(super) struct Water {
+    /// 0 on ridges, near 1 along large streams.
+    pub(super) moisture: Fine,
+    /// Share of each texel that is river; empty without rivers.
+    pub(super) rivers: Option<Grid<f32>>,
+}
+
+/// Which rivers are drawn: the ground that makes one, square pattern units, and the width of the widest, pattern units.
+#[derive(Clone, Copy)]
+pub(super) struct Measure {
+    pub(super) gather: f32,
+    pub(super) width: f32,
+}
+
+impl Water {
+    pub(super) fn new(heights: &Grid<f32>, frame: &SurfaceFrame, rivers: Option<Measure>) -> Self {
+        let ground = coarse(heights);
+        let drainage = Drainage::new(&ground);
+        let gathered = drainage.gathered();
+        let moist = gathered.iter().map(|cells| 1.0 - 1.0 / cells.sqrt().sqrt()).collect();
+        let moist = Grid::from_vec(ground.size(), moist).unwrap_or_else(|| Grid::new(ground.size(), 0.0));
+        let moisture = Fine::new(blurred(&moist, SPREAD), heights.size());
+        let rivers = rivers.map(|measure| {
+            let mut out = Grid::new(heights.size(), 0.0);
+            let course = Course { ground: &ground, drainage: &drainage, gathered: &gathered, frame, measure };
+            course.draw(&mut out);
+            out
+        });
+        Self { moisture, rivers }
+    }
+}
+
+/// The courses of rivers on the lattice.
+struct Course<'a> {
+    ground: &'a Grid<f32>,
+    drainage: &'a Drainage,
+    gathered: &'a [f32],
+    frame: &'a SurfaceFrame,
+    measure: Measure,
+}
+
+impl Course<'_> {
+    /// Texels along a side of a cell.
+    fn cell(&self) -> f32 {
+        block(self.frame.size()) as f32
+    }
+
+    /// What the mouth of each cell's river gathers, cells.
+    fn mouths(&self) -> Vec<f32> {
+        let mut mouths = vec![0.0; self.gathered.len()];
+        for &at in &self.drainage.order {
+            let (i, into) = (at as usize, self.drainage.into[at as usize]);
+            let is_mouth = into == at || self.drainage.into[into as usize] == into;
+            mouths[i] = if is_mouth { self.gathered[i] } else { mouths[into as usize] };
+        }
+        mouths
+    }
+
+    /// Draws every river from its sources down to a larger one, or to the sea.
+    fn draw(&self, out: &mut Grid<f32>) {
+        let cell = self.cell() / self.frame.texels_per_unit();
+        let least = (self.measure.gather / (cell * cell)).max(2.0);
+        let mouths = self.mouths();
+        let is_river = |i: usize| {
+            let is_land = self.drainage.into[i] as usize != i && self.ground.as_slice()[i] > 0.0;
+            is_land && mouths[i] >= least && self.gathered[i] >= SOURCE * least
+        };
+        let mut has_source = vec![false; self.gathered.len()];
+        let mut is_done = vec![false; self.gathered.len()];
+        for (i, &into) in self.drainage.into.iter().enumerate() {
+            has_source[into as usize] |= is_river(i);
+        }
+        for &source in self.drainage.order.iter().rev() {
+            let mut at = source as usize;
+            if !is_river(at) || has_source[at] {
+                continue;
+            }
+            let mut line = vec![self.point(at, least)];
+            while is_river(at) && !is_done[at] {
+                is_done[at] = true;
+                at = self.drainage.into[at] as usize;
+                line.push(self.point(at, least));
+            }
+            self.wind(&mut line);
+            for _ in 0..ROUNDS {
+                line = smoothed(&line);
+            }
+            line.windows(2).for_each(|ends| stroke(out, [ends[0], ends[1]]));
+        }
+    }
+
+    /// Moves the points of a river aside, all but its ends.
+    fn wind(&self, line: &mut [(Vec2, f32)]) {
+        let last = line.len().saturating_sub(1);
+        for (point, _) in line.iter_mut().take(last).skip(1) {
+            let cell = (*point / self.cell()).as_uvec2();
+            let draw = |axis: u64| hash_unit(axis, u64::from(cell.x) << 32 | u64::from(cell.y)) - 0.5;
+            *point += Vec2::new(draw(1), draw(2)) * (WINDING * self.cell());
+        }
+    }
+
+    /// The middle of a cell and the width of the river there, texels.
+    fn point(&self, i: usize, least: f32) -> (Vec2, f32) {
+        let width = self.ground.width();
+        let place = Vec2::new((i % width) as f32 + 0.5, (i / width) as f32 + 0.5) * self.cell();
+        let share = (self.gathered[i] / least).sqrt();
+        (place, self.measure.width * self.frame.texels_per_unit() * (0.7 * share).min(1.0))
+    }
+}
+
+/// A line with its corners cut; its ends stay.
+fn smoothed(line: &[(Vec2, f32)]) -> Vec<(Vec2, f32)> {
+    let between = |a: (Vec2, f32), b: (Vec2, f32), share: f32| (a.0.lerp(b.0, share), a.1 + (b.1 - a.1) * share);
+    let halves = line.windows(2).flat_map(|ends| [between(ends[0], ends[1], 0.25), between(ends[0], ends[1], 0.75)]);
+    line.first().copied().into_iter().chain(halves).chain(line.last().copied()).collect()
+}
+
+/// Draws a part of a river with soft banks.
+fn stroke(out: &mut Grid<f32>, [(from, wide), (to, wider)]: [(Vec2, f32); 2]) {
+    let reach = 0.5 * wide.max(wider) + 1.0;
+    let low = (from.min(to) - reach).max(Vec2::ZERO).as_usizevec2();
+    let high = (from.max(to) + reach).max(Vec2::ZERO).as_usizevec2();
+    let way = to - from;
+    for y in low.y..=high.y.min(out.height() - 1) {
+        let last = high.x.min(out.width() - 1);
+        for (x, texel) in out.row_mut(y).iter_mut().enumerate().take(last + 1).skip(low.x) {
+            let off = Vec2::new(x as f32 + 0.5, y as f32 + 0.5) - from;
+            let along = (off.dot(way) / way.length_squared().max(1e-6)).clamp(0.0, 1.0);
+            let half = 0.5 * (wide + (wider - wide) * along);
+            let share = (half + 0.5 - (off - way * along).length()).clamp(0.0, 1.0) * (2.0 * half).min(1.0);
+            *texel = texel.max(share);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// In a valley that falls to the right a river runs to the right, in its middle.
+    #[test]
+    fn rivers_follow_valleys() {
+        let size = [240, 160];
+        let height = |i: u32| {
+            let (x, y) = ((i % size[0]) as f32 / 160.0, (i / size[0]) as f32 / 160.0);
+            0.2 + 0.3 * (y - 0.5).abs() + 0.1 * (1.5 - x)
+        };
+        let heights = Grid::from_vec(size.into(), (0..size[0] * size[1]).map(height).collect()).unwrap();
+        let frame = SurfaceFrame::new(size.into()).unwrap();
+        let rivers = |gather| {
+            let water = Water::new(&heights, &frame, Some(Measure { gather, width: 0.02 }));
+            water.rivers.unwrap()
+        };
+        let river = rivers(0.1);
+        assert!((60..230).all(|x| (0..160).any(|y| river.row(y)[x] > 0.2)));
+        assert!((0..160usize).all(|y| y.abs_diff(80) < 30 || river.row(y)[30..200].iter().all(|share| *share == 0.0)));
+        assert!(rivers(16.0).as_slice().iter().all(|share| *share == 0.0));
+    }
+}
