@@ -27,7 +27,7 @@ use std::{sync::Arc, time::Duration};
 /// How long a task may wait for a thread before its work is done in slices of frames.
 const PATIENCE: Duration = Duration::from_millis(50);
 
-/// Nodes, and texels, of a surface that is drawn again in a frame.
+/// The most nodes, and texels, of a surface that is drawn again in a frame.
 const MAX_NODES: usize = 1024;
 const MAX_TEXELS: u64 = 512 * 512;
 
@@ -265,12 +265,16 @@ pub(crate) fn start(world: &mut World, entity: Entity, playback: Option<AsyncPla
     }
 }
 
+/// Whether all texels of a surface are more than a frame paints.
+pub(crate) fn is_large(active: &Active) -> bool {
+    TexelRect::whole(active.drawing.field.frame.size()).area() > MAX_TEXELS
+}
+
 /// Has all of a surface drawn again that shows something else in the same places: by a task, until which it shows what it showed, if it
 /// takes longer than a frame has. `false` if that cannot be.
 pub(crate) fn redraw(world: &mut World, entity: Entity, active: &mut Active) -> bool {
     let budget = world.resource::<CrackBudget>();
-    let is_little = active.cracks.growth.network().nodes().len() <= MAX_NODES
-        && TexelRect::whole(active.drawing.field.frame.size()).area() <= MAX_TEXELS;
+    let is_little = active.cracks.growth.network().nodes().len() <= MAX_NODES && !is_large(active);
     let is_whole = active.drawing.frozen.is_none() && active.drawing.carried.is_empty();
     if is_little || budget.is_unlimited() || !is_whole || !has_one_view(active) {
         return false;

@@ -196,6 +196,9 @@ fn update_preset(
         if !async_playback::redraw(world, entity, active) {
             stamp_anew(active);
         }
+    } else if async_playback::is_large(active) {
+        // To paint all of it takes longer than a frame has, too.
+        async_playback::redraw(world, entity, active);
     }
     active.playhead.rate = preset.steps_per_second;
     active.preset = preset;
@@ -357,8 +360,17 @@ mod tests {
     /// what it would show if a frame had drawn it.
     #[test]
     fn b5_a_large_surface_is_drawn_again_beside_the_frames() {
-        let other =
+        let redrawn =
             CrackPreset { profile: CrackPreset::MUD.profile, look: CrackPreset::MUD.look, ..CrackPreset::CONCRETE };
+        let mut repainted = CrackPreset::CONCRETE;
+        repainted.look.tint = 0.2;
+        repainted.look.shadow = 0.2;
+        for other in [redrawn, repainted] {
+            draw_again_beside_the_frames(&other);
+        }
+    }
+
+    fn draw_again_beside_the_frames(other: &CrackPreset) {
         let change = |budget: CrackBudget, no_threads: bool| {
             let mut app = app(CrackBudget { milliseconds: 1e6, ..default() });
             app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(20)));
