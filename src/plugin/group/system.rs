@@ -125,9 +125,10 @@ pub(crate) fn make_walls(world: &mut World, mut found: Local<Vec<Entity>>) {
     found.extend(groups.iter(world));
     found.sort_unstable();
     let changes = core::mem::take(&mut world.resource_mut::<GroupChanges>().0);
+    let prepared: EntityHashSet = world.resource::<Preparations>().wanted().collect();
     let mut left = MAX_BYTES;
     for &group in found.iter() {
-        let wanted = is_wanted(world, group);
+        let wanted = is_wanted(world, group, &prepared);
         let wall = world.get_mut::<Wall>(group).map(|mut wall| core::mem::take(&mut *wall));
         if wall.is_none() && !wanted {
             continue;
@@ -153,12 +154,12 @@ pub(crate) fn make_walls(world: &mut World, mut found: Local<Vec<Entity>>) {
     world.resource_mut::<FrameClock>().stop(&timer);
 }
 
-/// Whether something waits for the picture of a group.
-fn is_wanted(world: &World, group: Entity) -> bool {
+/// Whether something waits for the picture of a group. `prepared` are those that are to be made without a hit.
+fn is_wanted(world: &World, group: Entity, prepared: &EntityHashSet) -> bool {
     let Ok(entity) = world.get_entity(group) else { return false };
     entity.contains::<CrackSurface>()
         && (world.resource::<HitQueue>().first(group).is_some()
-            || world.resource::<Preparations>().is_wanted(group)
+            || prepared.contains(&group)
             || entity.contains::<GuidedCracks>()
             || entity.contains::<CrackStrands>()
             || entity.contains::<CrackRecord>()

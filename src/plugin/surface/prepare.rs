@@ -64,10 +64,10 @@ impl Preparations {
         self.wanted.push_back(entity);
     }
 
-    /// Whether a surface is to be made, though nothing hits it.
+    /// Surfaces that are to be made, though nothing hits them.
     #[cfg(feature = "2d")]
-    pub(crate) fn is_wanted(&self, entity: Entity) -> bool {
-        self.wanted.contains(&entity)
+    pub(crate) fn wanted(&self) -> impl Iterator<Item = Entity> + '_ {
+        self.wanted.iter().copied()
     }
 
     /// What was read of the picture before this frame has changed.
