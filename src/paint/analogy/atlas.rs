@@ -1,6 +1,6 @@
 //! [`Atlas`]: one level of all photographs and guides, below each other, with margins.
 
-use super::{pair::AnalogyPair, params::AnalogyParams, ramp};
+use super::{pair::AnalogyPair, params::AnalogyParams, ramp, widen};
 use crate::raster::TexelRect;
 use glam::{IVec2, UVec2};
 
@@ -63,13 +63,22 @@ pub(super) struct Atlas {
     occurring: Vec<u8>,
     /// The smallest value of the ramp: all that is deeper inside of cracks is alike.
     pub(super) deepest: u8,
+    /// Cracks that are thinner are widened.
+    pub(super) thin: u32,
 }
 
 /// The ramp of a photograph.
-fn pair_ramp(pair: &AnalogyPair, params: &AnalogyParams) -> Vec<u8> {
+fn pair_ramp(pair: &AnalogyPair, params: &AnalogyParams, thin: u32) -> Vec<u8> {
     let size = pair.size();
     let is_crack = |x, y| pair.is_crack(x, y, params.depth);
-    ramp::ramp(size, TexelRect::whole(size), params.reach, pair.is_tileable(), is_crack)
+    ramp::ramp(size, TexelRect::whole(size), params.reach, thin, pair.is_tileable(), is_crack)
+}
+
+/// The width of thin cracks of the photographs.
+fn thin(pairs: &[AnalogyPair], params: &AnalogyParams) -> u32 {
+    let widths =
+        |pair: &AnalogyPair| widen::widths(pair.size(), pair.is_tileable(), |x, y| pair.is_crack(x, y, params.depth));
+    widen::thin(pairs.iter().flat_map(widths).collect())
 }
 
 /// The value of the ramp below which a few of the texels of cracks lie. Wider cracks than those of the photographs
@@ -108,8 +117,9 @@ impl Atlas {
         }
         let texels = vec![[0; 4]; stride * rows];
         let extras = vec![0; stride * rows * channels];
-        let (listed, starts, occurring, deepest) = (Vec::new(), vec![0; 257], vec![0; 256], 0);
-        Self { stride, texels, extras, channels, sheets, sheet_of_row, listed, starts, occurring, deepest }
+        let (listed, starts, occurring) = (Vec::new(), vec![0; 257], vec![0; 256]);
+        let (deepest, thin) = (0, 1);
+        Self { stride, texels, extras, channels, sheets, sheet_of_row, listed, starts, occurring, deepest, thin }
     }
 
     /// The level of full size.
@@ -118,7 +128,8 @@ impl Atlas {
         let wraps: Vec<_> = pairs.iter().map(AnalogyPair::is_tileable).collect();
         let given = pairs.first().map_or(0, |pair| pair.channels().len());
         let mut atlas = Self::empty(&sizes, &wraps, channels(params, given));
-        let ramps: Vec<_> = pairs.iter().map(|pair| pair_ramp(pair, params)).collect();
+        atlas.thin = thin(pairs, params);
+        let ramps: Vec<_> = pairs.iter().map(|pair| pair_ramp(pair, params, atlas.thin)).collect();
         atlas.deepest = deepest(&ramps);
         for ((pair, sheet), mut ramp) in pairs.iter().zip(atlas.sheets.clone()).zip(ramps) {
             let size = pair.size();

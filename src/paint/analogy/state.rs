@@ -8,6 +8,7 @@ use super::{
     pair::{MAX_CHANNELS, check_channel, check_size},
     ramp,
     region::Region,
+    widen,
     work::Work,
 };
 use crate::{Grid, raster::TexelRect};
@@ -195,10 +196,11 @@ impl Analogy {
         std::mem::take(&mut self.changed)
     }
 
-    /// How far from a texel whose crack has changed texels can change: the reach of the guide, and the margin.
+    /// How far from a texel whose crack has changed texels can change: the reach of the guide,
+    /// the margin, and a few where thin cracks are widened.
     #[must_use]
     pub fn window(&self) -> u32 {
-        self.examples.params.reach + self.examples.params.margin
+        self.examples.params.reach + self.examples.params.margin + widen::reach(self.examples.thin())
     }
 
     /// Size of the surface, texels.
