@@ -188,25 +188,32 @@ fn threads_do_not_matter() {
     });
 }
 
-/// How many texels continue their right (lower) neighbour's source, inside and across the border.
+/// Steps of colour across the border against those inside. Only inside steps where texels of the smallest level meet
+/// count, as they do at the border; what is copied together has smaller ones.
 #[test]
 fn tileable_results_have_no_seam_at_their_border() {
     let size = UVec2::new(160, 128);
     let params = AnalogyParams { is_tileable: true, ..AnalogyParams::DEFAULT };
     let jumps = |params: AnalogyParams| {
         let examples = Arc::new(Examples::new(&[pair("concrete")], &params).unwrap());
-        let mut wall = Analogy::new(examples, &Grid::new(size, 0), &[], 4).unwrap();
-        wall.finish();
-        let colors = wall.colors();
-        let off = |a: UVec2, b: UVec2| {
-            let [a, b] = [a, b].map(|at| colors.get(at.x, at.y).unwrap());
-            (0..3).map(|channel| f64::from(a[channel].abs_diff(b[channel]))).sum::<f64>()
-        };
-        let column = |x: u32| (0..size.y).map(|y| off(UVec2::new(x, y), UVec2::new((x + 1) % size.x, y))).sum::<f64>();
-        let inside = (0..size.x - 1).map(column).sum::<f64>() / f64::from(size.x - 1);
-        column(size.x - 1) / inside
+        let (mut border, mut inside) = (0.0, 0.0);
+        for seed in 1..=8 {
+            let mut wall = Analogy::new(examples.clone(), &Grid::new(size, 0), &[], seed).unwrap();
+            wall.finish();
+            let colors = wall.colors();
+            let off = |a: UVec2, b: UVec2| {
+                let [a, b] = [a, b].map(|at| colors.get(at.x, at.y).unwrap());
+                (0..3).map(|channel| f64::from(a[channel].abs_diff(b[channel]))).sum::<f64>()
+            };
+            let column =
+                |x: u32| (0..size.y).map(|y| off(UVec2::new(x, y), UVec2::new((x + 1) % size.x, y))).sum::<f64>();
+            let meets = (1..size.x / 16).map(|at| 16 * at - 1);
+            inside += meets.clone().map(column).sum::<f64>() / meets.count() as f64;
+            border += column(size.x - 1);
+        }
+        border / inside
     };
     let (tileable, plain) = (jumps(params), jumps(AnalogyParams::DEFAULT));
     println!("step across the border against steps inside: {tileable:.3}, else {plain:.3}");
-    assert!(tileable < 1.2 && tileable < plain, "{tileable} {plain}");
+    assert!(tileable < 1.1 && tileable < plain, "{tileable} {plain}");
 }
