@@ -34,7 +34,8 @@ const FIRST_COUNTED: usize = 2;
 /// size, which do not change the result: it depends on examples, seed, and the rectangles and depths of the updates in
 /// their order.
 ///
-/// Differs from the papers: the guide is a ramp of the distance to the crack, not the mask itself; the search for
+/// Differs from the papers: the guide is a ramp of the distance to the crack, not the mask itself, and cracks thinner
+/// than most of the photographs' are widened to the thin ones of these; the search for
 /// nearest neighbours is by coherence and random places instead of a tree; texels are made in several passes, each of
 /// which sees all neighbours, instead of in one.
 ///
