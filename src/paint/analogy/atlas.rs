@@ -22,6 +22,9 @@ const MOST_LISTED: usize = 1 << 17;
 /// One in how many texels of cracks count as the deepest.
 const DEEP_SHARE: usize = 12;
 
+/// One in how many texels of the ground count as the farthest from cracks.
+const FAR_SHARE: usize = 4;
+
 /// A texel of the atlas: its row in the upper 16 bits, its column in the lower ones.
 pub(super) type Place = u32;
 
@@ -63,6 +66,8 @@ pub(super) struct Atlas {
     occurring: Vec<u8>,
     /// The smallest value of the ramp: all that is deeper inside of cracks is alike.
     pub(super) deepest: u8,
+    /// The largest one: all that is farther from cracks is alike.
+    pub(super) farthest: u8,
     /// Cracks that are thinner are widened.
     pub(super) thin: u32,
 }
@@ -93,6 +98,19 @@ fn deepest(ramps: &[Vec<u8>]) -> u8 {
         .unwrap_or(127)
 }
 
+/// The value of the ramp above which a few of the texels of the ground lie. Where cracks are farther apart than in the
+/// photographs, it would be made of these few over and over.
+fn farthest(ramps: &[Vec<u8>]) -> u8 {
+    let mut counts = [0_usize; 256];
+    ramps.iter().flatten().for_each(|&value| counts[usize::from(value)] += 1);
+    let ground: usize = counts[128..].iter().sum();
+    let mut left = ground / FAR_SHARE;
+    (128_u8..=255)
+        .rev()
+        .find(|&value| left.checked_sub(counts[usize::from(value)]).map(|rest| left = rest).is_none())
+        .unwrap_or(255)
+}
+
 /// Columns and rows of an atlas of photographs of these sizes.
 pub(super) fn atlas_size(sizes: impl Iterator<Item = UVec2>) -> [u64; 2] {
     sizes.fold([0, 0], |[w, h], size| {
@@ -118,8 +136,21 @@ impl Atlas {
         let texels = vec![[0; 4]; stride * rows];
         let extras = vec![0; stride * rows * channels];
         let (listed, starts, occurring) = (Vec::new(), vec![0; 257], vec![0; 256]);
-        let (deepest, thin) = (0, 1);
-        Self { stride, texels, extras, channels, sheets, sheet_of_row, listed, starts, occurring, deepest, thin }
+        let (deepest, farthest, thin) = (0, 255, 1);
+        Self {
+            stride,
+            texels,
+            extras,
+            channels,
+            sheets,
+            sheet_of_row,
+            listed,
+            starts,
+            occurring,
+            deepest,
+            farthest,
+            thin,
+        }
     }
 
     /// The level of full size.
@@ -130,10 +161,10 @@ impl Atlas {
         let mut atlas = Self::empty(&sizes, &wraps, channels(params, given));
         atlas.thin = thin(pairs, params);
         let ramps: Vec<_> = pairs.iter().map(|pair| pair_ramp(pair, params, atlas.thin)).collect();
-        atlas.deepest = deepest(&ramps);
+        (atlas.deepest, atlas.farthest) = (deepest(&ramps), farthest(&ramps));
         for ((pair, sheet), mut ramp) in pairs.iter().zip(atlas.sheets.clone()).zip(ramps) {
             let size = pair.size();
-            ramp.iter_mut().for_each(|value| *value = atlas.deepest.max(*value));
+            ramp.iter_mut().for_each(|value| *value = (*value).clamp(atlas.deepest, atlas.farthest));
             let given: Vec<_> = pair.channels().iter().map(ramp::bytes).collect();
             let at = |texel: IVec2| texel.clamp(IVec2::ZERO, size.as_ivec2() - 1).as_uvec2();
             let index = |texel: UVec2| (texel.y * size.x + texel.x) as usize;

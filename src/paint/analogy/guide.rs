@@ -61,9 +61,9 @@ impl GuideWork {
         let size = level.size;
         let is_crack = |x: u32, y: u32| cracks[(y * size.x + x) as usize];
         let ramp = ramp::ramp(size, band, examples.params.reach, examples.thin(), level.wraps, is_crack);
-        let deepest = examples.atlases.first().map_or(0, |atlas| atlas.deepest);
+        let (deepest, farthest) = examples.atlases.first().map_or((0, 255), |atlas| (atlas.deepest, atlas.farthest));
         for (y, row) in (band.min.y..band.max.y).zip(ramp.chunks_exact(band.size().x as usize)) {
-            for (x, value) in (band.min.x..).zip(row.iter().map(|&value| value.max(deepest))) {
+            for (x, value) in (band.min.x..).zip(row.iter().map(|&value| value.clamp(deepest, farthest))) {
                 let texel = &mut level.texels[(y * size.x + x) as usize];
                 if texel[3] != value {
                     texel[3] = value;

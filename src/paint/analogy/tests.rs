@@ -475,3 +475,20 @@ fn a_thin_crack_is_as_dark_as_the_wide_ones_of_the_photograph() {
     let dark = (0..64).filter(|&y| wall.color(20, y)[0] == 40).count();
     assert!(dark > 60, "{dark} of 64 rows");
 }
+
+/// A photograph with a crack every 12 texels, a surface with none: all rows between the cracks are used, not only the
+/// one in their middle.
+#[test]
+fn ground_far_from_cracks_is_made_of_many_texels() {
+    let size = UVec2::new(96, 96);
+    let mut rng = Rng::new(6);
+    let light = |y: u32, rng: &mut Rng| if y.is_multiple_of(12) { 10 } else { 120 + (rng.next_u32() % 80) as u8 };
+    let photo: Vec<u8> = texels(size).flat_map(|at| [light(at.y, &mut rng), 90, 80, 255]).collect();
+    let pair = AnalogyPair::from_darkness(size, &photo, 0.28).unwrap();
+    let examples = Arc::new(Examples::new(&[pair], &AnalogyParams::DEFAULT).unwrap());
+    let mut wall = Analogy::new(examples, &Grid::new(UVec2::splat(200), 0), &[], 1).unwrap();
+    wall.finish();
+    let rows: std::collections::BTreeSet<u16> =
+        wall.sources().as_slice().iter().map(|from| from.texel[1] % 12).collect();
+    assert!(rows.len() >= 3, "{rows:?}");
+}
