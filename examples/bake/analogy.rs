@@ -23,7 +23,7 @@ use std::{
 
 #[derive(Args)]
 pub(crate) struct Options {
-    /// A pair that ships: clay, concrete or paving; may be given many times
+    /// A pair that ships: clay, concrete or paving; may be given many times, with the parameters of the first
     #[arg(long, required_unless_present = "photo", conflicts_with = "photo")]
     pair: Vec<String>,
     /// A photograph of a cracked material, `A'`; may be given many times
@@ -110,8 +110,23 @@ pub(crate) fn shipped_pair(name: &str) -> Done<AnalogyPair> {
     let photo = read_picture(&shipped(name, ""))?;
     let guide = shares(&read_picture(&shipped(name, "_mask"))?);
     let pair = AnalogyPair::new(photo.dimensions().into(), photo.as_raw(), guide)?;
-    // The photographs are textures for walls; the clay is drawn.
-    Ok(if name == "clay" { pair } else { pair.tileable() })
+    Ok(if shipped_file(name)?.contains("is_tileable: true") { pair.tileable() } else { pair })
+}
+
+/// The text of the file of a pair that ships.
+fn shipped_file(name: &str) -> Done<String> {
+    Ok(fs::read_to_string(Path::new(crate::ASSETS).join("analogies").join(format!("{name}.analogy.ron")))?)
+}
+
+/// The parameters of a pair that ships.
+pub(crate) fn shipped_params(name: &str) -> Done<AnalogyParams> {
+    let (file, mut params) = (shipped_file(name)?, AnalogyParams::DEFAULT);
+    // Without the engine no reader of such files is at hand.
+    let fields = file.split_once("params: (").and_then(|(_, rest)| rest.split_once(')')).map_or("", |(inner, _)| inner);
+    for (field, value) in fields.split(',').filter_map(|field| field.split_once(':')) {
+        params.set(field.trim(), value)?;
+    }
+    Ok(params)
 }
 
 /// The guide of a pair and its photograph.
@@ -184,7 +199,7 @@ fn carry(analogy: &Analogy, files: &[PathBuf], pairs: &[AnalogyPair], out: &Path
 }
 
 pub(crate) fn bake(options: &Options) -> Done<()> {
-    let mut params = AnalogyParams::DEFAULT;
+    let mut params = options.pair.first().map_or(Ok(AnalogyParams::DEFAULT), |name| shipped_params(name))?;
     for (name, value) in &options.set {
         params.set(name, value)?;
     }

@@ -1,13 +1,13 @@
 //! `bake figures-mould`: the figures of Mould 2005 made again.
 
 use crate::{
-    analogy::{panels, pattern_panel, picture, shipped_pair},
+    analogy::{panels, pattern_panel, picture, shipped_pair, shipped_params},
     guided::regions,
     maps::{Paint, base_picture},
     ocr::{PROFILE, SIDE, deep},
 };
 use bevy_crack::{
-    paint::analogy::{Analogy, AnalogyParams, Examples},
+    paint::analogy::{Analogy, Examples},
     pattern::SurfaceFrame,
     raster::{DepthField, Profile},
     voronoi::{FONT, Front, Guide, Seams, SiteLayout, VoronoiBake, VoronoiMap, VoronoiParams, draw_text},
@@ -78,7 +78,7 @@ impl Studio {
 
     /// A pair that ships and the same for cracks along the seams: A, A', B, B'.
     fn analogy(&self, name: &str, seams: &Seams) -> Done<[RgbaImage; 4]> {
-        let (pair, params) = (shipped_pair(name)?, AnalogyParams::DEFAULT);
+        let (pair, params) = (shipped_pair(name)?, shipped_params(name)?);
         let mut field = DepthField::new(self.frame);
         seams.stamp(&mut field, &PROFILE);
         let [guide, photo] = panels(&pair, params.depth);

@@ -10,7 +10,7 @@ use bevy_crack::{
 };
 use glam::{UVec2, Vec2};
 use image::RgbaImage;
-use std::{path::PathBuf, sync::Arc, thread};
+use std::{fs, path::PathBuf, sync::Arc, thread};
 
 const NAMES: [&str; 3] = ["clay", "concrete", "paving"];
 
@@ -31,6 +31,17 @@ fn examples(name: &str) -> Arc<Examples> {
     Arc::new(Examples::new(&[pair(name)], &AnalogyParams::DEFAULT).unwrap())
 }
 
+/// The parameters in the file of a pair.
+fn shipped(name: &str) -> AnalogyParams {
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(format!("assets/analogies/{name}.analogy.ron"));
+    let (text, mut params) = (fs::read_to_string(path).unwrap(), AnalogyParams::DEFAULT);
+    let (_, fields) = text.split_once("params: (").unwrap();
+    for (field, value) in fields.split_once(')').unwrap().0.split(',').filter_map(|field| field.split_once(':')) {
+        params.set(field.trim(), value).unwrap();
+    }
+    params
+}
+
 /// Seams of a map as depths.
 fn seams(size: UVec2, sites: u32) -> Grid<u16> {
     let params = VoronoiParams { sites, ..VoronoiParams::DEFAULT };
@@ -42,10 +53,10 @@ fn seams(size: UVec2, sites: u32) -> Grid<u16> {
 
 #[test]
 fn the_own_guide_gives_the_photograph() {
-    for name in NAMES {
+    for (name, params) in NAMES.into_iter().flat_map(|name| [(name, AnalogyParams::DEFAULT), (name, shipped(name))]) {
         let pair = pair(name);
         // Beyond the borders of both lies the same.
-        let params = AnalogyParams { is_tileable: pair.is_tileable(), ..AnalogyParams::DEFAULT };
+        let params = AnalogyParams { is_tileable: pair.is_tileable(), ..params };
         let examples = Arc::new(Examples::new(std::slice::from_ref(&pair), &params).unwrap());
         let depth = pair.cracks().as_slice().iter().map(|&value| (value * 65535.0) as u16).collect();
         let mut wall = Analogy::new(examples, &Grid::from_vec(pair.size(), depth).unwrap(), &[], 3).unwrap();
@@ -64,8 +75,9 @@ fn the_own_guide_gives_the_photograph() {
 #[test]
 fn cracks_are_where_the_pattern_has_them() {
     for name in NAMES {
-        for sites in [12, 60] {
-            let mut wall = Analogy::new(examples(name), &seams(UVec2::new(260, 200), sites), &[], 1).unwrap();
+        for (sites, params) in [12, 60].into_iter().flat_map(|n| [(n, AnalogyParams::DEFAULT), (n, shipped(name))]) {
+            let examples = Arc::new(Examples::new(&[pair(name)], &params).unwrap());
+            let mut wall = Analogy::new(examples, &seams(UVec2::new(260, 200), sites), &[], 1).unwrap();
             wall.finish();
             let agreement = wall.agreement(0.1);
             assert!(agreement > 0.985, "{name}, {sites} sites: {agreement}");
@@ -188,25 +200,32 @@ fn threads_do_not_matter() {
     });
 }
 
-/// How many texels continue their right (lower) neighbour's source, inside and across the border.
+/// Steps of colour across the border against those inside. Only inside steps where texels of the smallest level meet
+/// count, as they do at the border; what is copied together has smaller ones.
 #[test]
 fn tileable_results_have_no_seam_at_their_border() {
     let size = UVec2::new(160, 128);
     let params = AnalogyParams { is_tileable: true, ..AnalogyParams::DEFAULT };
     let jumps = |params: AnalogyParams| {
         let examples = Arc::new(Examples::new(&[pair("concrete")], &params).unwrap());
-        let mut wall = Analogy::new(examples, &Grid::new(size, 0), &[], 4).unwrap();
-        wall.finish();
-        let colors = wall.colors();
-        let off = |a: UVec2, b: UVec2| {
-            let [a, b] = [a, b].map(|at| colors.get(at.x, at.y).unwrap());
-            (0..3).map(|channel| f64::from(a[channel].abs_diff(b[channel]))).sum::<f64>()
-        };
-        let column = |x: u32| (0..size.y).map(|y| off(UVec2::new(x, y), UVec2::new((x + 1) % size.x, y))).sum::<f64>();
-        let inside = (0..size.x - 1).map(column).sum::<f64>() / f64::from(size.x - 1);
-        column(size.x - 1) / inside
+        let (mut border, mut inside) = (0.0, 0.0);
+        for seed in 1..=8 {
+            let mut wall = Analogy::new(examples.clone(), &Grid::new(size, 0), &[], seed).unwrap();
+            wall.finish();
+            let colors = wall.colors();
+            let off = |a: UVec2, b: UVec2| {
+                let [a, b] = [a, b].map(|at| colors.get(at.x, at.y).unwrap());
+                (0..3).map(|channel| f64::from(a[channel].abs_diff(b[channel]))).sum::<f64>()
+            };
+            let column =
+                |x: u32| (0..size.y).map(|y| off(UVec2::new(x, y), UVec2::new((x + 1) % size.x, y))).sum::<f64>();
+            let meets = (1..size.x / 16).map(|at| 16 * at - 1);
+            inside += meets.clone().map(column).sum::<f64>() / meets.count() as f64;
+            border += column(size.x - 1);
+        }
+        border / inside
     };
     let (tileable, plain) = (jumps(params), jumps(AnalogyParams::DEFAULT));
     println!("step across the border against steps inside: {tileable:.3}, else {plain:.3}");
-    assert!(tileable < 1.2 && tileable < plain, "{tileable} {plain}");
+    assert!(tileable < 1.1 && tileable < plain, "{tileable} {plain}");
 }

@@ -1,6 +1,6 @@
 //! [`Atlas`]: one level of all photographs and guides, below each other, with margins.
 
-use super::{pair::AnalogyPair, params::AnalogyParams, ramp};
+use super::{pair::AnalogyPair, params::AnalogyParams, ramp, widen};
 use crate::raster::TexelRect;
 use glam::{IVec2, UVec2};
 
@@ -21,6 +21,9 @@ const MOST_LISTED: usize = 1 << 17;
 
 /// One in how many texels of cracks count as the deepest.
 const DEEP_SHARE: usize = 12;
+
+/// One in how many texels of the ground count as the farthest from cracks.
+const FAR_SHARE: usize = 4;
 
 /// A texel of the atlas: its row in the upper 16 bits, its column in the lower ones.
 pub(super) type Place = u32;
@@ -63,13 +66,24 @@ pub(super) struct Atlas {
     occurring: Vec<u8>,
     /// The smallest value of the ramp: all that is deeper inside of cracks is alike.
     pub(super) deepest: u8,
+    /// The largest one: all that is farther from cracks is alike.
+    pub(super) farthest: u8,
+    /// Cracks that are thinner are widened.
+    pub(super) thin: u32,
 }
 
 /// The ramp of a photograph.
-fn pair_ramp(pair: &AnalogyPair, params: &AnalogyParams) -> Vec<u8> {
+fn pair_ramp(pair: &AnalogyPair, params: &AnalogyParams, thin: u32) -> Vec<u8> {
     let size = pair.size();
     let is_crack = |x, y| pair.is_crack(x, y, params.depth);
-    ramp::ramp(size, TexelRect::whole(size), params.reach, pair.is_tileable(), is_crack)
+    ramp::ramp(size, TexelRect::whole(size), params.reach, thin, pair.is_tileable(), is_crack)
+}
+
+/// The width of thin cracks of the photographs.
+fn thin(pairs: &[AnalogyPair], params: &AnalogyParams) -> u32 {
+    let widths =
+        |pair: &AnalogyPair| widen::widths(pair.size(), pair.is_tileable(), |x, y| pair.is_crack(x, y, params.depth));
+    widen::thin(pairs.iter().flat_map(widths).collect())
 }
 
 /// The value of the ramp below which a few of the texels of cracks lie. Wider cracks than those of the photographs
@@ -82,6 +96,19 @@ fn deepest(ramps: &[Vec<u8>]) -> u8 {
     (0_u8..127)
         .find(|&value| left.checked_sub(counts[usize::from(value)]).map(|rest| left = rest).is_none())
         .unwrap_or(127)
+}
+
+/// The value of the ramp above which a few of the texels of the ground lie. Where cracks are farther apart than in the
+/// photographs, it would be made of these few over and over.
+fn farthest(ramps: &[Vec<u8>]) -> u8 {
+    let mut counts = [0_usize; 256];
+    ramps.iter().flatten().for_each(|&value| counts[usize::from(value)] += 1);
+    let ground: usize = counts[128..].iter().sum();
+    let mut left = ground / FAR_SHARE;
+    (128_u8..=255)
+        .rev()
+        .find(|&value| left.checked_sub(counts[usize::from(value)]).map(|rest| left = rest).is_none())
+        .unwrap_or(255)
 }
 
 /// Columns and rows of an atlas of photographs of these sizes.
@@ -108,8 +135,22 @@ impl Atlas {
         }
         let texels = vec![[0; 4]; stride * rows];
         let extras = vec![0; stride * rows * channels];
-        let (listed, starts, occurring, deepest) = (Vec::new(), vec![0; 257], vec![0; 256], 0);
-        Self { stride, texels, extras, channels, sheets, sheet_of_row, listed, starts, occurring, deepest }
+        let (listed, starts, occurring) = (Vec::new(), vec![0; 257], vec![0; 256]);
+        let (deepest, farthest, thin) = (0, 255, 1);
+        Self {
+            stride,
+            texels,
+            extras,
+            channels,
+            sheets,
+            sheet_of_row,
+            listed,
+            starts,
+            occurring,
+            deepest,
+            farthest,
+            thin,
+        }
     }
 
     /// The level of full size.
@@ -118,11 +159,12 @@ impl Atlas {
         let wraps: Vec<_> = pairs.iter().map(AnalogyPair::is_tileable).collect();
         let given = pairs.first().map_or(0, |pair| pair.channels().len());
         let mut atlas = Self::empty(&sizes, &wraps, channels(params, given));
-        let ramps: Vec<_> = pairs.iter().map(|pair| pair_ramp(pair, params)).collect();
-        atlas.deepest = deepest(&ramps);
+        atlas.thin = thin(pairs, params);
+        let ramps: Vec<_> = pairs.iter().map(|pair| pair_ramp(pair, params, atlas.thin)).collect();
+        (atlas.deepest, atlas.farthest) = (deepest(&ramps), farthest(&ramps));
         for ((pair, sheet), mut ramp) in pairs.iter().zip(atlas.sheets.clone()).zip(ramps) {
             let size = pair.size();
-            ramp.iter_mut().for_each(|value| *value = atlas.deepest.max(*value));
+            ramp.iter_mut().for_each(|value| *value = (*value).clamp(atlas.deepest, atlas.farthest));
             let given: Vec<_> = pair.channels().iter().map(ramp::bytes).collect();
             let at = |texel: IVec2| texel.clamp(IVec2::ZERO, size.as_ivec2() - 1).as_uvec2();
             let index = |texel: UVec2| (texel.y * size.x + texel.x) as usize;

@@ -44,19 +44,20 @@ impl Analogy {
     }
 
     /// The guide `B`: 255 at [`AnalogyParams::reach`](super::AnalogyParams::reach) or more from all cracks, 128 at
-    /// their edges, 0 that deep inside. As of the last work that was begun.
+    /// their edges, 0 that deep inside; limited to values that enough texels of the photographs have. As of the last work
+    /// that was begun.
     #[must_use]
     pub fn ramp(&self) -> Grid<u8> {
         let ramp = self.full().texels.iter().map(|texel| texel[3]).collect();
         Grid::from_vec(self.size(), ramp).unwrap_or_else(|| Grid::new(self.size(), 255))
     }
 
-    /// Whether a crack is nearer to a texel than [`AnalogyParams::reach`](super::AnalogyParams::reach), or the texel is
-    /// in one. As of the last work that was begun; false outside of the surface.
+    /// Whether a texel is in a crack or beside one: nearer than [`AnalogyParams::reach`](super::AnalogyParams::reach), and
+    /// than the ground of the photographs that is farthest from cracks. As of the last work that was begun; false outside of the surface.
     #[must_use]
     pub fn is_near_crack(&self, x: u32, y: u32) -> bool {
         let (level, texel) = (self.full(), UVec2::new(x, y));
-        texel.cmplt(level.size).all() && level.texels[level.index(texel)][3] < 255
+        texel.cmplt(level.size).all() && level.texels[level.index(texel)][3] < self.examples().atlases[0].farthest
     }
 
     /// The share of texels whose distance from the edge of a crack differs by less than `tolerance` from that of their

@@ -71,6 +71,11 @@ impl Examples {
         Grid::from_vec(sheet.size, all.map(|texel| atlas.texels[atlas.index(sheet.place(texel))][3]).collect())
     }
 
+    /// Cracks that are thinner are widened.
+    pub(super) fn thin(&self) -> u32 {
+        self.atlases.first().map_or(1, |atlas| atlas.thin)
+    }
+
     /// The guide at a place.
     pub(super) fn ramp_at(&self, place: Place) -> Option<u8> {
         (place != NOWHERE).then(|| self.atlases[0].texels[self.atlases[0].index(place)][3])

@@ -6,6 +6,7 @@ use super::{
     level::Level,
     ramp,
     region::{Region, Span},
+    widen,
 };
 use crate::raster::TexelRect;
 use glam::{IVec2, UVec2};
@@ -45,7 +46,7 @@ impl GuideWork {
             }
         }
         let params = &examples.params;
-        let around = Region::new(spans).grown(params.reach, size, params.is_tileable);
+        let around = Region::new(spans).grown(params.reach + widen::reach(examples.thin()), size, params.is_tileable);
         Self { bands: around.tiles(LOG_TILE, size).into(), changed: Vec::new() }
     }
 
@@ -59,10 +60,10 @@ impl GuideWork {
         let band = self.bands.pop_front()?;
         let size = level.size;
         let is_crack = |x: u32, y: u32| cracks[(y * size.x + x) as usize];
-        let ramp = ramp::ramp(size, band, examples.params.reach, level.wraps, is_crack);
-        let deepest = examples.atlases.first().map_or(0, |atlas| atlas.deepest);
+        let ramp = ramp::ramp(size, band, examples.params.reach, examples.thin(), level.wraps, is_crack);
+        let (deepest, farthest) = examples.atlases.first().map_or((0, 255), |atlas| (atlas.deepest, atlas.farthest));
         for (y, row) in (band.min.y..band.max.y).zip(ramp.chunks_exact(band.size().x as usize)) {
-            for (x, value) in (band.min.x..).zip(row.iter().map(|&value| value.max(deepest))) {
+            for (x, value) in (band.min.x..).zip(row.iter().map(|&value| value.clamp(deepest, farthest))) {
                 let texel = &mut level.texels[(y * size.x + x) as usize];
                 if texel[3] != value {
                     texel[3] = value;

@@ -26,6 +26,7 @@ mod search;
 mod state;
 #[cfg(test)]
 mod tests;
+mod widen;
 mod work;
 
 pub use carry::TexelSource;

@@ -69,7 +69,8 @@ params! {
     reach: u32 = 12, 2.0, 60.0;
     /// Depth from which a texel is crack, 0..=1; default 0.15, so that thin cracks have few gaps.
     depth: f32 = 0.15, 0.0, 1.0;
-    /// Weight of the guide against that of the three colours together, 0..=5; default 3. At 0 cracks go anywhere.
+    /// Weight of the guide against that of the three colours together, 0..=5; default 3. Smaller values
+    /// fit pieces to each other better than to the cracks. At 0 cracks go anywhere.
     guide: f32 = 3.0, 0.0, 5.0;
     /// Weight of the direction away from the crack against the guide, 0..=4; default 0. Raise it for photographs with
     /// light from one side.

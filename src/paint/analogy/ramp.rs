@@ -4,6 +4,7 @@
 //! to go by. The ramp tells every texel within reach how far it is from a crack, and its slope tells in which
 //! direction. It rises with the root of the distance: steepest at the edge, where one texel more or less is seen.
 
+use super::widen::widened;
 use crate::{
     Grid,
     math::ops,
@@ -17,12 +18,13 @@ const EDGE: f32 = 127.5;
 
 /// The ramp of the texels in `rect` of a surface of `size`: 0 = `reach` inside a crack, 255 = `reach` away from all.
 ///
-/// `is_crack` is asked for texels of the surface only. Beyond its borders there is no crack, or what lies at the
-/// opposite border if it `wraps`.
+/// Cracks thinner than `thin` are widened. `is_crack` is asked for texels of the surface only. Beyond its borders there
+/// is no crack, or what lies at the opposite border if it `wraps`.
 pub(super) fn ramp(
     size: UVec2,
     rect: TexelRect,
     reach: u32,
+    thin: u32,
     wraps: bool,
     is_crack: impl Fn(u32, u32) -> bool,
 ) -> Vec<u8> {
@@ -30,23 +32,11 @@ pub(super) fn ramp(
     let outer = inner + 2 * reach;
     let Ok(frame) = SurfaceFrame::new(outer) else { return vec![255; inner.element_product() as usize] };
     let (mut cracks, mut rest) = (DepthField::new(frame), DepthField::new(frame));
-    let (w, h) = (i64::from(size.x), i64::from(size.y));
-    let mut has_crack = false;
-    for y in 0..outer.y {
-        let v = i64::from(rect.min.y) + i64::from(y) - i64::from(reach);
-        let v = if wraps { v.rem_euclid(h) } else { v };
-        let (out, free) = (cracks.depth.row_mut(y as usize), rest.depth.row_mut(y as usize));
-        if !(0..h).contains(&v) {
-            free.fill(u16::MAX);
-            continue;
-        }
-        for (x, (out, free)) in (0..).zip(out.iter_mut().zip(free)) {
-            let u = i64::from(rect.min.x) + x - i64::from(reach);
-            let u = if wraps { u.rem_euclid(w) } else { u };
-            let crack = (0..w).contains(&u) && is_crack(u as u32, v as u32);
-            has_crack |= crack;
-            *(if crack { out } else { free }) = u16::MAX;
-        }
+    let is_crack = widened(size, rect, reach, thin, wraps, is_crack);
+    let has_crack = is_crack.contains(&true);
+    for (at, &is_crack) in is_crack.iter().enumerate() {
+        let to = if is_crack { &mut cracks } else { &mut rest };
+        to.depth.as_mut_slice()[at] = u16::MAX;
     }
     if !has_crack {
         return vec![255; inner.element_product() as usize];

@@ -8,6 +8,7 @@ use super::{
     pair::{MAX_CHANNELS, check_channel, check_size},
     ramp,
     region::Region,
+    widen,
     work::Work,
 };
 use crate::{Grid, raster::TexelRect};
@@ -33,7 +34,8 @@ const FIRST_COUNTED: usize = 2;
 /// size, which do not change the result: it depends on examples, seed, and the rectangles and depths of the updates in
 /// their order.
 ///
-/// Differs from the papers: the guide is a ramp of the distance to the crack, not the mask itself; the search for
+/// Differs from the papers: the guide is a ramp of the distance to the crack, not the mask itself, and cracks thinner
+/// than most of the photographs' are widened to the thin ones of these; the search for
 /// nearest neighbours is by coherence and random places instead of a tree; texels are made in several passes, each of
 /// which sees all neighbours, instead of in one.
 ///
@@ -195,10 +197,11 @@ impl Analogy {
         std::mem::take(&mut self.changed)
     }
 
-    /// How far from a texel whose crack has changed texels can change: the reach of the guide, and the margin.
+    /// How far from a texel whose crack has changed texels can change: the reach of the guide,
+    /// the margin, and a few where thin cracks are widened.
     #[must_use]
     pub fn window(&self) -> u32 {
-        self.examples.params.reach + self.examples.params.margin
+        self.examples.params.reach + self.examples.params.margin + widen::reach(self.examples.thin())
     }
 
     /// Size of the surface, texels.

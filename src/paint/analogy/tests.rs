@@ -153,7 +153,7 @@ fn ramps_are_distances() {
         let is_crack = |x: u32, y: u32| cracks[(y * size.x + x) as usize];
         let min = UVec2::new(rng.next_u32() % size.x, rng.next_u32() % size.y);
         let rect = TexelRect { min, max: size };
-        let got = ramp::ramp(size, rect, reach, wraps, is_crack);
+        let got = ramp::ramp(size, rect, reach, 1, wraps, is_crack);
         let at = |texel: IVec2| {
             let inside = if wraps { texel.rem_euclid(size.as_ivec2()) } else { texel };
             inside.cmpge(IVec2::ZERO).all()
@@ -456,4 +456,39 @@ fn surfaces_and_maps_of_a_wrong_size_are_refused() {
     wall.update(&all, &[TexelRect { min: UVec2::splat(40), max: UVec2::MAX }]).unwrap();
     wall.finish();
     assert!(!wall.is_busy() && wall.progress() == 1.0);
+}
+
+/// A photograph with wide cracks that are dark in the middle: a crack of one texel gets that middle too.
+#[test]
+fn a_thin_crack_is_as_dark_as_the_wide_ones_of_the_photograph() {
+    let size = UVec2::new(64, 64);
+    let light = |x: u32| [200, 120, 40, 120, 200][(x.clamp(29, 33) - 29) as usize];
+    let photo: Vec<u8> = texels(size).flat_map(|at| [light(at.x), light(at.x), light(at.x), 255]).collect();
+    let is_crack = |at: UVec2| if (29..34).contains(&at.x) { 1.0 } else { 0.0 };
+    let guide = Grid::from_vec(size, texels(size).map(is_crack).collect()).unwrap();
+    let pair = AnalogyPair::new(size, &photo, guide).unwrap();
+    let examples = Arc::new(Examples::new(&[pair], &AnalogyParams::DEFAULT).unwrap());
+    let mut depth = Grid::new(size, 0);
+    (0..64).for_each(|y| depth.row_mut(y)[20] = u16::MAX);
+    let mut wall = Analogy::new(examples, &depth, &[], 1).unwrap();
+    wall.finish();
+    let dark = (0..64).filter(|&y| wall.color(20, y)[0] == 40).count();
+    assert!(dark > 60, "{dark} of 64 rows");
+}
+
+/// A photograph with a crack every 12 texels, a surface with none: all rows between the cracks are used, not only the
+/// one in their middle.
+#[test]
+fn ground_far_from_cracks_is_made_of_many_texels() {
+    let size = UVec2::new(96, 96);
+    let mut rng = Rng::new(6);
+    let light = |y: u32, rng: &mut Rng| if y.is_multiple_of(12) { 10 } else { 120 + (rng.next_u32() % 80) as u8 };
+    let photo: Vec<u8> = texels(size).flat_map(|at| [light(at.y, &mut rng), 90, 80, 255]).collect();
+    let pair = AnalogyPair::from_darkness(size, &photo, 0.28).unwrap();
+    let examples = Arc::new(Examples::new(&[pair], &AnalogyParams::DEFAULT).unwrap());
+    let mut wall = Analogy::new(examples, &Grid::new(UVec2::splat(200), 0), &[], 1).unwrap();
+    wall.finish();
+    let rows: std::collections::BTreeSet<u16> =
+        wall.sources().as_slice().iter().map(|from| from.texel[1] % 12).collect();
+    assert!(rows.len() >= 3, "{rows:?}");
 }
