@@ -394,7 +394,9 @@ mod tests {
             assert!(is_done(&app), "it does not crack");
             app.insert_resource(budget);
             app.world_mut().resource_mut::<crate::plugin::jobs::threads::Threads>().are_missing = no_threads;
-            app.world_mut().get_mut::<CrackSurface>(entity).expect("it is there").preset = other.clone().into();
+            if let Some(mut surface) = app.world_mut().get_mut::<CrackSurface>(entity) {
+                surface.preset = other.clone().into();
+            }
             let mut pictures = vec![shown(&app, entity)];
             for _ in 0..400 {
                 app.update();
