@@ -61,7 +61,7 @@ const LIGHT: Vec3 = Vec3::new(-0.48, -0.52, 0.706);
 
 /// Height from which on a stone is a stone, and at which its surface begins to show beside what lies in gaps, pattern
 /// units.
-const STONE: [f32; 2] = [0.002, 0.009];
+const STONE: [f32; 2] = [0.0015, 0.0055];
 
 /// The colors of one row after another.
 struct Painter<'a> {
@@ -118,8 +118,8 @@ impl<'a> Painter<'a> {
         };
         let noises = [
             noise([0.25; 2], 6, 0.62),
-            noise([0.035; 2], 4, 0.75),
-            noise([0.012; 2], 3, 0.8),
+            noise([0.035; 2], 4, 0.66),
+            noise([0.012; 2], 2, 0.7),
             noise([0.035, 0.3], if colors.stains.is_some() { 3 } else { 0 }, 0.62),
         ];
         let measure = colors.rivers.map(|rivers| Measure { gather: rivers.gather, width: rivers.width });
@@ -182,7 +182,7 @@ impl<'a> Painter<'a> {
             // Little light falls into gaps.
             let open = smoothstep(-STONE[1], STONE[1], place.height);
             shade = shade.min(1.15) + (shade - shade.min(1.15)) * open;
-            shade = shade.max(0.5 * (1.0 - open));
+            shade = shade.max(0.62 * (1.0 - open));
         }
         let mut grain = 1.0 + variety * (0.07 * noise[1] + 0.075 * noise[2]);
         if let Some((woods, share)) = self.woods(place).filter(|(_, share)| *share > 0.0) {
@@ -207,7 +207,7 @@ impl<'a> Painter<'a> {
         let normal = Vec3::new(-right, -down, 1.0).normalize();
         let lit = (normal.dot(LIGHT) / LIGHT.z).max(0.0);
         // Twilight from above beside the sun.
-        cavity * (1.0 + self.colors.light * (0.42 * normal.z + 0.2 + 0.5 * lit.min(1.6) - 1.0))
+        cavity * (1.0 + self.colors.light * (0.34 * normal.z + 0.3 + 0.48 * (lit.min(1.0) + 0.4 * (lit - 1.0).clamp(0.0, 0.8)) - 1.0))
     }
 
     /// Ground and rock.
@@ -245,9 +245,10 @@ impl<'a> Painter<'a> {
 
     /// What lies in a gap: earth and loose pieces of the same rock.
     fn gap(&self, stones: &StoneColors, place: &Place, ground: Vec3) -> Vec3 {
-        let speckled = 1.0 + 0.2 * self.colors.variety * place.noise[2] + 0.2 * place.noise[1];
-        let piece = ground.lerp(self.rock(place, 0), 0.5) * 0.7;
-        rgb(stones.gap).lerp(piece, smoothstep(-0.1, 0.5, place.edge[0])) * speckled.max(0.2)
+        let noise = place.noise;
+        let mottled = 1.0 + self.colors.variety * (0.12 * noise[2] + 0.3 * noise[1] + 0.3 * noise[0]);
+        let piece = ground.lerp(self.rock(place, 0), 0.5) * 0.72;
+        rgb(stones.gap).lerp(piece, 0.8 * smoothstep(-0.3, 0.8, place.edge[0])) * mottled.max(0.4)
     }
 
     /// The surface of a stone.
@@ -255,9 +256,9 @@ impl<'a> Painter<'a> {
         let stone = self.stones.as_ref().and_then(|stones| stones.at(place.x, place.y));
         let mut color = ground.lerp(self.rock(place, stone.map_or(0, |stone| stone.seed)), 0.35 + 0.4 * steep);
         if let Some(stone) = stone {
-            let [light, warm, ..] = unit_draws(stone.seed ^ 0x70_4E);
-            let warm = stones.tone * 0.22 * (warm - 0.5);
-            color *= 1.0 + stones.tone * 0.75 * (light - 0.5);
+            let [light, warm, cool, _] = unit_draws(stone.seed ^ 0x70_4E);
+            let warm = stones.tone * 0.26 * (0.5 * (warm + cool) - 0.5);
+            color *= 1.0 + stones.tone * 0.6 * (light - 0.5);
             color *= Vec3::new(1.0 + warm, 1.0 + 0.15 * warm, 1.0 - warm);
         }
         self.patches(color, place)
@@ -277,8 +278,8 @@ impl<'a> Painter<'a> {
             color = color.lerp(rgb(stains.color) * (color.element_sum() / 400.0), 0.5 * share);
         }
         if let Some(lichen) = &self.colors.lichen {
-            let value = 0.75 * noise[1] - 0.55 * noise[0] + 0.3 * noise[2] + 0.25 * place.edge[1];
-            color = color.lerp(rgb(lichen.color), 0.6 * cover(lichen, value, 0.12));
+            let value = 0.75 * noise[1] - 0.55 * noise[0] + 0.12 * noise[2] + 0.25 * place.edge[1];
+            color = color.lerp(rgb(lichen.color), 0.55 * cover(lichen, value, 0.4));
         }
         color
     }
