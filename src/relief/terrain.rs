@@ -160,7 +160,7 @@ impl TerrainColors {
 
     /// An island: sea, beach, meadows, woods, rivers, rock and snow.
     pub const ISLAND: Self = Self {
-        sea: Some(Sea { shallow: [92, 178, 172], deep: [10, 44, 84], half: 0.016 }),
+        sea: Some(Sea { shallow: [84, 166, 164], deep: [10, 44, 84], half: 0.016 }),
         ground: [
             ground(0.0, [216, 199, 156]),
             ground(0.012, [118, 132, 70]),
@@ -173,13 +173,13 @@ impl TerrainColors {
         steep: [1.1, 1.9],
         stratum: 0.02,
         strata: 0.4,
-        cavity: 0.55,
+        cavity: 0.4,
         variety: 0.7,
         stones: None,
         stains: None,
         lichen: None,
         woods: Some(Woods { color: [50, 76, 40], spread: 0.76, top: 0.62, crown: 0.0055 }),
-        rivers: Some(Rivers { color: [60, 106, 128], gather: 0.02, width: 0.0048 }),
+        rivers: Some(Rivers { color: [60, 106, 128], gather: 0.02, width: 0.006 }),
         light: 0.35,
     };
 

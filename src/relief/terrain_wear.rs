@@ -139,11 +139,10 @@ const SHORE: f32 = 0.03;
 const CLIFF: f32 = 0.02;
 
 /// A height after valleys have changed it by `carved` and the sea has shaped its coast: a cliff on headlands (1), level
-/// ground in bays (0). The shore stays where it is.
-pub(super) fn shore(height: f32, carved: f32, headland: f32, coast: f32) -> f32 {
+/// ground in bays (0). The sea is as deep as the share of its depth tells. The shore stays where it is.
+pub(super) fn shore(height: f32, carved: f32, [headland, depth]: [f32; 2], coast: f32) -> f32 {
     if height <= 0.0 {
-        // The ground off bays is shallow.
-        return height * (1.0 - 0.45 * coast * (1.0 - headland));
+        return height * (1.0 + coast * (depth - 1.0));
     }
     let height = (height + carved * smoothstep(0.0, 0.5 * SHORE, height)).max(0.3 * height);
     let level = height * (0.3 + 0.7 * smoothstep(0.0, SHORE, height));
