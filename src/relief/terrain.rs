@@ -160,17 +160,17 @@ impl TerrainColors {
 
     /// An island: sea, beach, meadows, woods, rivers, rock and snow.
     pub const ISLAND: Self = Self {
-        sea: Some(Sea { shallow: [84, 166, 164], deep: [10, 44, 84], half: 0.016 }),
+        sea: Some(Sea { shallow: [84, 166, 164], deep: [12, 50, 92], half: 0.016 }),
         ground: [
             ground(0.0, [216, 199, 156]),
             ground(0.012, [118, 132, 70]),
             ground(0.36, [122, 124, 76]),
-            ground(0.6, [134, 127, 104]),
+            ground(0.6, [121, 114, 97]),
             ground(0.73, [240, 243, 247]),
         ],
         transition: 0.1,
         rock: [[128, 116, 102], [96, 90, 85]],
-        steep: [1.1, 1.9],
+        steep: [1.2, 2.0],
         stratum: 0.02,
         strata: 0.4,
         cavity: 0.4,

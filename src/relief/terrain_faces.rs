@@ -13,8 +13,8 @@ use crate::{
 use glam::Vec2;
 use std::{f32::consts::TAU, ops::Range};
 
-/// Lowest height that a face cuts down to, as a share of the height of its stone.
-const LEAST: f32 = 0.16;
+/// Share of its height that a place keeps at least.
+const KEPT: f32 = 0.34;
 
 /// A plane: its height at the middle of its stone, and its slope.
 #[derive(Clone, Copy, Debug)]
@@ -136,8 +136,7 @@ impl Faces {
                 b.depth * smoothstep(0.0, b.width, beyond)
             });
             let lowest = lowest - broken.sum::<f32>();
-            let least = height.min(LEAST * self.stones.list[stone].highest);
-            *height += self.amount * (lowest.max(least) - *height);
+            *height += self.amount * (lowest.max(KEPT * *height) - *height);
         }
     }
 }

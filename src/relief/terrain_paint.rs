@@ -181,7 +181,7 @@ impl<'a> Painter<'a> {
         if let Some(sea) = self.colors.sea.filter(|_| place.height < 0.0) {
             let fresh = self.river(place) * (1.0 - smoothstep(0.0, 0.25, -place.height / sea.half));
             return match &self.colors.rivers {
-                Some(rivers) => self.sea(&sea, place).lerp(rgb(rivers.color), 0.5 * fresh),
+                Some(_) => self.sea(&sea, place).lerp(rgb(sea.shallow), 0.75 * fresh),
                 None => self.sea(&sea, place),
             };
         }
@@ -203,7 +203,9 @@ impl<'a> Painter<'a> {
         }
         if let Some(rivers) = &self.colors.rivers {
             let share = self.river(place);
-            color = color.lerp(rgb(rivers.color), share);
+            let tide = self.colors.sea.map_or(0.0, |_| 0.75 * smoothstep(0.006, 0.0, place.height));
+            let shallow = self.colors.sea.map_or(Vec3::ZERO, |sea| rgb(sea.shallow));
+            color = color.lerp(rgb(rivers.color).lerp(shallow, tide), share);
             shade += (1.0 - shade) * 0.7 * share;
         }
         (color * (shade * grain).max(0.0)).min(Vec3::splat(255.0))
@@ -227,7 +229,10 @@ impl<'a> Painter<'a> {
         let normal = Vec3::new(-right, -down, 1.0).normalize();
         let lit = (normal.dot(LIGHT) / LIGHT.z).max(0.0);
         // Twilight from above beside the sun.
-        cavity * (1.0 + self.colors.light * (0.34 * normal.z + 0.3 + 0.48 * (lit.min(1.0) + 0.4 * (lit - 1.0).clamp(0.0, 0.8)) - 1.0))
+        cavity
+            * (1.0
+                + self.colors.light
+                    * (0.34 * normal.z + 0.3 + 0.48 * (lit.min(1.0) + 0.4 * (lit - 1.0).clamp(0.0, 0.8)) - 1.0))
     }
 
     /// Ground and rock.
@@ -236,11 +241,11 @@ impl<'a> Painter<'a> {
         let steep = place.slope * (1.0 + 0.25 * self.colors.variety * place.noise[1]);
         // Sand and snow lie on less and on more than other ground.
         let low = 1.0 - smoothstep(0.5, 1.3, place.share / self.colors.ground[1].from.max(1e-3));
-        let steep = if self.colors.sea.is_some() { steep * (1.0 + 1.2 * low) - 0.2 * snow.x } else { steep };
+        let steep = if self.colors.sea.is_some() { steep * (1.0 + 1.2 * low) - 0.5 * snow.x } else { steep };
         let rock = smoothstep(self.colors.steep[0], self.colors.steep[1], steep);
         let Some(stones) = self.colors.stones else {
             // Scree lies below rock.
-            let high = smoothstep(0.2, 0.5, place.share + 0.1 * place.noise[0]);
+            let high = smoothstep(0.3, 0.62, place.share + 0.12 * place.noise[0]);
             let loose =
                 high * smoothstep(0.7 * self.colors.steep[0], self.colors.steep[0], steep + 0.2 * place.noise[1]);
             let bare = self.rock(place, 0);
@@ -311,6 +316,9 @@ impl<'a> Painter<'a> {
         let wander = 0.6 * noise[0] + 0.35 * noise[1] - 0.25 * (place.edge[0] + place.edge[1]);
         let (mut color, mut last) = (rgb(self.colors.ground[0].color), 0.0);
         let facing = self.facing(place);
+        // Height by the wider surroundings, so that crests have no line of their own.
+        let around = (self.blurs[1].row(place.y)[place.x] - self.range[0]) / (self.range[1] - self.range[0]);
+        let broad = 0.4 * place.share + 0.6 * around;
         for (i, ground) in self.colors.ground.iter().enumerate().skip(1) {
             let half = (0.5 * self.colors.transition).min(0.35 * ground.from) * if i == 4 { 1.3 } else { 1.0 };
             let wide = 0.3 * half + 0.16 * ground.from;
@@ -322,9 +330,12 @@ impl<'a> Painter<'a> {
                 }
                 // Snow stays where it is shady and not steep.
                 (4, None) => {
-                    let stays = 0.1 - 0.16 * facing.clamp(-0.8, 1.0) - 0.16 * smoothstep(0.7, 1.5, place.slope);
-                    place.share + self.colors.variety * (wander * wide + stays + 0.06 * noise[0] + 0.05 * noise[1])
+                    let crest = place.edge[1].max(0.0);
+                    let stays =
+                        0.11 - 0.12 * crest - 0.09 * facing.clamp(-0.8, 1.0) - 0.1 * smoothstep(0.7, 1.5, place.slope);
+                    broad + self.colors.variety * (wander * wide + stays + 0.06 * noise[0] + 0.05 * noise[1])
                 }
+                (3, None) => broad + self.colors.variety * wander * wide,
                 _ => place.share + self.colors.variety * wander * wide,
             };
             last = smoothstep(ground.from - half, ground.from + half, moved);
@@ -412,9 +423,11 @@ impl<'a> Painter<'a> {
         let texel = 1.0 / self.frame.texels_per_unit();
         let away = -place.height / place.slope.max(0.02);
         let line = |at: f32, half: f32| 1.0 - smoothstep(0.5 * half, half, (away - at).abs());
-        let surf = 0.75 * line(0.0, (0.0022f32).max(1.2 * texel)) * smoothstep(-0.3, 0.3, 0.8 * noise[1] + 0.5 * noise[0]);
+        let surf =
+            0.65 * line(0.0, (0.0022f32).max(1.2 * texel)) * smoothstep(-0.05, 0.5, 0.8 * noise[1] + 0.5 * noise[0]);
         let second = 0.3 * line(0.007, (0.0018f32).max(texel)) * smoothstep(0.0, 0.5, noise[1] - 0.5 * noise[0]);
-        color.lerp(Vec3::new(236.0, 242.0, 240.0), surf.max(second) * smoothstep(0.4, 0.15, depth)) * (1.0 + 0.02 * noise[1])
+        color.lerp(Vec3::new(236.0, 242.0, 240.0), surf.max(second) * smoothstep(0.4, 0.15, depth))
+            * (1.0 + 0.05 * noise[0] + 0.02 * noise[1])
     }
 }
 

@@ -31,6 +31,10 @@ const LOWER: f32 = 0.9;
 /// How far a place comes nearer to the mean of those around it in a round, where rivers cut at a speed of 1.
 const CREEP: f32 = 0.62;
 
+/// Radius over which crests are rounded, cells, and how much, where rivers cut at a speed of 1.
+const CREST: usize = 2;
+const SOFT: f32 = 2.0;
+
 /// Radius of the surroundings that make a bay or a headland, pattern units.
 const AROUND: f32 = 0.045;
 
@@ -79,19 +83,18 @@ impl Valleys {
         let cell = block(heights.size()) as f32 / frame.texels_per_unit();
         // Unevenness breaks the eight directions of the lattice.
         let mut rng = Rng::new(seed).stream("valleys");
-        let [massifs, hard, start] =
-            [(0.3, 2, 0.5), (0.13, 3, 0.6), (0.22, 4, 0.6)].map(|(scale, octaves, persistence)| {
-                noise(first.size(), scale / cell, octaves, persistence, &mut rng)
-            });
+        let [massifs, hard, start] = [(0.3, 2, 0.5), (0.13, 3, 0.6), (0.22, 4, 0.6)]
+            .map(|(scale, octaves, persistence)| noise(first.size(), scale / cell, octaves, persistence, &mut rng));
         let (mut rise, mut cut, mut now) = (massifs, hard, start);
         for (i, &height) in first.as_slice().iter().enumerate() {
             let height = height.max(0.0);
             let [rise, cut, now] = [&mut rise, &mut cut, &mut now].map(|grid| &mut grid.as_mut_slice()[i]);
             // Some rock rises more, and some is harder: massifs with saddles between them, spurs of all lengths.
-            *rise = RISE * height * (0.85 + 0.75 * *rise).clamp(0.3, 1.7);
+            *rise = RISE * height * (0.85 + 1.1 * *rise).clamp(0.25, 2.0);
             *cut = CUT * (0.9 + 0.7 * *cut).clamp(0.35, 1.8);
             let uneven = START[0] + (START[1] - START[0]) * rng.unit();
-            *now = if height > 0.0 { height * uneven * (1.0 + 0.7 * *now).clamp(0.3, 1.7) } else { first.as_slice()[i] };
+            *now =
+                if height > 0.0 { height * uneven * (1.0 + 1.1 * *now).clamp(0.2, 2.0) } else { first.as_slice()[i] };
         }
         Self { first, rise, cut, now, cell, round: 0 }
     }
@@ -130,7 +133,8 @@ impl Valleys {
             for x in 1..here.len().saturating_sub(1) {
                 if here[x] > 0.0 {
                     let mean = 0.25 * (above[x] + below[x] + here[x - 1] + here[x + 1]);
-                    self.now.row_mut(y)[x] = (here[x] + CREEP * self.cut.row(y)[x] * (mean - here[x])).max(0.1 * here[x]);
+                    self.now.row_mut(y)[x] =
+                        (here[x] + CREEP * self.cut.row(y)[x] * (mean - here[x])).max(0.1 * here[x]);
                 }
             }
         }
@@ -140,7 +144,12 @@ impl Valleys {
     pub(super) fn finish(self, amount: f32) -> Grid<f32> {
         let highest = |grid: &Grid<f32>| grid.as_slice().iter().fold(1e-6f32, |most, height| most.max(*height));
         let scale = LOWER * highest(&self.first) / highest(&self.now);
+        let broad = blurred(&self.now, CREST);
         let mut out = self.now;
+        for ((out, &broad), &cut) in out.as_mut_slice().iter_mut().zip(broad.as_slice()).zip(self.cut.as_slice()) {
+            // Crests are broad where rock is soft.
+            *out += (broad - *out).min(0.0) * (SOFT * cut).min(1.0);
+        }
         for (out, &first) in out.as_mut_slice().iter_mut().zip(self.first.as_slice()) {
             *out = if first > 0.0 { amount * (*out * scale - first) } else { 0.0 };
         }
@@ -166,7 +175,7 @@ pub(super) fn headlands(heights: &Grid<f32>, frame: &SurfaceFrame) -> Grid<f32> 
 const WIDE: f32 = 0.08;
 
 /// Depth of the ground off lowland and off headlands, as shares of that of the contours.
-const DEPTHS: [f32; 2] = [0.26, 2.2];
+const DEPTHS: [f32; 2] = [0.26, 1.6];
 
 /// How deep the seabed is at each cell of the coarse lattice, as a share of the depth that the contours give it: wide
 /// shelves in bays and off some stretches of the coast, deep water off headlands, reefs.

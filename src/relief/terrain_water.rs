@@ -21,7 +21,7 @@ const SOURCE: f32 = 0.12;
 const APPEARS: f32 = 6.0;
 
 /// How much wider the last points of a river are where it meets the sea.
-const MOUTH: [f32; 3] = [2.4, 1.8, 1.3];
+const MOUTH: [f32; 3] = [1.9, 1.6, 1.25];
 
 /// How far the points of rivers are moved aside, cells.
 const WINDING: f32 = 0.8;

@@ -34,11 +34,11 @@ pub struct Weathering {
     pub bend: f32,
     /// Size of the largest bends. 0.005..=4; default 0.15.
     pub bend_size: f32,
-    /// How much rivers shape the land above height 0: 0 = not at all, 1 = valleys branch up to sharp ridges. 0..=1;
-    /// default 0.
+    /// How much rivers shape the land above height 0: 0 = not at all, 1 = valleys branch up to ridges, and some rock
+    /// rises higher, so there are massifs with saddles. 0..=1; default 0.
     pub valleys: f32,
-    /// How much the shore at height 0 differs from place to place: cliffs on headlands, level ground in bays. 0..=1;
-    /// default 0.
+    /// How much the shore at height 0 differs from place to place: cliffs on headlands, level ground in bays, and in
+    /// the sea shelves, reefs and deep water. 0..=1; default 0.
     pub coast: f32,
     /// Depth of the gullies that water wears into slopes above height 0, as a share of their width. They run downhill
     /// and branch. 0..=1; default 0.
