@@ -320,7 +320,7 @@ impl<'a> Painter<'a> {
         let around = (self.blurs[1].row(place.y)[place.x] - self.range[0]) / (self.range[1] - self.range[0]);
         let broad = 0.4 * place.share + 0.6 * around;
         for (i, ground) in self.colors.ground.iter().enumerate().skip(1) {
-            let half = (0.5 * self.colors.transition).min(0.35 * ground.from) * if i == 4 { 1.3 } else { 1.0 };
+            let half = (0.5 * self.colors.transition).min(0.35 * ground.from) * if i == 4 { 1.8 } else { 1.0 };
             let wide = 0.3 * half + 0.16 * ground.from;
             let moved = match (i, self.colors.stones) {
                 // Beaches have a smooth edge.
