@@ -2,6 +2,7 @@
 
 use super::{
     stones::{Stone, Stones},
+    terrain_check::smoothstep,
     terrain_noise::RowNoise,
 };
 use crate::{
@@ -12,8 +13,8 @@ use crate::{
 use glam::Vec2;
 use std::{f32::consts::TAU, ops::Range};
 
-/// Lowest height that a face cuts down to, as a share of the height of its stone.
-const LEAST: f32 = 0.12;
+/// Share of its height that a place keeps at least.
+const KEPT: f32 = 0.34;
 
 /// A plane: its height at the middle of its stone, and its slope.
 #[derive(Clone, Copy, Debug)]
@@ -24,6 +25,22 @@ struct Plane {
     uneven: Vec2,
 }
 
+/// A straight break across a stone: what lies beyond it is lower.
+#[derive(Clone, Copy, Debug)]
+struct Break {
+    way: Vec2,
+    reach: f32,
+    depth: f32,
+    /// Width of its slope.
+    width: f32,
+}
+
+/// Area of the smallest stone with breaks, square pattern units.
+const BROKEN: f32 = 0.004;
+
+/// How far breaks are bent, as a share of the size of their stone.
+const BENT: f32 = 0.07;
+
 /// How uneven faces are, pattern units.
 const UNEVEN: f32 = 0.0022;
 
@@ -32,7 +49,8 @@ const UNEVEN: f32 = 0.0022;
 pub(super) struct Faces {
     stones: Stones,
     planes: Vec<Plane>,
-    /// Those of each stone.
+    breaks: Vec<[Break; 2]>,
+    /// The planes of each stone.
     ranges: Vec<Range<usize>>,
     /// Share of what stands above the planes that is cut off.
     amount: f32,
@@ -47,8 +65,8 @@ fn planes(stone: &Stone, out: &mut Vec<Plane>) {
     let mut unevenness = rng.stream("uneven");
     let mut uneven = || UNEVEN * ops::unit(TAU * unevenness.unit());
     let front = Plane {
-        level: stone.highest * rng.range(0.42, 0.82),
-        slope: Vec2::new(rng.signed(), rng.signed()) * 0.22,
+        level: stone.highest * rng.range(0.28, 0.85),
+        slope: Vec2::new(rng.signed(), rng.signed()) * 0.27,
         uneven: uneven(),
     };
     out.push(front);
@@ -65,8 +83,20 @@ fn planes(stone: &Stone, out: &mut Vec<Plane>) {
     for side in 0..sides {
         let way = ops::unit(TAU * (first + (side as f32 + 0.6 * rng.signed()) / sides as f32));
         let reach = (way * stone.half).length();
-        beyond(way, reach * rng.range(0.5, 0.95), rng.range(0.4, 1.5));
+        beyond(way, reach * rng.range(0.45, 1.0), rng.range(0.25, 1.6));
     }
+}
+
+/// Two breaks, often without any depth.
+fn breaks(stone: &Stone) -> [Break; 2] {
+    let mut rng = Rng::new(stone.seed).stream("breaks");
+    [0.6, 0.3].map(|often| {
+        let way = ops::unit(TAU * rng.unit());
+        let reach = (way * stone.half).length() * rng.range(-0.35, 0.6);
+        let is_broken = rng.unit() < often && stone.area > BROKEN;
+        let depth = if is_broken { stone.highest * rng.range(0.04, 0.13) } else { 0.0 };
+        Break { way, reach, depth, width: rng.range(0.005, 0.018) }
+    })
 }
 
 impl Faces {
@@ -79,11 +109,12 @@ impl Faces {
             first..all.len()
         };
         let ranges = stones.list.iter().map(range).collect();
+        let breaks = stones.list.iter().map(breaks).collect();
         let (width, unit) = (heights.width(), frame.texels_per_unit());
         let mut rng = Rng::new(seed).stream("uneven faces");
         let mut noise = || RowNoise::new(width, [0.06 * unit; 2], 5, 0.62, &mut rng);
         let noises = [noise(), noise()];
-        Self { stones, planes: all, ranges, amount, unit, noises, noise: [vec![0.0; width], vec![0.0; width]] }
+        Self { stones, planes: all, breaks, ranges, amount, unit, noises, noise: [vec![0.0; width], vec![0.0; width]] }
     }
 
     /// Cuts row `y`.
@@ -99,8 +130,13 @@ impl Faces {
             let noise = Vec2::new(self.noise[0][x], self.noise[1][x]);
             let at = |plane: &Plane| plane.level + plane.slope.dot(off) + plane.uneven.dot(noise);
             let lowest = planes.iter().fold(*height, |lowest, plane| lowest.min(at(plane)));
-            let least = height.min(LEAST * self.stones.list[stone].highest);
-            *height += self.amount * (lowest.max(least) - *height);
+            let size = self.stones.list[stone].area.sqrt();
+            let broken = self.breaks[stone].iter().map(|b| {
+                let beyond = off.dot(b.way) - b.reach + BENT * size * noise.x;
+                b.depth * smoothstep(0.0, b.width, beyond)
+            });
+            let lowest = lowest - broken.sum::<f32>();
+            *height += self.amount * (lowest.max(KEPT * *height) - *height);
         }
     }
 }

@@ -61,7 +61,13 @@ const LIGHT: Vec3 = Vec3::new(-0.48, -0.52, 0.706);
 
 /// Height from which on a stone is a stone, and at which its surface begins to show beside what lies in gaps, pattern
 /// units.
-const STONE: [f32; 2] = [0.002, 0.009];
+const STONE: [f32; 2] = [0.0015, 0.0055];
+
+/// How much crowns differ in where they stand: the width of the edge of woods.
+const THIN: f32 = 0.5;
+
+/// The color of snow in shade, as a share of that in light.
+const SHADY: Vec3 = Vec3::new(0.76, 0.84, 0.95);
 
 /// The colors of one row after another.
 struct Painter<'a> {
@@ -118,8 +124,8 @@ impl<'a> Painter<'a> {
         };
         let noises = [
             noise([0.25; 2], 6, 0.62),
-            noise([0.035; 2], 4, 0.75),
-            noise([0.012; 2], 3, 0.8),
+            noise([0.035; 2], 4, 0.66),
+            noise([0.012; 2], 2, 0.7),
             noise([0.035, 0.3], if colors.stains.is_some() { 3 } else { 0 }, 0.62),
         ];
         let measure = colors.rivers.map(|rivers| Measure { gather: rivers.gather, width: rivers.width });
@@ -173,7 +179,11 @@ impl<'a> Painter<'a> {
     /// The color of a texel, 0..=255.
     fn color(&self, place: &Place) -> Vec3 {
         if let Some(sea) = self.colors.sea.filter(|_| place.height < 0.0) {
-            return self.sea(&sea, place);
+            let fresh = self.river(place) * (1.0 - smoothstep(0.0, 0.25, -place.height / sea.half));
+            return match &self.colors.rivers {
+                Some(_) => self.sea(&sea, place).lerp(rgb(sea.shallow), 0.75 * fresh),
+                None => self.sea(&sea, place),
+            };
         }
         let (variety, noise) = (self.colors.variety, place.noise);
         let mut color = self.dry(place);
@@ -182,22 +192,34 @@ impl<'a> Painter<'a> {
             // Little light falls into gaps.
             let open = smoothstep(-STONE[1], STONE[1], place.height);
             shade = shade.min(1.15) + (shade - shade.min(1.15)) * open;
-            shade = shade.max(0.5 * (1.0 - open));
+            shade = shade.max(0.62 * (1.0 - open));
         }
         let mut grain = 1.0 + variety * (0.07 * noise[1] + 0.075 * noise[2]);
-        if let Some((woods, share)) = self.woods(place).filter(|(_, share)| *share > 0.0) {
-            let (crown, light) = self.crown(&woods, place);
+        if let Some((woods, lush)) = self.woods(place).filter(|(_, lush)| *lush > -0.5 * THIN) {
+            let (crown, light, share) = self.crown(&woods, place, lush);
             color = color.lerp(crown, share);
             shade *= 1.0 + share * (light - 1.0);
             grain += (1.0 - grain) * share;
         }
-        if let (Some(rivers), Some(water)) = (&self.colors.rivers, self.water.as_ref().and_then(|w| w.rivers.as_ref()))
-        {
-            let share = water.row(place.y)[place.x];
-            color = color.lerp(rgb(rivers.color), share);
+        if let Some(rivers) = &self.colors.rivers {
+            let share = self.river(place);
+            let tide = self.colors.sea.map_or(0.0, |_| 0.75 * smoothstep(0.006, 0.0, place.height));
+            let shallow = self.colors.sea.map_or(Vec3::ZERO, |sea| rgb(sea.shallow));
+            color = color.lerp(rgb(rivers.color).lerp(shallow, tide), share);
             shade += (1.0 - shade) * 0.7 * share;
         }
         (color * (shade * grain).max(0.0)).min(Vec3::splat(255.0))
+    }
+
+    /// Share of a place that is river.
+    fn river(&self, place: &Place) -> f32 {
+        let rivers = self.water.as_ref().and_then(|water| water.rivers.as_ref());
+        rivers.map_or(0.0, |rivers| rivers.row(place.y)[place.x])
+    }
+
+    /// How far a place faces the light, about -1..=1.
+    fn facing(&self, place: &Place) -> f32 {
+        -(self.slopes.right[place.x] * LIGHT.x + self.slopes.down[place.x] * LIGHT.y)
     }
 
     /// Light and shade.
@@ -207,7 +229,10 @@ impl<'a> Painter<'a> {
         let normal = Vec3::new(-right, -down, 1.0).normalize();
         let lit = (normal.dot(LIGHT) / LIGHT.z).max(0.0);
         // Twilight from above beside the sun.
-        cavity * (1.0 + self.colors.light * (0.42 * normal.z + 0.2 + 0.5 * lit.min(1.6) - 1.0))
+        cavity
+            * (1.0
+                + self.colors.light
+                    * (0.34 * normal.z + 0.3 + 0.48 * (lit.min(1.0) + 0.4 * (lit - 1.0).clamp(0.0, 0.8)) - 1.0))
     }
 
     /// Ground and rock.
@@ -216,11 +241,11 @@ impl<'a> Painter<'a> {
         let steep = place.slope * (1.0 + 0.25 * self.colors.variety * place.noise[1]);
         // Sand and snow lie on less and on more than other ground.
         let low = 1.0 - smoothstep(0.5, 1.3, place.share / self.colors.ground[1].from.max(1e-3));
-        let steep = if self.colors.sea.is_some() { steep * (1.0 + 1.2 * low) - 0.35 * snow.x } else { steep };
+        let steep = if self.colors.sea.is_some() { steep * (1.0 + 1.2 * low) - 0.5 * snow.x } else { steep };
         let rock = smoothstep(self.colors.steep[0], self.colors.steep[1], steep);
         let Some(stones) = self.colors.stones else {
             // Scree lies below rock.
-            let high = smoothstep(0.2, 0.5, place.share + 0.1 * place.noise[0]);
+            let high = smoothstep(0.3, 0.62, place.share + 0.12 * place.noise[0]);
             let loose =
                 high * smoothstep(0.7 * self.colors.steep[0], self.colors.steep[0], steep + 0.2 * place.noise[1]);
             let bare = self.rock(place, 0);
@@ -245,9 +270,10 @@ impl<'a> Painter<'a> {
 
     /// What lies in a gap: earth and loose pieces of the same rock.
     fn gap(&self, stones: &StoneColors, place: &Place, ground: Vec3) -> Vec3 {
-        let speckled = 1.0 + 0.2 * self.colors.variety * place.noise[2] + 0.2 * place.noise[1];
-        let piece = ground.lerp(self.rock(place, 0), 0.5) * 0.7;
-        rgb(stones.gap).lerp(piece, smoothstep(-0.1, 0.5, place.edge[0])) * speckled.max(0.2)
+        let noise = place.noise;
+        let mottled = 1.0 + self.colors.variety * (0.12 * noise[2] + 0.3 * noise[1] + 0.3 * noise[0]);
+        let piece = ground.lerp(self.rock(place, 0), 0.5) * 0.72;
+        rgb(stones.gap).lerp(piece, 0.8 * smoothstep(-0.3, 0.8, place.edge[0])) * mottled.max(0.4)
     }
 
     /// The surface of a stone.
@@ -255,9 +281,9 @@ impl<'a> Painter<'a> {
         let stone = self.stones.as_ref().and_then(|stones| stones.at(place.x, place.y));
         let mut color = ground.lerp(self.rock(place, stone.map_or(0, |stone| stone.seed)), 0.35 + 0.4 * steep);
         if let Some(stone) = stone {
-            let [light, warm, ..] = unit_draws(stone.seed ^ 0x70_4E);
-            let warm = stones.tone * 0.22 * (warm - 0.5);
-            color *= 1.0 + stones.tone * 0.75 * (light - 0.5);
+            let [light, warm, cool, _] = unit_draws(stone.seed ^ 0x70_4E);
+            let warm = stones.tone * 0.26 * (0.5 * (warm + cool) - 0.5);
+            color *= 1.0 + stones.tone * 0.6 * (light - 0.5);
             color *= Vec3::new(1.0 + warm, 1.0 + 0.15 * warm, 1.0 - warm);
         }
         self.patches(color, place)
@@ -277,8 +303,8 @@ impl<'a> Painter<'a> {
             color = color.lerp(rgb(stains.color) * (color.element_sum() / 400.0), 0.5 * share);
         }
         if let Some(lichen) = &self.colors.lichen {
-            let value = 0.75 * noise[1] - 0.55 * noise[0] + 0.3 * noise[2] + 0.25 * place.edge[1];
-            color = color.lerp(rgb(lichen.color), 0.6 * cover(lichen, value, 0.12));
+            let value = 0.75 * noise[1] - 0.55 * noise[0] + 0.12 * noise[2] + 0.25 * place.edge[1];
+            color = color.lerp(rgb(lichen.color), 0.55 * cover(lichen, value, 0.4));
         }
         color
     }
@@ -289,16 +315,37 @@ impl<'a> Painter<'a> {
         // Borders between two kinds wander with the noise, and the upper kind lies in hollows first, as snow does.
         let wander = 0.6 * noise[0] + 0.35 * noise[1] - 0.25 * (place.edge[0] + place.edge[1]);
         let (mut color, mut last) = (rgb(self.colors.ground[0].color), 0.0);
-        for ground in &self.colors.ground[1..] {
-            let half = (0.5 * self.colors.transition).min(0.35 * ground.from);
-            let moved = place.share + self.colors.variety * wander * (0.3 * half + 0.16 * ground.from);
+        let facing = self.facing(place);
+        // Height by the wider surroundings, so that crests have no line of their own.
+        let around = (self.blurs[1].row(place.y)[place.x] - self.range[0]) / (self.range[1] - self.range[0]);
+        let broad = 0.4 * place.share + 0.6 * around;
+        for (i, ground) in self.colors.ground.iter().enumerate().skip(1) {
+            let half = (0.5 * self.colors.transition).min(0.35 * ground.from) * if i == 4 { 1.8 } else { 1.0 };
+            let wide = 0.3 * half + 0.16 * ground.from;
+            let moved = match (i, self.colors.stones) {
+                // Beaches have a smooth edge.
+                (1, None) if self.colors.sea.is_some() => {
+                    let even = self.blurs[0].row(place.y)[place.x] / (self.range[1] - self.range[0]);
+                    even + self.colors.variety * noise[0] * 0.5 * ground.from
+                }
+                // Snow stays where it is shady and not steep.
+                (4, None) => {
+                    let crest = place.edge[1].max(0.0);
+                    let stays =
+                        0.11 - 0.12 * crest - 0.09 * facing.clamp(-0.8, 1.0) - 0.1 * smoothstep(0.7, 1.5, place.slope);
+                    broad + self.colors.variety * (wander * wide + stays + 0.06 * noise[0] + 0.05 * noise[1])
+                }
+                (3, None) => broad + self.colors.variety * wander * wide,
+                _ => place.share + self.colors.variety * wander * wide,
+            };
             last = smoothstep(ground.from - half, ground.from + half, moved);
-            color = color.lerp(rgb(ground.color), last);
+            let shady = if i == 4 { smoothstep(0.15, -0.6, facing) } else { 0.0 };
+            color = color.lerp(rgb(ground.color) * Vec3::ONE.lerp(SHADY, shady), last);
         }
         let tint = Vec3::new(1.0 + 0.05 * noise[0], 1.0, 1.0 - 0.05 * noise[0]);
         // Ground that water runs to is greener, ridges are dry.
         let dry = if self.water.is_some() { (1.0 - last) * (0.45 - place.moist) } else { 0.0 };
-        let tint = tint * Vec3::new(1.0 + 0.4 * dry, 1.0 + 0.1 * dry, 1.0);
+        let tint = tint * Vec3::new(1.0 + 0.26 * dry, 1.0 + 0.06 * dry, 1.0);
         let patches = 1.0 + self.colors.variety * (0.1 * noise[0] + 0.06 * noise[1]);
         [color * tint * patches, Vec3::splat(last)]
     }
@@ -319,7 +366,7 @@ impl<'a> Painter<'a> {
         first.lerp(second, share.clamp(0.0, 1.0)) * seam
     }
 
-    /// How far woods cover a place.
+    /// How lush woods are at a place: above 0 they cover it.
     fn woods(&self, place: &Place) -> Option<(Woods, f32)> {
         let woods = self.colors.woods?;
         if woods.spread <= 0.0 {
@@ -336,34 +383,51 @@ impl<'a> Painter<'a> {
         let bare = 1.3 * high + 1.4 * shore + 1.3 * smoothstep(1.05, 1.8, place.slope);
         let lush = 1.6 * (woods.spread - 0.5) + 1.3 * (place.moist - 0.42) + 0.55 * noise[0] + 0.3 * noise[1];
         let hollow = -0.3 * (place.edge[1] + 0.5 * place.edge[0]);
-        Some((woods, smoothstep(-0.02, 0.07, lush + hollow + 0.08 * noise[2] - bare)))
+        Some((woods, lush + hollow + 0.08 * noise[2] - bare))
     }
 
-    /// Color and light of the crown at a place.
-    fn crown(&self, woods: &Woods, place: &Place) -> (Vec3, f32) {
-        let at = place.pos / woods.crown;
-        let near = around(self.seed, at).min_by(|a, b| a.0.length_squared().total_cmp(&b.0.length_squared()));
-        let (off, [.., tone, hue]) = near.unwrap_or((Vec2::ZERO, [0.5; 4]));
-        let far = off.length_squared().min(1.0);
-        let side = off.dot(Vec2::new(LIGHT.x, LIGHT.y));
-        let color = rgb(woods.color) * (0.8 + 0.4 * tone + 0.15 * place.noise[0]);
-        let color = color * Vec3::new(0.9 + 0.28 * hue, 1.0, 0.95);
-        (color, (1.08 - 0.5 * far) * (1.0 + 0.5 * side))
+    /// Color and light of the crowns at a place, and how far they cover it. At the edge of woods crowns stand apart.
+    fn crown(&self, woods: &Woods, place: &Place, lush: f32) -> (Vec3, f32, f32) {
+        let (mut cover, mut sums, mut weights) = (0.0f32, Vec3::ZERO, 1e-3);
+        for (off, [.., tone, hue]) in around(self.seed, place.pos / woods.crown) {
+            let square = off.length_squared();
+            let near = (1.0 - square).max(0.0);
+            let weight = near * near * near;
+            let light = (1.1 - 0.55 * square.min(1.0)) * (1.0 + 0.55 * off.dot(Vec2::new(LIGHT.x, LIGHT.y)));
+            sums += weight * Vec3::new(light, tone, hue);
+            weights += weight;
+            let stands = smoothstep(-0.08, 0.08, lush - THIN * (tone - 0.5));
+            cover = cover.max(stands * smoothstep(0.55, 0.12, square));
+        }
+        let [light, tone, hue] = (sums / weights).to_array();
+        let share = cover.max(0.9 * smoothstep(0.1, 0.5, lush));
+        // Light woods on dry ground, dark ones in moist hollows.
+        let dark = smoothstep(-0.35, 0.35, 0.7 * place.noise[0] + 1.2 * (place.moist - 0.5) + 0.25 * place.noise[1]);
+        let kind = Vec3::new(1.42, 1.3, 1.05).lerp(Vec3::new(0.86, 0.92, 1.0), dark);
+        let color = rgb(woods.color) * kind * (0.78 + 0.44 * tone);
+        (color * Vec3::new(0.88 + 0.3 * hue, 1.0, 0.95), light, share)
     }
 
     fn sea(&self, sea: &Sea, place: &Place) -> Vec3 {
         let noise = place.noise;
-        // What is seen of the ground through water is blurred.
-        let blurred = -self.blurs[1].row(place.y)[place.x];
-        let depth = (0.35 * -place.height + 0.65 * blurred.max(0.0)) * (1.0 + 0.25 * noise[0] + 0.12 * noise[1]);
-        let share = depth * depth / (depth * depth + sea.half * sea.half);
+        let blurred = -self.blurs[0].row(place.y)[place.x];
+        let depth = (0.5 * -place.height + 0.5 * blurred.max(0.0)) * (1.0 + 0.12 * noise[0] + 0.1 * noise[1]);
+        let depth = depth / sea.half;
+        let share = depth * depth / (depth * depth + 1.0);
         let sand = rgb(self.colors.ground[0].color);
-        let shallow = rgb(sea.shallow);
-        let ground = sand.lerp(shallow, smoothstep(0.0, 0.3, -place.height / sea.half + 0.04 * noise[1]) * 0.75 + 0.25);
-        let color = ground.lerp(rgb(sea.deep), share.clamp(0.0, 1.0));
-        // Foam at the shore.
-        let foam = 0.6 * (1.0 - smoothstep(0.0, 0.06, -place.height / sea.half + 0.035 * noise[1]));
-        color.lerp(Vec3::new(236.0, 242.0, 240.0), foam) * (1.0 + 0.02 * noise[1])
+        // Weeds and reefs make shallow ground dark in places.
+        let weeds = 0.3 * smoothstep(0.05, 0.6, 0.8 * noise[1] + 0.6 * noise[0]) * smoothstep(0.1, 0.4, depth);
+        let shallow = rgb(sea.shallow) * (1.0 - self.colors.variety * weeds);
+        let color = sand.lerp(shallow, 0.3 + 0.7 * smoothstep(0.0, 0.22, depth)).lerp(rgb(sea.deep), share);
+        // Surf: a thin line that breaks off.
+        let texel = 1.0 / self.frame.texels_per_unit();
+        let away = -place.height / place.slope.max(0.02);
+        let line = |at: f32, half: f32| 1.0 - smoothstep(0.5 * half, half, (away - at).abs());
+        let surf =
+            0.65 * line(0.0, (0.0022f32).max(1.2 * texel)) * smoothstep(-0.05, 0.5, 0.8 * noise[1] + 0.5 * noise[0]);
+        let second = 0.3 * line(0.007, (0.0018f32).max(texel)) * smoothstep(0.0, 0.5, noise[1] - 0.5 * noise[0]);
+        color.lerp(Vec3::new(236.0, 242.0, 240.0), surf.max(second) * smoothstep(0.4, 0.15, depth))
+            * (1.0 + 0.05 * noise[0] + 0.02 * noise[1])
     }
 }
 

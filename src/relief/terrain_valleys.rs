@@ -1,6 +1,6 @@
 //! Valleys that rivers wear: [`Valleys`], on a coarse lattice, and [`Fine`], which brings them to texels.
 
-use super::{drainage::Drainage, terrain_blur::blurred, terrain_check::smoothstep};
+use super::{drainage::Drainage, terrain_blur::blurred, terrain_check::smoothstep, terrain_noise::RowNoise};
 use crate::{Grid, math::Rng, pattern::SurfaceFrame};
 use glam::UVec2;
 
@@ -28,8 +28,12 @@ const STEEPEST: f32 = 1.05;
 /// Height of the highest peak, as a share of what it was.
 const LOWER: f32 = 0.9;
 
-/// How far a place comes nearer to the mean of those around it in a round.
-const CREEP: f32 = 0.07;
+/// How far a place comes nearer to the mean of those around it in a round, where rivers cut at a speed of 1.
+const CREEP: f32 = 0.62;
+
+/// Radius over which crests are rounded, cells, and how much, where rivers cut at a speed of 1.
+const CREST: usize = 2;
+const SOFT: f32 = 2.0;
 
 /// Radius of the surroundings that make a bay or a headland, pattern units.
 const AROUND: f32 = 0.045;
@@ -64,6 +68,9 @@ pub(super) fn coarse(heights: &Grid<f32>) -> Grid<f32> {
 #[derive(Clone, Debug)]
 pub(super) struct Valleys {
     first: Grid<f32>,
+    /// How much each cell rises in a round, and how fast rivers cut there.
+    rise: Grid<f32>,
+    cut: Grid<f32>,
     now: Grid<f32>,
     /// Length of a cell, pattern units.
     cell: f32,
@@ -76,11 +83,20 @@ impl Valleys {
         let cell = block(heights.size()) as f32 / frame.texels_per_unit();
         // Unevenness breaks the eight directions of the lattice.
         let mut rng = Rng::new(seed).stream("valleys");
-        let mut now = first.clone();
-        for height in now.as_mut_slice() {
-            *height *= START[0] + (START[1] - START[0]) * rng.unit();
+        let [massifs, hard, start] = [(0.3, 2, 0.5), (0.13, 3, 0.6), (0.22, 4, 0.6)]
+            .map(|(scale, octaves, persistence)| noise(first.size(), scale / cell, octaves, persistence, &mut rng));
+        let (mut rise, mut cut, mut now) = (massifs, hard, start);
+        for (i, &height) in first.as_slice().iter().enumerate() {
+            let height = height.max(0.0);
+            let [rise, cut, now] = [&mut rise, &mut cut, &mut now].map(|grid| &mut grid.as_mut_slice()[i]);
+            // Some rock rises more, and some is harder: massifs with saddles between them, spurs of all lengths.
+            *rise = RISE * height * (0.85 + 1.1 * *rise).clamp(0.25, 2.0);
+            *cut = CUT * (0.9 + 0.7 * *cut).clamp(0.35, 1.8);
+            let uneven = START[0] + (START[1] - START[0]) * rng.unit();
+            *now =
+                if height > 0.0 { height * uneven * (1.0 + 1.1 * *now).clamp(0.2, 2.0) } else { first.as_slice()[i] };
         }
-        Self { first, now, cell, round: 0 }
+        Self { first, rise, cut, now, cell, round: 0 }
     }
 
     pub(super) fn progress(&self) -> f32 {
@@ -98,9 +114,9 @@ impl Valleys {
                 continue;
             }
             let distance = drainage.distance(at, into) * self.cell;
-            let cut = CUT * (water[i] * self.cell * self.cell).sqrt() / distance;
+            let cut = self.cut.as_slice()[i] * (water[i] * self.cell * self.cell).sqrt() / distance;
             let below = heights[into as usize];
-            let risen = heights[i] + RISE * self.first.as_slice()[i].max(0.0);
+            let risen = heights[i] + self.rise.as_slice()[i];
             heights[i] = ((risen + cut * below) / (1.0 + cut)).min(below + STEEPEST * distance).max(below.min(risen));
         }
         self.creep();
@@ -117,7 +133,8 @@ impl Valleys {
             for x in 1..here.len().saturating_sub(1) {
                 if here[x] > 0.0 {
                     let mean = 0.25 * (above[x] + below[x] + here[x - 1] + here[x + 1]);
-                    self.now.row_mut(y)[x] = (here[x] + CREEP * (mean - here[x])).max(0.1 * here[x]);
+                    self.now.row_mut(y)[x] =
+                        (here[x] + CREEP * self.cut.row(y)[x] * (mean - here[x])).max(0.1 * here[x]);
                 }
             }
         }
@@ -127,7 +144,12 @@ impl Valleys {
     pub(super) fn finish(self, amount: f32) -> Grid<f32> {
         let highest = |grid: &Grid<f32>| grid.as_slice().iter().fold(1e-6f32, |most, height| most.max(*height));
         let scale = LOWER * highest(&self.first) / highest(&self.now);
+        let broad = blurred(&self.now, CREST);
         let mut out = self.now;
+        for ((out, &broad), &cut) in out.as_mut_slice().iter_mut().zip(broad.as_slice()).zip(self.cut.as_slice()) {
+            // Crests are broad where rock is soft.
+            *out += (broad - *out).min(0.0) * (SOFT * cut).min(1.0);
+        }
         for (out, &first) in out.as_mut_slice().iter_mut().zip(self.first.as_slice()) {
             *out = if first > 0.0 { amount * (*out * scale - first) } else { 0.0 };
         }
@@ -147,6 +169,44 @@ pub(super) fn headlands(heights: &Grid<f32>, frame: &SurfaceFrame) -> Grid<f32> 
         *share = smoothstep(0.56, 0.38, *share);
     }
     land
+}
+
+/// Radius of the surroundings that make a wide shelf, pattern units.
+const WIDE: f32 = 0.08;
+
+/// Depth of the ground off lowland and off headlands, as shares of that of the contours.
+const DEPTHS: [f32; 2] = [0.26, 1.6];
+
+/// How deep the seabed is at each cell of the coarse lattice, as a share of the depth that the contours give it: wide
+/// shelves in bays and off some stretches of the coast, deep water off headlands, reefs.
+pub(super) fn seabed(heights: &Grid<f32>, frame: &SurfaceFrame, seed: u64) -> Grid<f32> {
+    let mut land = coarse(heights);
+    let unit = frame.texels_per_unit() / block(heights.size()) as f32;
+    for height in land.as_mut_slice() {
+        *height = if *height > 0.0 { 1.0 } else { 0.0 };
+    }
+    let [mut near, wide] = [AROUND, WIDE].map(|radius| blurred(&land, (radius * unit).round() as usize));
+    let mut rng = Rng::new(seed).stream("seabed");
+    let broad = noise(land.size(), 0.26 * unit, 3, 0.5, &mut rng);
+    let patchy = noise(land.size(), 0.055 * unit, 3, 0.6, &mut rng);
+    for (i, share) in near.as_mut_slice().iter_mut().enumerate() {
+        let [wide, broad, patchy] = [&wide, &broad, &patchy].map(|grid| grid.as_slice()[i]);
+        let shelf = 0.45 * *share + 0.75 * wide + 0.34 * broad + 0.06 * patchy;
+        let depth = DEPTHS[1] + (DEPTHS[0] - DEPTHS[1]) * smoothstep(0.1, 0.66, shelf);
+        let reef = smoothstep(0.2, 0.6, patchy + 0.4 * broad) * smoothstep(0.12, 0.35, shelf);
+        *share = depth * (1.0 - 0.7 * reef);
+    }
+    near
+}
+
+/// Noise whose largest features measure `scale` cells.
+fn noise(size: UVec2, scale: f32, octaves: u32, persistence: f32, rng: &mut Rng) -> Grid<f32> {
+    let mut noise = RowNoise::new(size.x as usize, [scale; 2], octaves, persistence, rng);
+    let mut out = Grid::new(size, 0.0);
+    for y in 0..out.height() {
+        noise.fill_row(y, out.row_mut(y));
+    }
+    out
 }
 
 /// A coarse lattice read at texels, row by row: smooth, by cubic B-splines.

@@ -15,7 +15,13 @@ const SPREAD: usize = 1;
 const ROUNDS: usize = 3;
 
 /// What a source gathers, as a share of what makes a river at its mouth.
-const SOURCE: f32 = 0.18;
+const SOURCE: f32 = 0.12;
+
+/// Points over which a river appears at its source.
+const APPEARS: f32 = 6.0;
+
+/// How much wider the last points of a river are where it meets the sea.
+const MOUTH: [f32; 3] = [1.9, 1.6, 1.25];
 
 /// How far the points of rivers are moved aside, cells.
 const WINDING: f32 = 0.8;
@@ -105,6 +111,12 @@ impl Course<'_> {
                 line.push(self.point(at, least));
             }
             self.wind(&mut line);
+            for (k, (_, width)) in (0u16..).zip(&mut line) {
+                *width *= (f32::from(k) / APPEARS).min(1.0);
+            }
+            if self.ground.as_slice()[at] <= 0.0 {
+                line.iter_mut().rev().zip(MOUTH).for_each(|((_, width), wider)| *width *= wider);
+            }
             for _ in 0..ROUNDS {
                 line = smoothed(&line);
             }
@@ -127,7 +139,7 @@ impl Course<'_> {
         let width = self.ground.width();
         let place = Vec2::new((i % width) as f32 + 0.5, (i / width) as f32 + 0.5) * self.cell();
         let share = (self.gathered[i] / least).sqrt();
-        (place, self.measure.width * self.frame.texels_per_unit() * (0.7 * share).min(1.0))
+        (place, self.measure.width * self.frame.texels_per_unit() * (0.5 * share).min(1.0))
     }
 }
 

@@ -117,16 +117,19 @@ pub(super) fn rubble(seed: u64, largest: f32, pos: Vec2, height: f32) -> f32 {
             let inside = (half - turned).min_element().min(0.8 * (half.element_sum() - turned.element_sum()) - 0.12);
             let tilt = Vec2::new(b - 0.5, c - 0.5).dot(off);
             if inside > 0.0 {
-                highest = highest.max(size * ((1.6 * inside).min(0.22) + 0.5 * tilt + 0.3 * d - 0.3));
+                // Its sides rise from below the ground.
+                let top = 0.22 - 0.5 * (0.3 - inside).max(0.0);
+                let rise = (3.0 * inside).min(top + 0.3) - 0.55;
+                highest = highest.max(size * (rise + 0.5 * tilt + 0.3 * d));
             }
         }
     }
     height.max(highest.min(most))
 }
 
-/// Where a thin layer has broken off, from noise: 0..=1, with sharp edges.
+/// How much of a thin layer has worn off, from noise: 0..=1, with soft edges.
 pub(super) fn flakes(noise: f32) -> f32 {
-    smoothstep(0.34, 0.4, noise)
+    smoothstep(0.2, 0.6, noise)
 }
 
 /// Height up to which the coast is shaped, pattern units.
@@ -136,11 +139,10 @@ const SHORE: f32 = 0.03;
 const CLIFF: f32 = 0.02;
 
 /// A height after valleys have changed it by `carved` and the sea has shaped its coast: a cliff on headlands (1), level
-/// ground in bays (0). The shore stays where it is.
-pub(super) fn shore(height: f32, carved: f32, headland: f32, coast: f32) -> f32 {
+/// ground in bays (0). The sea is as deep as the share of its depth tells. The shore stays where it is.
+pub(super) fn shore(height: f32, carved: f32, [headland, depth]: [f32; 2], coast: f32) -> f32 {
     if height <= 0.0 {
-        // The ground off bays is shallow.
-        return height * (1.0 - 0.45 * coast * (1.0 - headland));
+        return height * (1.0 + coast * (depth - 1.0));
     }
     let height = (height + carved * smoothstep(0.0, 0.5 * SHORE, height)).max(0.3 * height);
     let level = height * (0.3 + 0.7 * smoothstep(0.0, SHORE, height));

@@ -3,11 +3,11 @@
 use super::{
     heights_error::HeightError,
     terrain_blur::blurred,
-    terrain_check::check_heights,
+    terrain_check::{check_heights, smoothstep},
     terrain_faces::Faces,
     terrain_noise::RowNoise,
     terrain_normals::Slopes,
-    terrain_valleys::{Fine, Valleys, headlands},
+    terrain_valleys::{Fine, Valleys, headlands, seabed},
     terrain_wear::{Gullies, flakes, rubble, shore},
 };
 use crate::{Grid, math::Rng, pattern::SurfaceFrame};
@@ -34,11 +34,11 @@ pub struct Weathering {
     pub bend: f32,
     /// Size of the largest bends. 0.005..=4; default 0.15.
     pub bend_size: f32,
-    /// How much rivers shape the land above height 0: 0 = not at all, 1 = valleys branch up to sharp ridges. 0..=1;
-    /// default 0.
+    /// How much rivers shape the land above height 0: 0 = not at all, 1 = valleys branch up to ridges, and some rock
+    /// rises higher, so there are massifs with saddles. 0..=1; default 0.
     pub valleys: f32,
-    /// How much the shore at height 0 differs from place to place: cliffs on headlands, level ground in bays. 0..=1;
-    /// default 0.
+    /// How much the shore at height 0 differs from place to place: cliffs on headlands, level ground in bays, and in
+    /// the sea shelves, reefs and deep water. 0..=1; default 0.
     pub coast: f32,
     /// Depth of the gullies that water wears into slopes above height 0, as a share of their width. They run downhill
     /// and branch. 0..=1; default 0.
@@ -186,7 +186,8 @@ enum Stage {
     /// Valleys and the coast are brought to the heights, beginning at a row.
     Carve {
         valleys: Option<Box<Fine>>,
-        headlands: Box<Fine>,
+        /// Headlands and the seabed.
+        coast: Box<[Fine; 2]>,
         row: usize,
     },
     /// Stones are cut, beginning at a row.
@@ -235,8 +236,9 @@ impl WeatherJob {
             return self.cut();
         }
         let size = self.heights.size();
-        let headlands = Box::new(Fine::new(headlands(&self.heights, &self.frame), size));
-        Stage::Carve { valleys: valleys.map(|grid| Box::new(Fine::new(grid, size))), headlands, row: 0 }
+        let coast = [headlands(&self.heights, &self.frame), seabed(&self.heights, &self.frame, self.seed)];
+        let coast = Box::new(coast.map(|grid| Fine::new(grid, size)));
+        Stage::Carve { valleys: valleys.map(|grid| Box::new(Fine::new(grid, size))), coast, row: 0 }
     }
 
     fn cut(&self) -> Stage {
@@ -277,11 +279,11 @@ impl WeatherJob {
                     self.carve(Some(valleys.finish(self.weathering.valleys)))
                 }
             }
-            Stage::Carve { mut valleys, mut headlands, row } => {
+            Stage::Carve { mut valleys, mut coast, row } => {
                 let end = end(row);
-                self.carve_rows(valleys.as_deref_mut(), &mut headlands, row..end);
+                self.carve_rows(valleys.as_deref_mut(), &mut coast, row..end);
                 let is_open = end < self.heights.height();
-                if is_open { Stage::Carve { valleys, headlands, row: end } } else { self.cut() }
+                if is_open { Stage::Carve { valleys, coast, row: end } } else { self.cut() }
             }
             Stage::Cut { mut faces, row } => {
                 let end = end(row);
@@ -326,22 +328,22 @@ impl WeatherJob {
         }
     }
 
-    fn carve_rows(&mut self, mut valleys: Option<&mut Fine>, headlands: &mut Fine, rows: Range<usize>) {
+    fn carve_rows(&mut self, mut valleys: Option<&mut Fine>, coast: &mut [Fine; 2], rows: Range<usize>) {
         for y in rows {
-            headlands.read(y);
+            coast.iter_mut().for_each(|fine| fine.read(y));
             if let Some(valleys) = &mut valleys {
                 valleys.read(y);
             }
             for (x, out) in self.heights.row_mut(y).iter_mut().enumerate() {
                 let carved = valleys.as_ref().map_or(0.0, |valleys| valleys.row[x]);
-                *out = shore(*out, carved, headlands.row[x], self.weathering.coast);
+                *out = shore(*out, carved, coast.each_ref().map(|fine| fine.row[x]), self.weathering.coast);
             }
         }
     }
 
     fn wear_rows(&mut self, broad: &Grid<f32>, noises: &mut [RowNoise; 2], rows: Range<usize>) {
         let mut slopes = Slopes::new(broad, &self.frame);
-        let Weathering { gullies, gully_width, chips, chip_size, grain, .. } = self.weathering;
+        let Weathering { gullies, gully_width, chips, chip_size, coast, grain, .. } = self.weathering;
         let gullies = Gullies::new(gullies, gully_width, self.seed);
         let mut rows_of_noise = [vec![0.0; self.heights.width()], vec![0.0; self.heights.width()]];
         for y in rows {
@@ -353,7 +355,9 @@ impl WeatherJob {
             for (x, out) in self.heights.row_mut(y).iter_mut().enumerate() {
                 let pos = self.frame.to_pos(Vec2::new(x as f32 + 0.5, y as f32 + 0.5));
                 let slope = Vec2::new(slopes.right[x], slopes.down[x]);
-                *out += gullies.depth(pos, slope, *out) + grain * rough[x];
+                // Beaches are smooth.
+                let dry = 1.0 - coast * (1.0 - smoothstep(0.0, 0.012, out.abs()));
+                *out += gullies.depth(pos, slope, *out) + grain * dry * rough[x];
                 if *out > 0.0 {
                     // Flakes end before a stone does.
                     *out = (*out - chips * chip_size * flakes(layers[x])).max(0.5 * *out);
