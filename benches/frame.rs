@@ -777,6 +777,15 @@ fn frame(c: &mut Criterion) {
     finished();
 }
 
+/// A frame of a sixtieth of a second, whose systems are measured.
+fn step(app: &mut App, frames: &mut Frames) {
+    app.insert_resource(OurSystems::default());
+    let frame = time_of(|| app.update());
+    let OurSystems(_, time, cpu) = app.world().resource();
+    frames.push([*time, *cpu]);
+    std::thread::sleep((Duration::from_secs(1) / 60).saturating_sub(frame));
+}
+
 /// What a frame takes while three hits grow, with and without an analogy, 60 frames a second under the default budget.
 fn analogies(_: &mut Criterion) {
     let texel = |i: u32| {
@@ -799,13 +808,6 @@ fn analogies(_: &mut Criterion) {
             if has_analogy {
                 entity.insert(CrackAnalogy::new(examples));
             }
-            let step = |app: &mut App, frames: &mut Frames| {
-                app.insert_resource(OurSystems::default());
-                let frame = time_of(|| app.update());
-                let OurSystems(_, time, cpu) = app.world().resource();
-                frames.push([*time, *cpu]);
-                std::thread::sleep((Duration::from_secs(1) / 60).saturating_sub(frame));
-            };
             let mut making = Vec::new();
             while has_analogy && app.world().get::<AnalogyProgress>(wall) != Some(&AnalogyProgress(1.0)) {
                 step(&mut app, &mut making);
@@ -841,13 +843,6 @@ fn groups(_: &mut Criterion) {
                 tile.insert(CrackMemberOf(group));
             }
         }
-        let step = |app: &mut App, frames: &mut Frames| {
-            app.insert_resource(OurSystems::default());
-            let frame = time_of(|| app.update());
-            let OurSystems(_, time, cpu) = app.world().resource();
-            frames.push([*time, *cpu]);
-            std::thread::sleep((Duration::from_secs(1) / 60).saturating_sub(frame));
-        };
         let [mut idle, mut first, mut hits] = [Frames::new(), Frames::new(), Frames::new()];
         (0..10).for_each(|_| step(&mut app, &mut Vec::new()));
         (0..100).for_each(|_| step(&mut app, &mut idle));

@@ -100,9 +100,7 @@ impl Stones {
         labels.as_mut_slice().iter_mut().for_each(|label| *label = names[*label as usize]);
         Self { labels, list }
     }
-}
 
-impl Stones {
     /// The stone at a texel of the surface.
     pub(super) fn at(&self, x: usize, y: usize) -> Option<&Stone> {
         self.list.get((self.labels.row(y)[x] as usize).checked_sub(1)?)

@@ -56,7 +56,7 @@ impl Members {
                 Some(tiles) if tiles.is_empty() => {}
                 Some(tiles) if tiles.iter().all(Tile::is_upright) => {
                     if members.list.is_empty() {
-                        members.layers = layers(world, entity);
+                        members.layers = world.get::<RenderLayers>(entity).cloned();
                     }
                     members.list.push((entity, tiles));
                 }
@@ -220,8 +220,4 @@ fn turned(across: bool, down: bool, diagonal: bool) -> DAffine2 {
     let sign = |is_mirrored: bool| if is_mirrored { -1.0 } else { 1.0 };
     let swap = if diagonal { DMat2::from_cols(DVec2::Y, DVec2::X) } else { DMat2::IDENTITY };
     DAffine2::from_mat2(DMat2::from_diagonal(DVec2::new(sign(across), sign(down))) * swap)
-}
-
-fn layers(world: &World, entity: Entity) -> Option<RenderLayers> {
-    world.get::<RenderLayers>(entity).cloned()
 }

@@ -102,16 +102,18 @@ pub(crate) fn watch_members(
     images: Option<MessageReader<AssetEvent<Image>>>,
     mut changes: ResMut<GroupChanges>,
 ) {
-    let images = images.into_iter().flat_map(|mut images| images.read().copied().collect::<Vec<_>>());
     if walls.is_empty() {
-        images.for_each(drop);
+        if let Some(mut images) = images {
+            images.clear();
+        }
         return;
     }
     changes.0.extend(changed.iter().map(|member| member.0).filter(|group| walls.contains(*group)));
     changes.0.extend(&groups);
-    for event in images {
+    let Some(mut images) = images else { return };
+    for event in images.read() {
         if let AssetEvent::Modified { id } | AssetEvent::Added { id } = event {
-            let shows = |(_, wall): &(Entity, &Wall)| wall.shown.pictures.iter().any(|picture| picture.id() == id);
+            let shows = |(_, wall): &(Entity, &Wall)| wall.shown.pictures.iter().any(|picture| picture.id() == *id);
             changes.0.extend(walls.iter().filter(shows).map(|(group, _)| group));
         }
     }

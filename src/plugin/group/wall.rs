@@ -142,6 +142,8 @@ pub(super) struct WallWork {
     tiles: Vec<Tile>,
     copies: vec::IntoIter<Image>,
     sources: Vec<Source>,
+    /// That of the last tile: tiles beside each other mostly have the same.
+    tint: Tint,
     done: usize,
     /// RGBA8, sRGB.
     texels: Vec<u8>,
@@ -151,10 +153,22 @@ impl WallWork {
     /// `copies` are the pictures of the tiles.
     pub(super) fn new(frame: WallFrame, mut tiles: Vec<Tile>, copies: Vec<Image>) -> Self {
         tiles.sort_by(|a, b| a.z.total_cmp(&b.z));
-        Self { frame, tiles, copies: copies.into_iter(), sources: Vec::new(), done: 0, texels: Vec::new() }
+        Self {
+            frame,
+            tiles,
+            copies: copies.into_iter(),
+            sources: Vec::new(),
+            tint: Tint::NONE,
+            done: 0,
+            texels: Vec::new(),
+        }
     }
 
+    /// Puts a tile in its place; returns how many texels it covers.
     fn put(&mut self, tile: &Tile) -> u64 {
+        if self.tint.color != tile.tint {
+            self.tint = Tint::new(tile.tint);
+        }
         let (Some(rect), Some(source)) = (self.frame.rect(tile), self.sources.get(tile.picture)) else { return 0 };
         let part = tile.part.intersect(Rect { min: Vec2::ZERO, max: source.size.as_vec2() });
         if part.is_empty() {
@@ -163,7 +177,6 @@ impl WallWork {
         let (least, most) = (part.min.floor().as_uvec2(), (part.max.ceil().as_uvec2()).saturating_sub(UVec2::ONE));
         let scale = DAffine2::from_scale_angle_translation(tile.part.size().as_dvec2(), 0.0, tile.part.min.as_dvec2());
         let back = scale * tile.place.inverse() * self.frame.to_plane();
-        let tint = Tint::new(tile.tint);
         let width = self.frame.size.x as usize;
         for y in rect.min.y..rect.max.y {
             for x in rect.min.x..rect.max.x {
@@ -175,7 +188,7 @@ impl WallWork {
                 let start = 4 * (y as usize * width + x as usize);
                 let (texel, below) = (source.texel(at.as_uvec2(), tile.layer), self.texels.get_mut(start..start + 4));
                 if let (Some(texel), Some(below)) = (texel, below.and_then(|below| below.first_chunk_mut())) {
-                    *below = over(tint.of(texel), *below);
+                    *below = over(self.tint.of(texel), *below);
                 }
             }
         }
@@ -209,20 +222,22 @@ impl Stepped for WallWork {
 }
 
 /// A colour that pictures are multiplied by.
-enum Tint {
-    None,
-    /// What becomes of each byte of each channel.
-    Table(Box<[[u8; 256]; 4]>),
+struct Tint {
+    /// Red, green, blue, alpha; sRGB.
+    color: [f32; 4],
+    /// What becomes of each byte of each channel; `None` = nothing else.
+    table: Option<Box<[[u8; 256]; 4]>>,
 }
 
 impl Tint {
-    fn new(tint: [f32; 4]) -> Self {
-        if tint == [1.0; 4] {
-            return Self::None;
+    const NONE: Self = Self { color: [1.0; 4], table: None };
+
+    fn new(color: [f32; 4]) -> Self {
+        if color == Self::NONE.color {
+            return Self::NONE;
         }
-        let [red, green, blue, alpha] = tint;
-        let tint = Srgba { red, green, blue, alpha };
-        let linear = LinearRgba::from(tint).to_f32_array();
+        let [red, green, blue, alpha] = color;
+        let linear = LinearRgba::from(Srgba { red, green, blue, alpha }).to_f32_array();
         let mut table = Box::new([[0; 256]; 4]);
         for byte in 0..=255u8 {
             let texel = LinearRgba::from(Srgba::from_u8_array([byte; 4])).to_f32_array();
@@ -231,17 +246,13 @@ impl Tint {
             let bytes = Srgba::from(LinearRgba::from_f32_array(product)).to_u8_array();
             table.iter_mut().zip(bytes).for_each(|(channel, out)| channel[usize::from(byte)] = out);
         }
-        Self::Table(table)
+        Self { color, table: Some(table) }
     }
 
     fn of(&self, texel: [u8; 4]) -> [u8; 4] {
-        match self {
-            Self::None => texel,
-            Self::Table(table) => {
-                let mut channels = table.iter();
-                texel.map(|byte| channels.next().map_or(byte, |channel| channel[usize::from(byte)]))
-            }
-        }
+        let Some(table) = &self.table else { return texel };
+        let mut channels = table.iter();
+        texel.map(|byte| channels.next().map_or(byte, |channel| channel[usize::from(byte)]))
     }
 }
 
