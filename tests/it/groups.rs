@@ -188,6 +188,22 @@ fn hits_on_members_land_on_the_group() {
     }
 }
 
+/// Healing refuses the hits before it that were on members, as those on the group; those after it land.
+#[test]
+fn i12_a_group_is_healed_in_the_frame_of_a_hit_on_a_member() {
+    let mut app = app();
+    let whole = speckled(WALL * TILE, 1);
+    let (group, members) = spawn_wall(&mut app, &whole, Vec3::ZERO, 9);
+    step(&mut app);
+    hit(&mut app, center(members[7]));
+    app.world_mut().commands().entity(group).heal_cracks();
+    app.world_mut().flush();
+    assert_eq!((counts(&app).sent, counts(&app).rejected), (1, 1));
+    hit(&mut app, center(members[8]));
+    settle(&mut app, group);
+    assert_eq!((counts(&app).applied, state(&app, group).hits), (1, 1));
+}
+
 /// The texel of a tile that the engine's shader shows at (u, v) in it.
 fn shader(orientation: TileOrientation, u: f32, v: f32) -> (f32, f32) {
     let u = if orientation.mirror_h() { 1.0 - u } else { u };

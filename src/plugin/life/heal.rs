@@ -1,5 +1,7 @@
 //! Healing, and what happens when a surface goes.
 
+#[cfg(feature = "2d")]
+use crate::plugin::api::CrackGroup;
 use crate::plugin::api::{AnalogyProgress, CrackRecord, CrackState, CrackStats, CrackSurface, CrackTextures};
 use crate::plugin::bake::work;
 use crate::plugin::carrier::kind::Found;
@@ -13,6 +15,8 @@ use crate::plugin::surface::cracked::{self, active_mut, with_queues};
 use crate::plugin::surface::owners::Owners;
 use crate::plugin::surface::prepare;
 use crate::plugin::surface::queue::HitQueue;
+#[cfg(feature = "2d")]
+use bevy::ecs::entity::EntityHashSet;
 use bevy::prelude::*;
 
 pub(super) fn close(world: &mut World, entity: Entity, seconds: f32) {
@@ -54,8 +58,13 @@ pub(super) fn purge(world: &mut World, entity: Entity) {
         return;
     }
     world.resource_scope(|world, mut queue: Mut<HitQueue>| {
+        #[cfg(feature = "2d")]
+        let members: EntityHashSet = world.get::<CrackGroup>(entity).into_iter().flat_map(CrackGroup::iter).collect();
         if let Some(mut stats) = world.get_resource_mut::<CrackStats>() {
             queue.purge(entity, &mut stats);
+            // A hit on a member is one on its group.
+            #[cfg(feature = "2d")]
+            queue.purge_inbox(|hit| members.contains(&hit), &mut stats);
         }
     });
 }

@@ -81,17 +81,22 @@ impl HitQueue {
 
     /// Drops all hits that wait on a surface, those of this frame's events too; they count as refused.
     pub(crate) fn purge(&mut self, entity: Entity, stats: &mut CrackStats) {
-        let before = self.inbox.len();
-        self.inbox.retain(|hit| hit.entity != entity);
-        let dropped = (before - self.inbox.len()) as u64;
-        stats.sent += dropped;
-        stats.rejected += dropped;
+        self.purge_inbox(|hit| hit == entity, stats);
         if let Some(hits) = self.hits.remove(&entity) {
             stats.queued -= hits.len() as u64;
             stats.rejected += hits.len() as u64;
             self.turns.retain(|e| *e != entity);
             self.parked.retain(|e| *e != entity);
         }
+    }
+
+    /// Drops hits of this frame's events; they count as refused.
+    pub(crate) fn purge_inbox(&mut self, is_on: impl Fn(Entity) -> bool, stats: &mut CrackStats) {
+        let before = self.inbox.len();
+        self.inbox.retain(|hit| !is_on(hit.entity));
+        let dropped = (before - self.inbox.len()) as u64;
+        stats.sent += dropped;
+        stats.rejected += dropped;
     }
 
     /// Whether any hit waits.
