@@ -44,6 +44,7 @@ pub mod raster;
 pub mod relief;
 pub mod shatter;
 pub mod strands;
+pub mod unwrap;
 pub mod voronoi;
 
 #[cfg(feature = "editor")]

@@ -48,19 +48,32 @@ impl SurfaceFrame {
         Ok(Self { size, texels_per_unit: unit })
     }
 
+    /// The frame of a surface of `size` texels with so many texels for a unit of pattern space; those that would make a side longer than 64
+    /// units, or are no number above 0, become the nearest that do not.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn with_unit(size: UVec2, texels_per_unit: f32) -> Result<Self, FrameError> {
+        let frame = Self::new(size)?;
+        let least = size.max_element() as f32 / MAX_ASPECT;
+        let most = size.min_element() as f32 * 64.0;
+        let unit = if texels_per_unit > 0.0 { texels_per_unit.min(most).max(least) } else { frame.texels_per_unit };
+        Ok(Self { size, texels_per_unit: unit })
+    }
+
     /// Size in texels.
     #[must_use]
     pub const fn size(&self) -> UVec2 {
         self.size
     }
 
-    /// Texels per pattern unit: the shorter side, in texels.
+    /// Texels per pattern unit: the shorter side, in texels, unless it was given.
     #[must_use]
     pub const fn texels_per_unit(&self) -> f32 {
         self.texels_per_unit
     }
 
-    /// Size in pattern units; the shorter side is 1 (below 1 only when one side is over 64 times the other).
+    /// Size in pattern units; the shorter side is 1 (below 1 only when one side is over 64 times the other), unless the unit was given.
     #[must_use]
     pub fn extent(&self) -> Vec2 {
         self.size.as_vec2() / self.texels_per_unit

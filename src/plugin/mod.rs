@@ -39,10 +39,10 @@ pub use api::{
     AnalogyExamples, AnalogyFailed, AnalogyMade, AnalogyProgress, BakeProgress, CellClosed, CrackAnalogy, CrackBaked,
     CrackBudget, CrackClock, CrackDrive, CrackError, CrackFailed, CrackFinished, CrackGuide, CrackHit, CrackMaps,
     CrackMaskSource, CrackRecord, CrackRelief, CrackResolution, CrackScript, CrackShards, CrackState, CrackStats,
-    CrackStatus, CrackStrands, CrackSurface, CrackSystems, CrackTextures, CrackTip, CrackUploadStats, GravitySpace,
-    GuideSource, GuidedAppearance, GuidedCracks, HitPoint, PresetSource, Reassembled, ReliefFailed, ReliefMade,
-    ReliefProgress, ScriptedHit, Shard, ShardsError, ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen,
-    Shattered, StrandField,
+    CrackStatus, CrackStrands, CrackSurface, CrackSystems, CrackTextures, CrackTip, CrackUnwrap, CrackUploadStats,
+    GravitySpace, GuideSource, GuidedAppearance, GuidedCracks, HitPoint, PresetSource, Reassembled, ReliefFailed,
+    ReliefMade, ReliefProgress, ScriptedHit, Shard, ShardsError, ShatterCracks, ShatterFailed, ShatterRequest,
+    ShatterWhen, Shattered, StrandField,
 };
 #[cfg(feature = "2d")]
 pub use api::{CrackGroup, CrackMemberOf};
@@ -66,9 +66,9 @@ pub mod prelude {
         CrackBaked, CrackBudget, CrackClock, CrackCommandsExt, CrackDrive, CrackError, CrackFailed, CrackFinished,
         CrackGuide, CrackHit, CrackMaps, CrackMaskSource, CrackPlugin, CrackPlugins, CrackRecord, CrackRecords,
         CrackRelief, CrackResolution, CrackScript, CrackShards, CrackState, CrackStats, CrackStatus, CrackStrands,
-        CrackSurface, CrackSystems, CrackTextures, CrackTip, GravitySpace, GuideSource, GuidedAppearance, GuidedCracks,
-        HitPoint, PresetSource, Reassembled, ReliefFailed, ReliefMade, ReliefProgress, ScriptedHit, Shard,
-        ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen, Shattered, StrandField,
+        CrackSurface, CrackSystems, CrackTextures, CrackTip, CrackUnwrap, GravitySpace, GuideSource, GuidedAppearance,
+        GuidedCracks, HitPoint, PresetSource, Reassembled, ReliefFailed, ReliefMade, ReliefProgress, ScriptedHit,
+        Shard, ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen, Shattered, StrandField,
     };
     #[cfg(feature = "2d")]
     pub use super::{CrackGroup, CrackLight2d, CrackLitMaterial, CrackMemberOf};
@@ -145,6 +145,7 @@ impl Plugin for CrackPlugin {
             .init_resource::<shards::request::ShardQueue>()
             .init_resource::<bake::work::Bakes>()
             .init_resource::<surface::prepare::Preparations>()
+            .init_resource::<surface::unfold::Unfoldings>()
             .init_resource::<carrier::pipelines::PipelineRequests>()
             .add_message::<CrackHit>()
             .add_observer(hits::collect::receive_hit)

@@ -69,5 +69,7 @@ mod strands;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod support;
 #[cfg(all(feature = "2d", feature = "3d"))]
+mod unfolded;
+#[cfg(all(feature = "2d", feature = "3d"))]
 mod values;
 mod voronoi;

@@ -26,7 +26,9 @@ fn failed(app: &mut App) -> Vec<ShardsError> {
 
 fn spawn(app: &mut App, mesh: &Handle<Mesh>, material: &Handle<StandardMaterial>, place: Transform) -> Entity {
     let mesh = (Mesh3d(mesh.clone()), MeshMaterial3d(material.clone()));
-    app.world_mut().spawn((mesh, place, surface(), loose())).id()
+    // Others are laid out: see `unfolded`.
+    let surface = surface().with_unwrap(CrackUnwrap::Never);
+    app.world_mut().spawn((mesh, place, surface, loose())).id()
 }
 
 /// What the texture of a surface has at each vertex of its mesh, 0..=1 along the picture that its material shows.

@@ -52,11 +52,21 @@ pub struct CrackRecord {
     pub past: Past,
     /// Steps that have passed, with their fraction: what a [`CrackClock`](super::CrackClock) shows goes on from there, and so does growth.
     pub time: f64,
+    /// Where its mesh was first hit, in its own space, if that was laid out ([`CrackUnwrap`](super::CrackUnwrap)): it is laid out around that point
+    /// again.
+    #[serde(default)]
+    pub around: Option<Vec3>,
 }
 
 impl Default for CrackRecord {
     fn default() -> Self {
-        Self { version: Self::VERSION, seed: 0, past: Past { extent: Vec2::ONE, ..Past::default() }, time: 0.0 }
+        Self {
+            version: Self::VERSION,
+            seed: 0,
+            past: Past { extent: Vec2::ONE, ..Past::default() },
+            time: 0.0,
+            around: None,
+        }
     }
 }
 
@@ -75,6 +85,11 @@ impl CrackRecord {
         }
         if !self.time.is_finite() || self.time < 0.0 {
             return Err(CrackError::Record { reason: format!("its time is {}, must be 0 or more", self.time) });
+        }
+        if self.around.is_some_and(|around| !around.is_finite()) {
+            return Err(CrackError::Record {
+                reason: "the point around which its mesh was laid out is not finite".to_owned(),
+            });
         }
         self.past.validate().map_err(|error| CrackError::Record { reason: error.to_string() })
     }

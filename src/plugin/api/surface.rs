@@ -14,12 +14,15 @@ use bevy::{prelude::*, reflect::serde::ReflectSerializeWithRegistry};
 /// by healing; another image or material put in its place is cracked as the first one was. A sprite that repeats or slices its picture shows
 /// it laid out in its texture while it is cracked, at the size that it had when that was made, and its `image_mode` is `Tiled` without tiles.
 ///
-/// On a 3D mesh some of whose faces show the same part of the picture, as those of a `Cuboid` or a `Cylinder`, only that face cracks which is hit
-/// first; hits on others are refused until it is healed. Its textures hold the picture twice, and `Mesh3d` is a copy with other texture
-/// coordinates while it is cracked. A face is what hangs together in the texture coordinates, or a side of a box. A box no thicker than a
+/// A 3D mesh that is neither flat nor a slab is laid out flat around its first hit, and all of it cracks: see [`CrackUnwrap`]. A box no thicker than a
 /// quarter of its width and height, as it is scaled in the world, is a slab: it cracks through, so that its back shows what its front shows,
-/// and is hit from all sides. Where a face shows a part of the picture twice itself, where the picture repeats, faces share vertices, or there
-/// are more than 65,536 triangles, the mesh stays as it is, and cracks show wherever their place of the picture does.
+/// and is hit from all sides.
+///
+/// Where a mesh is not laid out and some of its faces show the same part of the picture, as those of a `Cuboid` or a `Cylinder`, only that face cracks
+/// which is hit first; hits on others are refused until it is healed. Its textures hold the picture twice, and `Mesh3d` is a copy with other texture
+/// coordinates while it is cracked. A face is what hangs together in the texture coordinates, or a side of a box. Where a face shows a part of the
+/// picture twice itself, where the picture repeats, faces share vertices, or there are more than 65,536 triangles, the mesh stays as it is, and cracks
+/// show wherever their place of the picture does.
 #[derive(Component, Reflect, Clone, Debug, PartialEq)]
 #[type_path = "bevy_crack"]
 #[reflect(Component, Default, SerializeWithRegistry)]
@@ -43,6 +46,9 @@ pub struct CrackSurface {
     /// there (lightness as it is stored, times alpha). `None` (default) = everywhere alike. The first hit waits until it is loaded. A change takes
     /// effect as one of `resolution`.
     pub density: Option<Handle<Image>>,
+    /// Whether a 3D mesh is laid out flat around its first hit, so that cracks run over its edges and around its curves. A change takes effect
+    /// after healing.
+    pub unwrap: CrackUnwrap,
 }
 
 impl CrackSurface {
@@ -58,6 +64,7 @@ impl CrackSurface {
             alpha_mask: true,
             mask: CrackMaskSource::Auto,
             density: None,
+            unwrap: CrackUnwrap::Auto,
         }
     }
 
@@ -89,6 +96,13 @@ impl CrackSurface {
         self
     }
 
+    /// The same, its mesh laid out flat or not.
+    #[must_use]
+    pub fn with_unwrap(mut self, unwrap: CrackUnwrap) -> Self {
+        self.unwrap = unwrap;
+        self
+    }
+
     /// The same with a mask.
     #[must_use]
     pub fn with_mask(mut self, mask: CrackMaskSource) -> Self {
@@ -101,6 +115,31 @@ impl Default for CrackSurface {
     fn default() -> Self {
         Self::new(PresetSource::default())
     }
+}
+
+/// Whether a 3D mesh is laid out flat around its first hit.
+///
+/// Such a mesh cracks all over, its cracks running over edges and around curves as if it were flat around the hit: a box is unfolded, a rock is
+/// laid out by distance and direction. Lengths and angles stay as they are on meshes of flat faces (up to 64 of them), and change by no more than
+/// 1.6 times on others. What does not lie flat any more, as the far side of a ball, is laid out beside it and cracks too, but no crack runs from one
+/// part to another. Each needs textures for all of it: a box six times its picture, and about as much for the gaps.
+///
+/// Never laid out: flat meshes and slabs, those of more than 65,536 triangles, meshes whose surface has a [mask](CrackSurface::mask) of images, a
+/// [density](CrackSurface::density), a [fixed size](CrackResolution::Fixed), [`GuidedCracks`](crate::plugin::GuidedCracks) or
+/// [`CrackStrands`](crate::plugin::CrackStrands), which have their places in its picture.
+///
+/// While it is cracked, `Mesh3d` is a copy with other texture coordinates. Hits by texture coordinates are meant for those that the mesh had. One that
+/// is laid out does not shatter.
+#[derive(Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[type_path = "bevy_crack"]
+pub enum CrackUnwrap {
+    /// If that takes no more than 1.5 million texels at the resolution of its picture: a box with a picture of 350 x 350 or without one.
+    #[default]
+    Auto,
+    /// Always, with up to eight million texels and as many a side as the budget allows; fewer for a unit of length where that is not enough.
+    Always,
+    /// Cracks are where the mesh's own texture coordinates have them.
+    Never,
 }
 
 /// Size of a surface's textures.

@@ -11,7 +11,11 @@ use crate::plugin::source::png::MAX_SIDE;
 use crate::plugin::surface::cracked::active;
 use crate::plugin::surface::inputs::Copies;
 use crate::plugin::surface::plan::Plan;
+use crate::plugin::surface::unfold::unfold;
 use bevy::prelude::*;
+
+const LAID_OUT: &str =
+    "its mesh is laid out around its first hit: add it before that, or set `CrackSurface::unwrap` to `Never`";
 
 /// All that a bake needs; `None` if its pictures are not there yet.
 pub(super) fn begin(world: &mut World, entity: Entity, bake: &mut Bake) -> Result<Option<Work>, CrackError> {
@@ -35,9 +39,17 @@ pub(super) fn begin(world: &mut World, entity: Entity, bake: &mut Bake) -> Resul
             {
                 surface.seed = record.seed;
             }
+            if active(world, entity).is_none() && !unfold(world, entity) {
+                return Ok(None);
+            }
             (None, Some(CracksOrder::Record(Box::new(record))))
         }
     };
+    if !matches!(bake.kind, Baked::Record)
+        && active(world, entity).is_some_and(|active| active.carrier.unfolding.is_some())
+    {
+        return Err(CrackError::Bake { reason: LAID_OUT.to_owned() });
+    }
     let known = active(world, entity).and_then(|active| {
         let rect = active.canvas.views.get(active.canvas.view)?.rect;
         Some(BakeSurface::Known(active.canvas.base.clone(), rect))

@@ -202,8 +202,8 @@ impl Finish {
 
 impl FinishInputs {
     fn grow(&self, added: Option<&mut Added>) -> Result<Stage, CrackError> {
-        let frame = frame(self.rect)?;
-        let density = if self.surface.alpha_mask { self.base.density(self.rect) } else { None };
+        let frame = frame(self.rect, &self.base)?;
+        let density = if self.surface.alpha_mask || self.base.has_gaps() { self.base.density(self.rect) } else { None };
         let (mask, seed, is_nearest) = (self.mask.clone(), self.surface.seed, self.base.is_nearest);
         let regrowth = Regrowth { preset: &self.preset, frame, seed, is_nearest, mask, density };
         let mut grown = regrowth.grow(added, &self.past)?;
@@ -216,7 +216,7 @@ impl FinishInputs {
     }
 
     fn draw(&self, grown: Regrown, cells: CellTracker, added: Option<&Added>) -> Result<Stage, CrackError> {
-        let (frame, growth) = (frame(self.rect)?, &grown.growth);
+        let (frame, growth) = (frame(self.rect, &self.base)?, &grown.growth);
         let (mut field, mut touched) = (DepthField::new(frame), Touched::new(frame.size()));
         field.set_forbidden(&self.mask);
         field.set_layers(self.preset.look.layer(self.surface.seed));

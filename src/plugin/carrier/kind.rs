@@ -6,6 +6,7 @@ use crate::plugin::api::error::CrackError;
 use crate::plugin::api::hit::HitPoint;
 use crate::plugin::api::textures::{CrackTextures, Maps};
 use crate::plugin::source::layout::Layout;
+use crate::plugin::source::unfolding::Unfolding;
 use crate::raster::TexelRect;
 #[cfg(feature = "2d")]
 use bevy::sprite::SpriteImageMode;
@@ -89,6 +90,16 @@ pub(crate) trait CarrierKind: Send + Sync {
         false
     }
 
+    /// Has a mesh laid out flat, if that is of use; `false` if that is under way.
+    fn unfold(&self, _world: &mut World, _entity: Entity, _order: &UnfoldOrder) -> bool {
+        true
+    }
+
+    /// How its mesh is laid out, if it is.
+    fn unfolding(&self, _world: &World, _entity: Entity) -> Option<Arc<Unfolding>> {
+        None
+    }
+
     /// Where a hit lands. `point` is the same place in the entity's own space, if it is known. Chooses what of the entity cracks if it `is_blank`.
     fn aim(
         &self,
@@ -146,6 +157,23 @@ pub(crate) trait CarrierKind: Send + Sync {
     fn shards(&self) -> &'static dyn ShardVisuals;
 }
 
+/// How a mesh is to be laid out.
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(not(feature = "3d"), expect(dead_code, reason = "only 3D meshes are laid out"))]
+pub(crate) struct UnfoldOrder {
+    /// Where it is hit, and the same place in the entity's own space if that is known.
+    pub(crate) hit: Option<(HitPoint, Option<Vec3>)>,
+    /// Whether fewer texels than its picture has are better than none.
+    pub(crate) must: bool,
+    /// The most texels, and the most of a side.
+    pub(crate) most_texels: f64,
+    pub(crate) most_side: u32,
+    /// Whether it is made in this frame.
+    pub(crate) at_once: bool,
+    /// The id that it gets.
+    pub(crate) id: u64,
+}
+
 /// What shows the pictures of a surface, and what it showed before.
 pub(crate) struct Carrier {
     pub(crate) kind: &'static dyn CarrierKind,
@@ -161,6 +189,8 @@ pub(crate) struct Carrier {
     pub(crate) size: Option<Vec2>,
     /// Whether its textures hold the picture twice, one above the other: the upper one cracks.
     pub(crate) is_twofold: bool,
+    /// How its mesh is laid out in its textures, if it is.
+    pub(crate) unfolding: Option<Arc<Unfolding>>,
     /// How the sprite laid out its picture, if its texture has it laid out.
     #[cfg(feature = "2d")]
     pub(crate) mode: Option<SpriteImageMode>,
@@ -177,6 +207,7 @@ impl Carrier {
             mesh: None,
             size: None,
             is_twofold: false,
+            unfolding: None,
             #[cfg(feature = "2d")]
             mode: None,
         }

@@ -1,5 +1,7 @@
 //! Meshes with a material as carriers.
 
+#[cfg(feature = "3d")]
+use super::kind::UnfoldOrder;
 use super::kind::{Carrier, CarrierKind, Found, NextLook, Shown};
 use super::mesh::{aspect_of, check_for_tangents, closest, is_flat, lacks_tangents, place_of, wrap};
 use super::pipelines::{self, Shape};
@@ -7,12 +9,14 @@ use super::plane::Plane;
 use super::shard_visual::{MaterialVisuals, ShardVisuals};
 use super::slot::{CrackMaterial, MaterialSlot, mesh_of, to_picture, typed};
 #[cfg(feature = "3d")]
-use super::split;
+use super::{split, unfold};
 use crate::plugin::api::error::CrackError;
 #[cfg(feature = "3d")]
 use crate::plugin::api::error::EntityLabel;
 use crate::plugin::api::hit::HitPoint;
 use crate::plugin::api::textures::{CrackTextures, Maps};
+#[cfg(feature = "3d")]
+use crate::plugin::source::unfolding::Unfolding;
 use crate::raster::TexelRect;
 use bevy::{
     asset::{LoadState, UntypedHandle},
@@ -20,6 +24,11 @@ use bevy::{
     prelude::*,
 };
 use core::marker::PhantomData;
+#[cfg(feature = "3d")]
+use std::sync::Arc;
+
+const NOT_FLAT: &str =
+    "its mesh is neither flat nor a slab, which is a box at least four times as wide and high as thick";
 
 /// Meshes whose material is in the component `S`.
 pub(super) struct MaterialKind<S>(PhantomData<S>);
@@ -58,6 +67,9 @@ impl<S: MaterialSlot> CarrierKind for MaterialKind<S> {
         if carrier.is_twofold {
             material.show_upper_half();
         }
+        if carrier.unfolding.is_some() {
+            material.show_all();
+        }
         let own = carrier.own.as_ref().and_then(typed::<S::Material>).unwrap_or_else(|| materials.reserve_handle());
         // A handle that we hold is never refused.
         if materials.insert(&own, material).is_err() {
@@ -67,6 +79,8 @@ impl<S: MaterialSlot> CarrierKind for MaterialKind<S> {
         if let Some(mut slot) = world.get_mut::<S>(entity) {
             slot.set_material(own);
         }
+        #[cfg(feature = "3d")]
+        unfold::show(world, entity, carrier);
         #[cfg(feature = "3d")]
         if S::Material::MAPS.depth && carrier.mesh.is_none() && (textures.normal.is_some() || textures.depth.is_some())
         {
@@ -90,7 +104,10 @@ impl<S: MaterialSlot> CarrierKind for MaterialKind<S> {
             mesh.0 = before.clone();
         }
         #[cfg(feature = "3d")]
-        split::forget(world, entity);
+        {
+            split::forget(world, entity);
+            unfold::forget(world, entity);
+        }
     }
 
     fn can_draw(&self, world: &mut World, entity: Entity, look: &NextLook<'_>) -> bool {
@@ -144,15 +161,27 @@ impl<S: MaterialSlot> CarrierKind for MaterialKind<S> {
     fn is_twofold(&self, world: &World, entity: Entity) -> bool {
         #[cfg(feature = "3d")]
         if S::Material::MAPS.depth {
-            return split::shares_its_picture::<S>(world, entity);
+            return unfold::unfolding(world, entity).is_none() && split::shares_its_picture::<S>(world, entity);
         }
         let _ = (world, entity);
         false
     }
 
+    #[cfg(feature = "3d")]
+    fn unfold(&self, world: &mut World, entity: Entity, order: &UnfoldOrder) -> bool {
+        unfold::prepare::<S>(world, entity, order)
+    }
+
+    #[cfg(feature = "3d")]
+    fn unfolding(&self, world: &World, entity: Entity) -> Option<Arc<Unfolding>> {
+        unfold::unfolding(world, entity).filter(|_| S::Material::MAPS.depth)
+    }
+
     fn aim(&self, world: &mut World, entity: Entity, at: HitPoint, point: Option<Vec3>, is_blank: bool) -> HitPoint {
         #[cfg(feature = "3d")]
-        if let Some(at) = split::aim(world, entity, at, point, is_blank) {
+        if let Some(at) =
+            unfold::aim(world, entity, at, point).or_else(|| split::aim(world, entity, at, point, is_blank))
+        {
             return at;
         }
         let _ = (world, entity, point, is_blank);
@@ -186,6 +215,10 @@ impl<S: MaterialSlot> CarrierKind for MaterialKind<S> {
         let mesh = mesh_of(world, entity).ok_or("there is no mesh")?;
         let mesh =
             world.get_resource::<Assets<Mesh>>().and_then(|meshes| meshes.get(mesh)).ok_or("its mesh is not loaded")?;
+        #[cfg(feature = "3d")]
+        if unfold::unfolding(world, entity).is_some() {
+            return Err(NOT_FLAT);
+        }
         let transform = to_picture::<S>(world, entity)?;
         if transform.matrix2.determinant() == 0.0 {
             return Err("its material shows one line of the picture only");
@@ -199,9 +232,7 @@ impl<S: MaterialSlot> CarrierKind for MaterialKind<S> {
             return Ok(Plane { thickness: Some(thickness), ..plane });
         }
         if !is_flat(mesh, first, normal) {
-            return Err(
-                "its mesh is neither flat nor a slab, which is a box at least four times as wide and high as thick",
-            );
+            return Err(NOT_FLAT);
         }
         Ok(plane)
     }

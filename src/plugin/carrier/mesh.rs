@@ -41,6 +41,12 @@ impl<'a> Triangles<'a> {
         self.indices.map_or(self.positions.len(), Indices::len) / 3
     }
 
+    /// Where the vertices are.
+    #[cfg(feature = "3d")]
+    pub(crate) fn positions(&self) -> impl Iterator<Item = Vec3> + '_ {
+        self.positions.iter().map(|at| Vec3::from_array(*at))
+    }
+
     /// Number of vertices.
     #[cfg(feature = "3d")]
     pub(crate) fn vertices(&self) -> usize {
@@ -225,6 +231,13 @@ pub(crate) fn wrap(uv: Vec2) -> Vec2 {
 
 fn read<const N: usize>(values: &[[f32; N]], at: [usize; 3]) -> Option<[[f32; N]; 3]> {
     Some([*values.get(at[0])?, *values.get(at[1])?, *values.get(at[2])?])
+}
+
+/// The point of a triangle that is closest to `p`.
+#[cfg(feature = "3d")]
+pub(crate) fn nearest_on(p: Vec3, [a, b, c]: [Vec3; 3]) -> Vec3 {
+    let weights = closest_weights(p, a, b, c);
+    a * weights.x + b * weights.y + c * weights.z
 }
 
 /// Barycentric weights of the point of a triangle that is closest to `p` (Ericson 2004, section 5.1.5).

@@ -27,3 +27,5 @@ mod split;
 pub(crate) mod sprite;
 #[cfg(feature = "3d")]
 mod standard;
+#[cfg(feature = "3d")]
+mod unfold;

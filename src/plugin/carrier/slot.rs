@@ -22,6 +22,8 @@ pub(crate) trait CrackMaterial: Asset + Clone {
     }
     /// Shows the upper half of its textures as if that were all of them.
     fn show_upper_half(&mut self) {}
+    /// Shows its textures where the mesh's texture coordinates say.
+    fn show_all(&mut self) {}
     /// Becomes transparent where its picture is.
     fn open(&mut self);
     /// The same for shards: with this picture, the mesh's texture coordinates being the picture's, and so much of it there (0..=1).

@@ -48,6 +48,10 @@ impl CrackMaterial for StandardMaterial {
         self.parallax_depth_scale *= 0.5;
     }
 
+    fn show_all(&mut self) {
+        self.uv_transform = Affine2::IDENTITY;
+    }
+
     fn open(&mut self) {
         if self.alpha_mode == AlphaMode::Opaque {
             self.alpha_mode = AlphaMode::Mask(0.5);

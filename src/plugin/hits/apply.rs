@@ -202,7 +202,7 @@ fn apply(world: &mut World, entity: Entity, hit: QueuedHit, timer: &Timer) -> Re
     if active.drawing.cutouts.as_ref().is_some_and(|holes| holes.contains(texel)) {
         return Err("a shard has left the surface there");
     }
-    if active.surface.alpha_mask
+    if (active.surface.alpha_mask || active.canvas.base.has_gaps())
         && let Some(rect) = active.canvas.seen()
         && active.canvas.base.is_hole(rect.min + (uv * frame.size().as_vec2()).as_uvec2().min(rect.size() - 1))
     {

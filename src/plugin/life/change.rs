@@ -218,7 +218,8 @@ fn change_carrier(
     let carrier = Carrier::new(kind, shown.clone());
     if shown.asset.type_id() == active.carrier.shown.asset.type_id() {
         let (mesh, size) = (active.carrier.mesh.take(), active.carrier.size);
-        active.carrier = Carrier { mesh, size, ..carrier };
+        let unfolding = active.carrier.unfolding.take();
+        active.carrier = Carrier { mesh, size, unfolding, ..carrier };
     } else {
         active.carrier.kind.detach(world, entity, &active.carrier);
         active.carrier = carrier;
@@ -238,7 +239,7 @@ fn update_picture(
     active.canvas.offered = if other.is_some() { shown.pictures().map(Handle::id).collect() } else { Vec::new() };
     let Some(draft) = draft(world, entity, active, other, &shown)? else { return Ok(false) };
     let Some(mask) = resolve_mask(world, &active.surface, &active.preset, &shown, &draft)? else { return Ok(false) };
-    let frame = frame(draft.plan.rect)?;
+    let frame = frame(draft.plan.rect, &draft.base)?;
     let look = look(&active.preset, frame, draft.base.is_nearest)?;
     recall(world, entity, active);
     let regrown = regrow(active, frame, mask.clone(), draft.base.is_nearest)?;
@@ -257,7 +258,7 @@ fn update_picture(
         active.cracks.cells_reported = active.cracks.cells.cells().len();
         active.cracks.growth = growth;
     }
-    if active.surface.alpha_mask {
+    if active.surface.alpha_mask || draft.base.has_gaps() {
         active.cracks.growth.set_density(draft.base.density(draft.plan.rect));
     }
     let had_mask = !active.cracks.growth.mask().is_empty();
@@ -280,6 +281,7 @@ fn update_picture(
     active.show(draft.plan.rect);
     active.carrier.shown = shown;
     active.carrier.is_twofold = draft.plan.is_twofold;
+    active.carrier.unfolding = draft.plan.unfolding.clone();
     // The material is made again: one that exists keeps showing a texture of the old size.
     attach(world, entity, active);
     Ok(true)

@@ -89,6 +89,8 @@ pub(crate) struct MaskKey {
     pub(crate) rect: TexelRect,
     pub(crate) part: PicturePart,
     pub(crate) layout: Option<Layout>,
+    /// The id of the layout of the mesh.
+    pub(crate) unfolding: Option<u64>,
 }
 
 impl MaskKey {

@@ -6,3 +6,4 @@ pub(crate) mod mask;
 pub(crate) mod picture;
 pub(crate) mod png;
 pub(crate) mod preset;
+pub(crate) mod unfolding;

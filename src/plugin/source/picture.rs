@@ -4,6 +4,7 @@ use crate::Grid;
 use crate::paint::BaseTexels;
 use crate::plugin::api::error::CrackError;
 use crate::plugin::source::layout::Layout;
+use crate::plugin::source::unfolding::Unfolding;
 use crate::raster::TexelRect;
 use bevy::{
     asset::{AssetServer, LoadState},
@@ -27,6 +28,8 @@ pub(crate) struct BasePicture {
     pub(crate) normal: Option<Vec<u8>>,
     /// R8; `None` = 0.
     pub(crate) depth: Option<Vec<u8>>,
+    /// How the mesh is laid out in it, if it is.
+    unfolding: Option<Arc<Unfolding>>,
 }
 
 /// Alpha below this is a hole: hits are refused and no crack goes there.
@@ -35,12 +38,30 @@ const OPAQUE: u8 = 8;
 impl BasePicture {
     pub(crate) fn new(size: UVec2, diffuse: Vec<u8>, normal: Option<Vec<u8>>, depth: Option<Vec<u8>>) -> Self {
         let has_holes = diffuse.as_chunks::<4>().0.iter().any(|texel| texel[3] < OPAQUE);
-        Self { size, has_holes, is_nearest: false, diffuse, normal, depth }
+        Self { size, has_holes, is_nearest: false, diffuse, normal, depth, unfolding: None }
+    }
+
+    /// The same with a mesh laid out in it: there are no cracks where it is not.
+    pub(crate) fn with_unfolding(self, unfolding: Option<Arc<Unfolding>>) -> Self {
+        Self { has_holes: self.has_holes || unfolding.is_some(), unfolding, ..self }
+    }
+
+    /// Texels for a unit of pattern space, if not as many as the shorter side has.
+    pub(crate) fn unit(&self) -> Option<f32> {
+        self.unfolding.as_ref().map(|unfolding| unfolding.unit)
+    }
+
+    /// Whether there is something beside what cracks, whatever is transparent.
+    pub(crate) const fn has_gaps(&self) -> bool {
+        self.unfolding.is_some()
     }
 
     /// Whether the texel is a hole.
     pub(crate) fn is_hole(&self, texel: UVec2) -> bool {
         let texel = texel.min(self.size.saturating_sub(UVec2::ONE));
+        if self.unfolding.as_ref().is_some_and(|unfolding| unfolding.is_gap(texel)) {
+            return true;
+        }
         let i = (texel.y as usize * self.size.x as usize + texel.x as usize) * 4 + 3;
         self.diffuse.get(i).is_some_and(|alpha| *alpha < OPAQUE)
     }
@@ -73,6 +94,8 @@ pub(crate) struct BaseKey {
     pub(crate) size: UVec2,
     pub(crate) layout: Option<Layout>,
     pub(crate) is_twofold: bool,
+    /// The id of the layout of the mesh.
+    pub(crate) unfolding: Option<u64>,
 }
 
 impl BasePictures {
@@ -277,6 +300,26 @@ pub(crate) fn read_shown(
     Ok(texels)
 }
 
+/// The texels of a picture where a mesh shows them that is laid out, RGBA8 in `space`.
+pub(crate) fn read_unfolded(
+    image: &Image,
+    space: Space,
+    unfolding: &Unfolding,
+    is_nearest: bool,
+) -> Result<Vec<u8>, CrackError> {
+    let own_size = readable_size(image)?;
+    let texels = read(image, space, own_size)?;
+    let place = |x, y| {
+        let place = unfolding.place(UVec2::new(x, y), own_size);
+        if is_nearest { place.floor() + 0.5 } else { place }
+    };
+    let mut texels = Sampling::of(image, space).sample(&texels, own_size, unfolding.layout.size, place);
+    if space == Space::Srgb && image.texture_descriptor.format.components() == 1 {
+        texels.as_chunks_mut::<4>().0.iter_mut().for_each(|texel| (texel[1], texel[2]) = (0, 0));
+    }
+    Ok(texels)
+}
+
 /// The red channel alone.
 pub(crate) fn red(rgba: &[u8]) -> Vec<u8> {
     rgba.iter().step_by(4).copied().collect()
@@ -399,7 +442,8 @@ mod tests {
         let mut bases = BasePictures::default();
         let id = AssetId::from(bevy::asset::uuid::Uuid::from_u128(7));
         let pictures = [None, Some(id), None];
-        let key = |side| BaseKey { pictures, size: UVec2::splat(side), layout: None, is_twofold: false };
+        let key =
+            |side| BaseKey { pictures, size: UVec2::splat(side), layout: None, is_twofold: false, unfolding: None };
         let white = |side: u32| BasePicture::new(UVec2::splat(side), vec![255; 4 * (side * side) as usize], None, None);
         let unread = || -> Result<BasePicture, CrackError> { panic!("it is in use") };
         assert_eq!(bases.get(key(1), || Err(CrackError::NoCpuData)), Err(CrackError::NoCpuData));

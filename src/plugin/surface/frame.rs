@@ -4,12 +4,17 @@ use crate::CrackPreset;
 use crate::paint::{LookTable, Shades};
 use crate::pattern::SurfaceFrame;
 use crate::plugin::api::error::CrackError;
+use crate::plugin::source::picture::BasePicture;
 use crate::raster::{Profile, TexelRect};
 use std::borrow::Cow;
 
-/// Where the cracks of a surface lie that shows `rect`.
-pub(crate) fn frame(rect: TexelRect) -> Result<SurfaceFrame, CrackError> {
-    SurfaceFrame::new(rect.size()).map_err(|error| CrackError::Size { width: error.width, height: error.height })
+/// Where the cracks of a surface lie that shows `rect` of a picture.
+pub(crate) fn frame(rect: TexelRect, base: &BasePicture) -> Result<SurfaceFrame, CrackError> {
+    let frame = match base.unit() {
+        None => SurfaceFrame::new(rect.size()),
+        Some(unit) => SurfaceFrame::with_unit(rect.size(), unit),
+    };
+    frame.map_err(|error| CrackError::Size { width: error.width, height: error.height })
 }
 
 /// The look of a surface, ready to paint with. Where texels are shown as squares it has few shades, unless the preset says how many.

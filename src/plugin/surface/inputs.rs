@@ -95,11 +95,11 @@ impl BlankSurface {
         BaseAndMask { base, mask }: &BaseAndMask,
         rect: TexelRect,
     ) -> Result<Self, CrackError> {
-        let frame = frame(rect)?;
+        let frame = frame(rect, base)?;
         let look = look(preset, frame, base.is_nearest)?;
         let mut growth = CrackGrowth::new(preset.growth.clone(), frame.extent(), surface.seed)
             .map_err(|error| CrackError::Preset { reason: error.to_string() })?;
-        if surface.alpha_mask {
+        if surface.alpha_mask || base.has_gaps() {
             growth.set_density(base.density(rect));
         }
         growth.set_mask(mask.clone());

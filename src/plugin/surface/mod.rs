@@ -28,4 +28,5 @@ pub(crate) mod stamp;
 pub(crate) mod stamp_network;
 pub(crate) mod tile_set;
 pub(crate) mod time;
+pub(crate) mod unfold;
 pub(crate) mod warm;

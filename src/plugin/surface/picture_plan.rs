@@ -7,6 +7,7 @@ use crate::plugin::gpu::memory::TextureMemory;
 use crate::plugin::source::layout::{Layout, MOST_TEXELS};
 use crate::plugin::source::mask::{MaskKey, PicturePart};
 use crate::plugin::source::picture::{self, BaseKey, BasePicture, BasePictures, Space};
+use crate::plugin::source::unfolding::Unfolding;
 use crate::raster::TexelRect;
 use bevy::{image::ImageSampler, prelude::*, render::renderer::RenderDevice};
 use std::sync::Arc;
@@ -41,6 +42,8 @@ pub(crate) struct PicturePlan {
     is_nearest: bool,
     /// Whether the textures hold the picture twice, one above the other.
     pub(crate) is_twofold: bool,
+    /// How the mesh is laid out in them, if it is.
+    pub(crate) unfolding: Option<Arc<Unfolding>>,
 }
 
 impl PicturePlan {
@@ -53,13 +56,15 @@ impl PicturePlan {
     pub(super) fn key(&self, shown: &Shown) -> BaseKey {
         let pictures = self.needed(shown).map(|map| map.map(Handle::id));
         let layout = self.layout.as_deref().copied();
-        BaseKey { pictures, size: self.size, layout, is_twofold: self.is_twofold }
+        let unfolding = self.unfolding.as_ref().map(|unfolding| unfolding.id);
+        BaseKey { pictures, size: self.size, layout, is_twofold: self.is_twofold, unfolding }
     }
 
     /// What the mask is made from that `part` of the picture makes.
     pub(super) fn mask_key(&self, picture: &Handle<Image>, part: PicturePart) -> MaskKey {
         let (picture, layout) = (picture.id(), self.layout.as_deref().copied());
-        MaskKey { picture, size: self.size, rect: self.rect, part, layout }
+        let unfolding = self.unfolding.as_ref().map(|unfolding| unfolding.id);
+        MaskKey { picture, size: self.size, rect: self.rect, part, layout, unfolding }
     }
 
     /// Reads the pictures, unless somebody else has.
@@ -74,6 +79,9 @@ impl PicturePlan {
 
     /// The pictures, read.
     pub(super) fn read(&self, [diffuse, normal, depth]: [Option<&Image>; 3]) -> Result<BasePicture, CrackError> {
+        if let Some(unfolding) = &self.unfolding {
+            return self.read_unfolded(unfolding, [diffuse, normal, depth]);
+        }
         let size = if self.is_twofold { self.size / UVec2::new(1, 2) } else { self.size };
         let n = size.x as usize * size.y as usize;
         let read = |image: Option<&Image>| image.map(|image| picture::read(image, Space::Linear, size)).transpose();
@@ -85,6 +93,26 @@ impl PicturePlan {
         let depth = if self.maps.depth { read(depth)?.map(|rgba| picture::red(&rgba)) } else { None };
         let all = |texels: Vec<u8>| if self.is_twofold { texels.repeat(2) } else { texels };
         let mut picture = BasePicture::new(self.size, all(diffuse), normal.map(all), depth.map(all));
+        picture.is_nearest = self.is_nearest;
+        Ok(picture)
+    }
+
+    fn read_unfolded(
+        &self,
+        unfolding: &Arc<Unfolding>,
+        [diffuse, normal, depth]: [Option<&Image>; 3],
+    ) -> Result<BasePicture, CrackError> {
+        let read = |image: Option<&Image>, space| {
+            image.map(|image| picture::read_unfolded(image, space, unfolding, self.is_nearest)).transpose()
+        };
+        let diffuse =
+            read(diffuse, Space::Srgb)?.unwrap_or_else(|| vec![255; self.size.as_usizevec2().element_product() * 4]);
+        let mut normal = if self.maps.normal { read(normal, Space::Linear)? } else { None };
+        if let Some(normal) = &mut normal {
+            unfolding.turn_normals(normal);
+        }
+        let depth = if self.maps.depth { read(depth, Space::Linear)?.map(|rgba| picture::red(&rgba)) } else { None };
+        let mut picture = BasePicture::new(self.size, diffuse, normal, depth).with_unfolding(Some(unfolding.clone()));
         picture.is_nearest = self.is_nearest;
         Ok(picture)
     }
@@ -105,6 +133,8 @@ pub(crate) struct Stretch<'a> {
     pub(crate) kept: Option<(UVec2, UVec2)>,
     /// Whether the textures hold it twice, one above the other.
     pub(crate) is_twofold: bool,
+    /// How the mesh is laid out in them, if it is.
+    pub(crate) unfolding: Option<Arc<Unfolding>>,
 }
 
 /// Plans the pictures of a surface of which these maps are wanted; `None` if they are not there yet. Beside depths, a field takes `layer` bytes a texel; `owned` bytes of the
@@ -126,6 +156,30 @@ pub(super) fn plan_pictures(
     let maps = wanted.and(shown.maps);
     let image = shown.diffuse.as_ref().and_then(|picture| images.get(picture));
     let is_nearest = image.is_some_and(|image| picture::is_nearest(world, image));
+    let sampler = image.map_or(ImageSampler::Default, |image| image.sampler.clone());
+    if let Some(unfolding) = &stretch.unfolding {
+        let size = unfolding.layout.size;
+        let bytes = bytes(size, (maps, layer));
+        let used = world.resource::<TextureMemory>().used().saturating_sub(owned);
+        let left = world.resource::<CrackBudget>().max_texture_bytes.saturating_sub(used);
+        if bytes > left {
+            return Err(CrackError::TextureBudget { needed: bytes, left });
+        }
+        let (rect, unfolding) = (TexelRect::whole(size), Some(unfolding.clone()));
+        let plan = PicturePlan {
+            size,
+            rect,
+            bytes,
+            sampler,
+            maps,
+            unstretched: None,
+            layout: None,
+            is_nearest,
+            is_twofold: false,
+            unfolding,
+        };
+        return Ok(Some(plan));
+    }
     let (size, unstretched) = size(world, surface, shown, image, stretch, is_nearest, (maps, layer), owned)?;
     let is_twofold = stretch.is_twofold && shown.rect.is_none();
     let rect = shown.texels(size).ok_or_else(|| {
@@ -133,17 +187,31 @@ pub(super) fn plan_pictures(
         CrackError::Part { min, max, size }
     })?;
     let size = if is_twofold { size * UVec2::new(1, 2) } else { size };
-    let sampler = image.map_or(ImageSampler::Default, |image| image.sampler.clone());
     let (bytes, layout) = (bytes(size, (maps, layer)), shown.layout.clone());
-    Ok(Some(PicturePlan { size, rect, bytes, sampler, maps, unstretched, layout, is_nearest, is_twofold }))
+    Ok(Some(PicturePlan {
+        size,
+        rect,
+        bytes,
+        sampler,
+        maps,
+        unstretched,
+        layout,
+        is_nearest,
+        is_twofold,
+        unfolding: None,
+    }))
 }
 
 /// Bytes of the textures on the CPU and the GPU, the base picture, as if no other surface had the same, and the depth field with what it
 /// may hold beside depths.
 fn bytes(size: UVec2, (maps, layer): (Maps, u64)) -> u64 {
+    u64::from(size.x) * u64::from(size.y) * texel_bytes(maps, layer)
+}
+
+/// The same of one texel.
+pub(super) fn texel_bytes(maps: Maps, layer: u64) -> u64 {
     let whole = [maps.diffuse, maps.normal, maps.emissive].map(u64::from).iter().sum::<u64>();
-    let texel = 4 + 2 + layer + 8 * whole + 2 * u64::from(maps.depth);
-    u64::from(size.x) * u64::from(size.y) * texel
+    4 + 2 + layer + 8 * whole + 2 * u64::from(maps.depth)
 }
 
 /// Size of the textures: what is asked for, made smaller until it fits device and budget; and what it would be if the picture were not

@@ -66,7 +66,8 @@ impl Plan {
         };
         let aspect = |picture| kind.aspect(world, entity, picture, None);
         let is_twofold = kind.is_twofold(world, entity);
-        let stretch = Stretch { aspect: &aspect, kept: None, is_twofold };
+        let unfolding = kind.unfolding(world, entity);
+        let stretch = Stretch { aspect: &aspect, kept: None, is_twofold, unfolding };
         let layer = preset.look.layer(0).bytes_per_texel();
         let wanted = Maps::wanted(surface.write, &preset.look);
         let pictures = plan_pictures(world, (&surface, wanted), &shown, &stretch, layer, 0)?;
@@ -185,8 +186,8 @@ impl Plan {
                 world.resource_mut::<PictureMasks>().remember(pictures.mask_key(picture, part), &mask);
             }
         }
-        let PicturePlan { bytes, rect, unstretched, is_twofold, .. } = pictures;
-        let carrier = Carrier { is_twofold, ..Carrier::new(kind, shown) };
+        let PicturePlan { bytes, rect, unstretched, is_twofold, unfolding, .. } = pictures;
+        let carrier = Carrier { is_twofold, unfolding, ..Carrier::new(kind, shown) };
         let bytes = world.resource::<TextureMemory>().count(bytes);
         SurfaceParts { surface, preset, look, base, textures, carrier, bytes, rect, unstretched, read_at }
     }

@@ -6,6 +6,7 @@ use super::create::{install, make_now, report_failure};
 use super::inputs::{BaseAndMask, BlankSurface, Copies, SurfaceInputs};
 use super::plan::Plan;
 use super::queues::Queues;
+use super::unfold::unfold;
 use super::warm;
 use crate::CrackPreset;
 use crate::plugin::api::textures::MAPS;
@@ -206,6 +207,9 @@ fn ready(world: &mut World, entity: Entity, is_wanted: bool) -> Result<bool, Cra
     if !warm::can_crack(world, entity) {
         return Ok(false);
     }
+    if !unfold(world, entity) {
+        return Ok(false);
+    }
     let preparations = world.resource::<Preparations>();
     // One of many comes when it is its turn: the others take some time of the frames already.
     let (is_late, is_one_of_many) = (preparations.has_changed_often(entity), preparations.has_small());
@@ -226,7 +230,7 @@ pub(crate) fn make_beside(world: &mut World, entity: Entity) -> Result<bool, Cra
     let preparations = world.resource::<Preparations>();
     let is_known = preparations.is_making(entity) || preparations.has_changed_often(entity);
     let Some(threads) = threads(world).filter(|_| !is_known) else { return Ok(false) };
-    if has_cracked(world, entity) || !warm::can_crack(world, entity) {
+    if has_cracked(world, entity) || !warm::can_crack(world, entity) || !unfold(world, entity) {
         return Ok(false);
     }
     match Plan::new(world, entity)? {

@@ -95,7 +95,12 @@ pub(crate) fn draft(
     let aspect = |picture| kind.aspect(world, entity, picture, active.carrier.size);
     let same = active.canvas.unstretched.filter(|_| other.is_none());
     let kept = same.map(|unstretched| (unstretched, active.carrier.whole(active.canvas.base.size).size()));
-    let stretch = Stretch { aspect: &aspect, kept, is_twofold: kind.is_twofold(world, entity) };
+    let stretch = Stretch {
+        aspect: &aspect,
+        kept,
+        is_twofold: kind.is_twofold(world, entity),
+        unfolding: kind.unfolding(world, entity),
+    };
     let layer = active.preset.look.layer(0).bytes_per_texel();
     let emissive = active.canvas.textures.emissive.is_some();
     let wanted = Maps { emissive, ..Maps::wanted(active.surface.write, &active.preset.look) };

@@ -232,7 +232,8 @@ impl Active {
     pub(crate) fn record(&self) -> Option<CrackRecord> {
         let past = self.cracks.growth.past()?;
         let time = self.playhead.playback.as_ref().map_or(self.end() + self.playhead.due, |playback| playback.want);
-        Some(CrackRecord { version: CrackRecord::VERSION, seed: self.surface.seed, past, time })
+        let around = self.carrier.unfolding.as_ref().map(|unfolding| unfolding.around);
+        Some(CrackRecord { version: CrackRecord::VERSION, seed: self.surface.seed, past, time, around })
     }
 
     /// Goes on where `record` ends, on cracks that were grown from it and show the picture of those that were removed.

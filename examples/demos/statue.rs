@@ -1,0 +1,178 @@
+//! A stone pedestal with a clay jar on it, and a ball of plaster beside it, to shoot at: cracks run over the edges of the box and around the
+//! curves of the others.
+//!
+//! Click to shoot; H heals everything. The camera goes around them.
+//!
+//! Without a display (or with `--headless`) a script plays, and pictures and a GIF are written to `--out`.
+//! Try `--frames 120 --out film`.
+
+use bevy::{
+    asset::RenderAssetUsages,
+    camera::Hdr,
+    core_pipeline::tonemapping::Tonemapping,
+    math::ops,
+    mesh::{Indices, PrimitiveTopology},
+    prelude::*,
+};
+use bevy_crack::prelude::*;
+use bevy_crack_demos::{DemoArguments, Script, demo_app, heal_on_h, hit_on_press, play, with_normals};
+use std::f32::consts::TAU;
+
+/// Height of the pedestal, metres.
+const PEDESTAL: f32 = 1.1;
+
+/// Outline of the jar from its foot to its mouth: radius and height, metres.
+const JAR: [Vec2; 12] = [
+    Vec2::new(0.0, 0.0),
+    Vec2::new(0.2, 0.0),
+    Vec2::new(0.23, 0.03),
+    Vec2::new(0.2, 0.07),
+    Vec2::new(0.36, 0.3),
+    Vec2::new(0.45, 0.56),
+    Vec2::new(0.43, 0.76),
+    Vec2::new(0.3, 0.94),
+    Vec2::new(0.17, 1.04),
+    Vec2::new(0.17, 1.14),
+    Vec2::new(0.25, 1.22),
+    Vec2::new(0.22, 1.24),
+];
+
+/// Corners around the jar.
+const AROUND: u32 = 96;
+
+/// Shots of the scripted run: at which of the three, the direction from its middle, height above that, energy.
+const SHOTS: [(usize, f32, f32, f32); 7] = [
+    (0, 0.62, 0.25, 2.0),
+    (1, 0.5, 0.05, 2.5),
+    (2, 0.4, 0.1, 2.0),
+    (0, 0.15, -0.15, 1.5),
+    (1, -0.4, 0.25, 1.5),
+    (2, 1.3, -0.1, 1.5),
+    (0, 0.95, -0.3, 1.0),
+];
+
+#[derive(Component)]
+struct Target(usize);
+
+fn main() -> AppExit {
+    let arguments = DemoArguments::given("A pedestal, a jar and a ball whose cracks run all around them");
+    let mut app = demo_app("bevy_crack: statue", &arguments);
+    app.add_systems(Startup, setup).add_systems(Update, go_around);
+    play(app, heal_on_h, play_script)
+}
+
+fn setup(
+    mut commands: Commands,
+    assets: Res<AssetServer>,
+    mut meshes: ResMut<Assets<Mesh>>,
+    mut materials: ResMut<Assets<StandardMaterial>>,
+) {
+    commands.spawn((
+        Camera3d::default(),
+        Hdr,
+        // Needs no lookup table.
+        Tonemapping::AcesFitted,
+        AmbientLight { brightness: 420.0, color: Color::srgb(0.85, 0.9, 1.0), ..default() },
+        Transform::default(),
+    ));
+    commands.spawn((
+        DirectionalLight { illuminance: 7_000.0, color: Color::srgb(1.0, 0.95, 0.86), ..default() },
+        Transform::from_xyz(-2.0, 2.6, 2.4).looking_at(Vec3::ZERO, Vec3::Y),
+    ));
+    let (picture, normals) = with_normals(&assets, "concrete_fine");
+    let stone = materials.add(StandardMaterial {
+        base_color_texture: Some(picture),
+        normal_map_texture: Some(normals),
+        perceptual_roughness: 0.9,
+        ..default()
+    });
+    let plain = |color: Color, roughness: f32| StandardMaterial {
+        base_color: color,
+        perceptual_roughness: roughness,
+        ..default()
+    };
+    let floor = materials.add(plain(Color::srgb(0.36, 0.34, 0.33), 0.95));
+    let clay = materials.add(plain(Color::srgb(0.72, 0.42, 0.28), 0.6));
+    let plaster = materials.add(plain(Color::srgb(0.86, 0.84, 0.8), 0.85));
+    commands.spawn((Mesh3d(meshes.add(Plane3d::new(Vec3::Y, Vec2::splat(8.0)))), MeshMaterial3d(floor)));
+    // It has a picture of its own, which is laid out with it.
+    let pedestal = CrackSurface::new(CrackPreset::CONCRETE).with_unwrap(CrackUnwrap::Always);
+    let jar = CrackSurface::new(CrackPreset::CLAY).with_seed(1);
+    let ball = CrackSurface::new(CrackPreset::PLASTER).with_seed(2);
+    let turned = Quat::from_rotation_y(0.5);
+    let targets = [
+        (
+            Mesh::from(Cuboid::new(1.0, PEDESTAL, 1.0)),
+            stone,
+            Transform::from_xyz(-0.3, 0.5 * PEDESTAL, 0.0).with_rotation(turned),
+            pedestal,
+        ),
+        (turned_on_a_lathe(&JAR, AROUND), clay, Transform::from_xyz(-0.3, PEDESTAL, 0.0), jar),
+        (Sphere::new(0.42).mesh().uv(96, 64), plaster, Transform::from_xyz(0.85, 0.42, 0.35), ball),
+    ];
+    for (i, (mesh, material, place, surface)) in targets.into_iter().enumerate() {
+        commands
+            .spawn((Target(i), Mesh3d(meshes.add(mesh)), MeshMaterial3d(material), place, surface))
+            .observe(hit_on_press);
+    }
+}
+
+/// The mesh that an outline makes when it turns around the y axis.
+fn turned_on_a_lathe(outline: &[Vec2], around: u32) -> Mesh {
+    const BETWEEN: u32 = 5;
+    let last = outline.len() - 1;
+    // A curve through all points (Catmull and Rom 1974).
+    let point = |i: u32| {
+        let (at, share) = ((i / BETWEEN) as usize, (i % BETWEEN) as f32 / BETWEEN as f32);
+        let [a, b, c, d] = [at.saturating_sub(1), at, at + 1, at + 2].map(|i| outline[i.min(last)]);
+        let (linear, square, cube) = (c - a, 2.0 * a - 5.0 * b + 4.0 * c - d, 3.0 * (b - c) + d - a);
+        b + 0.5 * share * (linear + share * (square + share * cube))
+    };
+    let rows = BETWEEN * last as u32 + 1;
+    let (mut positions, mut uvs, mut indices) = (Vec::new(), Vec::new(), Vec::new());
+    for row in 0..rows {
+        let Vec2 { x: radius, y: height } = point(row).max(Vec2::ZERO);
+        for i in 0..=around {
+            let (sin, cos) = ops::sin_cos(TAU * i as f32 / around as f32);
+            positions.push([radius * cos, height, -radius * sin]);
+            uvs.push([i as f32 / around as f32, 1.0 - row as f32 / (rows - 1) as f32]);
+        }
+    }
+    for (row, i) in (0..rows - 1).flat_map(|row| (0..around).map(move |i| (row, i))) {
+        let (a, b) = (row * (around + 1) + i, (row + 1) * (around + 1) + i);
+        indices.extend([a, a + 1, b + 1, a, b + 1, b]);
+    }
+    Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::default())
+        .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, positions)
+        .with_inserted_attribute(Mesh::ATTRIBUTE_UV_0, uvs)
+        .with_inserted_indices(Indices::U32(indices))
+        .with_computed_smooth_normals()
+}
+
+fn go_around(time: Res<Time>, mut camera: Query<&mut Transform, With<Camera3d>>) {
+    for mut transform in &mut camera {
+        let angle = 0.55 + 0.45 * ops::sin(0.5 * time.elapsed_secs());
+        let eye = Vec3::new(3.3 * ops::sin(angle), 1.9, 3.3 * ops::cos(angle));
+        *transform = Transform::from_translation(eye).looking_at(Vec3::new(0.1, 1.0, 0.0), Vec3::Y);
+    }
+}
+
+/// The scripted run: shots at all of them in turn.
+fn play_script(mut commands: Commands, script: Script, targets: Query<(Entity, &Target, &GlobalTransform)>) {
+    for i in script.due(SHOTS.len() as u32, 0.05..0.75) {
+        let (which, angle, height, energy) = SHOTS[i as usize];
+        let Some((entity, _, at)) = targets.iter().find(|(_, target, _)| target.0 == which) else { continue };
+        let middle = at.translation() + Vec3::Y * (height + if which == 1 { 0.6 } else { 0.0 });
+        // On the box, which is turned: its face is 0.5 away from the middle.
+        let out = Vec3::new(ops::sin(angle), 0.0, ops::cos(angle));
+        let away = match which {
+            0 => {
+                let own = at.rotation().inverse() * out;
+                0.5 / own.x.abs().max(own.z.abs())
+            }
+            1 => 0.44,
+            _ => 0.42,
+        };
+        commands.trigger(CrackHit::world(entity, middle + away * out).with_energy(energy));
+    }
+}

@@ -1,0 +1,278 @@
+//! 3D meshes that are laid out flat around their first hit, so that cracks run over their edges.
+
+use super::faces::Faces;
+use super::kind::{Carrier, UnfoldOrder};
+use super::mesh::{Triangles, is_flat, place_of};
+use super::slot::{CrackMaterial, MaterialSlot, to_picture};
+use crate::plugin::api::hit::HitPoint;
+use crate::plugin::jobs::background::{BackgroundJob, PATIENCE, guarded};
+use crate::plugin::source::unfolding::Unfolding;
+use crate::unwrap::{MAX_TRIANGLES, MeshShape, Unwrap, UnwrapError};
+use bevy::{math::Affine2, platform::time::Instant, prelude::*};
+use std::sync::Arc;
+
+/// Texels for a unit of pattern space where there is no picture.
+const WITHOUT_PICTURE: f32 = 256.0;
+
+/// A mesh with more triangles is looked at by the task only.
+const FEW: usize = 1024;
+
+/// How much of its texels a unit of length keeps at each try to make a layout fit.
+const SMALLER: f32 = 0.8;
+
+/// Beside a surface whose mesh is laid out, or is not to be.
+#[derive(Component)]
+#[component(clone_behavior = Ignore)]
+struct Unfold {
+    /// The mesh as it was.
+    before: Handle<Mesh>,
+    stage: Stage,
+}
+
+enum Stage {
+    Working(BackgroundJob<Box<Work>, Option<Made>>, Instant),
+    /// It stays as it is.
+    Refused,
+    Made(Box<Mesh>, Arc<Unfolding>),
+    /// The entity shows this mesh.
+    Shown(Handle<Mesh>, Arc<Unfolding>),
+}
+
+type Made = (Box<Mesh>, Arc<Unfolding>);
+
+/// What a task lays out.
+struct Work {
+    mesh: Mesh,
+    to_picture: Affine2,
+    scale: Vec3,
+    /// Where it is hit, in the mesh's space.
+    hit: Option<Vec3>,
+    picture: Option<UVec2>,
+    order: UnfoldOrder,
+}
+
+/// The layout of the mesh that an entity shows, or is to show.
+pub(super) fn unfolding(world: &World, entity: Entity) -> Option<Arc<Unfolding>> {
+    let (unfold, mesh) = (world.get::<Unfold>(entity)?, &world.get::<Mesh3d>(entity)?.0);
+    match &unfold.stage {
+        Stage::Made(_, made) if *mesh == unfold.before => Some(made.clone()),
+        Stage::Shown(own, made) if mesh == own => Some(made.clone()),
+        _ => None,
+    }
+}
+
+/// Has the mesh of an entity laid out, if that is of use; `false` if that is under way.
+pub(super) fn prepare<S: MaterialSlot>(world: &mut World, entity: Entity, order: &UnfoldOrder) -> bool {
+    if !S::Material::MAPS.depth {
+        return true;
+    }
+    let Some(mesh) = world.get::<Mesh3d>(entity).map(|mesh| mesh.0.clone()) else { return true };
+    if let Some(mut unfold) = world.get_mut::<Unfold>(entity) {
+        let is_same = unfold.before == mesh || matches!(&unfold.stage, Stage::Shown(own, _) if *own == mesh);
+        if is_same {
+            return unfold.poll();
+        }
+    }
+    let Some(work) = work::<S>(world, entity, &mesh, order) else {
+        forget(world, entity);
+        return true;
+    };
+    let mut stage = Stage::Working(BackgroundJob::start(Box::new(work), |work| work.make()), Instant::now());
+    if order.at_once
+        && let Stage::Working(job, _) = stage
+    {
+        stage = Stage::of(job.finish().flatten());
+    }
+    let is_ready = !matches!(stage, Stage::Working(..));
+    if let Ok(mut entity) = world.get_entity_mut(entity) {
+        entity.insert(Unfold { before: mesh, stage });
+    }
+    is_ready
+}
+
+impl Stage {
+    fn of(made: Option<Made>) -> Self {
+        made.map_or(Self::Refused, |(mesh, unfolding)| Self::Made(mesh, unfolding))
+    }
+}
+
+impl Unfold {
+    /// Whether it is done.
+    fn poll(&mut self) -> bool {
+        let Stage::Working(job, since) = &mut self.stage else { return true };
+        let Some(made) = job.take_if_done(since.elapsed() >= PATIENCE) else { return false };
+        self.stage = Stage::of(made);
+        true
+    }
+}
+
+/// What is to be laid out; `None` if the mesh is better left as it is: it is flat, a slab, or has too many triangles.
+fn work<S: MaterialSlot>(world: &World, entity: Entity, mesh: &Handle<Mesh>, order: &UnfoldOrder) -> Option<Work> {
+    let mesh = world.get_resource::<Assets<Mesh>>()?.get(mesh)?;
+    let triangles = Triangles::of(mesh).ok()?;
+    let ([a, b, c], _) = triangles.get(0)?;
+    if triangles.len() > MAX_TRIANGLES || is_flat(mesh, a, (b - a).cross(c - a).normalize_or_zero()) {
+        return None;
+    }
+    let material = world.get::<S>(entity)?.material();
+    let diffuse = world.get_resource::<Assets<S::Material>>()?.get(material)?.pictures()[0].clone();
+    let images = world.get_resource::<Assets<Image>>();
+    let picture = diffuse.and_then(|picture| images?.get(&picture).map(Image::size));
+    let axes = world.get::<GlobalTransform>(entity).copied().unwrap_or_default().affine().matrix3;
+    let scale = Vec3::new(axes.x_axis.length(), axes.y_axis.length(), axes.z_axis.length());
+    let to_picture = to_picture::<S>(world, entity).ok()?;
+    if triangles.len() <= FEW && is_slab(mesh, to_picture, scale) {
+        return None;
+    }
+    let hit = match order.hit {
+        Some((HitPoint::Local(point), _)) => Some(point),
+        Some((_, Some(point))) => Some(point),
+        Some((HitPoint::Uv(uv), None)) => {
+            place_of(mesh, to_picture.inverse().transform_point2(uv)).map(|place| place.0)
+        }
+        _ => None,
+    };
+    Some(Work { mesh: mesh.clone(), to_picture, scale, hit, picture, order: *order })
+}
+
+fn is_slab(mesh: &Mesh, to_picture: Affine2, scale: Vec3) -> bool {
+    Faces::of(mesh, to_picture, scale).is_some_and(|faces| faces.slab().is_some())
+}
+
+impl Work {
+    /// A panic is none.
+    fn make(self) -> Option<Made> {
+        guarded(|| Ok(self.lay_out())).ok().flatten()
+    }
+
+    fn lay_out(mut self) -> Option<Made> {
+        let triangles = Triangles::of(&self.mesh).ok()?;
+        if triangles.len() > FEW && is_slab(&self.mesh, self.to_picture, self.scale) {
+            return None;
+        }
+        let corners: Vec<[u32; 3]> = (0..triangles.len())
+            .map(|i| Some(triangles.corners(i)?.map(|vertex| vertex as u32)))
+            .collect::<Option<_>>()?;
+        let positions: Vec<Vec3> = triangles.positions().map(|at| at * self.scale).collect();
+        let shape = MeshShape::new(&positions, &corners).ok()?;
+        if shape.faces() == 1 {
+            return None;
+        }
+        let uvs = |i: usize| triangles.get(i).map(|(_, uvs)| uvs.map(|uv| self.to_picture.transform_point2(uv)));
+        let around = self.hit.map(|hit| hit * self.scale);
+        let triangle = nearest(&shape, &positions, &corners, around)?;
+        let [a, b, c] = corners[triangle].map(|vertex| positions[vertex as usize]);
+        let around = around.unwrap_or((a + b + c) / 3.0);
+        // To the right in the picture where it is hit.
+        let right = uvs(triangle).map_or(Vec3::ZERO, |[p, q, r]| (b - a) * (r - p).y - (c - a) * (q - p).y)
+            * uvs(triangle).map_or(1.0, |[p, q, r]| (q - p).perp_dot(r - p).signum());
+        let unit = (shape.area() / 6.0).sqrt();
+        let wanted = self.density(&shape, &uvs).unwrap_or(WITHOUT_PICTURE / unit);
+        let largest = self.order.most_texels.min(f64::MAX) as f32;
+        let mut density = wanted;
+        // Charts fill about two thirds of what is around them.
+        let fits = (largest / (1.5 * shape.area())).sqrt();
+        if self.order.must && density > fits {
+            density = fits;
+        }
+        let layout = loop {
+            let unwrap = Unwrap { around, triangle, right, texels: density, largest: self.order.most_side };
+            let laid_out = match unwrap.apply(&shape) {
+                Ok(laid_out) if laid_out.size.as_vec2().element_product() <= largest => break laid_out,
+                Ok(_) | Err(UnwrapError::TooLarge { .. }) => None::<()>,
+                Err(_) => return None,
+            };
+            if laid_out.is_none() && (!self.order.must || density * unit < 8.0) {
+                return None;
+            }
+            density *= SMALLER;
+        };
+        let unfolding = Arc::new(Unfolding::new(self.order.id, layout, density * unit, around / self.scale, uvs));
+        let size = unfolding.layout.size.as_vec2();
+        let uvs: Vec<[f32; 2]> = unfolding
+            .layout
+            .corners
+            .iter()
+            .flat_map(|corners| corners.unwrap_or_default().map(|corner| (corner / size).to_array()))
+            .collect();
+        let _tangents = self.mesh.try_remove_attribute(Mesh::ATTRIBUTE_TANGENT);
+        self.mesh.try_duplicate_vertices().ok()?;
+        self.mesh.try_insert_attribute(Mesh::ATTRIBUTE_UV_0, uvs).ok()?;
+        Some((Box::new(self.mesh.with_generated_tangents().ok()?), unfolding))
+    }
+
+    /// Texels for a unit of length: as many as its picture has.
+    fn density(&self, shape: &MeshShape, uvs: &dyn Fn(usize) -> Option<[Vec2; 3]>) -> Option<f32> {
+        let picture = self.picture?.as_vec2().element_product();
+        let area = |i| uvs(i).map_or(0.0, |[p, q, r]| 0.5 * (q - p).perp_dot(r - p).abs());
+        let texels = (0..shape.len()).filter(|i| shape.has_area(*i)).map(area).sum::<f32>() * picture;
+        Some((texels / shape.area()).sqrt()).filter(|density| density.is_normal())
+    }
+}
+
+/// The triangle of a point, or the largest one.
+fn nearest(shape: &MeshShape, positions: &[Vec3], corners: &[[u32; 3]], point: Option<Vec3>) -> Option<usize> {
+    let with_area = (0..shape.len()).filter(|i| shape.has_area(*i));
+    let of = |i: usize| corners[i].map(|vertex| positions[vertex as usize]);
+    let Some(point) = point else {
+        let area = |i: &usize| {
+            let [a, b, c] = of(*i);
+            (b - a).cross(c - a).length()
+        };
+        return with_area.max_by(|a, b| area(a).total_cmp(&area(b)).then(b.cmp(a)));
+    };
+    let distance = |i: &usize| {
+        let [a, b, c] = of(*i);
+        super::mesh::nearest_on(point, [a, b, c]).distance_squared(point)
+    };
+    with_area.map(|i| (distance(&i), i)).min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, i)| i)
+}
+
+/// Gives an entity the mesh that is laid out, if its textures are.
+pub(super) fn show(world: &mut World, entity: Entity, carrier: &mut Carrier) {
+    if carrier.unfolding.is_none() {
+        forget(world, entity);
+        return;
+    }
+    let Some(mut unfold) = world.get_mut::<Unfold>(entity) else { return };
+    let before = unfold.before.clone();
+    let (mesh, unfolding) = match core::mem::replace(&mut unfold.stage, Stage::Refused) {
+        Stage::Made(mesh, unfolding) => (mesh, unfolding),
+        other => {
+            unfold.stage = other;
+            return;
+        }
+    };
+    let Some(mut meshes) = world.get_resource_mut::<Assets<Mesh>>() else { return };
+    let own = meshes.add(*mesh);
+    if let Some(mut unfold) = world.get_mut::<Unfold>(entity) {
+        unfold.stage = Stage::Shown(own.clone(), unfolding);
+    }
+    if let Some(mut mesh) = world.get_mut::<Mesh3d>(entity) {
+        mesh.0 = own.clone();
+        carrier.mesh = Some((before, own));
+    }
+}
+
+/// Nothing is known of its mesh any more.
+pub(super) fn forget(world: &mut World, entity: Entity) {
+    if world.get::<Unfold>(entity).is_some()
+        && let Ok(mut entity) = world.get_entity_mut(entity)
+    {
+        entity.remove::<Unfold>();
+    }
+}
+
+/// The point that a hit is meant for on a mesh that is laid out: texture coordinates are those of the mesh as it was.
+pub(super) fn aim(world: &World, entity: Entity, at: HitPoint, point: Option<Vec3>) -> Option<HitPoint> {
+    unfolding(world, entity)?;
+    match (at, point) {
+        (HitPoint::Local(_), _) => Some(at),
+        (_, Some(point)) => Some(HitPoint::Local(point)),
+        (HitPoint::Uv(uv), None) => {
+            let before = world.get_resource::<Assets<Mesh>>()?.get(&world.get::<Unfold>(entity)?.before)?;
+            Some(HitPoint::Local(place_of(before, uv)?.0))
+        }
+        _ => None,
+    }
+}

@@ -1,0 +1,63 @@
+//! Meshes are laid out before they crack.
+
+use super::picture_plan::texel_bytes;
+use crate::plugin::api::textures::Maps;
+use crate::plugin::api::{
+    CrackBudget, CrackMaskSource, CrackRecord, CrackResolution, CrackStrands, CrackSurface, CrackUnwrap, GuidedCracks,
+    HitPoint,
+};
+use crate::plugin::carrier::kind::UnfoldOrder;
+use crate::plugin::carrier::kinds;
+use crate::plugin::gpu::memory::TextureMemory;
+use crate::plugin::jobs::threads::Threads;
+use crate::plugin::source::preset;
+use crate::plugin::surface::queue::HitQueue;
+use bevy::{prelude::*, render::renderer::RenderDevice};
+
+/// The most texels of a layout that nobody asked for.
+const MOST_BY_ITSELF: f64 = 1.5 * 1024.0 * 1024.0;
+
+/// The most texels of any.
+const MOST: f64 = 8.0 * 1024.0 * 1024.0;
+
+/// How many layouts there were.
+#[derive(Resource, Default)]
+pub(crate) struct Unfoldings(u64);
+
+/// Has the mesh of a surface laid out that has not cracked, if that is of use; `false` if that is under way.
+pub(crate) fn unfold(world: &mut World, entity: Entity) -> bool {
+    let Some(surface) = world.get::<CrackSurface>(entity).filter(|_| world.get::<Mesh3d>(entity).is_some()) else {
+        return true;
+    };
+    // What is given over the whole of a picture has its place there.
+    let has_places = !matches!(surface.mask, CrackMaskSource::Auto | CrackMaskSource::None)
+        || surface.density.is_some()
+        || surface.resolution != CrackResolution::Picture
+        || world.get::<GuidedCracks>(entity).is_some()
+        || world.get::<CrackStrands>(entity).is_some();
+    if surface.unwrap == CrackUnwrap::Never || has_places {
+        return true;
+    }
+    let must = surface.unwrap == CrackUnwrap::Always;
+    let write = surface.write;
+    let Ok(Some(preset)) = preset::resolve(world, &surface.preset) else { return true };
+    let texel = texel_bytes(Maps::wanted(write, &preset.look), preset.look.layer(0).bytes_per_texel());
+    let (Some(kind), _) = kinds::inspect(world, entity) else { return true };
+    let budget = world.resource::<CrackBudget>();
+    let left = budget.max_texture_bytes.saturating_sub(world.resource::<TextureMemory>().used());
+    let device = world.get_resource::<RenderDevice>().map_or(u32::MAX, |d| d.limits().max_texture_dimension_2d);
+    let hit = match world.get::<CrackRecord>(entity).and_then(|record| record.around) {
+        Some(around) => Some((HitPoint::Local(around), None)),
+        None => world.resource::<HitQueue>().first(entity).map(|hit| (hit.at, hit.point)),
+    };
+    let order = UnfoldOrder {
+        hit,
+        must,
+        most_texels: (left as f64 / texel as f64).min(if must { MOST } else { MOST_BY_ITSELF }),
+        most_side: budget.max_side.min(device).clamp(1, crate::pattern::MAX_SIDE),
+        at_once: budget.is_unlimited() || world.resource::<Threads>().pool().is_none(),
+        id: world.resource::<Unfoldings>().0,
+    };
+    world.resource_mut::<Unfoldings>().0 += 1;
+    kind.unfold(world, entity, &order)
+}

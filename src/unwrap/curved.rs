@@ -1,0 +1,231 @@
+//! Curved meshes, laid out by distance and direction from a point.
+
+use super::{Chart, MeshShape, Start, along};
+use glam::{Quat, Vec2, Vec3};
+use std::{cmp::Reverse, collections::BinaryHeap};
+
+/// The most that a triangle may be stretched or shrunk in the plane, along any of its edges and in area.
+const MOST_STRETCH: f32 = 1.6;
+
+/// Cells along the longer side of a chart in which triangles are looked for that cover one another.
+const CELLS: f32 = 512.0;
+
+/// How far within a triangle the middle of a cell is that it covers, cells: neighbours that share an edge do not share a cell by rounding.
+const CLEARANCE: f32 = 1e-3;
+
+/// What meets in each point of a mesh.
+pub(super) struct Points {
+    /// Unit normals, means over the triangles.
+    normals: Vec<Vec3>,
+    /// The triangles of each point: where they begin in `triangles`, one more at the end.
+    first: Vec<u32>,
+    triangles: Vec<u32>,
+}
+
+impl Points {
+    pub(super) fn of(shape: &MeshShape) -> Self {
+        let with_area = || (0..shape.len()).filter(|triangle| shape.has_area(*triangle));
+        let (mut normals, mut first) = (vec![Vec3::ZERO; shape.points()], vec![0; shape.points() + 1]);
+        for triangle in with_area() {
+            let [a, b, c] = shape.corners(triangle);
+            for point in shape.numbers(triangle) {
+                normals[point] += (b - a).cross(c - a);
+                first[point + 1] += 1;
+            }
+        }
+        for i in 1..first.len() {
+            first[i] += first[i - 1];
+        }
+        let (mut next, mut triangles) = (first.clone(), vec![0; first[shape.points()] as usize]);
+        for triangle in with_area() {
+            for point in shape.numbers(triangle) {
+                triangles[next[point] as usize] = triangle as u32;
+                next[point] += 1;
+            }
+        }
+        normals.iter_mut().for_each(|normal| *normal = normal.normalize_or_zero());
+        Self { normals, first, triangles }
+    }
+
+    fn triangles(&self, point: usize) -> impl Iterator<Item = usize> + '_ {
+        let range = self.first[point] as usize..self.first[point + 1] as usize;
+        self.triangles[range].iter().map(|triangle| *triangle as usize)
+    }
+}
+
+/// A point in the plane.
+#[derive(Clone, Copy)]
+struct Laid {
+    at: Vec2,
+    /// The direction on the mesh that is to the right in the plane.
+    right: Vec3,
+}
+
+impl Laid {
+    /// Where a point of the mesh is, seen from this one, which is at `from` and faces `normal`.
+    fn see(&self, from: Vec3, normal: Vec3, to: Vec3) -> Vec2 {
+        let way = to - from;
+        let flat = way.reject_from_normalized(normal).normalize_or_zero() * way.length();
+        self.at + Vec2::new(flat.dot(self.right), flat.dot(self.right.cross(normal)))
+    }
+
+    /// The same direction elsewhere.
+    fn turned(&self, from: Vec3, to: Vec3) -> Vec3 {
+        (Quat::from_rotation_arc(from, to) * self.right)
+            .reject_from_normalized(to)
+            .normalize_or(to.any_orthonormal_vector())
+    }
+}
+
+/// The chart that spreads from a point, as far as triangles keep their size and do not cover others.
+pub(super) fn lay_out(shape: &MeshShape, points: &Points, start: Start, is_free: &[bool]) -> Chart {
+    let laid = spread(shape, points, start, is_free);
+    let corners = |triangle: usize| -> Option<[Vec2; 3]> {
+        let [a, b, c] = shape.numbers(triangle).map(|point| laid[point].map(|laid| laid.at));
+        Some([a?, b?, c?])
+    };
+    let mut cover = Cover::new(laid.iter().flatten().map(|laid| laid.at));
+    let mut chart = Chart { triangles: Vec::new() };
+    let mut is_seen: Vec<bool> = is_free.iter().map(|is_free| !is_free).collect();
+    let mut nearest = BinaryHeap::new();
+    is_seen[start.triangle] = true;
+    nearest.push(Reverse((0, start.triangle)));
+    while let Some(Reverse((_, triangle))) = nearest.pop() {
+        // The first is there in any case, so that every chart has one.
+        let is_first = chart.triangles.is_empty();
+        let laid = corners(triangle).filter(|laid| is_first || keeps_its_size(shape.corners(triangle), *laid));
+        let Some(laid) = laid.filter(|laid| cover.take(triangle, *laid) || is_first) else { continue };
+        chart.triangles.push((triangle, laid));
+        for (other, _) in shape.across(triangle).into_iter().flatten() {
+            let other = other as usize;
+            if !is_seen[other] {
+                is_seen[other] = true;
+                let distance = corners(other).map_or(f32::MAX, |[a, b, c]| (a + b + c).length());
+                nearest.push(Reverse((distance.to_bits(), other)));
+            }
+        }
+    }
+    chart
+}
+
+/// Distance and direction of all points that can be reached, the nearest first.
+fn spread(shape: &MeshShape, points: &Points, start: Start, is_free: &[bool]) -> Vec<Option<Laid>> {
+    let mut laid: Vec<Option<Laid>> = vec![None; shape.points()];
+    let normal = shape.normal(start.triangle);
+    let [a, b, _] = shape.corners(start.triangle);
+    let right = [start.right, b - a].into_iter().find_map(|way| along(way, normal));
+    let first = Laid { at: Vec2::ZERO, right: right.unwrap_or_else(|| normal.any_orthonormal_vector()) };
+    let mut nearest = BinaryHeap::new();
+    for point in shape.numbers(start.triangle) {
+        let at = first.see(start.point, normal, shape.point(point));
+        laid[point] = Some(Laid { at, right: first.turned(normal, points.normals[point]) });
+    }
+    let mut is_done = vec![false; shape.points()];
+    for point in shape.numbers(start.triangle) {
+        is_done[point] = true;
+    }
+    let reach = |point: usize, laid: &[Option<Laid>], is_done: &[bool], nearest: &mut BinaryHeap<_>| {
+        let Some(from) = laid[point] else { return };
+        for other in around(shape, points, point, is_free).filter(|other| !is_done[*other]) {
+            let at = from.see(shape.point(point), points.normals[point], shape.point(other));
+            nearest.push(Reverse((at.length().to_bits(), other)));
+        }
+    };
+    for point in shape.numbers(start.triangle) {
+        reach(point, &laid, &is_done, &mut nearest);
+    }
+    while let Some(Reverse((_, point))) = nearest.pop() {
+        if is_done[point] {
+            continue;
+        }
+        is_done[point] = true;
+        laid[point] = mean(shape, points, point, is_free, &laid);
+        reach(point, &laid, &is_done, &mut nearest);
+    }
+    laid
+}
+
+/// The points that share a free triangle with this one; most of them twice.
+fn around<'a>(
+    shape: &'a MeshShape,
+    points: &'a Points,
+    point: usize,
+    is_free: &'a [bool],
+) -> impl Iterator<Item = usize> + 'a {
+    let free = points.triangles(point).filter(|triangle| is_free[*triangle]);
+    free.flat_map(|triangle| shape.numbers(triangle)).filter(move |other| *other != point)
+}
+
+/// Where a point is, as its neighbours see it that are laid out. Those count the most from which the way leads straight away from where the
+/// chart begins: ways along a curve are longer there than in the plane.
+fn mean(shape: &MeshShape, points: &Points, point: usize, is_free: &[bool], laid: &[Option<Laid>]) -> Option<Laid> {
+    let (to, normal) = (shape.point(point), points.normals[point]);
+    let (mut at, mut right, mut sum) = (Vec2::ZERO, Vec3::ZERO, 0.0);
+    for other in around(shape, points, point, is_free) {
+        let Some(from) = laid[other] else { continue };
+        let (place, other_normal) = (shape.point(other), points.normals[other]);
+        let seen = from.see(place, other_normal, to);
+        let straight = (seen - from.at).normalize_or_zero().dot(from.at.normalize_or_zero()).max(0.05);
+        let weight = straight * straight * straight * place.distance(to).recip().min(1e12);
+        at += weight * seen;
+        right += weight * from.turned(other_normal, normal);
+        sum += weight;
+    }
+    let right = right.reject_from_normalized(normal).try_normalize()?;
+    (sum > 0.0 && at.is_finite()).then(|| Laid { at: at / sum, right })
+}
+
+/// Whether a triangle is about as large in the plane as on the mesh, and not turned over.
+fn keeps_its_size([a, b, c]: [Vec3; 3], [p, q, r]: [Vec2; 3]) -> bool {
+    let is_like = |own: f32, laid: f32| laid <= MOST_STRETCH * own && own <= MOST_STRETCH * laid;
+    // Seen from outside, y down.
+    let area = -(q - p).perp_dot(r - p);
+    let edges = [(b - a, q - p), (c - b, r - q), (a - c, p - r)];
+    is_like((b - a).cross(c - a).length(), area) && edges.iter().all(|(own, laid)| is_like(own.length(), laid.length()))
+}
+
+/// Which triangles cover which part of the plane.
+struct Cover {
+    min: Vec2,
+    /// Cells for a unit of length.
+    scale: f32,
+    width: usize,
+    owner: Vec<u32>,
+}
+
+impl Cover {
+    const NONE: u32 = u32::MAX;
+
+    fn new(places: impl Iterator<Item = Vec2>) -> Self {
+        let (min, max) = places.fold((Vec2::INFINITY, Vec2::NEG_INFINITY), |(min, max), at| (min.min(at), max.max(at)));
+        let scale = CELLS / (max - min).max_element();
+        if !(scale.is_finite() && scale > 0.0) {
+            return Self { min: Vec2::ZERO, scale: 0.0, width: 0, owner: Vec::new() };
+        }
+        let [width, height] = ((max - min) * scale).ceil().max(Vec2::ONE).as_usizevec2().to_array();
+        Self { min, scale, width, owner: vec![Self::NONE; width * height] }
+    }
+
+    /// Gives a triangle the cells whose middles it covers; `false` if one of them has an owner.
+    fn take(&mut self, triangle: usize, corners: [Vec2; 3]) -> bool {
+        let [a, b, c] = corners.map(|corner| (corner - self.min) * self.scale);
+        let turn = (b - a).perp_dot(c - a).signum();
+        let height = self.owner.len().checked_div(self.width).unwrap_or(0);
+        let (min, max) = (a.min(b).min(c).max(Vec2::ZERO).as_usizevec2(), a.max(b).max(c).ceil().as_usizevec2());
+        let mut own = Vec::new();
+        for y in min.y..max.y.min(height) {
+            for x in min.x..max.x.min(self.width) {
+                let at = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
+                let is_beyond = |(p, q): &(Vec2, Vec2)| (*q - *p).perp_dot(at - *p) * turn > CLEARANCE * p.distance(*q);
+                if [(a, b), (b, c), (c, a)].iter().all(is_beyond) {
+                    if self.owner[self.width * y + x] != Self::NONE {
+                        return false;
+                    }
+                    own.push(self.width * y + x);
+                }
+            }
+        }
+        own.into_iter().for_each(|cell| self.owner[cell] = triangle as u32);
+        true
+    }
+}

@@ -1,0 +1,179 @@
+//! Meshes laid out flat: cracks grow in a plane, also those on boxes, stairs and rocks.
+//!
+//! A mesh is cut into charts, parts of it that lie in the plane without covering one another. The first chart spreads from the point that is
+//! hit, so that cracks run over edges and around curves; what does not lie flat any more becomes charts of its own, and so on until all of
+//! the mesh is laid out.
+//!
+//! - Meshes of few flat faces are unfolded about their edges (`hinge.rs`): lengths and angles stay as they are.
+//! - Others are laid out by distance and direction from the point (`curved.rs`), the discrete exponential map of Schmidt, Grimm and Wyvill
+//!   (2006), with the means over all neighbours of Schmidt (2013).
+//!
+//! ```
+//! use bevy_crack::unwrap::{MeshShape, Unwrap};
+//! use glam::{UVec2, Vec3};
+//!
+//! // Two squares that meet at a right angle.
+//! let corner = |x: f32, y: f32, z: f32| Vec3::new(x, y, z);
+//! let positions = [
+//!     corner(0., 0., 0.), corner(1., 0., 0.), corner(1., 1., 0.), corner(0., 1., 0.),
+//!     corner(1., 0., -1.), corner(1., 1., -1.),
+//! ];
+//! let triangles = [[0, 1, 2], [0, 2, 3], [1, 4, 5], [1, 5, 2]];
+//! let shape = MeshShape::new(&positions, &triangles)?;
+//! let laid_out = Unwrap { around: Vec3::new(0.5, 0.5, 0.), triangle: 0, right: Vec3::X, texels: 64.0, largest: 4096 }.apply(&shape)?;
+//! // Side by side, with some texels around them.
+//! assert!(laid_out.size.x >= 128 && laid_out.size.y >= 64);
+//! let [corners, beside] = [0, 2].map(|triangle| laid_out.corners[triangle].unwrap());
+//! // They share an edge.
+//! assert!(corners[1].distance(beside[0]) < 1e-3);
+//! # Ok::<(), bevy_crack::unwrap::UnwrapError>(())
+//! ```
+
+mod curved;
+mod hinge;
+mod pack;
+mod shape;
+
+pub use pack::{GUTTER, LaidOut};
+pub use shape::MeshShape;
+
+use glam::Vec3;
+
+/// The most triangles of a mesh that is laid out.
+pub const MAX_TRIANGLES: usize = 1 << 16;
+
+/// The most charts that a mesh may fall into.
+pub const MAX_CHARTS: usize = 1024;
+
+/// A mesh that cannot be laid out.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum UnwrapError {
+    /// No triangle has an area.
+    #[error("none of its {0} triangles has an area")]
+    NoTriangles(usize),
+    /// More than [`MAX_TRIANGLES`].
+    #[error("it has {0} triangles, more than {MAX_TRIANGLES}")]
+    TooManyTriangles(usize),
+    /// A triangle names a vertex that is not there.
+    #[error("a triangle names vertex {vertex} of {vertices}")]
+    NoVertex {
+        /// The vertex.
+        vertex: u32,
+        /// How many there are.
+        vertices: usize,
+    },
+    /// A position is not finite, or beyond ±1e9.
+    #[error("position {0} is not within ±1e9")]
+    Position(usize),
+    /// It falls into more than [`MAX_CHARTS`] charts.
+    #[error("it falls into more than {MAX_CHARTS} flat parts")]
+    TooManyCharts,
+    /// It would need more texels a side than are allowed.
+    #[error("it needs {needed} texels a side, {largest} are allowed")]
+    TooLarge {
+        /// Texels of the longer side.
+        needed: u64,
+        /// Texels allowed.
+        largest: u32,
+    },
+    /// A parameter is out of its range.
+    #[error("`{0}` is out of its range")]
+    Parameter(&'static str),
+}
+
+/// How a mesh is laid out.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Unwrap {
+    /// The point from which the first chart spreads, in the space of the positions.
+    pub around: Vec3,
+    /// The triangle in which it lies.
+    pub triangle: usize,
+    /// The direction that is to the right in the plane of the first chart; any length. Where it is of no use, an edge of the triangle is.
+    pub right: Vec3,
+    /// Texels for a unit of length, above 0.
+    pub texels: f32,
+    /// The most texels of a side.
+    pub largest: u32,
+}
+
+impl Unwrap {
+    /// Lays out a mesh.
+    ///
+    /// # Errors
+    /// [`UnwrapError::Parameter`] for values out of their range, [`UnwrapError::TooManyCharts`] and [`UnwrapError::TooLarge`] for meshes
+    /// that do not fit.
+    pub fn apply(&self, shape: &MeshShape) -> Result<LaidOut, UnwrapError> {
+        if !self.around.is_finite() {
+            return Err(UnwrapError::Parameter("around"));
+        }
+        if !(self.texels > 0.0 && self.texels.is_finite()) {
+            return Err(UnwrapError::Parameter("texels"));
+        }
+        if self.largest == 0 {
+            return Err(UnwrapError::Parameter("largest"));
+        }
+        if !shape.has_area(self.triangle) {
+            return Err(UnwrapError::Parameter("triangle"));
+        }
+        let charts = charts(shape, self)?;
+        pack::pack(shape, &charts, self.texels, self.largest)
+    }
+}
+
+/// Triangles in a plane, y down, seen from outside.
+struct Chart {
+    /// Each with its corners.
+    triangles: Vec<(usize, [glam::Vec2; 3])>,
+}
+
+/// Where a chart begins.
+#[derive(Clone, Copy)]
+struct Start {
+    triangle: usize,
+    point: Vec3,
+    right: Vec3,
+}
+
+/// The unit vector in the plane across `normal` that is nearest to a direction; `None` if that is about the normal's.
+fn along(way: Vec3, normal: Vec3) -> Option<Vec3> {
+    let flat = way.try_normalize()?.reject_from_normalized(normal);
+    (flat.length() > 0.01).then(|| flat.normalize())
+}
+
+fn charts(shape: &MeshShape, unwrap: &Unwrap) -> Result<Vec<Chart>, UnwrapError> {
+    let mut is_free: Vec<bool> = (0..shape.len()).map(|triangle| shape.has_area(triangle)).collect();
+    let mut charts = Vec::new();
+    let mut start = Some(Start { triangle: unwrap.triangle, point: unwrap.around, right: unwrap.right });
+    let points = (shape.faces() > hinge::MAX_FACES).then(|| curved::Points::of(shape));
+    let mut first_free = 0;
+    while let Some(from) = start {
+        if charts.len() == MAX_CHARTS {
+            return Err(UnwrapError::TooManyCharts);
+        }
+        let chart = match &points {
+            None => hinge::unfold(shape, from, &is_free),
+            Some(points) => curved::lay_out(shape, points, from, &is_free),
+        };
+        for (triangle, _) in &chart.triangles {
+            is_free[*triangle] = false;
+        }
+        charts.push(chart);
+        first_free += is_free[first_free..].iter().take_while(|is_free| !**is_free).count();
+        start = (first_free < is_free.len()).then(|| {
+            let triangle =
+                if points.is_some() { farthest(shape, unwrap.around, &is_free, first_free) } else { first_free };
+            Start { triangle, point: shape.centroid(triangle), right: unwrap.right }
+        });
+    }
+    Ok(charts)
+}
+
+/// The free triangle that is farthest from a point: what is left of a curved mesh is opposite to where the first chart began.
+fn farthest(shape: &MeshShape, from: Vec3, is_free: &[bool], first: usize) -> usize {
+    let free = (first..is_free.len()).filter(|triangle| is_free[*triangle]);
+    let distance = |triangle: &usize| shape.centroid(*triangle).distance_squared(from);
+    free.max_by(|a, b| distance(a).total_cmp(&distance(b)).then(b.cmp(a))).unwrap_or(first)
+}
+
+#[cfg(test)]
+mod tests;

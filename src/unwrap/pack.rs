@@ -1,0 +1,154 @@
+//! Charts side by side in one picture: [`LaidOut`].
+
+use super::{Chart, MeshShape, UnwrapError};
+use glam::{UVec2, Vec2};
+
+/// Texels around each chart that belong to it too, so that filtering at its border finds what goes on there.
+pub const GUTTER: u32 = 4;
+
+/// A mesh that is laid out.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LaidOut {
+    /// Size of the picture, texels.
+    pub size: UVec2,
+    /// Where the corners of each triangle are, texels; the top left is at (0, 0). `None` for one without area.
+    pub corners: Vec<Option<[Vec2; 3]>>,
+    /// Number of charts. Triangles of different charts have no texel in common.
+    pub charts: usize,
+    /// The chart of each triangle, the first being 0; [`LaidOut::NOTHING`] for one without area.
+    pub chart: Vec<u32>,
+    /// The triangle that each texel belongs to, row by row; [`LaidOut::NOTHING`] if to none.
+    pub owner: Vec<u32>,
+}
+
+impl LaidOut {
+    /// The number of no triangle or chart.
+    pub const NOTHING: u32 = u32::MAX;
+
+    /// The triangle of a texel, those within [`GUTTER`] texels of it among them.
+    #[must_use]
+    pub fn owner(&self, texel: UVec2) -> Option<usize> {
+        let i = texel.y as usize * self.size.x as usize + texel.x as usize;
+        let owner = self.owner.get(i).filter(|_| texel.x < self.size.x)?;
+        (*owner != Self::NOTHING).then_some(*owner as usize)
+    }
+}
+
+/// A chart and where it lies.
+struct Part<'a> {
+    chart: &'a Chart,
+    min: Vec2,
+    size: UVec2,
+    at: UVec2,
+}
+
+/// Lays charts side by side: the first at the top left, the others beside and below it in rows, the highest first.
+pub(super) fn pack(shape: &MeshShape, charts: &[Chart], texels: f32, largest: u32) -> Result<LaidOut, UnwrapError> {
+    let mut parts = Vec::with_capacity(charts.len());
+    for chart in charts {
+        let corners = chart.triangles.iter().flat_map(|(_, corners)| corners);
+        let (min, max) =
+            corners.fold((Vec2::INFINITY, Vec2::NEG_INFINITY), |(min, max), at| (min.min(*at), max.max(*at)));
+        let size = ((max - min) * texels).ceil() + 2.0 * GUTTER as f32;
+        if size.max_element() > largest as f32 {
+            return Err(UnwrapError::TooLarge { needed: size.max_element() as u64, largest });
+        }
+        parts.push(Part { chart, min, size: size.as_uvec2().max(UVec2::ONE), at: UVec2::ZERO });
+    }
+    let size = arrange(&mut parts);
+    if size.max_element() > largest {
+        return Err(UnwrapError::TooLarge { needed: u64::from(size.max_element()), largest });
+    }
+    let mut corners = vec![None; shape.len()];
+    for part in &parts {
+        let origin = part.at.as_vec2() + GUTTER as f32;
+        for (triangle, laid) in &part.chart.triangles {
+            corners[*triangle] = Some(laid.map(|at| (at - part.min) * texels + origin));
+        }
+    }
+    let owner = owners(&corners, size, &parts);
+    let mut chart = vec![LaidOut::NOTHING; shape.len()];
+    for (number, (triangle, _)) in
+        (0..).zip(charts).flat_map(|(number, chart)| chart.triangles.iter().map(move |of| (number, of)))
+    {
+        chart[*triangle] = number;
+    }
+    Ok(LaidOut { size, corners, charts: charts.len(), chart, owner })
+}
+
+/// Finds places for all parts; returns the size of what is around them.
+fn arrange(parts: &mut [Part<'_>]) -> UVec2 {
+    let Some((first, others)) = parts.split_first_mut() else { return UVec2::ONE };
+    let mut order: Vec<usize> = (0..others.len()).collect();
+    order.sort_by_key(|i| core::cmp::Reverse((others[*i].size.y, others[*i].size.x)));
+    let area: u64 = others.iter().map(|part| u64::from(part.size.x) * u64::from(part.size.y)).sum();
+    let widest = others.iter().map(|part| part.size.x).max().unwrap_or(0);
+    // Beside the first if that is higher than wide, else below it.
+    let is_beside = first.size.y > first.size.x;
+    let width = if is_beside { (area as f64 / f64::from(first.size.y)).ceil() as u32 } else { first.size.x };
+    let width = width.max(widest).max((area as f64).sqrt().min(f64::from(first.size.max_element())) as u32);
+    let corner = if is_beside { UVec2::new(first.size.x, 0) } else { UVec2::new(0, first.size.y) };
+    let (mut at, mut row) = (UVec2::ZERO, 0);
+    let mut size = first.size;
+    for i in order {
+        let part = &mut others[i];
+        if at.x + part.size.x > width && at.x > 0 {
+            (at, row) = (UVec2::new(0, at.y + row), 0);
+        }
+        part.at = corner + at;
+        at.x += part.size.x;
+        row = row.max(part.size.y);
+        size = size.max(part.at + part.size);
+    }
+    size
+}
+
+/// The triangle of each texel. Those around a chart belong to the triangles at its border.
+fn owners(corners: &[Option<[Vec2; 3]>], size: UVec2, parts: &[Part<'_>]) -> Vec<u32> {
+    let width = size.x as usize;
+    let mut owner = vec![LaidOut::NOTHING; width * size.y as usize];
+    for (triangle, laid) in corners.iter().enumerate().filter_map(|(i, laid)| Some((i as u32, (*laid)?))) {
+        let [a, b, c] = laid;
+        let turn = (b - a).perp_dot(c - a);
+        let (min, max) = (a.min(b).min(c).max(Vec2::ZERO).as_uvec2(), a.max(b).max(c).ceil().as_uvec2().min(size));
+        for y in min.y..max.y {
+            for x in min.x..max.x {
+                let at = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
+                if [(a, b), (b, c), (c, a)].iter().all(|(p, q)| (*q - *p).perp_dot(at - *p) * turn >= 0.0) {
+                    let owner = &mut owner[y as usize * width + x as usize];
+                    *owner = (*owner).min(triangle);
+                }
+            }
+        }
+    }
+    for Part { at, size, .. } in parts {
+        widen(&mut owner, width, *at, *at + *size);
+    }
+    owner
+}
+
+/// Gives the texels next to others their triangle, [`GUTTER`] times, within a rectangle.
+fn widen(owner: &mut [u32], width: usize, min: UVec2, max: UVec2) {
+    let (min, max) = (min.as_usizevec2(), max.as_usizevec2());
+    let mut edge: Vec<usize> = (min.y..max.y).flat_map(|y| (min.x..max.x).map(move |x| y * width + x)).collect();
+    edge.retain(|i| owner[*i] != LaidOut::NOTHING);
+    for _ in 0..GUTTER {
+        let mut next = Vec::new();
+        for i in edge {
+            let (x, y) = (i % width, i / width);
+            let beside = [
+                (x > min.x).then(|| i - 1),
+                (x + 1 < max.x).then(|| i + 1),
+                (y > min.y).then(|| i - width),
+                (y + 1 < max.y).then(|| i + width),
+            ];
+            for other in beside.into_iter().flatten() {
+                if owner[other] == LaidOut::NOTHING {
+                    owner[other] = owner[i];
+                    next.push(other);
+                }
+            }
+        }
+        edge = next;
+    }
+}
