@@ -3,6 +3,7 @@
 mod arrest;
 mod divide;
 mod energy;
+mod long;
 mod masonry;
 mod rays;
 mod rays_reference;
