@@ -34,6 +34,8 @@
 //! ```
 
 pub mod blend;
+#[cfg(test)]
+mod fuzz;
 mod grid;
 pub mod growth;
 pub mod math;

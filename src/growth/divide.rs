@@ -185,7 +185,7 @@ impl CrackGrowth {
         let begun = self.division.as_ref().and_then(|division| division.begun.get(impact as usize));
         match begun {
             Some((step, _)) if self.params.front > 0.0 => {
-                self.params.front * (self.steps.saturating_sub(*step) + 1) as f32
+                self.params.front * self.steps.saturating_sub(*step).saturating_add(1) as f32
             }
             _ => f32::INFINITY,
         }
@@ -231,7 +231,7 @@ impl CrackGrowth {
         if self.mask.is_forbidden(middle / self.network.extent()) {
             return;
         }
-        self.nucleated += 1;
+        self.nucleated = self.nucleated.saturating_add(1);
         let node = self.network.nodes.len() as u32;
         self.add_node(middle, NO_PARENT, 0, candidate.impact, 1.0);
         self.run_out_of(node, across);

@@ -130,7 +130,7 @@ impl MarkerField {
         self.set_params(params);
         let before = self.newborn.len();
         self.newborn.retain(|marker| !is_lost(marker.owner));
-        self.killed += (before - self.newborn.len()) as u32;
+        self.count_killed(before - self.newborn.len());
         self.newborn.sort_unstable_by_key(|marker| marker.id);
         for (id, marker) in (0..).zip(&mut self.newborn) {
             marker.id = id;
@@ -139,6 +139,10 @@ impl MarkerField {
         if let Some(relations) = &mut self.relations {
             relations.keep(self.newborn.len());
         }
+    }
+
+    fn count_killed(&mut self, markers: usize) {
+        self.killed = self.killed.saturating_add(markers as u32);
     }
 
     /// Positions of the living markers in the field.
@@ -183,7 +187,7 @@ impl MarkerField {
         let near_sq = relieved.max(0.0) * relieved;
         self.newborn.push(Newborn { pos, id: self.next, owner, given_up: 0, near_sq });
         self.next += 1;
-        self.made += 1;
+        self.made = self.made.saturating_add(1);
         if let Some(relations) = &mut self.relations {
             relations.add();
         }
@@ -256,7 +260,7 @@ impl MarkerField {
         let is_own = self.is_own(owner, index, node);
         if distance_sq <= self.kill_sq && (is_own || !is_ray(owner)) {
             self.near_sq[marker] = DEAD;
-            self.killed += 1;
+            self.count_killed(1);
             return;
         }
         if self.divides {
@@ -301,7 +305,7 @@ impl MarkerField {
             Bond::Waits => {}
             Bond::Dead => {
                 self.near_sq[marker] = DEAD;
-                self.killed += 1;
+                self.count_killed(1);
             }
         }
     }
@@ -358,7 +362,7 @@ impl MarkerField {
                 Bond::Waits => self.node[i] = NO_NODE,
                 Bond::Dead if self.near_sq[i] > DEAD => {
                     self.near_sq[i] = DEAD;
-                    self.killed += 1;
+                    self.count_killed(1);
                 }
                 Bond::Dead => {}
             }
@@ -368,7 +372,7 @@ impl MarkerField {
         self.given_up[i] += 1;
         if self.given_up[i] >= MOST_GIVEN_UP {
             self.near_sq[i] = DEAD;
-            self.killed += 1;
+            self.count_killed(1);
         }
     }
 
@@ -384,7 +388,7 @@ impl MarkerField {
         let away = |i: &usize| Vec2::new(self.x[*i], self.y[*i]).distance_squared(center);
         let i = found.min_by(|a, b| away(a).total_cmp(&away(b)))?;
         self.near_sq[i] = DEAD;
-        self.killed += 1;
+        self.count_killed(1);
         Some((Vec2::new(self.x[i], self.y[i]), self.owner[i]))
     }
 
@@ -419,7 +423,7 @@ impl MarkerField {
     /// Removes a marker.
     pub(super) fn take(&mut self, index: u32) {
         self.near_sq[index as usize] = DEAD;
-        self.killed += 1;
+        self.count_killed(1);
     }
 
     /// Whether settling of new markers is in progress.

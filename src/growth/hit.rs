@@ -120,7 +120,7 @@ impl CrackGrowth {
         for (i, place) in places.into_iter().enumerate() {
             let place = self.masonry.as_ref().and_then(|masonry| masonry.nearest(place)).unwrap_or(place);
             let is_free = !self.nodes.any_within(place, 1e-4) && !self.is_on_crack(place, index);
-            if is_free && !self.mask.is_forbidden(place / extent) {
+            if is_free && self.room() > 0 && !self.mask.is_forbidden(place / extent) {
                 born.push((i, self.network.nodes.len() as u32));
                 self.add_node(place, NO_PARENT, 0, index, 1.0);
             }

@@ -160,7 +160,7 @@ impl Past {
 pub(super) struct Record {
     events: Vec<PastEvent>,
     /// Calls of `step` that may have changed something.
-    steps: u32,
+    pub(super) steps: u32,
     /// Whether there were more events than are kept.
     is_cut: bool,
 }

@@ -55,9 +55,10 @@ impl Rays {
         !self.walkers.is_empty()
     }
 
-    /// The impact of a ray.
+    /// The impact of a ray; `None` if that is the name of none.
     pub(super) fn impact_of(&self, ray: u32) -> Option<u32> {
-        self.rays.get((ray & !RAY) as usize).map(|&(impact, _)| impact)
+        let named = (ray & RAY != 0).then_some((ray & !RAY) as usize);
+        named.and_then(|ray| self.rays.get(ray)).map(|&(impact, _)| impact)
     }
 
     pub(super) fn last_of(&self, ray: u32) -> u32 {

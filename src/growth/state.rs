@@ -24,7 +24,7 @@ use crate::{
 use glam::Vec2;
 use std::{collections::VecDeque, ops::Range, sync::Arc};
 
-/// Number of markers in each state: the other numbers add up to `total`.
+/// Number of markers in each state: the other numbers add up to `total`. Those of all time stop at `u32::MAX`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct MarkerCounts {
     /// Markers ever created.

@@ -3,7 +3,6 @@
 use super::{
     arrest::{Advance, Arrest},
     draws,
-    field::ANY_IMPACT,
     params::StartLayout,
     pull::{NO_PULL, Pull},
     state::CrackGrowth,
@@ -188,12 +187,19 @@ impl CrackGrowth {
             let drawn = [0, 1, 2, 3, 4, 5].map(|i| mix(of_try ^ i << 48));
             let drawn = if is_impact { &drawn[..] } else { &drawn[..1] };
             let Some((place, owner)) = self.field.take_waiting(drawn, center) else { break };
-            self.tried += 1;
-            let impact = if owner == ANY_IMPACT { self.impacts.len().saturating_sub(1) as u32 } else { owner };
-            let is_free = !self.nodes.any_within(place, 2.0 * self.params.step_length)
-                && !self.mask.is_forbidden(place / self.network.extent());
+            self.tried = self.tried.wrapping_add(1);
+            let latest = self.impacts.len().saturating_sub(1) as u32;
+            // Markers of rays belong to these.
+            let owner = self.rays.impact_of(owner).unwrap_or(owner);
+            let impact = if (owner as usize) < self.impacts.len() { owner } else { latest };
+            // Markers of rays may lie off the surface.
+            let extent = self.network.extent();
+            let is_within = place.cmpge(Vec2::ZERO).all() && place.cmple(extent).all();
+            let is_free = is_within
+                && !self.nodes.any_within(place, 2.0 * self.params.step_length)
+                && !self.mask.is_forbidden(place / extent);
             if is_free {
-                self.nucleated += 1;
+                self.nucleated = self.nucleated.saturating_add(1);
                 // A step in which nothing else grows counts as well.
                 self.steps = self.steps.max(self.timeline.now());
                 self.add_node(place, NO_PARENT, 0, impact, 1.0);

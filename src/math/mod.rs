@@ -4,6 +4,8 @@
 //! Random numbers come from [`Rng`], whose stream never changes between versions.
 
 pub mod ops;
+#[cfg(test)]
+pub(crate) mod pools;
 mod rng;
 mod simd;
 pub(crate) mod whole;

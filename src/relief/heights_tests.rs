@@ -181,7 +181,7 @@ fn threads_and_stripes_give_the_same_bits() {
     let params = HeightParams { roughness: 0.5, cliffs: 0.3, variation: 0.3, ..HeightParams::DEFAULT };
     let map = HeightMap::new(&contours, &params, frame, 9).unwrap();
     let one = map.heights(1);
-    for threads in [2, 3, 64] {
+    for threads in [1, 2, 3, 8, 64] {
         assert!(one == map.heights(threads), "{threads} threads");
     }
     let mut rows = vec![7.0; 333 * 401];

@@ -73,7 +73,7 @@ mod terrain_valleys;
 mod terrain_water;
 mod terrain_wear;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 mod trace;
 mod untangle;
 mod weather;

@@ -94,8 +94,8 @@ const ROUNDS: u32 = 12;
 impl Shards {
     /// Breaks a shard into pieces of at most `largest_area` (pattern units squared), which fill it.
     ///
-    /// A piece is cut across its length, at a slightly random angle, until it is small enough. Positions remain those
-    /// of the surface, and so do texture coordinates.
+    /// A piece is cut across its length, at a slightly random angle, until it is small enough or was cut 12 times.
+    /// Positions remain those of the surface, and so do texture coordinates.
     ///
     /// # Errors
     /// [`ShatterError::NoShard`] if there is no such shard, [`ShatterError::OutOfRange`] if the area is not within
@@ -130,13 +130,13 @@ impl Shards {
                 pieces.retain(&inside);
                 return Ok(pieces);
             }
-            for piece in large {
-                let Some(from) = pieces.inner_point(piece) else { continue };
+            drawing.cut_across(large.into_iter().filter_map(|piece| {
+                let from = pieces.inner_point(piece)?;
                 let askew = 0.4 * rng.signed();
                 let across = pieces.axis(piece) + std::f32::consts::FRAC_PI_2 + askew;
                 let own = u64::from(rng.next_u32());
-                drawing.cut_across(from, ops::unit(across), rng.substream(own));
-            }
+                Some((from, ops::unit(across), rng.substream(own)))
+            }));
             drawing.make_planar();
             round += 1;
         }

@@ -47,8 +47,11 @@ pub enum ShatterError {
 
 /// `Ok` if a parameter lies in its range.
 pub(super) fn in_range(name: &'static str, value: f32, min: f64, max: f64) -> Result<(), ShatterError> {
-    let value = f64::from(value);
-    if (min..=max).contains(&value) { Ok(()) } else { Err(ShatterError::OutOfRange { name, value, min, max }) }
+    // Compared in single precision: `1e-6_f32` is a little less than `1e-6_f64`.
+    if (min as f32..=max as f32).contains(&value) {
+        return Ok(());
+    }
+    Err(ShatterError::OutOfRange { name, value: value.into(), min, max })
 }
 
 /// The lines along which a surface is cut.

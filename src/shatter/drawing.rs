@@ -318,20 +318,23 @@ impl Drawing {
         Some(pieces)
     }
 
-    /// Adds a rough line through a point, in both directions to the next line.
-    pub(super) fn cut_across(&mut self, from: Vec2, way: Vec2, rng: Rng) {
-        let start = self.lattice.snap(from);
-        let way = way.as_dvec2().to_array();
-        let grid = EdgeGrid::new(self);
-        let Some((there, one)) = self.first_hit(start, way, &grid) else { return };
-        let Some((back, other)) = self.first_hit(start, way.map(|x| -x), &grid) else { return };
-        self.split(there, one);
-        if back != there {
-            self.split(back, other);
+    /// Adds rough lines, each through a point, in both directions to the next line, those before it included.
+    pub(super) fn cut_across(&mut self, cuts: impl IntoIterator<Item = (Vec2, Vec2, Rng)>) {
+        let mut grid = EdgeGrid::new(self);
+        for (from, way, rng) in cuts {
+            let start = self.lattice.snap(from);
+            let way = way.as_dvec2().to_array();
+            let Some((there, one)) = self.first_hit(start, way, &grid) else { continue };
+            let Some((back, other)) = self.first_hit(start, way.map(|x| -x), &grid) else { continue };
+            self.split(there, one);
+            if back != there {
+                self.split(back, other);
+            }
+            let ends = [other, one].map(|vertex| self.lattice.pos(self.places[vertex as usize]));
+            let line = self.rough_line(ends, rng);
+            self.line(line.into_iter());
+            grid.add_new(self);
         }
-        let ends = [other, one].map(|vertex| self.lattice.pos(self.places[vertex as usize]));
-        let line = self.rough_line(ends, rng);
-        self.line(line.into_iter());
         self.edges.retain(|&edge| edge != DEAD);
     }
 
@@ -559,5 +562,36 @@ mod tests {
             }
         }
         assert!(met > 3000 && upright > 300, "{met} {upright}");
+    }
+
+    /// The index that is kept up to date against one that is made anew for each line.
+    #[test]
+    fn lines_across_are_the_same_one_by_one() {
+        let mut rng = Rng::new(9);
+        let mut added = 0;
+        for case in 0..60 {
+            let extent = Vec2::new(1.0, 0.3 + rng.unit());
+            let place = |rng: &mut Rng| Vec2::new(rng.unit(), rng.unit()) * extent;
+            let mut drawing = Drawing::new(Lattice::new(extent).unwrap());
+            for _ in 0..rng.next_u32() % 20 {
+                let line = [place(&mut rng), place(&mut rng)];
+                drawing.line(line.into_iter());
+            }
+            drawing.make_planar();
+            let cuts: Vec<_> = (0..rng.next_u32() % 50)
+                .map(|i| {
+                    let way = Vec2::new(rng.signed(), rng.signed()) * if i % 7 == 0 { 0.0 } else { 1.0 };
+                    (place(&mut rng), way, rng.substream(u64::from(i)))
+                })
+                .collect();
+            let (mut all, mut single) = (drawing.clone(), drawing.clone());
+            all.cut_across(cuts.iter().cloned());
+            for cut in cuts {
+                single.cut_across([cut]);
+            }
+            assert_eq!((&all.places, &all.edges), (&single.places, &single.edges), "case {case}");
+            added += all.edges.len() - drawing.edges.len();
+        }
+        assert!(added > 5000, "{added}");
     }
 }

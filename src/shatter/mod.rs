@@ -35,7 +35,7 @@ mod rim;
 mod shards;
 mod support;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 mod triangulate;
 
 pub use again::{BreakAgain, SizeClasses};

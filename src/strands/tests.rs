@@ -3,7 +3,7 @@
 use super::*;
 use crate::{
     Grid,
-    math::Rng,
+    math::{Rng, pools::check_in_pools},
     pattern::{NO_PARENT, Network},
 };
 use glam::{UVec2, Vec2};
@@ -246,18 +246,14 @@ fn networks_are_sound_and_the_same_on_every_thread() {
         let network = strands.network(&primitives).unwrap();
         (strands, network)
     };
-    let all = move || (0..40).map(make).collect::<Vec<_>>();
-    let expected = all();
+    let expected: Vec<_> = (0..40).map(make).collect();
     let mut segments = 0;
     for (strands, network) in &expected {
         check_network(strands, network);
         segments += network.segments().count();
     }
     assert!(segments > 10_000, "{segments}");
-    let threads: Vec<_> = (0..4).map(|_| std::thread::spawn(all)).collect();
-    for thread in threads {
-        assert!(thread.join().unwrap() == expected);
-    }
+    check_in_pools(40, |seed| make(seed as u64));
 }
 
 /// Each child hangs on its parent, and each strand that has met another one is linked to it.

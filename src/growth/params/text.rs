@@ -6,7 +6,7 @@ use crate::strands::{StrandError, StrandParams};
 macro_rules! fields {
     ($($name:ident: $kind:ty = $min:expr, $max:expr;)*) => {
         /// All plain numbers of the parameters with their ranges.
-        fn ranges(&self) -> impl Iterator<Item = (&'static str, f64, f64, f64)> {
+        pub(crate) fn ranges(&self) -> impl Iterator<Item = (&'static str, f64, f64, f64)> {
             [$((stringify!($name), f64::from(self.$name), $min, $max)),*].into_iter()
         }
 

@@ -3,6 +3,7 @@
 mod arrest;
 mod divide;
 mod energy;
+mod long;
 mod masonry;
 mod rays;
 mod rays_reference;
@@ -14,7 +15,7 @@ mod widths;
 use super::{CrackGrowth, GrowthParams, HitOutcome, MAX_ENERGY, MarkerLayout, Rejected, StartLayout, Venation};
 use crate::{
     CrackPreset, Grid,
-    math::{Rng, mix},
+    math::{Rng, mix, pools::check_in_pools},
     pattern::{LinkKind, NO_PARENT, SegmentId},
 };
 use glam::Vec2;
@@ -195,20 +196,13 @@ fn preset_run(preset: &CrackPreset, seed: u64) -> CrackGrowth {
     growth
 }
 
+/// Several growths on each thread, one after another and at the same time.
 #[test]
 fn same_bits_on_every_thread() {
-    for preset in CrackPreset::NAMES.map(|name| CrackPreset::named(name).unwrap()) {
-        let alone = fingerprint(&preset_run(&preset, 3));
-        let handles: Vec<_> = (0..4)
-            .map(|_| {
-                let preset = preset.clone();
-                std::thread::spawn(move || fingerprint(&preset_run(&preset, 3)))
-            })
-            .collect();
-        for handle in handles {
-            assert_eq!(handle.join().unwrap(), alone);
-        }
-    }
+    check_in_pools(2 * CrackPreset::NAMES.len(), |job| {
+        let name = CrackPreset::NAMES[job % CrackPreset::NAMES.len()];
+        fingerprint(&preset_run(&CrackPreset::named(name).unwrap(), 3 + job as u64))
+    });
 }
 
 #[test]

@@ -328,3 +328,40 @@ fn always_ends_with_rays() {
     }
     assert!(kinds.len() >= 2, "rings and junctions came");
 }
+
+/// Cracks that start where no ray has come yet lie on the surface, and belong to a hit.
+#[test]
+fn cracks_that_start_among_rays_belong_to_a_hit() {
+    let mut started = 0;
+    for seed in 0..20 {
+        let params = GrowthParams { nucleation: 4.0, ..CrackPreset::GLASS.growth };
+        let mut growth = CrackGrowth::new(params, Vec2::new(1.5, 1.0), seed).unwrap();
+        for (hits, at) in (1..).zip([Vec2::new(0.02, 0.03), Vec2::new(1.2, 0.99)]) {
+            growth.hit(at, 2.0);
+            while growth.step().grew() {}
+            for node in growth.network().nodes() {
+                let is_within = node.pos.cmpge(Vec2::ZERO).all() && node.pos.cmple(Vec2::new(1.5, 1.0)).all();
+                assert!(is_within && node.impact < hits, "seed {seed}: {node:?}");
+            }
+        }
+        started += growth.nucleated;
+    }
+    assert!(started > 20, "{started}");
+}
+
+/// There is no room for all nodes with which a hit would begin.
+#[test]
+fn a_hit_begins_with_no_more_nodes_than_there_may_be() {
+    for name in CrackPreset::NAMES {
+        for max_nodes in [1, 2, 5, 30] {
+            let params = GrowthParams { max_nodes, ..CrackPreset::named(name).unwrap().growth };
+            let mut growth = CrackGrowth::new(params, Vec2::ONE, 3).unwrap();
+            for at in [0.5, 0.2] {
+                growth.hit(Vec2::splat(at), 4.0);
+                while growth.step().grew() {}
+            }
+            let count = growth.network().nodes().len();
+            assert!((1..=max_nodes as usize).contains(&count), "{name}: {count} nodes of {max_nodes}");
+        }
+    }
+}

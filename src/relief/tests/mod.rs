@@ -2,6 +2,6 @@
 
 mod fourier;
 mod input;
-mod oracle;
-mod rings;
+pub(crate) mod oracle;
+pub(crate) mod rings;
 mod shapes;

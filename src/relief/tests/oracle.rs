@@ -167,7 +167,7 @@ fn area(rings: &[WholeRing]) -> i128 {
 }
 
 /// Panics unless all rings are simple, all levels nested and at least `least` apart (pattern units), and areas shrink.
-pub(super) fn assert_contours(contours: &Contours, least: f64, what: &str) {
+pub(crate) fn assert_contours(contours: &Contours, least: f64, what: &str) {
     let Some((low, high)) = contours.levels() else { return };
     let scale = scale(&contours.rings);
     let level = |level: i32| contours.level(level).map(|ring| whole(ring, scale)).collect::<Vec<_>>();

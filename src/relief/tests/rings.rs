@@ -41,7 +41,7 @@ fn params(rng: &mut Rng) -> ReliefParams {
 /// How near a level may come to the one before, in units of the distance.
 ///
 /// Lines of many points may be so rough that they are simplified more than usual.
-fn least(params: &ReliefParams, points: u32) -> f64 {
+pub(crate) fn least(params: &ReliefParams, points: u32) -> f64 {
     let slack = if points > 1000 { 0.04 } else { 0.0 };
     let join = match params.join {
         Join::Miter | Join::Round => 0.99,

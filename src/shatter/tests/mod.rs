@@ -1,5 +1,8 @@
-//! Shards against what they must be: that they tile ([`tiling`]), and what is to be known of each and becomes of it ([`pieces`]).
+//! Shards against what they must be: that they tile ([`tiling`]) along the lines that they were cut along ([`lines`]), also where there are
+//! many ([`many`]), and what is to be known of each and becomes of it ([`pieces`]).
 
+mod lines;
+mod many;
 mod pieces;
 mod tiling;
 
@@ -31,7 +34,7 @@ fn edges(ring: &[u32]) -> impl Iterator<Item = [u32; 2]> + '_ {
 }
 
 /// Every property that makes the shards a tiling of the surface, exactly.
-fn check_tiling(shards: &Shards) {
+pub(crate) fn check_tiling(shards: &Shards) {
     let [w, h] = shards.lattice.corner.map(i64::from);
     let sum = check_pieces(shards);
     assert_eq!(sum, 2 * w * h, "areas");
@@ -100,7 +103,7 @@ fn check_pieces(shards: &Shards) -> i64 {
     sum
 }
 
-fn check_meshes(shards: &Shards, rng: &mut Rng) {
+pub(crate) fn check_meshes(shards: &Shards, rng: &mut Rng) {
     let rim = RimLook { width: [0.0, 0.002, 0.02][rng.next_u32() as usize % 3], ..RimLook::STONE };
     let frame = MeshFrame {
         size: Vec2::new(3.0, 2.0),
