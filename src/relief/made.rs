@@ -10,8 +10,8 @@ use super::{
     params::ReliefParams,
     shapes::ReliefShape,
     terrain::TerrainColors,
-    terrain_normals::normals,
-    terrain_paint::colors,
+    terrain_colors::ColorJob,
+    terrain_normals::Normals,
     weather::{WeatherJob, Weathering},
 };
 use crate::{
@@ -142,8 +142,8 @@ enum Stage {
     Contours(Box<ContourJob>),
     Heights { contours: Contours, map: Box<HeightMap>, heights: Grid<f32>, stripe: usize },
     Weather { contours: Contours, job: Box<WeatherJob> },
-    Normals { contours: Contours, heights: Grid<f32> },
-    Colors { contours: Contours, heights: Grid<f32>, normal: Grid<[u8; 4]> },
+    Normals { contours: Contours, heights: Grid<f32>, job: Box<Normals> },
+    Colors { contours: Contours, heights: Grid<f32>, normal: Grid<[u8; 4]>, job: Box<ColorJob> },
     Done,
 }
 
@@ -173,7 +173,7 @@ pub struct ReliefJob {
 }
 
 /// Shares of the progress at which contours, heights, weather and normals are done.
-const PROGRESS: [f32; 4] = [0.2, 0.35, 0.9, 0.93];
+const PROGRESS: [f32; 4] = [0.1, 0.16, 0.62, 0.65];
 
 impl ReliefJob {
     /// A job for a relief of `size` texels.
@@ -219,16 +219,23 @@ impl ReliefJob {
                 if job.step() {
                     Stage::Weather { contours, job }
                 } else {
-                    Stage::Normals { contours, heights: job.heights }
+                    let normals = Box::new(Normals::new(frame.size(), &frame));
+                    Stage::Normals { contours, heights: job.heights, job: normals }
                 }
             }
-            Stage::Normals { contours, heights } => {
-                let normal = normals(&heights, &frame);
-                Stage::Colors { contours, heights, normal }
+            Stage::Normals { contours, heights, mut job } => {
+                if job.step(&heights) {
+                    Stage::Normals { contours, heights, job }
+                } else {
+                    let colors = Box::new(ColorJob::new(&heights, frame, self.settings.colors, seed));
+                    Stage::Colors { contours, heights, normal: job.out, job: colors }
+                }
             }
-            Stage::Colors { contours, heights, normal } => {
-                let diffuse = colors(&heights, &frame, &self.settings.colors, seed)?;
-                return Ok(Some(Relief { contours, heights, diffuse, normal }));
+            Stage::Colors { contours, heights, normal, mut job } => {
+                if !job.step(&heights)? {
+                    return Ok(Some(Relief { contours, heights, diffuse: job.out, normal }));
+                }
+                Stage::Colors { contours, heights, normal, job }
             }
             Stage::Done => Stage::Done,
         };
@@ -245,8 +252,8 @@ impl ReliefJob {
                 contours + (heights - contours) * *stripe as f32 / map.stripes().max(1) as f32
             }
             Stage::Weather { job, .. } => heights + (weather - heights) * job.progress(),
-            Stage::Normals { .. } => weather,
-            Stage::Colors { .. } => normals,
+            Stage::Normals { job, .. } => weather + (normals - weather) * job.progress(),
+            Stage::Colors { job, .. } => normals + (1.0 - normals) * job.progress().min(0.99),
             Stage::Done => 1.0,
         }
     }
@@ -271,6 +278,7 @@ impl ReliefJob {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::relief::rows::{MANY, tests::TAKEN};
     use glam::Vec2;
 
     #[test]
@@ -291,6 +299,26 @@ mod tests {
             assert_eq!(job.step(), Ok(None));
             let steep = by_steps.steepness();
             assert!(steep.as_slice().iter().any(|&steep| steep > 60) && steep.size() == size);
+        }
+    }
+
+    /// After contours and heights, which are made level by level and stripe by stripe, no step works on more texels than a few
+    /// rows have.
+    #[test]
+    fn steps_are_bounded() {
+        let size = UVec2::new(500, 700);
+        for settings in [ReliefSettings::rock_wall(), ReliefSettings::island()] {
+            let mut job = ReliefJob::new(settings, size, 3).unwrap();
+            let (mut all, mut is_done) = (0, false);
+            while !is_done {
+                let before = TAKEN.get();
+                is_done = job.step().unwrap().is_some();
+                let taken = TAKEN.get() - before;
+                assert!(taken <= MANY, "{taken} texels at {}", job.progress());
+                all += taken;
+            }
+            // Bends, wear, normals, colors, and all that these measure before.
+            assert!(all >= 12 * (size.x * size.y) as usize, "{all}");
         }
     }
 

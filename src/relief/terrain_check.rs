@@ -12,9 +12,14 @@ pub(super) fn check_heights(heights: &Grid<f32>, least: u32) -> Result<(), Heigh
     if size.min_element() < least || size.max_element() > MAX_SIDE {
         return Err(HeightError::Size { width: size.x, height: size.y, least, most: MAX_SIDE });
     }
+    (0..heights.height()).try_for_each(|y| check_row(heights.row(y), y))
+}
+
+/// Checks that the heights of row `y` are finite.
+pub(super) fn check_row(row: &[f32], y: usize) -> Result<(), HeightError> {
     let is_wrong = |height: &f32| !(-MOST_HEIGHT..=MOST_HEIGHT).contains(height);
-    match heights.as_slice().iter().position(is_wrong) {
-        Some(i) => Err(HeightError::Height { x: i as u32 % size.x, y: i as u32 / size.x }),
+    match row.iter().position(is_wrong) {
+        Some(x) => Err(HeightError::Height { x: x as u32, y: y as u32 }),
         None => Ok(()),
     }
 }
