@@ -172,8 +172,9 @@ impl Segments {
             for i in nearest {
                 kept |= u32::from(i / LANES == block) << (i % LANES);
             }
-            if block + 1 == self.blocks.len() && self.len % LANES > 0 {
-                kept &= (1 << (self.len % LANES)) - 1;
+            if block + 1 == self.blocks.len() {
+                // What the last block is filled up with is left out.
+                kept &= u32::MAX >> (u32::BITS as usize - (self.len - block * LANES));
             }
             while kept != 0 {
                 out.add(self.get(block * LANES + kept.trailing_zeros() as usize));

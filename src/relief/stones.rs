@@ -91,7 +91,8 @@ impl StonesJob {
                     Stage::Label => self.label_row(y, heights.row(y)),
                     Stage::Sum => self.sum_row(y, heights.row(y)),
                     Stage::Rename => {
-                        self.labels.row_mut(y).iter_mut().for_each(|label| *label = self.names[*label as usize])
+                        let labels = self.labels.row_mut(y);
+                        labels.iter_mut().for_each(|label| *label = self.names[*label as usize]);
                     }
                     Stage::Name | Stage::Done => {}
                 }

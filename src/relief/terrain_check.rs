@@ -25,6 +25,7 @@ pub(super) fn check_row(row: &[f32], y: usize) -> Result<(), HeightError> {
 }
 
 /// 0 up to `from`, 1 from `to` on, smooth between.
+#[inline(always)]
 pub(super) fn smoothstep(from: f32, to: f32, value: f32) -> f32 {
     let width = to - from;
     let share = ((value - from) / if width.abs() < 1e-6 { 1e-6 } else { width }).clamp(0.0, 1.0);

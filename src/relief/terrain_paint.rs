@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     Grid,
-    math::{Rng, mix},
+    math::{Rng, mix, vectorized},
     pattern::SurfaceFrame,
 };
 use glam::{Vec2, Vec3};
@@ -71,10 +71,12 @@ struct Place {
     moist: f32,
 }
 
+#[inline(always)]
 fn rgb(color: [u8; 3]) -> Vec3 {
     Vec3::from_array(color.map(f32::from))
 }
 
+#[inline(always)]
 fn unit_draws(seed: u64) -> [f32; 4] {
     let bits = mix(seed);
     [0, 16, 32, 48].map(|shift| f32::from((bits >> shift) as u16) * (1.0 / 65_536.0))
@@ -120,13 +122,19 @@ impl Painter {
         if let Some(water) = &mut self.measured.water {
             water.moisture.read(y);
         }
-        for (x, out) in out.iter_mut().enumerate() {
-            let color = self.color(&self.place(heights.row(y)[x], x, y));
-            let [r, g, b] = color.to_array().map(|value| (value + 0.5) as u8);
-            *out = [r, g, b, 255];
-        }
+        vectorized(
+            #[inline(always)]
+            || {
+                for (x, out) in out.iter_mut().enumerate() {
+                    let color = self.color(&self.place(heights.row(y)[x], x, y));
+                    let [r, g, b] = color.to_array().map(|value| (value + 0.5) as u8);
+                    *out = [r, g, b, 255];
+                }
+            },
+        );
     }
 
+    #[inline(always)]
     fn place(&self, height: f32, x: usize, y: usize) -> Place {
         let [right, down] = [self.slopes.right[x], self.slopes.down[x]];
         Place {
@@ -145,6 +153,7 @@ impl Painter {
     }
 
     /// The color of a texel, 0..=255.
+    #[inline(always)]
     fn color(&self, place: &Place) -> Vec3 {
         if let Some(sea) = self.colors.sea.filter(|_| place.height < 0.0) {
             let fresh = self.river(place) * (1.0 - smoothstep(0.0, 0.25, -place.height / sea.half));
@@ -180,17 +189,20 @@ impl Painter {
     }
 
     /// Share of a place that is river.
+    #[inline(always)]
     fn river(&self, place: &Place) -> f32 {
         let rivers = self.measured.water.as_ref().and_then(|water| water.rivers.as_ref());
         rivers.map_or(0.0, |rivers| rivers.row(place.y)[place.x])
     }
 
     /// How far a place faces the light, about -1..=1.
+    #[inline(always)]
     fn facing(&self, place: &Place) -> f32 {
         -(self.slopes.right[place.x] * LIGHT.x + self.slopes.down[place.x] * LIGHT.y)
     }
 
     /// Light and shade.
+    #[inline(always)]
     fn shade(&self, place: &Place) -> f32 {
         let (right, down) = (self.slopes.right[place.x], self.slopes.down[place.x]);
         let cavity = 1.0 + self.colors.cavity * (0.28 * place.edge[0] + 0.3 * place.edge[1]);
@@ -204,6 +216,7 @@ impl Painter {
     }
 
     /// Ground and rock.
+    #[inline(always)]
     fn dry(&self, place: &Place) -> Vec3 {
         let [ground, snow] = self.ground(place);
         let steep = place.slope * (1.0 + 0.25 * self.colors.variety * place.noise[1]);
@@ -223,6 +236,7 @@ impl Painter {
     }
 
     /// The surface of a stone, or what lies beside it.
+    #[inline(always)]
     fn stone(&self, stones: &StoneColors, place: &Place, ground: Vec3, steep: f32) -> Vec3 {
         let share = smoothstep(STONE[0], STONE[1], place.height + 0.003 * place.noise[1]);
         let gap = || self.gap(stones, place, ground);
@@ -237,6 +251,7 @@ impl Painter {
     }
 
     /// What lies in a gap: earth and loose pieces of the same rock.
+    #[inline(always)]
     fn gap(&self, stones: &StoneColors, place: &Place, ground: Vec3) -> Vec3 {
         let noise = place.noise;
         let mottled = 1.0 + self.colors.variety * (0.12 * noise[2] + 0.3 * noise[1] + 0.3 * noise[0]);
@@ -245,6 +260,7 @@ impl Painter {
     }
 
     /// The surface of a stone.
+    #[inline(always)]
     fn face(&self, stones: &StoneColors, place: &Place, ground: Vec3, steep: f32) -> Vec3 {
         let stone = self.measured.stones.as_ref().and_then(|stones| stones.at(place.x, place.y));
         let mut color = ground.lerp(self.rock(place, stone.map_or(0, |stone| stone.seed)), 0.35 + 0.4 * steep);
@@ -258,6 +274,7 @@ impl Painter {
     }
 
     /// Stains and lichen on rock.
+    #[inline(always)]
     fn patches(&self, color: Vec3, place: &Place) -> Vec3 {
         let noise = place.noise;
         let cover = |patches: &Patches, value: f32, soft: f32| {
@@ -278,6 +295,7 @@ impl Painter {
     }
 
     /// The color of the ground, and how far it is the uppermost kind.
+    #[inline(always)]
     fn ground(&self, place: &Place) -> [Vec3; 2] {
         let noise = place.noise;
         // Borders between two kinds wander with the noise, and the upper kind lies in hollows first, as snow does.
@@ -321,6 +339,7 @@ impl Painter {
     }
 
     /// The color of rock: strata bend with the noise. Those of stones lie as each stone does.
+    #[inline(always)]
     fn rock(&self, place: &Place, stone: u64) -> Vec3 {
         let [first, second] = self.colors.rock.map(rgb);
         let noise = place.noise;
@@ -337,6 +356,7 @@ impl Painter {
     }
 
     /// How lush woods are at a place: above 0 they cover it.
+    #[inline(always)]
     fn woods(&self, place: &Place) -> Option<(Woods, f32)> {
         let woods = self.colors.woods?;
         if woods.spread <= 0.0 {
@@ -357,6 +377,7 @@ impl Painter {
     }
 
     /// Color and light of the crowns at a place, and how far they cover it. At the edge of woods crowns stand apart.
+    #[inline(always)]
     fn crown(&self, woods: &Woods, place: &Place, lush: f32) -> (Vec3, f32, f32) {
         let (mut cover, mut sums, mut weights) = (0.0f32, Vec3::ZERO, 1e-3);
         for (off, [.., tone, hue]) in around(self.seed, place.pos / woods.crown) {
@@ -378,6 +399,7 @@ impl Painter {
         (color * Vec3::new(0.88 + 0.3 * hue, 1.0, 0.95), light, share)
     }
 
+    #[inline(always)]
     fn sea(&self, sea: &Sea, place: &Place) -> Vec3 {
         let noise = place.noise;
         let blurred = -self.measured.blurs[0].row(place.y)[place.x];

@@ -4,7 +4,6 @@ use super::{
     drainage::{Drainage, DrainageJob},
     rows::{MANY, Rows},
     terrain_blur::Blur,
-    terrain_check::smoothstep,
     terrain_noise::RowNoise,
 };
 use crate::{Grid, math::Rng, pattern::SurfaceFrame};

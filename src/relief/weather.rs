@@ -13,7 +13,11 @@ use super::{
     terrain_valleys::{Coarse, Fine, Valleys},
     terrain_wear::{Gullies, flakes, rubble, shore},
 };
-use crate::{Grid, math::Rng, pattern::SurfaceFrame};
+use crate::{
+    Grid,
+    math::{Rng, vectorized},
+    pattern::SurfaceFrame,
+};
 use glam::Vec2;
 use std::ops::Range;
 
@@ -377,18 +381,23 @@ impl WeatherJob {
                 noise.fill_row(y, row);
             }
             let [rough, layers] = &rows_of_noise;
-            for (x, out) in self.heights.row_mut(y).iter_mut().enumerate() {
-                let pos = self.frame.to_pos(Vec2::new(x as f32 + 0.5, y as f32 + 0.5));
-                let slope = Vec2::new(slopes.right[x], slopes.down[x]);
-                // Beaches are smooth.
-                let dry = 1.0 - coast * (1.0 - smoothstep(0.0, 0.012, out.abs()));
-                *out += gullies.depth(pos, slope, *out) + grain * dry * rough[x];
-                if *out > 0.0 {
-                    // Flakes end before a stone does.
-                    *out = (*out - chips * chip_size * flakes(layers[x])).max(0.5 * *out);
-                }
-                *out = rubble(self.seed, self.weathering.rubble, pos, *out);
-            }
+            vectorized(
+                #[inline(always)]
+                || {
+                    for (x, out) in self.heights.row_mut(y).iter_mut().enumerate() {
+                        let pos = self.frame.to_pos(Vec2::new(x as f32 + 0.5, y as f32 + 0.5));
+                        let slope = Vec2::new(slopes.right[x], slopes.down[x]);
+                        // Beaches are smooth.
+                        let dry = 1.0 - coast * (1.0 - smoothstep(0.0, 0.012, out.abs()));
+                        *out += gullies.depth(pos, slope, *out) + grain * dry * rough[x];
+                        if *out > 0.0 {
+                            // Flakes end before a stone does.
+                            *out = (*out - chips * chip_size * flakes(layers[x])).max(0.5 * *out);
+                        }
+                        *out = rubble(self.seed, self.weathering.rubble, pos, *out);
+                    }
+                },
+            );
         }
     }
 }
