@@ -2,8 +2,8 @@
 
 use super::{
     contours::Contours,
+    error::ReliefError,
     heights_bands::{Band, Bands},
-    heights_error::HeightError,
     heights_near::{Corners, FAR, Segments, TILE, Tiles},
     heights_params::HeightParams,
     heights_slope::{Across, Lane},
@@ -98,29 +98,29 @@ pub fn heights(
     params: &HeightParams,
     frame: SurfaceFrame,
     seed: u64,
-) -> Result<Grid<f32>, HeightError> {
+) -> Result<Grid<f32>, ReliefError> {
     Ok(HeightMap::new(contours, params, frame, seed)?.heights(1))
 }
 
-fn check(contours: &Contours) -> Result<(), HeightError> {
+fn check(contours: &Contours) -> Result<(), ReliefError> {
     let (min, max) = (1e-6, 1e6);
     if !(min..=max).contains(&contours.distance) {
-        return Err(HeightError::OutOfRange { name: "distance", value: contours.distance, min, max });
+        return Err(ReliefError::OutOfRange { name: "distance", value: contours.distance, min, max });
     }
-    let count = contours.rings.iter().map(|ring| ring.points.len()).sum();
-    if count > MAX_HEIGHT_POINTS {
-        return Err(HeightError::TooManyPoints { count, most: MAX_HEIGHT_POINTS });
+    if contours.rings.iter().map(|ring| ring.points.len()).sum::<usize>() > MAX_HEIGHT_POINTS {
+        return Err(ReliefError::TooManyPoints { most: MAX_HEIGHT_POINTS });
     }
     for (i, ring) in contours.rings.iter().enumerate() {
         if ring.points.len() < 3 {
-            return Err(HeightError::FewPoints { ring: i, points: ring.points.len() });
+            return Err(ReliefError::TooFewPoints { contour: i, points: ring.points.len() });
         }
         if !(-MAX_LEVEL..=MAX_LEVEL).contains(&ring.level) {
-            return Err(HeightError::Level { ring: i, level: ring.level, most: MAX_LEVEL });
+            return Err(ReliefError::Level { ring: i, level: ring.level, most: MAX_LEVEL });
         }
         let is_far = |point: &glam::Vec2| !(point.is_finite() && point.abs().max_element() <= MOST_PLACE);
         if let Some(point) = ring.points.iter().position(is_far) {
-            return Err(HeightError::Point { ring: i, point, most: MOST_PLACE });
+            let glam::Vec2 { x, y } = ring.points[point];
+            return Err(ReliefError::Point { contour: i, point, x, y, most: MOST_PLACE });
         }
     }
     Ok(())
@@ -136,14 +136,14 @@ impl HeightMap {
     /// and the same for the same values, but mean nothing. Without rings all heights are 0.
     ///
     /// # Errors
-    /// [`HeightError`] if a parameter, the distance of the contours, a ring or its level is out of range, or if there are more than
+    /// [`ReliefError`] if a parameter, the distance of the contours, a ring or its level is out of range, or if there are more than
     /// [`MAX_HEIGHT_POINTS`] points.
     pub fn new(
         contours: &Contours,
         params: &HeightParams,
         frame: SurfaceFrame,
         seed: u64,
-    ) -> Result<Self, HeightError> {
+    ) -> Result<Self, ReliefError> {
         params.validate()?;
         check(contours)?;
         let (lowest, highest) = contours.levels().unwrap_or((0, -1));

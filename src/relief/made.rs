@@ -5,7 +5,6 @@ use super::{
     error::ReliefError,
     generate::ContourJob,
     heights::HeightMap,
-    heights_error::HeightError,
     heights_params::HeightParams,
     params::ReliefParams,
     shapes::ReliefShape,
@@ -14,10 +13,7 @@ use super::{
     terrain_normals::Normals,
     weather::{WeatherJob, Weathering},
 };
-use crate::{
-    Grid,
-    pattern::{FrameError, SurfaceFrame},
-};
+use crate::{Grid, pattern::SurfaceFrame};
 use glam::UVec2;
 
 /// Everything that a relief is made from, except its size and seed.
@@ -42,21 +38,6 @@ pub struct ReliefSettings {
     pub weathering: Weathering,
     /// How heights become colors.
     pub colors: TerrainColors,
-}
-
-/// Why a relief cannot be made.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum ReliefJobError {
-    /// The contours cannot be made.
-    #[error("contours: {0}")]
-    Contours(#[from] ReliefError),
-    /// The heights or colors cannot be made.
-    #[error("heights: {0}")]
-    Heights(#[from] HeightError),
-    /// The surface cannot have this size.
-    #[error(transparent)]
-    Size(#[from] FrameError),
 }
 
 impl ReliefSettings {
@@ -95,12 +76,12 @@ impl ReliefSettings {
     /// Checks every number against its range.
     ///
     /// # Errors
-    /// [`ReliefJobError`] for the first number that is out of its range or not finite. Lines are checked when contours are made.
-    pub fn validate(&self) -> Result<(), ReliefJobError> {
+    /// [`ReliefError`] for the first number that is out of its range or not finite. Lines are checked when contours are made.
+    pub fn validate(&self) -> Result<(), ReliefError> {
         self.contours.validate()?;
         self.heights.validate()?;
         self.weathering.validate()?;
-        Ok(self.colors.validate()?)
+        self.colors.validate()
     }
 }
 
@@ -162,7 +143,7 @@ enum Stage {
 ///     assert!(job.progress() < 1.0);
 /// };
 /// assert_eq!(relief.diffuse.size(), [96, 64].into());
-/// # Ok::<(), bevy_crack::relief::ReliefJobError>(())
+/// # Ok::<(), bevy_crack::relief::ReliefError>(())
 /// ```
 #[derive(Clone, Debug)]
 pub struct ReliefJob {
@@ -179,9 +160,9 @@ impl ReliefJob {
     /// A job for a relief of `size` texels.
     ///
     /// # Errors
-    /// [`ReliefJobError`] if a number is out of its range, the size is zero or above
+    /// [`ReliefError`] if a number is out of its range, the size is zero or above
     /// [`MAX_SIDE`](crate::pattern::MAX_SIDE), or the lines of the shape cannot be used.
-    pub fn new(settings: ReliefSettings, size: UVec2, seed: u64) -> Result<Self, ReliefJobError> {
+    pub fn new(settings: ReliefSettings, size: UVec2, seed: u64) -> Result<Self, ReliefError> {
         settings.validate()?;
         let frame = SurfaceFrame::new(size)?;
         let seeds = settings.shape.contours(frame.extent(), seed);
@@ -192,8 +173,8 @@ impl ReliefJob {
     /// One step of the work; the relief when it is done, once.
     ///
     /// # Errors
-    /// [`ReliefJobError`] if contours or heights cannot be made. The job is over then.
-    pub fn step(&mut self) -> Result<Option<Relief>, ReliefJobError> {
+    /// [`ReliefError`] if contours or heights cannot be made. The job is over then.
+    pub fn step(&mut self) -> Result<Option<Relief>, ReliefError> {
         let (frame, seed) = (self.frame, self.seed);
         self.stage = match std::mem::replace(&mut self.stage, Stage::Done) {
             Stage::Contours(mut job) => {
@@ -262,7 +243,7 @@ impl ReliefJob {
     ///
     /// # Errors
     /// Those of [`step`](Self::step).
-    pub fn finish(mut self) -> Result<Relief, ReliefJobError> {
+    pub fn finish(mut self) -> Result<Relief, ReliefError> {
         loop {
             if let Some(relief) = self.step()? {
                 return Ok(relief);

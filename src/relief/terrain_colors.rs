@@ -1,7 +1,7 @@
 //! The colors of height fields: [`colors`], and in steps [`ColorJob`].
 
 use super::{
-    heights_error::HeightError,
+    error::ReliefError,
     rows::{FEW, MANY, Rows},
     stones::{Stones, StonesJob},
     terrain::TerrainColors,
@@ -17,7 +17,7 @@ use crate::{Grid, pattern::SurfaceFrame};
 /// Heights are in pattern units, of texels as `frame` tells. `seed` is that of the variety.
 ///
 /// # Errors
-/// [`HeightError`] if a number of `colors` is out of range, or a height is not finite.
+/// [`ReliefError`] if a number of `colors` is out of range, or a height is not finite.
 ///
 /// ```
 /// use bevy_crack::{Grid, pattern::SurfaceFrame, relief::{TerrainColors, colors}};
@@ -36,7 +36,7 @@ pub fn colors(
     frame: &SurfaceFrame,
     colors: &TerrainColors,
     seed: u64,
-) -> Result<Grid<[u8; 4]>, HeightError> {
+) -> Result<Grid<[u8; 4]>, ReliefError> {
     colors.validate()?;
     check_heights(heights, 1)?;
     let mut job = ColorJob::new(heights, *frame, *colors, seed);
@@ -103,7 +103,7 @@ impl ColorJob {
     /// Some rows; `false` when all is done.
     ///
     /// Fails where a height is not finite.
-    pub(super) fn step(&mut self, heights: &Grid<f32>) -> Result<bool, HeightError> {
+    pub(super) fn step(&mut self, heights: &Grid<f32>) -> Result<bool, ReliefError> {
         let mut stage = std::mem::replace(&mut self.stage, Stage::Done);
         let is_open = match &mut stage {
             Stage::Range => {
@@ -123,7 +123,7 @@ impl ColorJob {
         Ok(!matches!(self.stage, Stage::Done))
     }
 
-    fn find_range(&mut self, heights: &Grid<f32>) -> Result<(), HeightError> {
+    fn find_range(&mut self, heights: &Grid<f32>) -> Result<(), ReliefError> {
         for y in self.rows.take(MANY) {
             let row = heights.row(y);
             check_row(row, y)?;

@@ -1,7 +1,7 @@
 //! What weather makes of a height field: [`Weathering`], [`weathered`].
 
 use super::{
-    heights_error::HeightError,
+    error::ReliefError,
     rows::{FEW, Rows},
     stones::StonesJob,
     terrain_blur::Blur,
@@ -108,8 +108,8 @@ impl Weathering {
     /// Checks every number against its range.
     ///
     /// # Errors
-    /// [`HeightError::OutOfRange`] for the first number that is out of its range or not finite.
-    pub fn validate(&self) -> Result<(), HeightError> {
+    /// [`ReliefError::OutOfRange`] for the first number that is out of its range or not finite.
+    pub fn validate(&self) -> Result<(), ReliefError> {
         let ranges = [
             ("bend", self.bend, 0.0, 0.2),
             ("bend_size", self.bend_size, 0.005, 4.0),
@@ -124,7 +124,7 @@ impl Weathering {
             ("grain", self.grain, 0.0, 0.1),
         ];
         match ranges.into_iter().find(|(_, value, min, max)| !(*min..=*max).contains(value)) {
-            Some((name, value, min, max)) => Err(HeightError::OutOfRange { name, value, min, max }),
+            Some((name, value, min, max)) => Err(ReliefError::OutOfRange { name, value, min, max }),
             None => Ok(()),
         }
     }
@@ -141,7 +141,7 @@ impl Default for Weathering {
 /// Heights are in pattern units, of texels as `frame` tells. The result depends on the arguments alone.
 ///
 /// # Errors
-/// [`HeightError`] if a number of `weathering` is out of range, or a height is not finite.
+/// [`ReliefError`] if a number of `weathering` is out of range, or a height is not finite.
 ///
 /// ```
 /// use bevy_crack::{Grid, pattern::SurfaceFrame, relief::{Weathering, weathered}};
@@ -159,7 +159,7 @@ pub fn weathered(
     frame: &SurfaceFrame,
     weathering: &Weathering,
     seed: u64,
-) -> Result<Grid<f32>, HeightError> {
+) -> Result<Grid<f32>, ReliefError> {
     weathering.validate()?;
     check_heights(heights, 1)?;
     let mut job = WeatherJob::new(heights.clone(), *frame, *weathering, seed);
