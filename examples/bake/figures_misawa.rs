@@ -1,5 +1,6 @@
 //! `bake figures-misawa`: the figures of the paper on contour generation, made again with a contour of our own.
 
+use crate::{mountain::Mountain, terrain::Terrain};
 use bevy_crack::{
     math::{Rng, ops},
     relief::{Contours, Descriptors, Join, ReliefParams},
@@ -7,7 +8,12 @@ use bevy_crack::{
 use clap::Args;
 use glam::Vec2;
 use image::RgbaImage;
-use std::{error::Error, f32::consts::TAU, fs, path::PathBuf};
+use std::{
+    error::Error,
+    f32::consts::TAU,
+    fs,
+    path::{Path, PathBuf},
+};
 use tiny_skia::{Color, Paint, PathBuilder, Pixmap, Stroke, Transform};
 
 #[derive(Args)]
@@ -17,6 +23,9 @@ pub(crate) struct Options {
     out: PathBuf,
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Real terrain for figures 9 and 17: a 16-bit picture of heights with a JSON text of the same name beside it
+    #[arg(long, default_value = "assets/terrain/jacksboro_fault.png")]
+    dem: PathBuf,
     /// Side of a panel, texels
     #[arg(long, default_value_t = 640, value_parser = clap::value_parser!(u32).range(64..=4096))]
     side: u32,
@@ -27,6 +36,9 @@ const GAP: u32 = 16;
 
 /// Distance from contour to contour, in units of the panel's side.
 const DISTANCE: f32 = 0.0125;
+
+/// Contours over the whole height of the real terrain.
+const LEVELS: u16 = 40;
 
 /// Corners of the seed contour.
 const CORNERS: u32 = 230;
@@ -143,7 +155,7 @@ pub(crate) fn bake(options: &Options) -> Done<()> {
     joins(&studio, out)?;
     let simple = |join| studio.panel(ReliefParams { join, ..ReliefParams::SIMPLE });
     let arc = |factor| simple(Join::Arc { factor });
-    save(&[simple(Join::Miter)?, simple(Join::Bevel)?, arc(1.2)?], out.join("fig_09_simple.png"))?;
+    real(&studio, &options.dem, out)?;
     save(&[arc(1.4)?, arc(1.6)?], out.join("fig_10_arcs.png"))?;
     let midpoint =
         |degrees: f32| studio.panel(ReliefParams { max_angle: degrees.to_radians(), ..ReliefParams::MIDPOINT });
@@ -152,12 +164,32 @@ pub(crate) fn bake(options: &Options) -> Done<()> {
     save(&[studio.panel(ReliefParams::FOURIER)?], out.join("fig_15_fourier.png"))?;
     save(&[studio.panel(ReliefParams::IMPROVED)?], out.join("fig_16_improved.png"))?;
     beyond(&studio, out)?;
-    println!("figures 5, 7, 9, 10, 12, 14, 15 and 16, and what goes beyond the paper, are in {}", out.display());
+    println!("figures 5, 7, 9, 10, 12 and 14 to 17, and what goes beyond the paper, are in {}", out.display());
+    Ok(())
+}
+
+/// 9: the three joins from a real contour, beside the contours of the real map. 17: bird's-eye views of the real contours, of
+/// simple and of improved ones.
+fn real(studio: &Studio, dem: &Path, out: &Path) -> Done<()> {
+    let mountain = Mountain::of(&Terrain::read(dem)?, LEVELS)?;
+    let made = |params: ReliefParams| {
+        let params = ReliefParams { distance: mountain.contours.distance, ..params };
+        Contours::generate(&params, &mountain.seeds(), studio.seed)
+    };
+    let simple = |join| made(ReliefParams { join, ..ReliefParams::SIMPLE });
+    let panel = |contours: &Contours| Ok(Panel::new(studio.side)?.contours(contours));
+    let joins = [Join::Miter, Join::Bevel, Join::Arc { factor: 1.2 }].map(|join| panel(&simple(join)?));
+    let panels = joins.into_iter().chain([panel(&mountain.contours)]).collect::<Done<Vec<_>>>()?;
+    save(&panels, out.join("fig_09_simple.png"))?;
+    let views = [mountain.contours.clone(), simple(Join::Arc { factor: 1.4 })?, made(ReliefParams::IMPROVED)?];
+    for (contours, name) in views.iter().zip(["a_real", "b_simple", "c_improved"]) {
+        mountain.birds_eye(contours)?.save(out.join(format!("fig_17{name}.png")))?;
+    }
     Ok(())
 }
 
 /// 5: a valley with edges extended, joined by a line, and by a circle. 7: the circle by two lines.
-fn joins(studio: &Studio, out: &std::path::Path) -> Done<()> {
+fn joins(studio: &Studio, out: &Path) -> Done<()> {
     let wide = [[-2.0, 0.9], [0.2, 0.9], [0.5, 0.45], [0.8, 0.9], [3.0, 0.9], [3.0, -3.0], [-2.0, -3.0]];
     let panels = [Join::Miter, Join::Bevel, Join::Round].map(|join| studio.corner(&wide, join, None));
     save(&panels.into_iter().collect::<Done<Vec<_>>>()?, out.join("fig_05_joins.png"))?;
@@ -168,7 +200,7 @@ fn joins(studio: &Studio, out: &std::path::Path) -> Done<()> {
 }
 
 /// 14: one contour, and what random phases from lower and lower frequencies on make of it.
-fn phases(studio: &Studio, out: &std::path::Path) -> Done<()> {
+fn phases(studio: &Studio, out: &Path) -> Done<()> {
     let contours = studio.contours(ReliefParams { inward: 4, ..ReliefParams::SIMPLE })?;
     let rings = contours.level(4).max_by_key(|ring| ring.points.len());
     let ring = rings.ok_or("the fourth contour")?;
@@ -186,7 +218,7 @@ fn phases(studio: &Studio, out: &std::path::Path) -> Done<()> {
 }
 
 /// Parameters from the seed, a steep side, both ways from a contour in the middle, several seeds.
-fn beyond(studio: &Studio, out: &std::path::Path) -> Done<()> {
+fn beyond(studio: &Studio, out: &Path) -> Done<()> {
     let estimated = ReliefParams::estimate(&studio.contour)?;
     println!("estimated from the seed: {estimated:?}");
     let steep = ReliefParams { steepness: 0.6, steep_angle: -0.6, ..ReliefParams::IMPROVED };

@@ -11,7 +11,6 @@
 mod analogy;
 mod birds_eye;
 mod blend;
-mod contour_lines;
 mod figures;
 mod figures_misawa;
 mod figures_strands;
@@ -22,6 +21,7 @@ mod guided;
 mod ink;
 mod legible;
 mod maps;
+mod mountain;
 mod ocr;
 mod own;
 mod painting;

@@ -1,13 +1,13 @@
 //! `bake relief-terrain`: from one real contour to the others, by every method, beside the real ones.
 
 use crate::{
-    birds_eye::{View, birds_eye},
-    terrain::{Terrain, length},
+    mountain::{Mountain, total_length},
+    terrain::Terrain,
 };
 use bevy_crack::{
     Grid,
     pattern::SurfaceFrame,
-    relief::{Contours, HeightParams, Join, Method, ReliefParams, Ring, TerrainColors, colors, heights},
+    relief::{Contours, HeightParams, Join, Method, ReliefParams, heights},
 };
 use clap::Args;
 use glam::{UVec2, Vec2};
@@ -31,67 +31,6 @@ pub(crate) struct Options {
 
 /// Side of the surface to which the region of the seed contour is fitted, texels.
 const SIDE: u32 = 512;
-
-fn is_inside(points: &[Vec2], at: Vec2) -> bool {
-    let sides = points.iter().zip(points.iter().cycle().skip(1));
-    let crosses =
-        |(a, b): &(&Vec2, &Vec2)| (a.y > at.y) != (b.y > at.y) && at.x < a.x + (at.y - a.y) * (b.x - a.x) / (b.y - a.y);
-    sides.filter(crosses).count() % 2 == 1
-}
-
-fn bounds(points: &[Vec2]) -> [Vec2; 2] {
-    [Vec2::min, Vec2::max].map(|pick| points.iter().copied().reduce(pick).unwrap_or_default())
-}
-
-/// The seed contour as level 0, and the real contours inside of it, fitted to a square; heights from level to level in that unit.
-fn real(terrain: &Terrain, levels: u16) -> Option<(Contours, f32)> {
-    let (all, step) = terrain.contours(levels);
-    let extent = terrain.frame.extent();
-    let border = 1.5 / terrain.frame.texels_per_unit();
-    let is_whole = |ring: &&Ring| {
-        let [min, max] = bounds(&ring.points);
-        !ring.is_hole() && min.min_element() > border && (extent - max).min_element() > border
-    };
-    let depth = |ring: &Ring| {
-        let inside =
-            all.rings.iter().filter(|other| other.level > ring.level && is_inside(&ring.points, other.points[0]));
-        inside.map(|other| other.level - ring.level).max().unwrap_or(0)
-    };
-    // The largest mountain with five contours above its foot.
-    let whole = all.rings.iter().filter(is_whole).filter(|ring| depth(ring) >= 5);
-    let seed = whole.max_by(|a, b| a.signed_area().total_cmp(&b.signed_area()))?;
-    let [min, max] = bounds(&seed.points);
-    let scale = 0.86 / (max - min).max_element();
-    let fitted = |ring: &Ring| Ring {
-        points: ring.points.iter().map(|&point| (point - 0.5 * (min + max)) * scale + 0.5).collect(),
-        level: ring.level - seed.level,
-    };
-    let is_part = |ring: &&Ring| {
-        ring.level == seed.level && ring.points == seed.points
-            || (ring.level > seed.level || ring.is_hole() && ring.level == seed.level)
-                && is_inside(&seed.points, ring.points[0])
-    };
-    let rings: Vec<_> = all.rings.iter().filter(is_part).map(fitted).collect();
-    let mut real = Contours { rings, distance: 0.02 };
-    real.distance = spacing(&real);
-    Some((real, step * scale))
-}
-
-fn area(contours: &Contours, level: i32) -> f32 {
-    contours.level(level).map(|ring| ring.signed_area() as f32).sum()
-}
-
-fn total_length(contours: &Contours, level: i32) -> f32 {
-    contours.level(level).map(|ring| length(&ring.points)).sum()
-}
-
-/// Mean distance between the levels: the area between two of them over their mean length.
-fn spacing(contours: &Contours) -> f32 {
-    let last = contours.levels().map_or(0, |(_, highest)| highest);
-    let between: f32 = (0..last).map(|k| area(contours, k) - area(contours, k + 1)).sum();
-    let lengths: f32 = (0..last).map(|k| 0.5 * (total_length(contours, k) + total_length(contours, k + 1))).sum();
-    between / lengths.max(1e-6)
-}
 
 /// Points on the rings of a level, a small step apart.
 fn samples(contours: &Contours, level: i32, step: f32) -> Vec<Vec2> {
@@ -174,26 +113,23 @@ fn name(method: Method) -> &'static str {
     }
 }
 
-fn picture(options: &Options, contours: &Contours, step: f32, file: &str) -> Result<(), Box<dyn Error>> {
+fn picture(options: &Options, mountain: &Mountain, contours: &Contours, file: &str) -> Result<(), Box<dyn Error>> {
     let Some(out) = &options.out else { return Ok(()) };
     fs::create_dir_all(out)?;
-    let frame = SurfaceFrame::new(UVec2::splat(1024))?;
-    let params = HeightParams { step: 3.0 * step, floor: 1.5, ..HeightParams::DEFAULT };
-    let ground = heights(contours, &params, frame, 1)?;
-    let unlit = colors(&ground, &frame, &TerrainColors { light: 0.0, ..TerrainColors::MOUNTAIN }, 1)?;
-    birds_eye(&ground, &unlit, &frame, &View::WIDE).save(out.join(format!("{file}.png")))?;
+    mountain.birds_eye(contours)?.save(out.join(format!("{file}.png")))?;
     fs::write(out.join(format!("{file}.svg")), contours.to_svg(Vec2::ONE, 1000.0))?;
     Ok(())
 }
 
 pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
     let terrain = Terrain::read(&options.dem)?;
-    let (real, step) = real(&terrain, options.levels).ok_or("no mountain with five contours above its foot")?;
+    let mountain = Mountain::of(&terrain, options.levels)?;
+    let (real, step) = (&mountain.contours, mountain.step);
     let frame = SurfaceFrame::new(UVec2::splat(SIDE))?;
     let params = HeightParams { step, floor: 0.0, ..HeightParams::DEFAULT };
-    let real_ground = heights(&real, &params, frame, 1)?;
-    let seeds: Vec<_> = real.level(0).filter(|ring| !ring.is_hole()).map(|ring| ring.points.clone()).collect();
-    let itself = score(&real, &real, [&real_ground; 2], step);
+    let real_ground = heights(real, &params, frame, 1)?;
+    let seeds = mountain.seeds();
+    let itself = score(real, real, [&real_ground; 2], step);
     println!(
         "{} rings, {:.0} m from level to level, {:.4} apart",
         real.rings.len(),
@@ -205,7 +141,7 @@ pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
         println!("{name:9} {:8.3} {:7.3} {:10.3} {:7.3}", it.distance, it.length, it.dimension, it.height);
     };
     row("real", itself);
-    picture(options, &real, step, "a_real")?;
+    picture(options, &mountain, real, "a_real")?;
     for method in Method::ALL {
         // The constants that the paper gives for each.
         let factor = if method == Method::Improved { 3.0 } else { 1.4 };
@@ -215,7 +151,7 @@ pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
         for seed in 1..=options.seeds {
             let made = Contours::generate(&rings, &seeds, seed)?;
             let ground = heights(&made, &params, frame, 1)?;
-            let it = score(&made, &real, [&ground, &real_ground], step);
+            let it = score(&made, real, [&ground, &real_ground], step);
             let share = 1.0 / options.seeds as f64;
             mean.distance += share * it.distance;
             mean.length += share * it.length;
@@ -224,8 +160,8 @@ pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
             if seed == 1 {
                 picture(
                     options,
+                    &mountain,
                     &made,
-                    step,
                     &format!("{}_{}", if method == Method::Simple { "b" } else { "c" }, name(method)),
                 )?;
             }

@@ -1,7 +1,9 @@
 //! Seed contours for `bake relief`: shapes with a name, lists of points, outlines in pictures.
 
-use crate::contour_lines::contour_lines;
-use bevy_crack::{Grid, relief::ReliefShape};
+use bevy_crack::{
+    Grid,
+    relief::{ReliefShape, Ring, outlines},
+};
 use glam::{UVec2, Vec2};
 use std::{error::Error, fs, path::Path};
 
@@ -12,15 +14,16 @@ fn points(text: &str) -> Result<Vec<Vec<Vec2>>, Box<dyn Error>> {
 }
 
 /// The outlines of what is dark in a picture, fitted to the surface.
-fn outlines(path: &Path, extent: Vec2) -> Result<Vec<Vec<Vec2>>, Box<dyn Error>> {
+fn of_picture(path: &Path, extent: Vec2) -> Result<Vec<Vec<Vec2>>, Box<dyn Error>> {
     let picture = image::open(path)?.into_luma8();
     let size = UVec2::from(picture.dimensions());
     let dark = picture.into_raw().into_iter().map(|light| 255.0 - f32::from(light)).collect();
     let dark = Grid::from_vec(size, dark).ok_or("a picture of another size")?;
-    let scale = (extent / size.as_vec2()).min_element();
-    let shift = 0.5 * (extent - scale * size.as_vec2());
-    let rings = contour_lines(&dark, 127.5, 0);
-    let rings = rings.into_iter().filter(|ring| ring.signed_area() > 20.0);
+    let texels = size.min_element() as f32;
+    let scale = (extent * texels / size.as_vec2()).min_element();
+    let shift = 0.5 * (extent - scale * size.as_vec2() / texels);
+    let rings = outlines(&dark, 127.5)?.into_iter().map(|points| Ring { points, level: 0 });
+    let rings = rings.filter(|ring| ring.signed_area() * f64::from(texels * texels) > 20.0);
     Ok(rings.map(|ring| ring.points.iter().map(|point| *point * scale + shift).collect()).collect())
 }
 
@@ -31,6 +34,6 @@ pub(crate) fn seed_contours(name: &str, extent: Vec2, seed: u64) -> Result<Vec<V
         "island" => Ok(ReliefShape::Island.contours(extent, seed)),
         "wall" => Ok(ReliefShape::Wall.contours(extent, seed)),
         _ if name.ends_with(".json") => points(&fs::read_to_string(name)?),
-        _ => outlines(name.as_ref(), extent),
+        _ => of_picture(name.as_ref(), extent),
     }
 }

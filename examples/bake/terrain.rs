@@ -1,7 +1,10 @@
 //! Digital elevation models: a 16-bit picture and a JSON text beside it.
 
-use crate::contour_lines::contour_lines;
-use bevy_crack::{Grid, pattern::SurfaceFrame, relief::Contours};
+use bevy_crack::{
+    Grid,
+    pattern::SurfaceFrame,
+    relief::{Contours, ReliefError, Ring, outlines},
+};
 use glam::{UVec2, Vec2};
 use std::{error::Error, fs, path::Path};
 
@@ -33,19 +36,17 @@ impl Terrain {
 
     /// Contour lines at `count` even steps between the lowest and the highest place, and the step. Level 0 lies one
     /// step above the lowest place.
-    pub(crate) fn contours(&self, count: u16) -> (Contours, f32) {
+    pub(crate) fn contours(&self, count: u16) -> Result<(Contours, f32), ReliefError> {
         let highest = self.heights.as_slice().iter().copied().fold(0.0, f32::max);
         let step = highest / f32::from(count + 1);
         let mut rings = Vec::new();
         for level in 0..i32::from(count) {
-            rings.extend(contour_lines(&self.heights, step * (level + 1) as f32, level));
-        }
-        for ring in &mut rings {
-            ring.points.iter_mut().for_each(|point| *point = self.frame.to_pos(*point));
+            let lines = outlines(&self.heights, step * (level + 1) as f32)?;
+            rings.extend(lines.into_iter().map(|points| Ring { points, level }));
         }
         let length: f32 = rings.iter().map(|ring| length(&ring.points)).sum();
         let extent = self.frame.extent();
-        (Contours { rings, distance: extent.x * extent.y / length.max(1.0) }, step)
+        Ok((Contours { rings, distance: extent.x * extent.y / length.max(1.0) }, step))
     }
 }
 

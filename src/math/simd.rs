@@ -36,7 +36,7 @@ mod tests {
         },
         pattern::{CrackMask, PathPoint, SegmentPath, SurfaceFrame},
         raster::{DepthField, Profile, TexelRect, stamp_path},
-        relief::{Contours, HeightParams, Ring, heights, normals},
+        relief::{Contours, HeightParams, Ring, TerrainColors, Weathering, colors, heights, normals, weathered},
         voronoi::{VoronoiParams, voronoi_map},
     };
     use glam::{UVec2, Vec2};
@@ -173,8 +173,13 @@ mod tests {
                 let contours = Contours { rings: (0..4).map(ring).collect(), distance: 0.09 };
                 let frame = SurfaceFrame::new(UVec2::new(141, 93)).unwrap();
                 let heights = heights(&contours, &HeightParams::DEFAULT, frame, 1).unwrap();
-                let normals = normals(&heights, &frame);
-                (heights, normals)
+                let (weather, look) = match seed % 2 {
+                    0 => (Weathering::ROCK, TerrainColors::ROCK),
+                    _ => (Weathering::LAND, TerrainColors::ISLAND),
+                };
+                let worn = weathered(&heights, &frame, &weather, 1).unwrap();
+                let pictures = (normals(&worn, &frame), colors(&worn, &frame, &look, 1).unwrap());
+                (heights, worn, pictures)
             });
             assert!(wide == plain, "seed {seed}");
         }

@@ -2,7 +2,7 @@
 
 use super::{
     contours::{Contours, Ring},
-    heights_error::HeightError,
+    error::ReliefError,
 };
 use crate::{Grid, math::Rng, pattern::SurfaceFrame};
 use glam::{UVec2, Vec2};
@@ -44,8 +44,8 @@ impl CraterParams {
     /// Checks every number against its range.
     ///
     /// # Errors
-    /// [`HeightError::OutOfRange`] for the first number that is out of its range or not finite.
-    pub fn validate(&self) -> Result<(), HeightError> {
+    /// [`ReliefError::OutOfRange`] for the first number that is out of its range or not finite.
+    pub fn validate(&self) -> Result<(), ReliefError> {
         let ranges = [
             ("radius", self.radius, 0.0001, 16.0),
             ("terraces", self.terraces as f32, 1.0, MOST_TERRACES as f32),
@@ -53,7 +53,7 @@ impl CraterParams {
             ("walls", self.walls, 0.0, 1.0),
         ];
         match ranges.into_iter().find(|(_, value, min, max)| !(*min..=*max).contains(value)) {
-            Some((name, value, min, max)) => Err(HeightError::OutOfRange { name, value, min, max }),
+            Some((name, value, min, max)) => Err(ReliefError::OutOfRange { name, value, min, max }),
             None => Ok(()),
         }
     }
@@ -77,7 +77,7 @@ impl Default for CraterParams {
 /// assert_eq!(crater.depth_at([0.5, 0.5].into()), 1.0);
 /// assert_eq!(crater.depth_at([0.7, 0.5].into()), 0.0);
 /// assert_eq!(crater.contours().rings.len(), 3);
-/// # Ok::<(), bevy_crack::relief::HeightError>(())
+/// # Ok::<(), bevy_crack::relief::ReliefError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Crater {
@@ -148,13 +148,13 @@ impl Crater {
     /// The crater of a hit at `center`, pattern units.
     ///
     /// # Errors
-    /// [`HeightError::OutOfRange`] if a number of `params` or of `center` is out of its range or not finite.
-    pub fn new(center: Vec2, params: &CraterParams, seed: u64) -> Result<Self, HeightError> {
+    /// [`ReliefError::OutOfRange`] if a number of `params` or of `center` is out of its range or not finite.
+    pub fn new(center: Vec2, params: &CraterParams, seed: u64) -> Result<Self, ReliefError> {
         params.validate()?;
         let most = 1e4;
         for value in center.to_array() {
             if !(-most..=most).contains(&value) {
-                return Err(HeightError::OutOfRange { name: "center", value, min: -most, max: most });
+                return Err(ReliefError::OutOfRange { name: "center", value, min: -most, max: most });
             }
         }
         let mut rng = Rng::new(seed).stream("crater");
@@ -351,7 +351,7 @@ mod tests {
             CraterParams { walls: -1.0, ..CraterParams::DEFAULT },
         ];
         for params in wrong {
-            assert!(matches!(Crater::new(Vec2::ZERO, &params, 1), Err(HeightError::OutOfRange { .. })), "{params:?}");
+            assert!(matches!(Crater::new(Vec2::ZERO, &params, 1), Err(ReliefError::OutOfRange { .. })), "{params:?}");
         }
         assert!(Crater::new(Vec2::new(0.0, f32::NAN), &CraterParams::DEFAULT, 1).is_err());
         assert!(make(3).depth_at(Vec2::splat(f32::NAN)).is_finite());

@@ -1,4 +1,4 @@
-//! How water runs over a lattice of heights: [`Drainage`].
+//! How water runs over a lattice of heights: [`DrainageJob`] finds it, [`Drainage`] holds it.
 
 use crate::Grid;
 use std::{cmp::Reverse, collections::BinaryHeap};
@@ -23,41 +23,64 @@ fn key(height: f32) -> u32 {
 
 const OPEN: u32 = u32::MAX;
 
-impl Drainage {
-    /// The drainage of a lattice. Cells at the border and cells at height 0 or below are outlets.
+/// Cells that a step of a flood reaches.
+const CELLS: usize = 1 << 12;
+
+/// The search for the drainage of a lattice in steps.
+#[derive(Clone, Debug)]
+pub(super) struct DrainageJob {
+    flood: Flood,
+    queue: Queue,
+    outlets: Vec<bool>,
+    order: Vec<u32>,
+    into: Vec<u32>,
+}
+
+impl DrainageJob {
+    /// Cells at the border and cells at height 0 or below are outlets.
     pub(super) fn new(heights: &Grid<f32>) -> Self {
         let (width, height) = (heights.width(), heights.height());
         let values = heights.as_slice();
         let mut flood = Flood { width, height, filled: values.to_vec(), rank: vec![OPEN; values.len()] };
-        let mut into: Vec<u32> = (0..values.len() as u32).collect();
         let mut order = Vec::with_capacity(values.len());
         // The sea is lower than all else, so it needs no queue.
         for (cell, _) in (0..).zip(values).filter(|(_, height)| **height <= 0.0) {
             flood.reach(cell, &mut order);
         }
-        let mut queue =
-            Queue { heap: BinaryHeap::new(), entered: flood.rank.iter().map(|rank| *rank != OPEN).collect(), count: 0 };
+        let entered = flood.rank.iter().map(|rank| *rank != OPEN).collect();
+        let mut queue = Queue { heap: BinaryHeap::new(), cells: Vec::new(), entered };
         for (i, &value) in values.iter().enumerate() {
             if i % width == 0 || i % width + 1 == width || i < width || i / width + 1 == height {
                 queue.enter(i, value);
             }
         }
         let outlets = queue.entered.clone();
-        let sea = order.clone();
-        for cell in sea {
+        for &cell in &order {
             flood.spread(cell as usize, &mut queue);
         }
-        while let Some(Reverse((_, _, cell))) = queue.heap.pop() {
-            let i = cell as usize;
-            flood.reach(cell, &mut order);
-            if !outlets[i] {
-                into[i] = flood.downhill(i);
-            }
-            flood.spread(i, &mut queue);
-        }
-        Self { order, into, width }
+        Self { flood, queue, outlets, order, into: (0..values.len() as u32).collect() }
     }
 
+    /// Some cells; `false` when all are reached.
+    pub(super) fn step(&mut self) -> bool {
+        for _ in 0..CELLS {
+            let Some(cell) = self.queue.next() else { return false };
+            let i = cell as usize;
+            self.flood.reach(cell, &mut self.order);
+            if !self.outlets[i] {
+                self.into[i] = self.flood.downhill(i);
+            }
+            self.flood.spread(i, &mut self.queue);
+        }
+        true
+    }
+
+    pub(super) fn finish(self) -> Drainage {
+        Drainage { order: self.order, into: self.into, width: self.flood.width }
+    }
+}
+
+impl Drainage {
     /// How many cells drain through each, itself included.
     pub(super) fn gathered(&self) -> Vec<f32> {
         let mut gathered = vec![1.0; self.into.len()];
@@ -82,24 +105,34 @@ impl Drainage {
 }
 
 /// Cells that the flood comes to, the lowest first, and those of a height in turn.
+#[derive(Clone, Debug)]
 struct Queue {
-    heap: BinaryHeap<Reverse<(u32, u32, u32)>>,
+    /// The height of a cell, as a number that orders as it does, in the upper half; its place in `cells` in the lower.
+    heap: BinaryHeap<Reverse<u64>>,
+    /// All cells that were ever in it, in turn.
+    cells: Vec<u32>,
     /// Which cells are or were in it, or need not be.
     entered: Vec<bool>,
-    count: u32,
 }
 
 impl Queue {
     fn enter(&mut self, i: usize, height: f32) {
         if !self.entered[i] {
             self.entered[i] = true;
-            self.heap.push(Reverse((key(height), self.count, i as u32)));
-            self.count += 1;
+            self.heap.push(Reverse(u64::from(key(height)) << 32 | self.cells.len() as u64));
+            self.cells.push(i as u32);
         }
+    }
+
+    /// The cell that the flood comes to next.
+    fn next(&mut self) -> Option<u32> {
+        let Reverse(first) = self.heap.pop()?;
+        Some(self.cells[first as u32 as usize])
     }
 }
 
 /// The state of a flood.
+#[derive(Clone, Debug)]
 struct Flood {
     width: usize,
     height: usize,
@@ -156,13 +189,19 @@ mod tests {
     use super::*;
     use crate::math::Rng;
 
+    fn drainage(heights: &Grid<f32>) -> Drainage {
+        let mut job = DrainageJob::new(heights);
+        while job.step() {}
+        job.finish()
+    }
+
     #[test]
     fn all_water_reaches_an_outlet() {
         let mut rng = Rng::new(4);
         for size in [[1, 1], [2, 5], [40, 30]] {
             let heights = (0..size[0] * size[1]).map(|_| rng.signed()).collect();
             let heights = Grid::from_vec(size.into(), heights).unwrap();
-            let drainage = Drainage::new(&heights);
+            let drainage = drainage(&heights);
             let mut place = vec![0; drainage.into.len()];
             drainage.order.iter().enumerate().for_each(|(rank, &cell)| place[cell as usize] = rank);
             assert_eq!(drainage.order.len(), drainage.into.len());
@@ -182,7 +221,7 @@ mod tests {
     fn hollows_overflow_at_the_lowest_rim() {
         let mut heights = Grid::new([7, 7].into(), 0.9);
         heights.row_mut(3)[2..].copy_from_slice(&[0.1, 0.1, 0.1, 0.5, 0.6]);
-        let drainage = Drainage::new(&heights);
+        let drainage = drainage(&heights);
         let mut cell = 3 * 7 + 2;
         while drainage.into[cell] != cell as u32 {
             cell = drainage.into[cell] as usize;

@@ -1,6 +1,8 @@
 //! [`ReliefError`].
 
-/// Why contour lines cannot be made.
+use crate::pattern::FrameError;
+
+/// Why contour lines, heights, colors, meshes or craters cannot be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReliefError {
@@ -135,4 +137,37 @@ pub enum ReliefError {
         /// Height of the surface.
         down: f32,
     },
+    /// The level of a ring is too high or too low.
+    #[error("ring {ring} has level {level}, must lie in -{most}..={most}")]
+    Level {
+        /// Index of the ring.
+        ring: usize,
+        /// Its level.
+        level: i32,
+        /// Largest level allowed.
+        most: i32,
+    },
+    /// Heights are too large, or not finite.
+    #[error("the height at column {x}, row {y} must be finite and lie in -1e6..=1e6")]
+    Height {
+        /// Column of the texel.
+        x: u32,
+        /// Row of the texel.
+        y: u32,
+    },
+    /// A grid of heights is too small or too large.
+    #[error("heights of {width} x {height} texels: both sides must lie in {least}..={most}")]
+    Size {
+        /// Width, texels.
+        width: u32,
+        /// Height, texels.
+        height: u32,
+        /// Shortest side allowed.
+        least: u32,
+        /// Longest side allowed.
+        most: u32,
+    },
+    /// The surface cannot have this size.
+    #[error(transparent)]
+    Frame(#[from] FrameError),
 }

@@ -66,7 +66,7 @@ impl ReliefMesh {
     /// let mesh = ReliefMesh::new(&Grid::new([2, 2].into(), 0.0), &ReliefFrame::new([2.0, 2.0].into()), 0)?;
     /// assert!(mesh.to_obj().starts_with("v -1 1 0\n"));
     /// assert!(mesh.to_obj().ends_with("f 1/1/1 4/4/4 2/2/2\n"));
-    /// # Ok::<(), bevy_crack::relief::HeightError>(())
+    /// # Ok::<(), bevy_crack::relief::ReliefError>(())
     /// ```
     #[must_use]
     pub fn to_obj(&self) -> String {

@@ -192,12 +192,13 @@ impl Sampled {
         }
         let spacing = length / count as f64;
         let mut edge = 0;
+        let mut long = line[0].distance(next(0));
         let sample = |j: usize| {
             let at = spacing * j as f64;
             while edge + 1 < line.len() && ends[edge] < at {
                 edge += 1;
+                long = line[edge].distance(next(edge));
             }
-            let long = line[edge].distance(next(edge));
             let rest = if long > 0.0 { ((ends[edge] - at) / long).clamp(0.0, 1.0) } else { 0.0 };
             next(edge).lerp(line[edge], rest)
         };

@@ -2,9 +2,9 @@
 
 use super::{
     contours::Contours,
+    error::ReliefError,
     heights_bands::{Band, Bands},
-    heights_error::HeightError,
-    heights_near::{Bounds, FAR, Room, Segments, TILE},
+    heights_near::{Corners, FAR, Segments, TILE, Tiles},
     heights_params::HeightParams,
     heights_slope::{Across, Lane},
     terrain_noise::RowNoise,
@@ -98,29 +98,29 @@ pub fn heights(
     params: &HeightParams,
     frame: SurfaceFrame,
     seed: u64,
-) -> Result<Grid<f32>, HeightError> {
+) -> Result<Grid<f32>, ReliefError> {
     Ok(HeightMap::new(contours, params, frame, seed)?.heights(1))
 }
 
-fn check(contours: &Contours) -> Result<(), HeightError> {
+fn check(contours: &Contours) -> Result<(), ReliefError> {
     let (min, max) = (1e-6, 1e6);
     if !(min..=max).contains(&contours.distance) {
-        return Err(HeightError::OutOfRange { name: "distance", value: contours.distance, min, max });
+        return Err(ReliefError::OutOfRange { name: "distance", value: contours.distance, min, max });
     }
-    let count = contours.rings.iter().map(|ring| ring.points.len()).sum();
-    if count > MAX_HEIGHT_POINTS {
-        return Err(HeightError::TooManyPoints { count, most: MAX_HEIGHT_POINTS });
+    if contours.rings.iter().map(|ring| ring.points.len()).sum::<usize>() > MAX_HEIGHT_POINTS {
+        return Err(ReliefError::TooManyPoints { most: MAX_HEIGHT_POINTS });
     }
     for (i, ring) in contours.rings.iter().enumerate() {
         if ring.points.len() < 3 {
-            return Err(HeightError::FewPoints { ring: i, points: ring.points.len() });
+            return Err(ReliefError::TooFewPoints { contour: i, points: ring.points.len() });
         }
         if !(-MAX_LEVEL..=MAX_LEVEL).contains(&ring.level) {
-            return Err(HeightError::Level { ring: i, level: ring.level, most: MAX_LEVEL });
+            return Err(ReliefError::Level { ring: i, level: ring.level, most: MAX_LEVEL });
         }
         let is_far = |point: &glam::Vec2| !(point.is_finite() && point.abs().max_element() <= MOST_PLACE);
         if let Some(point) = ring.points.iter().position(is_far) {
-            return Err(HeightError::Point { ring: i, point, most: MOST_PLACE });
+            let glam::Vec2 { x, y } = ring.points[point];
+            return Err(ReliefError::Point { contour: i, point, x, y, most: MOST_PLACE });
         }
     }
     Ok(())
@@ -136,14 +136,14 @@ impl HeightMap {
     /// and the same for the same values, but mean nothing. Without rings all heights are 0.
     ///
     /// # Errors
-    /// [`HeightError`] if a parameter, the distance of the contours, a ring or its level is out of range, or if there are more than
+    /// [`ReliefError`] if a parameter, the distance of the contours, a ring or its level is out of range, or if there are more than
     /// [`MAX_HEIGHT_POINTS`] points.
     pub fn new(
         contours: &Contours,
         params: &HeightParams,
         frame: SurfaceFrame,
         seed: u64,
-    ) -> Result<Self, HeightError> {
+    ) -> Result<Self, ReliefError> {
         params.validate()?;
         check(contours)?;
         let (lowest, highest) = contours.levels().unwrap_or((0, -1));
@@ -234,9 +234,7 @@ impl HeightMap {
         }
         work.begin(self, first, width, n_rows);
         let area = Area { first, width, n_rows };
-        for x in (0..width).step_by(SIDES[0]) {
-            self.fill_tile(0, [x, 0], &area, rows, work);
-        }
+        self.fill_tiles(&area, rows, work);
         if self.params.terraces > 0.0 || self.params.cliffs > 0.0 || self.params.roughness > 0.0 {
             self.reshape(&area, rows, work);
         }
@@ -258,68 +256,81 @@ impl HeightMap {
         Band(code).lower().clamp(self.lowest - 1, self.lowest + self.levels.len() as i32 - 1)
     }
 
-    /// Fills a tile of side `SIDES[depth]`, whose top left in the stripe is `at`, from the segments of the tile around it.
-    fn fill_tile(&self, depth: usize, at: [usize; 2], area: &Area, rows: &mut [f32], work: &mut Work) {
-        let side = SIDES[depth];
-        let end = [(at[0] + side).min(area.width), (at[1] + side).min(area.n_rows)];
-        let bands = work.range(self, depth, at, area);
-        let min = [at[0] as f32, (area.first + at[1]) as f32];
-        let bounds: Bounds = [min, [min[0] + side as f32, min[1] + side as f32]];
-        let is_leaf = depth + 1 == SIDES.len();
-        let needed = self.needed(bands);
-        work.corners.clear();
-        for level in needed.clone() {
-            let (outer, inner) = work.lists.split_at_mut(depth);
-            let from = outer.last().map_or(&self.levels[level], |lists| &lists[level]);
-            let is_beyond = is_leaf && self.is_beyond(level, bands);
-            work.corners.push(if is_beyond {
-                from.corners(bounds, &mut work.room)
-            } else {
-                from.nearest_in(bounds, &mut work.room, &mut inner[0][level])
-            });
-        }
-        let Some(&inner) = SIDES.get(depth + 1) else {
-            self.fill_leaf(at, end, bands, area, rows, work);
-            return;
-        };
-        for y in (at[1]..end[1]).step_by(inner) {
-            for x in (at[0]..end[0]).step_by(inner) {
-                self.fill_tile(depth + 1, [x, y], area, rows, work);
-            }
+    /// Fills the tiles of a stripe.
+    fn fill_tiles(&self, area: &Area, rows: &mut [f32], work: &mut Work) {
+        for x in (0..area.width).step_by(SIDES[0]) {
+            let tiles = Tiles { min: [x as f32, area.first as f32], side: SIDES[0] as f32, count: [1, 1] };
+            let Work { lists, corners, .. } = work;
+            vectorized(
+                #[inline(always)]
+                || {
+                    for level in self.needed(work.ranges[0][x / SIDES[0]]) {
+                        self.levels[level].measure(&tiles, &mut corners[0][level]);
+                        self.levels[level].nearest_in(&tiles, [0, 0], &corners[0][level], &mut lists[0][level]);
+                    }
+                },
+            );
+            self.fill_tile([x, 0], area, rows, work);
         }
     }
 
+    /// Fills a tile of the first size, whose top left in the stripe is `at`, from the lists of that size.
+    fn fill_tile(&self, at: [usize; 2], area: &Area, rows: &mut [f32], work: &mut Work) {
+        let tiles = area.within(0, at);
+        vectorized(
+            #[inline(always)]
+            || work.measure(0, &tiles, self.needed(work.range(0, at, area))),
+        );
+        for (tile, at) in area.inner(0, at, &tiles) {
+            let bands = work.range(1, at, area);
+            vectorized(
+                #[inline(always)]
+                || {
+                    for level in self.needed(bands) {
+                        work.pick(0, &tiles, tile, level);
+                    }
+                    let tiles = area.within(1, at);
+                    work.measure(1, &tiles, self.needed(bands));
+                    for (tile, at) in area.inner(1, at, &tiles) {
+                        self.fill_leaf(&tiles, tile, at, area, rows, work);
+                    }
+                },
+            );
+        }
+    }
+
+    /// Fills a tile of the last size, whose top left in the stripe is `at`.
+    #[inline(always)]
     fn fill_leaf(
         &self,
+        tiles: &Tiles,
+        tile: [usize; 2],
         at: [usize; 2],
-        end: [usize; 2],
-        bands: [i32; 2],
         area: &Area,
         rows: &mut [f32],
         work: &mut Work,
     ) {
+        let bands = work.range(2, at, area);
         let levels = self.needed(bands);
         let place = [at[0] as f32 + 0.5, (area.first + at[1]) as f32 + 0.5];
-        let lists = &work.lists[SIDES.len() - 1];
-        vectorized(
-            #[inline(always)]
-            || {
-                work.near.clear();
-                for (level, corners) in levels.clone().zip(&work.corners) {
-                    let squares =
-                        if self.is_beyond(level, bands) { [[0.0; TILE]; TILE] } else { lists[level].tile(place) };
-                    work.near.push((squares, corners.map(f32::sqrt)));
-                }
-                let n = end[0] - at[0];
-                for (row, y) in (at[1]..end[1]).enumerate() {
-                    let start = y * area.width + at[0];
-                    let mut codes = [work.codes[start]; TILE];
-                    codes[..n].copy_from_slice(&work.codes[start..start + n]);
-                    let heights = self.row(&codes, row, bands, levels.start, &work.near);
-                    rows[start..start + n].copy_from_slice(&heights[..n]);
-                }
-            },
-        );
+        work.near.clear();
+        for level in levels.clone() {
+            let squares = if self.is_beyond(level, bands) {
+                [[0.0; TILE]; TILE]
+            } else {
+                work.pick(1, tiles, tile, level);
+                work.lists[2][level].tile(place)
+            };
+            work.near.push((squares, work.corners[1][level].of(tile).map(f32::sqrt)));
+        }
+        let [n, n_rows] = [area.width - at[0], area.n_rows - at[1]].map(|n| n.min(TILE));
+        for row in 0..n_rows {
+            let start = (at[1] + row) * area.width + at[0];
+            let mut codes = [work.codes[start]; TILE];
+            codes[..n].copy_from_slice(&work.codes[start..start + n]);
+            let heights = self.row(&codes, row, bands, levels.start, &work.near);
+            rows[start..start + n].copy_from_slice(&heights[..n]);
+        }
     }
 
     /// Heights of a row of a tile, from the squares of its distances to the levels from `first` on.
@@ -349,10 +360,15 @@ impl HeightMap {
             let left = corners[0] + (corners[2] - corners[0]) * down;
             let right = corners[1] + (corners[3] - corners[1]) * down;
             let beyond = RAMP.map(|share| left + (right - left) * share);
-            put(&mut across.lower, &band, level + 1, &beyond);
-            put(&mut across.low, &band, level, squares);
-            put(&mut across.high, &band, level - 1, squares);
-            put(&mut across.higher, &band, level - 2, &beyond);
+            let put_at = |out: &mut Lane, level: i32, values: &Lane| {
+                if (low..=high).contains(&level) {
+                    put(out, &band, level, values);
+                }
+            };
+            put_at(&mut across.lower, level + 1, &beyond);
+            put_at(&mut across.low, level, squares);
+            put_at(&mut across.high, level - 1, squares);
+            put_at(&mut across.higher, level - 2, &beyond);
         }
         for i in 0..TILE {
             across.low[i] = across.low[i].sqrt();
@@ -447,6 +463,30 @@ struct Area {
     n_rows: usize,
 }
 
+impl Area {
+    /// The tiles of the next size in a tile of side `SIDES[depth]`, whose top left in the stripe is `at`.
+    #[inline(always)]
+    fn within(&self, depth: usize, at: [usize; 2]) -> Tiles {
+        let count = [self.width - at[0], self.n_rows - at[1]].map(|n| n.min(SIDES[depth]).div_ceil(SIDES[depth + 1]));
+        Tiles { min: [at[0] as f32, (self.first + at[1]) as f32], side: SIDES[depth + 1] as f32, count }
+    }
+
+    /// Those tiles one after another, and the top left of each in the stripe.
+    #[inline(always)]
+    fn inner(
+        &self,
+        depth: usize,
+        at: [usize; 2],
+        tiles: &Tiles,
+    ) -> impl Iterator<Item = ([usize; 2], [usize; 2])> + use<> {
+        let (side, [across, down]) = (SIDES[depth + 1], tiles.count);
+        (0..across * down).map(move |i| {
+            let tile = [i % across, i / across];
+            (tile, [at[0] + tile[0] * side, at[1] + tile[1] * side])
+        })
+    }
+}
+
 /// Memory for stripes.
 #[derive(Default)]
 struct Work {
@@ -458,9 +498,9 @@ struct Work {
     lists: [Vec<Segments>; SIDES.len()],
     /// Squares of the distances of a tile to the levels that it needs.
     near: Vec<([Lane; TILE], [f32; 4])>,
-    /// Squares of the distances of the corners of the current tile.
-    corners: Vec<[f32; 4]>,
-    room: Room,
+    /// For each size of tiles but the last and each level, the distances of the segments of the current tile to the corners of
+    /// the tiles in it.
+    corners: [Vec<Corners>; SIDES.len() - 1],
 }
 
 impl Work {
@@ -469,6 +509,9 @@ impl Work {
         map.bands.fill(first, width, &mut self.codes);
         for lists in &mut self.lists {
             lists.resize_with(map.levels.len(), Segments::default);
+        }
+        for corners in &mut self.corners {
+            corners.resize_with(map.levels.len(), Corners::default);
         }
         for (side, ranges) in SIDES.iter().zip(&mut self.ranges) {
             ranges.clear();
@@ -496,8 +539,24 @@ impl Work {
         }
     }
 
+    /// Measures the distances of the segments of a tile to the corners of the tiles in it.
+    #[inline(always)]
+    fn measure(&mut self, depth: usize, tiles: &Tiles, levels: std::ops::Range<usize>) {
+        for level in levels {
+            self.lists[depth][level].measure(tiles, &mut self.corners[depth][level]);
+        }
+    }
+
+    /// Makes the list of a tile from that of the tile around it.
+    #[inline(always)]
+    fn pick(&mut self, depth: usize, tiles: &Tiles, tile: [usize; 2], level: usize) {
+        let (outer, inner) = self.lists.split_at_mut(depth + 1);
+        outer[depth][level].nearest_in(tiles, tile, &self.corners[depth][level], &mut inner[0][level]);
+    }
+
     /// The lowest and the highest band in a tile.
-    fn range(&self, _: &HeightMap, depth: usize, at: [usize; 2], area: &Area) -> [i32; 2] {
+    #[inline(always)]
+    fn range(&self, depth: usize, at: [usize; 2], area: &Area) -> [i32; 2] {
         let across = area.width.div_ceil(SIDES[depth]);
         self.ranges[depth][at[1] / SIDES[depth] * across + at[0] / SIDES[depth]]
     }

@@ -4,8 +4,6 @@
 //! around it: a segment is left out if a known point is nearer to all four corners of the tile than the segment is. The
 //! places that are nearer to a point than to a segment form a convex set, so then the point is nearer to all of the tile.
 
-use crate::math::vectorized;
-
 /// Segments computed at once.
 const LANES: usize = 8;
 
@@ -29,16 +27,27 @@ type Block = [[f32; LANES]; 5];
 /// A block of segments far away.
 const NOTHING: Block = [[1e9; LANES], [1e9; LANES], [0.0; LANES], [0.0; LANES], [0.0; LANES]];
 
-/// Memory for [`Segments::nearest_in`].
-#[derive(Debug, Default)]
-pub(super) struct Room {
-    /// Squares of the distances to the four corners.
-    squares: [Vec<[f32; LANES]>; 4],
-    keep: Vec<[f32; LANES]>,
+/// Tiles of one size side by side and one below another.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Tiles {
+    /// The top left corner of the first one, texels.
+    pub(super) min: [f32; 2],
+    /// Side of a tile, texels.
+    pub(super) side: f32,
+    /// Number of tiles across and down.
+    pub(super) count: [usize; 2],
 }
 
-/// The top left and the bottom right of a tile, texels.
-pub(super) type Bounds = [[f32; 2]; 2];
+/// The distances of all segments to the corners of tiles.
+#[derive(Debug, Default)]
+pub(super) struct Corners {
+    /// For each corner, row by row, the squares of the distances of all blocks of segments.
+    squares: Vec<[f32; LANES]>,
+    /// For each corner the square of the distance of the nearest segment, and which one that is.
+    nearest: Vec<(f32, usize)>,
+    /// Corners in a row.
+    across: usize,
+}
 
 #[inline(always)]
 fn square(at: [f32; 2], start: [f32; 2], along: [f32; 2], inverse: f32) -> f32 {
@@ -48,8 +57,26 @@ fn square(at: [f32; 2], start: [f32; 2], along: [f32; 2], inverse: f32) -> f32 {
     x * x + y * y
 }
 
-fn corners([min, max]: Bounds) -> [[f32; 2]; 4] {
-    [min, [max[0], min[1]], [min[0], max[1]], max]
+impl Tiles {
+    /// The place of a corner.
+    #[inline(always)]
+    fn corner(&self, [x, y]: [usize; 2]) -> [f32; 2] {
+        [self.min[0] + x as f32 * self.side, self.min[1] + y as f32 * self.side]
+    }
+}
+
+/// The four corners of a tile, by column and row: top left, top right, bottom left, bottom right.
+#[inline(always)]
+fn around([x, y]: [usize; 2]) -> [[usize; 2]; 4] {
+    [[x, y], [x + 1, y], [x, y + 1], [x + 1, y + 1]]
+}
+
+impl Corners {
+    /// Squares of the distances of the four corners of a tile to the nearest segment.
+    #[inline(always)]
+    pub(super) fn of(&self, tile: [usize; 2]) -> [f32; 4] {
+        around(tile).map(|[x, y]| self.nearest[y * self.across + x].0)
+    }
 }
 
 impl Segments {
@@ -89,65 +116,71 @@ impl Segments {
         [x + share * along_x, y + share * along_y]
     }
 
-    /// Replaces `out` by those segments of which one is nearest to each place of a tile; returns the squares of the
-    /// distances of its corners.
-    pub(super) fn nearest_in(&self, bounds: Bounds, room: &mut Room, out: &mut Self) -> [f32; 4] {
+    /// Measures the distances of all segments to the corners of `tiles`.
+    #[inline(always)]
+    pub(super) fn measure(&self, tiles: &Tiles, out: &mut Corners) {
+        let [across, down] = tiles.count.map(|count| count + 1);
+        out.across = across;
+        out.nearest.clear();
+        out.squares.resize(across * down * self.blocks.len(), [0.0; LANES]);
+        for corner in 0..across * down {
+            let squares = &mut out.squares[corner * self.blocks.len()..][..self.blocks.len()];
+            out.nearest.push(self.squares_at(tiles.corner([corner % across, corner / across]), squares));
+        }
+    }
+
+    /// Squares of the distances of all segments to one place; returns the least, and the first segment that has it.
+    #[inline(always)]
+    fn squares_at(&self, at: [f32; 2], out: &mut [[f32; LANES]]) -> (f32, usize) {
+        let (mut least, mut places) = ([f32::MAX; LANES], [0u32; LANES]);
+        for (place, ([x, y, along_x, along_y, inverse], out)) in (0..).zip(self.blocks.iter().zip(out)) {
+            let mut squares = [0.0; LANES];
+            for i in 0..LANES {
+                squares[i] = square(at, [x[i], y[i]], [along_x[i], along_y[i]], inverse[i]);
+            }
+            for i in 0..LANES {
+                let is_less = squares[i] < least[i];
+                least[i] = if is_less { squares[i] } else { least[i] };
+                places[i] = if is_less { place } else { places[i] };
+            }
+            *out = squares;
+        }
+        let square = least.into_iter().fold(f32::MAX, f32::min);
+        let segment = |i: usize| if least[i] == square { places[i] as usize * LANES + i } else { usize::MAX };
+        let segment = (0..LANES).map(segment).fold(usize::MAX, usize::min);
+        if square <= FAR { (square, segment) } else { (FAR, 0) }
+    }
+
+    /// Replaces `out` by those segments of which one is nearest to each place of a tile among those whose corners are
+    /// measured.
+    #[inline(always)]
+    pub(super) fn nearest_in(&self, tiles: &Tiles, tile: [usize; 2], measured: &Corners, out: &mut Self) {
         out.clear();
-        let least = self.corners(bounds, room);
         if self.len <= 2 {
             (0..self.len).for_each(|i| out.add(self.get(i)));
-            return least;
+            return;
         }
-        let corners = corners(bounds);
-        let mut nearest = [0; 4];
-        for ((squares, least), nearest) in room.squares.iter().zip(least).zip(&mut nearest) {
-            *nearest = squares.as_flattened().iter().position(|&square| square == least).unwrap_or(0);
-        }
+        let around = around(tile);
+        let index = around.map(|[x, y]| y * measured.across + x);
+        let nearest = index.map(|corner| measured.nearest[corner].1);
+        let corners = around.map(|corner| tiles.corner(corner));
         let points: [_; 4] = std::array::from_fn(|i| self.nearest_point(nearest[i], corners[i]));
         let bounds = points.map(|point| corners.map(|corner| square(corner, point, [0.0; 2], 0.0)));
-        room.mark(&bounds);
-        for i in nearest {
-            room.keep[i / LANES][i % LANES] = 1.0;
-        }
-        for (i, keep) in room.keep.iter().enumerate() {
-            for (lane, &keep) in keep.iter().enumerate() {
-                if keep > 0.0 && i * LANES + lane < self.len {
-                    out.add(self.get(i * LANES + lane));
-                }
+        let squares = index.map(|corner| &measured.squares[corner * self.blocks.len()..][..self.blocks.len()]);
+        for block in 0..self.blocks.len() {
+            let mut kept = nearer(&bounds, squares.map(|squares| &squares[block]));
+            for i in nearest {
+                kept |= u32::from(i / LANES == block) << (i % LANES);
+            }
+            if block + 1 == self.blocks.len() {
+                // What the last block is filled up with is left out.
+                kept &= u32::MAX >> (u32::BITS as usize - (self.len - block * LANES));
+            }
+            while kept != 0 {
+                out.add(self.get(block * LANES + kept.trailing_zeros() as usize));
+                kept &= kept - 1;
             }
         }
-        least
-    }
-
-    /// Squares of the distances of a tile's corners to the nearest segment; `room` has those to all.
-    pub(super) fn corners(&self, bounds: Bounds, room: &mut Room) -> [f32; 4] {
-        let mut least = [FAR; 4];
-        for ((squares, corner), least) in room.squares.iter_mut().zip(corners(bounds)).zip(&mut least) {
-            squares.resize(self.blocks.len(), [0.0; LANES]);
-            *least = self.squares_at(corner, squares).min(FAR);
-        }
-        least
-    }
-
-    /// Squares of the distances of all segments to one place; returns the least.
-    fn squares_at(&self, at: [f32; 2], out: &mut [[f32; LANES]]) -> f32 {
-        vectorized(
-            #[inline(always)]
-            || {
-                let mut least = [f32::MAX; LANES];
-                for ([x, y, along_x, along_y, inverse], out) in self.blocks.iter().zip(out) {
-                    let mut squares = [0.0; LANES];
-                    for i in 0..LANES {
-                        squares[i] = square(at, [x[i], y[i]], [along_x[i], along_y[i]], inverse[i]);
-                    }
-                    for i in 0..LANES {
-                        least[i] = if squares[i] < least[i] { squares[i] } else { least[i] };
-                    }
-                    *out = squares;
-                }
-                least.into_iter().fold(f32::MAX, f32::min)
-            },
-        )
     }
 
     /// Squares of the distances of the texels of a tile, whose first center is at `at`, to the nearest segment.
@@ -170,34 +203,19 @@ impl Segments {
     }
 }
 
-impl Room {
-    /// Marks the segments that are nearer to one corner at least than each of four points, given the squares of the
-    /// distances of the points to the corners.
-    fn mark(&mut self, bounds: &[[f32; 4]; 4]) {
-        let n = self.squares[0].len();
-        self.keep.clear();
-        self.keep.resize(n, [0.0; LANES]);
-        let [first, second, third, fourth] = &self.squares;
-        vectorized(
-            #[inline(always)]
-            || {
-                let squares = first.iter().zip(second).zip(third.iter().zip(fourth));
-                for (keep, ((first, second), (third, fourth))) in self.keep.iter_mut().zip(squares) {
-                    let mut kept = [1.0; LANES];
-                    for bound in bounds {
-                        for i in 0..LANES {
-                            let is_farther = (bound[0] <= first[i])
-                                & (bound[1] <= second[i])
-                                & (bound[2] <= third[i])
-                                & (bound[3] <= fourth[i]);
-                            kept[i] = if is_farther { 0.0 } else { kept[i] };
-                        }
-                    }
-                    *keep = kept;
-                }
-            },
-        );
+/// The segments of a block, one for each bit, that are nearer to one corner at least than each of four points, given the
+/// squares of the distances of the points to the corners.
+#[inline(always)]
+fn nearer(bounds: &[[f32; 4]; 4], [first, second, third, fourth]: [&[f32; LANES]; 4]) -> u32 {
+    let mut kept = [u32::MAX; LANES];
+    for bound in bounds {
+        for i in 0..LANES {
+            let is_farther =
+                (bound[0] <= first[i]) & (bound[1] <= second[i]) & (bound[2] <= third[i]) & (bound[3] <= fourth[i]);
+            kept[i] = if is_farther { 0 } else { kept[i] };
+        }
     }
+    (0..LANES).map(|i| kept[i] & 1 << i).sum()
 }
 
 #[cfg(test)]
@@ -218,10 +236,15 @@ mod tests {
                 all.push(last, next);
                 last = next;
             }
-            let (mut large, mut small, mut room) = (Segments::default(), Segments::default(), Room::default());
-            all.nearest_in([[0.5; 2], [31.5; 2]], &mut room, &mut large);
-            for at in [[0.5, 0.5], [8.5, 16.5], [24.5, 24.5]] {
-                large.nearest_in([at, [at[0] + 7.0, at[1] + 7.0]], &mut room, &mut small);
+            let (mut large, mut small, mut corners) = (Segments::default(), Segments::default(), Corners::default());
+            let tiles = Tiles { min: [0.0; 2], side: 32.0, count: [1, 1] };
+            all.measure(&tiles, &mut corners);
+            all.nearest_in(&tiles, [0, 0], &corners, &mut large);
+            let tiles = Tiles { side: 8.0, count: [4, 4], ..tiles };
+            large.measure(&tiles, &mut corners);
+            for tile in [[0, 0], [1, 2], [3, 3]] {
+                large.nearest_in(&tiles, tile, &corners, &mut small);
+                let at = tile.map(|at| 8.0 * at as f32 + 0.5);
                 let (exact, found) = (all.tile(at), small.tile(at));
                 for (exact, found) in exact.as_flattened().iter().zip(found.as_flattened()) {
                     assert!((exact.sqrt() - found.sqrt()).abs() <= 1e-3, "seed {seed}: {exact} {found}");

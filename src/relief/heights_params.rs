@@ -1,6 +1,6 @@
 //! The settings of heights: [`HeightParams`].
 
-use super::heights_error::HeightError;
+use super::error::ReliefError;
 
 macro_rules! params {
     ($($(#[doc = $doc:literal])* $name:ident = $default:expr, $min:expr, $max:expr;)*) => {
@@ -30,11 +30,11 @@ macro_rules! params {
             /// Checks every number against its range.
             ///
             /// # Errors
-            /// [`HeightError::OutOfRange`] for the first number that is out of its range or not finite.
-            pub fn validate(&self) -> Result<(), HeightError> {
+            /// [`ReliefError::OutOfRange`] for the first number that is out of its range or not finite.
+            pub fn validate(&self) -> Result<(), ReliefError> {
                 let ranges = [$((stringify!($name), self.$name, $min, $max)),*];
                 match ranges.into_iter().find(|(_, value, min, max)| !(*min..=*max).contains(value)) {
-                    Some((name, value, min, max)) => Err(HeightError::OutOfRange { name, value, min, max }),
+                    Some((name, value, min, max)) => Err(ReliefError::OutOfRange { name, value, min, max }),
                     None => Ok(()),
                 }
             }
@@ -42,14 +42,14 @@ macro_rules! params {
             /// Sets the number `name` from text, as in `step` and `0.02`.
             ///
             /// # Errors
-            /// [`HeightError::Unknown`] if there is no such number, [`HeightError::Unreadable`] if the text is not its
-            /// value, [`HeightError::OutOfRange`] if it is out of its range; nothing changes then.
-            pub fn set(&mut self, name: &str, text: &str) -> Result<(), HeightError> {
-                let unreadable = || HeightError::Unreadable { name: name.into(), text: text.into() };
+            /// [`ReliefError::Unknown`] if there is no such number, [`ReliefError::Unreadable`] if the text is not its
+            /// value, [`ReliefError::OutOfRange`] if it is out of its range; nothing changes then.
+            pub fn set(&mut self, name: &str, text: &str) -> Result<(), ReliefError> {
+                let unreadable = || ReliefError::Unreadable { name: name.into(), text: text.into() };
                 let mut changed = *self;
                 match name {
                     $(stringify!($name) => changed.$name = text.trim().parse().map_err(|_| unreadable())?,)*
-                    _ => return Err(HeightError::Unknown { name: name.into() }),
+                    _ => return Err(ReliefError::Unknown { name: name.into() }),
                 }
                 changed.validate()?;
                 *self = changed;

@@ -199,15 +199,15 @@ fn hostile_input_is_refused_or_gives_finite_heights() {
     let ring = |points: &[[f32; 2]], level| Ring { points: points.iter().map(|&point| point.into()).collect(), level };
     let triangle = [[0.1, 0.1], [0.9, 0.2], [0.4, 0.9]];
     let of = |ring: Ring| heights(&Contours { rings: vec![ring], distance: 0.1 }, &HeightParams::DEFAULT, frame(9), 1);
-    assert_eq!(of(ring(&triangle[..2], 0)), Err(HeightError::FewPoints { ring: 0, points: 2 }));
-    assert_eq!(of(ring(&triangle, 5000)), Err(HeightError::Level { ring: 0, level: 5000, most: MAX_LEVEL }));
+    assert_eq!(of(ring(&triangle[..2], 0)), Err(ReliefError::TooFewPoints { contour: 0, points: 2 }));
+    assert_eq!(of(ring(&triangle, 5000)), Err(ReliefError::Level { ring: 0, level: 5000, most: MAX_LEVEL }));
     for wrong in [f32::NAN, f32::INFINITY, -1e9] {
         let found = of(ring(&[[0.0, 0.0], [1.0, wrong], [0.0, 1.0]], 0));
-        assert_eq!(found, Err(HeightError::Point { ring: 0, point: 1, most: 1e4 }));
+        assert!(matches!(found, Err(ReliefError::Point { contour: 0, point: 1, most: 1e4, .. })));
     }
     for distance in [0.0, -1.0, f32::NAN, 1e9] {
         let found = heights(&Contours { rings: Vec::new(), distance }, &HeightParams::DEFAULT, frame(9), 1);
-        assert!(matches!(found, Err(HeightError::OutOfRange { name: "distance", .. })), "{found:?}");
+        assert!(matches!(found, Err(ReliefError::OutOfRange { name: "distance", .. })), "{found:?}");
     }
     let empty = Contours { rings: Vec::new(), distance: 0.1 };
     assert_eq!(heights(&empty, &HeightParams::DEFAULT, frame(9), 1).unwrap(), Grid::new(UVec2::splat(9), 0.0));
@@ -241,8 +241,8 @@ fn numbers_out_of_range_are_named() {
         }
     }
     let mut params = HeightParams::DEFAULT;
-    assert_eq!(params.set("stepp", "1"), Err(HeightError::Unknown { name: "stepp".into() }));
-    assert_eq!(params.set("step", "x"), Err(HeightError::Unreadable { name: "step".into(), text: "x".into() }));
+    assert_eq!(params.set("stepp", "1"), Err(ReliefError::Unknown { name: "stepp".into() }));
+    assert_eq!(params.set("step", "x"), Err(ReliefError::Unreadable { name: "step".into(), text: "x".into() }));
     params.set("step", " 0.5 ").unwrap();
     assert_eq!(params.step, 0.5);
 }
@@ -265,9 +265,9 @@ fn normals_and_colors_tell_slopes_and_heights() {
         assert!(picture == colors(&grid, &frame, &look, 1).unwrap());
         assert!(picture.as_slice().iter().all(|texel| texel[3] == 255));
         let wrong = TerrainColors { stratum: f32::NAN, ..look };
-        assert!(matches!(colors(&grid, &frame, &wrong, 1), Err(HeightError::OutOfRange { name: "stratum", .. })));
+        assert!(matches!(colors(&grid, &frame, &wrong, 1), Err(ReliefError::OutOfRange { name: "stratum", .. })));
     }
     let mut broken = grid;
     broken.row_mut(7)[5] = f32::NAN;
-    assert_eq!(colors(&broken, &frame, &TerrainColors::ROCK, 1), Err(HeightError::Height { x: 5, y: 7 }));
+    assert_eq!(colors(&broken, &frame, &TerrainColors::ROCK, 1), Err(ReliefError::Height { x: 5, y: 7 }));
 }

@@ -56,7 +56,8 @@ pub(super) const fn dot(u: [i64; 2], v: [i64; 2]) -> i64 {
 
 /// Pairs of a point and the next one, round the loop.
 pub(super) fn edges(points: &[Point]) -> impl Iterator<Item = (Point, Point)> + '_ {
-    points.iter().copied().zip(points.iter().copied().cycle().skip(1))
+    let (first, others) = points.split_at(points.len().min(1));
+    points.iter().copied().zip(others.iter().chain(first).copied())
 }
 
 /// Twice the area inside, positive or negative, exact.

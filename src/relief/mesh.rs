@@ -1,6 +1,6 @@
 //! Meshes of height fields, as plain arrays: [`ReliefMesh`].
 
-use super::{heights_error::HeightError, terrain_check::check_heights};
+use super::{error::ReliefError, terrain_check::check_heights};
 use crate::Grid;
 use glam::Vec2;
 
@@ -16,7 +16,7 @@ pub const MAX_DETAIL: u32 = 10;
 /// let mesh = ReliefMesh::new(&heights, &ReliefFrame::new([2.0, 2.0].into()), 0)?;
 /// assert_eq!((mesh.positions.len(), mesh.indices.len()), (9, 24));
 /// assert_eq!(mesh.positions[4], [0.0, 0.0, 2.0]);
-/// # Ok::<(), bevy_crack::relief::HeightError>(())
+/// # Ok::<(), bevy_crack::relief::ReliefError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ReliefFrame {
@@ -67,8 +67,8 @@ impl ReliefMesh {
     /// that all levels of detail are lit alike.
     ///
     /// # Errors
-    /// [`HeightError`] if the field has less than two texels on a side, a height is not finite, or a number of `frame` or `detail` is out of range.
-    pub fn new(heights: &Grid<f32>, frame: &ReliefFrame, detail: u32) -> Result<Self, HeightError> {
+    /// [`ReliefError`] if the field has less than two texels on a side, a height is not finite, or a number of `frame` or `detail` is out of range.
+    pub fn new(heights: &Grid<f32>, frame: &ReliefFrame, detail: u32) -> Result<Self, ReliefError> {
         check_heights(heights, 2)?;
         let most = 1e6;
         let ranges = [
@@ -80,7 +80,7 @@ impl ReliefMesh {
         if let Some((name, value, min, max)) =
             ranges.into_iter().find(|(_, value, min, max)| !(*min..=*max).contains(value))
         {
-            return Err(HeightError::OutOfRange { name, value, min, max });
+            return Err(ReliefError::OutOfRange { name, value, min, max });
         }
         let size = heights.size();
         let (columns, rows) = (picks(size.x, 1 << detail), picks(size.y, 1 << detail));
@@ -209,10 +209,10 @@ mod tests {
     fn wrong_numbers_are_refused() {
         let frame = ReliefFrame::new(Vec2::ONE);
         let small = ReliefMesh::new(&Grid::new(UVec2::new(1, 9), 0.0), &frame, 0);
-        assert!(matches!(small, Err(HeightError::Size { width: 1, height: 9, .. })));
+        assert!(matches!(small, Err(ReliefError::Size { width: 1, height: 9, .. })));
         let flat = Grid::new(UVec2::splat(9), 0.0);
-        assert!(matches!(ReliefMesh::new(&flat, &frame, 11), Err(HeightError::OutOfRange { name: "detail", .. })));
+        assert!(matches!(ReliefMesh::new(&flat, &frame, 11), Err(ReliefError::OutOfRange { name: "detail", .. })));
         let frame = ReliefFrame { size: Vec2::new(1.0, f32::NAN), ..frame };
-        assert!(matches!(ReliefMesh::new(&flat, &frame, 0), Err(HeightError::OutOfRange { name: "size", .. })));
+        assert!(matches!(ReliefMesh::new(&flat, &frame, 0), Err(ReliefError::OutOfRange { name: "size", .. })));
     }
 }

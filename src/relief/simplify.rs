@@ -8,13 +8,11 @@ use super::lattice::{Loop, Point, double_area};
 /// form a wedge, and the line goes on as long as its end lies in the wedge (the sleeve of Zhao and Saalfeld 1997). The pass starts at the
 /// corner with the smallest x, which stays, so it does not matter where the loop starts. The result may cross itself.
 pub(super) fn simplified(points: &[Point], tolerance: f64) -> Loop {
-    let count = points.len();
-    let Some(first) = (0..count).min_by_key(|&i| points[i]) else { return Loop::new() };
+    let Some(first) = (0..points.len()).min_by_key(|&i| points[i]) else { return Loop::new() };
     let mut out = vec![points[first]];
     let mut wedge = Wedge::new(points[first]);
     let mut last = points[first];
-    for i in 1..=count {
-        let point = points[(first + i) % count];
+    for &point in points[first + 1..].iter().chain(&points[..=first]) {
         let mut way = wedge.to(point);
         if !wedge.holds(way) {
             out.push(last);

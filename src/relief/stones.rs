@@ -1,7 +1,8 @@
-//! The parts of a height field that gaps part: [`Stones`].
+//! The parts of a height field that gaps part: [`StonesJob`] finds them, [`Stones`] holds them.
 
+use super::rows::{MANY, Rows};
 use crate::{Grid, math::mix, pattern::SurfaceFrame};
-use glam::Vec2;
+use glam::{UVec2, Vec2};
 
 /// Smallest area of a stone, square pattern units.
 const LEAST_AREA: f32 = 0.0003;
@@ -34,37 +35,8 @@ fn root(parents: &mut [u32], mut label: u32) -> u32 {
     label
 }
 
-/// A label for each texel, and for each label another one of the same stone, or itself.
-fn label(heights: &Grid<f32>, level: f32) -> (Grid<u32>, Vec<u32>) {
-    let mut labels = Grid::new(heights.size(), 0u32);
-    let mut parents = vec![0u32];
-    let mut above = vec![0u32; heights.width()];
-    for y in 0..heights.height() {
-        let row = labels.row_mut(y);
-        let mut left = 0;
-        for (x, &height) in heights.row(y).iter().enumerate() {
-            left = match (height > level, left, above[x]) {
-                (false, ..) => 0,
-                (true, 0, 0) => {
-                    parents.push(parents.len() as u32);
-                    parents.len() as u32 - 1
-                }
-                (true, one, 0) | (true, 0, one) => one,
-                (true, one, other) => {
-                    let (one, other) = (root(&mut parents, one), root(&mut parents, other));
-                    parents[one.max(other) as usize] = one.min(other);
-                    one.min(other)
-                }
-            };
-            row[x] = left;
-        }
-        above.copy_from_slice(row);
-    }
-    (labels, parents)
-}
-
 /// Sums over the texels of a stone.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 struct Sum {
     texels: u32,
     place: [u64; 2],
@@ -73,34 +45,127 @@ struct Sum {
     highest: f32,
 }
 
-impl Stones {
-    pub(super) fn new(heights: &Grid<f32>, frame: &SurfaceFrame, level: f32, seed: u64) -> Self {
-        let (mut labels, mut parents) = label(heights, level);
-        let none = Sum { texels: 0, place: [0; 2], low: [u32::MAX; 2], high: [0; 2], highest: f32::MIN };
-        let mut sums = vec![none; parents.len()];
-        for y in 0..heights.height() {
-            for (x, (label, &height)) in labels.row_mut(y).iter_mut().zip(heights.row(y)).enumerate() {
-                if *label > 0 {
-                    *label = root(&mut parents, *label);
-                    sums[*label as usize].add([x as u32, y as u32], height);
+/// The search for stones in steps.
+#[derive(Clone, Debug)]
+pub(super) struct StonesJob {
+    level: f32,
+    seed: u64,
+    stage: Stage,
+    rows: Rows,
+    labels: Grid<u32>,
+    /// For each label another one of the same stone, or itself.
+    parents: Vec<u32>,
+    sums: Vec<Sum>,
+    /// For each label, one more than the index of its stone, or 0.
+    names: Vec<u32>,
+    list: Vec<Stone>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Stage {
+    Label,
+    Sum,
+    /// Large sums become stones.
+    Name,
+    Rename,
+    Done,
+}
+
+const NO_SUM: Sum = Sum { texels: 0, place: [0; 2], low: [u32::MAX; 2], high: [0; 2], highest: f32::MIN };
+
+impl StonesJob {
+    /// For the places above `level`.
+    pub(super) fn new(size: UVec2, level: f32, seed: u64) -> Self {
+        let (labels, rows) = (Grid::new(size, 0), Rows::new(size));
+        let [parents, names] = [vec![0], Vec::new()];
+        Self { level, seed, stage: Stage::Label, rows, labels, parents, sums: Vec::new(), names, list: Vec::new() }
+    }
+
+    /// Some rows of `heights`, which are the same in all steps; `false` when all is done.
+    pub(super) fn step(&mut self, heights: &Grid<f32>, frame: &SurfaceFrame) -> bool {
+        if self.stage == Stage::Name {
+            self.name(frame);
+        } else {
+            for y in self.rows.take(MANY) {
+                match self.stage {
+                    Stage::Label => self.label_row(y, heights.row(y)),
+                    Stage::Sum => self.sum_row(y, heights.row(y)),
+                    Stage::Rename => {
+                        let labels = self.labels.row_mut(y);
+                        labels.iter_mut().for_each(|label| *label = self.names[*label as usize]);
+                    }
+                    Stage::Name | Stage::Done => {}
                 }
             }
         }
-        let mut list = Vec::new();
-        let names: Vec<u32> = sums
-            .iter()
-            .map(|sum| match sum.stone(frame, seed) {
-                Some(stone) => {
-                    list.push(stone);
-                    list.len() as u32
-                }
-                None => 0,
-            })
-            .collect();
-        labels.as_mut_slice().iter_mut().for_each(|label| *label = names[*label as usize]);
-        Self { labels, list }
+        self.advance();
+        self.stage != Stage::Done
     }
 
+    fn advance(&mut self) {
+        let is_done = if self.stage == Stage::Name { self.names.len() == self.sums.len() } else { self.rows.is_done() };
+        if !is_done {
+            return;
+        }
+        self.rows = Rows::new(self.labels.size());
+        self.stage = match self.stage {
+            Stage::Label => {
+                self.sums = vec![NO_SUM; self.parents.len()];
+                Stage::Sum
+            }
+            Stage::Sum => Stage::Name,
+            Stage::Name => Stage::Rename,
+            Stage::Rename | Stage::Done => Stage::Done,
+        };
+    }
+
+    pub(super) fn finish(self) -> Stones {
+        Stones { labels: self.labels, list: self.list }
+    }
+
+    fn label_row(&mut self, y: usize, heights: &[f32]) {
+        let width = heights.len();
+        let (before, row) = self.labels.as_mut_slice()[..(y + 1) * width].split_at_mut(y * width);
+        let above = before.chunks_exact(width).next_back();
+        let (parents, mut left) = (&mut self.parents, 0);
+        for (x, (label, &height)) in row.iter_mut().zip(heights).enumerate() {
+            left = match (height > self.level, left, above.map_or(0, |above| above[x])) {
+                (false, ..) => 0,
+                (true, 0, 0) => {
+                    parents.push(parents.len() as u32);
+                    parents.len() as u32 - 1
+                }
+                (true, one, 0) | (true, 0, one) => one,
+                (true, one, other) => {
+                    let (one, other) = (root(parents, one), root(parents, other));
+                    parents[one.max(other) as usize] = one.min(other);
+                    one.min(other)
+                }
+            };
+            *label = left;
+        }
+    }
+
+    fn sum_row(&mut self, y: usize, heights: &[f32]) {
+        for (x, (label, &height)) in self.labels.row_mut(y).iter_mut().zip(heights).enumerate() {
+            if *label > 0 {
+                *label = root(&mut self.parents, *label);
+                self.sums[*label as usize].add([x as u32, y as u32], height);
+            }
+        }
+    }
+
+    fn name(&mut self, frame: &SurfaceFrame) {
+        let first = self.names.len();
+        for sum in &self.sums[first..(first + MANY).min(self.sums.len())] {
+            let stone = sum.stone(frame, self.seed);
+            self.list.extend(stone);
+            self.names.push(if stone.is_some() { self.list.len() as u32 } else { 0 });
+        }
+    }
+}
+
+impl Stones {
     /// The stone at a texel of the surface.
     pub(super) fn at(&self, x: usize, y: usize) -> Option<&Stone> {
         self.list.get((self.labels.row(y)[x] as usize).checked_sub(1)?)
@@ -149,7 +214,10 @@ mod tests {
         let rows = ["#...#", "#.#.#", "#...#", "#####"];
         let heights = rows.iter().flat_map(|row| row.bytes()).map(|c| if c == b'#' { 0.5 } else { -0.5 }).collect();
         let heights = Grid::from_vec([5, 4].into(), heights).unwrap();
-        let stones = Stones::new(&heights, &SurfaceFrame::new([5, 4].into()).unwrap(), 0.0, 1);
+        let frame = SurfaceFrame::new([5, 4].into()).unwrap();
+        let mut job = StonesJob::new(heights.size(), 0.0, 1);
+        while job.step(&heights, &frame) {}
+        let stones = job.finish();
         assert_eq!(stones.list.len(), 2);
         assert_eq!(stones.labels.row(0), [1, 0, 0, 0, 1]);
         assert_eq!(stones.labels.row(1), [1, 0, 2, 0, 1]);

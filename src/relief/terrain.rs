@@ -1,6 +1,6 @@
 //! Settings of the colors of height fields: [`TerrainColors`].
 
-use super::heights_error::HeightError;
+use super::error::ReliefError;
 
 /// Ground that is not steep, from a height on up to that of the next one.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -211,8 +211,8 @@ impl TerrainColors {
     /// Checks every number against its range.
     ///
     /// # Errors
-    /// [`HeightError::OutOfRange`] for the first number that is out of its range or not finite.
-    pub fn validate(&self) -> Result<(), HeightError> {
+    /// [`ReliefError::OutOfRange`] for the first number that is out of its range or not finite.
+    pub fn validate(&self) -> Result<(), ReliefError> {
         let mut ranges = vec![
             ("transition", self.transition, 0.0, 1.0),
             ("steep", self.steep[0], 0.0, 100.0),
@@ -238,7 +238,7 @@ impl TerrainColors {
             ranges.push(("rivers.width", rivers.width, 0.0001, 1.0));
         }
         match ranges.into_iter().find(|(_, value, min, max)| !(*min..=*max).contains(value)) {
-            Some((name, value, min, max)) => Err(HeightError::OutOfRange { name, value, min, max }),
+            Some((name, value, min, max)) => Err(ReliefError::OutOfRange { name, value, min, max }),
             None => Ok(()),
         }
     }

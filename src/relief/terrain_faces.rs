@@ -6,7 +6,6 @@ use super::{
     terrain_noise::RowNoise,
 };
 use crate::{
-    Grid,
     math::{Rng, ops},
     pattern::SurfaceFrame,
 };
@@ -100,8 +99,8 @@ fn breaks(stone: &Stone) -> [Break; 2] {
 }
 
 impl Faces {
-    pub(super) fn new(heights: &Grid<f32>, frame: &SurfaceFrame, amount: f32, seed: u64) -> Self {
-        let stones = Stones::new(heights, frame, 0.0, seed);
+    /// `amount` of what stands above the planes of `stones` is cut off.
+    pub(super) fn new(stones: Stones, frame: &SurfaceFrame, amount: f32, seed: u64) -> Self {
         let mut all = Vec::new();
         let range = |stone: &Stone| {
             let first = all.len();
@@ -110,7 +109,7 @@ impl Faces {
         };
         let ranges = stones.list.iter().map(range).collect();
         let breaks = stones.list.iter().map(breaks).collect();
-        let (width, unit) = (heights.width(), frame.texels_per_unit());
+        let (width, unit) = (stones.labels.width(), frame.texels_per_unit());
         let mut rng = Rng::new(seed).stream("uneven faces");
         let mut noise = || RowNoise::new(width, [0.06 * unit; 2], 5, 0.62, &mut rng);
         let noises = [noise(), noise()];

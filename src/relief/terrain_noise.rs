@@ -1,6 +1,6 @@
 //! Gradient noise row by row: [`RowNoise`].
 
-use crate::math::{Rng, hash_unit, ops};
+use crate::math::{Rng, hash_unit, ops, vectorized};
 
 /// Perlin's gradient noise (1985, 2002) of several octaves, in texel space, one row after another.
 ///
@@ -19,8 +19,11 @@ struct Octave {
     frequency: [f32; 2],
     /// Slope and offset of the linear function at the left of each cell.
     lines: Vec<[f32; 2]>,
-    /// For each texel of a row: its cell, its position in it, and that position smoothed.
-    places: Vec<(u32, f32, f32)>,
+    /// For each texel of a row: its position in its cell, and that position smoothed.
+    inside: Vec<f32>,
+    fade: Vec<f32>,
+    /// Where the texels of each cell end.
+    ends: Vec<usize>,
 }
 
 fn smooth(t: f32) -> f32 {
@@ -38,14 +41,17 @@ impl RowNoise {
         let octaves = (0..octaves).map(|octave| {
             let frequency = scale.map(|scale| (1u32 << octave) as f32 / scale.max(1.0));
             let seed = u64::from(rng.next_u32()) << 32 | u64::from(rng.next_u32());
-            let places = (0..width).map(|x| {
+            let (mut inside, mut fade, mut ends) = (Vec::with_capacity(width), Vec::with_capacity(width), Vec::new());
+            for x in 0..width {
                 let place = (x as f32 + 0.5) * frequency[0];
-                let inside = place - place.floor();
-                (place as u32, inside, smooth(inside))
-            });
-            let places: Vec<_> = places.collect();
-            let cells = places.last().map_or(0, |place| place.0 as usize);
-            let octave = Octave { seed, amplitude, frequency, lines: vec![[0.0; 2]; cells + 2], places };
+                inside.push(place - place.floor());
+                fade.push(smooth(place - place.floor()));
+                ends.resize(ends.len().max(place as usize + 1), x);
+            }
+            ends.push(width);
+            ends.remove(0);
+            let lines = vec![[0.0; 2]; ends.len() + 1];
+            let octave = Octave { seed, amplitude, frequency, lines, inside, fade, ends };
             amplitude *= persistence;
             octave
         });
@@ -78,12 +84,22 @@ impl Octave {
             let [from_above, from_below] = [above[1] * inside, below[1] * (inside - 1.0)];
             self.lines[column] = [slope, from_above + (from_below - from_above) * fade];
         }
-        for (sum, &(cell, inside, fade)) in sum.iter_mut().zip(&self.places) {
-            let [left, right] = [self.lines[cell as usize], self.lines[cell as usize + 1]];
-            let from_left = left[0] * inside + left[1];
-            let from_right = right[0] * (inside - 1.0) + right[1];
-            *sum += self.amplitude * (from_left + (from_right - from_left) * fade);
-        }
+        vectorized(
+            #[inline(always)]
+            || {
+                let mut first = 0;
+                for (lines, &end) in self.lines.windows(2).zip(&self.ends) {
+                    let [left, right] = [lines[0], lines[1]];
+                    let places = self.inside[first..end].iter().zip(&self.fade[first..end]);
+                    for (sum, (&inside, &fade)) in sum[first..end].iter_mut().zip(places) {
+                        let from_left = left[0] * inside + left[1];
+                        let from_right = right[0] * (inside - 1.0) + right[1];
+                        *sum += self.amplitude * (from_left + (from_right - from_left) * fade);
+                    }
+                    first = end;
+                }
+            },
+        );
     }
 }
 

@@ -1,6 +1,8 @@
 //! Normal maps of height fields: [`normals`].
 
+use super::rows::{MANY, Rows};
 use crate::{Grid, math::vectorized, pattern::SurfaceFrame};
+use glam::UVec2;
 
 /// The normal map of a height field: tangent space, +Y up, `[red, green, blue, 255]`, linear.
 ///
@@ -17,30 +19,54 @@ use crate::{Grid, math::vectorized, pattern::SurfaceFrame};
 /// ```
 #[must_use]
 pub fn normals(heights: &Grid<f32>, frame: &SurfaceFrame) -> Grid<[u8; 4]> {
-    let mut out = Grid::new(heights.size(), [128, 128, 255, 255]);
-    if heights.width() == 0 {
-        return out;
+    let mut normals = Normals::new(heights.size(), frame);
+    while normals.step(heights) {}
+    normals.out
+}
+
+/// The normal map of a height field in steps.
+#[derive(Clone, Debug)]
+pub(super) struct Normals {
+    slopes: Slopes,
+    rows: Rows,
+    pub(super) out: Grid<[u8; 4]>,
+}
+
+impl Normals {
+    pub(super) fn new(size: UVec2, frame: &SurfaceFrame) -> Self {
+        let height = if size.x == 0 { 0 } else { size.y };
+        let rows = Rows::new(UVec2::new(size.x, height));
+        Self { slopes: Slopes::new(size.x as usize, frame), rows, out: Grid::new(size, [128, 128, 255, 255]) }
     }
-    let mut slopes = Slopes::new(heights, frame);
-    for y in 0..heights.height() {
-        slopes.read(y);
-        vectorized(
-            #[inline(always)]
-            || {
-                for ((out, &x), &y) in out.row_mut(y).iter_mut().zip(&slopes.right).zip(&slopes.down) {
-                    let scale = 127.5 / (x * x + y * y + 1.0).sqrt();
-                    let byte = |value: f32| (value * scale + 128.0) as u8;
-                    *out = [byte(-x), byte(y), byte(1.0), 255];
-                }
-            },
-        );
+
+    /// Some rows of `heights`, which are the same in all steps; `false` when all is done.
+    pub(super) fn step(&mut self, heights: &Grid<f32>) -> bool {
+        let slopes = &mut self.slopes;
+        for y in self.rows.take(MANY) {
+            slopes.read(heights, y);
+            vectorized(
+                #[inline(always)]
+                || {
+                    for ((out, &x), &y) in self.out.row_mut(y).iter_mut().zip(&slopes.right).zip(&slopes.down) {
+                        let scale = 127.5 / (x * x + y * y + 1.0).sqrt();
+                        let byte = |value: f32| (value * scale + 128.0) as u8;
+                        *out = [byte(-x), byte(y), byte(1.0), 255];
+                    }
+                },
+            );
+        }
+        !self.rows.is_done()
     }
-    out
+
+    /// How much is done, 0..=1.
+    pub(super) fn progress(&self) -> f32 {
+        self.rows.share()
+    }
 }
 
 /// Slopes of one row of a height field after another.
-pub(super) struct Slopes<'a> {
-    heights: &'a Grid<f32>,
+#[derive(Clone, Debug)]
+pub(super) struct Slopes {
     scale: f32,
     /// Three rows with one texel more on either side.
     rows: [Vec<f32>; 3],
@@ -49,19 +75,19 @@ pub(super) struct Slopes<'a> {
     pub(super) down: Vec<f32>,
 }
 
-impl<'a> Slopes<'a> {
-    pub(super) fn new(heights: &'a Grid<f32>, frame: &SurfaceFrame) -> Self {
-        let width = heights.width();
+impl Slopes {
+    /// For rows of `width` texels.
+    pub(super) fn new(width: usize, frame: &SurfaceFrame) -> Self {
         let [wide, row] = [vec![0.0; width + 2], vec![0.0; width]];
         let rows = [wide.clone(), wide.clone(), wide];
-        Self { heights, scale: frame.texels_per_unit() / 8.0, rows, right: row.clone(), down: row }
+        Self { scale: frame.texels_per_unit() / 8.0, rows, right: row.clone(), down: row }
     }
 
     /// Reads row `y`.
-    pub(super) fn read(&mut self, y: usize) {
-        let (width, last) = (self.heights.width(), self.heights.height() - 1);
+    pub(super) fn read(&mut self, heights: &Grid<f32>, y: usize) {
+        let (width, last) = (heights.width(), heights.height() - 1);
         for (wide, y) in self.rows.iter_mut().zip([y.saturating_sub(1), y, (y + 1).min(last)]) {
-            let row = self.heights.row(y);
+            let row = heights.row(y);
             wide[1..=width].copy_from_slice(row);
             (wide[0], wide[width + 1]) = (row[0], row[width - 1]);
         }

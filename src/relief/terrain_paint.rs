@@ -1,67 +1,30 @@
-//! The colors of height fields: [`colors`].
+//! The colors of the texels of a height field: [`Painter`].
 
 use super::{
-    heights_error::HeightError,
     stones::Stones,
     terrain::{Patches, Sea, StoneColors, TerrainColors, Woods},
-    terrain_blur::blurred,
-    terrain_check::{check_heights, smoothstep},
+    terrain_check::smoothstep,
     terrain_noise::RowNoise,
     terrain_normals::Slopes,
-    terrain_water::{Measure, Water},
+    terrain_water::Water,
     terrain_wear::around,
 };
 use crate::{
     Grid,
-    math::{Rng, mix},
+    math::{Rng, mix, vectorized},
     pattern::SurfaceFrame,
 };
 use glam::{Vec2, Vec3};
 
-/// The colors of a height field: `[red, green, blue, 255]`, sRGB.
-///
-/// Heights are in pattern units, of texels as `frame` tells. `seed` is that of the variety.
-///
-/// # Errors
-/// [`HeightError`] if a number of `colors` is out of range, or a height is not finite.
-///
-/// ```
-/// use bevy_crack::{Grid, pattern::SurfaceFrame, relief::{TerrainColors, colors}};
-///
-/// // Sea on the left, land on the right.
-/// let frame = SurfaceFrame::new([64, 64].into())?;
-/// let shore = (0..64 * 64).map(|i| (i % 64) as f32 / 320.0 - 0.1).collect();
-/// let heights = Grid::from_vec([64, 64].into(), shore).unwrap();
-/// let picture = colors(&heights, &frame, &TerrainColors::ISLAND, 1)?;
-/// let [red, _, blue, _] = picture.get(2, 30).unwrap();
-/// assert!(blue > red);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-pub fn colors(
-    heights: &Grid<f32>,
-    frame: &SurfaceFrame,
-    colors: &TerrainColors,
-    seed: u64,
-) -> Result<Grid<[u8; 4]>, HeightError> {
-    colors.validate()?;
-    check_heights(heights, 1)?;
-    let mut painter = Painter::new(heights, frame, colors, seed);
-    let mut out = Grid::new(heights.size(), [0, 0, 0, 255]);
-    for y in 0..heights.height() {
-        painter.paint_row(y, out.row_mut(y));
-    }
-    Ok(out)
-}
-
 /// Radii of the two blurs that tell hollows from edges, pattern units.
-const RADII: [f32; 2] = [0.004, 0.022];
+pub(super) const RADII: [f32; 2] = [0.004, 0.022];
 
 /// Where the light comes from: left, up, towards the viewer.
 const LIGHT: Vec3 = Vec3::new(-0.48, -0.52, 0.706);
 
 /// Height from which on a stone is a stone, and at which its surface begins to show beside what lies in gaps, pattern
 /// units.
-const STONE: [f32; 2] = [0.0015, 0.0055];
+pub(super) const STONE: [f32; 2] = [0.0015, 0.0055];
 
 /// How much crowns differ in where they stand: the width of the edge of woods.
 const THIN: f32 = 0.5;
@@ -69,20 +32,26 @@ const THIN: f32 = 0.5;
 /// The color of snow in shade, as a share of that in light.
 const SHADY: Vec3 = Vec3::new(0.76, 0.84, 0.95);
 
-/// The colors of one row after another.
-struct Painter<'a> {
-    heights: &'a Grid<f32>,
-    colors: &'a TerrainColors,
-    frame: &'a SurfaceFrame,
-    slopes: Slopes<'a>,
-    /// The height field, blurred by [`RADII`].
-    blurs: [Grid<f32>; 2],
+/// What is measured of a height field before it is painted.
+#[derive(Clone, Debug)]
+pub(super) struct Measured {
     /// Lowest and highest height, the lowest not below the sea.
-    range: [f32; 2],
+    pub(super) range: [f32; 2],
+    /// The height field, blurred by [`RADII`].
+    pub(super) blurs: [Grid<f32>; 2],
+    pub(super) stones: Option<Stones>,
+    pub(super) water: Option<Water>,
+}
+
+/// The colors of one row after another.
+#[derive(Clone, Debug)]
+pub(super) struct Painter {
+    colors: TerrainColors,
+    frame: SurfaceFrame,
+    slopes: Slopes,
+    measured: Measured,
     noises: [RowNoise; 4],
     noise: [Vec<f32>; 4],
-    stones: Option<Stones>,
-    water: Option<Water>,
     seed: u64,
 }
 
@@ -102,22 +71,27 @@ struct Place {
     moist: f32,
 }
 
+#[inline(always)]
 fn rgb(color: [u8; 3]) -> Vec3 {
     Vec3::from_array(color.map(f32::from))
 }
 
+#[inline(always)]
 fn unit_draws(seed: u64) -> [f32; 4] {
     let bits = mix(seed);
     [0, 16, 32, 48].map(|shift| f32::from((bits >> shift) as u16) * (1.0 / 65_536.0))
 }
 
-impl<'a> Painter<'a> {
-    fn new(heights: &'a Grid<f32>, frame: &'a SurfaceFrame, colors: &'a TerrainColors, seed: u64) -> Self {
+impl Painter {
+    /// For rows of `width` texels.
+    pub(super) fn new(
+        width: usize,
+        frame: &SurfaceFrame,
+        colors: &TerrainColors,
+        measured: Measured,
+        seed: u64,
+    ) -> Self {
         let unit = frame.texels_per_unit();
-        let (low, high) =
-            heights.as_slice().iter().fold((f32::MAX, f32::MIN), |(low, high), &h| (low.min(h), high.max(h)));
-        let low = if colors.sea.is_some() { 0.0 } else { low };
-        let width = heights.width();
         let mut rng = Rng::new(seed).stream("terrain colors");
         let mut noise = |scale: [f32; 2], octaves, persistence| {
             RowNoise::new(width, scale.map(|scale| scale * unit), octaves, persistence, &mut rng)
@@ -128,55 +102,58 @@ impl<'a> Painter<'a> {
             noise([0.012; 2], 2, 0.7),
             noise([0.035, 0.3], if colors.stains.is_some() { 3 } else { 0 }, 0.62),
         ];
-        let measure = colors.rivers.map(|rivers| Measure { gather: rivers.gather, width: rivers.width });
-        let is_wet = colors.woods.is_some() || colors.rivers.is_some();
         Self {
-            heights,
-            colors,
-            frame,
-            slopes: Slopes::new(heights, frame),
-            blurs: RADII.map(|radius| blurred(heights, (radius * unit).round() as usize)),
-            range: [low, high.max(low + 1e-6)],
+            colors: *colors,
+            frame: *frame,
+            slopes: Slopes::new(width, frame),
+            measured,
             noises,
             noise: std::array::from_fn(|_| vec![0.0; width]),
-            stones: colors.stones.map(|_| Stones::new(heights, frame, STONE[0], seed)),
-            water: is_wet.then(|| Water::new(heights, frame, measure)),
             seed: mix(seed ^ 0xC0105),
         }
     }
 
-    fn paint_row(&mut self, y: usize, out: &mut [[u8; 4]]) {
-        self.slopes.read(y);
+    /// Paints row `y`.
+    pub(super) fn paint_row(&mut self, heights: &Grid<f32>, y: usize, out: &mut [[u8; 4]]) {
+        self.slopes.read(heights, y);
         for (noise, row) in self.noises.iter_mut().zip(&mut self.noise) {
             noise.fill_row(y, row);
         }
-        if let Some(water) = &mut self.water {
+        if let Some(water) = &mut self.measured.water {
             water.moisture.read(y);
         }
-        for (x, out) in out.iter_mut().enumerate() {
-            let color = self.color(&self.place(x, y));
-            let [r, g, b] = color.to_array().map(|value| (value + 0.5) as u8);
-            *out = [r, g, b, 255];
-        }
+        vectorized(
+            #[inline(always)]
+            || {
+                for (x, out) in out.iter_mut().enumerate() {
+                    let color = self.color(&self.place(heights.row(y)[x], x, y));
+                    let [r, g, b] = color.to_array().map(|value| (value + 0.5) as u8);
+                    *out = [r, g, b, 255];
+                }
+            },
+        );
     }
 
-    fn place(&self, x: usize, y: usize) -> Place {
-        let height = self.heights.row(y)[x];
+    #[inline(always)]
+    fn place(&self, height: f32, x: usize, y: usize) -> Place {
         let [right, down] = [self.slopes.right[x], self.slopes.down[x]];
         Place {
             x,
             y,
             pos: self.frame.to_pos(Vec2::new(x as f32 + 0.5, y as f32 + 0.5)),
             height,
-            share: (height - self.range[0]) / (self.range[1] - self.range[0]),
+            share: (height - self.measured.range[0]) / (self.measured.range[1] - self.measured.range[0]),
             noise: std::array::from_fn(|i| self.noise[i][x]),
-            edge: std::array::from_fn(|i| ((height - self.blurs[i].row(y)[x]) / RADII[i] * 1.6).clamp(-1.0, 1.0)),
+            edge: std::array::from_fn(|i| {
+                ((height - self.measured.blurs[i].row(y)[x]) / RADII[i] * 1.6).clamp(-1.0, 1.0)
+            }),
             slope: (right * right + down * down).sqrt(),
-            moist: self.water.as_ref().map_or(0.0, |water| water.moisture.row[x]),
+            moist: self.measured.water.as_ref().map_or(0.0, |water| water.moisture.row[x]),
         }
     }
 
     /// The color of a texel, 0..=255.
+    #[inline(always)]
     fn color(&self, place: &Place) -> Vec3 {
         if let Some(sea) = self.colors.sea.filter(|_| place.height < 0.0) {
             let fresh = self.river(place) * (1.0 - smoothstep(0.0, 0.25, -place.height / sea.half));
@@ -212,17 +189,20 @@ impl<'a> Painter<'a> {
     }
 
     /// Share of a place that is river.
+    #[inline(always)]
     fn river(&self, place: &Place) -> f32 {
-        let rivers = self.water.as_ref().and_then(|water| water.rivers.as_ref());
+        let rivers = self.measured.water.as_ref().and_then(|water| water.rivers.as_ref());
         rivers.map_or(0.0, |rivers| rivers.row(place.y)[place.x])
     }
 
     /// How far a place faces the light, about -1..=1.
+    #[inline(always)]
     fn facing(&self, place: &Place) -> f32 {
         -(self.slopes.right[place.x] * LIGHT.x + self.slopes.down[place.x] * LIGHT.y)
     }
 
     /// Light and shade.
+    #[inline(always)]
     fn shade(&self, place: &Place) -> f32 {
         let (right, down) = (self.slopes.right[place.x], self.slopes.down[place.x]);
         let cavity = 1.0 + self.colors.cavity * (0.28 * place.edge[0] + 0.3 * place.edge[1]);
@@ -236,6 +216,7 @@ impl<'a> Painter<'a> {
     }
 
     /// Ground and rock.
+    #[inline(always)]
     fn dry(&self, place: &Place) -> Vec3 {
         let [ground, snow] = self.ground(place);
         let steep = place.slope * (1.0 + 0.25 * self.colors.variety * place.noise[1]);
@@ -255,6 +236,7 @@ impl<'a> Painter<'a> {
     }
 
     /// The surface of a stone, or what lies beside it.
+    #[inline(always)]
     fn stone(&self, stones: &StoneColors, place: &Place, ground: Vec3, steep: f32) -> Vec3 {
         let share = smoothstep(STONE[0], STONE[1], place.height + 0.003 * place.noise[1]);
         let gap = || self.gap(stones, place, ground);
@@ -269,6 +251,7 @@ impl<'a> Painter<'a> {
     }
 
     /// What lies in a gap: earth and loose pieces of the same rock.
+    #[inline(always)]
     fn gap(&self, stones: &StoneColors, place: &Place, ground: Vec3) -> Vec3 {
         let noise = place.noise;
         let mottled = 1.0 + self.colors.variety * (0.12 * noise[2] + 0.3 * noise[1] + 0.3 * noise[0]);
@@ -277,8 +260,9 @@ impl<'a> Painter<'a> {
     }
 
     /// The surface of a stone.
+    #[inline(always)]
     fn face(&self, stones: &StoneColors, place: &Place, ground: Vec3, steep: f32) -> Vec3 {
-        let stone = self.stones.as_ref().and_then(|stones| stones.at(place.x, place.y));
+        let stone = self.measured.stones.as_ref().and_then(|stones| stones.at(place.x, place.y));
         let mut color = ground.lerp(self.rock(place, stone.map_or(0, |stone| stone.seed)), 0.35 + 0.4 * steep);
         if let Some(stone) = stone {
             let [light, warm, cool, _] = unit_draws(stone.seed ^ 0x70_4E);
@@ -290,6 +274,7 @@ impl<'a> Painter<'a> {
     }
 
     /// Stains and lichen on rock.
+    #[inline(always)]
     fn patches(&self, color: Vec3, place: &Place) -> Vec3 {
         let noise = place.noise;
         let cover = |patches: &Patches, value: f32, soft: f32| {
@@ -310,6 +295,7 @@ impl<'a> Painter<'a> {
     }
 
     /// The color of the ground, and how far it is the uppermost kind.
+    #[inline(always)]
     fn ground(&self, place: &Place) -> [Vec3; 2] {
         let noise = place.noise;
         // Borders between two kinds wander with the noise, and the upper kind lies in hollows first, as snow does.
@@ -317,7 +303,8 @@ impl<'a> Painter<'a> {
         let (mut color, mut last) = (rgb(self.colors.ground[0].color), 0.0);
         let facing = self.facing(place);
         // Height by the wider surroundings, so that crests have no line of their own.
-        let around = (self.blurs[1].row(place.y)[place.x] - self.range[0]) / (self.range[1] - self.range[0]);
+        let around = (self.measured.blurs[1].row(place.y)[place.x] - self.measured.range[0])
+            / (self.measured.range[1] - self.measured.range[0]);
         let broad = 0.4 * place.share + 0.6 * around;
         for (i, ground) in self.colors.ground.iter().enumerate().skip(1) {
             let half = (0.5 * self.colors.transition).min(0.35 * ground.from) * if i == 4 { 1.8 } else { 1.0 };
@@ -325,7 +312,8 @@ impl<'a> Painter<'a> {
             let moved = match (i, self.colors.stones) {
                 // Beaches have a smooth edge.
                 (1, None) if self.colors.sea.is_some() => {
-                    let even = self.blurs[0].row(place.y)[place.x] / (self.range[1] - self.range[0]);
+                    let even = self.measured.blurs[0].row(place.y)[place.x]
+                        / (self.measured.range[1] - self.measured.range[0]);
                     even + self.colors.variety * noise[0] * 0.5 * ground.from
                 }
                 // Snow stays where it is shady and not steep.
@@ -344,13 +332,14 @@ impl<'a> Painter<'a> {
         }
         let tint = Vec3::new(1.0 + 0.05 * noise[0], 1.0, 1.0 - 0.05 * noise[0]);
         // Ground that water runs to is greener, ridges are dry.
-        let dry = if self.water.is_some() { (1.0 - last) * (0.45 - place.moist) } else { 0.0 };
+        let dry = if self.measured.water.is_some() { (1.0 - last) * (0.45 - place.moist) } else { 0.0 };
         let tint = tint * Vec3::new(1.0 + 0.26 * dry, 1.0 + 0.06 * dry, 1.0);
         let patches = 1.0 + self.colors.variety * (0.1 * noise[0] + 0.06 * noise[1]);
         [color * tint * patches, Vec3::splat(last)]
     }
 
     /// The color of rock: strata bend with the noise. Those of stones lie as each stone does.
+    #[inline(always)]
     fn rock(&self, place: &Place, stone: u64) -> Vec3 {
         let [first, second] = self.colors.rock.map(rgb);
         let noise = place.noise;
@@ -367,6 +356,7 @@ impl<'a> Painter<'a> {
     }
 
     /// How lush woods are at a place: above 0 they cover it.
+    #[inline(always)]
     fn woods(&self, place: &Place) -> Option<(Woods, f32)> {
         let woods = self.colors.woods?;
         if woods.spread <= 0.0 {
@@ -387,6 +377,7 @@ impl<'a> Painter<'a> {
     }
 
     /// Color and light of the crowns at a place, and how far they cover it. At the edge of woods crowns stand apart.
+    #[inline(always)]
     fn crown(&self, woods: &Woods, place: &Place, lush: f32) -> (Vec3, f32, f32) {
         let (mut cover, mut sums, mut weights) = (0.0f32, Vec3::ZERO, 1e-3);
         for (off, [.., tone, hue]) in around(self.seed, place.pos / woods.crown) {
@@ -408,9 +399,10 @@ impl<'a> Painter<'a> {
         (color * Vec3::new(0.88 + 0.3 * hue, 1.0, 0.95), light, share)
     }
 
+    #[inline(always)]
     fn sea(&self, sea: &Sea, place: &Place) -> Vec3 {
         let noise = place.noise;
-        let blurred = -self.blurs[0].row(place.y)[place.x];
+        let blurred = -self.measured.blurs[0].row(place.y)[place.x];
         let depth = (0.5 * -place.height + 0.5 * blurred.max(0.0)) * (1.0 + 0.12 * noise[0] + 0.1 * noise[1]);
         let depth = depth / sea.half;
         let share = depth * depth / (depth * depth + 1.0);
@@ -434,6 +426,7 @@ impl<'a> Painter<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::relief::colors;
 
     fn mean(picture: &Grid<[u8; 4]>, columns: std::ops::Range<usize>) -> Vec3 {
         let texels = (0..picture.height()).flat_map(|y| &picture.row(y)[columns.clone()]);

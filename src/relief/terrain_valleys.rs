@@ -1,6 +1,11 @@
 //! Valleys that rivers wear: [`Valleys`], on a coarse lattice, and [`Fine`], which brings them to texels.
 
-use super::{drainage::Drainage, terrain_blur::blurred, terrain_check::smoothstep, terrain_noise::RowNoise};
+use super::{
+    drainage::{Drainage, DrainageJob},
+    rows::{MANY, Rows},
+    terrain_blur::Blur,
+    terrain_noise::RowNoise,
+};
 use crate::{Grid, math::Rng, pattern::SurfaceFrame};
 use glam::UVec2;
 
@@ -35,30 +40,42 @@ const CREEP: f32 = 0.62;
 const CREST: usize = 2;
 const SOFT: f32 = 2.0;
 
-/// Radius of the surroundings that make a bay or a headland, pattern units.
-const AROUND: f32 = 0.045;
-
 /// Texels along a side of a cell of the lattice.
 pub(super) fn block(size: UVec2) -> u32 {
     ((2 * size.min_element() + CELLS) / (2 * CELLS)).max(size.max_element().div_ceil(MOST)).max(1)
 }
 
-/// The coarse lattice of a height field: means of blocks of texels.
-pub(super) fn coarse(heights: &Grid<f32>) -> Grid<f32> {
-    let size = heights.size();
-    let block = block(size);
-    let cells = UVec2::new(size.x.div_ceil(block), size.y.div_ceil(block));
-    let mut out = Grid::new(cells, 0.0);
-    for row in 0..out.height() {
-        let rows = row as u32 * block..((row as u32 + 1) * block).min(size.y);
-        let sums = out.row_mut(row);
-        for y in rows.clone() {
-            for (sum, texels) in sums.iter_mut().zip(heights.row(y as usize).chunks(block as usize)) {
-                *sum += texels.iter().sum::<f32>() / (texels.len() * rows.len()) as f32;
+/// The coarse lattice of a height field, means of blocks of texels, in steps.
+#[derive(Clone, Debug)]
+pub(super) struct Coarse {
+    block: usize,
+    rows: Rows,
+    height: usize,
+    out: Grid<f32>,
+}
+
+impl Coarse {
+    pub(super) fn new(size: UVec2) -> Self {
+        let block = block(size);
+        let cells = UVec2::new(size.x.div_ceil(block), size.y.div_ceil(block));
+        Self { block: block as usize, rows: Rows::new(size), height: size.y as usize, out: Grid::new(cells, 0.0) }
+    }
+
+    /// Some rows of `heights`, which are the same in all steps; `false` when all is done.
+    pub(super) fn step(&mut self, heights: &Grid<f32>) -> bool {
+        for y in self.rows.take(MANY) {
+            let row = y / self.block;
+            let n_rows = self.block.min(self.height - row * self.block);
+            for (sum, texels) in self.out.row_mut(row).iter_mut().zip(heights.row(y).chunks(self.block)) {
+                *sum += texels.iter().sum::<f32>() / (texels.len() * n_rows) as f32;
             }
         }
+        !self.rows.is_done()
     }
-    out
+
+    pub(super) fn finish(self) -> Grid<f32> {
+        self.out
+    }
 }
 
 /// Ground that rises as its contours tell, while rivers cut into it and slopes slide, round by round.
@@ -75,12 +92,16 @@ pub(super) struct Valleys {
     /// Length of a cell, pattern units.
     cell: f32,
     round: u32,
+    /// Where water runs in this round, while that is found.
+    flood: Option<Box<DrainageJob>>,
+    /// The broad shape of the ground, after all rounds.
+    broad: Blur,
 }
 
 impl Valleys {
-    pub(super) fn new(heights: &Grid<f32>, frame: &SurfaceFrame, seed: u64) -> Self {
-        let first = coarse(heights);
-        let cell = block(heights.size()) as f32 / frame.texels_per_unit();
+    /// Over the coarse lattice of heights of `size`.
+    pub(super) fn new(first: Grid<f32>, size: UVec2, frame: &SurfaceFrame, seed: u64) -> Self {
+        let cell = block(size) as f32 / frame.texels_per_unit();
         // Unevenness breaks the eight directions of the lattice.
         let mut rng = Rng::new(seed).stream("valleys");
         let [massifs, hard, start] = [(0.3, 2, 0.5), (0.13, 3, 0.6), (0.22, 4, 0.6)]
@@ -96,16 +117,34 @@ impl Valleys {
             *now =
                 if height > 0.0 { height * uneven * (1.0 + 1.1 * *now).clamp(0.2, 2.0) } else { first.as_slice()[i] };
         }
-        Self { first, rise, cut, now, cell, round: 0 }
+        let broad = Blur::new(first.size(), CREST);
+        Self { first, rise, cut, now, cell, round: 0, flood: None, broad }
     }
 
     pub(super) fn progress(&self) -> f32 {
         self.round as f32 / ROUNDS as f32
     }
 
-    /// A round; `false` when all are done.
+    /// A part of a round; `false` when all are done.
     pub(super) fn step(&mut self) -> bool {
-        let drainage = Drainage::new(&self.now);
+        match self.flood.take() {
+            None if self.round == ROUNDS => return self.broad.step(&self.now),
+            None => self.flood = Some(Box::new(DrainageJob::new(&self.now))),
+            Some(mut flood) => {
+                if flood.step() {
+                    self.flood = Some(flood);
+                } else {
+                    self.wear(&flood.finish());
+                    self.creep();
+                    self.round += 1;
+                }
+            }
+        }
+        true
+    }
+
+    /// Ground rises, rivers cut into it and slopes slide.
+    fn wear(&mut self, drainage: &Drainage) {
         let water = drainage.gathered();
         let heights = self.now.as_mut_slice();
         for &at in &drainage.order {
@@ -119,9 +158,6 @@ impl Valleys {
             let risen = heights[i] + self.rise.as_slice()[i];
             heights[i] = ((risen + cut * below) / (1.0 + cut)).min(below + STEEPEST * distance).max(below.min(risen));
         }
-        self.creep();
-        self.round += 1;
-        self.round < ROUNDS
     }
 
     /// Soil creeps down: ridges become a little rounder.
@@ -144,7 +180,7 @@ impl Valleys {
     pub(super) fn finish(self, amount: f32) -> Grid<f32> {
         let highest = |grid: &Grid<f32>| grid.as_slice().iter().fold(1e-6f32, |most, height| most.max(*height));
         let scale = LOWER * highest(&self.first) / highest(&self.now);
-        let broad = blurred(&self.now, CREST);
+        let broad = self.broad.finish();
         let mut out = self.now;
         for ((out, &broad), &cut) in out.as_mut_slice().iter_mut().zip(broad.as_slice()).zip(self.cut.as_slice()) {
             // Crests are broad where rock is soft.
@@ -157,50 +193,8 @@ impl Valleys {
     }
 }
 
-/// How far each cell of the coarse lattice juts out into the sea: 0 in bays, 1 on headlands.
-pub(super) fn headlands(heights: &Grid<f32>, frame: &SurfaceFrame) -> Grid<f32> {
-    let mut land = coarse(heights);
-    for height in land.as_mut_slice() {
-        *height = if *height > 0.0 { 1.0 } else { 0.0 };
-    }
-    let radius = AROUND * frame.texels_per_unit() / block(heights.size()) as f32;
-    let mut land = blurred(&land, radius.round() as usize);
-    for share in land.as_mut_slice() {
-        *share = smoothstep(0.56, 0.38, *share);
-    }
-    land
-}
-
-/// Radius of the surroundings that make a wide shelf, pattern units.
-const WIDE: f32 = 0.08;
-
-/// Depth of the ground off lowland and off headlands, as shares of that of the contours.
-const DEPTHS: [f32; 2] = [0.26, 1.6];
-
-/// How deep the seabed is at each cell of the coarse lattice, as a share of the depth that the contours give it: wide
-/// shelves in bays and off some stretches of the coast, deep water off headlands, reefs.
-pub(super) fn seabed(heights: &Grid<f32>, frame: &SurfaceFrame, seed: u64) -> Grid<f32> {
-    let mut land = coarse(heights);
-    let unit = frame.texels_per_unit() / block(heights.size()) as f32;
-    for height in land.as_mut_slice() {
-        *height = if *height > 0.0 { 1.0 } else { 0.0 };
-    }
-    let [mut near, wide] = [AROUND, WIDE].map(|radius| blurred(&land, (radius * unit).round() as usize));
-    let mut rng = Rng::new(seed).stream("seabed");
-    let broad = noise(land.size(), 0.26 * unit, 3, 0.5, &mut rng);
-    let patchy = noise(land.size(), 0.055 * unit, 3, 0.6, &mut rng);
-    for (i, share) in near.as_mut_slice().iter_mut().enumerate() {
-        let [wide, broad, patchy] = [&wide, &broad, &patchy].map(|grid| grid.as_slice()[i]);
-        let shelf = 0.45 * *share + 0.75 * wide + 0.34 * broad + 0.06 * patchy;
-        let depth = DEPTHS[1] + (DEPTHS[0] - DEPTHS[1]) * smoothstep(0.1, 0.66, shelf);
-        let reef = smoothstep(0.2, 0.6, patchy + 0.4 * broad) * smoothstep(0.12, 0.35, shelf);
-        *share = depth * (1.0 - 0.7 * reef);
-    }
-    near
-}
-
 /// Noise whose largest features measure `scale` cells.
-fn noise(size: UVec2, scale: f32, octaves: u32, persistence: f32, rng: &mut Rng) -> Grid<f32> {
+pub(super) fn noise(size: UVec2, scale: f32, octaves: u32, persistence: f32, rng: &mut Rng) -> Grid<f32> {
     let mut noise = RowNoise::new(size.x as usize, [scale; 2], octaves, persistence, rng);
     let mut out = Grid::new(size, 0.0);
     for y in 0..out.height() {

@@ -1,12 +1,12 @@
-//! Where ground is moist and where rivers run: [`Water`].
+//! Where ground is moist and where rivers run: [`WaterJob`] finds it, [`Water`] holds it.
 
 use super::{
-    drainage::Drainage,
-    terrain_blur::blurred,
-    terrain_valleys::{Fine, block, coarse},
+    drainage::{Drainage, DrainageJob},
+    terrain_blur::Blur,
+    terrain_valleys::{Coarse, Fine, block},
 };
 use crate::{Grid, math::hash_unit, pattern::SurfaceFrame};
-use glam::Vec2;
+use glam::{UVec2, Vec2};
 
 /// Radius over which moisture spreads, cells.
 const SPREAD: usize = 1;
@@ -27,6 +27,7 @@ const MOUTH: [f32; 3] = [1.9, 1.6, 1.25];
 const WINDING: f32 = 0.8;
 
 /// The water on the ground, from the drainage of its heights.
+#[derive(Clone, Debug)]
 pub(super) struct Water {
     /// 0 on ridges, near 1 along large streams.
     pub(super) moisture: Fine,
@@ -35,27 +36,85 @@ pub(super) struct Water {
 }
 
 /// Which rivers are drawn: the ground that makes one, square pattern units, and the width of the widest, pattern units.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Measure {
     pub(super) gather: f32,
     pub(super) width: f32,
 }
 
-impl Water {
-    pub(super) fn new(heights: &Grid<f32>, frame: &SurfaceFrame, rivers: Option<Measure>) -> Self {
-        let ground = coarse(heights);
-        let drainage = Drainage::new(&ground);
-        let gathered = drainage.gathered();
-        let moist = gathered.iter().map(|cells| 1.0 - 1.0 / cells.sqrt().sqrt()).collect();
-        let moist = Grid::from_vec(ground.size(), moist).unwrap_or_else(|| Grid::new(ground.size(), 0.0));
-        let moisture = Fine::new(blurred(&moist, SPREAD), heights.size());
-        let rivers = rivers.map(|measure| {
-            let mut out = Grid::new(heights.size(), 0.0);
-            let course = Course { ground: &ground, drainage: &drainage, gathered: &gathered, frame, measure };
-            course.draw(&mut out);
-            out
-        });
-        Self { moisture, rivers }
+/// The search for water in steps.
+#[derive(Clone, Debug)]
+pub(super) struct WaterJob {
+    size: UVec2,
+    rivers: Option<Measure>,
+    stage: Stage,
+}
+
+#[derive(Clone, Debug)]
+enum Stage {
+    /// The coarse lattice of the heights.
+    Coarse(Box<Coarse>),
+    /// Where the water of that lattice runs.
+    Drain(Box<DrainageJob>, Grid<f32>),
+    /// How moist ground is.
+    Moist {
+        drainage: Box<Drainage>,
+        ground: Grid<f32>,
+        moist: Grid<f32>,
+        blur: Box<Blur>,
+    },
+    Done(Box<Water>),
+}
+
+impl WaterJob {
+    /// On heights of `size`, with rivers of a measure or without.
+    pub(super) fn new(size: UVec2, rivers: Option<Measure>) -> Self {
+        Self { size, rivers, stage: Stage::Coarse(Box::new(Coarse::new(size))) }
+    }
+
+    /// A part of the search on `heights`, which are the same in all steps; `false` when all is done.
+    pub(super) fn step(&mut self, heights: &Grid<f32>, frame: &SurfaceFrame) -> bool {
+        let is_open = match &mut self.stage {
+            Stage::Coarse(coarse) => coarse.step(heights),
+            Stage::Drain(drainage, _) => drainage.step(),
+            Stage::Moist { moist, blur, .. } => blur.step(moist),
+            Stage::Done(_) => true,
+        };
+        if !is_open {
+            let none = Stage::Coarse(Box::new(Coarse::new(UVec2::ONE)));
+            self.stage = match std::mem::replace(&mut self.stage, none) {
+                Stage::Coarse(coarse) => {
+                    let ground = coarse.finish();
+                    Stage::Drain(Box::new(DrainageJob::new(&ground)), ground)
+                }
+                Stage::Drain(drainage, ground) => {
+                    let drainage = Box::new(drainage.finish());
+                    let moist = drainage.gathered().into_iter().map(|cells| 1.0 - 1.0 / cells.sqrt().sqrt()).collect();
+                    let moist = Grid::from_vec(ground.size(), moist).unwrap_or_else(|| Grid::new(ground.size(), 0.0));
+                    let blur = Box::new(Blur::new(ground.size(), SPREAD));
+                    Stage::Moist { drainage, ground, moist, blur }
+                }
+                Stage::Moist { drainage, ground, blur, .. } => {
+                    let moisture = Fine::new(blur.finish(), self.size);
+                    let rivers = self.rivers.map(|measure| {
+                        let mut out = Grid::new(self.size, 0.0);
+                        let gathered = drainage.gathered();
+                        let course =
+                            Course { ground: &ground, drainage: &drainage, gathered: &gathered, frame, measure };
+                        course.draw(&mut out);
+                        out
+                    });
+                    Stage::Done(Box::new(Water { moisture, rivers }))
+                }
+                done @ Stage::Done(_) => done,
+            };
+        }
+        !matches!(self.stage, Stage::Done(_))
+    }
+
+    /// The water, when all is done.
+    pub(super) fn finish(self) -> Option<Water> {
+        if let Stage::Done(water) = self.stage { Some(*water) } else { None }
     }
 }
 
@@ -183,8 +242,9 @@ mod tests {
         let heights = Grid::from_vec(size.into(), (0..size[0] * size[1]).map(height).collect()).unwrap();
         let frame = SurfaceFrame::new(size.into()).unwrap();
         let rivers = |gather| {
-            let water = Water::new(&heights, &frame, Some(Measure { gather, width: 0.02 }));
-            water.rivers.unwrap()
+            let mut job = WaterJob::new(heights.size(), Some(Measure { gather, width: 0.02 }));
+            while job.step(&heights, &frame) {}
+            job.finish().unwrap().rivers.unwrap()
         };
         let river = rivers(0.1);
         assert!((60..230).all(|x| (0..160).any(|y| river.row(y)[x] > 0.2)));

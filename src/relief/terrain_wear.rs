@@ -6,6 +6,7 @@ use glam::Vec2;
 use std::f32::consts::TAU;
 
 /// Random numbers of a cell of a lattice, 0..1.
+#[inline(always)]
 fn draws(seed: u64, cell: [i32; 2]) -> [f32; 4] {
     let [x, y] = cell.map(|at| u64::from(at as u32));
     let bits = mix(seed ^ (x << 32 | y));
@@ -13,6 +14,7 @@ fn draws(seed: u64, cell: [i32; 2]) -> [f32; 4] {
 }
 
 /// Sine and cosine of a whole turn times `turns`, to within 0.002.
+#[inline(always)]
 fn wave(turns: f32) -> [f32; 2] {
     let sine = |turns: f32| {
         let t = turns - (turns + 0.5).floor();
@@ -27,6 +29,7 @@ fn wave(turns: f32) -> [f32; 2] {
 const MARGIN: f32 = 0.15;
 
 /// The cells around a place of a lattice, each with the offset from its random site, in cells, and its random numbers.
+#[inline(always)]
 pub(super) fn around(seed: u64, place: Vec2) -> impl Iterator<Item = (Vec2, [f32; 4])> {
     let corner = place.floor();
     let [left, top] = corner.as_ivec2().to_array();
@@ -61,6 +64,7 @@ impl Gullies {
     }
 
     /// What is worn off at a place, zero or less.
+    #[inline(always)]
     pub(super) fn depth(&self, pos: Vec2, slope: Vec2, height: f32) -> f32 {
         // The shore stays where it is.
         let dry = smoothstep(0.0, 2.5 * self.depth, height);
@@ -97,6 +101,7 @@ const PIECES: [f32; 3] = [1.0, 0.62, 0.36];
 
 /// Loose pieces with flat faces that lie where the ground is below height 0: the height of their surface, or of the
 /// ground above it.
+#[inline(always)]
 pub(super) fn rubble(seed: u64, largest: f32, pos: Vec2, height: f32) -> f32 {
     let most = 0.3 * largest;
     if largest <= 0.0 || height > most {
@@ -128,6 +133,7 @@ pub(super) fn rubble(seed: u64, largest: f32, pos: Vec2, height: f32) -> f32 {
 }
 
 /// How much of a thin layer has worn off, from noise: 0..=1, with soft edges.
+#[inline(always)]
 pub(super) fn flakes(noise: f32) -> f32 {
     smoothstep(0.2, 0.6, noise)
 }

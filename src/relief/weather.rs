@@ -1,16 +1,23 @@
 //! What weather makes of a height field: [`Weathering`], [`weathered`].
 
 use super::{
-    heights_error::HeightError,
-    terrain_blur::blurred,
+    error::ReliefError,
+    rows::{FEW, Rows},
+    stones::StonesJob,
+    terrain_blur::Blur,
     terrain_check::{check_heights, smoothstep},
+    terrain_coast::Coast,
     terrain_faces::Faces,
     terrain_noise::RowNoise,
     terrain_normals::Slopes,
-    terrain_valleys::{Fine, Valleys, headlands, seabed},
+    terrain_valleys::{Coarse, Fine, Valleys},
     terrain_wear::{Gullies, flakes, rubble, shore},
 };
-use crate::{Grid, math::Rng, pattern::SurfaceFrame};
+use crate::{
+    Grid,
+    math::{Rng, vectorized},
+    pattern::SurfaceFrame,
+};
 use glam::Vec2;
 use std::ops::Range;
 
@@ -101,8 +108,8 @@ impl Weathering {
     /// Checks every number against its range.
     ///
     /// # Errors
-    /// [`HeightError::OutOfRange`] for the first number that is out of its range or not finite.
-    pub fn validate(&self) -> Result<(), HeightError> {
+    /// [`ReliefError::OutOfRange`] for the first number that is out of its range or not finite.
+    pub fn validate(&self) -> Result<(), ReliefError> {
         let ranges = [
             ("bend", self.bend, 0.0, 0.2),
             ("bend_size", self.bend_size, 0.005, 4.0),
@@ -117,7 +124,7 @@ impl Weathering {
             ("grain", self.grain, 0.0, 0.1),
         ];
         match ranges.into_iter().find(|(_, value, min, max)| !(*min..=*max).contains(value)) {
-            Some((name, value, min, max)) => Err(HeightError::OutOfRange { name, value, min, max }),
+            Some((name, value, min, max)) => Err(ReliefError::OutOfRange { name, value, min, max }),
             None => Ok(()),
         }
     }
@@ -134,7 +141,7 @@ impl Default for Weathering {
 /// Heights are in pattern units, of texels as `frame` tells. The result depends on the arguments alone.
 ///
 /// # Errors
-/// [`HeightError`] if a number of `weathering` is out of range, or a height is not finite.
+/// [`ReliefError`] if a number of `weathering` is out of range, or a height is not finite.
 ///
 /// ```
 /// use bevy_crack::{Grid, pattern::SurfaceFrame, relief::{Weathering, weathered}};
@@ -152,16 +159,13 @@ pub fn weathered(
     frame: &SurfaceFrame,
     weathering: &Weathering,
     seed: u64,
-) -> Result<Grid<f32>, HeightError> {
+) -> Result<Grid<f32>, ReliefError> {
     weathering.validate()?;
     check_heights(heights, 1)?;
     let mut job = WeatherJob::new(heights.clone(), *frame, *weathering, seed);
     while job.step() {}
     Ok(job.heights)
 }
-
-/// Texels of a step, about.
-const TEXELS: usize = 1 << 12;
 
 /// The weathering of a height field in steps of bounded work.
 #[derive(Clone, Debug)]
@@ -171,37 +175,39 @@ pub(super) struct WeatherJob {
     weathering: Weathering,
     seed: u64,
     stage: Stage,
+    rows: Rows,
 }
 
 #[derive(Clone, Debug)]
 enum Stage {
-    /// Lines are bent, from these heights, beginning at a row.
+    /// Lines are bent, from these heights.
     Bend {
         from: Grid<f32>,
         noises: Box<[RowNoise; 2]>,
-        row: usize,
     },
-    /// Rivers are at work.
-    Valleys(Box<Valleys>),
-    /// Valleys and the coast are brought to the heights, beginning at a row.
+    /// The coarse lattice for rivers and the coast.
+    Coarse(Box<Coarse>),
+    /// Rivers are at work on the coarse lattice.
+    Valleys(Box<Valleys>, Grid<f32>),
+    /// The coast is looked at on the coarse lattice; what valleys change.
+    Coast(Box<Coast>, Option<Grid<f32>>),
+    /// Valleys and the coast are brought to the heights.
     Carve {
         valleys: Option<Box<Fine>>,
         /// Headlands and the seabed.
         coast: Box<[Fine; 2]>,
-        row: usize,
     },
-    /// Stones are cut, beginning at a row.
-    Cut {
-        faces: Box<Faces>,
-        row: usize,
-    },
+    /// Stones are looked for.
+    Stones(Box<StonesJob>),
+    /// Stones are cut.
+    Cut(Box<Faces>),
     /// The broad slopes are measured.
-    Measure,
-    /// Everything else, beginning at a row.
+    Measure(Box<Blur>),
+    /// Everything else.
     Wear {
+        slopes: Box<Slopes>,
         broad: Grid<f32>,
         noises: Box<[RowNoise; 2]>,
-        row: usize,
     },
     Done,
 }
@@ -209,109 +215,133 @@ enum Stage {
 impl WeatherJob {
     /// Numbers and heights have been checked.
     pub(super) fn new(heights: Grid<f32>, frame: SurfaceFrame, weathering: Weathering, seed: u64) -> Self {
-        let mut job = Self { heights, frame, weathering, seed, stage: Stage::Done };
+        let rows = Rows::new(heights.size());
+        let mut job = Self { heights, frame, weathering, seed, stage: Stage::Done, rows };
         if weathering != Weathering::NONE {
-            job.stage = if weathering.bend > 0.0 { job.bend() } else { job.valleys() };
+            job.stage = if weathering.bend > 0.0 { job.bend() } else { job.coarse() };
         }
         job
     }
 
-    fn bend(&self) -> Stage {
+    fn bend(&mut self) -> Stage {
         let scale = self.weathering.bend_size * self.frame.texels_per_unit();
         let mut rng = Rng::new(self.seed).stream("bends");
         let mut noise = || RowNoise::new(self.heights.width(), [scale; 2], 5, 0.55, &mut rng);
-        Stage::Bend { from: self.heights.clone(), noises: Box::new([noise(), noise()]), row: 0 }
+        let noises = Box::new([noise(), noise()]);
+        let bent = Grid::new(self.heights.size(), 0.0);
+        Stage::Bend { from: std::mem::replace(&mut self.heights, bent), noises }
     }
 
-    fn valleys(&self) -> Stage {
-        if self.weathering.valleys > 0.0 {
-            Stage::Valleys(Box::new(Valleys::new(&self.heights, &self.frame, self.seed)))
-        } else {
-            self.carve(None)
+    fn coarse(&self) -> Stage {
+        if self.weathering.valleys <= 0.0 && self.weathering.coast <= 0.0 {
+            return self.stones();
         }
+        Stage::Coarse(Box::new(Coarse::new(self.heights.size())))
     }
 
-    fn carve(&self, valleys: Option<Grid<f32>>) -> Stage {
-        if valleys.is_none() && self.weathering.coast <= 0.0 {
-            return self.cut();
+    fn valleys(&self, ground: Grid<f32>) -> Stage {
+        if self.weathering.valleys <= 0.0 {
+            return self.coast(&ground, None);
         }
-        let size = self.heights.size();
-        let coast = [headlands(&self.heights, &self.frame), seabed(&self.heights, &self.frame, self.seed)];
-        let coast = Box::new(coast.map(|grid| Fine::new(grid, size)));
-        Stage::Carve { valleys: valleys.map(|grid| Box::new(Fine::new(grid, size))), coast, row: 0 }
+        Stage::Valleys(Box::new(Valleys::new(ground.clone(), self.heights.size(), &self.frame, self.seed)), ground)
     }
 
-    fn cut(&self) -> Stage {
+    fn coast(&self, ground: &Grid<f32>, valleys: Option<Grid<f32>>) -> Stage {
+        Stage::Coast(Box::new(Coast::new(ground, self.heights.size(), &self.frame, self.seed)), valleys)
+    }
+
+    fn carve(&self, coast: Coast, valleys: Option<Grid<f32>>) -> Stage {
+        let fine = |grid| Fine::new(grid, self.heights.size());
+        Stage::Carve { valleys: valleys.map(|grid| Box::new(fine(grid))), coast: Box::new(coast.finish().map(fine)) }
+    }
+
+    fn stones(&self) -> Stage {
         if self.weathering.faces <= 0.0 {
-            return Stage::Measure;
+            return self.measure();
         }
-        Stage::Cut { faces: Box::new(Faces::new(&self.heights, &self.frame, self.weathering.faces, self.seed)), row: 0 }
+        Stage::Stones(Box::new(StonesJob::new(self.heights.size(), 0.0, self.seed)))
+    }
+
+    fn measure(&self) -> Stage {
+        let radius = 0.25 * self.weathering.gully_width * self.frame.texels_per_unit();
+        Stage::Measure(Box::new(Blur::new(self.heights.size(), radius.round() as usize)))
     }
 
     /// How much is done, 0..=1.
     pub(super) fn progress(&self) -> f32 {
-        let share = |row: usize| row as f32 / self.heights.height().max(1) as f32;
+        let rows = self.rows.share();
         match &self.stage {
-            Stage::Bend { row, .. } => 0.1 * share(*row),
-            Stage::Valleys(valleys) => 0.1 + 0.4 * valleys.progress(),
-            Stage::Carve { row, .. } => 0.5 + 0.03 * share(*row),
-            Stage::Cut { row, .. } => 0.53 + 0.02 * share(*row),
-            Stage::Measure => 0.55,
-            Stage::Wear { row, .. } => 0.6 + 0.4 * share(*row),
+            Stage::Bend { .. } => 0.1 * rows,
+            Stage::Coarse(_) => 0.1,
+            Stage::Valleys(valleys, _) => 0.1 + 0.4 * valleys.progress(),
+            Stage::Coast(..) => 0.5,
+            Stage::Carve { .. } => 0.5 + 0.03 * rows,
+            Stage::Stones(_) => 0.53,
+            Stage::Cut(_) => 0.54 + 0.01 * rows,
+            Stage::Measure(_) => 0.55,
+            Stage::Wear { .. } => 0.6 + 0.4 * rows,
             Stage::Done => 1.0,
         }
     }
 
     /// Some rows; `false` when all is done.
     pub(super) fn step(&mut self) -> bool {
-        let rows = (TEXELS / self.heights.width().max(1)).max(1);
-        let end = |row: usize| (row + rows).min(self.heights.height());
-        self.stage = match std::mem::replace(&mut self.stage, Stage::Done) {
-            Stage::Bend { from, mut noises, row } => {
-                let end = end(row);
-                self.bend_rows(&from, &mut noises, row..end);
-                if end < self.heights.height() { Stage::Bend { from, noises, row: end } } else { self.valleys() }
+        let mut stage = std::mem::replace(&mut self.stage, Stage::Done);
+        let is_open = match &mut stage {
+            Stage::Coarse(coarse) => coarse.step(&self.heights),
+            Stage::Valleys(valleys, _) => valleys.step(),
+            Stage::Coast(coast, _) => coast.step(),
+            Stage::Stones(stones) => stones.step(&self.heights, &self.frame),
+            Stage::Measure(blur) => blur.step(&self.heights),
+            Stage::Done => false,
+            Stage::Bend { .. } | Stage::Carve { .. } | Stage::Cut(_) | Stage::Wear { .. } => {
+                self.change_rows(&mut stage);
+                !self.rows.is_done()
             }
-            Stage::Valleys(mut valleys) => {
-                if valleys.step() {
-                    Stage::Valleys(valleys)
-                } else {
-                    self.carve(Some(valleys.finish(self.weathering.valleys)))
-                }
-            }
-            Stage::Carve { mut valleys, mut coast, row } => {
-                let end = end(row);
-                self.carve_rows(valleys.as_deref_mut(), &mut coast, row..end);
-                let is_open = end < self.heights.height();
-                if is_open { Stage::Carve { valleys, coast, row: end } } else { self.cut() }
-            }
-            Stage::Cut { mut faces, row } => {
-                let end = end(row);
-                for y in row..end {
-                    faces.cut_row(y, self.heights.row_mut(y));
-                }
-                if end < self.heights.height() { Stage::Cut { faces, row: end } } else { Stage::Measure }
-            }
-            Stage::Measure => self.measured(),
-            Stage::Wear { broad, mut noises, row } => {
-                let end = end(row);
-                self.wear_rows(&broad, &mut noises, row..end);
-                if end < self.heights.height() { Stage::Wear { broad, noises, row: end } } else { Stage::Done }
-            }
-            Stage::Done => Stage::Done,
         };
+        self.stage = if is_open { stage } else { self.next(stage) };
         !matches!(self.stage, Stage::Done)
     }
 
+    /// Some rows of a stage that changes heights.
+    fn change_rows(&mut self, stage: &mut Stage) {
+        let rows = self.rows.take(FEW);
+        match stage {
+            Stage::Bend { from, noises } => self.bend_rows(from, noises, rows),
+            Stage::Carve { valleys, coast } => self.carve_rows(valleys.as_deref_mut(), coast, rows),
+            Stage::Cut(faces) => rows.for_each(|y| faces.cut_row(y, self.heights.row_mut(y))),
+            Stage::Wear { slopes, broad, noises } => self.wear_rows(slopes, broad, noises, rows),
+            _ => {}
+        }
+    }
+
+    /// What comes after a stage.
+    fn next(&mut self, stage: Stage) -> Stage {
+        self.rows = Rows::new(self.heights.size());
+        match stage {
+            Stage::Bend { .. } => self.coarse(),
+            Stage::Coarse(coarse) => self.valleys(coarse.finish()),
+            Stage::Valleys(valleys, ground) => self.coast(&ground, Some(valleys.finish(self.weathering.valleys))),
+            Stage::Coast(coast, valleys) => self.carve(*coast, valleys),
+            Stage::Carve { .. } => self.stones(),
+            Stage::Stones(stones) => {
+                let faces = Faces::new(stones.finish(), &self.frame, self.weathering.faces, self.seed);
+                Stage::Cut(Box::new(faces))
+            }
+            Stage::Cut(_) => self.measure(),
+            Stage::Measure(blur) => self.wear(blur.finish()),
+            Stage::Wear { .. } | Stage::Done => Stage::Done,
+        }
+    }
+
     /// What comes after the broad slopes are measured.
-    fn measured(&self) -> Stage {
+    fn wear(&self, broad: Grid<f32>) -> Stage {
         let (unit, width, weathering) = (self.frame.texels_per_unit(), self.heights.width(), &self.weathering);
         let rng = Rng::new(self.seed);
         let grain = RowNoise::new(width, [0.012 * unit; 2], 4, 0.75, &mut rng.stream("grain"));
         let octaves = if weathering.chips > 0.0 { 6 } else { 0 };
         let flakes = RowNoise::new(width, [weathering.chip_size * unit; 2], octaves, 0.55, &mut rng.stream("flakes"));
-        let broad = blurred(&self.heights, (0.25 * weathering.gully_width * unit).round() as usize);
-        Stage::Wear { broad, noises: Box::new([grain, flakes]), row: 0 }
+        Stage::Wear { slopes: Box::new(Slopes::new(width, &self.frame)), broad, noises: Box::new([grain, flakes]) }
     }
 
     fn bend_rows(&mut self, from: &Grid<f32>, noises: &mut [RowNoise; 2], rows: Range<usize>) {
@@ -341,29 +371,33 @@ impl WeatherJob {
         }
     }
 
-    fn wear_rows(&mut self, broad: &Grid<f32>, noises: &mut [RowNoise; 2], rows: Range<usize>) {
-        let mut slopes = Slopes::new(broad, &self.frame);
+    fn wear_rows(&mut self, slopes: &mut Slopes, broad: &Grid<f32>, noises: &mut [RowNoise; 2], rows: Range<usize>) {
         let Weathering { gullies, gully_width, chips, chip_size, coast, grain, .. } = self.weathering;
         let gullies = Gullies::new(gullies, gully_width, self.seed);
         let mut rows_of_noise = [vec![0.0; self.heights.width()], vec![0.0; self.heights.width()]];
         for y in rows {
-            slopes.read(y);
+            slopes.read(broad, y);
             for (noise, row) in noises.iter_mut().zip(&mut rows_of_noise) {
                 noise.fill_row(y, row);
             }
             let [rough, layers] = &rows_of_noise;
-            for (x, out) in self.heights.row_mut(y).iter_mut().enumerate() {
-                let pos = self.frame.to_pos(Vec2::new(x as f32 + 0.5, y as f32 + 0.5));
-                let slope = Vec2::new(slopes.right[x], slopes.down[x]);
-                // Beaches are smooth.
-                let dry = 1.0 - coast * (1.0 - smoothstep(0.0, 0.012, out.abs()));
-                *out += gullies.depth(pos, slope, *out) + grain * dry * rough[x];
-                if *out > 0.0 {
-                    // Flakes end before a stone does.
-                    *out = (*out - chips * chip_size * flakes(layers[x])).max(0.5 * *out);
-                }
-                *out = rubble(self.seed, self.weathering.rubble, pos, *out);
-            }
+            vectorized(
+                #[inline(always)]
+                || {
+                    for (x, out) in self.heights.row_mut(y).iter_mut().enumerate() {
+                        let pos = self.frame.to_pos(Vec2::new(x as f32 + 0.5, y as f32 + 0.5));
+                        let slope = Vec2::new(slopes.right[x], slopes.down[x]);
+                        // Beaches are smooth.
+                        let dry = 1.0 - coast * (1.0 - smoothstep(0.0, 0.012, out.abs()));
+                        *out += gullies.depth(pos, slope, *out) + grain * dry * rough[x];
+                        if *out > 0.0 {
+                            // Flakes end before a stone does.
+                            *out = (*out - chips * chip_size * flakes(layers[x])).max(0.5 * *out);
+                        }
+                        *out = rubble(self.seed, self.weathering.rubble, pos, *out);
+                    }
+                },
+            );
         }
     }
 }

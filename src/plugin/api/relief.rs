@@ -1,7 +1,7 @@
 //! [`CrackRelief`]: rock walls, islands and mountains, made by a background task.
 
 use super::CrackError;
-use crate::relief::{ReliefJobError, ReliefSettings};
+use crate::relief::{ReliefError, ReliefSettings};
 use bevy::prelude::*;
 
 /// Makes the picture of a surface: a rock wall, an island, a mountain, from contour lines ([`relief`](crate::relief)).
@@ -128,8 +128,8 @@ impl Default for CrackRelief {
     }
 }
 
-impl From<ReliefJobError> for CrackError {
-    fn from(error: ReliefJobError) -> Self {
+impl From<ReliefError> for CrackError {
+    fn from(error: ReliefError) -> Self {
         Self::Relief { reason: error.to_string() }
     }
 }

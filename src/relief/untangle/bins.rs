@@ -69,10 +69,15 @@ impl Bins {
     }
 
     /// Calls `visit` for each cell that the edge reaches.
+    #[inline]
     pub(super) fn cells(&self, edge: &Edge, mut visit: impl FnMut(u32)) {
         let [x0, y0, x1, y1] = edge.bounds();
         let [c0, c1] = [self.column(x0 - MARGIN), self.column(x1 + MARGIN)];
         let [r0, r1] = [self.row(y0 - MARGIN), self.row(y1 + MARGIN)];
+        if c0 == c1 && r0 == r1 {
+            visit(r0 * self.columns + c0);
+            return;
+        }
         if c1 - c0 <= 1 || r1 - r0 <= 1 {
             for row in r0..=r1 {
                 (c0..=c1).for_each(|column| visit(row * self.columns + column));

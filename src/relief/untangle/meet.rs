@@ -40,6 +40,9 @@ fn cleaned(points: &[Point]) -> Loop {
 impl Edges {
     fn new(loops: &[Loop]) -> Self {
         let mut out = Self::default();
+        let many = loops.iter().map(Vec::len).sum();
+        out.edges.reserve(many);
+        out.next.reserve(many);
         for points in loops {
             let points = cleaned(points);
             let first = out.edges.len() as u32;
@@ -78,6 +81,15 @@ impl Edges {
             }
         }
         *self = out;
+    }
+
+    /// Whether the edges are a single loop that does not meet itself.
+    pub(super) fn is_one_ring(&self) -> bool {
+        let is_next = |(i, next): (usize, &u32)| *next as usize == i + 1;
+        let last = self.next.len().saturating_sub(1);
+        self.next.last() == Some(&0)
+            && self.next[..last].iter().enumerate().all(is_next)
+            && !self.is_node.iter().any(|is_node| *is_node)
     }
 
     fn push(&mut self, edge: Edge, is_node: bool) {
@@ -171,22 +183,25 @@ impl Members {
 }
 
 fn members(edges: &Edges, bins: &Bins) -> Members {
-    let mut pairs = Vec::with_capacity(2 * edges.edges.len());
+    let mut pairs = Vec::with_capacity(4 * edges.edges.len());
+    // First where each cell ends, then where it starts.
     let mut starts = vec![0u32; bins.len() + 1];
     for (i, edge) in edges.edges.iter().enumerate() {
         bins.cells(edge, |cell| {
-            starts[cell as usize + 1] += 1;
+            starts[cell as usize] += 1;
             pairs.push((cell, i as u32));
         });
     }
-    for cell in 1..starts.len() {
-        starts[cell] += starts[cell - 1];
+    let mut end = 0;
+    for start in &mut starts {
+        end += *start;
+        *start = end;
     }
-    let mut at = starts.clone();
     let mut items = vec![0; pairs.len()];
-    for (cell, edge) in pairs {
-        items[at[cell as usize] as usize] = edge;
-        at[cell as usize] += 1;
+    for &(cell, edge) in pairs.iter().rev() {
+        let start = &mut starts[cell as usize];
+        *start -= 1;
+        items[*start as usize] = edge;
     }
     Members { starts, items }
 }
@@ -204,7 +219,8 @@ fn find(edges: &mut Edges, members: &Members, found: &mut Cuts, most: usize) -> 
         boxes.extend(cell.iter().map(|&i| (edges.edges[i as usize].bounds(), i)));
         for (k, &(near, e)) in boxes.iter().enumerate() {
             for &(far, f) in &boxes[k + 1..] {
-                let is_apart = near[0] > far[2] || far[0] > near[2] || near[1] > far[3] || far[1] > near[3];
+                // Without a branch for each side.
+                let is_apart = (near[0] > far[2]) | (far[0] > near[2]) | (near[1] > far[3]) | (far[1] > near[3]);
                 if !is_apart {
                     meet(edges, e, f, found);
                 }

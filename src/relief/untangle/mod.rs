@@ -32,6 +32,16 @@ pub(super) fn untangle(loops: &[Loop], fill: Fill, least: i128, most: usize) -> 
 /// As [`untangle`], and whether the rings are the loops as they came: none met itself or another one, none was left out.
 pub(super) fn untangled(loops: &[Loop], fill: Fill, least: i128, most: usize) -> Result<(Vec<Loop>, bool), TooTangled> {
     let edges = meet::cut(loops, most)?;
+    if fill.holds(1) && edges.is_one_ring() {
+        // The common case, which needs no more than that.
+        let ring: Loop = edges.edges.iter().map(|edge| edge.a).collect();
+        let area = double_area(&ring);
+        if area > 0 {
+            let rings = if area >= least.max(1) { vec![ring] } else { Vec::new() };
+            let is_same = rings.len() == loops.len();
+            return Ok((rings, is_same));
+        }
+    }
     let mut chains = chains::chains(&edges);
     faces::wind(&mut chains, &edges);
     let mut rings = rings::trace(&chains, &edges, fill);
