@@ -42,13 +42,13 @@ const AROUND: u32 = 96;
 
 /// Shots of the scripted run: at which of the three, the direction from its middle, height above that, energy.
 const SHOTS: [(usize, f32, f32, f32); 7] = [
-    (0, 0.62, 0.25, 2.0),
-    (1, 0.5, 0.05, 2.5),
-    (2, 0.4, 0.1, 2.0),
-    (0, 0.15, -0.15, 1.5),
-    (1, -0.4, 0.25, 1.5),
-    (2, 1.3, -0.1, 1.5),
-    (0, 0.95, -0.3, 1.0),
+    (0, 0.75, 0.42, 4.0),
+    (1, 0.6, 0.05, 2.5),
+    (2, 0.5, 0.15, 2.0),
+    (0, 1.2, -0.05, 3.0),
+    (1, -0.3, 0.2, 1.5),
+    (2, 1.2, -0.1, 1.5),
+    (0, 0.35, -0.3, 1.5),
 ];
 
 #[derive(Component)]
@@ -69,6 +69,7 @@ fn setup(
 ) {
     commands.spawn((
         Camera3d::default(),
+        Camera { clear_color: ClearColorConfig::Custom(Color::srgb(0.46, 0.5, 0.54)), ..default() },
         Hdr,
         // Needs no lookup table.
         Tonemapping::AcesFitted,
@@ -108,7 +109,7 @@ fn setup(
             pedestal,
         ),
         (turned_on_a_lathe(&JAR, AROUND), clay, Transform::from_xyz(-0.3, PEDESTAL, 0.0), jar),
-        (Sphere::new(0.42).mesh().uv(96, 64), plaster, Transform::from_xyz(0.85, 0.42, 0.35), ball),
+        (Sphere::new(0.42).mesh().uv(96, 64), plaster, Transform::from_xyz(0.75, 0.42, -0.35), ball),
     ];
     for (i, (mesh, material, place, surface)) in targets.into_iter().enumerate() {
         commands
@@ -151,9 +152,9 @@ fn turned_on_a_lathe(outline: &[Vec2], around: u32) -> Mesh {
 
 fn go_around(time: Res<Time>, mut camera: Query<&mut Transform, With<Camera3d>>) {
     for mut transform in &mut camera {
-        let angle = 0.55 + 0.45 * ops::sin(0.5 * time.elapsed_secs());
-        let eye = Vec3::new(3.3 * ops::sin(angle), 1.9, 3.3 * ops::cos(angle));
-        *transform = Transform::from_translation(eye).looking_at(Vec3::new(0.1, 1.0, 0.0), Vec3::Y);
+        let angle = 0.75 + 0.4 * ops::sin(0.5 * time.elapsed_secs());
+        let eye = Vec3::new(3.7 * ops::sin(angle), 2.35, 3.7 * ops::cos(angle));
+        *transform = Transform::from_translation(eye).looking_at(Vec3::new(0.0, 1.08, 0.0), Vec3::Y);
     }
 }
 

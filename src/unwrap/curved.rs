@@ -1,11 +1,12 @@
 //! Curved meshes, laid out by distance and direction from a point.
 
-use super::{Chart, MeshShape, Start, along};
+use super::chart::{Chart, Start, along};
+use super::shape::MeshShape;
 use glam::{Quat, Vec2, Vec3};
 use std::{cmp::Reverse, collections::BinaryHeap};
 
 /// The most that a triangle may be stretched or shrunk in the plane, along any of its edges and in area.
-const MOST_STRETCH: f32 = 1.6;
+const MOST_STRETCH: f32 = 2.0;
 
 /// Cells along the longer side of a chart in which triangles are looked for that cover one another.
 const CELLS: f32 = 512.0;

@@ -1,6 +1,7 @@
 //! Flat faces, unfolded about the edges in which they meet.
 
-use super::{Chart, MeshShape, Start, along};
+use super::chart::{Chart, Start, along};
+use super::shape::MeshShape;
 use glam::{Vec2, Vec3};
 use std::{cmp::Reverse, collections::BinaryHeap};
 
@@ -65,14 +66,13 @@ pub(super) fn unfold(shape: &MeshShape, start: Start, is_free: &[bool]) -> Chart
         }
         is_in[face as usize] = true;
         let before = edges.len();
-        for (triangle, corners) in &new {
+        for (triangle, _) in &new {
             for (corner, (other, _)) in
                 shape.across(*triangle).into_iter().enumerate().filter_map(|(i, to)| Some((i, to?)))
             {
                 let other = other as usize;
                 if shape.face(other) != face && is_free[other] {
                     edges.push(Edge { from: *triangle, corner, to: other, placed });
-                    let _ = corners;
                 }
             }
         }

@@ -1,6 +1,8 @@
 //! Charts side by side in one picture: [`LaidOut`].
 
-use super::{Chart, MeshShape, UnwrapError};
+use super::chart::Chart;
+use super::error::UnwrapError;
+use super::shape::MeshShape;
 use glam::{UVec2, Vec2};
 
 /// Texels around each chart that belong to it too, so that filtering at its border finds what goes on there.

@@ -1,6 +1,6 @@
 //! [`MeshShape`]: the triangles of a mesh, and which of them meet.
 
-use super::{MAX_TRIANGLES, UnwrapError};
+use super::error::{MAX_TRIANGLES, UnwrapError};
 use glam::Vec3;
 use std::collections::HashMap;
 

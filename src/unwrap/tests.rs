@@ -229,8 +229,8 @@ fn any_triangles_are_laid_out_or_refused() {
     let mut rng = Rng::new(8);
     for round in 0..300 {
         let n = 3 + (rng.next_u32() % 40) as usize;
-        let is_flat = (rng.next_u32() % 3) == 0;
-        let snap = (rng.next_u32() % 2) == 0;
+        let is_flat = rng.next_u32().is_multiple_of(3);
+        let snap = rng.next_u32().is_multiple_of(2);
         let mut positions: Vec<Vec3> = (0..n)
             .map(|_| {
                 let mut at = Vec3::new(rng.unit(), rng.unit(), if is_flat { 0.0 } else { rng.unit() });

@@ -146,7 +146,7 @@ fn e9_what_cannot_be_made_is_refused() {
         ("distance", |relief| relief.settings.contours.distance = f32::INFINITY),
         ("step", |relief| relief.settings.heights.step = 0.0),
         ("strata", |relief| relief.settings.colors.strata = 7.0),
-        ("contours", |relief| relief.settings.shape = ReliefShape::Lines(vec![vec![Vec2::NAN; 4]])),
+        ("contour 0", |relief| relief.settings.shape = ReliefShape::Lines(vec![vec![Vec2::NAN; 4]])),
     ] {
         let mut relief = island();
         change(&mut relief);

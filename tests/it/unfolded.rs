@@ -17,9 +17,13 @@ const PLAIN: [u8; 4] = [180, 170, 160, 255];
 #[derive(Resource, Default)]
 struct Failed(Vec<ShardsError>);
 
+#[derive(Resource, Default)]
+struct Unbaked(Vec<CrackError>);
+
 fn bodies(picture: Option<Image>) -> (App, Handle<StandardMaterial>) {
     let mut app = app();
-    app.init_resource::<Failed>();
+    app.init_resource::<Failed>().init_resource::<Unbaked>();
+    app.add_observer(|event: On<CrackFailed>, mut failed: ResMut<Unbaked>| failed.0.push(event.error.clone()));
     app.add_observer(|event: On<ShatterFailed>, mut failed: ResMut<Failed>| failed.0.push(event.error.clone()));
     let image = picture.map(|picture| add(&mut app, picture));
     let material = add(&mut app, StandardMaterial { base_color_texture: image, ..default() });
@@ -288,7 +292,8 @@ fn s11_some_meshes_stay_as_they_are() {
     assert!(size.min_element() >= 3 * 512 && size.max_element() < 2200, "{size}");
     // What would have its place in the picture comes too late.
     app.world_mut().entity_mut(entity).insert(GuidedCracks::new(CrackGuide::text("HI")));
-    wait_for(&mut app, "an answer", |app| matches!(state(app, entity).status, CrackStatus::Failed(_)));
+    wait_for(&mut app, "an answer", |app| !app.world().resource::<Unbaked>().0.is_empty());
+    assert!(matches!(app.world().resource::<Unbaked>().0[..], [CrackError::Bake { .. }]));
 }
 
 /// Meshes that nothing can be made of, and those that change: no panic, one warning at the most, nothing is left.

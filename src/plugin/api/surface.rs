@@ -121,7 +121,7 @@ impl Default for CrackSurface {
 ///
 /// Such a mesh cracks all over, its cracks running over edges and around curves as if it were flat around the hit: a box is unfolded, a rock is
 /// laid out by distance and direction. Lengths and angles stay as they are on meshes of flat faces (up to 64 of them), and change by no more than
-/// 1.6 times on others. What does not lie flat any more, as the far side of a ball, is laid out beside it and cracks too, but no crack runs from one
+/// twice on others. What does not lie flat any more, as the far side of a ball, is laid out beside it and cracks too, but no crack runs from one
 /// part to another. Each needs textures for all of it: a box six times its picture, and about as much for the gaps.
 ///
 /// Never laid out: flat meshes and slabs, those of more than 65,536 triangles, meshes whose surface has a [mask](CrackSurface::mask) of images, a
