@@ -78,7 +78,7 @@ fn setup(
     ));
     commands.spawn((
         DirectionalLight { illuminance: 7_000.0, color: Color::srgb(1.0, 0.95, 0.86), ..default() },
-        Transform::from_xyz(-2.0, 2.6, 2.4).looking_at(Vec3::ZERO, Vec3::Y),
+        Transform::from_xyz(2.4, 3.0, 1.8).looking_at(Vec3::ZERO, Vec3::Y),
     ));
     let (picture, normals) = with_normals(&assets, "concrete_fine");
     let stone = materials.add(StandardMaterial {

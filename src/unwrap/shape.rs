@@ -7,6 +7,9 @@ use std::collections::HashMap;
 /// Triangles lie in one plane if the sine of the angle between them is below this.
 const FLAT: f32 = 1e-3;
 
+/// Positions nearer to one another are one, as a share of the mesh's diagonal: where a ball is closed, its ends differ by rounding.
+const SAME: f32 = 1e-5;
+
 /// Positions beyond this are refused.
 const FARTHEST: f32 = 1e9;
 
@@ -30,7 +33,7 @@ pub struct MeshShape {
 impl MeshShape {
     /// The shape of triangles, each given by three numbers of positions, counterclockwise from outside.
     ///
-    /// Triangles without area are left out. An edge of more than two triangles, or of two that face opposite ways, is a border.
+    /// Positions that are no further from one another than 1e-5 of the mesh's diagonal are one. Triangles without area are left out. An edge of more than two triangles, or of two that face opposite ways, is a border.
     ///
     /// # Errors
     /// [`UnwrapError`] if a number or position is out of range, or no triangle has an area.
@@ -41,18 +44,7 @@ impl MeshShape {
         if let Some(i) = positions.iter().position(|at| !at.is_finite() || at.abs().max_element() > FARTHEST) {
             return Err(UnwrapError::Position(i));
         }
-        let mut points = Vec::new();
-        let mut known = HashMap::new();
-        let of_position: Vec<u32> = positions
-            .iter()
-            .map(|at| {
-                // 0 and -0 are one place.
-                *known.entry((*at + 0.0).to_array().map(f32::to_bits)).or_insert_with(|| {
-                    points.push(*at);
-                    points.len() as u32 - 1
-                })
-            })
-            .collect();
+        let (points, of_position) = weld(positions);
         let vertices = positions.len();
         let point =
             |vertex: u32| of_position.get(vertex as usize).copied().ok_or(UnwrapError::NoVertex { vertex, vertices });
@@ -143,6 +135,34 @@ impl MeshShape {
         let [a, b, c] = self.corners(triangle);
         (a + b + c) / 3.0
     }
+}
+
+/// Each place once, and the place of each position.
+fn weld(positions: &[Vec3]) -> (Vec<Vec3>, Vec<u32>) {
+    let (min, max) =
+        positions.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(min, max), at| (min.min(*at), max.max(*at)));
+    let near = (SAME * min.distance(max)).max(f32::MIN_POSITIVE);
+    // In cells that are larger: most positions lie in one, whatever is near them.
+    let cell = |at: Vec3| ((at - min) / (8.0 * near)).floor().as_ivec3();
+    let mut points = Vec::<Vec3>::new();
+    let mut cells: HashMap<[i32; 3], Vec<u32>> = HashMap::new();
+    let mut find = |at: Vec3| {
+        let (low, high) = (cell(at - near), cell(at + near));
+        for (x, y, z) in
+            (low.x..=high.x).flat_map(|x| (low.y..=high.y).flat_map(move |y| (low.z..=high.z).map(move |z| (x, y, z))))
+        {
+            let known = cells.get(&[x, y, z]).into_iter().flatten();
+            if let Some(point) = known.copied().find(|point| points[*point as usize].distance(at) <= near) {
+                return point;
+            }
+        }
+        let point = points.len() as u32;
+        points.push(at);
+        cells.entry(cell(at).to_array()).or_default().push(point);
+        point
+    };
+    let of_position = positions.iter().map(|at| find(*at)).collect();
+    (points, of_position)
 }
 
 /// The triangle across each edge, if there is one.

@@ -62,6 +62,9 @@ fn lay_out(mesh: &(Vec<Vec3>, Vec<[u32; 3]>), around: Vec3, texels: f32) -> (Mes
     (shape, laid_out)
 }
 
+/// In place of how much a mesh of triangles at random may be stretched.
+const AT_RANDOM: f32 = f32::INFINITY;
+
 /// Each triangle is there once, seen from outside, and no texel lies in two of them.
 fn check(shape: &MeshShape, laid_out: &LaidOut, stretch: f32) {
     let mut covered = vec![0u8; laid_out.owner.len()];
@@ -101,8 +104,8 @@ fn check(shape: &MeshShape, laid_out: &LaidOut, stretch: f32) {
         }
     }
     let twice = covered.iter().filter(|covered| **covered > 1).count();
-    // Slivers of triangles at random may touch.
-    let most = if shape.faces() == shape.len() { covered.len() / 2000 } else { 0 };
+    // Triangles at random may lie over one another in one plane of the mesh itself.
+    let most = if stretch == AT_RANDOM { covered.len() / 100 } else { 0 };
     assert!(twice <= most, "{twice} texels lie in several triangles");
 }
 
@@ -204,6 +207,18 @@ fn a_ball_falls_into_few_charts_and_keeps_distances_from_the_hit() {
     assert!(seen > 300 && worst < 0.02, "{seen}: {worst}");
 }
 
+/// As where a ball is closed: its ends differ by rounding.
+#[test]
+fn vertices_that_are_about_in_one_place_are_one() {
+    let exact = ball(3);
+    let mut rng = Rng::new(2);
+    let mut moved = exact.clone();
+    moved.0.iter_mut().for_each(|at| *at += 1e-6 * Vec3::new(rng.signed(), rng.signed(), rng.signed()));
+    let [exact, moved] = [exact, moved].map(|mesh| lay_out(&mesh, Vec3::Z, 50.0));
+    assert_eq!(exact.0.points(), 258, "corners of a divided octahedron");
+    assert_eq!((moved.0.points(), moved.1.charts, moved.1.chart), (258, exact.1.charts, exact.1.chart));
+}
+
 #[test]
 fn a_tube_unrolls() {
     let mesh = tube(96);
@@ -263,7 +278,7 @@ fn any_triangles_are_laid_out_or_refused() {
         let unwrap = Unwrap { around, triangle, right: Vec3::Y, texels, largest: 4096 };
         match unwrap.apply(&shape) {
             Ok(laid_out) => {
-                check(&shape, &laid_out, 0.0);
+                check(&shape, &laid_out, AT_RANDOM);
                 assert_eq!(laid_out, unwrap.apply(&shape).unwrap(), "the same again");
             }
             Err(error) => assert!(matches!(error, UnwrapError::TooLarge { .. }), "{round}: {error}"),
