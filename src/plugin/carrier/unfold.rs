@@ -110,8 +110,13 @@ impl Unfold {
 fn work<S: MaterialSlot>(world: &World, entity: Entity, mesh: &Handle<Mesh>, order: &UnfoldOrder) -> Option<Work> {
     let mesh = world.get_resource::<Assets<Mesh>>()?.get(mesh)?;
     let triangles = Triangles::of(mesh).ok()?;
-    let ([a, b, c], _) = triangles.get(0)?;
-    if triangles.len() > MAX_TRIANGLES || is_flat(mesh, a, (b - a).cross(c - a).normalize_or_zero()) {
+    let plane = |i: usize| {
+        let ([a, b, c], _) = triangles.get(i)?;
+        // The first may have no area, as at the pole of a ball.
+        Some((a, (b - a).cross(c - a).try_normalize()?))
+    };
+    let (point, normal) = (0..triangles.len()).find_map(plane)?;
+    if triangles.len() > MAX_TRIANGLES || is_flat(mesh, point, normal) {
         return None;
     }
     let material = world.get::<S>(entity)?.material();
