@@ -18,6 +18,12 @@ fn times(a: DVec2, b: DVec2) -> DVec2 {
     DVec2::new(a.x * b.x - a.y * b.y, a.x * b.y + a.y * b.x)
 }
 
+/// `a` with `b` turned by a root, added and subtracted.
+fn both(a: DVec2, b: DVec2, root: DVec2) -> (DVec2, DVec2) {
+    let turned = times(b, root);
+    (a + turned, a - turned)
+}
+
 impl Transform {
     /// For `samples` values, a power of two from 2 on.
     pub(super) fn new(samples: u32) -> Self {
@@ -38,18 +44,44 @@ impl Transform {
     fn forward(&self, values: &[DVec2]) -> Vec<DVec2> {
         let mut out: Vec<DVec2> = self.order.iter().map(|&i| values[i as usize]).collect();
         let mut half = 1;
-        while half < out.len() {
-            let stride = self.roots.len() / half;
-            for block in out.chunks_exact_mut(2 * half) {
-                let (low, high) = block.split_at_mut(half);
-                for ((a, b), root) in low.iter_mut().zip(high).zip(self.roots.iter().step_by(stride)) {
-                    let turned = times(*b, *root);
-                    (*a, *b) = (*a + turned, *a - turned);
-                }
+        if out.len() >= 4 {
+            // As `two_steps`, whose loops are too short here.
+            let [first, third] = [self.roots[0], self.roots[self.roots.len() / 2]];
+            let (blocks, _) = out.as_chunks_mut();
+            for [a, b, c, d] in blocks {
+                let ((p, q), (r, s)) = (both(*a, *b, first), both(*c, *d, first));
+                ((*a, *c), (*b, *d)) = (both(p, r, first), both(q, s, third));
             }
-            half *= 2;
+            half = 4;
+        }
+        while 4 * half <= out.len() {
+            self.two_steps(&mut out, half);
+            half *= 4;
+        }
+        if half < out.len() {
+            let (low, high) = out.split_at_mut(half);
+            for ((a, b), root) in low.iter_mut().zip(high).zip(&self.roots) {
+                (*a, *b) = both(*a, *b, *root);
+            }
         }
         out
+    }
+
+    /// The step for blocks of `half` values and the one after it, in one go over the values.
+    fn two_steps(&self, values: &mut [DVec2], half: usize) {
+        let stride = self.roots.len() / (2 * half);
+        for block in values.chunks_exact_mut(4 * half) {
+            let (low, high) = block.split_at_mut(2 * half);
+            let ((a, b), (c, d)) = (low.split_at_mut(half), high.split_at_mut(half));
+            let first = self.roots.iter().step_by(2 * stride);
+            let (second, third) = (&self.roots[..half * stride], &self.roots[half * stride..]);
+            let roots = first.zip(second.iter().step_by(stride).zip(third.iter().step_by(stride)));
+            for (((a, b), (c, d)), (first, (second, third))) in a.iter_mut().zip(b).zip(c.iter_mut().zip(d)).zip(roots)
+            {
+                let ((p, q), (r, s)) = (both(*a, *b, *first), both(*c, *d, *first));
+                ((*a, *c), (*b, *d)) = (both(p, r, *second), both(q, s, *third));
+            }
+        }
     }
 
     /// `Σ_k values(k) exp(2πi j k / n)` for all `j`.
@@ -119,10 +151,12 @@ impl Descriptors {
     /// The descriptors of samples.
     pub(super) fn of(samples: &[DVec2], spacing: f64, transform: &Transform) -> Self {
         let count = samples.len();
-        let way = |j: usize| (samples[if j + 1 == count { 0 } else { j + 1 }] - samples[j]) / spacing;
-        let ways: Vec<DVec2> = (0..count).map(way).collect();
+        let mut ways: Vec<DVec2> = samples.windows(2).map(|pair| (pair[1] - pair[0]) / spacing).collect();
+        ways.push((samples[0] - samples[count - 1]) / spacing);
         let mut harmonics = transform.forward(&ways);
-        harmonics.iter_mut().for_each(|c| *c /= count as f64);
+        // The number of samples is a power of two, so this is the same as to divide.
+        let share = 1.0 / count as f64;
+        harmonics.iter_mut().for_each(|c| *c *= share);
         // The line is closed.
         harmonics[0] = DVec2::ZERO;
         Self { harmonics, spacing, start: samples[0] }
@@ -184,27 +218,36 @@ impl Sampled {
     /// `count` samples of a closed line that is longer than 0, from its first corner.
     pub(super) fn new(line: &[DVec2], count: usize) -> Self {
         let next = |i: usize| line[if i + 1 == line.len() { 0 } else { i + 1 }];
-        let mut ends = Vec::with_capacity(line.len());
+        let others = line[1..].iter().chain(&line[..1]);
+        let longs: Vec<f64> = line.iter().zip(others).map(|(point, next)| point.distance(*next)).collect();
         let mut length = 0.0;
-        for (i, point) in line.iter().enumerate() {
-            length += point.distance(next(i));
-            ends.push(length);
-        }
+        let to_end = |long: &f64| {
+            length += long;
+            length
+        };
+        let ends: Vec<f64> = longs.iter().map(to_end).collect();
         let spacing = length / count as f64;
+        let passed_at_end: Vec<f64> = ends.iter().map(|end| end / spacing).collect();
+        // How many edges end before each sample and after the one before it. Where they do is as good as random, so there is
+        // no branch for it; the quotient is a sample off at most.
+        let mut ended = vec![0u32; count + 1];
+        for (end, passed) in ends.iter().zip(&passed_at_end) {
+            let low = (*passed as usize).saturating_sub(1);
+            let is_before = |j: usize| usize::from(spacing * j as f64 <= *end);
+            let first = low + is_before(low) + is_before(low + 1) + is_before(low + 2);
+            ended[first.min(count)] += 1;
+        }
         let mut edge = 0;
-        let mut long = line[0].distance(next(0));
-        let sample = |j: usize| {
-            let at = spacing * j as f64;
-            while edge + 1 < line.len() && ends[edge] < at {
-                edge += 1;
-                long = line[edge].distance(next(edge));
-            }
+        let sample = |(j, ended): (usize, &u32)| {
+            edge += *ended as usize;
+            let (at, edge) = (spacing * j as f64, edge.min(line.len() - 1));
+            let long = longs[edge];
             let rest = if long > 0.0 { ((ends[edge] - at) / long).clamp(0.0, 1.0) } else { 0.0 };
             next(edge).lerp(line[edge], rest)
         };
-        let points = (0..count).map(sample).collect();
-        let starts = std::iter::once(0.0).chain(ends.iter().copied());
-        let passed = starts.take(line.len()).map(|start| start / spacing).collect();
+        let points = ended[..count].iter().enumerate().map(sample).collect();
+        let starts = std::iter::once(0.0).chain(passed_at_end);
+        let passed = starts.take(line.len()).collect();
         Self { points, spacing, passed }
     }
 }

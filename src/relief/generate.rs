@@ -12,7 +12,7 @@ use super::{
     scramble::Scramble,
     seeds::{Seeds, limits},
     simplify::working_copy,
-    untangle::{Fill, MAX_CUTS, untangle, untangled},
+    untangle::{Fill, untangled},
 };
 use crate::{Grid, math::Rng};
 use glam::Vec2;
@@ -90,6 +90,8 @@ pub struct ContourJob {
     longest: f64,
     seeds: Vec<Loop>,
     current: Vec<Loop>,
+    /// Whether the current rings are a single one, made of a loop that did not meet itself.
+    is_lone: bool,
     level: i32,
     stage: Stage,
     rings: Vec<Ring>,
@@ -167,6 +169,7 @@ impl ContourJob {
             rng: Rng::new(seed),
             longest,
             current: rings.clone(),
+            is_lone: false,
             areas: [area(&rings); 2],
             seeds: rings,
             level: 0,
@@ -212,6 +215,7 @@ impl ContourJob {
             self.stage = Stage::Outward;
             self.level = 0;
             self.current.clone_from(&self.seeds);
+            self.is_lone = false;
         }
         if self.stage == Stage::Outward && -self.level >= self.params.outward as i32 {
             self.stage = Stage::Done;
@@ -255,11 +259,12 @@ impl ContourJob {
         let least = least_area(self.pace.least(), LEAST_DISPLACED_AREA);
         let rng = self.rng.stream("contours").substream(u64::from(level as u32));
         let from = std::mem::take(&mut self.current);
+        let known = if std::mem::take(&mut self.is_lone) { from.first().map_or(&[][..], Vec::as_slice) } else { &[] };
         let plain = Move { rings: &from, join: self.params.join, pace: &self.pace, tolerance: 0.0 };
         let mut rings = if method == Method::Improved {
             let mut displaced = from.clone();
             self.displace(&mut displaced, &mut rng.stream("midpoints"))?;
-            let (displaced, is_same) = untangled(&displaced, POSITIVE, least, MAX_CUTS).map_err(tangled)?;
+            let (displaced, is_same) = untangled(&displaced, known, POSITIVE, least).map_err(tangled)?;
             let pace = Pace::even(self.room_of_phases() + KEPT * self.pace.least());
             let tolerance = KEPT_TOLERANCE * self.pace.least();
             let kept = Move { join: Join::Round, pace: &pace, tolerance, ..plain };
@@ -276,7 +281,9 @@ impl ContourJob {
             Method::Midpoint => self.displace(&mut rings, &mut rng.stream("midpoints"))?,
             Method::Fourier | Method::Improved => self.scramble(&mut rings, &mut rng.stream("phases")),
         }
-        untangle(&rings, POSITIVE, least, MAX_CUTS).map_err(tangled)
+        let (rings, is_same) = untangled(&rings, &[], POSITIVE, least).map_err(tangled)?;
+        self.is_lone = is_same && rings.len() == 1;
+        Ok(rings)
     }
 
     /// How far points may go in all displacements of one level.

@@ -39,6 +39,11 @@ impl Point {
         [i64::from(other.x) - i64::from(self.x), i64::from(other.y) - i64::from(self.y)]
     }
 
+    /// One number for both coordinates, in the order of points: by x, then by y.
+    pub(super) const fn rank(self) -> i64 {
+        ((self.x as i64) << 32) + self.y as i64
+    }
+
     pub(super) fn distance(self, other: Self) -> f64 {
         let [x, y] = self.to(other);
         ((x * x + y * y) as f64).sqrt()

@@ -32,8 +32,13 @@ impl Displacement {
         let mut out = Loop::with_capacity(2 * points.len());
         let mut waiting = Vec::new();
         for (a, b) in edges(points) {
+            let length = a.distance(b);
+            if length <= self.longest {
+                out.push(a);
+                continue;
+            }
             let [from, to] = [a, b].map(|point| Displaced { place: point.place(), base: point.place() });
-            waiting.push((from, to, self.halvings(a.distance(b))));
+            waiting.push((from, to, self.halvings(length)));
             while let Some((from, to, halvings)) = waiting.pop() {
                 match self.midpoint(from, to, rng) {
                     Some(middle) if halvings > 0 => {

@@ -30,10 +30,11 @@ impl Scramble<'_> {
         let mut descriptors = Descriptors::of(&sampled.points, sampled.spacing, self.transform);
         descriptors.scramble(self.first_harmonic, rng);
         let moved = descriptors.places(self.transform);
-        let steps: Vec<DVec2> = moved.iter().zip(&sampled.points).map(|(to, from)| *to - *from).collect();
+        let mut steps: Vec<DVec2> = moved.iter().zip(&sampled.points).map(|(to, from)| *to - *from).collect();
         let mean = steps.iter().copied().sum::<DVec2>() / steps.len() as f64;
-        let steps: Vec<DVec2> =
-            steps.iter().map(|step| DVec2::from_array(shortened((*step - mean).to_array(), self.within))).collect();
+        for step in &mut steps {
+            *step = DVec2::from_array(shortened((*step - mean).to_array(), self.within));
+        }
         self.joined(&places, &sampled, &steps)
     }
 
@@ -41,22 +42,29 @@ impl Scramble<'_> {
     fn joined(&self, corners: &[DVec2], sampled: &Sampled, steps: &[DVec2]) -> Loop {
         let count = steps.len();
         let next = |j: usize| if j + 1 == count { 0 } else { j + 1 };
-        let mut out = Loop::with_capacity(count + corners.len() / 4);
-        let mut corner = 0;
+        // Corners by the sample that they follow. Whether a corner is missed is as good as random, so there is no branch for it.
+        let follow = || corners.iter().zip(&sampled.passed).map(|(corner, &passed)| (*corner, passed, passed as usize));
+        let follow = || follow().take_while(|(_, _, j)| *j < count);
+        let mut is_missed = vec![false; count];
+        for (corner, _, j) in follow() {
+            is_missed[j] |= distance(corner, [sampled.points[j], sampled.points[next(j)]]) > self.tolerance;
+        }
+        let mut added = vec![0; count];
+        let mut out = vec![Point::default(); count + corners.len() + 1];
+        let mut before = 0;
+        for (corner, passed, j) in follow() {
+            let place = corner + steps[j].lerp(steps[next(j)], passed - j as f64);
+            // What is not missed is overwritten by what comes after it.
+            out[j + 1 + before] = Point::round(place.x, place.y);
+            before += usize::from(is_missed[j]);
+            added[j] += usize::from(is_missed[j]);
+        }
+        out.truncate(count + before);
+        let mut before = 0;
         for (j, (sample, step)) in sampled.points.iter().zip(steps).enumerate() {
             let place = *sample + *step;
-            out.push(Point::round(place.x, place.y));
-            let from = corner;
-            while corner < corners.len() && sampled.passed[corner] < (j + 1) as f64 {
-                corner += 1;
-            }
-            let between = from..corner;
-            let chord = [*sample, sampled.points[next(j)]];
-            let is_missed = between.clone().any(|i| distance(corners[i], chord) > self.tolerance);
-            for i in between.filter(|_| is_missed) {
-                let place = corners[i] + step.lerp(steps[next(j)], sampled.passed[i] - j as f64);
-                out.push(Point::round(place.x, place.y));
-            }
+            out[j + before] = Point::round(place.x, place.y);
+            before += added[j];
         }
         out
     }

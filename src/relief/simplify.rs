@@ -8,8 +8,9 @@ use super::lattice::{Loop, Point, double_area};
 /// form a wedge, and the line goes on as long as its end lies in the wedge (the sleeve of Zhao and Saalfeld 1997). The pass starts at the
 /// corner with the smallest x, which stays, so it does not matter where the loop starts. The result may cross itself.
 pub(super) fn simplified(points: &[Point], tolerance: f64) -> Loop {
-    let Some(first) = (0..points.len()).min_by_key(|&i| points[i]) else { return Loop::new() };
-    let mut out = vec![points[first]];
+    let Some(first) = first_along_x(points) else { return Loop::new() };
+    let mut out = Loop::with_capacity(points.len());
+    out.push(points[first]);
     let mut wedge = Wedge::new(points[first]);
     let mut last = points[first];
     for &point in points[first + 1..].iter().chain(&points[..=first]) {
@@ -25,12 +26,20 @@ pub(super) fn simplified(points: &[Point], tolerance: f64) -> Loop {
     out
 }
 
+/// The first of the points with the smallest x and, of these, the smallest y.
+fn first_along_x(points: &[Point]) -> Option<usize> {
+    let least = points.iter().map(|point| point.rank()).min()?;
+    points.iter().position(|point| point.rank() == least)
+}
+
 /// Directions from a corner.
 struct Wedge {
     from: [f64; 2],
     /// The two borders; between them turns are positive from the first and negative from the second.
     borders: Option<[[f64; 2]; 2]>,
-    /// Distance of the farthest corner.
+    /// Squared distance of the farthest corner.
+    ///
+    /// Squares are whole numbers below 2⁵², which are exact, and differ so much that no two have the same root.
     far: f64,
 }
 
@@ -43,25 +52,27 @@ impl Wedge {
         Self { from: from.place(), borders: None, far: 0.0 }
     }
 
-    /// The way to a point, and its length.
+    /// The way to a point, and its squared length.
     fn to(&self, point: Point) -> ([f64; 2], f64) {
         let [x, y] = point.place();
         let way = [x - self.from[0], y - self.from[1]];
-        (way, (way[0] * way[0] + way[1] * way[1]).sqrt())
+        (way, way[0] * way[0] + way[1] * way[1])
     }
 
     /// Whether a line to the point passes all corners so far, and does not turn back.
     fn holds(&self, (way, far): ([f64; 2], f64)) -> bool {
         let is_between = |[low, high]: [[f64; 2]; 2]| {
             let along = [low[0] + high[0], low[1] + high[1]];
-            cross(low, way) >= 0.0 && cross(way, high) >= 0.0 && along[0] * way[0] + along[1] * way[1] > 0.0
+            // Without a branch for each.
+            (cross(low, way) >= 0.0) & (cross(way, high) >= 0.0) & (along[0] * way[0] + along[1] * way[1] > 0.0)
         };
         far >= self.far && self.borders.is_none_or(is_between)
     }
 
     /// Leaves the directions that pass the point within `tolerance`.
-    fn narrow(&mut self, (way, far): ([f64; 2], f64), tolerance: f64) {
-        self.far = self.far.max(far);
+    fn narrow(&mut self, (way, square): ([f64; 2], f64), tolerance: f64) {
+        self.far = self.far.max(square);
+        let far = square.sqrt();
         if far <= tolerance {
             return;
         }

@@ -29,8 +29,8 @@ pub(super) struct Bins {
 }
 
 impl Bins {
-    /// Some four times as many cells as edges, unless edges are so long that each would be in too many.
-    pub(super) fn new(edges: &[Edge]) -> Self {
+    /// At most `per` cells for each edge and a few more, and a quarter of that at least, unless edges are so long that each would be in too many.
+    pub(super) fn new(edges: &[Edge], per: u64) -> Self {
         let mut bounds = [i32::MAX, i32::MAX, i32::MIN, i32::MIN];
         let mut length = 0i64;
         for edge in edges {
@@ -44,7 +44,7 @@ impl Bins {
         let mean = length as u64 / count.max(1);
         let cells = |shift: u32| (u64::from(width[0] >> shift) + 1) * (u64::from(width[1] >> shift) + 1);
         let mut shift = 2;
-        while (16 << shift) < mean || cells(shift) > 4 * count + 64 {
+        while (16 << shift) < mean || cells(shift) > per * count + 64 {
             shift += 1;
         }
         Self { low, shift, columns: (width[0] >> shift) + 1, rows: (width[1] >> shift) + 1 }

@@ -12,8 +12,9 @@ pub(super) const NONE: u32 = u32::MAX;
 /// Edges that follow each other without a place where others meet them.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Chain {
-    /// Index of the first edge.
+    /// Indices of the first edge and of the last one.
     first: u32,
+    last: u32,
     /// Number of edges.
     pub(super) count: u32,
     /// Nodes at both ends, or [`NONE`].
@@ -89,7 +90,7 @@ impl End {
 pub(super) fn chains(edges: &Edges) -> Chains {
     let mut nodes: Vec<Point> =
         edges.edges.iter().zip(&edges.is_node).filter(|(_, is_node)| **is_node).map(|(edge, _)| edge.a).collect();
-    nodes.sort_unstable();
+    nodes.sort_unstable_by_key(|node| node.rank());
     nodes.dedup();
     let mut out = Chains { nodes, ..Chains::default() };
     // Loops that meet nothing, loops that do.
@@ -112,19 +113,22 @@ pub(super) fn chains(edges: &Edges) -> Chains {
 /// The chain that begins with an edge.
 fn follow(edges: &Edges, first: usize, is_done: &mut [bool], nodes: &[Point]) -> Chain {
     let (mut at, mut count) = (first, 0);
-    loop {
+    let last = loop {
         is_done[at] = true;
         count += 1;
+        let here = at;
         at = edges.next[at] as usize;
         if at == first || edges.is_node[at] {
-            break;
+            break here;
         }
-    }
+    };
     let node = |i: usize| {
-        let place = edges.is_node[i].then(|| nodes.binary_search(&edges.edges[i].a).ok()).flatten();
+        let place = edges.is_node[i]
+            .then(|| nodes.binary_search_by_key(&edges.edges[i].a.rank(), |node| node.rank()).ok())
+            .flatten();
         place.map_or(NONE, |node| node as u32)
     };
-    Chain { first: first as u32, count, ends: [node(first), node(at)], weight: 1, left: 0 }
+    Chain { first: first as u32, last: last as u32, count, ends: [node(first), node(at)], weight: 1, left: 0 }
 }
 
 /// Makes one of chains that run along the same edge, and removes those that cancel.
@@ -149,27 +153,33 @@ fn merge(chains: &mut Vec<Chain>, edges: &Edges) {
 }
 
 fn sort_ends(out: &mut Chains, edges: &Edges) {
-    for (c, chain) in out.chains.iter().enumerate().filter(|(_, chain)| chain.ends[0] != NONE) {
-        let mut last = chain.first as usize;
-        for _ in 1..chain.count {
-            last = edges.next[last] as usize;
-        }
-        let (first, last) = (edges.edges[chain.first as usize], edges.edges[last]);
-        let c = c as u32;
-        out.ends.push(End { node: chain.ends[0], way: first.a.to(first.b), chain: c, is_start: true });
-        out.ends.push(End { node: chain.ends[1], way: last.b.to(last.a), chain: c, is_start: false });
-    }
-    out.ends.sort_unstable_by(|a, b| {
-        let same = || (a.chain, a.is_start).cmp(&(b.chain, b.is_start));
-        a.node.cmp(&b.node).then_with(|| by_angle(a.way, b.way)).then_with(same)
-    });
+    let mut ends = Vec::with_capacity(2 * out.chains.len());
     out.starts = vec![0; out.nodes.len() + 1];
-    out.places = vec![[0; 2]; out.chains.len()];
-    for (i, end) in out.ends.iter().enumerate() {
-        out.starts[end.node as usize + 1] += 1;
-        out.places[end.chain as usize][usize::from(!end.is_start)] = i as u32;
+    for (c, chain) in out.chains.iter().enumerate().filter(|(_, chain)| chain.ends[0] != NONE) {
+        let (first, last) = (edges.edges[chain.first as usize], edges.edges[chain.last as usize]);
+        let c = c as u32;
+        ends.push(End { node: chain.ends[0], way: first.a.to(first.b), chain: c, is_start: true });
+        ends.push(End { node: chain.ends[1], way: last.b.to(last.a), chain: c, is_start: false });
+        chain.ends.iter().for_each(|&node| out.starts[node as usize + 1] += 1);
     }
     for node in 1..out.starts.len() {
         out.starts[node] += out.starts[node - 1];
+    }
+    // First by node, without comparing.
+    let mut places = out.starts.clone();
+    out.ends.clone_from(&ends);
+    for end in ends {
+        let place = &mut places[end.node as usize];
+        out.ends[*place as usize] = end;
+        *place += 1;
+    }
+    for star in out.starts.windows(2) {
+        out.ends[star[0] as usize..star[1] as usize].sort_unstable_by(|a, b| {
+            by_angle(a.way, b.way).then_with(|| (a.chain, a.is_start).cmp(&(b.chain, b.is_start)))
+        });
+    }
+    out.places = vec![[0; 2]; out.chains.len()];
+    for (i, end) in out.ends.iter().enumerate() {
+        out.places[end.chain as usize][usize::from(!end.is_start)] = i as u32;
     }
 }

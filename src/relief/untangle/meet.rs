@@ -110,7 +110,7 @@ impl Cuts {
     fn dedup(&mut self) {
         self.cuts.sort_unstable();
         self.cuts.dedup();
-        self.crossings.sort_unstable();
+        self.crossings.sort_unstable_by_key(|point| point.rank());
         self.crossings.dedup();
     }
 }
@@ -125,7 +125,7 @@ pub(super) fn cut(loops: &[Loop], most: usize) -> Result<Edges, TooTangled> {
     if edges.edges.is_empty() {
         return Ok(edges);
     }
-    let bins = Bins::new(&edges.edges);
+    let bins = Bins::new(&edges.edges, 4);
     let members = members(&edges, &bins);
     let mut found = Cuts::default();
     find(&mut edges, &members, &mut found, most)?;
@@ -240,7 +240,7 @@ fn find(edges: &mut Edges, members: &Members, found: &mut Cuts, most: usize) -> 
 /// Whether the edge passes through the square of side 1 around `p`, which is none of its ends.
 ///
 /// Of its border, the square has the sides towards smaller coordinates, and of its corners the one between them.
-fn passes(edge: &Edge, p: Point) -> bool {
+pub(super) fn passes(edge: &Edge, p: Point) -> bool {
     let [x0, y0, x1, y1] = edge.bounds();
     if p.x < x0 || p.x > x1 || p.y < y0 || p.y > y1 || p == edge.a || p == edge.b {
         return false;
@@ -303,7 +303,7 @@ fn follow(all: &mut Edges, [first, second]: [&Edge; 2], [i, j]: [u32; 2], cuts: 
 }
 
 /// The lattice point nearest to the place where two edges cross, if they do.
-fn crossing(e: &Edge, f: &Edge) -> Option<Point> {
+pub(super) fn crossing(e: &Edge, f: &Edge) -> Option<Point> {
     let (u, v) = (e.a.to(e.b), f.a.to(f.b));
     let [a, b] = [f.a, f.b].map(|p| cross(u, e.a.to(p)));
     let [c, d] = [e.a, e.b].map(|p| cross(v, f.a.to(p)));
