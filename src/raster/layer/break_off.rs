@@ -23,7 +23,10 @@ const WALL: f32 = 0.45;
 
 const SHADE: f32 = 0.5;
 
-const DEEP_SHADE: f32 = 0.62;
+const DEEP_SHADE: f32 = 0.72;
+
+/// How much brighter a wall is that faces the light.
+const LIT: f32 = 0.45;
 
 /// Strength of the shadow of the step down to the basin, as a share of that of the edge.
 const STEP_SHADE: f32 = 0.6;
@@ -113,10 +116,10 @@ impl Shape<'_> {
         let CrushedZone { pale, speckle, stones, .. } = *self.crushed;
         let crumbles = self.jag > 0.0;
         let bump = |k: u32, size: f32| noise(seed ^ k, at.x / size, at.y / size);
-        let share = if broken.basin.is_some() { SHELF } else { 1.0 };
+        let share = if broken.steps.is_empty() { 1.0 } else { SHELF };
         // In some places a wall is a slope.
         let slope = bump(draws::WALL_SLOPE, (0.35 * self.radius).max(4.0));
-        let run = if crumbles { 0.8 + 2.6 * slope.max(0.0) } else { 1.0 };
+        let run = if crumbles { 0.8 + 1.4 * slope.max(0.0) } else { 1.0 };
         let wall = (within / (run * WALL * share * self.depth).max(1.0)).clamp(0.0, 1.0);
         let bowl = (within / (0.8 * self.radius).max(1.0)).clamp(0.0, 1.0);
         let mut down = share * (wall + BOWL * (bowl - wall));
@@ -125,17 +128,22 @@ impl Shape<'_> {
         // A shadow is soft where the edge that casts it is far away.
         let soft = if crumbles { (0.7 * length).max(HARD) } else { HARD };
         let mut shadow = sink(self.within(broken, off + TO_LIGHT * length, at + TO_LIGHT * length, seed), soft);
+        // The wall on the far side faces the light.
+        let facing = (1.5 * WALL * share * self.depth).max(1.0);
+        let lit = sink(self.within(broken, off - TO_LIGHT * facing, at - TO_LIGHT * facing, seed), HARD);
         let mut sunk = 0.0;
-        if let Some(basin) = &broken.basin {
+        let one = 1.0 / broken.steps.len().max(1) as f32;
+        for step in &broken.steps {
             let within =
-                basin.within(off) - 2.0 * self.jag * (0.5 + 0.5 * bump(draws::BASIN_EDGE, (3.0 * self.jag).max(2.0)));
-            let share = (within / (2.5 * WALL * self.depth).max(2.0)).clamp(0.0, 1.0);
-            sunk = share * share * (3.0 - 2.0 * share);
-            down += (1.0 - SHELF) * sunk;
+                step.within(off) - 2.0 * self.jag * (0.5 + 0.5 * bump(draws::BASIN_EDGE, (3.0 * self.jag).max(2.0)));
+            let share = (within / (2.5 * WALL * one * self.depth).max(2.0)).clamp(0.0, 1.0);
+            let gone = one * share * share * (3.0 - 2.0 * share);
+            sunk += gone;
+            down += (1.0 - SHELF) * gone;
             if within > 0.0 {
-                let length = long * (1.0 - SHELF) * self.depth;
+                let length = long * (1.0 - SHELF) * one * self.depth;
                 // The step is lower and rounder than the edge.
-                shadow = shadow.max(STEP_SHADE * sink(basin.within(off + TO_LIGHT * length), 1.5 * soft));
+                shadow = shadow.max(STEP_SHADE * sink(step.within(off + TO_LIGHT * length), 1.5 * soft));
             }
         }
         let fold = |k: u32, size: f32| {
@@ -186,7 +194,7 @@ impl Shape<'_> {
         place.height = -self.depth * down + bumps;
         // The wall has the colour of the material that came off, not of what lay under it.
         place.pale = pale * inside * if crumbles { 0.15 + 0.85 * wall } else { 1.0 };
-        place.shade = speckle * tone * inside;
+        place.shade = (speckle * tone + LIT * lit * (1.0 - shadow)) * inside;
         place.dark = shade * shadow * inside * (SHADOW * self.depth).min(1.0);
     }
 
