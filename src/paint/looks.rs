@@ -190,7 +190,7 @@ impl Look {
         crushed: Some(CrushedZone {
             radius: 0.040,
             ragged: 0.7,
-            depth: 0.02,
+            depth: 0.025,
             rough: 0.003,
             grain: 0.008,
             color: [0.57, 0.53, 0.48],

@@ -263,7 +263,14 @@ fn laid_out(print: &mut Print) -> Made<()> {
     };
     for (positions, triangles) in [bent(4, 1, FRAC_PI_2), bent(24, 12, 0.2)] {
         let shape = MeshShape::new(&positions, &triangles)?;
-        let unwrap = Unwrap { around: positions[0], triangle: 0, right: Vec3::Y, texels: 40.0, largest: 1024 };
+        let unwrap = Unwrap {
+            around: positions[0],
+            triangle: 0,
+            right: Vec3::Y,
+            texels: 40.0,
+            most_side: 1024,
+            most_texels: 1 << 20,
+        };
         let laid_out = unwrap.apply(&shape)?;
         print.words([laid_out.size.x, laid_out.size.y, laid_out.charts as u32]);
         print.places(laid_out.corners.iter().flatten().flatten());

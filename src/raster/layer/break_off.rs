@@ -15,6 +15,9 @@ use glam::Vec2;
 /// Share of the depth that lies outside the basin.
 const SHELF: f32 = 0.5;
 
+/// The same where there are several steps down.
+const EDGE: f32 = 0.45;
+
 /// Share of that depth which is gained on the way to the middle.
 const BOWL: f32 = 0.4;
 
@@ -116,7 +119,12 @@ impl Shape<'_> {
         let CrushedZone { pale, speckle, stones, .. } = *self.crushed;
         let crumbles = self.jag > 0.0;
         let bump = |k: u32, size: f32| noise(seed ^ k, at.x / size, at.y / size);
-        let share = if broken.steps.is_empty() { 1.0 } else { SHELF };
+        let share = match broken.steps.len() {
+            0 => 1.0,
+            1 => SHELF,
+            // A shallow edge, and deeper and deeper steps.
+            _ => EDGE,
+        };
         // In some places a wall is a slope.
         let slope = bump(draws::WALL_SLOPE, (0.35 * self.radius).max(4.0));
         let run = if crumbles { 0.8 + 1.4 * slope.max(0.0) } else { 1.0 };
@@ -136,12 +144,12 @@ impl Shape<'_> {
         for step in &broken.steps {
             let within =
                 step.within(off) - 2.0 * self.jag * (0.5 + 0.5 * bump(draws::BASIN_EDGE, (3.0 * self.jag).max(2.0)));
-            let share = (within / (2.5 * WALL * one * self.depth).max(2.0)).clamp(0.0, 1.0);
-            let gone = one * share * share * (3.0 - 2.0 * share);
+            let fall = (within / (2.5 * WALL * one * self.depth).max(2.0)).clamp(0.0, 1.0);
+            let gone = one * fall * fall * (3.0 - 2.0 * fall);
             sunk += gone;
-            down += (1.0 - SHELF) * gone;
+            down += (1.0 - share) * gone;
             if within > 0.0 {
-                let length = long * (1.0 - SHELF) * one * self.depth;
+                let length = long * (1.0 - share) * one * self.depth;
                 // The step is lower and rounder than the edge.
                 shadow = shadow.max(STEP_SHADE * sink(step.within(off + TO_LIGHT * length), 1.5 * soft));
             }
@@ -175,7 +183,7 @@ impl Shape<'_> {
             let mut tone = 0.30 * coarse + 0.16 * plate + (0.5 - 0.2 * stones) * sand
                 - 0.14 * stones
                 - 0.6 * corner * wall
-                - 0.3 * sunk;
+                - 0.4 * sunk;
             if stones > 0.0
                 && let Some(stone) = Stone::find(seed ^ draws::STONES, at, self.grain, stones)
             {
