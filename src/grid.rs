@@ -54,7 +54,7 @@ impl<T: Copy> Grid<T> {
     /// A grid over existing rows; `None` if `data` does not have exactly `size.x * size.y` values.
     #[must_use]
     pub fn from_vec(size: UVec2, data: Vec<T>) -> Option<Self> {
-        (data.len() == size.x as usize * size.y as usize).then_some(Self { size, data })
+        (data.len() as u64 == u64::from(size.x) * u64::from(size.y)).then_some(Self { size, data })
     }
 
     /// Width and height.

@@ -122,6 +122,7 @@ fn setup(
             ),
             Transform::from_xyz(x, HEIGHT, 0.0),
             surface,
+            CrackChips::default(),
             OnCanvas { picture, size: Vec2::splat(SIDE) },
         ));
     }

@@ -130,12 +130,16 @@ fn turned_on_a_lathe(outline: &[Vec2], around: u32) -> Mesh {
         b + 0.5 * share * (linear + share * (square + share * cube))
     };
     let rows = BETWEEN * last as u32 + 1;
-    let (mut positions, mut uvs, mut indices) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut positions, mut normals, mut uvs, mut indices) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for row in 0..rows {
         let Vec2 { x: radius, y: height } = point(row).max(Vec2::ZERO);
+        // Across the outline, so that the mesh has no seam where it closes.
+        let along = point((row + 1).min(rows - 1)) - point(row.saturating_sub(1));
+        let out = -along.perp().normalize_or(Vec2::NEG_Y);
         for i in 0..=around {
             let (sin, cos) = ops::sin_cos(TAU * i as f32 / around as f32);
             positions.push([radius * cos, height, -radius * sin]);
+            normals.push([out.x * cos, out.y, -out.x * sin]);
             uvs.push([i as f32 / around as f32, 1.0 - row as f32 / (rows - 1) as f32]);
         }
     }
@@ -145,9 +149,9 @@ fn turned_on_a_lathe(outline: &[Vec2], around: u32) -> Mesh {
     }
     Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::default())
         .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, positions)
+        .with_inserted_attribute(Mesh::ATTRIBUTE_NORMAL, normals)
         .with_inserted_attribute(Mesh::ATTRIBUTE_UV_0, uvs)
         .with_inserted_indices(Indices::U32(indices))
-        .with_computed_smooth_normals()
 }
 
 fn go_around(time: Res<Time>, mut camera: Query<&mut Transform, With<Camera3d>>) {

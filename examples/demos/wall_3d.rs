@@ -85,6 +85,9 @@ fn setup(
     // Walls crack along their mortar, the light lines of the picture.
     let of_brick = CrackSurface::new(CrackPreset::BRICK);
     let of_concrete = CrackSurface::new(CrackPreset::CONCRETE);
+    // They come to rest on the floor.
+    let mut chips = CrackChips { floor: Some(-HALF), ..default() };
+    chips.burst.fade_after = 4.0;
     let sides = [
         (Transform::from_xyz(0.0, 0.0, -HALF), concrete.clone(), of_concrete.clone().with_seed(1)),
         (
@@ -97,7 +100,7 @@ fn setup(
     ];
     for (transform, material, surface) in sides {
         commands
-            .spawn((Wall, Mesh3d(wall.clone()), MeshMaterial3d(material), transform, surface))
+            .spawn((Wall, Mesh3d(wall.clone()), MeshMaterial3d(material), transform, surface, chips.clone()))
             .observe(hit_on_press);
     }
     commands.spawn((

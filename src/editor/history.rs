@@ -1,7 +1,7 @@
 //! Undo and redo: the settings of a surface before each change.
 
 use super::subject::AnalogyChoice;
-use crate::plugin::{CrackClock, CrackRelief, CrackStrands, CrackSurface, GuidedCracks, ShatterCracks};
+use crate::plugin::{CrackChips, CrackClock, CrackRelief, CrackStrands, CrackSurface, GuidedCracks, ShatterCracks};
 use bevy::prelude::Entity;
 
 /// The most changes that can be taken back.
@@ -16,6 +16,7 @@ pub(super) struct Settings {
     pub(super) relief: Option<CrackRelief>,
     pub(super) analogy: Option<AnalogyChoice>,
     pub(super) shatter: Option<ShatterCracks>,
+    pub(super) chips: Option<CrackChips>,
     pub(super) clock: Option<CrackClock>,
 }
 

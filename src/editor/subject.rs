@@ -1,8 +1,8 @@
 //! What the panel knows of the surface that is chosen: values that it shows and changes. No part of it is in the world.
 
 use crate::plugin::{
-    BakeProgress, CrackClock, CrackRelief, CrackState, CrackStrands, CrackSurface, GuidedCracks, ShatterCracks,
-    ShatterRequest,
+    BakeProgress, CrackChips, CrackClock, CrackRelief, CrackState, CrackStrands, CrackSurface, GuidedCracks,
+    ShatterCracks, ShatterRequest,
 };
 use bevy::prelude::*;
 use bevy_egui::egui::TextureId;
@@ -37,6 +37,8 @@ pub struct Subject {
     pub progress: Option<BakeProgress>,
     /// How it shatters.
     pub shatter: Option<ShatterCracks>,
+    /// The chips that its craters lose.
+    pub chips: Option<CrackChips>,
     /// Its shards: shown, gone and all; read only.
     pub shards: Option<(u32, u32, u32)>,
     /// Its textures, by name; read only.

@@ -10,9 +10,9 @@ use super::{
 use crate::{
     CrackPreset,
     plugin::{
-        AnalogyProgress, BakeProgress, CrackAnalogy, CrackClock, CrackCommandsExt, CrackHit, CrackRelief, CrackShards,
-        CrackState, CrackStrands, CrackSurface, CrackTextures, CrackUploadStats, GuidedCracks, PresetSource,
-        ReliefProgress, Shard, ShatterCracks, inspect,
+        AnalogyProgress, BakeProgress, CrackAnalogy, CrackChips, CrackClock, CrackCommandsExt, CrackHit, CrackRelief,
+        CrackShards, CrackState, CrackStrands, CrackSurface, CrackTextures, CrackUploadStats, GuidedCracks,
+        PresetSource, ReliefProgress, Shard, ShatterCracks, inspect,
     },
 };
 use bevy::{
@@ -103,6 +103,7 @@ fn gather(world: &mut World, entity: Entity) -> Option<Subject> {
         analogy_progress: of.get::<AnalogyProgress>().map_or(0.0, |progress| progress.0),
         progress: of.get::<BakeProgress>().cloned(),
         shatter: of.get::<ShatterCracks>().cloned(),
+        chips: of.get::<CrackChips>().cloned(),
         shards,
         textures: show_textures(world, &textures),
     })
@@ -168,6 +169,7 @@ fn settings(subject: &Subject) -> Settings {
         relief: subject.relief.clone(),
         analogy: subject.analogy.clone(),
         shatter: subject.shatter.clone(),
+        chips: subject.chips.clone(),
         clock: subject.clock,
     }
 }
@@ -182,13 +184,14 @@ fn settings_of(world: &World, entity: Entity) -> Option<Settings> {
         relief: of.get().cloned(),
         analogy: analogy_of(world, entity),
         shatter: of.get().cloned(),
+        chips: of.get().cloned(),
         clock: of.get().copied(),
     })
 }
 
 /// Puts settings on a surface: only what has changed.
 fn put(world: &mut World, entity: Entity, before: &Settings, after: Settings) {
-    let Settings { surface, guided, strands, relief, analogy, shatter, clock } = after;
+    let Settings { surface, guided, strands, relief, analogy, shatter, chips, clock } = after;
     if before.analogy != analogy {
         put_analogy(world, entity, analogy);
     }
@@ -197,6 +200,7 @@ fn put(world: &mut World, entity: Entity, before: &Settings, after: Settings) {
     put_one(world, entity, before.strands.as_ref(), strands);
     put_one(world, entity, before.relief.as_ref(), relief);
     put_one(world, entity, before.shatter.as_ref(), shatter);
+    put_one(world, entity, before.chips.as_ref(), chips);
     put_one(world, entity, before.clock.as_ref(), clock);
 }
 

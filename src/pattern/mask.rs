@@ -224,12 +224,12 @@ fn lightness(texel: &[u8]) -> f32 {
 }
 
 fn bytes_per_texel(size: UVec2, texels: &[u8]) -> Result<usize, MaskError> {
-    let count = size.x as usize * size.y as usize;
+    let count = u64::from(size.x) * u64::from(size.y);
     let fits = size.min_element() > 0 && size.max_element() <= super::MAX_SIDE;
-    match texels.len() {
+    match texels.len() as u64 {
         length if fits && length == count => Ok(1),
         length if fits && length == 4 * count => Ok(4),
-        length => Err(MaskError { width: size.x, height: size.y, length }),
+        _ => Err(MaskError { width: size.x, height: size.y, length: texels.len() }),
     }
 }
 

@@ -37,12 +37,12 @@ mod surface;
 
 pub use api::{
     AnalogyExamples, AnalogyFailed, AnalogyMade, AnalogyProgress, BakeProgress, CellClosed, CrackAnalogy, CrackBaked,
-    CrackBudget, CrackClock, CrackDrive, CrackError, CrackFailed, CrackFinished, CrackGuide, CrackHit, CrackMaps,
-    CrackMaskSource, CrackRecord, CrackRelief, CrackResolution, CrackScript, CrackShards, CrackState, CrackStats,
-    CrackStatus, CrackStrands, CrackSurface, CrackSystems, CrackTextures, CrackTip, CrackUnwrap, CrackUploadStats,
-    GravitySpace, GuideSource, GuidedAppearance, GuidedCracks, HitPoint, PresetSource, Reassembled, ReliefFailed,
-    ReliefMade, ReliefProgress, ScriptedHit, Shard, ShardsError, ShatterCracks, ShatterFailed, ShatterRequest,
-    ShatterWhen, Shattered, StrandField,
+    CrackBudget, CrackChip, CrackChips, CrackClock, CrackDrive, CrackError, CrackFailed, CrackFinished, CrackGuide,
+    CrackHit, CrackMaps, CrackMaskSource, CrackRecord, CrackRelief, CrackResolution, CrackScript, CrackShards,
+    CrackState, CrackStats, CrackStatus, CrackStrands, CrackSurface, CrackSystems, CrackTextures, CrackTip,
+    CrackUnwrap, CrackUploadStats, GravitySpace, GuideSource, GuidedAppearance, GuidedCracks, HitPoint, PresetSource,
+    Reassembled, ReliefFailed, ReliefMade, ReliefProgress, ScriptedHit, Shard, ShardsError, ShatterCracks,
+    ShatterFailed, ShatterRequest, ShatterWhen, Shattered, StrandField,
 };
 #[cfg(feature = "2d")]
 pub use api::{CrackGroup, CrackMemberOf};
@@ -63,12 +63,13 @@ use bevy::{
 pub mod prelude {
     pub use super::{
         AnalogyExamples, AnalogyFailed, AnalogyMade, AnalogyProgress, BakeProgress, CellClosed, CrackAnalogy,
-        CrackBaked, CrackBudget, CrackClock, CrackCommandsExt, CrackDrive, CrackError, CrackFailed, CrackFinished,
-        CrackGuide, CrackHit, CrackMaps, CrackMaskSource, CrackPlugin, CrackPlugins, CrackRecord, CrackRecords,
-        CrackRelief, CrackResolution, CrackScript, CrackShards, CrackState, CrackStats, CrackStatus, CrackStrands,
-        CrackSurface, CrackSystems, CrackTextures, CrackTip, CrackUnwrap, GravitySpace, GuideSource, GuidedAppearance,
-        GuidedCracks, HitPoint, PresetSource, Reassembled, ReliefFailed, ReliefMade, ReliefProgress, ScriptedHit,
-        Shard, ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen, Shattered, StrandField,
+        CrackBaked, CrackBudget, CrackChip, CrackChips, CrackClock, CrackCommandsExt, CrackDrive, CrackError,
+        CrackFailed, CrackFinished, CrackGuide, CrackHit, CrackMaps, CrackMaskSource, CrackPlugin, CrackPlugins,
+        CrackRecord, CrackRecords, CrackRelief, CrackResolution, CrackScript, CrackShards, CrackState, CrackStats,
+        CrackStatus, CrackStrands, CrackSurface, CrackSystems, CrackTextures, CrackTip, CrackUnwrap, GravitySpace,
+        GuideSource, GuidedAppearance, GuidedCracks, HitPoint, PresetSource, Reassembled, ReliefFailed, ReliefMade,
+        ReliefProgress, ScriptedHit, Shard, ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen, Shattered,
+        StrandField,
     };
     #[cfg(feature = "2d")]
     pub use super::{CrackGroup, CrackLight2d, CrackLitMaterial, CrackMemberOf};
@@ -120,6 +121,8 @@ impl Plugin for CrackPlugin {
             .register_type::<CellClosed>()
             .register_type::<ShatterCracks>()
             .register_type::<Shard>()
+            .register_type::<CrackChips>()
+            .register_type::<CrackChip>()
             .register_type::<CrackShards>()
             .register_type::<Shattered>()
             .register_type::<Reassembled>()
@@ -132,6 +135,7 @@ impl Plugin for CrackPlugin {
             .init_resource::<gpu::uploads::Uploads>()
             .init_resource::<jobs::deferred::Later>()
             .init_resource::<shards::body::Spares>()
+            .init_resource::<shards::chips::Chips>()
             .init_resource::<jobs::frame_time::FrameClock>()
             .init_resource::<surface::queue::HitQueue>()
             .init_resource::<source::mask::PictureMasks>()
@@ -175,6 +179,7 @@ impl Plugin for CrackPlugin {
                         shards::fly::fly_shards,
                         shards::request::shatter_when_due,
                         shards::release::shatter_surfaces.run_if(shards::request::any_requests),
+                        shards::chips::fly_chips.run_if(shards::chips::any_chips),
                     )
                         .chain()
                         .in_set(Shatter),

@@ -50,8 +50,9 @@ pub use stamp::{stamp_dot, stamp_path, stamp_path_with};
 use crate::{
     Grid,
     pattern::{CrackMask, Moment, Network, SurfaceFrame, Timeline},
+    relief::Crater,
 };
-use glam::UVec2;
+use glam::{UVec2, Vec2};
 use std::sync::Arc;
 
 /// How deep the crack is at each texel: 0 = untouched, 65535 = the deepest; row-major from the top left.
@@ -170,6 +171,24 @@ impl DepthField {
     #[cfg_attr(not(feature = "bevy"), expect(dead_code, reason = "surfaces of the plugin forget"))]
     pub(crate) fn freeze_layer(&mut self, network: &Network, timeline: &Timeline) {
         self.layer.freeze(network, timeline);
+    }
+
+    /// The crater that impact number `impact` at `pos` (pattern units) has at an energy, as it is drawn: its contours, and how deep it is.
+    /// `None` if the [plan](Self::plan) has no crushed zones with [terraces](CrushedZone::terraces), or the energy is 0 or less.
+    ///
+    /// ```
+    /// use bevy_crack::{paint::Look, pattern::SurfaceFrame, raster::DepthField};
+    ///
+    /// let mut field = DepthField::new(SurfaceFrame::new([256, 256].into())?);
+    /// field.set_layers(Look::CONCRETE.layer(7));
+    /// let crater = |energy| field.crater(0, [0.5, 0.5].into(), energy);
+    /// assert!(crater(4.0).map(|crater| crater.reach()) > crater(1.0).map(|crater| crater.reach()));
+    /// assert_eq!(crater(0.0), None);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn crater(&self, impact: u32, pos: Vec2, energy: f32) -> Option<Crater> {
+        self.layer.crater(impact, pos, energy)
     }
 
     pub(crate) const fn layer(&self) -> &Layer {

@@ -8,7 +8,10 @@ use crate::{Grid, math::Rng, pattern::SurfaceFrame};
 use glam::{UVec2, Vec2};
 
 /// Corners of each ring of a crater.
-const CORNERS: usize = 56;
+const CORNERS: usize = 72;
+
+/// A corner stands out no further than those so many corners beside it, about.
+const BESIDE: usize = 4;
 
 /// Most terraces of a crater.
 const MOST_TERRACES: usize = 4;
@@ -116,31 +119,39 @@ fn direction(turn: f32) -> Vec2 {
     at.normalize()
 }
 
-/// Values on a closed line, smooth over `CORNERS / knots` corners: -1..1.
-fn wave(knots: usize, rng: &mut Rng) -> [f32; CORNERS] {
-    let values: Vec<_> = (0..knots).map(|_| rng.signed()).collect();
-    let offset = rng.unit();
+/// The radii of a polygon on all rays, about 1: few corners, whose sides are broken `levels` times, and longer in one direction.
+fn chords(count: u32, levels: u32, uneven: f32, rng: &mut Rng) -> [f32; CORNERS] {
+    let mut corners: Vec<Vec2> = (0..count)
+        .map(|k| {
+            let place = (k as f32 + 0.7 * (rng.unit() - 0.5)) / count as f32;
+            direction(4.0 * (place - place.floor())) * (1.0 + 0.7 * uneven * rng.signed())
+        })
+        .collect();
+    for _ in 0..levels {
+        let sides: Vec<_> = corners.iter().copied().zip(corners.iter().copied().cycle().skip(1)).collect();
+        let broken = |(a, b): (Vec2, Vec2)| {
+            let (along, aside) = (0.3 + 0.4 * rng.unit(), 0.22 * uneven * rng.signed());
+            [a, a + (b - a) * along + (b - a).perp() * aside]
+        };
+        corners = sides.into_iter().flat_map(broken).collect();
+    }
+    let (way, by) = (direction(4.0 * rng.unit()), 1.0 + 0.5 * uneven * rng.unit());
+    for corner in &mut corners {
+        let along = way * corner.dot(way);
+        *corner = along * by + (*corner - along) / by;
+    }
+    corners.sort_by(|a, b| turn(*a).total_cmp(&turn(*b)));
+    let radii: [f32; CORNERS] = std::array::from_fn(|i| {
+        let ray = direction(4.0 * i as f32 / CORNERS as f32);
+        let next = corners.partition_point(|corner| turn(*corner) <= turn(ray));
+        let [a, b] = [(next + corners.len() - 1) % corners.len(), next % corners.len()].map(|k| corners[k]);
+        let radius = a.perp_dot(b) / ray.perp_dot(b - a);
+        if radius.is_finite() { radius.clamp(0.25, 1.7) } else { 1.0 }
+    });
+    // Brittle material leaves no thorns.
     std::array::from_fn(|i| {
-        let place = (i as f32 / CORNERS as f32 + offset) * knots as f32;
-        let (knot, share) = (place as usize, place - place.floor());
-        let smooth = share * share * (3.0 - 2.0 * share);
-        values[knot % knots] + (values[(knot + 1) % knots] - values[knot % knots]) * smooth
-    })
-}
-
-/// Shells: how far each corner lies inside of the circle because pieces broke out in arcs, 0..=1.
-fn shells(n: usize, rng: &mut Rng) -> [f32; CORNERS] {
-    let mut edges: Vec<_> = (0..n).map(|i| (i as f32 + 0.7 * rng.unit()) / n as f32).collect();
-    edges.push(edges[0] + 1.0);
-    std::array::from_fn(|i| {
-        let mut place = i as f32 / CORNERS as f32;
-        if place < edges[0] {
-            place += 1.0;
-        }
-        let shell = edges.windows(2).find(|shell| place < shell[1]).map_or([0.0, 1.0], |shell| [shell[0], shell[1]]);
-        let share = (place - shell[0]) / (shell[1] - shell[0]);
-        // Corners between shells stand out inwards: each shell bulges outwards.
-        1.0 - 4.0 * share * (1.0 - share)
+        let beside = radii[(i + CORNERS - BESIDE) % CORNERS].max(radii[(i + BESIDE) % CORNERS]);
+        radii[i].min(1.15 * beside)
     })
 }
 
@@ -178,26 +189,25 @@ impl Crater {
     fn radii(params: &CraterParams, rng: &mut Rng) -> Vec<[f32; CORNERS]> {
         let n = params.terraces as usize;
         let roughness = params.roughness;
-        let (broad, fine, shell) = (wave(5, rng), wave(23, rng), shells(7 + (rng.next_u32() % 4) as usize, rng));
-        let mut radii: [_; CORNERS] = std::array::from_fn(|i| {
-            let jag = rng.signed();
-            params.radius * (1.0 + roughness * (0.28 * broad[i] + 0.1 * fine[i] + 0.06 * jag - 0.22 * shell[i]))
-        });
+        let mut outline = |count: u32, uneven: f32| {
+            let levels = if uneven < 0.65 { 1 } else { 2 };
+            chords(count + rng.next_u32() % 3, levels, uneven, rng)
+                .map(|radius| 1.0 + (1.1 * roughness).min(1.0) * (radius - 1.0))
+        };
+        let mut radii = outline(6, roughness).map(|radius| params.radius * radius);
         let mut rings = vec![radii];
         for ring in 1..n {
             let mean = (n - ring) as f32 / (n - ring + 1) as f32;
-            let (broad, fine, shell) = (wave(4, rng), wave(17, rng), shells(4 + (rng.next_u32() % 4) as usize, rng));
-            for (i, radius) in radii.iter_mut().enumerate() {
-                let uneven = 0.34 * broad[i] + 0.12 * fine[i] + 0.08 * rng.signed() - 0.3 * (shell[i] - 0.33);
+            for (radius, share) in radii.iter_mut().zip(outline(5, 0.8 * roughness)) {
                 // Never outside of the ring around it.
-                *radius *= (mean * (1.0 + roughness * uneven)).clamp(0.15, 0.93);
+                *radius *= (mean * share).clamp(0.15, 0.93);
             }
             rings.push(radii);
         }
         rings
     }
 
-    /// The rings: level 0 around the crater, 1, 2, ... deeper inside. 56 corners each.
+    /// The rings: level 0 around the crater, 1, 2, ... deeper inside. 72 corners each.
     #[must_use]
     pub fn contours(&self) -> Contours {
         let ring = |(ring, level): (&[Vec2; CORNERS], i32)| Ring {
@@ -206,6 +216,12 @@ impl Crater {
         };
         let distance = self.reach / self.rings.len() as f32;
         Contours { rings: self.rings.iter().zip(0..).map(ring).collect(), distance }
+    }
+
+    /// Where it is, pattern units.
+    #[must_use]
+    pub const fn center(&self) -> Vec2 {
+        self.center
     }
 
     /// How far the crater reaches from its center, pattern units.

@@ -236,7 +236,9 @@ impl Clipper {
         self.origin = [left, top];
         self.shift = 0;
         let size = |shift: u32| (((right - left) >> shift) + 1, ((bottom - top) >> shift) + 1);
-        while size(self.shift).0 as usize * size(self.shift).1 as usize > 2 * self.blockers.len() + 16 {
+        // In 64 bits: on 32-bit machines the first products are above all numbers.
+        let count = |shift: u32| size(shift).0 as u64 * size(shift).1 as u64;
+        while count(self.shift) > 2 * self.blockers.len() as u64 + 16 {
             self.shift += 1;
         }
         (self.columns, self.rows) = size(self.shift);

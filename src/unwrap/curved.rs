@@ -1,15 +1,17 @@
 //! Curved meshes, laid out by distance and direction from a point.
 
-use super::chart::{Chart, Start, along};
+use super::chart::{Chart, Start, along, bounds, cells};
 use super::shape::MeshShape;
-use glam::{Quat, Vec2, Vec3};
+use glam::{Quat, UVec2, Vec2, Vec3};
 use std::{cmp::Reverse, collections::BinaryHeap};
 
 /// The most that a triangle may be stretched or shrunk in the plane, along any of its edges and in area.
 const MOST_STRETCH: f32 = 2.0;
 
-/// Cells along the longer side of a chart in which triangles are looked for that cover one another.
-const CELLS: f32 = 512.0;
+/// Cells along the longer side of a chart in which triangles are looked for that cover one another: so many for each triangle in a row, and the
+/// most.
+const CELLS: f32 = 8.0;
+const MOST_CELLS: f32 = 512.0;
 
 /// How far within a triangle the middle of a cell is that it covers, cells: neighbours that share an edge do not share a cell by rounding.
 const CLEARANCE: f32 = 1e-3;
@@ -85,7 +87,8 @@ pub(super) fn lay_out(shape: &MeshShape, points: &Points, start: Start, is_free:
         let [a, b, c] = shape.numbers(triangle).map(|point| laid[point].map(|laid| laid.at));
         Some([a?, b?, c?])
     };
-    let mut cover = Cover::new(laid.iter().flatten().map(|laid| laid.at));
+    let free = is_free.iter().filter(|is_free| **is_free).count();
+    let mut cover = Cover::new(free, laid.iter().flatten().map(|laid| laid.at));
     let mut chart = Chart { triangles: Vec::new() };
     let mut is_seen: Vec<bool> = is_free.iter().map(|is_free| !is_free).collect();
     let mut nearest = BinaryHeap::new();
@@ -95,7 +98,7 @@ pub(super) fn lay_out(shape: &MeshShape, points: &Points, start: Start, is_free:
         // The first is there in any case, so that every chart has one.
         let is_first = chart.triangles.is_empty();
         let laid = corners(triangle).filter(|laid| is_first || keeps_its_size(shape.corners(triangle), *laid));
-        let Some(laid) = laid.filter(|laid| cover.take(triangle, *laid) || is_first) else { continue };
+        let Some(laid) = laid.filter(|laid| cover.take(*laid) || is_first) else { continue };
         chart.triangles.push((triangle, laid));
         for (other, _) in shape.across(triangle).into_iter().flatten() {
             let other = other as usize;
@@ -185,48 +188,35 @@ fn keeps_its_size([a, b, c]: [Vec3; 3], [p, q, r]: [Vec2; 3]) -> bool {
     is_like((b - a).cross(c - a).length(), area) && edges.iter().all(|(own, laid)| is_like(own.length(), laid.length()))
 }
 
-/// Which triangles cover which part of the plane.
+/// Which parts of the plane are covered.
 struct Cover {
     min: Vec2,
     /// Cells for a unit of length.
     scale: f32,
-    width: usize,
-    owner: Vec<u32>,
+    size: UVec2,
+    is_covered: Vec<bool>,
 }
 
 impl Cover {
-    const NONE: u32 = u32::MAX;
-
-    fn new(places: impl Iterator<Item = Vec2>) -> Self {
-        let (min, max) = places.fold((Vec2::INFINITY, Vec2::NEG_INFINITY), |(min, max), at| (min.min(at), max.max(at)));
-        let scale = CELLS / (max - min).max_element();
-        if !(scale.is_finite() && scale > 0.0) {
-            return Self { min: Vec2::ZERO, scale: 0.0, width: 0, owner: Vec::new() };
-        }
-        let [width, height] = ((max - min) * scale).ceil().max(Vec2::ONE).as_usizevec2().to_array();
-        Self { min, scale, width, owner: vec![Self::NONE; width * height] }
+    /// For so many triangles at the most, whose corners are at these places.
+    fn new(triangles: usize, places: impl Iterator<Item = Vec2>) -> Self {
+        let (min, max) = bounds(places);
+        let scale = (CELLS * (triangles as f32).sqrt()).min(MOST_CELLS) / (max - min).max_element();
+        // Where all places are one there is nothing to cover.
+        let scale = if scale.is_finite() { scale } else { 0.0 };
+        let size = ((max - min) * scale).ceil().max(Vec2::ONE).as_uvec2();
+        Self { min, scale, size, is_covered: vec![false; size.as_usizevec2().element_product()] }
     }
 
-    /// Gives a triangle the cells whose middles it covers; `false` if one of them has an owner.
-    fn take(&mut self, triangle: usize, corners: [Vec2; 3]) -> bool {
-        let [a, b, c] = corners.map(|corner| (corner - self.min) * self.scale);
-        let turn = (b - a).perp_dot(c - a).signum();
-        let height = self.owner.len().checked_div(self.width).unwrap_or(0);
-        let (min, max) = (a.min(b).min(c).max(Vec2::ZERO).as_usizevec2(), a.max(b).max(c).ceil().as_usizevec2());
-        let mut own = Vec::new();
-        for y in min.y..max.y.min(height) {
-            for x in min.x..max.x.min(self.width) {
-                let at = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
-                let is_beyond = |(p, q): &(Vec2, Vec2)| (*q - *p).perp_dot(at - *p) * turn > CLEARANCE * p.distance(*q);
-                if [(a, b), (b, c), (c, a)].iter().all(is_beyond) {
-                    if self.owner[self.width * y + x] != Self::NONE {
-                        return false;
-                    }
-                    own.push(self.width * y + x);
-                }
-            }
+    /// Covers the cells whose middles lie in a triangle; `false` if one of them is covered.
+    fn take(&mut self, corners: [Vec2; 3]) -> bool {
+        let corners = corners.map(|corner| (corner - self.min) * self.scale);
+        let own: Vec<usize> =
+            cells(corners, self.size, CLEARANCE).map(|cell| (cell.y * self.size.x + cell.x) as usize).collect();
+        let is_free = own.iter().all(|cell| !self.is_covered[*cell]);
+        if is_free {
+            own.into_iter().for_each(|cell| self.is_covered[cell] = true);
         }
-        own.into_iter().for_each(|cell| self.owner[cell] = triangle as u32);
-        true
+        is_free
     }
 }

@@ -29,13 +29,13 @@ pub enum UnwrapError {
     /// It falls into more than [`MAX_CHARTS`] charts.
     #[error("it falls into more than {MAX_CHARTS} flat parts")]
     TooManyCharts,
-    /// It would need more texels a side than are allowed.
-    #[error("it needs {needed} texels a side, {largest} are allowed")]
+    /// It would need more texels, a side or in all, than are allowed.
+    #[error("it needs {width} x {height} texels, more than are allowed")]
     TooLarge {
-        /// Texels of the longer side.
-        needed: u64,
-        /// Texels allowed.
-        largest: u32,
+        /// Texels across.
+        width: u64,
+        /// Texels down.
+        height: u64,
     },
     /// A parameter is out of its range.
     #[error("`{0}` is out of its range")]

@@ -1,6 +1,6 @@
 //! Flat faces, unfolded about the edges in which they meet.
 
-use super::chart::{Chart, Start, along};
+use super::chart::{Chart, Start, along, bounds};
 use super::shape::MeshShape;
 use glam::{Vec2, Vec3};
 use std::{cmp::Reverse, collections::BinaryHeap};
@@ -116,13 +116,9 @@ fn distance([a, b]: [Vec2; 2]) -> f32 {
 
 /// Whether any of the triangles covers a part of any other.
 fn covers(some: &[(usize, [Vec2; 3])], others: &[(usize, [Vec2; 3])]) -> bool {
-    let bounds = |triangles: &[(usize, [Vec2; 3])]| {
-        let corners = triangles.iter().flat_map(|(_, corners)| corners);
-        corners.fold((Vec2::INFINITY, Vec2::NEG_INFINITY), |(min, max), corner| (min.min(*corner), max.max(*corner)))
-    };
-    let (min, max) = bounds(others);
+    let (min, max) = bounds(others.iter().flat_map(|(_, corners)| *corners));
     let is_near = |(_, corners): &&(usize, [Vec2; 3])| {
-        let (low, high) = bounds(&[(0, *corners)]);
+        let (low, high) = bounds(*corners);
         low.cmplt(max).all() && high.cmpgt(min).all()
     };
     some.iter().filter(is_near).any(|(_, a)| others.iter().any(|(_, b)| overlap(a, b)))

@@ -6,7 +6,7 @@
 //!
 //! - Meshes of few flat faces are unfolded about their edges (`hinge.rs`): lengths and angles stay as they are.
 //! - Others are laid out by distance and direction from the point (`curved.rs`), the discrete exponential map of Schmidt, Grimm and Wyvill
-//!   (2006), with the means over all neighbours of Schmidt (2013).
+//!   (2006), with means over neighbours as Schmidt (2013) has them, in which those count the most that lie straight before a vertex.
 //!
 //! ```
 //! use bevy_crack::unwrap::{MeshShape, Unwrap};
@@ -20,7 +20,9 @@
 //! ];
 //! let triangles = [[0, 1, 2], [0, 2, 3], [1, 4, 5], [1, 5, 2]];
 //! let shape = MeshShape::new(&positions, &triangles)?;
-//! let laid_out = Unwrap { around: Vec3::new(0.5, 0.5, 0.), triangle: 0, right: Vec3::X, texels: 64.0, largest: 4096 }.apply(&shape)?;
+//! let around = Vec3::new(0.5, 0.5, 0.);
+//! let unwrap = Unwrap { around, triangle: 0, right: Vec3::X, texels: 64.0, most_side: 4096, most_texels: 1 << 20 };
+//! let laid_out = unwrap.apply(&shape)?;
 //! // Side by side, with some texels around them.
 //! assert!(laid_out.size.x >= 128 && laid_out.size.y >= 64);
 //! let [corners, beside] = [0, 2].map(|triangle| laid_out.corners[triangle].unwrap());
@@ -54,8 +56,10 @@ pub struct Unwrap {
     pub right: Vec3,
     /// Texels for a unit of length, above 0.
     pub texels: f32,
-    /// The most texels of a side.
-    pub largest: u32,
+    /// The most texels of a side, 1..=65,536.
+    pub most_side: u32,
+    /// The most texels in all, gaps among them.
+    pub most_texels: u64,
 }
 
 impl Unwrap {
@@ -71,14 +75,14 @@ impl Unwrap {
         if !(self.texels > 0.0 && self.texels.is_finite()) {
             return Err(UnwrapError::Parameter("texels"));
         }
-        if self.largest == 0 {
-            return Err(UnwrapError::Parameter("largest"));
+        if !(1..=1 << 16).contains(&self.most_side) {
+            return Err(UnwrapError::Parameter("most_side"));
         }
         if !shape.has_area(self.triangle) {
             return Err(UnwrapError::Parameter("triangle"));
         }
         let charts = charts(shape, self)?;
-        pack::pack(shape, &charts, self.texels, self.largest)
+        pack::pack(shape, &charts, self.texels, (self.most_side, self.most_texels))
     }
 }
 

@@ -1,9 +1,9 @@
 //! Charts side by side in one picture: [`LaidOut`].
 
-use super::chart::Chart;
+use super::chart::{Chart, bounds, cells};
 use super::error::UnwrapError;
 use super::shape::MeshShape;
-use glam::{UVec2, Vec2};
+use glam::{U64Vec2, UVec2, Vec2};
 
 /// Texels around each chart that belong to it too, so that filtering at its border finds what goes on there.
 pub const GUTTER: u32 = 4;
@@ -45,22 +45,24 @@ struct Part<'a> {
 }
 
 /// Lays charts side by side: the first at the top left, the others beside and below it in rows, the highest first.
-pub(super) fn pack(shape: &MeshShape, charts: &[Chart], texels: f32, largest: u32) -> Result<LaidOut, UnwrapError> {
+pub(super) fn pack(
+    shape: &MeshShape,
+    charts: &[Chart],
+    texels: f32,
+    (most_side, most_texels): (u32, u64),
+) -> Result<LaidOut, UnwrapError> {
+    // Before memory is taken for them.
+    let check = |size: U64Vec2| {
+        let fits = size.max_element() <= u64::from(most_side) && size.element_product() <= most_texels;
+        if fits { Ok(size.as_uvec2()) } else { Err(UnwrapError::TooLarge { width: size.x, height: size.y }) }
+    };
     let mut parts = Vec::with_capacity(charts.len());
     for chart in charts {
-        let corners = chart.triangles.iter().flat_map(|(_, corners)| corners);
-        let (min, max) =
-            corners.fold((Vec2::INFINITY, Vec2::NEG_INFINITY), |(min, max), at| (min.min(*at), max.max(*at)));
-        let size = ((max - min) * texels).ceil() + 2.0 * GUTTER as f32;
-        if size.max_element() > largest as f32 {
-            return Err(UnwrapError::TooLarge { needed: size.max_element() as u64, largest });
-        }
-        parts.push(Part { chart, min, size: size.as_uvec2().max(UVec2::ONE), at: UVec2::ZERO });
+        let (min, max) = bounds(chart.triangles.iter().flat_map(|(_, corners)| *corners));
+        let size = check((((max - min) * texels).ceil() + 2.0 * GUTTER as f32).min(Vec2::splat(1e9)).as_u64vec2())?;
+        parts.push(Part { chart, min, size, at: UVec2::ZERO });
     }
-    let size = arrange(&mut parts);
-    if size.max_element() > largest {
-        return Err(UnwrapError::TooLarge { needed: u64::from(size.max_element()), largest });
-    }
+    let size = check(arrange(&mut parts).as_u64vec2())?;
     let mut corners = vec![None; shape.len()];
     for part in &parts {
         let origin = part.at.as_vec2() + GUTTER as f32;
@@ -109,18 +111,10 @@ fn arrange(parts: &mut [Part<'_>]) -> UVec2 {
 fn owners(corners: &[Option<[Vec2; 3]>], size: UVec2, parts: &[Part<'_>]) -> Vec<u32> {
     let width = size.x as usize;
     let mut owner = vec![LaidOut::NOTHING; width * size.y as usize];
-    for (triangle, laid) in corners.iter().enumerate().filter_map(|(i, laid)| Some((i as u32, (*laid)?))) {
-        let [a, b, c] = laid;
-        let turn = (b - a).perp_dot(c - a);
-        let (min, max) = (a.min(b).min(c).max(Vec2::ZERO).as_uvec2(), a.max(b).max(c).ceil().as_uvec2().min(size));
-        for y in min.y..max.y {
-            for x in min.x..max.x {
-                let at = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
-                if [(a, b), (b, c), (c, a)].iter().all(|(p, q)| (*q - *p).perp_dot(at - *p) * turn >= 0.0) {
-                    let owner = &mut owner[y as usize * width + x as usize];
-                    *owner = (*owner).min(triangle);
-                }
-            }
+    for (triangle, laid) in (0..).zip(corners) {
+        for texel in laid.iter().flat_map(|laid| cells(*laid, size, 0.0)) {
+            let owner = &mut owner[texel.y as usize * width + texel.x as usize];
+            *owner = (*owner).min(triangle);
         }
     }
     for Part { at, size, .. } in parts {
@@ -132,19 +126,23 @@ fn owners(corners: &[Option<[Vec2; 3]>], size: UVec2, parts: &[Part<'_>]) -> Vec
 /// Gives the texels next to others their triangle, [`GUTTER`] times, within a rectangle.
 fn widen(owner: &mut [u32], width: usize, min: UVec2, max: UVec2) {
     let (min, max) = (min.as_usizevec2(), max.as_usizevec2());
-    let mut edge: Vec<usize> = (min.y..max.y).flat_map(|y| (min.x..max.x).map(move |x| y * width + x)).collect();
-    edge.retain(|i| owner[*i] != LaidOut::NOTHING);
+    let beside = |i: usize| {
+        let (x, y) = (i % width, i / width);
+        let all = [
+            (x > min.x, i.wrapping_sub(1)),
+            (x + 1 < max.x, i + 1),
+            (y > min.y, i.wrapping_sub(width)),
+            (y + 1 < max.y, i + width),
+        ];
+        all.into_iter().filter(|(is_within, _)| *is_within).map(|(_, other)| other)
+    };
+    let is_edge = |i: &usize| owner[*i] != LaidOut::NOTHING && beside(*i).any(|other| owner[other] == LaidOut::NOTHING);
+    let all = (min.y..max.y).flat_map(|y| (min.x..max.x).map(move |x| y * width + x));
+    let mut edge: Vec<usize> = all.filter(is_edge).collect();
     for _ in 0..GUTTER {
         let mut next = Vec::new();
         for i in edge {
-            let (x, y) = (i % width, i / width);
-            let beside = [
-                (x > min.x).then(|| i - 1),
-                (x + 1 < max.x).then(|| i + 1),
-                (y > min.y).then(|| i - width),
-                (y + 1 < max.y).then(|| i + width),
-            ];
-            for other in beside.into_iter().flatten() {
+            for other in beside(i) {
                 if owner[other] == LaidOut::NOTHING {
                     owner[other] = owner[i];
                     next.push(other);

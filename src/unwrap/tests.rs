@@ -58,7 +58,8 @@ fn lay_out(mesh: &(Vec<Vec3>, Vec<[u32; 3]>), around: Vec3, texels: f32) -> (Mes
     let distance = |triangle: &usize| shape.centroid(*triangle).distance_squared(around);
     let triangle = (0..shape.len()).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap();
     let right = Vec3::X;
-    let laid_out = Unwrap { around, triangle, right, texels, largest: 8192 }.apply(&shape).unwrap();
+    let laid_out =
+        Unwrap { around, triangle, right, texels, most_side: 8192, most_texels: 1 << 26 }.apply(&shape).unwrap();
     (shape, laid_out)
 }
 
@@ -275,7 +276,7 @@ fn any_triangles_are_laid_out_or_refused() {
         let triangle = (0..shape.len()).find(|triangle| shape.has_area(*triangle)).unwrap();
         let around = shape.centroid(triangle);
         let texels = 40.0 / shape.area().sqrt();
-        let unwrap = Unwrap { around, triangle, right: Vec3::Y, texels, largest: 4096 };
+        let unwrap = Unwrap { around, triangle, right: Vec3::Y, texels, most_side: 4096, most_texels: 1 << 24 };
         match unwrap.apply(&shape) {
             Ok(laid_out) => {
                 check(&shape, &laid_out, AT_RANDOM);
@@ -290,19 +291,25 @@ fn any_triangles_are_laid_out_or_refused() {
 fn what_is_out_of_range_is_named() {
     let (positions, triangles) = cuboid(Vec3::ONE);
     let shape = MeshShape::new(&positions, &triangles).unwrap();
-    let good = Unwrap { around: Vec3::X, triangle: 0, right: Vec3::X, texels: 10.0, largest: 512 };
+    let good =
+        Unwrap { around: Vec3::X, triangle: 0, right: Vec3::X, texels: 10.0, most_side: 512, most_texels: 1 << 18 };
     assert!(good.apply(&shape).is_ok());
     let bad = [
         Unwrap { around: Vec3::NAN, ..good },
         Unwrap { triangle: 12, ..good },
         Unwrap { texels: 0.0, ..good },
         Unwrap { texels: f32::INFINITY, ..good },
-        Unwrap { largest: 0, ..good },
+        Unwrap { most_side: 0, ..good },
+        Unwrap { most_side: u32::MAX, ..good },
     ];
     for bad in bad {
         assert!(matches!(bad.apply(&shape), Err(UnwrapError::Parameter(_))), "{bad:?}");
     }
-    assert!(matches!(Unwrap { largest: 40, ..good }.apply(&shape), Err(UnwrapError::TooLarge { .. })));
+    for small in
+        [Unwrap { most_side: 40, ..good }, Unwrap { most_texels: 3000, ..good }, Unwrap { texels: 1e30, ..good }]
+    {
+        assert!(matches!(small.apply(&shape), Err(UnwrapError::TooLarge { .. })));
+    }
     // Of no use, but not wrong.
     for right in [Vec3::ZERO, Vec3::NAN, shape.normal(0)] {
         assert!(Unwrap { right, ..good }.apply(&shape).is_ok());

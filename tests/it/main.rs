@@ -13,6 +13,7 @@ mod blend;
 mod blink;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod cells;
+mod chips;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod clock;
 mod docs;

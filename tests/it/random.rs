@@ -49,6 +49,8 @@ enum Carrier {
     Tiled,
     Mesh2d,
     Wall,
+    /// A box or a curved mesh, which is laid out.
+    Body(u8),
     /// Of what a mesh may be that cannot crack or that the engine would stumble over.
     BrokenMesh(u8),
 }
@@ -59,7 +61,7 @@ impl Carrier {
         match self {
             Self::Sprite | Self::Mesh2d | Self::Wall => true,
             Self::Resized(size) => size.iter().all(|side| (1.0..=500.0).contains(side)),
-            Self::Part(_) | Self::Frame(_) | Self::Tiled | Self::BrokenMesh(_) => false,
+            Self::Part(_) | Self::Frame(_) | Self::Tiled | Self::Body(_) | Self::BrokenMesh(_) => false,
         }
     }
 }
@@ -160,6 +162,10 @@ enum Op {
         again: bool,
         fly: bool,
         seek: Option<f32>,
+    },
+    Chips {
+        slot: u8,
+        count: Option<u32>,
     },
     CrackShard(u8),
     DespawnShard(u8),
@@ -296,6 +302,15 @@ fn broken_mesh(kind: u8) -> Mesh {
     mesh
 }
 
+fn body(kind: u8) -> Mesh {
+    match kind % 4 {
+        0 => Mesh::from(Cuboid::new(3.0, 2.0, 2.5)),
+        1 => Mesh::from(Sphere::new(1.5)),
+        2 => Mesh::from(Cylinder::new(1.0, 3.0)),
+        _ => Mesh::from(Torus::new(0.6, 1.5)),
+    }
+}
+
 impl Game {
     fn new(mut app: App, is_drawn: bool) -> Self {
         let parents =
@@ -362,8 +377,12 @@ impl Game {
                 shown = Shown::Color(material.clone());
                 world.spawn((Mesh2d(mesh), MeshMaterial2d(material), at)).id()
             }
-            Carrier::Wall => {
-                let mesh = world.resource_mut::<Assets<Mesh>>().add(Mesh::from(Rectangle::new(3.0, 2.0)));
+            Carrier::Wall | Carrier::Body(_) => {
+                let mesh = match carrier {
+                    Carrier::Body(kind) => body(kind),
+                    _ => Mesh::from(Rectangle::new(3.0, 2.0)),
+                };
+                let mesh = world.resource_mut::<Assets<Mesh>>().add(mesh);
                 let material = StandardMaterial { base_color_texture: Some(image), ..default() };
                 let material = world.resource_mut::<Assets<StandardMaterial>>().add(material);
                 shown = Shown::Standard(material.clone());
@@ -414,6 +433,7 @@ impl Game {
             | Op::Clock { slot, .. }
             | Op::Guide { slot, .. }
             | Op::Shatter { slot, .. }
+            | Op::Chips { slot, .. }
             | Op::Settings { slot, .. } => Some(slot),
             _ => None,
         };
@@ -532,6 +552,12 @@ impl Game {
             Op::Shatter { uv, reach, .. } => {
                 let request = uv.map_or(ShatterRequest::ALL, |uv| ShatterRequest::around(uv.into(), reach));
                 commands.shatter_cracks(request);
+            }
+            Op::Chips { count, .. } => {
+                match count {
+                    Some(count) => commands.insert(CrackChips { count, ..default() }),
+                    None => commands.remove::<CrackChips>(),
+                };
             }
             Op::Settings { when, speed, again, fly, seek, .. } => {
                 commands.insert(ShatterCracks {
@@ -781,9 +807,9 @@ fn operation(rng: &mut Rng) -> Op {
     let mut some = |low: f32, high: f32| if rng.unit() < 0.08 { wild } else { rng.range(low, high) };
     let [a, b, c] = [some(0.0, 1.0), some(0.0, 1.0), some(0.2, 4.0)];
     let size = [16 + (rng.next_u32() % 60) as u16, 16 + (rng.next_u32() % 60) as u16];
-    match rng.next_u32() % 42 {
+    match rng.next_u32() % 45 {
         0..5 => {
-            let carrier = match rng.next_u32() % 12 {
+            let carrier = match rng.next_u32() % 14 {
                 0..4 => Carrier::Sprite,
                 4 => Carrier::Resized([60.0 * a, 80.0 * b]),
                 5 => Carrier::Part([20.0 * a, 20.0 * b, 40.0 * b, 60.0 * c]),
@@ -791,6 +817,7 @@ fn operation(rng: &mut Rng) -> Op {
                 7 => Carrier::Tiled,
                 8 | 9 => Carrier::Mesh2d,
                 10 => Carrier::Wall,
+                11 => Carrier::Body(number / 11),
                 _ => Carrier::BrokenMesh(number),
             };
             let show = match rng.next_u32() % 16 {
@@ -847,6 +874,7 @@ fn operation(rng: &mut Rng) -> Op {
         }
         39 | 40 => Op::Restore { from: slot, to: number % SLOTS, is_healed: !number.is_multiple_of(3) },
         38 => Op::Speed([0.0, 0.5, 1.0, 1.0, 8.0][usize::from(number) % 5]),
+        41 | 42 => Op::Chips { slot, count: (!number.is_multiple_of(4)).then_some(number.into()) },
         _ if number.is_multiple_of(2) => Op::Frame([0, 1, 16, 20, 1000][usize::from(number) % 5]),
         _ => Op::Resize { target: number % 4, size: [u16::from(number), size[0]] },
     }

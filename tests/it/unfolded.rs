@@ -400,3 +400,34 @@ fn t11_a_box_that_is_laid_out_gets_another_picture() {
     assert_eq!(get::<Mesh3d>(&app, entity).0, cube);
     assert_eq!(get::<MeshMaterial3d<StandardMaterial>>(&app, entity).0, other);
 }
+
+/// Hits by texture coordinates are meant for those of the picture, also where the material shows a part of it, before and after it is laid out;
+/// what is not on the mesh is refused.
+#[test]
+fn t4_hits_by_coordinates_land_where_the_picture_has_them() {
+    let (mut app, material) = bodies(Some(solid(UVec2::splat(96), PLAIN)));
+    let mut half = app.world().resource::<Assets<StandardMaterial>>().get(&material).expect("it").clone();
+    half.uv_transform = bevy::math::Affine2::from_scale(Vec2::splat(0.5));
+    let material = add(&mut app, half);
+    let cube = add(&mut app, Mesh::from(Cuboid::new(1.0, 1.0, 1.0)));
+    // The front shows the picture from 0 to 0.5; v runs up it.
+    let at = |u: f32, v: f32| Vec3::new(2.0 * u - 0.5, 2.0 * v - 0.5, 0.5);
+    let [by_uv, by_point] = [true, false].map(|by_uv| {
+        let entity = spawn(&mut app, &cube, &material, Transform::IDENTITY);
+        for (u, v) in [(0.1875, 0.3125), (0.375, 0.125)] {
+            let place = if by_uv { CrackHit::uv(entity, Vec2::new(u, v)) } else { CrackHit::local(entity, at(u, v)) };
+            hit(&mut app, place.with_energy(2.0));
+            settle(&mut app, entity);
+        }
+        entity
+    });
+    assert_eq!(state(&app, by_uv).hits, 2);
+    assert_eq!(state(&app, by_uv).nodes, state(&app, by_point).nodes);
+    let different =
+        shown_3d(&app, by_uv).iter().zip(shown_3d(&app, by_point)).filter(|(a, b)| a.abs_diff(*b) > 8).count();
+    assert!(different < 200, "{different}: by rounding of places alone");
+    let before = counts(&app).rejected;
+    hit(&mut app, CrackHit::uv(by_uv, Vec2::splat(0.9)));
+    step(&mut app);
+    assert_eq!(counts(&app).rejected, before + 1);
+}

@@ -5,7 +5,7 @@ use crate::{
         form,
         subject::{EditorCommand, Subject},
     },
-    plugin::{ShatterCracks, ShatterRequest},
+    plugin::{CrackChips, ShatterCracks, ShatterRequest},
 };
 use bevy_egui::egui::Ui;
 
@@ -42,5 +42,13 @@ pub(super) fn show(ui: &mut Ui, subject: &mut Subject, energy: f32, asked: &mut 
                 subject.shatter = Some(ShatterCracks::default());
             }
         }
+    }
+    let mut has_chips = subject.chips.is_some();
+    let note = "What a hit knocks out of its crater flies off. The preset needs craters with terraces.";
+    if ui.checkbox(&mut has_chips, "Chips fly out of craters").on_hover_text(note).changed() {
+        subject.chips = has_chips.then(CrackChips::default);
+    }
+    if let Some(chips) = &mut subject.chips {
+        form::show_fields(ui, chips, &vec![&CrackChips::default()]);
     }
 }

@@ -2,6 +2,7 @@
 
 pub(crate) mod analogy;
 pub(crate) mod budget;
+pub(crate) mod chips;
 pub(crate) mod clock;
 mod defaults;
 pub(crate) mod error;
@@ -24,6 +25,7 @@ pub(crate) mod textures;
 
 pub use analogy::{AnalogyExamples, AnalogyFailed, AnalogyMade, AnalogyProgress, CrackAnalogy};
 pub use budget::{CrackBudget, CrackStats, CrackUploadStats};
+pub use chips::{CrackChip, CrackChips};
 pub use clock::{CrackClock, CrackDrive};
 pub use error::CrackError;
 #[cfg(feature = "2d")]

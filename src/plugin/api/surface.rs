@@ -128,7 +128,7 @@ impl Default for CrackSurface {
 /// [density](CrackSurface::density), a [fixed size](CrackResolution::Fixed), [`GuidedCracks`](crate::plugin::GuidedCracks) or
 /// [`CrackStrands`](crate::plugin::CrackStrands), which have their places in its picture.
 ///
-/// While it is cracked, `Mesh3d` is a copy with other texture coordinates. Hits by texture coordinates are meant for those that the mesh had. One that
+/// While it is cracked, `Mesh3d` is a copy with other texture coordinates. Hits by texture coordinates are meant for those of the picture, as before. One that
 /// is laid out does not shatter.
 #[derive(Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[type_path = "bevy_crack"]

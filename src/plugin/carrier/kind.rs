@@ -90,6 +90,11 @@ pub(crate) trait CarrierKind: Send + Sync {
         false
     }
 
+    /// Whether its mesh is laid out flat, or is to stay as it is; `None` if that was not asked yet.
+    fn poll_unfold(&self, _world: &mut World, _entity: Entity) -> Option<bool> {
+        Some(true)
+    }
+
     /// Has a mesh laid out flat, if that is of use; `false` if that is under way.
     fn unfold(&self, _world: &mut World, _entity: Entity, _order: &UnfoldOrder) -> bool {
         true
@@ -166,7 +171,7 @@ pub(crate) struct UnfoldOrder {
     /// Whether fewer texels than its picture has are better than none.
     pub(crate) must: bool,
     /// The most texels, and the most of a side.
-    pub(crate) most_texels: f64,
+    pub(crate) most_texels: u64,
     pub(crate) most_side: u32,
     /// Whether it is made in this frame.
     pub(crate) at_once: bool,

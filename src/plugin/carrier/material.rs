@@ -168,6 +168,11 @@ impl<S: MaterialSlot> CarrierKind for MaterialKind<S> {
     }
 
     #[cfg(feature = "3d")]
+    fn poll_unfold(&self, world: &mut World, entity: Entity) -> Option<bool> {
+        if S::Material::MAPS.depth { unfold::poll(world, entity) } else { Some(true) }
+    }
+
+    #[cfg(feature = "3d")]
     fn unfold(&self, world: &mut World, entity: Entity, order: &UnfoldOrder) -> bool {
         unfold::prepare::<S>(world, entity, order)
     }

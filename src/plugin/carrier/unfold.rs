@@ -17,6 +17,9 @@ const WITHOUT_PICTURE: f32 = 256.0;
 /// A mesh with more triangles is looked at by the task only.
 const FEW: usize = 1024;
 
+/// A mesh is not laid out with fewer texels for a unit of pattern space.
+const COARSEST: f32 = 8.0;
+
 /// How much of its texels a unit of length keeps at each try to make a layout fit.
 const SMALLER: f32 = 0.8;
 
@@ -26,6 +29,8 @@ const SMALLER: f32 = 0.8;
 struct Unfold {
     /// The mesh as it was.
     before: Handle<Mesh>,
+    /// From its texture coordinates to those of the picture.
+    to_picture: Affine2,
     stage: Stage,
 }
 
@@ -61,33 +66,31 @@ pub(super) fn unfolding(world: &World, entity: Entity) -> Option<Arc<Unfolding>>
     }
 }
 
+/// Whether the mesh of an entity is laid out, or is to stay as it is; `None` if that was not asked yet.
+pub(super) fn poll(world: &mut World, entity: Entity) -> Option<bool> {
+    let mesh = world.get::<Mesh3d>(entity)?.0.clone();
+    let mut unfold = world.get_mut::<Unfold>(entity)?;
+    let is_same = unfold.before == mesh || matches!(&unfold.stage, Stage::Shown(own, _) if *own == mesh);
+    is_same.then(|| unfold.poll())
+}
+
 /// Has the mesh of an entity laid out, if that is of use; `false` if that is under way.
 pub(super) fn prepare<S: MaterialSlot>(world: &mut World, entity: Entity, order: &UnfoldOrder) -> bool {
-    if !S::Material::MAPS.depth {
-        return true;
-    }
     let Some(mesh) = world.get::<Mesh3d>(entity).map(|mesh| mesh.0.clone()) else { return true };
-    if let Some(mut unfold) = world.get_mut::<Unfold>(entity) {
-        let is_same = unfold.before == mesh || matches!(&unfold.stage, Stage::Shown(own, _) if *own == mesh);
-        if is_same {
-            return unfold.poll();
-        }
-    }
     let Some(work) = work::<S>(world, entity, &mesh, order) else {
         forget(world, entity);
         return true;
     };
-    let mut stage = Stage::Working(BackgroundJob::start(Box::new(work), |work| work.make()), Instant::now());
-    if order.at_once
-        && let Stage::Working(job, _) = stage
-    {
-        stage = Stage::of(job.finish().flatten());
-    }
-    let is_ready = !matches!(stage, Stage::Working(..));
+    let to_picture = work.to_picture;
+    let stage = if order.at_once {
+        Stage::of(work.make())
+    } else {
+        Stage::Working(BackgroundJob::start(Box::new(work), |work| work.make()), Instant::now())
+    };
     if let Ok(mut entity) = world.get_entity_mut(entity) {
-        entity.insert(Unfold { before: mesh, stage });
+        entity.insert(Unfold { before: mesh, to_picture, stage });
     }
-    is_ready
+    order.at_once
 }
 
 impl Stage {
@@ -132,12 +135,15 @@ fn work<S: MaterialSlot>(world: &World, entity: Entity, mesh: &Handle<Mesh>, ord
     let hit = match order.hit {
         Some((HitPoint::Local(point), _)) => Some(point),
         Some((_, Some(point))) => Some(point),
-        Some((HitPoint::Uv(uv), None)) => {
-            place_of(mesh, to_picture.inverse().transform_point2(uv)).map(|place| place.0)
-        }
+        Some((HitPoint::Uv(uv), None)) => place_in(mesh, to_picture, uv),
         _ => None,
     };
     Some(Work { mesh: mesh.clone(), to_picture, scale, hit, picture, order: *order })
+}
+
+/// The point of a mesh where its picture has these texture coordinates.
+fn place_in(mesh: &Mesh, to_picture: Affine2, uv: Vec2) -> Option<Vec3> {
+    place_of(mesh, to_picture.inverse().transform_point2(uv)).map(|place| place.0)
 }
 
 fn is_slab(mesh: &Mesh, to_picture: Affine2, scale: Vec3) -> bool {
@@ -169,30 +175,24 @@ impl Work {
         let [a, b, c] = corners[triangle].map(|vertex| positions[vertex as usize]);
         let around = around.unwrap_or((a + b + c) / 3.0);
         // To the right in the picture where it is hit.
-        let right = uvs(triangle).map_or(Vec3::ZERO, |[p, q, r]| (b - a) * (r - p).y - (c - a) * (q - p).y)
-            * uvs(triangle).map_or(1.0, |[p, q, r]| (q - p).perp_dot(r - p).signum());
+        let right = uvs(triangle).map_or(Vec3::ZERO, |[p, q, r]| {
+            ((b - a) * (r - p).y - (c - a) * (q - p).y) * (q - p).perp_dot(r - p).signum()
+        });
         let unit = (shape.area() / 6.0).sqrt();
-        let wanted = self.density(&shape, &uvs).unwrap_or(WITHOUT_PICTURE / unit);
-        let largest = self.order.most_texels.min(f64::MAX) as f32;
-        let mut density = wanted;
-        // Charts fill about two thirds of what is around them.
-        let fits = (largest / (1.5 * shape.area())).sqrt();
-        if self.order.must && density > fits {
-            density = fits;
+        let UnfoldOrder { id, must, most_side, most_texels, .. } = self.order;
+        let mut texels = self.density(&shape, &uvs).unwrap_or(WITHOUT_PICTURE / unit);
+        if must {
+            // Charts fill about two thirds of what is around them.
+            texels = texels.min((most_texels as f32 / (1.5 * shape.area())).sqrt());
         }
         let layout = loop {
-            let unwrap = Unwrap { around, triangle, right, texels: density, largest: self.order.most_side };
-            let laid_out = match unwrap.apply(&shape) {
-                Ok(laid_out) if laid_out.size.as_vec2().element_product() <= largest => break laid_out,
-                Ok(_) | Err(UnwrapError::TooLarge { .. }) => None::<()>,
+            match (Unwrap { around, triangle, right, texels, most_side, most_texels }).apply(&shape) {
+                Ok(laid_out) => break laid_out,
+                Err(UnwrapError::TooLarge { .. }) if must && texels * unit > COARSEST => texels *= SMALLER,
                 Err(_) => return None,
-            };
-            if laid_out.is_none() && (!self.order.must || density * unit < 8.0) {
-                return None;
             }
-            density *= SMALLER;
         };
-        let unfolding = Arc::new(Unfolding::new(self.order.id, layout, density * unit, around / self.scale, uvs));
+        let unfolding = Arc::new(Unfolding::new(id, layout, texels * unit, around / self.scale, uvs));
         let size = unfolding.layout.size.as_vec2();
         let uvs: Vec<[f32; 2]> = unfolding
             .layout
@@ -268,15 +268,17 @@ pub(super) fn forget(world: &mut World, entity: Entity) {
     }
 }
 
-/// The point that a hit is meant for on a mesh that is laid out: texture coordinates are those of the mesh as it was.
+/// The point that a hit is meant for on a mesh that is laid out: texture coordinates are those of its picture.
 pub(super) fn aim(world: &World, entity: Entity, at: HitPoint, point: Option<Vec3>) -> Option<HitPoint> {
     unfolding(world, entity)?;
     match (at, point) {
         (HitPoint::Local(_), _) => Some(at),
         (_, Some(point)) => Some(HitPoint::Local(point)),
         (HitPoint::Uv(uv), None) => {
-            let before = world.get_resource::<Assets<Mesh>>()?.get(&world.get::<Unfold>(entity)?.before)?;
-            Some(HitPoint::Local(place_of(before, uv)?.0))
+            let Unfold { before, to_picture, .. } = world.get::<Unfold>(entity)?;
+            let before = world.get_resource::<Assets<Mesh>>()?.get(before)?;
+            // Nowhere on the surface if not on the mesh.
+            Some(place_in(before, *to_picture, uv).map_or(HitPoint::Uv(Vec2::NAN), HitPoint::Local))
         }
         _ => None,
     }

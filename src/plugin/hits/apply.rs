@@ -2,7 +2,7 @@
 
 use crate::growth::HitOutcome;
 use crate::plugin::api::error::EntityLabel;
-use crate::plugin::api::{CrackBudget, CrackClock, CrackState, CrackStatus, HitPoint};
+use crate::plugin::api::{CrackBudget, CrackChips, CrackClock, CrackState, CrackStatus, HitPoint};
 use crate::plugin::carrier::kind::{CarrierKind, Found};
 use crate::plugin::carrier::kinds;
 use crate::plugin::draw::freeze::freeze_if_full;
@@ -196,6 +196,7 @@ fn apply(world: &mut World, entity: Entity, hit: QueuedHit, timer: &Timer) -> Re
     let is_blank = before.is_some_and(|active| active.cracks.growth.network().nodes().is_empty());
     let at = kind.aim(world, entity, hit.at, hit.point, is_blank);
     let uv = locate(world, entity, kind, at)?;
+    let has_chips = world.get::<CrackChips>(entity).is_some();
     let active = active_mut(world, entity).ok_or(GONE)?;
     let frame = active.drawing.field.frame;
     let texel = frame.to_texel(frame.uv_to_pos(uv)).max(Vec2::ZERO).as_uvec2();
@@ -219,6 +220,7 @@ fn apply(world: &mut World, entity: Entity, hit: QueuedHit, timer: &Timer) -> Re
         let energy = hit.energy.min(HARDEST);
         active.cracks.last_hit = Some(LastHit { pos, energy, direction: hit.direction });
         active.cracks.hits += 1;
+        active.cracks.unchipped += u32::from(has_chips);
         active.note_hit();
         let turned = active.turn_forwards();
         with_queues(world, entity, |queues, turn| {

@@ -10,6 +10,7 @@ use crate::plugin::draw::async_playback::{self, recall};
 use crate::plugin::gpu::memory::TextureMemory;
 use crate::plugin::jobs::deferred::hold;
 use crate::plugin::jobs::frame_time::{FrameClock, Timer};
+use crate::plugin::jobs::threads::Threads;
 use crate::plugin::shards::broken::drop_shards;
 use crate::plugin::source::picture::FrameCount;
 use crate::plugin::source::preset;
@@ -20,7 +21,7 @@ use crate::plugin::surface::frame::{frame, look, profile};
 use crate::plugin::surface::plan::resolve_mask;
 use crate::plugin::surface::prepare::fail;
 use crate::plugin::surface::queues::Queues;
-use crate::plugin::surface::regrow::{Regrown, regrow};
+use crate::plugin::surface::regrow::{OnAnother, Regrown, Regrowth, regrow};
 use crate::plugin::surface::reread::draft;
 use crate::plugin::surface::stamp::stamp_anew;
 use crate::plugin::surface::time::SLICE;
@@ -241,8 +242,20 @@ fn update_picture(
     let Some(mask) = resolve_mask(world, &active.surface, &active.preset, &shown, &draft)? else { return Ok(false) };
     let frame = frame(draft.plan.rect, &draft.base)?;
     let look = look(&active.preset, frame, draft.base.is_nearest)?;
+    let has_threads = world.resource::<Threads>().pool().is_some();
+    let at_once = !has_threads || world.resource::<CrackBudget>().is_unlimited();
+    let (preset, seed, is_nearest) = (active.preset.clone(), active.surface.seed, draft.base.is_nearest);
+    let inputs = Regrowth { preset, frame, seed, is_nearest, mask: mask.clone(), density: None };
+    let regrown = match regrow(active, inputs, at_once)? {
+        OnAnother::Same => None,
+        OnAnother::Grown(regrown) => Some(*regrown),
+        OnAnother::Wait => {
+            // Hits come after it.
+            world.resource_mut::<Queues>().late.insert(entity);
+            return Ok(false);
+        }
+    };
     recall(world, entity, active);
-    let regrown = regrow(active, frame, mask.clone(), draft.base.is_nearest)?;
     active.canvas.textures = make_textures(world, &draft, Some(&active.canvas.textures))?;
     // Shards show the picture that was.
     drop_shards(world, entity, active);
@@ -358,6 +371,57 @@ mod tests {
         assert!(app.world().resource::<Queues>().late.is_empty());
     }
 
+    /// Fault B5: cracks on a picture of other proportions are grown again by a task, as a frame would have grown them; hits come after that.
+    #[test]
+    fn b5_cracks_on_another_picture_are_grown_beside_the_frames() {
+        let grown = |budget: CrackBudget| {
+            let mut app = app(CrackBudget { milliseconds: 1e6, ..default() });
+            app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(20)));
+            let [first, other] = [UVec2::new(96, 96), UVec2::new(160, 80)]
+                .map(|size| app.world_mut().resource_mut::<Assets<Image>>().add(blank(size)));
+            let surface = CrackSurface::new(CrackPreset::CLAY.scaled(0.5)).with_seed(4);
+            let entity = app.world_mut().spawn((Sprite::from_image(first), surface)).id();
+            app.world_mut().trigger(CrackHit::uv(entity, Vec2::new(0.3, 0.6)).with_energy(4.0));
+            // They are still growing.
+            (0..60).for_each(|_| app.update());
+            let extent = |app: &App| active(app.world(), entity).map(|a| a.cracks.growth.network().extent());
+            let before = extent(&app);
+            assert!(active(app.world(), entity).is_some_and(|a| a.cracks.growth.network().nodes().len() > 1024));
+            app.insert_resource(budget);
+            // Their time stands still, so that the hit comes after the same step.
+            app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::ZERO));
+            if let Some(mut sprite) = app.world_mut().get_mut::<Sprite>(entity) {
+                sprite.image = other;
+            }
+            app.world_mut().trigger(CrackHit::uv(entity, Vec2::new(0.7, 0.4)));
+            let is_limited = !app.world().resource::<CrackBudget>().is_unlimited();
+            app.update();
+            assert_eq!(extent(&app) == before, is_limited, "the frame of the change");
+            for _ in 0..10_000 {
+                if extent(&app) != before {
+                    break;
+                }
+                let hits = active(app.world(), entity).map(|active| active.cracks.hits);
+                assert_eq!(hits, Some(1), "a hit comes after the change");
+                std::thread::sleep(Duration::from_millis(1));
+                app.update();
+            }
+            assert_ne!(extent(&app), before);
+            app.insert_resource(CrackBudget { milliseconds: 1e6, ..default() });
+            app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(20)));
+            (0..600).for_each(|_| app.update());
+            assert!(app.world().resource::<Queues>().late.is_empty());
+            let grown = active(app.world(), entity);
+            let grown = grown.map(|active| (active.cracks.hits, active.cracks.growth.steps_made()));
+            (grown, shown(&app, entity))
+        };
+        let at_once = grown(CrackBudget { milliseconds: 1e6, ..default() });
+        assert_eq!(at_once.0.map(|grown| grown.0), Some(2));
+        let beside = grown(CrackBudget { milliseconds: 500.0, ..default() });
+        assert_eq!(at_once.0, beside.0);
+        assert!(at_once.1 == beside.1, "other cracks");
+    }
+
     /// Fault B5: a large surface with other settings is drawn again by a task, or in slices of frames. It shows what it showed until then, and
     /// what it would show if a frame had drawn it.
     #[test]
@@ -395,7 +459,7 @@ mod tests {
             }
             assert!(is_done(&app), "it does not crack");
             app.insert_resource(budget);
-            app.world_mut().resource_mut::<crate::plugin::jobs::threads::Threads>().are_missing = no_threads;
+            app.world_mut().resource_mut::<Threads>().are_missing = no_threads;
             if let Some(mut surface) = app.world_mut().get_mut::<CrackSurface>(entity) {
                 surface.preset = other.clone().into();
             }

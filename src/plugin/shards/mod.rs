@@ -9,6 +9,7 @@
 mod batch;
 pub(crate) mod body;
 pub(crate) mod broken;
+pub(crate) mod chips;
 mod drawn;
 pub(crate) mod fly;
 mod form;
@@ -17,3 +18,4 @@ pub(crate) mod release;
 pub(crate) mod request;
 mod show;
 mod spans;
+mod throw;

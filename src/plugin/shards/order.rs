@@ -5,13 +5,13 @@ use super::broken::{Broken, broken};
 use super::drawn::{Drawn, Sketch};
 use super::form::Style;
 use super::spans::{Scan, join_spans};
+use super::throw::{Throw, in_plane};
 use crate::Grid;
 use crate::math::mix;
 use crate::pattern::{Network, SurfaceFrame};
 use crate::plugin::api::shatter::rim_for;
-use crate::plugin::api::{CrackBudget, GravitySpace, ShardsError, ShatterCracks, ShatterRequest};
+use crate::plugin::api::{CrackBudget, ShardsError, ShatterCracks, ShatterRequest};
 use crate::plugin::carrier::plane::Plane;
-use crate::plugin::carrier::space;
 use crate::plugin::jobs::background::guarded_as;
 use crate::plugin::source::mask;
 use crate::plugin::source::picture::BasePicture;
@@ -144,29 +144,20 @@ impl ShatterJob {
         let from = request.uv.map_or(pos, |uv| uv * extent);
         let seen = active.canvas.seen().ok_or(ShardsError::NotFlat { reason: "it shows nothing" })?;
         let plane = active.carrier.kind.plane(world, entity, seen).map_err(|reason| ShardsError::NotFlat { reason })?;
-        let back = world.get::<GlobalTransform>(entity).and_then(space::to_local).unwrap_or_default();
-        let direction = back.transform_vector3(space::direction(request.direction.unwrap_or(direction)));
-        let direction = plane.rotation.inverse() * space::direction(direction);
+        let direction = in_plane(world, entity, &plane, request.direction.unwrap_or(direction));
         let broken = broken(world, entity);
         let released = broken.map_or(0, |broken| broken.released);
         let seed = active.surface.seed;
         let energy = request.energy.unwrap_or(energy);
-        let mut burst = Burst::new(settings.burst, from, direction, energy, seed ^ u64::from(released))?;
-        if settings.gravity == GravitySpace::World
-            && let Some(gravity) =
-                world.get::<GlobalTransform>(entity).and_then(|place| plane.down(extent, place, settings.burst.gravity))
-        {
-            burst = burst.with_gravity(gravity);
-        }
-        if let (Some(height), Some(place)) =
-            (settings.floor.filter(|height| height.is_finite()), world.get::<GlobalTransform>(entity))
-        {
-            let is_solid = active.carrier.is_solid;
-            let thickness = is_solid.then(|| plane.thickness(settings.thickness, extent));
-            if let Some(floor) = plane.floor(extent, place, height, thickness) {
-                burst = burst.with_floor(floor)?;
-            }
-        }
+        let throw = Throw {
+            params: &settings.burst,
+            gravity: settings.gravity,
+            floor: settings.floor,
+            thickness: active.carrier.is_solid.then(|| plane.thickness(settings.thickness, extent)),
+            seed: seed ^ u64::from(released),
+        };
+        let place = world.get::<GlobalTransform>(entity);
+        let burst = throw.burst(place, (&plane, extent), (from, direction, energy))?;
         let grown = (network.nodes().len(), network.links().len());
         let same = |broken: &Broken| broken.grown == grown && broken.settings.cut == settings.cut;
         let pieces = match broken {

@@ -7,6 +7,7 @@ use super::cracks::Cracks;
 use super::drawing::Drawing;
 use super::frame::profile;
 use super::playhead::Playhead;
+use super::regrow::Regrowing;
 use crate::growth::CrackGrowth;
 use crate::paint::LookTable;
 use crate::plugin::api::surface::CrackSurface;
@@ -35,6 +36,8 @@ pub(crate) struct Active {
     pub(crate) analogy: AnalogyState,
     pub(crate) carrier: Carrier,
     pub(crate) turn: Turn,
+    /// Its cracks on another picture, until they are there.
+    pub(crate) regrowing: Option<Box<Regrowing>>,
     /// Bytes of its textures.
     pub(crate) bytes: TextureBytes,
     /// Nodes of the network and closed cells when shards last fell by themselves.
@@ -107,6 +110,7 @@ impl Active {
             carrier,
             turn: Turn::default(),
             bytes,
+            regrowing: None,
             fell_at: (0, 1),
             revision: Arc::default(),
             surface,

@@ -137,7 +137,7 @@ impl AnalogyWork {
             let start = diffuse.len();
             for (x, own) in (rect.min.x..rect.max.x).zip(base.as_chunks::<4>().0) {
                 let [red, green, blue, _] = analogy.color(x, y);
-                let is_made = near.as_ref().is_none_or(|near| near.get(x - rect.min.x, y - rect.min.y) == Some(true));
+                let is_made = self.is_made(analogy, near.as_ref(), rect, [x, y]);
                 diffuse.extend(if is_made { [red, green, blue, own[3]] } else { *own });
             }
             is_own &= diffuse.get(start..) == Some(base);
@@ -152,6 +152,15 @@ impl AnalogyWork {
         Some(MadePatch { rect, diffuse, normal, depth })
     }
 
+    /// Whether a texel comes from a photograph. All others are those of the surface's own picture, in their own places: what is
+    /// copied from elsewhere in it would be seen to have moved.
+    fn is_made(&self, analogy: &Analogy, near: Option<&Grid<bool>>, rect: TexelRect, [x, y]: [u32; 2]) -> bool {
+        near.is_none_or(|near| {
+            near.get(x - rect.min.x, y - rect.min.y) == Some(true)
+                && analogy.source(x, y).is_some_and(|source| source.pair > 0)
+        })
+    }
+
     /// Normals from where the colours come from.
     fn normals(&self, analogy: &Analogy, rect: TexelRect, near: Option<&Grid<bool>>) -> Vec<u8> {
         const FLAT: [u8; 4] = [128, 128, 255, 255];
@@ -163,10 +172,8 @@ impl AnalogyWork {
         let mut normals = Vec::with_capacity(4 * rect.area() as usize);
         for (x, y) in (rect.min.y..rect.max.y).flat_map(|y| (rect.min.x..rect.max.x).map(move |x| (x, y))) {
             let source = analogy.source(x, y).map(|source| (usize::from(source.pair), source.texel.map(u32::from)));
-            let is_made = near.is_none_or(|near| near.get(x - rect.min.x, y - rect.min.y) == Some(true));
             let normal = match source {
-                _ if !is_made => own(x, y),
-                Some((0, [x, y])) if self.wish.keeps_picture => own(x, y),
+                _ if !self.is_made(analogy, near, rect, [x, y]) => own(x, y),
                 Some((pair, [x, y])) => {
                     let map = maps.get(pair.saturating_sub(usize::from(self.wish.keeps_picture)));
                     map.and_then(|map| map.get(x, y))

@@ -16,6 +16,8 @@ pub(crate) struct Cracks {
     /// Hits that started or fed a crack.
     pub(crate) hits: u32,
     pub(crate) last_hit: Option<LastHit>,
+    /// Hits whose chips are still to fly off.
+    pub(crate) unchipped: u32,
     /// Nodes that were there when tips were last listed.
     pub(crate) tips_from: usize,
 }
@@ -62,6 +64,6 @@ pub(crate) struct LastHit {
 impl Cracks {
     pub(crate) fn new(growth: CrackGrowth) -> Self {
         let cells = CellTracker::new(growth.network().extent());
-        Self { growth, cells, cells_reported: 1, added: None, hits: 0, last_hit: None, tips_from: 0 }
+        Self { growth, cells, cells_reported: 1, added: None, hits: 0, last_hit: None, unchipped: 0, tips_from: 0 }
     }
 }

@@ -9,25 +9,80 @@ use super::tile_set::Touched;
 use crate::growth::{CrackGrowth, Past, PastEvent};
 use crate::pattern::{CellTracker, CrackMask, SurfaceFrame};
 use crate::plugin::api::CrackError;
+use crate::plugin::jobs::background::{BackgroundJob, PATIENCE, guarded};
 use crate::raster::DepthField;
 use crate::{CrackPreset, Grid};
+use bevy::platform::time::Instant;
 use std::sync::Arc;
 
-/// On a picture of other proportions the same hits, in the same places, make other cracks: grown as far as they were.
-/// `None` if they may stay.
-pub(crate) fn regrow(
-    active: &mut Active,
-    frame: SurfaceFrame,
-    mask: Arc<CrackMask>,
-    is_nearest: bool,
-) -> Result<Option<Regrown>, CrackError> {
-    if active.cracks.growth.network().extent() == frame.extent() {
-        return Ok(None);
+/// Nodes up to which cracks are grown again in the frame.
+const MAX_NODES: usize = 1024;
+
+/// What has changed so often before it was grown, as films of other proportions do, is grown in the frame.
+const MAX_RESTARTS: u32 = 3;
+
+/// Cracks that a task grows again. What was shown before is shown until then.
+pub(crate) struct Regrowing {
+    inputs: Regrowth,
+    past: Past,
+    job: BackgroundJob<Work, Result<(Regrown, Option<Added>), CrackError>>,
+    since: Instant,
+    restarts: u32,
+}
+
+/// What has become of cracks on another picture.
+pub(crate) enum OnAnother {
+    /// They may stay: the picture has the same proportions.
+    Same,
+    /// They are being grown.
+    Wait,
+    Grown(Box<Regrown>),
+}
+
+struct Work {
+    inputs: Regrowth,
+    past: Past,
+    added: Option<Added>,
+}
+
+impl Work {
+    fn grow(mut self) -> Result<(Regrown, Option<Added>), CrackError> {
+        guarded(|| {
+            let grown = self.inputs.grow(self.added.as_mut(), &self.past)?;
+            Ok((grown, self.added))
+        })
+    }
+}
+
+/// On a picture of other proportions the same hits, in the same places, make other cracks: grown as far as they are. By a task, if that
+/// takes longer than a frame has, unless it is to be `at_once`.
+pub(crate) fn regrow(active: &mut Active, inputs: Regrowth, at_once: bool) -> Result<OnAnother, CrackError> {
+    let before = active.regrowing.take();
+    if active.cracks.growth.network().extent() == inputs.frame.extent() {
+        return Ok(OnAnother::Same);
     }
     let past = past(active);
-    let Active { preset, surface, cracks, .. } = active;
-    let seed = surface.seed;
-    Regrowth { preset, frame, seed, is_nearest, mask, density: None }.grow(cracks.added.as_mut(), &past).map(Some)
+    let restarts = match before {
+        Some(mut known) if known.inputs.is_like(&inputs) && known.past.events == past.events => {
+            let Some(made) = known.job.take_if_done(known.since.elapsed() >= PATIENCE) else {
+                active.regrowing = Some(known);
+                return Ok(OnAnother::Wait);
+            };
+            let (mut grown, added) = made?;
+            // The cracks that are shown have gone on.
+            (known.past.steps..past.steps).for_each(|_| _ = grown.growth.step());
+            active.cracks.added = added;
+            return Ok(OnAnother::Grown(Box::new(grown)));
+        }
+        known => known.map_or(0, |known| known.restarts + 1),
+    };
+    if at_once || restarts > MAX_RESTARTS || active.cracks.growth.network().nodes().len() <= MAX_NODES {
+        return Ok(OnAnother::Grown(Box::new(inputs.grow(active.cracks.added.as_mut(), &past)?)));
+    }
+    let work = Work { inputs: inputs.clone(), past: past.clone(), added: active.cracks.added.clone() };
+    let job = BackgroundJob::start(work, Work::grow);
+    active.regrowing = Some(Box::new(Regrowing { inputs, past, job, since: Instant::now(), restarts }));
+    Ok(OnAnother::Wait)
 }
 
 /// What has happened to a surface.
@@ -42,8 +97,9 @@ pub(crate) fn past(active: &Active) -> Past {
 }
 
 /// All that cracks which are grown again depend on, beside their past.
-pub(crate) struct Regrowth<'a> {
-    pub(crate) preset: &'a CrackPreset,
+#[derive(Clone)]
+pub(crate) struct Regrowth {
+    pub(crate) preset: CrackPreset,
     pub(crate) frame: SurfaceFrame,
     pub(crate) seed: u64,
     /// Whether the picture is shown in whole texels.
@@ -59,7 +115,15 @@ pub(crate) struct Regrown {
     pub(crate) frozen: Option<Frozen>,
 }
 
-impl Regrowth<'_> {
+impl Regrowth {
+    fn is_like(&self, other: &Self) -> bool {
+        let Self { preset, frame, seed, is_nearest, mask, density } = self;
+        let is_same_mask = Arc::ptr_eq(mask, &other.mask) || *mask == other.mask;
+        is_same_mask
+            && (frame, seed, is_nearest) == (&other.frame, &other.seed, &other.is_nearest)
+            && (preset, density) == (&other.preset, &other.density)
+    }
+
     /// The same happens again around what is added.
     pub(crate) fn grow(self, added: Option<&mut Added>, past: &Past) -> Result<Regrown, CrackError> {
         let Self { preset, frame, seed, is_nearest, mask, density } = self;
@@ -82,7 +146,7 @@ impl Regrowth<'_> {
                 },
                 |(field, frozen)| (field, Some(frozen)),
             );
-            stamp_all(growth, &profile(preset, is_nearest), &mut field, &mut Touched::new(frame.size()));
+            stamp_all(growth, &profile(&preset, is_nearest), &mut field, &mut Touched::new(frame.size()));
             let mut cells = CellTracker::new(frame.extent());
             let (frozen, _) = Frozen::after(before, growth, keep, &mut field, &mut cells);
             picture = Some((field, frozen));

@@ -15,20 +15,22 @@ use crate::plugin::surface::queue::HitQueue;
 use bevy::{prelude::*, render::renderer::RenderDevice};
 
 /// The most texels of a layout that nobody asked for.
-const MOST_BY_ITSELF: f64 = 1.5 * 1024.0 * 1024.0;
+const MOST_BY_ITSELF: u64 = 3 << 19;
 
 /// The most texels of any.
-const MOST: f64 = 8.0 * 1024.0 * 1024.0;
+const MOST: u64 = 8 << 20;
 
-/// How many layouts there were.
+/// The number of the next layout.
 #[derive(Resource, Default)]
 pub(crate) struct Unfoldings(u64);
 
 /// Has the mesh of a surface laid out that has not cracked, if that is of use; `false` if that is under way.
 pub(crate) fn unfold(world: &mut World, entity: Entity) -> bool {
-    let Some(surface) = world.get::<CrackSurface>(entity).filter(|_| world.get::<Mesh3d>(entity).is_some()) else {
-        return true;
-    };
+    let (Some(kind), _) = kinds::inspect(world, entity) else { return true };
+    if let Some(is_ready) = kind.poll_unfold(world, entity) {
+        return is_ready;
+    }
+    let Some(surface) = world.get::<CrackSurface>(entity) else { return true };
     // What is given over the whole of a picture has its place there.
     let has_places = !matches!(surface.mask, CrackMaskSource::Auto | CrackMaskSource::None)
         || surface.density.is_some()
@@ -42,7 +44,6 @@ pub(crate) fn unfold(world: &mut World, entity: Entity) -> bool {
     let write = surface.write;
     let Ok(Some(preset)) = preset::resolve(world, &surface.preset) else { return true };
     let texel = texel_bytes(Maps::wanted(write, &preset.look), preset.look.layer(0).bytes_per_texel());
-    let (Some(kind), _) = kinds::inspect(world, entity) else { return true };
     let budget = world.resource::<CrackBudget>();
     let left = budget.max_texture_bytes.saturating_sub(world.resource::<TextureMemory>().used());
     let device = world.get_resource::<RenderDevice>().map_or(u32::MAX, |d| d.limits().max_texture_dimension_2d);
@@ -53,7 +54,7 @@ pub(crate) fn unfold(world: &mut World, entity: Entity) -> bool {
     let order = UnfoldOrder {
         hit,
         must,
-        most_texels: (left as f64 / texel as f64).min(if must { MOST } else { MOST_BY_ITSELF }),
+        most_texels: (left / texel).min(if must { MOST } else { MOST_BY_ITSELF }),
         most_side: budget.max_side.min(device).clamp(1, crate::pattern::MAX_SIDE),
         at_once: budget.is_unlimited() || world.resource::<Threads>().pool().is_none(),
         id: world.resource::<Unfoldings>().0,

@@ -15,6 +15,9 @@ use glam::Vec2;
 /// Share of the depth that lies outside the basin.
 const SHELF: f32 = 0.5;
 
+/// The same where there are several steps down.
+const EDGE: f32 = 0.45;
+
 /// Share of that depth which is gained on the way to the middle.
 const BOWL: f32 = 0.4;
 
@@ -23,7 +26,10 @@ const WALL: f32 = 0.45;
 
 const SHADE: f32 = 0.5;
 
-const DEEP_SHADE: f32 = 0.62;
+const DEEP_SHADE: f32 = 0.72;
+
+/// How much brighter a wall is that faces the light.
+const LIT: f32 = 0.45;
 
 /// Strength of the shadow of the step down to the basin, as a share of that of the edge.
 const STEP_SHADE: f32 = 0.6;
@@ -113,10 +119,15 @@ impl Shape<'_> {
         let CrushedZone { pale, speckle, stones, .. } = *self.crushed;
         let crumbles = self.jag > 0.0;
         let bump = |k: u32, size: f32| noise(seed ^ k, at.x / size, at.y / size);
-        let share = if broken.basin.is_some() { SHELF } else { 1.0 };
+        let share = match broken.steps.len() {
+            0 => 1.0,
+            1 => SHELF,
+            // A shallow edge, and deeper and deeper steps.
+            _ => EDGE,
+        };
         // In some places a wall is a slope.
         let slope = bump(draws::WALL_SLOPE, (0.35 * self.radius).max(4.0));
-        let run = if crumbles { 0.8 + 2.6 * slope.max(0.0) } else { 1.0 };
+        let run = if crumbles { 0.8 + 1.4 * slope.max(0.0) } else { 1.0 };
         let wall = (within / (run * WALL * share * self.depth).max(1.0)).clamp(0.0, 1.0);
         let bowl = (within / (0.8 * self.radius).max(1.0)).clamp(0.0, 1.0);
         let mut down = share * (wall + BOWL * (bowl - wall));
@@ -125,17 +136,22 @@ impl Shape<'_> {
         // A shadow is soft where the edge that casts it is far away.
         let soft = if crumbles { (0.7 * length).max(HARD) } else { HARD };
         let mut shadow = sink(self.within(broken, off + TO_LIGHT * length, at + TO_LIGHT * length, seed), soft);
+        // The wall on the far side faces the light.
+        let facing = (1.5 * WALL * share * self.depth).max(1.0);
+        let lit = sink(self.within(broken, off - TO_LIGHT * facing, at - TO_LIGHT * facing, seed), HARD);
         let mut sunk = 0.0;
-        if let Some(basin) = &broken.basin {
+        let one = 1.0 / broken.steps.len().max(1) as f32;
+        for step in &broken.steps {
             let within =
-                basin.within(off) - 2.0 * self.jag * (0.5 + 0.5 * bump(draws::BASIN_EDGE, (3.0 * self.jag).max(2.0)));
-            let share = (within / (2.5 * WALL * self.depth).max(2.0)).clamp(0.0, 1.0);
-            sunk = share * share * (3.0 - 2.0 * share);
-            down += (1.0 - SHELF) * sunk;
+                step.within(off) - 2.0 * self.jag * (0.5 + 0.5 * bump(draws::BASIN_EDGE, (3.0 * self.jag).max(2.0)));
+            let fall = (within / (2.5 * WALL * one * self.depth).max(2.0)).clamp(0.0, 1.0);
+            let gone = one * fall * fall * (3.0 - 2.0 * fall);
+            sunk += gone;
+            down += (1.0 - share) * gone;
             if within > 0.0 {
-                let length = long * (1.0 - SHELF) * self.depth;
+                let length = long * (1.0 - share) * one * self.depth;
                 // The step is lower and rounder than the edge.
-                shadow = shadow.max(STEP_SHADE * sink(basin.within(off + TO_LIGHT * length), 1.5 * soft));
+                shadow = shadow.max(STEP_SHADE * sink(step.within(off + TO_LIGHT * length), 1.5 * soft));
             }
         }
         let fold = |k: u32, size: f32| {
@@ -167,7 +183,7 @@ impl Shape<'_> {
             let mut tone = 0.30 * coarse + 0.16 * plate + (0.5 - 0.2 * stones) * sand
                 - 0.14 * stones
                 - 0.6 * corner * wall
-                - 0.3 * sunk;
+                - 0.4 * sunk;
             if stones > 0.0
                 && let Some(stone) = Stone::find(seed ^ draws::STONES, at, self.grain, stones)
             {
@@ -186,7 +202,7 @@ impl Shape<'_> {
         place.height = -self.depth * down + bumps;
         // The wall has the colour of the material that came off, not of what lay under it.
         place.pale = pale * inside * if crumbles { 0.15 + 0.85 * wall } else { 1.0 };
-        place.shade = speckle * tone * inside;
+        place.shade = (speckle * tone + LIT * lit * (1.0 - shadow)) * inside;
         place.dark = shade * shadow * inside * (SHADOW * self.depth).min(1.0);
     }
 

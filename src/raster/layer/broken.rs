@@ -9,6 +9,7 @@ use super::{
 use crate::{
     math::{mix, ops},
     pattern::Bricks,
+    relief::{Crater, CraterParams},
 };
 use glam::Vec2;
 
@@ -67,7 +68,8 @@ pub(super) struct Broken {
     pub(super) off: Vec<Outline>,
     /// Faces of bricks that have come off, in place of those: each is the part of an outline that lies in its brick.
     pub(super) faces: Vec<Face>,
-    pub(super) basin: Option<Outline>,
+    /// Where it goes down further, step by step.
+    pub(super) steps: Vec<Outline>,
     pub(super) chips: Vec<Chip>,
     /// Strokes between two places; the first end is the wide one.
     pub(super) ticks: Vec<[Vec2; 2]>,
@@ -86,7 +88,15 @@ impl Broken {
         let levels = if crumbles && ragged < 0.65 { 1 } else { 2 };
         let shape = |outline: Outline, k: u32| if crumbles { outline.stretched(mix_in(seed, k)) } else { outline };
         let count = 6 + (3.0 * pick(0, 0)) as u32;
-        let mut off = vec![shape(Outline::new(Vec2::ZERO, radius, count, levels, ragged, seed ^ draws::CRATER), 0x300)];
+        let (edge, steps) = terraces(crushed, unit, radius, seed).unwrap_or_else(|| {
+            let edge = shape(Outline::new(Vec2::ZERO, radius, count, levels, ragged, seed ^ draws::CRATER), 0x300);
+            let basin = (crushed.basin > 0.0).then(|| {
+                let centre = Vec2::new(pick(0, 4) - 0.5, pick(0, 5) - 0.3) * (0.3 * radius);
+                shape(Outline::new(centre, radius * crushed.basin, 7, 2, 0.8 * ragged, seed ^ draws::BASIN), 0x301)
+            });
+            (edge, basin.into_iter().collect())
+        });
+        let mut off = vec![edge];
         let flakes = (crushed.flakes as f32 * more).round().min(64.0) as u32;
         let one = radius / more.max(1.0) * more.max(1.0).sqrt();
         for k in 0..flakes {
@@ -107,10 +117,6 @@ impl Broken {
         if !faces.is_empty() {
             off.clear();
         }
-        let basin = (crushed.basin > 0.0).then(|| {
-            let centre = Vec2::new(pick(0, 4) - 0.5, pick(0, 5) - 0.3) * (0.3 * radius);
-            shape(Outline::new(centre, radius * crushed.basin, 7, 2, 0.8 * ragged, seed ^ draws::BASIN), 0x301)
-        });
         let chips = (24.0 * crushed.chips * more).round().min(96.0) as u32;
         let is_drawn = crushed.outline > 0.0;
         let chips: Vec<Chip> = (0..chips)
@@ -149,7 +155,7 @@ impl Broken {
                 [near, near - way * (1.0 + 1.1 * pick(k, 24)) * outline.reach]
             })
             .collect();
-        Self { off, faces, basin, chips, ticks, thick: 0.8 * crushed.outline * unit, pit }
+        Self { off, faces, steps, chips, ticks, thick: 0.8 * crushed.outline * unit, pit }
     }
 
     /// Drops the pieces that do not reach into a rectangle, texels from the hit.
@@ -168,6 +174,20 @@ impl Broken {
         let off = self.off.iter().map(|outline| outline.within(at));
         off.chain(self.faces.iter().map(|face| face.within(at))).fold(-FAR_OUT, f32::max)
     }
+}
+
+/// The crater of a hit at `pos`, all in pattern units. `None` if the zone has no terraces.
+pub(super) fn crater(crushed: &CrushedZone, pos: Vec2, radius: f32, seed: u32) -> Option<Crater> {
+    let CrushedZone { terraces, ragged: roughness, .. } = *crushed;
+    let params = CraterParams { radius, terraces, roughness, ..CraterParams::DEFAULT };
+    Crater::new(pos, &params, u64::from(seed ^ draws::CRATER)).ok()
+}
+
+/// The edge of a crater and its terraces, if it has any; texels.
+fn terraces(crushed: &CrushedZone, unit: f32, radius: f32, seed: u32) -> Option<(Outline, Vec<Outline>)> {
+    let rings = crater(crushed, Vec2::ZERO, radius / unit, seed)?.contours().rings;
+    let mut outlines = rings.iter().map(|ring| Outline::through(ring.points.iter().map(|corner| *corner * unit)));
+    Some((outlines.next()?, outlines.collect()))
 }
 
 /// A different seed for each `k`.

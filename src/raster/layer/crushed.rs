@@ -42,6 +42,10 @@ pub struct CrushedZone {
     /// Radius of the deeper hollow in the middle of a [`broken`](Self::broken) zone, as a share of the radius; it has
     /// more than half of the depth. 0..=1; default 0 = a flat floor.
     pub basin: f32,
+    /// Number of terraces of a [`broken`](Self::broken) zone from its edge to the bottom, each inside the one before:
+    /// the contours of a [`Crater`](crate::relief::Crater), in place of the [`basin`](Self::basin). 0..=4; default 0 =
+    /// none.
+    pub terraces: u32,
     /// Number of smaller flakes that have come off further out, for a [`broken`](Self::broken) zone at energy 1;
     /// proportional to the root of the energy. 0..=16; default 0.
     pub flakes: u32,
@@ -103,6 +107,7 @@ impl CrushedZone {
         reach: 2.5,
         broken: false,
         basin: 0.0,
+        terraces: 0,
         flakes: 0,
         tint: 0.0,
         fall: 0.0,
@@ -138,6 +143,7 @@ impl CrushedZone {
             ("crushed.chips", self.chips, 0.0..=1.0, "0..=1"),
             ("crushed.reach", self.reach, 1.0..=8.0, "1..=8"),
             ("crushed.basin", self.basin, 0.0..=1.0, "0..=1"),
+            ("crushed.terraces", self.terraces as f32, 0.0..=4.0, "0..=4"),
             ("crushed.flakes", self.flakes as f32, 0.0..=16.0, "0..=16"),
             ("crushed.tint", self.tint, 0.0..=1.0, "0..=1"),
             ("crushed.fall", self.fall, 0.0..=1.0, "0..=1"),

@@ -26,7 +26,9 @@ use super::TexelRect;
 use crate::{
     Grid,
     pattern::{Moment, Network, SurfaceFrame, Timeline},
+    relief::Crater,
 };
+use glam::Vec2;
 use plates::PlateField;
 
 /// The layers that a [`DepthField`](super::DepthField) holds in addition to depths.
@@ -142,6 +144,11 @@ impl Layer {
 
     pub(crate) fn plates(&self) -> Option<&PlateField> {
         self.plates.as_deref().filter(|plates| !plates.is_empty())
+    }
+
+    /// The crater that an impact at `pos` (pattern units) has at an energy, if zones have terraces.
+    pub(crate) fn crater(&self, impact: u32, pos: Vec2, energy: f32) -> Option<Crater> {
+        self.crushed.as_deref()?.crater(impact, pos, energy)
     }
 
     pub(crate) fn crushed(&self) -> Option<&CrushedField> {

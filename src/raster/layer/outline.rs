@@ -63,6 +63,14 @@ impl Outline {
         Self { centre, reach, corners, is_worn: false }
     }
 
+    /// The polygon around the origin with these corners.
+    pub(super) fn through(corners: impl Iterator<Item = Vec2>) -> Self {
+        let mut corners: Vec<(f32, Vec2)> = corners.map(|corner| (turn(corner), corner)).collect();
+        corners.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let reach = corners.iter().map(|(_, corner)| corner.length()).fold(0.0, f32::max);
+        Self { centre: Vec2::ZERO, reach, corners, is_worn: true }
+    }
+
     /// The same polygon, longer in one direction and shorter across it.
     pub(super) fn stretched(mut self, seed: u32) -> Self {
         self.is_worn = true;

@@ -1,6 +1,7 @@
 //! The crushed zones of all hits.
 
 use super::{
+    broken::crater,
     crushed::CrushedZone,
     noise::noise,
     outline::WIDEST,
@@ -12,6 +13,7 @@ use crate::{
     math::mix,
     pattern::{Bricks, Strike, SurfaceFrame},
     raster::TexelRect,
+    relief::Crater,
 };
 use glam::{UVec2, Vec2};
 use std::collections::VecDeque;
@@ -244,6 +246,17 @@ impl CrushedField {
         }
     }
 
+    /// The crater that an impact at `pos` (pattern units) has at an energy; `None` if zones have no terraces.
+    pub(crate) fn crater(&self, impact: u32, pos: Vec2, energy: f32) -> Option<Crater> {
+        let radius = self.crushed.radius * level(energy).sqrt();
+        crater(&self.crushed, pos, radius, self.seed_of(impact))
+    }
+
+    /// Seed of what is random about the zone of an impact.
+    const fn seed_of(&self, impact: u32) -> u32 {
+        self.seed ^ impact.wrapping_mul(0x9E37_79B1)
+    }
+
     fn radius(&self, energy: f32) -> f32 {
         self.crushed.radius * self.frame.texels_per_unit() * energy.sqrt()
     }
@@ -256,11 +269,10 @@ impl CrushedField {
         if rect.is_empty() {
             return;
         }
-        let radius = self.radius(zone.energy);
+        let (radius, seed) = (self.radius(zone.energy), self.seed_of(index));
         let slot = &mut self.tiles[(tile.y * self.columns + tile.x) as usize];
         self.used += usize::from(slot.is_none());
         let texels = slot.get_or_insert_with(|| Box::new([Spot::NONE; (TILE * TILE) as usize]));
-        let seed = self.seed ^ index.wrapping_mul(0x9E37_79B1);
         let mut shape = Shape::new(&self.crushed, self.frame.texels_per_unit(), radius, seed, &zone.bricks);
         if let Some(broken) = &mut shape.broken {
             broken.keep_near(rect.min.as_vec2() - zone.pos, rect.max.as_vec2() - zone.pos, shape.depth);

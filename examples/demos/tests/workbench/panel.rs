@@ -82,6 +82,10 @@ fn buttons_ask_for_what_they_say() {
     let asked = harness.state_mut().asked.split_off(0);
     assert_eq!(asked, [EditorCommand::Shatter(ShatterRequest::ALL.with_energy(1.0))]);
     assert!(harness.state().subject.shatter.is_some());
+    press(&mut harness, "Chips fly out of craters");
+    assert_eq!(harness.state().subject.chips, Some(CrackChips::default()));
+    press(&mut harness, "Chips fly out of craters");
+    assert_eq!(harness.state().subject.chips, None);
 }
 
 #[test]

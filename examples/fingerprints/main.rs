@@ -1,0 +1,26 @@
+//! Prints a fingerprint of everything that the crate makes: the same on every machine and in every build.
+//!
+//! ```text
+//! cargo run -p bevy_crack_fingerprints | diff tests/golden/fingerprints.txt -
+//! ```
+//!
+//! For WebAssembly, run by Node (`rustup target add wasm32-wasip1`):
+//!
+//! ```text
+//! export CARGO_TARGET_WASM32_WASIP1_RUNNER="node --no-warnings --no-turbo-fast-api-calls $PWD/.ci/wasi.mjs"
+//! cargo run -p bevy_crack_fingerprints --target wasm32-wasip1 | diff tests/golden/fingerprints.txt -
+//! ```
+
+#![expect(clippy::print_stdout, reason = "a command-line tool")]
+
+#[path = "../../tests/fingerprints/prints.rs"]
+mod prints;
+
+use std::error::Error;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    for line in prints::prints()? {
+        println!("{line}");
+    }
+    Ok(())
+}
