@@ -1,10 +1,27 @@
-//! [`Grid`]: the one two-dimensional buffer of the crate.
+//! [`Grid`]: the one two-dimensional buffer of the crate. [`OutOfMemory`]: what is said where there is no memory for large ones.
 
 #[cfg(feature = "bevy")]
 use bevy::reflect::{ReflectDeserialize, ReflectSerialize};
 use glam::UVec2;
 #[cfg(feature = "bevy")]
 use serde::{Serialize, de::DeserializeOwned};
+
+/// There is not as much memory as a surface of this size needs. Nothing was made; with a smaller one it may work.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("there is no memory for {bytes} bytes")]
+pub struct OutOfMemory {
+    /// How many bytes were asked for.
+    pub bytes: u64,
+}
+
+/// Asks for memory and gives it back: what is to be allocated in many places should be there when the work begins.
+pub(crate) fn ask_for(bytes: u64) -> Result<(), OutOfMemory> {
+    let mut asked = Vec::<u8>::new();
+    let outcome = usize::try_from(bytes).map(|bytes| asked.try_reserve_exact(bytes));
+    // Otherwise the compiler may leave both out.
+    std::hint::black_box(&mut asked);
+    if matches!(outcome, Ok(Ok(()))) { Ok(()) } else { Err(OutOfMemory { bytes }) }
+}
 
 /// A row-major buffer of `size.x * size.y` values: (0, 0) is the top left, x runs right, y runs down.
 ///
@@ -49,6 +66,19 @@ impl<T: Copy> Grid<T> {
     #[must_use]
     pub fn new(size: UVec2, fill: T) -> Self {
         Self { size, data: vec![fill; size.x as usize * size.y as usize] }
+    }
+
+    /// Like [`new`](Self::new), which ends the program where there is no memory.
+    ///
+    /// # Errors
+    /// [`OutOfMemory`] if there is no memory for all values.
+    pub fn try_new(size: UVec2, fill: T) -> Result<Self, OutOfMemory> {
+        let count = u64::from(size.x) * u64::from(size.y);
+        let error = OutOfMemory { bytes: count.saturating_mul(size_of::<T>() as u64) };
+        let (mut data, count) = (Vec::new(), usize::try_from(count).map_err(|_| error)?);
+        data.try_reserve_exact(count).map_err(|_| error)?;
+        data.resize(count, fill);
+        Ok(Self { size, data })
     }
 
     /// A grid over existing rows; `None` if `data` does not have exactly `size.x * size.y` values.

@@ -54,7 +54,7 @@ pub mod editor;
 #[cfg(feature = "bevy")]
 pub mod plugin;
 
-pub use grid::Grid;
+pub use grid::{Grid, OutOfMemory};
 pub use preset::CrackPreset;
 
 /// The items that most games need.

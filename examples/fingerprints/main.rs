@@ -4,6 +4,8 @@
 //! cargo run -p bevy_crack_fingerprints | diff tests/golden/fingerprints.txt -
 //! ```
 //!
+//! `cargo run -p bevy_crack_fingerprints -- painted` makes only those whose names begin so.
+//!
 //! For WebAssembly, run by Node (`rustup target add wasm32-wasip1`):
 //!
 //! ```text
@@ -16,10 +18,10 @@
 #[path = "../../tests/fingerprints/prints.rs"]
 mod prints;
 
-use std::error::Error;
+use std::{env, error::Error};
 
 fn main() -> Result<(), Box<dyn Error>> {
-    for line in prints::prints()? {
+    for line in prints::prints(&env::args().nth(1).unwrap_or_default())? {
         println!("{line}");
     }
     Ok(())

@@ -32,14 +32,14 @@ pub(super) fn params(input: &mut Input) -> GrowthParams {
         }
     }
     let kinds = ["occupancy", "jitter", "through"].map(|name| (name, 0.0, 1.0));
-    let more = [("spacing", 0.002, 1.0), ("sectors", 1.0, 360.0), ("strand_count", 1.0, 1024.0)];
+    let more = [("spacing", 0.002, 1.0), ("sectors", 1.0, 360.0), ("strand_count", 1.0, 64.0)];
     let starts = [("start_count", 1.0, 1024.0), ("start_radius", 0.0, 1.0)];
-    // Finer steps are allowed, but a hit with them takes seconds.
+    // Finer steps, more strands and longer ones are allowed, but a hit with them takes seconds.
     let strands = [
         ("strands.frequency", 0.0, 256.0),
         ("strands.rotation", 0.0, 1.0),
         ("strands.inertia", 0.0, 1.0),
-        ("strands.length", 0.001, 64.0),
+        ("strands.length", 0.001, 4.0),
         ("strands.step", 0.002, 0.05),
         ("strands.depth", 0.0, 3.0),
         ("strands.branch_cost", 0.005, 64.0),

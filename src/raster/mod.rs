@@ -48,7 +48,7 @@ pub use replay::{DOT_DEPTH, Replay, ReplayChanges};
 pub use stamp::{stamp_dot, stamp_path, stamp_path_with};
 
 use crate::{
-    Grid,
+    Grid, OutOfMemory,
     pattern::{CrackMask, Moment, Network, SurfaceFrame, Timeline},
     relief::Crater,
 };
@@ -72,9 +72,20 @@ impl DepthField {
     /// An untouched field.
     #[must_use]
     pub fn new(frame: SurfaceFrame) -> Self {
+        Self::over(frame, Grid::new(frame.size(), u16::MAX))
+    }
+
+    /// Like [`new`](Self::new), which ends the program where there is no memory.
+    ///
+    /// # Errors
+    /// [`OutOfMemory`] if there is no memory for the depths.
+    pub fn try_new(frame: SurfaceFrame) -> Result<Self, OutOfMemory> {
+        Ok(Self::over(frame, Grid::try_new(frame.size(), u16::MAX)?))
+    }
+
+    fn over(frame: SurfaceFrame, mut depth: Grid<u16>) -> Self {
         // Written twice: the first write to each page of new memory is slow (a page fault), and it should not happen
         // while cracks grow.
-        let mut depth = Grid::new(frame.size(), u16::MAX);
         std::hint::black_box(&mut depth).as_mut_slice().fill(0);
         Self { frame, depth, forbidden: None, layer: Layer::default(), correction: None }
     }

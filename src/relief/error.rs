@@ -1,6 +1,6 @@
 //! [`ReliefError`].
 
-use crate::pattern::FrameError;
+use crate::{OutOfMemory, pattern::FrameError};
 
 /// Why contour lines, heights, colors, meshes or craters cannot be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -170,4 +170,7 @@ pub enum ReliefError {
     /// The surface cannot have this size.
     #[error(transparent)]
     Frame(#[from] FrameError),
+    /// There is no memory for a relief of this size.
+    #[error(transparent)]
+    Memory(#[from] OutOfMemory),
 }

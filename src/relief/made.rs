@@ -13,7 +13,7 @@ use super::{
     terrain_normals::Normals,
     weather::{WeatherJob, Weathering},
 };
-use crate::{Grid, pattern::SurfaceFrame};
+use crate::{Grid, grid::ask_for, pattern::SurfaceFrame};
 use glam::UVec2;
 
 /// Everything that a relief is made from, except its size and seed.
@@ -153,6 +153,12 @@ pub struct ReliefJob {
     stage: Stage,
 }
 
+/// The most memory that a job holds at a time, bytes for each texel; by measurement.
+const OF_TEXEL: u64 = 30;
+
+/// Memory for what is small, bytes.
+const SMALL: u64 = 4_000_000;
+
 /// Shares of the progress at which contours, heights, weather and normals are done.
 const PROGRESS: [f32; 4] = [0.1, 0.16, 0.62, 0.65];
 
@@ -161,10 +167,12 @@ impl ReliefJob {
     ///
     /// # Errors
     /// [`ReliefError`] if a number is out of its range, the size is zero or above
-    /// [`MAX_SIDE`](crate::pattern::MAX_SIDE), or the lines of the shape cannot be used.
+    /// [`MAX_SIDE`](crate::pattern::MAX_SIDE), the lines of the shape cannot be used, or there is no memory for what
+    /// is made of the texels. What contours need is not foreseen.
     pub fn new(settings: ReliefSettings, size: UVec2, seed: u64) -> Result<Self, ReliefError> {
         settings.validate()?;
         let frame = SurfaceFrame::new(size)?;
+        ask_for(u64::from(size.x) * u64::from(size.y) * OF_TEXEL + SMALL)?;
         let seeds = settings.shape.contours(frame.extent(), seed);
         let stage = Stage::Contours(Box::new(ContourJob::new(&settings.contours, &seeds, seed)?));
         Ok(Self { settings, frame, seed, stage })

@@ -5,7 +5,7 @@ use super::{
     lattice::{Lattice, Layer, WALL, edges_across, edges_down},
     level::Level,
     noise::Noise,
-    params::MAX_LEVELS,
+    params::{MAX_LEVELS, MAX_SITES},
     resample::Resampler,
     seams::Seams,
     search::BLOCK,
@@ -14,7 +14,7 @@ use super::{
     trace::Tracer,
     widths::Guidance,
 };
-use crate::{Grid, math::Rng, pattern::SurfaceFrame};
+use crate::{Grid, grid::ask_for, math::Rng, pattern::SurfaceFrame};
 use glam::UVec2;
 
 /// The progress of a bake.
@@ -93,14 +93,33 @@ pub struct VoronoiMap {
     full_cost: Option<f32>,
 }
 
+/// Memory for strokes and for what is small, bytes.
+const SMALL: u64 = 4_000_000;
+
+/// The most memory that a bake holds at a time, bytes; by measurement where it depends on how the regions lie.
+fn need(params: &VoronoiParams, guides: usize, size: UVec2) -> u64 {
+    let texels = u64::from(size.x) * u64::from(size.y);
+    // Noise and guides; edges and paths of each level; paths that are found anew with larger numbers; edges of regions.
+    let of_texel = 2 * (1 + guides as u64) + 13 * u64::from(params.levels) + 5;
+    // Seams are the longer the more regions there are.
+    let sites = match &params.layout {
+        SiteLayout::Given(points) => points.len() as u64,
+        _ => u64::from(params.sites),
+    };
+    let seams = texels.saturating_mul(sites.min(u64::from(MAX_SITES)).min(texels)).isqrt();
+    texels * of_texel + 900 * seams + SMALL
+}
+
 impl VoronoiBake {
     /// Starts a map of `size` texels.
     ///
     /// # Errors
-    /// [`VoronoiError::OutOfRange`] if a parameter is out of its range, [`VoronoiError::Size`] if the size is.
+    /// [`VoronoiError::OutOfRange`] if a parameter is out of its range, [`VoronoiError::Size`] if the size is,
+    /// [`VoronoiError::Memory`] if there is no memory for what all steps need.
     pub fn new(params: VoronoiParams, guides: Vec<Guide>, size: UVec2, seed: u64) -> Result<Self, VoronoiError> {
         params.validate(&guides)?;
         let frame = SurfaceFrame::new(size)?;
+        ask_for(need(&params, guides.len(), size))?;
         let mut noise = Rng::new(seed).stream("noise");
         let noise_seed = u64::from(noise.next_u32()) << 32 | u64::from(noise.next_u32());
         let layer = |gamma: f32| {
@@ -245,7 +264,7 @@ impl VoronoiBake {
     fn lay_sites(&mut self) -> Stage {
         let map = &mut self.map;
         if map.params.layout == SiteLayout::StrokePairs
-            && let Some(pairs) = StrokePairs::new(&map.frame, &map.layers, map.params.sites as usize)
+            && let Some(pairs) = StrokePairs::new(&map.frame, &map.layers, map.params.sites.min(MAX_SITES) as usize)
         {
             return Stage::StrokePairs(Box::new(pairs));
         }

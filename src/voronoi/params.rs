@@ -1,7 +1,7 @@
 //! The settings of a map: [`VoronoiParams`], [`Guide`], [`SiteLayout`].
 
 use super::lattice::MAX_WEIGHT;
-use crate::{Grid, pattern::FrameError};
+use crate::{Grid, OutOfMemory, pattern::FrameError};
 use glam::Vec2;
 
 /// The largest number of sites of a map; larger numbers are clamped.
@@ -195,6 +195,9 @@ pub enum VoronoiError {
     /// A size that a surface cannot have.
     #[error(transparent)]
     Size(#[from] FrameError),
+    /// There is no memory for a map of this size.
+    #[error(transparent)]
+    Memory(#[from] OutOfMemory),
     /// The progress callback asked to stop.
     #[error("cancelled")]
     Cancelled,

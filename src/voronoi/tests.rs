@@ -3,7 +3,7 @@
 mod seams;
 
 use super::{
-    BakeStatus, Guide, Seams, SiteLayout, VoronoiBake, VoronoiError, VoronoiMap, VoronoiParams,
+    BakeStatus, FONT, Guide, Seams, SiteLayout, VoronoiBake, VoronoiError, VoronoiMap, VoronoiParams, draw_text,
     lattice::{Lattice, Layer, WALL},
     resample::Resampler,
     search::{Packed, Search},
@@ -314,6 +314,11 @@ fn g3_any_number_of_sites() {
             }
         }
     }
+    // Beside strokes as well.
+    let word = draw_text(FONT, "A", [40, 30].into(), f32::INFINITY).unwrap();
+    let params = VoronoiParams { sites: u32::MAX, layout: SiteLayout::StrokePairs, ..VoronoiParams::DEFAULT };
+    let (map, _) = made(&params, &[Guide { image: word, gamma: 28.0 }], [40, 30], 1);
+    assert!(map.strokes().is_some() && map.sites().len() == super::MAX_SITES as usize);
     let given = |points: Vec<Vec2>| {
         let params = VoronoiParams { layout: SiteLayout::Given(points), ..VoronoiParams::DEFAULT };
         made(&params, &[], [40, 30], 1)

@@ -9,7 +9,7 @@ use std::{env, fs, path::Path};
 
 #[test]
 fn fingerprints_are_frozen() {
-    let found = prints::prints().unwrap();
+    let found = prints::prints("").unwrap();
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/fingerprints.txt");
     if env::var_os("UPDATE_FINGERPRINTS").is_some() {
         fs::write(&file, found.join("\n") + "\n").unwrap();
@@ -24,7 +24,7 @@ fn fingerprints_are_frozen() {
 /// No two things have the same fingerprint: none is that of nothing.
 #[test]
 fn fingerprints_differ() {
-    let found = prints::prints().unwrap();
+    let found = prints::prints("").unwrap();
     let mut prints: Vec<_> = found.iter().filter_map(|line| line.rsplit_once(' ')).map(|(_, print)| print).collect();
     prints.sort_unstable();
     let all = prints.len();

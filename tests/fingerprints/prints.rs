@@ -279,10 +279,13 @@ fn laid_out(print: &mut Print) -> Made<()> {
     Ok(())
 }
 
-/// A line for each thing: its name and the fingerprint.
-pub(crate) fn prints() -> Made<Vec<String>> {
+/// A line for each thing whose name begins like this: its name and the fingerprint.
+pub(crate) fn prints(begin: &str) -> Made<Vec<String>> {
     let mut out = Vec::new();
     let mut add = |name: &str, make: &dyn Fn(&mut Print) -> Made<()>| -> Made<()> {
+        if !name.starts_with(begin) {
+            return Ok(());
+        }
         let mut print = Print::new();
         make(&mut print).map_err(|error| format!("{name}: {error}"))?;
         out.push(format!("{name} {:016x}", print.0));
