@@ -13,6 +13,7 @@ mod blend;
 mod blink;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod cells;
+#[cfg(all(feature = "2d", feature = "3d"))]
 mod chips;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod clock;

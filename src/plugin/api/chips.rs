@@ -69,7 +69,7 @@ impl Default for CrackChips {
 /// A chip in the air, see [`CrackChips`].
 #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
 #[type_path = "bevy_crack"]
-#[reflect(Component)]
+#[reflect(Component, Default)]
 pub struct CrackChip {
     /// Where it comes from.
     pub surface: Entity,

@@ -2,8 +2,8 @@
 //! that does not exist, so that an event without an entity is about nothing.
 
 use super::{
-    AnalogyFailed, AnalogyMade, CellClosed, CrackBaked, CrackError, CrackFailed, CrackFinished, CrackHit, CrackShards,
-    HitPoint, Reassembled, ReliefFailed, ReliefMade, Shard, Shattered,
+    AnalogyFailed, AnalogyMade, CellClosed, CrackBaked, CrackChip, CrackError, CrackFailed, CrackFinished, CrackHit,
+    CrackShards, HitPoint, Reassembled, ReliefFailed, ReliefMade, Shard, Shattered,
 };
 use crate::shatter::Shards;
 use bevy::prelude::*;
@@ -22,6 +22,12 @@ impl Default for HitPoint {
     /// The middle of the picture.
     fn default() -> Self {
         Self::Uv(Vec2::splat(0.5))
+    }
+}
+
+impl Default for CrackChip {
+    fn default() -> Self {
+        Self { surface: NOBODY }
     }
 }
 

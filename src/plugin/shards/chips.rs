@@ -311,7 +311,7 @@ impl Pieces {
             cuts.add_line(&line.map(|point| *point - corner).collect::<Vec<Vec2>>()).ok()?;
         }
         // Each ray cuts all rings; between two of them another one cuts only the outermost.
-        let rays = (2 * count / (2 * rings.len() + 1)).max(3);
+        let rays = (count / (rings.len() + 1)).max(3);
         let mut rng = Rng::new(seed).stream("chips");
         for ray in 0..rays {
             for is_whole in [true, false] {
