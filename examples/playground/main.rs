@@ -16,7 +16,7 @@ use bevy::{
     prelude::*,
 };
 use bevy_crack::{
-    editor::{CrackEditor, CrackEditorPlugin},
+    editor::{CrackEditor, CrackEditorPlugin, PrimaryEguiContext},
     prelude::*,
     shatter::{Anchor, BurstParams, ShatterParams},
 };
@@ -75,7 +75,7 @@ fn setup(
     mut materials: ResMut<Assets<StandardMaterial>>,
 ) {
     // Nothing here has edges that need smoothing.
-    commands.spawn((Camera2d, Msaa::Off));
+    commands.spawn((Camera2d, Msaa::Off, PrimaryEguiContext));
     // The pane stands before bricks, so that one sees it is glass.
     let [bricks, normals] = with_normals(&assets, "brick_red");
     commands.spawn((

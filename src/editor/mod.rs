@@ -20,6 +20,9 @@
 //!     .run();
 //! ```
 //!
+//! The panel is drawn by the camera with [`PrimaryEguiContext`]. If none has it, that is the one of the primary window that is drawn
+//! last and has no viewport of its own.
+//!
 //! [`Panel::show`] is a function of a `Ui` and plain values, for panels of one's own and for tests.
 
 mod export;
@@ -27,18 +30,20 @@ mod form;
 mod history;
 mod overlay;
 mod panel;
+mod place;
 mod pointer;
 mod state;
 mod subject;
 mod text;
 mod world;
 
+pub use bevy_egui::PrimaryEguiContext;
 pub use panel::{Overlays, Panel};
 pub use state::CrackEditor;
 pub use subject::{AnalogyChoice, Costs, EditorCommand, Export, Subject};
 
 use bevy::{picking::mesh_picking::MeshPickingPlugin, prelude::*};
-use bevy_egui::{EguiGlobalSettings, EguiPlugin, EguiPrimaryContextPass};
+use bevy_egui::{EguiGlobalSettings, EguiPlugin, EguiPreUpdateSet, EguiPrimaryContextPass, EguiStartupSet};
 
 /// The workbench. Add it after `DefaultPlugins`, [`CrackPlugins`](crate::plugin::CrackPlugins) and, if you add them yourself, egui's
 /// plugin and the engine's `MeshPickingPlugin`: it adds what is missing of the last two. What it shows is in [`CrackEditor`].
@@ -68,6 +73,14 @@ impl Plugin for CrackEditorPlugin {
             settings.enable_absorb_bevy_input_system = true;
         }
         app.insert_resource(CrackEditor { is_open: self.is_open, key: self.key, ..default() })
+            .add_systems(
+                PreStartup,
+                place::choose_camera.run_if(place::is_open_to_choice).before(EguiStartupSet::InitContexts),
+            )
+            .add_systems(
+                PreUpdate,
+                place::choose_camera.run_if(place::is_open_to_choice).before(EguiPreUpdateSet::InitContexts),
+            )
             .add_observer(pointer::press)
             .add_observer(pointer::release)
             .add_systems(Update, (toggle, pointer::make_pickable.run_if(is_open)))

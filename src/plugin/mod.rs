@@ -21,7 +21,7 @@ mod bake;
 mod carrier;
 mod draw;
 mod gpu;
-#[cfg(feature = "2d")]
+#[cfg(any(feature = "2d", feature = "3d"))]
 mod group;
 #[cfg(all(test, feature = "2d"))]
 mod headless;
@@ -44,7 +44,7 @@ pub use api::{
     Reassembled, ReliefFailed, ReliefMade, ReliefProgress, ScriptedHit, Shard, ShardsError, ShatterCracks,
     ShatterFailed, ShatterRequest, ShatterWhen, Shattered, StrandField,
 };
-#[cfg(feature = "2d")]
+#[cfg(any(feature = "2d", feature = "3d"))]
 pub use api::{CrackGroup, CrackMemberOf};
 #[cfg(feature = "2d")]
 pub use carrier::lit::{CrackLight2d, CrackLitMaterial, CrackLitUniform, MAX_LIGHTS};
@@ -71,10 +71,10 @@ pub mod prelude {
         ReliefProgress, ScriptedHit, Shard, ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen, Shattered,
         StrandField,
     };
-    #[cfg(feature = "2d")]
-    pub use super::{CrackGroup, CrackLight2d, CrackLitMaterial, CrackMemberOf};
     #[cfg(any(feature = "2d", feature = "3d"))]
-    pub use super::{CrackPlace, CrackPlaces};
+    pub use super::{CrackGroup, CrackMemberOf, CrackPlace, CrackPlaces};
+    #[cfg(feature = "2d")]
+    pub use super::{CrackLight2d, CrackLitMaterial};
     pub use crate::preset::CrackPreset;
 }
 
@@ -224,21 +224,32 @@ impl Plugin for CrackPlugin {
         // What a sprite shows changes by hits, by bakes and when cracks have closed, and then the engine cuts it into parts.
         #[cfg(feature = "2d")]
         app.configure_sets(PostUpdate, (Hit, Grow).before(bevy::sprite_render::SpriteSystems::ComputeSlices));
+        #[cfg(any(feature = "2d", feature = "3d"))]
+        app.register_type::<CrackMemberOf>().register_type::<CrackGroup>().add_observer(group::hide::show_leaving);
         #[cfg(feature = "2d")]
-        app.register_type::<CrackMemberOf>()
-            .register_type::<CrackGroup>()
-            .init_resource::<group::system::GroupChanges>()
-            .add_observer(group::hide::show_leaving)
-            .add_systems(
-                PostUpdate,
-                (group::system::watch_members, group::system::make_walls)
-                    .chain()
-                    .run_if(group::system::any_groups)
-                    .in_set(Hit)
-                    .after(hits::collect::collect_hits)
-                    .before(surface::prepare::prepare_surfaces)
-                    .before(bevy::camera::visibility::VisibilitySystems::CheckVisibility),
-            );
+        app.init_resource::<group::system::GroupChanges>().add_systems(
+            PostUpdate,
+            (group::system::watch_members, group::system::make_walls)
+                .chain()
+                .run_if(group::system::any_groups)
+                .in_set(Hit)
+                .after(hits::collect::collect_hits)
+                .before(surface::prepare::prepare_surfaces)
+                .before(bevy::camera::visibility::VisibilitySystems::CheckVisibility),
+        );
+        #[cfg(feature = "3d")]
+        {
+            let bodies = (group::bodies::watch_members, group::bodies::make_bodies)
+                .chain()
+                .run_if(group::bodies::any_groups)
+                .in_set(Hit)
+                .after(hits::collect::collect_hits)
+                .before(surface::prepare::prepare_surfaces)
+                .before(bevy::camera::visibility::VisibilitySystems::CheckVisibility);
+            #[cfg(feature = "2d")]
+            let bodies = bodies.after(group::system::make_walls);
+            app.init_resource::<group::bodies::BodyChanges>().add_systems(PostUpdate, bodies);
+        }
         #[cfg(feature = "2d")]
         app.add_systems(
             PostUpdate,

@@ -1,12 +1,19 @@
 //! Flat faces, unfolded about the edges in which they meet.
 
+use super::beside::{self, Beside};
 use super::chart::{Chart, Start, along, bounds};
 use super::shape::MeshShape;
 use glam::{Vec2, Vec3};
 use std::{cmp::Reverse, collections::BinaryHeap};
 
-/// A mesh of more flat faces is laid out as if it were curved.
+/// A mesh of more flat faces is laid out as if it were curved, unless they mostly meet at large angles.
 pub(super) const MAX_FACES: usize = 64;
+
+/// Then it is only if there are more than this.
+const MAX_STEPS: usize = 1024;
+
+/// The cosine of such an angle, 60 degrees.
+const STEEP: f32 = 0.5;
 
 /// How far triangles may reach into one another, as a share of their size, and not overlap: rounding.
 const SLACK: f32 = 1e-4;
@@ -42,9 +49,31 @@ struct Edge {
     placed: Placed,
 }
 
+/// Whether a mesh is one of flat faces, rather than a curve in many small ones.
+pub(super) fn has_hinges(shape: &MeshShape) -> bool {
+    if shape.faces() <= MAX_FACES || shape.faces() > MAX_STEPS {
+        return shape.faces() <= MAX_FACES;
+    }
+    let (mut steep, mut all) = (0.0, 0.0);
+    for triangle in 0..shape.len() {
+        let corners = shape.corners(triangle);
+        for (corner, (other, _)) in
+            shape.across(triangle).into_iter().enumerate().filter_map(|(i, across)| Some((i, across?)))
+        {
+            let other = other as usize;
+            if shape.face(other) != shape.face(triangle) {
+                let length = corners[corner].distance(corners[(corner + 1) % 3]);
+                all += length;
+                steep += if shape.normal(other).dot(shape.normal(triangle)) < STEEP { length } else { 0.0 };
+            }
+        }
+    }
+    steep >= 0.5 * all
+}
+
 /// The chart that spreads from a face: first those come in whose edges are the nearest to where it begins. A face that would cover another
 /// waits for another chart.
-pub(super) fn unfold(shape: &MeshShape, start: Start, is_free: &[bool]) -> Chart {
+pub(super) fn unfold(shape: &MeshShape, beside: &[Beside], start: Start, is_free: &[bool]) -> Chart {
     let normal = shape.normal(start.triangle);
     let [a, b, _] = shape.corners(start.triangle);
     let ways = [start.right, b - a];
@@ -67,10 +96,10 @@ pub(super) fn unfold(shape: &MeshShape, start: Start, is_free: &[bool]) -> Chart
         is_in[face as usize] = true;
         let before = edges.len();
         for (triangle, _) in &new {
-            for (corner, (other, _)) in
-                shape.across(*triangle).into_iter().enumerate().filter_map(|(i, to)| Some((i, to?)))
-            {
-                let other = other as usize;
+            let across = shape.across(*triangle).into_iter().enumerate();
+            let across = across.filter_map(|(corner, to)| Some((corner, to?.0 as usize)));
+            let in_part = beside::of(beside, *triangle).map(|beside| (beside.corner, beside.other));
+            for (corner, other) in across.chain(in_part) {
                 if shape.face(other) != face && is_free[other] {
                     edges.push(Edge { from: *triangle, corner, to: other, placed });
                 }

@@ -4,7 +4,8 @@
 //! hit, so that cracks run over edges and around curves; what does not lie flat any more becomes charts of its own, and so on until all of
 //! the mesh is laid out.
 //!
-//! - Meshes of few flat faces are unfolded about their edges (`hinge.rs`): lengths and angles stay as they are.
+//! - Meshes of few flat faces, or of faces that mostly meet at large angles, are unfolded about their edges (`hinge.rs`): lengths and angles
+//!   stay as they are. Edges that are one in part only are hinges too.
 //! - Others are laid out by distance and direction from the point (`curved.rs`), the discrete exponential map of Schmidt, Grimm and Wyvill
 //!   (2006), with means over neighbours as Schmidt (2013) has them, in which those count the most that lie straight before a vertex.
 //!
@@ -31,6 +32,7 @@
 //! # Ok::<(), bevy_crack::unwrap::UnwrapError>(())
 //! ```
 
+mod beside;
 mod chart;
 mod curved;
 mod error;
@@ -90,14 +92,15 @@ fn charts(shape: &MeshShape, unwrap: &Unwrap) -> Result<Vec<Chart>, UnwrapError>
     let mut is_free: Vec<bool> = (0..shape.len()).map(|triangle| shape.has_area(triangle)).collect();
     let mut charts = Vec::new();
     let mut start = Some(Start { triangle: unwrap.triangle, point: unwrap.around, right: unwrap.right });
-    let points = (shape.faces() > hinge::MAX_FACES).then(|| curved::Points::of(shape));
+    let points = (!hinge::has_hinges(shape)).then(|| curved::Points::of(shape));
+    let beside = if points.is_none() { beside::find(shape) } else { Vec::new() };
     let mut first_free = 0;
     while let Some(from) = start {
         if charts.len() == MAX_CHARTS {
             return Err(UnwrapError::TooManyCharts);
         }
         let chart = match &points {
-            None => hinge::unfold(shape, from, &is_free),
+            None => hinge::unfold(shape, &beside, from, &is_free),
             Some(points) => curved::lay_out(shape, points, from, &is_free),
         };
         for (triangle, _) in &chart.triangles {

@@ -8,6 +8,9 @@ use glam::{U64Vec2, UVec2, Vec2};
 /// Texels around each chart that belong to it too, so that filtering at its border finds what goes on there.
 pub const GUTTER: u32 = 4;
 
+/// Part of a texel that rounding may add to the size of a chart.
+const ROUNDING: f32 = 0.01;
+
 /// A mesh that is laid out.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LaidOut {
@@ -59,7 +62,9 @@ pub(super) fn pack(
     let mut parts = Vec::with_capacity(charts.len());
     for chart in charts {
         let (min, max) = bounds(chart.triangles.iter().flat_map(|(_, corners)| *corners));
-        let size = check((((max - min) * texels).ceil() + 2.0 * GUTTER as f32).min(Vec2::splat(1e9)).as_u64vec2())?;
+        // No row of texels for what rounding adds.
+        let own = ((max - min) * texels - ROUNDING).ceil().max(Vec2::ONE);
+        let size = check((own + 2.0 * GUTTER as f32).min(Vec2::splat(1e9)).as_u64vec2())?;
         parts.push(Part { chart, min, size, at: UVec2::ZERO });
     }
     let size = check(arrange(&mut parts).as_u64vec2())?;

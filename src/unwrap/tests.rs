@@ -152,6 +152,49 @@ fn a_box_becomes_a_cross_whose_edges_stay_together() {
 }
 
 /// Over an edge lengths and angles stay as they are: the straight way in the plane is as long as the shortest one on the box.
+/// Two panels stand on a floor that is as wide as both and a part of the third; the ways over the edge keep their length.
+#[test]
+fn edges_that_are_one_in_part_are_hinges() {
+    let quad = |a: Vec3, right: Vec3, up: Vec3| [a, a + right, a + right + up, a + up];
+    let (right, up) = (Vec3::X * 2.0, Vec3::Y * 3.0);
+    let panels = [0.0, 2.0, 4.0].map(|x| quad(Vec3::X * x, right, up));
+    let floor = quad(Vec3::Z * 4.0, Vec3::X * 5.0, Vec3::NEG_Z * 4.0);
+    let apart = quad(Vec3::new(0.0, 8.0, 0.0), right, up);
+    let positions: Vec<Vec3> = [panels[0], floor, panels[1], panels[2], apart].concat();
+    let triangles: Vec<[u32; 3]> =
+        (0..5).flat_map(|i| [[4 * i, 4 * i + 1, 4 * i + 2], [4 * i, 4 * i + 2, 4 * i + 3]]).collect();
+    for around in [Vec3::new(2.5, 0.0, 2.0), Vec3::new(1.0, 1.0, 0.0)] {
+        let (shape, laid_out) = lay_out(&(positions.clone(), triangles.clone()), around, 20.0);
+        check(&shape, &laid_out, 1.001);
+        assert_eq!(laid_out.charts, 2, "what meets nothing is by itself");
+        // A floor of 4 before walls of 3.
+        let place = |triangle: usize, corner: usize| laid_out.corners[triangle].unwrap()[corner];
+        let (before, above) = (place(2, 0), place(7, 2));
+        let expected = 20.0 * Vec2::new(4.0, 7.0).length();
+        assert!((before.distance(above) - expected).abs() < 0.01, "{} {expected}", before.distance(above));
+    }
+}
+
+/// Many steps are unfolded as few are: no way up over them is shortened.
+#[test]
+fn stairs_are_unfolded_step_by_step() {
+    let (mut positions, mut triangles) = (Vec::new(), Vec::<[u32; 3]>::new());
+    for step in 0..60 {
+        let at = Vec3::new(0.0, step as f32, -(step as f32));
+        for (from, way) in [(at, Vec3::Y), (at + Vec3::Y, Vec3::NEG_Z)] {
+            let n = positions.len() as u32;
+            positions.extend([from, from + 4.0 * Vec3::X, from + 4.0 * Vec3::X + way, from + way]);
+            triangles.extend([[n, n + 1, n + 2], [n, n + 2, n + 3]]);
+        }
+    }
+    let (shape, laid_out) = lay_out(&(positions, triangles), Vec3::new(2.0, 30.5, -30.0), 8.0);
+    check(&shape, &laid_out, 1.001);
+    assert_eq!(laid_out.charts, 1);
+    assert!((texels(&shape, &laid_out) / 8.0 - 1.0).abs() < 1e-3);
+    // A ball of as many faces is a curve.
+    assert!(!hinge::has_hinges(&MeshShape::new(&ball(3).0, &ball(3).1).unwrap()));
+}
+
 #[test]
 fn ways_over_edges_keep_their_length() {
     let half = Vec3::new(1.0, 0.8, 0.6);

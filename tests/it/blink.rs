@@ -2,7 +2,7 @@
 
 use crate::support::*;
 use bevy::{
-    camera::{ClearColorConfig, RenderTarget},
+    camera::{ClearColorConfig, RenderTarget, visibility::RenderLayers},
     core_pipeline::tonemapping::Tonemapping,
     image::TextureAtlasLayout,
     light::LightPlugin,
@@ -163,6 +163,35 @@ fn first_hit_and_shatter(stage: Stage, is_early: bool) {
     let first = shares(&mut app, &target, 30, is_shattered);
     let least = first.iter().copied().fold(1.0, f32::min);
     assert!(least > 0.7, "{stage:?}: a first shatter, and the surface is gone: {first:?}");
+}
+
+/// Fault E13: a group of meshes takes the place of its members, and gives it back.
+#[test]
+fn e13_no_frame_without_the_room() {
+    let Some((_one, mut app)) = app() else { return };
+    let (target, wall) = set_up(&mut app, Stage::Standard);
+    // The same in four parts.
+    let material = get::<MeshMaterial3d<StandardMaterial>>(&app, wall);
+    app.world_mut().despawn(wall);
+    let part = add(&mut app, Mesh::from(Rectangle::new(2.0, 2.0)));
+    let group = app.world_mut().spawn(cracks()).id();
+    let places = [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)];
+    let members = places.map(|(x, y)| {
+        let shown = (Mesh3d(part.clone()), material.clone(), Transform::from_xyz(x, y, 0.0));
+        app.world_mut().spawn((shown, CrackMemberOf(group))).id()
+    });
+    wait_until_seen(&mut app, &target);
+    hit(&mut app, CrackHit::world(members[3], Vec3::new(0.1, 0.1, 0.0)));
+    let is_hidden = |app: &App| {
+        members.iter().all(|member| app.world().get::<RenderLayers>(*member) == Some(&RenderLayers::none()))
+    };
+    let first = shares(&mut app, &target, 12, |app| state(app, group).status == CrackStatus::Done && is_hidden(app));
+    let least = first.iter().copied().fold(1.0, f32::min);
+    assert!(least > 0.7, "a first hit, and the room is gone: {first:?}");
+    app.world_mut().commands().entity(group).heal_cracks();
+    let healed = shares(&mut app, &target, 12, |app| app.world().get::<Mesh3d>(group).is_none());
+    let least = healed.iter().copied().fold(1.0, f32::min);
+    assert!(least > 0.7 && !is_hidden(&app), "it is healed, and the room is gone: {healed:?}");
 }
 
 /// Fault E13: what a surface is to look like is asked of the renderer as soon as there is a surface.

@@ -12,6 +12,8 @@ mod blend;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod blink;
 #[cfg(all(feature = "2d", feature = "3d"))]
+mod budgets;
+#[cfg(all(feature = "2d", feature = "3d"))]
 mod cells;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod chips;
@@ -54,6 +56,8 @@ mod records;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod reliefs;
 mod replay;
+#[cfg(all(feature = "2d", feature = "3d"))]
+mod rooms;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod saved;
 #[cfg(all(feature = "2d", feature = "3d"))]

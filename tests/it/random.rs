@@ -990,24 +990,24 @@ fn alone(test: &str) {
 }
 
 #[test]
-fn random_operations_leave_the_world_as_the_model_has_it() {
+fn b3_random_operations_leave_nothing_behind() {
     alone("random::random_operations");
 }
 
 #[test]
-#[ignore = "run by `random_operations_leave_the_world_as_the_model_has_it`"]
+#[ignore = "run by `b3_random_operations_leave_nothing_behind`"]
 fn random_operations() {
     let frames = number("CRACK_RANDOM_FRAMES", 2000) as usize;
     run(|| Some(Game::new(app(), false)), frames, number("CRACK_RANDOM_SEED", 1));
 }
 
 #[test]
-fn random_operations_with_a_renderer() {
+fn b3_random_operations_with_a_renderer() {
     alone("random::drawn_random_operations");
 }
 
 #[test]
-#[ignore = "run by `random_operations_with_a_renderer`"]
+#[ignore = "run by `b3_random_operations_with_a_renderer`"]
 fn drawn_random_operations() {
     let frames = number("CRACK_RANDOM_FRAMES", 2000) as usize / 4;
     let new = || {

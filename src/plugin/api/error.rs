@@ -22,7 +22,7 @@ pub enum CrackError {
     )]
     Tilemap,
     /// The members of its group cannot be put together.
-    #[error("its group cannot be shown as one picture: {reason}")]
+    #[error("its group cannot be shown as one: {reason}")]
     Group {
         /// What is in the way.
         reason: String,

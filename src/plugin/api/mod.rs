@@ -6,7 +6,7 @@ pub(crate) mod chips;
 pub(crate) mod clock;
 mod defaults;
 pub(crate) mod error;
-#[cfg(feature = "2d")]
+#[cfg(any(feature = "2d", feature = "3d"))]
 pub(crate) mod group;
 pub(crate) mod guided;
 pub(crate) mod hit;
@@ -28,7 +28,7 @@ pub use budget::{CrackBudget, CrackStats, CrackUploadStats};
 pub use chips::{CrackChip, CrackChips};
 pub use clock::{CrackClock, CrackDrive};
 pub use error::CrackError;
-#[cfg(feature = "2d")]
+#[cfg(any(feature = "2d", feature = "3d"))]
 pub use group::{CrackGroup, CrackMemberOf};
 pub use guided::{BakeProgress, CrackBaked, CrackGuide, GuideSource, GuidedAppearance, GuidedCracks};
 pub use hit::{CrackHit, HitPoint};

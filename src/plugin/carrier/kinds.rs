@@ -7,7 +7,7 @@ use super::lit::CrackLitMaterial;
 use super::material::MaterialKind;
 #[cfg(feature = "2d")]
 use super::sprite::SpriteKind;
-#[cfg(feature = "2d")]
+#[cfg(any(feature = "2d", feature = "3d"))]
 use crate::plugin::api::CrackGroup;
 use crate::plugin::api::error::CrackError;
 use bevy::prelude::*;
@@ -35,7 +35,7 @@ pub(crate) fn inspect(world: &World, entity: Entity) -> (Option<&'static dyn Car
         }
     }
     // Its picture is yet to be made.
-    #[cfg(feature = "2d")]
+    #[cfg(any(feature = "2d", feature = "3d"))]
     if world.get::<CrackGroup>(entity).is_some() {
         return (None, Found::Waiting);
     }

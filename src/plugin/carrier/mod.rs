@@ -28,4 +28,4 @@ pub(crate) mod sprite;
 #[cfg(feature = "3d")]
 mod standard;
 #[cfg(feature = "3d")]
-mod unfold;
+pub(crate) mod unfold;

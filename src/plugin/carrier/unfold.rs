@@ -7,7 +7,7 @@ use super::slot::{CrackMaterial, MaterialSlot, to_picture};
 use crate::plugin::api::hit::HitPoint;
 use crate::plugin::jobs::background::{BackgroundJob, PATIENCE, guarded};
 use crate::plugin::source::unfolding::Unfolding;
-use crate::unwrap::{MAX_TRIANGLES, MeshShape, Unwrap, UnwrapError};
+use crate::unwrap::{LaidOut, MAX_TRIANGLES, MeshShape, Unwrap, UnwrapError};
 use bevy::{math::Affine2, platform::time::Instant, prelude::*};
 use std::sync::Arc;
 
@@ -156,7 +156,7 @@ impl Work {
         guarded(|| Ok(self.lay_out())).ok().flatten()
     }
 
-    fn lay_out(mut self) -> Option<Made> {
+    fn lay_out(self) -> Option<Made> {
         let triangles = Triangles::of(&self.mesh).ok()?;
         if triangles.len() > FEW && is_slab(&self.mesh, self.to_picture, self.scale) {
             return None;
@@ -171,39 +171,13 @@ impl Work {
         }
         let uvs = |i: usize| triangles.get(i).map(|(_, uvs)| uvs.map(|uv| self.to_picture.transform_point2(uv)));
         let around = self.hit.map(|hit| hit * self.scale);
-        let triangle = nearest(&shape, &positions, &corners, around)?;
-        let [a, b, c] = corners[triangle].map(|vertex| positions[vertex as usize]);
-        let around = around.unwrap_or((a + b + c) / 3.0);
-        // To the right in the picture where it is hit.
-        let right = uvs(triangle).map_or(Vec3::ZERO, |[p, q, r]| {
-            ((b - a) * (r - p).y - (c - a) * (q - p).y) * (q - p).perp_dot(r - p).signum()
-        });
-        let unit = (shape.area() / 6.0).sqrt();
-        let UnfoldOrder { id, must, most_side, most_texels, .. } = self.order;
-        let mut texels = self.density(&shape, &uvs).unwrap_or(WITHOUT_PICTURE / unit);
-        if must {
-            // Charts fill about two thirds of what is around them.
-            texels = texels.min((most_texels as f32 / (1.5 * shape.area())).sqrt());
-        }
-        let layout = loop {
-            match (Unwrap { around, triangle, right, texels, most_side, most_texels }).apply(&shape) {
-                Ok(laid_out) => break laid_out,
-                Err(UnwrapError::TooLarge { .. }) if must && texels * unit > COARSEST => texels *= SMALLER,
-                Err(_) => return None,
-            }
-        };
-        let unfolding = Arc::new(Unfolding::new(id, layout, texels * unit, around / self.scale, uvs));
-        let size = unfolding.layout.size.as_vec2();
-        let uvs: Vec<[f32; 2]> = unfolding
-            .layout
-            .corners
-            .iter()
-            .flat_map(|corners| corners.unwrap_or_default().map(|corner| (corner / size).to_array()))
-            .collect();
-        let _tangents = self.mesh.try_remove_attribute(Mesh::ATTRIBUTE_TANGENT);
-        self.mesh.try_duplicate_vertices().ok()?;
-        self.mesh.try_insert_attribute(Mesh::ATTRIBUTE_UV_0, uvs).ok()?;
-        Some((Box::new(self.mesh.with_generated_tangents().ok()?), unfolding))
+        let texels = self.density(&shape, &uvs);
+        let laid = Flattening { shape: &shape, positions: &positions, corners: &corners, around, uvs: &uvs, texels }
+            .apply(&self.order)?;
+        let Flat { layout, unit, around } = laid;
+        let unfolding = Arc::new(Unfolding::new(self.order.id, layout, unit, around / self.scale, uvs));
+        let mesh = flat_mesh(self.mesh, &unfolding.layout)?;
+        Some((Box::new(mesh), unfolding))
     }
 
     /// Texels for a unit of length: as many as its picture has.
@@ -213,6 +187,76 @@ impl Work {
         let texels = (0..shape.len()).filter(|i| shape.has_area(*i)).map(area).sum::<f32>() * picture;
         Some((texels / shape.area()).sqrt()).filter(|density| density.is_normal())
     }
+}
+
+/// Triangles that are to be laid out, in the proportions that they have in the world.
+pub(crate) struct Flattening<'a> {
+    pub(crate) shape: &'a MeshShape,
+    pub(crate) positions: &'a [Vec3],
+    pub(crate) corners: &'a [[u32; 3]],
+    /// Where it is hit.
+    pub(crate) around: Option<Vec3>,
+    /// The corners of each triangle in its picture.
+    pub(crate) uvs: &'a dyn Fn(usize) -> Option<[Vec2; 3]>,
+    /// Texels for a unit of length; `None` = some.
+    pub(crate) texels: Option<f32>,
+}
+
+/// Triangles that are laid out.
+pub(crate) struct Flat {
+    pub(crate) layout: LaidOut,
+    /// Texels for a unit of pattern space.
+    pub(crate) unit: f32,
+    /// Around which point.
+    pub(crate) around: Vec3,
+}
+
+impl Flattening<'_> {
+    /// Lays them out; `None` if they do not fit.
+    pub(crate) fn apply(&self, order: &UnfoldOrder) -> Option<Flat> {
+        let Self { shape, positions, corners, .. } = *self;
+        let triangle = nearest(shape, positions, corners, self.around)?;
+        let [a, b, c] = corners[triangle].map(|vertex| positions[vertex as usize]);
+        let around = self.around.unwrap_or((a + b + c) / 3.0);
+        // To the right in the picture where it is hit.
+        let right = (self.uvs)(triangle).map_or(Vec3::ZERO, |[p, q, r]| {
+            ((b - a) * (r - p).y - (c - a) * (q - p).y) * (q - p).perp_dot(r - p).signum()
+        });
+        let unit = (shape.area() / 6.0).sqrt();
+        let UnfoldOrder { must, most_side, most_texels, .. } = *order;
+        let mut texels = steady(self.texels.unwrap_or(WITHOUT_PICTURE / unit));
+        if must {
+            // Charts fill about two thirds of what is around them.
+            texels = texels.min((most_texels as f32 / (1.5 * shape.area())).sqrt());
+        }
+        loop {
+            match (Unwrap { around, triangle, right, texels, most_side, most_texels }).apply(shape) {
+                Ok(layout) => return Some(Flat { layout, unit: texels * unit, around }),
+                Err(UnwrapError::TooLarge { .. }) if must && texels * unit > COARSEST => texels *= SMALLER,
+                Err(_) => return None,
+            }
+        }
+    }
+}
+
+/// A number without its last bits: the same, whichever way it was computed.
+fn steady(number: f32) -> f32 {
+    const LAST: u32 = 1 << 7;
+    f32::from_bits((number.to_bits() + LAST / 2) & !(LAST - 1))
+}
+
+/// A mesh with its triangles where they are laid out, and with tangents.
+pub(crate) fn flat_mesh(mut mesh: Mesh, layout: &LaidOut) -> Option<Mesh> {
+    let size = layout.size.as_vec2();
+    let uvs: Vec<[f32; 2]> = layout
+        .corners
+        .iter()
+        .flat_map(|corners| corners.unwrap_or_default().map(|corner| (corner / size).to_array()))
+        .collect();
+    let _tangents = mesh.try_remove_attribute(Mesh::ATTRIBUTE_TANGENT);
+    mesh.try_duplicate_vertices().ok()?;
+    mesh.try_insert_attribute(Mesh::ATTRIBUTE_UV_0, uvs).ok()?;
+    mesh.with_generated_tangents().ok()
 }
 
 /// The triangle of a point, or the largest one.
@@ -231,6 +275,20 @@ fn nearest(shape: &MeshShape, positions: &[Vec3], corners: &[[u32; 3]], point: O
         super::mesh::nearest_on(point, [a, b, c]).distance_squared(point)
     };
     with_area.map(|i| (distance(&i), i)).min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, i)| i)
+}
+
+/// Gives an entity a mesh that is laid out already: its surface will be so too. `before` is the same mesh, which it shows until it is cracked.
+pub(crate) fn give(
+    world: &mut World,
+    entity: Entity,
+    before: Handle<Mesh>,
+    mesh: Box<Mesh>,
+    unfolding: Arc<Unfolding>,
+) {
+    if let Ok(mut entity) = world.get_entity_mut(entity) {
+        let stage = Stage::Made(mesh, unfolding);
+        entity.insert((Mesh3d(before.clone()), Unfold { before, to_picture: Affine2::IDENTITY, stage }));
+    }
 }
 
 /// Gives an entity the mesh that is laid out, if its textures are.

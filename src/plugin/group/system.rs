@@ -1,20 +1,16 @@
 //! When the picture of a group is made, and shown in place of its members.
 
-use super::hide::{hide, show};
+use super::common::{SHARE, is_wanted, warn_left_out};
+use super::hide::Shown;
 use super::members::Members;
 use super::wall::{WallFrame, WallWork};
-use crate::plugin::api::error::EntityLabel;
-use crate::plugin::api::{
-    CrackAnalogy, CrackBudget, CrackError, CrackGroup, CrackMemberOf, CrackRecord, CrackStrands, CrackSurface,
-    CrackTextures, GuidedCracks,
-};
+use crate::plugin::api::{CrackBudget, CrackError, CrackGroup, CrackMemberOf, CrackTextures};
 use crate::plugin::jobs::background::PATIENCE;
 use crate::plugin::jobs::copy::{CopyProgress, MAX_BYTES, PictureCopies};
 use crate::plugin::jobs::frame_time::{FrameClock, Timer};
 use crate::plugin::jobs::stepped::{News, Running};
 use crate::plugin::jobs::threads::Threads;
 use crate::plugin::surface::prepare::{self, Preparations};
-use crate::plugin::surface::queue::HitQueue;
 use bevy::{
     asset::RenderAssetUsages,
     camera::visibility::RenderLayers,
@@ -24,15 +20,6 @@ use bevy::{
     render::render_resource::{Extent3d, TextureDimension, TextureFormat},
     sprite::Anchor,
 };
-
-/// Share of the frame's budget after which no further slice is made.
-const SHARE: f32 = 0.9;
-
-/// Frames after which members are hidden that the group shows: by then it is drawn.
-const SHOWN_FOR: u32 = 3;
-
-/// Members that are hidden, or shown again, in a frame.
-const MAX_MEMBERS: usize = 512;
 
 /// Frames between two pictures of a group whose members change.
 const PAUSE: u32 = 8;
@@ -53,11 +40,8 @@ pub(crate) struct Wall {
     shown: Members,
     /// Members that have left it.
     gone: EntityHashSet,
-    /// Members that lie within it, and how many of them are hidden.
-    within: Vec<Entity>,
-    hidden: usize,
-    /// For how many frames it has been cracked.
-    frames: u32,
+    /// Members that lie within it.
+    within: Shown,
     /// Whether members have changed since it was made.
     is_stale: bool,
     /// For how many frames it is not made again.
@@ -132,7 +116,7 @@ pub(crate) fn make_walls(world: &mut World, mut found: Local<Vec<Entity>>) {
     for &group in found.iter() {
         let wanted = is_wanted(world, group, &prepared);
         let wall = world.get_mut::<Wall>(group).map(|mut wall| core::mem::take(&mut *wall));
-        if wall.is_none() && !wanted {
+        if wall.is_none() && (!wanted || is_solid(world, group)) {
             continue;
         }
         let mut wall = wall.unwrap_or_default();
@@ -156,16 +140,12 @@ pub(crate) fn make_walls(world: &mut World, mut found: Local<Vec<Entity>>) {
     world.resource_mut::<FrameClock>().stop(&timer);
 }
 
-/// Whether something waits for the picture of a group. `prepared` are those that are to be made without a hit.
-fn is_wanted(world: &World, group: Entity, prepared: &EntityHashSet) -> bool {
-    let Ok(entity) = world.get_entity(group) else { return false };
-    entity.contains::<CrackSurface>()
-        && (world.resource::<HitQueue>().first(group).is_some()
-            || prepared.contains(&group)
-            || entity.contains::<GuidedCracks>()
-            || entity.contains::<CrackStrands>()
-            || entity.contains::<CrackRecord>()
-            || entity.contains::<CrackAnalogy>())
+/// Whether a group has meshes in 3D, which are put together in another way.
+fn is_solid(world: &World, group: Entity) -> bool {
+    #[cfg(feature = "3d")]
+    return super::bodies::is_solid(world, group);
+    #[cfg(not(feature = "3d"))]
+    return world.get_entity(group).is_err();
 }
 
 impl Wall {
@@ -204,13 +184,7 @@ impl Wall {
                 }
             }
         };
-        self.frames = if has_cracked { self.frames.saturating_add(1) } else { 0 };
-        if self.frames > SHOWN_FOR {
-            let next = self.within.iter().skip(self.hidden).take(MAX_MEMBERS);
-            let next: Vec<Entity> = next.copied().collect();
-            self.hidden += next.len();
-            next.into_iter().for_each(|member| hide(world, member));
-        }
+        self.within.hide_more(world, has_cracked);
         Ok(true)
     }
 
@@ -227,7 +201,7 @@ impl Wall {
         if frame.is_none() {
             return Err(failed(members.left_out.unwrap_or("none of its members shows anything")));
         }
-        self.warn_of(world, group, members.left_out);
+        warn_left_out(world, group, members.left_out, &mut self.has_warned);
         Ok(start_copying(world, members))
     }
 
@@ -273,7 +247,8 @@ impl Wall {
         let Some(frame) = self.frame else { return };
         let (_, within) = members.within(&frame);
         if within.len() < members.list.len() {
-            self.warn_of(world, group, Some("it lies outside of the rectangle that has cracked"));
+            let reason = "it lies outside of the rectangle that has cracked";
+            warn_left_out(world, group, Some(reason), &mut self.has_warned);
         }
         let Some(mut images) = world.get_resource_mut::<Assets<Image>>() else { return };
         let size = Extent3d { width: frame.size.x, height: frame.size.y, depth_or_array_layers: 1 };
@@ -296,37 +271,21 @@ impl Wall {
                 }
             }
         }
-        let stay: EntityHashSet = within.iter().copied().collect();
-        for member in self.within.iter().filter(|member| !stay.contains(*member)) {
-            show(world, *member);
-        }
-        (self.within, self.hidden) = (within, 0);
+        self.within.become_of(world, within);
         (self.shown, self.pause) = (members, PAUSE);
     }
 
     /// Shows members again, some in each frame, and then nothing of the group; whether that is done.
     fn take_down(&mut self, world: &mut World, group: Entity) -> bool {
-        let stay = self.hidden.saturating_sub(MAX_MEMBERS);
-        let next = self.within.iter().take(self.hidden).skip(stay);
-        next.for_each(|member| show(world, *member));
-        self.hidden = stay;
-        if stay == 0
+        let is_over = self.within.show_more(world);
+        if is_over
             && self.is_there()
             && let Ok(mut group) = world.get_entity_mut(group)
             && group.get::<Sprite>().is_some_and(|sprite| sprite.image == self.picture)
         {
             group.remove::<(Sprite, Anchor)>();
         }
-        stay == 0
-    }
-
-    /// Says once why members are left out.
-    fn warn_of(&mut self, world: &World, group: Entity, reason: Option<&str>) {
-        if let Some(reason) = reason
-            && !core::mem::replace(&mut self.has_warned, true)
-        {
-            warn!("a member of the group {} is left out: {reason}", EntityLabel::of(world, group));
-        }
+        is_over
     }
 }
 

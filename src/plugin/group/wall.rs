@@ -1,5 +1,6 @@
 //! The picture of a group: tiles, put together by a task.
 
+use super::tint::Tint;
 use crate::plugin::api::CrackError;
 use crate::plugin::jobs::stepped::{Step, Stepped};
 use crate::plugin::source::picture::{self, Space};
@@ -166,9 +167,7 @@ impl WallWork {
 
     /// Puts a tile in its place; returns how many texels it covers.
     fn put(&mut self, tile: &Tile) -> u64 {
-        if self.tint.color != tile.tint {
-            self.tint = Tint::new(tile.tint);
-        }
+        self.tint.become_of(tile.tint);
         let (Some(rect), Some(source)) = (self.frame.rect(tile), self.sources.get(tile.picture)) else { return 0 };
         let part = tile.part.intersect(Rect { min: Vec2::ZERO, max: source.size.as_vec2() });
         if part.is_empty() {
@@ -218,41 +217,6 @@ impl Stepped for WallWork {
 
     fn progress(&self) -> f32 {
         self.done as f32 / self.tiles.len().max(1) as f32
-    }
-}
-
-/// A colour that pictures are multiplied by.
-struct Tint {
-    /// Red, green, blue, alpha; sRGB.
-    color: [f32; 4],
-    /// What becomes of each byte of each channel; `None` = nothing else.
-    table: Option<Box<[[u8; 256]; 4]>>,
-}
-
-impl Tint {
-    const NONE: Self = Self { color: [1.0; 4], table: None };
-
-    fn new(color: [f32; 4]) -> Self {
-        if color == Self::NONE.color {
-            return Self::NONE;
-        }
-        let [red, green, blue, alpha] = color;
-        let linear = LinearRgba::from(Srgba { red, green, blue, alpha }).to_f32_array();
-        let mut table = Box::new([[0; 256]; 4]);
-        for byte in 0..=255u8 {
-            let texel = LinearRgba::from(Srgba::from_u8_array([byte; 4])).to_f32_array();
-            let mut product = [0.0; 4];
-            product.iter_mut().zip(texel).zip(linear).for_each(|((out, a), b)| *out = a * b);
-            let bytes = Srgba::from(LinearRgba::from_f32_array(product)).to_u8_array();
-            table.iter_mut().zip(bytes).for_each(|(channel, out)| channel[usize::from(byte)] = out);
-        }
-        Self { color, table: Some(table) }
-    }
-
-    fn of(&self, texel: [u8; 4]) -> [u8; 4] {
-        let Some(table) = &self.table else { return texel };
-        let mut channels = table.iter();
-        texel.map(|byte| channels.next().map_or(byte, |channel| channel[usize::from(byte)]))
     }
 }
 

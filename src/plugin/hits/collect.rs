@@ -1,15 +1,15 @@
 //! Hits of a frame are queued.
 
-#[cfg(feature = "2d")]
+#[cfg(any(feature = "2d", feature = "3d"))]
 use crate::plugin::api::CrackMemberOf;
 use crate::plugin::api::error::EntityLabel;
 use crate::plugin::api::{CrackBudget, CrackHit, CrackStats, CrackSurface, HitPoint};
-#[cfg(feature = "2d")]
+#[cfg(any(feature = "2d", feature = "3d"))]
 use crate::plugin::carrier::place::CrackPlaces;
 use crate::plugin::carrier::space;
 use crate::plugin::jobs::frame_time::FrameClock;
 use crate::plugin::surface::queue::{HitQueue, QueuedHit};
-#[cfg(feature = "2d")]
+#[cfg(any(feature = "2d", feature = "3d"))]
 use bevy::ecs::system::SystemParam;
 use bevy::{ecs::query::QueryEntityError, prelude::*};
 
@@ -27,7 +27,7 @@ pub(crate) fn collect_hits(
     mut clock: ResMut<FrameClock>,
     surfaces: Query<Option<&GlobalTransform>, With<CrackSurface>>,
     names: Query<&Name>,
-    #[cfg(feature = "2d")] members: Members,
+    #[cfg(any(feature = "2d", feature = "3d"))] members: Members,
 ) {
     if queue.inbox.is_empty() && messages.is_empty() {
         return;
@@ -37,7 +37,7 @@ pub(crate) fn collect_hits(
     let mut inbox = core::mem::take(&mut queue.inbox);
     for hit in inbox.iter().chain(messages.read()) {
         stats.sent += 1;
-        #[cfg(feature = "2d")]
+        #[cfg(any(feature = "2d", feature = "3d"))]
         let hit = &members.of_group(hit);
         let at = match surfaces.get(hit.entity) {
             Ok(transform) => localize(hit, transform),
@@ -65,14 +65,14 @@ pub(crate) fn collect_hits(
 }
 
 /// Members of groups.
-#[cfg(feature = "2d")]
+#[cfg(any(feature = "2d", feature = "3d"))]
 #[derive(SystemParam)]
 pub(crate) struct Members<'w, 's> {
     members: Query<'w, 's, (&'static CrackMemberOf, Option<&'static GlobalTransform>), Without<CrackSurface>>,
     places: CrackPlaces<'w, 's>,
 }
 
-#[cfg(feature = "2d")]
+#[cfg(any(feature = "2d", feature = "3d"))]
 impl Members<'_, '_> {
     /// A hit on a member is one on its group, in the same place of the world.
     fn of_group(&self, hit: &CrackHit) -> CrackHit {

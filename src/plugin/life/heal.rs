@@ -1,6 +1,6 @@
 //! Healing, and what happens when a surface goes.
 
-#[cfg(feature = "2d")]
+#[cfg(any(feature = "2d", feature = "3d"))]
 use crate::plugin::api::CrackGroup;
 use crate::plugin::api::{AnalogyProgress, CrackRecord, CrackState, CrackStats, CrackSurface, CrackTextures};
 use crate::plugin::bake::work;
@@ -15,7 +15,7 @@ use crate::plugin::surface::cracked::{self, active_mut, with_queues};
 use crate::plugin::surface::owners::Owners;
 use crate::plugin::surface::prepare;
 use crate::plugin::surface::queue::HitQueue;
-#[cfg(feature = "2d")]
+#[cfg(any(feature = "2d", feature = "3d"))]
 use bevy::ecs::entity::EntityHashSet;
 use bevy::prelude::*;
 
@@ -58,12 +58,12 @@ pub(super) fn purge(world: &mut World, entity: Entity) {
         return;
     }
     world.resource_scope(|world, mut queue: Mut<HitQueue>| {
-        #[cfg(feature = "2d")]
+        #[cfg(any(feature = "2d", feature = "3d"))]
         let members: EntityHashSet = world.get::<CrackGroup>(entity).into_iter().flat_map(CrackGroup::iter).collect();
         if let Some(mut stats) = world.get_resource_mut::<CrackStats>() {
             queue.purge(entity, &mut stats);
             // A hit on a member is one on its group.
-            #[cfg(feature = "2d")]
+            #[cfg(any(feature = "2d", feature = "3d"))]
             queue.purge_inbox(|hit| members.contains(&hit), &mut stats);
         }
     });

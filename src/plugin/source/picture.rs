@@ -332,7 +332,7 @@ fn to_byte(value: f32) -> u8 {
 }
 
 /// How a picture is read between its texels: bilinear, as the renderer does.
-struct Sampling {
+pub(crate) struct Sampling {
     /// Whether it goes on at the other side beyond an edge, across and down; else the edge is held.
     repeats: [bool; 2],
     levels: &'static Levels,
@@ -351,7 +351,7 @@ static SRGB: LazyLock<Levels> = LazyLock::new(|| Levels::new(Space::Srgb));
 static LINEAR: LazyLock<Levels> = LazyLock::new(|| Levels::new(Space::Linear));
 
 impl Sampling {
-    fn of(image: &Image, space: Space) -> Self {
+    pub(crate) fn of(image: &Image, space: Space) -> Self {
         let repeats = match &image.sampler {
             ImageSampler::Default => [false; 2],
             ImageSampler::Descriptor(sampler) => {
@@ -376,8 +376,20 @@ impl Sampling {
     }
 
     /// The colours `at` the places of other texels; texel centres are at half-integers.
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "coordinates lie inside the picture")]
     fn sample(&self, texels: &[u8], from: UVec2, to: UVec2, at: impl Fn(u32, u32) -> Vec2) -> Vec<u8> {
+        let mut out = Vec::with_capacity(to.x as usize * to.y as usize * 4);
+        for y in 0..to.y {
+            for x in 0..to.x {
+                out.extend(self.texel(texels, from, at(x, y)));
+            }
+        }
+        out
+    }
+
+    /// The colour of one place.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "coordinates lie inside the picture")]
+    #[inline]
+    pub(crate) fn texel(&self, texels: &[u8], from: UVec2, place: Vec2) -> [u8; 4] {
         // The texels before and after a place along an axis, and how far it is from the one to the other.
         let beside = |at: f32, axis: usize| {
             let last = from[axis] - 1;
@@ -391,23 +403,18 @@ impl Sampling {
                 (low, (low + 1).min(last), at.fract())
             }
         };
-        let (rows, mut out) = (texels.as_chunks::<4>().0, Vec::with_capacity(to.x as usize * to.y as usize * 4));
-        for y in 0..to.y {
-            for x in 0..to.x {
-                let place = at(x, y);
-                let ((left, right, across), (top, bottom, down)) = (beside(place.x, 0), beside(place.y, 1));
-                let texel = |x: u32, y: u32| rows[y as usize * from.x as usize + x as usize];
-                let corners = [texel(left, top), texel(right, top), texel(left, bottom), texel(right, bottom)];
-                let mix = |[a, b, c, d]: [f32; 4]| a.lerp(b, across).lerp(c.lerp(d, across), down);
-                for c in 0..3 {
-                    let light = mix(corners.map(|texel| self.levels.light[usize::from(texel[c])]));
-                    let root = (light.sqrt() * Levels::LIGHTS + 0.5) as usize;
-                    out.push(self.levels.level[root.min(self.levels.level.len() - 1)]);
-                }
-                out.push((mix(corners.map(|texel| f32::from(texel[3]))) + 0.5) as u8);
-            }
-        }
-        out
+        let rows = texels.as_chunks::<4>().0;
+        let ((left, right, across), (top, bottom, down)) = (beside(place.x, 0), beside(place.y, 1));
+        let texel = |x: u32, y: u32| rows[y as usize * from.x as usize + x as usize];
+        let corners = [texel(left, top), texel(right, top), texel(left, bottom), texel(right, bottom)];
+        let mix = |[a, b, c, d]: [f32; 4]| a.lerp(b, across).lerp(c.lerp(d, across), down);
+        let level = |channel: usize| {
+            let light = mix(corners.map(|texel| self.levels.light[usize::from(texel[channel])]));
+            let root = (light.sqrt() * Levels::LIGHTS + 0.5) as usize;
+            self.levels.level[root.min(self.levels.level.len() - 1)]
+        };
+        let alpha = (mix(corners.map(|texel| f32::from(texel[3]))) + 0.5) as u8;
+        [level(0), level(1), level(2), alpha]
     }
 }
 

@@ -40,9 +40,18 @@ pub(crate) fn unfold(world: &mut World, entity: Entity) -> bool {
     if surface.unwrap == CrackUnwrap::Never || has_places {
         return true;
     }
+    match order(world, entity) {
+        Some(order) => kind.unfold(world, entity, &order),
+        None => true,
+    }
+}
+
+/// How the mesh of a surface that has not cracked is to be laid out; `None` as long as its preset is not there.
+pub(crate) fn order(world: &mut World, entity: Entity) -> Option<UnfoldOrder> {
+    let surface = world.get::<CrackSurface>(entity)?;
     let must = surface.unwrap == CrackUnwrap::Always;
     let write = surface.write;
-    let Ok(Some(preset)) = preset::resolve(world, &surface.preset) else { return true };
+    let preset = preset::resolve(world, &surface.preset).ok()??;
     let texel = texel_bytes(Maps::wanted(write, &preset.look), preset.look.layer(0).bytes_per_texel());
     let budget = world.resource::<CrackBudget>();
     let left = budget.max_texture_bytes.saturating_sub(world.resource::<TextureMemory>().used());
@@ -60,5 +69,5 @@ pub(crate) fn unfold(world: &mut World, entity: Entity) -> bool {
         id: world.resource::<Unfoldings>().0,
     };
     world.resource_mut::<Unfoldings>().0 += 1;
-    kind.unfold(world, entity, &order)
+    Some(order)
 }

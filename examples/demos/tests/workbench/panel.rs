@@ -1,9 +1,11 @@
 //! The panel: every control does what it says.
 
 use crate::{app, state, wait_for};
-use bevy::prelude::*;
+use bevy::{camera::Viewport, ecs::name::NameOrEntity, prelude::*};
 use bevy_crack::{
-    editor::{AnalogyChoice, Costs, CrackEditor, CrackEditorPlugin, EditorCommand, Export, Panel, Subject},
+    editor::{
+        AnalogyChoice, Costs, CrackEditor, CrackEditorPlugin, EditorCommand, Export, Panel, PrimaryEguiContext, Subject,
+    },
     growth::MarkerLayout,
     plugin::{CrackDrive, PresetSource},
     prelude::*,
@@ -191,6 +193,49 @@ fn every_section_can_be_opened_on_every_preset() {
         }
         assert_eq!(harness.state().preset(), &preset, "looking changes nothing");
         assert!(harness.state().asked.is_empty());
+    }
+}
+
+/// Of cameras that are spawned in one frame, in any order, the panel is drawn by the last one that has the whole window; one that the
+/// game has chosen is left alone.
+#[test]
+fn the_panel_is_in_the_whole_window() {
+    let part =
+        || Camera { order: 2, viewport: Some(Viewport { physical_size: UVec2::splat(64), ..default() }), ..default() };
+    let over = || Camera { order: 1, ..default() };
+    let chosen = |app: &mut App| {
+        let mut chosen = app.world_mut().query_filtered::<NameOrEntity, With<PrimaryEguiContext>>();
+        let chosen = chosen.single(app.world()).expect("one camera draws the panel");
+        chosen.name.expect("a name").to_string()
+    };
+    for order in [[0, 1, 2], [2, 1, 0], [1, 0, 2]] {
+        let mut app = app(|app| {
+            app.add_plugins(CrackEditorPlugin::default());
+        });
+        for i in order {
+            let name = Name::new(["part", "over", "under"][i]);
+            match i {
+                0 => app.world_mut().spawn((Camera3d::default(), part(), name)),
+                1 => app.world_mut().spawn((Camera2d, over(), name)),
+                _ => app.world_mut().spawn((Camera3d::default(), name)),
+            };
+        }
+        for _ in 0..3 {
+            app.update();
+            assert_eq!(chosen(&mut app), "over", "spawned as {order:?}");
+        }
+        app.world_mut().spawn((Camera2d, Camera { order: 3, ..default() }));
+        app.update();
+        assert_eq!(chosen(&mut app), "over", "the panel does not jump");
+    }
+    let mut app = app(|app| {
+        app.add_plugins(CrackEditorPlugin::default());
+    });
+    app.world_mut().spawn((Camera2d, over()));
+    app.world_mut().spawn((Camera2d, Name::new("the game's choice"), PrimaryEguiContext));
+    for _ in 0..3 {
+        app.update();
+        assert_eq!(chosen(&mut app), "the game's choice");
     }
 }
 
