@@ -4,12 +4,14 @@
 //! (texels), anywhere and in any direction on a surface of 1024 x 1024.
 
 use bevy_crack::{
+    CrackPreset,
+    growth::CrackGrowth,
     math::{Rng, ops},
-    paint::{BaseTexels, Look, LookTable, PaintTargets, paint_into},
-    pattern::{PathPoint, SegmentPath, SurfaceFrame},
+    paint::{BaseTexels, Look, LookTable, PaintTargets, paint_into, paint_rects},
+    pattern::{Moment, PathPoint, SegmentPath, SurfaceFrame},
     raster::{DepthField, DirtyTiles, Profile, TexelRect, stamp_path},
 };
-use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use criterion::{BatchSize, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use glam::{UVec2, Vec2};
 use std::hint::black_box;
 
@@ -154,5 +156,41 @@ fn dirty(c: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, stamps, paints, dirty);
+/// What the crater of one hit takes before any crack has grown, on a surface of 512 x 512: drawn into the field, and painted.
+fn craters(c: &mut Criterion) {
+    let mut group = c.benchmark_group("crater");
+    let size = UVec2::splat(512);
+    let texels = (size.x * size.y) as usize;
+    let picture = vec![150; 4 * texels];
+    let base = BaseTexels { size, diffuse: &picture, normal: None, depth: None };
+    let [mut diffuse, mut normal] = [picture.clone(), picture.clone()];
+    for name in ["concrete", "plaster", "ice", "glass"] {
+        let (Some(preset), Some(mut blank)) = (CrackPreset::named(name), field(size)) else { continue };
+        let unit = blank.frame.texels_per_unit();
+        blank.set_layers(preset.look.layer(7));
+        let Ok(look) = LookTable::new(&preset.look, unit) else { continue };
+        for energy in [1.0, 4.0] {
+            let Ok(mut growth) = CrackGrowth::new(preset.growth.clone(), Vec2::ONE, 7) else { continue };
+            growth.hit(Vec2::splat(0.5), energy);
+            let draw = |field: &mut DepthField| {
+                let mut changed = Vec::new();
+                field.show_layers(growth.network(), growth.timeline(), Moment::after(1), &mut changed);
+                changed
+            };
+            let mut drawn = blank.clone();
+            let changed = draw(&mut drawn);
+            assert!(!changed.is_empty(), "{name} has a crater");
+            let id = |what: &str| BenchmarkId::new(format!("{name}, energy {energy}"), what);
+            group.bench_function(id("drawn"), |b| {
+                b.iter_batched_ref(|| blank.clone(), |field| draw(field), BatchSize::LargeInput);
+            });
+            group.bench_function(id("painted"), |b| {
+                let mut targets = PaintTargets { diffuse: Some(&mut diffuse), normal: Some(&mut normal), depth: None };
+                b.iter(|| paint_rects(base, &drawn, &look, black_box(&changed), UVec2::ZERO, &mut targets));
+            });
+        }
+    }
+}
+
+criterion_group!(benches, stamps, paints, dirty, craters);
 criterion_main!(benches);

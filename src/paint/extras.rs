@@ -22,8 +22,9 @@ pub(super) struct Extras<'a, const ROOM: usize> {
     pub(super) tint: f32,
     /// Whether dark texels are shadows instead of holes.
     pub(super) shades: bool,
-    /// How much of the cracks is hidden where material has broken off.
+    /// How much of the cracks is hidden where material has broken off, and the inverse of the depth where all of it is.
     bare: f32,
+    hides: f32,
     /// Whether the zone is drawn, with chips over the cracks.
     pub(super) is_drawn: bool,
     /// Whether pale texels in a hole are its wall.
@@ -64,6 +65,8 @@ impl<'a, const ROOM: usize> Extras<'a, ROOM> {
             tint: settings.map_or(0.0, |all| all.tint),
             shades: settings.is_some_and(|all| all.broken),
             bare: settings.map_or(0.0, |all| if all.broken { all.bare } else { 0.0 }),
+            // The cracks go on over the upper ledges.
+            hides: settings.map_or(0.0, |all| if all.terraces > 2 { 1.0 / 120.0 } else { 1.0 / 64.0 }),
             has_walls: settings.is_some_and(|all| !all.broken && all.hole > 0.0 && all.edge > 0.0),
             is_drawn: settings.is_some_and(|all| all.broken && all.outline > 0.0),
             deep: settings.map_or(0.0, |all| all.depth * look.deep),
@@ -244,7 +247,7 @@ impl<'a, const ROOM: usize> Extras<'a, ROOM> {
     /// Share of a crack that is visible on the floor where material has broken off.
     #[inline(always)]
     pub(super) fn left(&self, place: usize) -> f32 {
-        let deep = (f32::from(self.room.spot[place].deep) * (1.0 / 64.0)).min(1.0);
+        let deep = (f32::from(self.room.spot[place].deep) * self.hides).min(1.0);
         1.0 - self.bare * deep
     }
 

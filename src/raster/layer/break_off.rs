@@ -4,6 +4,7 @@ use super::{
     broken::{Broken, Chip, LONG_SHADOW, SHADOW},
     crushed::CrushedZone,
     draws,
+    ledges::{BRIGHTEST, LEDGE_LIT, LEDGE_SHADE, SAG},
     noise::{draw, lattice, noise},
     outline::FAR_OUT,
     shape::{Place, Shape, TO_LIGHT},
@@ -16,7 +17,7 @@ use glam::Vec2;
 const SHELF: f32 = 0.5;
 
 /// The same where there are several steps down.
-const EDGE: f32 = 0.45;
+const EDGE: f32 = 0.31;
 
 /// Share of that depth which is gained on the way to the middle.
 const BOWL: f32 = 0.4;
@@ -37,6 +38,26 @@ const STEP_SHADE: f32 = 0.6;
 /// Strength of the shadow at this distance from the edge that casts it.
 fn sink(within: f32, soft: f32) -> f32 {
     (0.5 - within / soft).clamp(0.0, 1.0)
+}
+
+/// How chips are lit.
+struct ChipLight {
+    /// Length of the shadow, in sizes of the chip, and how dark it is.
+    length: f32,
+    shade: f32,
+    /// How much brighter the chip is than the surface, and its side towards the light than the one away from it.
+    tone: f32,
+    sides: f32,
+    /// Share of the crushed colour in it.
+    pale: f32,
+}
+
+impl ChipLight {
+    /// Flat chips of the surface itself.
+    const PLAIN: Self = Self { length: 0.35, shade: SHADE, tone: 0.0, sides: 0.0, pale: 0.3 };
+
+    /// Lumps that show where they broke.
+    const FRESH: Self = Self { length: 0.5, shade: 1.2 * SHADE, tone: 0.12, sides: 0.5, pale: 0.6 };
 }
 
 /// Texels over which a hard shadow ends.
@@ -74,9 +95,13 @@ impl Shape<'_> {
                     cloud *= 1.0 - fall * (0.4 - 0.4 * noise(seed ^ 8, at.x / wide, at.y / (7.0 * wide)));
                 }
                 place.pale = place.pale.max(dust * left * left * cloud * (1.0 - inside));
+                if broken.steps.len() > 1 {
+                    self.add_dust(place, at, left, 1.0 - inside, seed);
+                }
             }
             if self.jag > 0.0 {
-                self.add_crumbs(place, at, (1.2 * chips * left).min(0.6) * left, inside, seed);
+                let many = if broken.steps.len() > 1 { 2.0 } else { 1.0 };
+                self.add_crumbs(place, at, (many * (1.2 * chips * left).min(0.6) * left).min(0.9), inside, seed);
             } else if self.crushed.outline <= 0.0 {
                 self.add_grit(place, at, (chips * left).min(0.5) * left, seed);
             }
@@ -125,12 +150,15 @@ impl Shape<'_> {
             // A shallow edge, and deeper and deeper steps.
             _ => EDGE,
         };
+        let has_ledges = broken.steps.len() > 1;
         // In some places a wall is a slope.
         let slope = bump(draws::WALL_SLOPE, (0.35 * self.radius).max(4.0));
         let run = if crumbles { 0.8 + 1.4 * slope.max(0.0) } else { 1.0 };
         let wall = (within / (run * WALL * share * self.depth).max(1.0)).clamp(0.0, 1.0);
         let bowl = (within / (0.8 * self.radius).max(1.0)).clamp(0.0, 1.0);
-        let mut down = share * (wall + BOWL * (bowl - wall));
+        let hollow = if has_ledges { self.hollow(off) * wall } else { 0.0 };
+        let sag = if has_ledges { SAG } else { 0.0 };
+        let mut down = share * (wall + BOWL * (bowl - wall)) + (1.0 - share) * sag * hollow;
         let (long, shade) = if crumbles { (LONG_SHADOW, DEEP_SHADE) } else { (SHADOW, SHADE) };
         let length = long * share * self.depth;
         // A shadow is soft where the edge that casts it is far away.
@@ -139,7 +167,7 @@ impl Shape<'_> {
         // The wall on the far side faces the light.
         let facing = (1.5 * WALL * share * self.depth).max(1.0);
         let lit = sink(self.within(broken, off - TO_LIGHT * facing, at - TO_LIGHT * facing, seed), HARD);
-        let mut sunk = 0.0;
+        let (mut sunk, mut bright) = (0.0, 0.0f32);
         let one = 1.0 / broken.steps.len().max(1) as f32;
         for step in &broken.steps {
             let within =
@@ -147,11 +175,16 @@ impl Shape<'_> {
             let fall = (within / (2.5 * WALL * one * self.depth).max(2.0)).clamp(0.0, 1.0);
             let gone = one * fall * fall * (3.0 - 2.0 * fall);
             sunk += gone;
-            down += (1.0 - share) * gone;
+            down += (1.0 - share) * (1.0 - sag) * gone;
             if within > 0.0 {
                 let length = long * (1.0 - share) * one * self.depth;
                 // The step is lower and rounder than the edge.
-                shadow = shadow.max(STEP_SHADE * sink(step.within(off + TO_LIGHT * length), 1.5 * soft));
+                let strength = if has_ledges { LEDGE_SHADE } else { STEP_SHADE };
+                shadow = shadow.max(strength * sink(step.within(off + TO_LIGHT * length), 1.5 * soft));
+                if has_ledges {
+                    let facing = (2.0 * WALL * one * self.depth).max(1.5);
+                    bright = bright.max(LEDGE_LIT * sink(step.within(off - TO_LIGHT * facing), 2.0 * HARD));
+                }
             }
         }
         let fold = |k: u32, size: f32| {
@@ -183,7 +216,12 @@ impl Shape<'_> {
             let mut tone = 0.30 * coarse + 0.16 * plate + (0.5 - 0.2 * stones) * sand
                 - 0.14 * stones
                 - 0.6 * corner * wall
-                - 0.4 * sunk;
+                - if has_ledges { 0.0 } else { 0.4 * sunk };
+            if has_ledges {
+                let powder = self.powder(at, seed) * fade;
+                tone += (0.3 + 0.12 * sand - tone) * 0.8 * powder;
+                bumps *= 1.0 - 0.5 * powder;
+            }
             if stones > 0.0
                 && let Some(stone) = Stone::find(seed ^ draws::STONES, at, self.grain, stones)
             {
@@ -202,7 +240,13 @@ impl Shape<'_> {
         place.height = -self.depth * down + bumps;
         // The wall has the colour of the material that came off, not of what lay under it.
         place.pale = pale * inside * if crumbles { 0.15 + 0.85 * wall } else { 1.0 };
-        place.shade = (speckle * tone + LIT * lit * (1.0 - shadow)) * inside;
+        let (mut light, mut lit) = (speckle * tone, lit);
+        if has_ledges {
+            light -= (1.0 + light) * self.darkness(off, sunk, hollow, wall);
+            lit = self.ledge_light(lit, bright, at, seed);
+        }
+        let light = light + LIT * lit * (1.0 - shadow);
+        place.shade = if has_ledges { light.min(BRIGHTEST) } else { light } * inside;
         place.dark = shade * shadow * inside * (SHADOW * self.depth).min(1.0);
     }
 
@@ -214,21 +258,22 @@ impl Shape<'_> {
             return;
         }
         let crumbles = self.jag > 0.0;
+        let light = if self.crushed.terraces > 0 { ChipLight::FRESH } else { ChipLight::PLAIN };
         let mut within = outline.within(off);
         if crumbles {
             within -= 0.14 * size * (1.0 + noise(seed ^ draws::CHIP_EDGE, 2.2 * at.x / size, 2.2 * at.y / size));
         }
         let inside = (within + 0.5).clamp(0.0, 1.0);
         if inside < 1.0 && *ink <= 0.0 {
-            let shadow = (outline.within(off + TO_LIGHT * (0.35 * size)) + 0.5).clamp(0.0, 1.0);
-            place.dark = place.dark.max(SHADE * shadow * (1.0 - inside));
+            let shadow = (outline.within(off + TO_LIGHT * (light.length * size)) + 0.5).clamp(0.0, 1.0);
+            place.dark = place.dark.max(light.shade * shadow * (1.0 - inside));
         }
         if inside > 0.0 {
             place.dark *= 1.0 - inside;
             let face = if crumbles { 0.16 * noise(seed ^ draws::CHIP_FACE, 0.5 * at.x, 0.5 * at.y) } else { 0.0 };
-            place.shade += (tone + face - place.shade) * inside;
-            // Its face is the surface itself.
-            let pale = if *ink > 0.0 { 1.0 } else { 0.3 * self.crushed.pale };
+            let turned = ((off - outline.centre).dot(-TO_LIGHT) / size.max(0.1) - 0.1).clamp(-0.5, 0.5);
+            place.shade += (tone + face + light.tone - light.sides * turned - place.shade) * inside;
+            let pale = if *ink > 0.0 { 1.0 } else { light.pale * self.crushed.pale };
             place.pale += (pale - place.pale) * inside;
             if *ink > 0.0 {
                 // The line is wider on the side away from the light.

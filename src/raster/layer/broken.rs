@@ -117,13 +117,15 @@ impl Broken {
         if !faces.is_empty() {
             off.clear();
         }
-        let chips = (24.0 * crushed.chips * more).round().min(96.0) as u32;
+        // Craters from contours have more chips around them, and slightly larger ones.
+        let (many, large) = if crushed.terraces > 0 { (58.0, 1.05) } else { (24.0, 1.0) };
+        let chips = (many * crushed.chips * more).round().min(96.0) as u32;
         let is_drawn = crushed.outline > 0.0;
         let chips: Vec<Chip> = (0..chips)
             .map(|k| {
                 let size = if crumbles {
                     // Many small chips, few large ones.
-                    grain * (0.3 + 0.13 * (1.0 / (0.12 + pick(k, 6)) - 0.9))
+                    large * grain * (0.3 + 0.13 * (1.0 / (0.12 + pick(k, 6)) - 0.9))
                 } else {
                     grain * (0.4 + pick(k, 6) * pick(k, 7))
                 };

@@ -19,6 +19,12 @@ pub(super) const SMALL_PLATES: u32 = 0x54;
 pub(super) const COARSE_TONE: u32 = 0x56;
 pub(super) const BROAD_TONE: u32 = 0x5F;
 
+/// Patches of light on the edge of a crater with ledges, powder on its floor, and heaps of dust around it; the next
+/// numbers are those of finer ones.
+pub(super) const EDGE_PATCHES: u32 = 0x15A;
+pub(super) const POWDER: u32 = 0x25F;
+pub(super) const HEAPS: u32 = 0x333;
+
 /// Its sand, and pits in it.
 pub(super) const SAND: u32 = 0x57;
 pub(super) const SAND_PITS: u32 = 0x65;

@@ -5,6 +5,7 @@ mod broken;
 mod bruise;
 mod crushed;
 mod draws;
+mod ledges;
 mod noise;
 mod outline;
 mod plates;
