@@ -18,16 +18,8 @@ const WALL: Vec2 = Vec2::new(110.0, 20.0);
 const PHOTO: f32 = 190.0;
 const STEP: f32 = 205.0;
 
-/// The photographs, and what cracks as they do.
+/// The photographs, each with a preset beside it that cracks as it does.
 const NAMES: [&str; 3] = ["concrete", "clay", "paving"];
-
-fn preset(number: usize) -> CrackPreset {
-    match number {
-        1 => CrackPreset::CLAY,
-        2 => CrackPreset::MUD,
-        _ => CrackPreset::CONCRETE.scaled(0.8),
-    }
-}
 
 #[derive(Component)]
 struct Wall;
@@ -83,7 +75,8 @@ fn blank() -> Image {
 fn made_as(number: usize, assets: &AssetServer) -> (CrackSurface, CrackAnalogy) {
     let name = NAMES[number % NAMES.len()];
     let examples = assets.load(format!("analogies/{name}.{}", AnalogyExamples::EXTENSION));
-    (CrackSurface::new(preset(number)).with_seed(3), CrackAnalogy::new(examples).with_their_material())
+    let preset: Handle<CrackPreset> = assets.load(format!("analogies/{name}.crack.ron"));
+    (CrackSurface::new(preset).with_seed(3), CrackAnalogy::new(examples).with_their_material())
 }
 
 fn choose(commands: &mut Commands, wall: Entity, number: usize, assets: &AssetServer) {
@@ -127,7 +120,7 @@ fn play_script(mut commands: Commands, script: Script, assets: Res<AssetServer>,
         }
         for i in script.due(3, start + 0.3 * PART..start + 0.7 * PART) {
             let at = [Vec2::new(0.36, 0.45), Vec2::new(0.7, 0.6), Vec2::new(0.55, 0.2)][i as usize % 3];
-            commands.trigger(CrackHit::uv(*wall, at).with_energy(3.0));
+            commands.trigger(CrackHit::uv(*wall, at).with_energy(2.0));
         }
     }
 }

@@ -42,6 +42,27 @@ fn shipped(name: &str) -> AnalogyParams {
     params
 }
 
+/// The presets beside the photographs can be read, and a hit in the middle cracks most of a surface without a crater.
+#[cfg(feature = "serde")]
+#[test]
+fn each_photograph_has_a_preset_that_cracks_as_it_does() {
+    for name in NAMES {
+        let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(format!("assets/analogies/{name}.crack.ron"));
+        let preset = CrackPreset::from_ron(&fs::read_to_string(path).unwrap()).unwrap();
+        preset.validate().unwrap();
+        assert!(preset.look.crushed.is_none() && preset.look.facets.is_none(), "{name}");
+        let mut growth = CrackGrowth::new(preset.growth.clone(), Vec2::ONE, 1).unwrap();
+        growth.hit(Vec2::splat(0.5), 4.0);
+        while growth.step().grew() {}
+        let nodes: Vec<Vec2> = growth.network().nodes().iter().map(|node| node.pos).collect();
+        let parts = (0..16).filter(|part| {
+            let min = Vec2::new((part % 4) as f32, (part / 4) as f32) / 4.0;
+            nodes.iter().any(|at| at.cmpge(min).all() && at.cmplt(min + 0.25).all())
+        });
+        assert!(parts.count() >= 14, "{name}");
+    }
+}
+
 /// Seams of a map as depths.
 fn seams(size: UVec2, sites: u32) -> Grid<u16> {
     let params = VoronoiParams { sites, ..VoronoiParams::DEFAULT };
