@@ -17,6 +17,7 @@ use bevy::{
     asset::RenderAssetUsages,
     camera::visibility::RenderLayers,
     ecs::entity::EntityHashSet,
+    image::ImageSampler,
     light::{NotShadowCaster, NotShadowReceiver},
     math::Affine3A,
     mesh::VertexAttributeValues,
@@ -75,6 +76,7 @@ struct MadeOf {
     /// The members, and where they are.
     members: Vec<(Entity, Affine3A)>,
     material: StandardMaterial,
+    sampler: ImageSampler,
     layers: Option<RenderLayers>,
 }
 
@@ -213,7 +215,9 @@ impl Body {
         let Some(mut images) = world.get_resource_mut::<Assets<Image>>() else { return };
         let mut add = |texels, format| {
             let size = Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 };
-            images.add(Image::new(size, TextureDimension::D2, texels, format, RenderAssetUsages::default()))
+            let mut image = Image::new(size, TextureDimension::D2, texels, format, RenderAssetUsages::default());
+            image.sampler = of.sampler.clone();
+            images.add(image)
         };
         let material = StandardMaterial {
             base_color_texture: Some(add(made.diffuse, TextureFormat::Rgba8UnormSrgb)),
@@ -305,6 +309,7 @@ fn copy(
             let made_of = Box::new(MadeOf {
                 members: solids.list.iter().map(|solid| (solid.entity, solid.place)).collect(),
                 material: solids.material.clone(),
+                sampler: solids.sampler(),
                 layers: solids.layers.clone(),
             });
             let work = BodyWork::new(*solids, meshes, copies.finish(), order, scale);

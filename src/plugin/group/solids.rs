@@ -106,6 +106,12 @@ impl Solids {
         Ok(Some(solids))
     }
 
+    /// How the first picture is sampled: that of the group is so too.
+    pub(super) fn sampler(&self) -> ImageSampler {
+        let first = self.pictures.iter().find(|picture| picture.space == Space::Srgb);
+        first.map_or(ImageSampler::Default, |picture| picture.sampler.clone())
+    }
+
     /// Adds a member; false if its material or a picture is not there yet.
     fn add(
         &mut self,
