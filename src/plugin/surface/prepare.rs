@@ -66,7 +66,7 @@ impl Preparations {
     }
 
     /// Surfaces that are to be made, though nothing hits them.
-    #[cfg(feature = "2d")]
+    #[cfg(any(feature = "2d", feature = "3d"))]
     pub(crate) fn wanted(&self) -> impl Iterator<Item = Entity> + '_ {
         self.wanted.iter().copied()
     }
