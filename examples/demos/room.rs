@@ -74,8 +74,11 @@ fn setup(
         perceptual_roughness: 0.85,
         ..default()
     });
-    // All that cracks as one.
-    let room = commands.spawn(CrackSurface::new(CrackPreset::CONCRETE).with_seed(4)).observe(hit_on_press).id();
+    // All that cracks as one, and what is knocked out of its craters.
+    let room = commands
+        .spawn((CrackSurface::new(CrackPreset::CONCRETE).with_seed(4), CrackChips { floor: Some(0.0), ..default() }))
+        .observe(hit_on_press)
+        .id();
     let (x, y, z) = (ROOM * Vec3::X, ROOM * Vec3::Y, ROOM * Vec3::Z);
     let (up, out) = (Vec3::Y * LEDGE.x, Vec3::Z * LEDGE.y);
     // From one corner to the right and up, as it is seen. Edges in which two of them meet are the same.

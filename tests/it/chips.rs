@@ -27,6 +27,53 @@ fn heights(app: &mut App) -> (f32, f32, usize) {
     (all.iter().copied().fold(f32::MAX, f32::min), all.iter().copied().fold(f32::MIN, f32::max), all.len())
 }
 
+/// Off a box, a ball and a room, from the place that is hit, outward.
+#[test]
+fn chips_fly_off_bodies() {
+    let mut app = app();
+    let image = add(&mut app, picture(UVec2::splat(96)));
+    let material = add(&mut app, StandardMaterial { base_color_texture: Some(image), ..default() });
+    let meshes = [Mesh::from(Cuboid::new(2.0, 2.0, 2.0)), Sphere::new(1.0).mesh().uv(48, 32)];
+    let meshes = meshes.map(|mesh| add(&mut app, mesh));
+    let shown = |mesh: &Handle<Mesh>| (Mesh3d(mesh.clone()), MeshMaterial3d(material.clone()));
+    let spot = Vec3::new(0.2, 0.1, 1.0);
+    for kind in 0..3 {
+        let place = Transform::from_xyz(3.0, -1.0, 2.0).with_rotation(Quat::from_rotation_y(0.7));
+        let body = app.world_mut().spawn((surface(CrackPreset::CONCRETE), place)).id();
+        let at = if kind == 1 { spot.normalize() } else { spot };
+        if kind < 2 {
+            app.world_mut().entity_mut(body).insert(shown(&meshes[kind]));
+        } else {
+            // Two boxes beside each other.
+            for x in [-1.0, 1.0] {
+                let part = Transform::from_xyz(x, 0.0, 0.0);
+                app.world_mut().spawn((shown(&meshes[0]), part, CrackMemberOf(body), ChildOf(body)));
+            }
+        }
+        step(&mut app);
+        hit(&mut app, CrackHit::world(body, place.transform_point(at)).with_energy(4.0));
+        let mut frames = 0;
+        while chips(&mut app).is_empty() {
+            step(&mut app);
+            frames += 1;
+            assert!(frames < 3000, "{kind}: nothing comes off");
+        }
+        let all = chips(&mut app);
+        assert!(all.len() >= 4, "{kind}: {}", all.len());
+        for chip in all {
+            let place = get::<Transform>(&app, chip);
+            assert!(place.translation.distance(at) < 0.5, "{kind}: {place:?}");
+            let out = if kind == 1 { at } else { Vec3::Z };
+            assert!(
+                place.translation.dot(out) > 0.85 && (place.rotation * Vec3::Z).dot(out) > 0.9,
+                "{kind}: {place:?}"
+            );
+        }
+        app.world_mut().despawn(body);
+        step(&mut app);
+    }
+}
+
 #[test]
 fn chips_fly_off_and_nothing_is_left_of_them() {
     let mut app = app();

@@ -129,6 +129,12 @@ pub(crate) trait CarrierKind: Send + Sync {
     /// Where the picture lies in the entity's own space, if it is flat. `seen` is the part of its texture that it shows.
     fn plane(&self, world: &World, entity: Entity, seen: TexelRect) -> Result<Plane, &'static str>;
 
+    /// The plane in which a place of a mesh lies that is laid out flat; what is nearby lies there as it is laid out. `texel` is a place of
+    /// the layout.
+    fn plane_at(&self, _world: &World, _entity: Entity, _texel: Vec2) -> Option<Plane> {
+        None
+    }
+
     /// Makes what it shows transparent where its texture is, or has no holes any more.
     fn open(&self, _world: &mut World, _entity: Entity, _carrier: &Carrier, _has_holes: bool) {}
 

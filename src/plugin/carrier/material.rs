@@ -242,6 +242,11 @@ impl<S: MaterialSlot> CarrierKind for MaterialKind<S> {
         Ok(plane)
     }
 
+    #[cfg(feature = "3d")]
+    fn plane_at(&self, world: &World, entity: Entity, texel: Vec2) -> Option<Plane> {
+        unfold::plane_at(world, entity, texel)
+    }
+
     #[cfg_attr(not(feature = "3d"), expect(unused_variables, reason = "only 3D meshes have sides"))]
     fn open(&self, world: &mut World, entity: Entity, carrier: &Carrier, has_holes: bool) {
         #[cfg(feature = "3d")]

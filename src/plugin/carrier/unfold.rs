@@ -3,12 +3,17 @@
 use super::faces::Faces;
 use super::kind::{Carrier, UnfoldOrder};
 use super::mesh::{Triangles, is_flat, place_of};
+use super::plane::Plane;
 use super::slot::{CrackMaterial, MaterialSlot, to_picture};
 use crate::plugin::api::hit::HitPoint;
 use crate::plugin::jobs::background::{BackgroundJob, PATIENCE, guarded};
 use crate::plugin::source::unfolding::Unfolding;
 use crate::unwrap::{LaidOut, MAX_TRIANGLES, MeshShape, Unwrap, UnwrapError};
-use bevy::{math::Affine2, platform::time::Instant, prelude::*};
+use bevy::{
+    math::{Affine2, Mat2},
+    platform::time::Instant,
+    prelude::*,
+};
 use std::sync::Arc;
 
 /// Texels for a unit of pattern space where there is no picture.
@@ -324,6 +329,28 @@ pub(super) fn forget(world: &mut World, entity: Entity) {
     {
         entity.remove::<Unfold>();
     }
+}
+
+/// The plane of the triangle in which a texel of a mesh lies that is laid out. Its picture is all of the layout, as it would lie in that plane.
+pub(super) fn plane_at(world: &World, entity: Entity, texel: Vec2) -> Option<Plane> {
+    let unfolding = unfolding(world, entity)?;
+    let layout = &unfolding.layout;
+    let triangle = layout.owner(texel.max(Vec2::ZERO).as_uvec2())?;
+    let [a, b, c] = layout.corners.get(triangle).copied().flatten()?;
+    let mesh = world.get_resource::<Assets<Mesh>>()?.get(&world.get::<Mesh3d>(entity)?.0)?;
+    let ([p, q, r], _) = Triangles::of(mesh).ok()?.get(triangle)?;
+    // From texels to the mesh's space.
+    let back = Mat2::from_cols(b - a, c - a).inverse();
+    let along = |way: Vec2| (q - p) * (back * way).x + (r - p) * (back * way).y;
+    let (right, down) = (along(Vec2::X), along(Vec2::Y));
+    let (side, normal) = (right.try_normalize()?, (q - p).cross(r - p).try_normalize()?);
+    let up = normal.cross(side);
+    let (scale, whole) = (Vec2::new(right.length(), down.length()), layout.size.as_vec2());
+    // Exact where the texel is, whatever is stretched.
+    let to_middle = (0.5 * whole - texel) * scale;
+    let middle = p + along(texel - a) + side * to_middle.x - up * to_middle.y;
+    let (rotation, size) = (Quat::from_mat3(&Mat3::from_cols(side, up, normal)), whole * scale);
+    (middle.is_finite() && size.is_finite()).then_some(Plane { middle, rotation, size, thickness: None })
 }
 
 /// The point that a hit is meant for on a mesh that is laid out: texture coordinates are those of its picture.

@@ -32,6 +32,9 @@ const THICKNESS: f32 = 0.18;
 /// How far 2D chips lie in front of their surface, in the entity's units.
 const IN_FRONT: f32 = 2e-3;
 
+/// The cosine of the most that the surface may turn from where it is hit to where a chip comes off.
+const SAME_PLANE: f32 = 0.8;
+
 /// All chips that are in the air.
 #[derive(Resource, Default)]
 pub(crate) struct Chips {
@@ -155,12 +158,15 @@ impl Chips {
             let crater = layer.crater(strike.impact, strike.pos, strike.energy);
             let Some(crater) = crater else { continue };
             let before = layer.crater(strike.impact, strike.pos, strike.before);
-            let Some(surface) = Surface::of(world, entity, active) else { continue };
+            let Some(surface) = Surface::of(world, entity, active, strike.pos) else { continue };
             let burst = surface.burst(world, entity, active, settings, strike)?;
             let count = settings.count.min(CrackChips::MOST) as f32 * strike.energy.max(0.0).sqrt();
             let seed = mix(active.surface.seed ^ u64::from(strike.impact) << 32 ^ u64::from(strike.energy.to_bits()));
             let count = (count.round() as usize).min(CrackChips::MOST as usize);
-            let Some(cut) = Pieces::of(&crater, before.as_ref(), count, surface.extent, seed) else { continue };
+            let is_there = |pos: Vec2| surface.lies_in_its_plane(world, entity, active, pos);
+            let Some(cut) = Pieces::of(&crater, before.as_ref(), (count, surface.extent), is_there, seed) else {
+                continue;
+            };
             self.release(world, entity, active, &surface, (&cut, &burst), seed);
         }
         Ok(())
@@ -217,13 +223,14 @@ impl Chips {
         entity: Entity,
         active: &Active,
     ) -> Option<(UntypedHandle, Option<UntypedHandle>)> {
-        let Carrier { kind, own, shown, is_twofold, .. } = &active.carrier;
+        let Carrier { kind, own, shown, is_twofold, unfolding, .. } = &active.carrier;
         let of = own.as_ref().unwrap_or(&shown.asset);
         if let Some(known) = self.materials.get(&entity).filter(|known| known.of == *of) {
             return Some((known.picture.clone(), known.sides.clone()));
         }
         // The picture without cracks, unless the surface has it laid out in another way.
-        let plain = shown.diffuse.as_ref().filter(|_| shown.layout.is_none() && !is_twofold);
+        let is_its_own = unfolding.as_ref().is_none_or(|unfolding| unfolding.is_own);
+        let plain = shown.diffuse.as_ref().filter(|_| shown.layout.is_none() && !is_twofold && is_its_own);
         let image = plain.or(active.canvas.textures.diffuse.as_ref())?.clone();
         let picture = kind.shard_material(world, entity, &active.carrier, &image, 1.0)?;
         let bright = rim_for(&ShatterCracks::default(), &active.preset.look).bright;
@@ -248,13 +255,25 @@ struct Surface {
 }
 
 impl Surface {
-    /// `None` if it is not flat, or shows nothing.
-    fn of(world: &World, entity: Entity, active: &Active) -> Option<Self> {
+    /// As it is where it is hit, at `pos`, pattern units. `None` if it shows nothing, or is neither flat nor laid out.
+    fn of(world: &World, entity: Entity, active: &Active, pos: Vec2) -> Option<Self> {
         let seen = active.canvas.seen()?;
-        let plane = active.carrier.kind.plane(world, entity, seen).ok()?;
+        let kind = active.carrier.kind;
+        let plane = match &active.carrier.unfolding {
+            Some(unfolding) => kind.plane_at(world, entity, pos * unfolding.unit)?,
+            None => kind.plane(world, entity, seen).ok()?,
+        };
         let size = active.canvas.base.size.as_vec2();
         let uv = [seen.min.as_vec2() / size, seen.max.as_vec2() / size];
         Some(Self { plane, extent: active.cracks.growth.network().extent(), uv })
+    }
+
+    /// Whether a place, pattern units, lies about in the plane; always on what is flat.
+    fn lies_in_its_plane(&self, world: &World, entity: Entity, active: &Active, pos: Vec2) -> bool {
+        active.carrier.unfolding.as_ref().is_none_or(|unfolding| {
+            let there = active.carrier.kind.plane_at(world, entity, pos * unfolding.unit);
+            there.is_some_and(|there| (there.rotation * Vec3::Z).dot(self.plane.rotation * Vec3::Z) > SAME_PLANE)
+        })
     }
 
     /// Texture coordinates of a place, pattern units.
@@ -298,8 +317,14 @@ struct Pieces {
 }
 
 impl Pieces {
-    /// About `count` pieces of a crater, of what is not in the crater `before` and lies on the surface.
-    fn of(crater: &Crater, before: Option<&Crater>, count: usize, extent: Vec2, seed: u64) -> Option<Self> {
+    /// About `count` pieces of a crater, of what is not in the crater `before`, lies on the surface, and `is_there`.
+    fn of(
+        crater: &Crater,
+        before: Option<&Crater>,
+        (count, extent): (usize, Vec2),
+        is_there: impl Fn(Vec2) -> bool,
+        seed: u64,
+    ) -> Option<Self> {
         let rings = crater.contours().rings;
         let outer = rings.first()?;
         let reach = 1.01 * crater.reach();
@@ -335,7 +360,8 @@ impl Pieces {
         let comes_off = |number: &u32| {
             let place = shards.inner_point(*number).map(|place| place + corner);
             place.is_some_and(|place| {
-                crater.depth_at(place) > 0.0 && before.is_none_or(|before| before.depth_at(place) == 0.0)
+                let is_new = before.is_none_or(|before| before.depth_at(place) == 0.0);
+                crater.depth_at(place) > 0.0 && is_new && is_there(place)
             })
         };
         let mut numbers: Vec<u32> =
@@ -368,7 +394,7 @@ mod tests {
             let crater = Crater::new(centre, &params, u64::from(seed)).unwrap();
             let small = CraterParams { radius: 0.5 * params.radius, ..params };
             let before = (seed % 2 == 0).then(|| Crater::new(centre, &small, u64::from(seed)).unwrap());
-            let pieces = Pieces::of(&crater, before.as_ref(), 64, extent, u64::from(seed)).unwrap();
+            let pieces = Pieces::of(&crater, before.as_ref(), (64, extent), |_| true, u64::from(seed)).unwrap();
             let mut covered = 0.0;
             for number in &pieces.numbers {
                 let place = pieces.shards.inner_point(*number).unwrap() + pieces.corner;
@@ -388,7 +414,7 @@ mod tests {
     #[test]
     fn few_chips_are_the_largest_and_none_are_none() {
         let crater = Crater::new(Vec2::splat(0.5), &CraterParams::DEFAULT, 3).unwrap();
-        let of = |count| Pieces::of(&crater, None, count, Vec2::ONE, 1).unwrap();
+        let of = |count| Pieces::of(&crater, None, (count, Vec2::ONE), |_| true, 1).unwrap();
         assert_eq!(of(0).numbers.len(), 0);
         let some = of(5);
         let areas: Vec<f32> = some.numbers.iter().map(|number| some.shards.get(*number).unwrap().area).collect();

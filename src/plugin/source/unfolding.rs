@@ -16,6 +16,8 @@ pub(crate) struct Unfolding {
     pub(crate) unit: f32,
     /// The point around which it is laid out, in the mesh's space.
     pub(crate) around: Vec3,
+    /// Whether the picture is laid out so itself.
+    pub(crate) is_own: bool,
     /// From texels to the coordinates of the picture, for each triangle.
     to_picture: Vec<Affine2>,
 }
@@ -38,7 +40,7 @@ impl Unfolding {
             if map.is_finite() { map } else { Affine2::from_mat2_translation(Mat2::ZERO, p) }
         });
         let to_picture = to_picture.collect();
-        Self { id, layout, unit, around, to_picture }
+        Self { id, layout, unit, around, is_own: false, to_picture }
     }
 
     /// Whether a texel shows nothing of the mesh.
