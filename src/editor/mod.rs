@@ -71,16 +71,13 @@ impl Plugin for CrackEditorPlugin {
         }
         if let Some(mut settings) = app.world_mut().get_resource_mut::<EguiGlobalSettings>() {
             settings.enable_absorb_bevy_input_system = true;
+            if core::mem::take(&mut settings.auto_create_primary_context) {
+                let choose = || place::choose_camera.run_if(place::has_no_camera);
+                app.add_systems(PreStartup, choose().before(EguiStartupSet::InitContexts))
+                    .add_systems(PreUpdate, choose().before(EguiPreUpdateSet::InitContexts));
+            }
         }
         app.insert_resource(CrackEditor { is_open: self.is_open, key: self.key, ..default() })
-            .add_systems(
-                PreStartup,
-                place::choose_camera.run_if(place::is_open_to_choice).before(EguiStartupSet::InitContexts),
-            )
-            .add_systems(
-                PreUpdate,
-                place::choose_camera.run_if(place::is_open_to_choice).before(EguiPreUpdateSet::InitContexts),
-            )
             .add_observer(pointer::press)
             .add_observer(pointer::release)
             .add_systems(Update, (toggle, pointer::make_pickable.run_if(is_open)))

@@ -8,6 +8,10 @@ use crate::{
 use glam::Vec2;
 use std::cell::Cell;
 
+/// The depth, in levels of 255, from which on no crack is seen on a floor, and the same where there are ledges.
+const HIDDEN: f32 = 64.0;
+const HIDDEN_BELOW_LEDGES: f32 = 120.0;
+
 /// Plates and crushed zones of a patch; indices as in [`Patch`].
 pub(super) struct Extras<'a, const ROOM: usize> {
     facets: Option<&'a Facets>,
@@ -65,8 +69,8 @@ impl<'a, const ROOM: usize> Extras<'a, ROOM> {
             tint: settings.map_or(0.0, |all| all.tint),
             shades: settings.is_some_and(|all| all.broken),
             bare: settings.map_or(0.0, |all| if all.broken { all.bare } else { 0.0 }),
-            // The cracks go on over the upper ledges.
-            hides: settings.map_or(0.0, |all| if all.terraces > 2 { 1.0 / 120.0 } else { 1.0 / 64.0 }),
+            // With ledges, the cracks go on over the upper ones.
+            hides: settings.map_or(0.0, |all| if all.terraces > 2 { HIDDEN_BELOW_LEDGES } else { HIDDEN }.recip()),
             has_walls: settings.is_some_and(|all| !all.broken && all.hole > 0.0 && all.edge > 0.0),
             is_drawn: settings.is_some_and(|all| all.broken && all.outline > 0.0),
             deep: settings.map_or(0.0, |all| all.depth * look.deep),

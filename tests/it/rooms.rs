@@ -283,12 +283,26 @@ fn e9_meshes_that_fit_no_group() {
         steps(&mut app, 3);
         assert!(matches!(state(&app, group).status, CrackStatus::Failed(CrackError::Group { .. })));
     }
-    // Layouts that do not fit become coarser, and a mesh of its own is no place for a group.
+    // A mesh of its own.
     let own = app.world_mut().spawn((CrackSurface::new(preset()), Mesh3d(good.clone()))).id();
     app.world_mut().spawn((Mesh3d(good.clone()), MeshMaterial3d(material.clone()), CrackMemberOf(own)));
     hit(&mut app, CrackHit::world(own, Vec3::ZERO));
     steps(&mut app, 3);
     assert!(matches!(state(&app, own).status, CrackStatus::Failed(_)));
+    // A preset that is invalid.
+    let mut invalid = preset();
+    invalid.growth.reach = f32::NAN;
+    let group = app.world_mut().spawn(CrackSurface::new(invalid)).id();
+    app.world_mut().spawn((Mesh3d(good.clone()), MeshMaterial3d(material.clone()), CrackMemberOf(group)));
+    hit(&mut app, CrackHit::world(group, Vec3::ZERO));
+    steps(&mut app, 5);
+    assert!(matches!(state(&app, group).status, CrackStatus::Failed(CrackError::Preset { .. })));
+    // A sprite of its own.
+    let own = app.world_mut().spawn((CrackSurface::new(preset()), Sprite::default())).id();
+    app.world_mut().spawn((Mesh3d(good.clone()), MeshMaterial3d(material.clone()), CrackMemberOf(own)));
+    hit(&mut app, CrackHit::world(own, Vec3::ZERO));
+    steps(&mut app, 3);
+    assert!(matches!(state(&app, own).status, CrackStatus::Failed(CrackError::Group { .. })));
     // A picture whose texels the CPU does not have.
     let mut image = solid(UVec2::splat(4), [9; 4]);
     image.data = None;

@@ -1,17 +1,15 @@
 //! When the mesh of a group is made, and shown in place of its members.
 
 use super::body::{BodyWork, MadeBody};
-use super::common::{SHARE, is_wanted, warn_left_out};
-use super::hide::Shown;
+use super::common::{self, GroupFrame, Whole, warn_left_out};
+use super::hide::Replaced;
 use super::solids::{Solids, place_in};
-use crate::plugin::api::{CrackBudget, CrackError, CrackGroup, CrackMemberOf, CrackTextures};
+use crate::plugin::api::{CrackError, CrackGroup, CrackMemberOf, CrackTextures};
 use crate::plugin::carrier::unfold;
 use crate::plugin::jobs::background::PATIENCE;
-use crate::plugin::jobs::copy::{CopyProgress, MAX_BYTES, PictureCopies};
-use crate::plugin::jobs::frame_time::{FrameClock, Timer};
+use crate::plugin::jobs::copy::{CopyProgress, PictureCopies};
 use crate::plugin::jobs::stepped::{News, Running};
 use crate::plugin::jobs::threads::Threads;
-use crate::plugin::surface::prepare::{self, Preparations};
 use crate::plugin::surface::unfold::order;
 use bevy::{
     asset::RenderAssetUsages,
@@ -40,9 +38,8 @@ pub(crate) struct BodyChanges(EntityHashSet);
 pub(crate) struct Body {
     stage: Stage,
     mesh: Handle<Mesh>,
-    material: Handle<StandardMaterial>,
     members: Vec<Member>,
-    shown: Shown,
+    replaced: Replaced,
     has_warned: bool,
 }
 
@@ -80,17 +77,9 @@ struct MadeOf {
     layers: Option<RenderLayers>,
 }
 
-/// Whether a group is, or would be, one of meshes.
-pub(super) fn is_solid(world: &World, group: Entity) -> bool {
-    world.get::<Body>(group).is_some()
-        || world
-            .get::<CrackGroup>(group)
-            .is_some_and(|members| members.iter().any(|member| world.get::<Mesh3d>(member).is_some()))
-}
-
 /// Whether there is any group that may be one of meshes.
 pub(crate) fn any_groups(groups: Query<(), Or<(With<CrackGroup>, With<Body>)>>) -> bool {
-    !groups.is_empty()
+    common::any_groups(groups)
 }
 
 /// Notes groups of which some member may have moved or gone.
@@ -108,77 +97,32 @@ pub(crate) fn watch_members(
 
 /// Goes on with all groups of meshes.
 pub(crate) fn make_bodies(world: &mut World, mut found: Local<Vec<Entity>>) {
-    let timer = world.resource::<FrameClock>().start(world.resource::<CrackBudget>(), SHARE);
-    let mut groups = world.query_filtered::<Entity, Or<(With<CrackGroup>, With<Body>)>>();
-    found.clear();
-    found.extend(groups.iter(world));
-    found.sort_unstable();
     let changes = core::mem::take(&mut world.resource_mut::<BodyChanges>().0);
-    let prepared: EntityHashSet = world.resource::<Preparations>().wanted().collect();
-    let mut left = MAX_BYTES;
-    for &group in found.iter() {
-        let wanted = is_wanted(world, group, &prepared);
-        let body = world.get_mut::<Body>(group).map(|mut body| core::mem::take(&mut *body));
-        if body.is_none() && (!wanted || is_sprite(world, group) || !is_solid(world, group)) {
-            continue;
-        }
-        let mut body = body.unwrap_or_default();
-        match body.go_on(world, group, wanted, changes.contains(&group), (&timer, &mut left)) {
-            Ok(true) => match world.get_mut::<Body>(group) {
-                Some(mut place) => *place = body,
-                None => _ = world.get_entity_mut(group).map(|mut group| _ = group.insert(body)),
-            },
-            Ok(false) => _ = world.get_entity_mut(group).map(|mut group| _ = group.remove::<Body>()),
-            Err(error) => {
-                body.stage = Stage::Rest;
-                if let Some(mut place) = world.get_mut::<Body>(group) {
-                    *place = body;
-                }
-                prepare::fail(world, group, error);
-            }
-        }
-    }
-    world.resource_mut::<FrameClock>().stop(&timer);
+    common::go_on_with_all::<Body>(world, &mut found, &changes);
 }
 
-/// Whether a group shows a sprite already.
-fn is_sprite(world: &World, group: Entity) -> bool {
-    #[cfg(feature = "2d")]
-    return world.get::<Sprite>(group).is_some();
-    #[cfg(not(feature = "2d"))]
-    return world.get_entity(group).is_err();
-}
-
-impl Body {
-    fn is_there(&self) -> bool {
-        self.mesh != Handle::default()
+impl Whole for Body {
+    fn is_for(world: &World, group: Entity) -> bool {
+        common::is_solid(world, group)
     }
 
-    /// A frame's work; whether there is anything to remember.
-    fn go_on(
-        &mut self,
-        world: &mut World,
-        group: Entity,
-        wanted: bool,
-        has_changed: bool,
-        (timer, left): (&Timer, &mut usize),
-    ) -> Result<bool, CrackError> {
+    fn go_on(&mut self, world: &mut World, group: Entity, frame: &mut GroupFrame<'_>) -> Result<bool, CrackError> {
         let has_cracked = world.get::<CrackTextures>(group).is_some();
-        if !has_cracked && !wanted {
+        if !has_cracked && !frame.wanted {
             self.stage = Stage::Rest;
             return Ok(!self.take_down(world, group));
         }
         self.stage = match core::mem::take(&mut self.stage) {
             Stage::Rest if !self.is_there() => self.begin(world, group)?,
             Stage::Rest => {
-                if has_changed {
+                if frame.has_changed {
                     self.let_go(world, group);
                 }
                 Stage::Rest
             }
-            Stage::Copying { copies, solids, since } => copy(world, group, copies, solids, (since, left)),
+            Stage::Copying { copies, solids, since } => copy(world, group, copies, solids, (since, &mut frame.left))?,
             Stage::Making { work, made_of } => {
-                match world.resource_scope(|_, mut threads: Mut<Threads>| work.look(&mut threads, timer)) {
+                match world.resource_scope(|_, mut threads: Mut<Threads>| work.look(&mut threads, frame.timer)) {
                     News::Going(work, _) => Stage::Making { work, made_of },
                     News::Ended(made) => {
                         self.put_up(world, group, made?, *made_of);
@@ -187,8 +131,18 @@ impl Body {
                 }
             }
         };
-        self.shown.hide_more(world, has_cracked);
+        self.replaced.hide_more(world, has_cracked);
         Ok(true)
+    }
+
+    fn rest(&mut self) {
+        self.stage = Stage::Rest;
+    }
+}
+
+impl Body {
+    fn is_there(&self) -> bool {
+        self.mesh != Handle::default()
     }
 
     fn begin(&mut self, world: &World, group: Entity) -> Result<Stage, CrackError> {
@@ -225,14 +179,14 @@ impl Body {
             ..of.material
         };
         let Some(mut materials) = world.get_resource_mut::<Assets<StandardMaterial>>() else { return };
-        self.material = materials.add(material);
+        let material = materials.add(material);
         let Some(mut meshes) = world.get_resource_mut::<Assets<Mesh>>() else { return };
-        self.mesh = meshes.add((*made.mesh).clone());
+        self.mesh = meshes.add(made.before);
         let (casts, receives) =
             (world.get::<NotShadowCaster>(first.0).is_none(), world.get::<NotShadowReceiver>(first.0).is_none());
         unfold::give(world, group, self.mesh.clone(), made.mesh, made.unfolding);
         if let Ok(mut group) = world.get_entity_mut(group) {
-            group.insert(MeshMaterial3d(self.material.clone()));
+            group.insert(MeshMaterial3d(material));
             if let Some(layers) = of.layers.filter(|_| !group.contains::<RenderLayers>()) {
                 group.insert(layers);
             }
@@ -245,7 +199,7 @@ impl Body {
         }
         let members = of.members.into_iter().zip(made.triangles);
         self.members = members.map(|((entity, place), triangles)| Member { entity, place, triangles }).collect();
-        self.shown.become_of(world, self.members.iter().map(|member| member.entity).collect());
+        self.replaced.become_of(world, self.members.iter().map(|member| member.entity).collect());
         self.let_go(world, group);
     }
 
@@ -268,12 +222,12 @@ impl Body {
                 }
             }
         }
-        self.shown.become_of(world, self.members.iter().map(|member| member.entity).collect());
+        self.replaced.become_of(world, self.members.iter().map(|member| member.entity).collect());
     }
 
     /// Shows members again, some in each frame, and then nothing of the group; whether that is done.
     fn take_down(&mut self, world: &mut World, group: Entity) -> bool {
-        let is_over = self.shown.show_more(world);
+        let is_over = self.replaced.show_more(world);
         if is_over
             && self.is_there()
             && let Ok(mut group) = world.get_entity_mut(group)
@@ -291,19 +245,22 @@ fn copy(
     mut copies: PictureCopies,
     solids: Box<Solids>,
     (since, left): (Instant, &mut usize),
-) -> Stage {
-    let Some(images) = world.get_resource::<Assets<Image>>() else { return Stage::Rest };
+) -> Result<Stage, CrackError> {
+    let Some(images) = world.get_resource::<Assets<Image>>() else { return Ok(Stage::Rest) };
     if since.elapsed() >= PATIENCE {
         copies.wait_no_more();
     }
-    match copies.step(images, left) {
+    Ok(match copies.step(images, left) {
         CopyProgress::More => Stage::Copying { copies, solids, since },
         CopyProgress::Changed => Stage::Rest,
         CopyProgress::Done => {
-            let Some(order) = order(world, group) else { return Stage::Copying { copies, solids, since } };
+            // Until its preset is there.
+            let Some(order) = order(world, group)? else { return Ok(Stage::Copying { copies, solids, since }) };
             let meshes = world.get_resource::<Assets<Mesh>>();
             let read = |mesh: &Handle<Mesh>| meshes.and_then(|meshes| meshes.get(mesh)).cloned();
-            let Some(meshes) = solids.list.iter().map(|solid| read(&solid.mesh)).collect() else { return Stage::Rest };
+            let Some(meshes) = solids.list.iter().map(|solid| read(&solid.mesh)).collect() else {
+                return Ok(Stage::Rest);
+            };
             let axes = world.get::<GlobalTransform>(group).copied().unwrap_or_default().affine().matrix3;
             let scale = Vec3::new(axes.x_axis.length(), axes.y_axis.length(), axes.z_axis.length());
             let made_of = Box::new(MadeOf {
@@ -315,7 +272,7 @@ fn copy(
             let work = BodyWork::new(*solids, meshes, copies.finish(), order, scale);
             Stage::Making { work: Running::start(world.resource::<Threads>(), work), made_of }
         }
-    }
+    })
 }
 
 /// Whether a member is where it was, but for rounding.

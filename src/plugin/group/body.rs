@@ -26,6 +26,8 @@ const FLAT: [u8; 4] = [128, 128, 255, 255];
 /// What a task makes of the members of a group.
 pub(super) struct MadeBody {
     pub(super) mesh: Box<Mesh>,
+    /// The same, to be shown until it is cracked.
+    pub(super) before: Mesh,
     pub(super) unfolding: Arc<Unfolding>,
     /// The triangles of each member.
     pub(super) triangles: Vec<Range<usize>>,
@@ -134,7 +136,8 @@ impl BodyWork {
         let own = layout.corners.clone();
         let own =
             |i: usize| own.get(i).copied().flatten().map(|corners: [Vec2; 3]| corners.map(|corner| corner / size));
-        let unfolding = Unfolding::new(order.id, layout, unit, around, own);
+        let mut unfolding = Unfolding::new(order.id, layout, unit, around, own);
+        unfolding.is_own = true;
         let Joined { owner, triangles, .. } = &joined;
         let (owner, triangles) = (owner.clone(), triangles.clone());
         let mesh = joined.mesh().ok_or_else(|| failed("its members have no mesh".into()))?;
@@ -219,8 +222,8 @@ impl Stepped for BodyWork {
         if let Some(normal) = &mut normal {
             to_pictures.turn_normals(normal);
         }
-        let (mesh, unfolding) = (Box::new(mesh), Arc::new(unfolding));
-        Ok(Step::Done(MadeBody { mesh, unfolding, triangles, diffuse, normal }))
+        let (before, mesh, unfolding) = (mesh.clone(), Box::new(mesh), Arc::new(unfolding));
+        Ok(Step::Done(MadeBody { mesh, before, unfolding, triangles, diffuse, normal }))
     }
 
     fn progress(&self) -> f32 {

@@ -11,7 +11,7 @@ const MAX_MEMBERS: usize = 512;
 
 /// The members that a group shows in their place.
 #[derive(Default)]
-pub(super) struct Shown {
+pub(super) struct Replaced {
     members: Vec<Entity>,
     /// How many of them are hidden.
     hidden: usize,
@@ -19,7 +19,7 @@ pub(super) struct Shown {
     frames: u32,
 }
 
-impl Shown {
+impl Replaced {
     /// Goes on with hiding them, once the group has been drawn.
     pub(super) fn hide_more(&mut self, world: &mut World, has_cracked: bool) {
         self.frames = if has_cracked { self.frames.saturating_add(1) } else { 0 };

@@ -1,16 +1,14 @@
 //! When the picture of a group is made, and shown in place of its members.
 
-use super::common::{SHARE, is_wanted, warn_left_out};
-use super::hide::Shown;
+use super::common::{self, GroupFrame, Whole, warn_left_out};
+use super::hide::Replaced;
 use super::members::Members;
 use super::wall::{WallFrame, WallWork};
-use crate::plugin::api::{CrackBudget, CrackError, CrackGroup, CrackMemberOf, CrackTextures};
+use crate::plugin::api::{CrackError, CrackGroup, CrackMemberOf, CrackTextures};
 use crate::plugin::jobs::background::PATIENCE;
-use crate::plugin::jobs::copy::{CopyProgress, MAX_BYTES, PictureCopies};
-use crate::plugin::jobs::frame_time::{FrameClock, Timer};
+use crate::plugin::jobs::copy::{CopyProgress, PictureCopies};
 use crate::plugin::jobs::stepped::{News, Running};
 use crate::plugin::jobs::threads::Threads;
-use crate::plugin::surface::prepare::{self, Preparations};
 use bevy::{
     asset::RenderAssetUsages,
     camera::visibility::RenderLayers,
@@ -41,7 +39,7 @@ pub(crate) struct Wall {
     /// Members that have left it.
     gone: EntityHashSet,
     /// Members that lie within it.
-    within: Shown,
+    within: Replaced,
     /// Whether members have changed since it was made.
     is_stale: bool,
     /// For how many frames it is not made again.
@@ -61,11 +59,6 @@ enum Stage {
         since: Instant,
     },
     Making(Running<WallWork>, Box<Members>),
-}
-
-/// Whether there is any group.
-pub(crate) fn any_groups(groups: Query<(), Or<(With<CrackGroup>, With<Wall>)>>) -> bool {
-    !groups.is_empty()
 }
 
 /// What a member may show, and how.
@@ -103,79 +96,37 @@ pub(crate) fn watch_members(
     }
 }
 
-/// Goes on with all groups.
+/// Whether there is any group.
+pub(crate) fn any_groups(groups: Query<(), Or<(With<CrackGroup>, With<Wall>)>>) -> bool {
+    common::any_groups(groups)
+}
+
+/// Goes on with all groups of sprites and tile maps.
 pub(crate) fn make_walls(world: &mut World, mut found: Local<Vec<Entity>>) {
-    let timer = world.resource::<FrameClock>().start(world.resource::<CrackBudget>(), SHARE);
-    let mut groups = world.query_filtered::<Entity, Or<(With<CrackGroup>, With<Wall>)>>();
-    found.clear();
-    found.extend(groups.iter(world));
-    found.sort_unstable();
     let changes = core::mem::take(&mut world.resource_mut::<GroupChanges>().0);
-    let prepared: EntityHashSet = world.resource::<Preparations>().wanted().collect();
-    let mut left = MAX_BYTES;
-    for &group in found.iter() {
-        let wanted = is_wanted(world, group, &prepared);
-        let wall = world.get_mut::<Wall>(group).map(|mut wall| core::mem::take(&mut *wall));
-        if wall.is_none() && (!wanted || is_solid(world, group)) {
-            continue;
-        }
-        let mut wall = wall.unwrap_or_default();
-        wall.is_stale |= changes.contains(&group);
-        match wall.go_on(world, group, wanted, &timer, &mut left) {
-            Ok(true) => match world.get_mut::<Wall>(group) {
-                Some(mut place) => *place = wall,
-                None => _ = world.get_entity_mut(group).map(|mut group| _ = group.insert(wall)),
-            },
-            Ok(false) => _ = world.get_entity_mut(group).map(|mut group| _ = group.remove::<Wall>()),
-            Err(error) => {
-                // What it shows stays until its cracks are healed.
-                wall.stage = Stage::Rest;
-                if let Some(mut place) = world.get_mut::<Wall>(group) {
-                    *place = wall;
-                }
-                prepare::fail(world, group, error);
-            }
-        }
-    }
-    world.resource_mut::<FrameClock>().stop(&timer);
+    common::go_on_with_all::<Wall>(world, &mut found, &changes);
 }
 
-/// Whether a group has meshes in 3D, which are put together in another way.
-fn is_solid(world: &World, group: Entity) -> bool {
-    #[cfg(feature = "3d")]
-    return super::bodies::is_solid(world, group);
-    #[cfg(not(feature = "3d"))]
-    return world.get_entity(group).is_err();
-}
-
-impl Wall {
-    /// Whether there is a picture.
-    fn is_there(&self) -> bool {
-        self.picture != Handle::default()
+impl Whole for Wall {
+    fn is_for(world: &World, group: Entity) -> bool {
+        !common::is_solid(world, group)
     }
 
-    /// A frame's work; whether there is anything to remember.
-    fn go_on(
-        &mut self,
-        world: &mut World,
-        group: Entity,
-        wanted: bool,
-        timer: &Timer,
-        left: &mut usize,
-    ) -> Result<bool, CrackError> {
+    fn go_on(&mut self, world: &mut World, group: Entity, frame: &mut GroupFrame<'_>) -> Result<bool, CrackError> {
         let has_cracked = world.get::<CrackTextures>(group).is_some();
-        if !has_cracked && !wanted {
+        if !has_cracked && !frame.wanted {
             self.stage = Stage::Rest;
             return Ok(!self.take_down(world, group));
         }
+        self.is_stale |= frame.has_changed;
         self.pause = self.pause.saturating_sub(1);
         self.stage = match core::mem::take(&mut self.stage) {
             Stage::Rest if !self.is_there() => self.begin(world, group)?,
             Stage::Rest if self.is_stale && self.pause == 0 => self.begin_again(world, group)?,
             Stage::Rest => Stage::Rest,
-            Stage::Copying { copies, members, since } => self.copy(world, copies, members, since, left),
+            Stage::Copying { copies, members, since } => self.copy(world, copies, members, since, &mut frame.left),
             Stage::Making(running, members) => {
-                match world.resource_scope(|_, mut threads: Mut<Threads>| running.look(&mut threads, timer)) {
+                match world.resource_scope(|_, mut threads: Mut<Threads>| running.look(&mut threads, frame.timer)) {
                     News::Going(running, _) => Stage::Making(running, members),
                     News::Ended(texels) => {
                         self.put_up(world, group, texels?, *members);
@@ -186,6 +137,17 @@ impl Wall {
         };
         self.within.hide_more(world, has_cracked);
         Ok(true)
+    }
+
+    fn rest(&mut self) {
+        self.stage = Stage::Rest;
+    }
+}
+
+impl Wall {
+    /// Whether there is a picture.
+    fn is_there(&self) -> bool {
+        self.picture != Handle::default()
     }
 
     /// The first picture.

@@ -3,8 +3,8 @@
 use super::picture_plan::texel_bytes;
 use crate::plugin::api::textures::Maps;
 use crate::plugin::api::{
-    CrackBudget, CrackMaskSource, CrackRecord, CrackResolution, CrackStrands, CrackSurface, CrackUnwrap, GuidedCracks,
-    HitPoint,
+    CrackBudget, CrackError, CrackMaskSource, CrackRecord, CrackResolution, CrackStrands, CrackSurface, CrackUnwrap,
+    GuidedCracks, HitPoint,
 };
 use crate::plugin::carrier::kind::UnfoldOrder;
 use crate::plugin::carrier::kinds;
@@ -41,17 +41,17 @@ pub(crate) fn unfold(world: &mut World, entity: Entity) -> bool {
         return true;
     }
     match order(world, entity) {
-        Some(order) => kind.unfold(world, entity, &order),
-        None => true,
+        Ok(Some(order)) => kind.unfold(world, entity, &order),
+        _ => true,
     }
 }
 
 /// How the mesh of a surface that has not cracked is to be laid out; `None` as long as its preset is not there.
-pub(crate) fn order(world: &mut World, entity: Entity) -> Option<UnfoldOrder> {
-    let surface = world.get::<CrackSurface>(entity)?;
+pub(crate) fn order(world: &mut World, entity: Entity) -> Result<Option<UnfoldOrder>, CrackError> {
+    let Some(surface) = world.get::<CrackSurface>(entity) else { return Ok(None) };
     let must = surface.unwrap == CrackUnwrap::Always;
     let write = surface.write;
-    let preset = preset::resolve(world, &surface.preset).ok()??;
+    let Some(preset) = preset::resolve(world, &surface.preset)? else { return Ok(None) };
     let texel = texel_bytes(Maps::wanted(write, &preset.look), preset.look.layer(0).bytes_per_texel());
     let budget = world.resource::<CrackBudget>();
     let left = budget.max_texture_bytes.saturating_sub(world.resource::<TextureMemory>().used());
@@ -69,5 +69,5 @@ pub(crate) fn order(world: &mut World, entity: Entity) -> Option<UnfoldOrder> {
         id: world.resource::<Unfoldings>().0,
     };
     world.resource_mut::<Unfoldings>().0 += 1;
-    Some(order)
+    Ok(Some(order))
 }

@@ -95,12 +95,12 @@ impl Shape<'_> {
                     cloud *= 1.0 - fall * (0.4 - 0.4 * noise(seed ^ 8, at.x / wide, at.y / (7.0 * wide)));
                 }
                 place.pale = place.pale.max(dust * left * left * cloud * (1.0 - inside));
-                if broken.steps.len() > 1 {
+                if broken.has_ledges() {
                     self.add_dust(place, at, left, 1.0 - inside, seed);
                 }
             }
             if self.jag > 0.0 {
-                let many = if broken.steps.len() > 1 { 2.0 } else { 1.0 };
+                let many = if broken.has_ledges() { 2.0 } else { 1.0 };
                 self.add_crumbs(place, at, (many * (1.2 * chips * left).min(0.6) * left).min(0.9), inside, seed);
             } else if self.crushed.outline <= 0.0 {
                 self.add_grit(place, at, (chips * left).min(0.5) * left, seed);
@@ -150,7 +150,7 @@ impl Shape<'_> {
             // A shallow edge, and deeper and deeper steps.
             _ => EDGE,
         };
-        let has_ledges = broken.steps.len() > 1;
+        let has_ledges = broken.has_ledges();
         // In some places a wall is a slope.
         let slope = bump(draws::WALL_SLOPE, (0.35 * self.radius).max(4.0));
         let run = if crumbles { 0.8 + 1.4 * slope.max(0.0) } else { 1.0 };

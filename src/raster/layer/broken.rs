@@ -78,6 +78,11 @@ pub(super) struct Broken {
 }
 
 impl Broken {
+    /// Whether there are ledges below the edge, and not only a step or none.
+    pub(super) fn has_ledges(&self) -> bool {
+        self.steps.len() > 1
+    }
+
     pub(super) fn new(crushed: &CrushedZone, unit: f32, radius: f32, grain: f32, seed: u32, bricks: &Bricks) -> Self {
         let CrushedZone { ragged, reach, fall, .. } = *crushed;
         // The root of the energy.

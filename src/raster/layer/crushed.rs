@@ -43,8 +43,9 @@ pub struct CrushedZone {
     /// more than half of the depth. 0..=1; default 0 = a flat floor.
     pub basin: f32,
     /// Number of terraces of a [`broken`](Self::broken) zone from its edge to the bottom, each inside the one before:
-    /// the contours of a [`Crater`](crate::relief::Crater), in place of the [`basin`](Self::basin). 0..=4; default 0 =
-    /// none.
+    /// the contours of a [`Crater`](crate::relief::Crater), in place of the [`basin`](Self::basin). From three on, the
+    /// floor is a hollow around the hit as well, with powder on it, and more dust and larger chips lie around.
+    /// 0..=4; default 0 = none.
     pub terraces: u32,
     /// Number of smaller flakes that have come off further out, for a [`broken`](Self::broken) zone at energy 1;
     /// proportional to the root of the energy. 0..=16; default 0.

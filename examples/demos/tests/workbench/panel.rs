@@ -10,7 +10,7 @@ use bevy_crack::{
     plugin::{CrackDrive, PresetSource},
     prelude::*,
 };
-use bevy_egui::egui;
+use bevy_egui::{EguiSchedule, egui};
 use egui_kittest::{Harness, kittest::Queryable};
 use std::path::Path;
 
@@ -224,9 +224,15 @@ fn the_panel_is_in_the_whole_window() {
             app.update();
             assert_eq!(chosen(&mut app), "over", "spawned as {order:?}");
         }
-        app.world_mut().spawn((Camera2d, Camera { order: 3, ..default() }));
+        app.world_mut().spawn((Camera2d, Camera { order: 3, ..default() }, Name::new("of the next level")));
         app.update();
         assert_eq!(chosen(&mut app), "over", "the panel does not jump");
+        // As if that camera had gone: without a renderer the engine cannot despawn one.
+        let mut chosen_one = app.world_mut().query_filtered::<Entity, With<PrimaryEguiContext>>();
+        let camera = chosen_one.single(app.world()).expect("one");
+        app.world_mut().entity_mut(camera).remove::<(PrimaryEguiContext, EguiSchedule)>();
+        app.update();
+        assert_eq!(chosen(&mut app), "of the next level");
     }
     let mut app = app(|app| {
         app.add_plugins(CrackEditorPlugin::default());
