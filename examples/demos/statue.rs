@@ -1,7 +1,7 @@
 //! A stone pedestal with a clay jar on it, and a ball of plaster beside it, to shoot at: cracks run over the edges of the box and around the
-//! curves of the others.
+//! curves of the others. At last the ball falls to pieces, as a hollow shell.
 //!
-//! Click to shoot; H heals everything. The camera goes around them.
+//! Click to shoot; B breaks the ball; H heals everything. The camera goes around them.
 //!
 //! Without a display (or with `--headless`) a script plays, and pictures and a GIF are written to `--out`.
 //! Try `--frames 120 --out film`.
@@ -14,7 +14,7 @@ use bevy::{
     mesh::{Indices, PrimitiveTopology},
     prelude::*,
 };
-use bevy_crack::prelude::*;
+use bevy_crack::{prelude::*, shatter::BurstParams};
 use bevy_crack_demos::{DemoArguments, Script, demo_app, heal_on_h, hit_on_press, play, with_normals};
 use std::f32::consts::TAU;
 
@@ -51,6 +51,9 @@ const SHOTS: [(usize, f32, f32, f32); 7] = [
     (0, 0.35, -0.3, 1.5),
 ];
 
+/// Which of the three the ball is.
+const BALL: usize = 2;
+
 #[derive(Component)]
 struct Target(usize);
 
@@ -58,7 +61,7 @@ fn main() -> AppExit {
     let arguments = DemoArguments::given("A pedestal, a jar and a ball whose cracks run all around them");
     let mut app = demo_app("bevy_crack: statue", &arguments);
     app.add_systems(Startup, setup).add_systems(Update, go_around);
-    play(app, heal_on_h, play_script)
+    play(app, (heal_on_h, break_on_b), play_script)
 }
 
 fn setup(
@@ -112,8 +115,14 @@ fn setup(
         (Sphere::new(0.42).mesh().uv(96, 64), plaster, Transform::from_xyz(0.75, 0.42, -0.35), ball),
     ];
     for (i, (mesh, material, place, surface)) in targets.into_iter().enumerate() {
+        let pieces = ShatterCracks {
+            thickness: 0.07,
+            floor: Some(0.0),
+            burst: BurstParams { fade_after: 30.0, ..BurstParams::DEFAULT },
+            ..default()
+        };
         commands
-            .spawn((Target(i), Mesh3d(meshes.add(mesh)), MeshMaterial3d(material), place, surface))
+            .spawn((Target(i), Mesh3d(meshes.add(mesh)), MeshMaterial3d(material), place, surface, pieces))
             .observe(hit_on_press);
     }
 }
@@ -162,9 +171,29 @@ fn go_around(time: Res<Time>, mut camera: Query<&mut Transform, With<Camera3d>>)
     }
 }
 
-/// The scripted run: shots at all of them in turn.
+/// Takes the ball apart.
+fn break_ball(commands: &mut Commands, targets: &Query<(Entity, &Target, &GlobalTransform)>) {
+    for (entity, ..) in targets.iter().filter(|(_, target, _)| target.0 == BALL) {
+        commands.entity(entity).shatter_cracks(ShatterRequest::EVERYTHING.with_energy(2.5));
+    }
+}
+
+fn break_on_b(
+    mut commands: Commands,
+    keys: Res<ButtonInput<KeyCode>>,
+    targets: Query<(Entity, &Target, &GlobalTransform)>,
+) {
+    if keys.just_pressed(KeyCode::KeyB) {
+        break_ball(&mut commands, &targets);
+    }
+}
+
+/// The scripted run: shots at all of them in turn; then the ball breaks.
 fn play_script(mut commands: Commands, script: Script, targets: Query<(Entity, &Target, &GlobalTransform)>) {
-    for i in script.due(SHOTS.len() as u32, 0.05..0.75) {
+    if script.is_at(0.7) {
+        break_ball(&mut commands, &targets);
+    }
+    for i in script.due(SHOTS.len() as u32, 0.05..0.6) {
         let (which, angle, height, energy) = SHOTS[i as usize];
         let Some((entity, _, at)) = targets.iter().find(|(_, target, _)| target.0 == which) else { continue };
         let middle = at.translation() + Vec3::Y * (height + if which == 1 { 0.6 } else { 0.0 });

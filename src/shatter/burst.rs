@@ -98,7 +98,8 @@ pub struct Burst {
     params: BurstParams,
     gravity: Vec3,
     floor: Option<Floor>,
-    from: Vec2,
+    /// y up, z towards the viewer.
+    from: Vec3,
     direction: Vec3,
     energy: f32,
     seed: u64,
@@ -171,6 +172,7 @@ impl Burst {
             return Err(ShatterError::NotFinite { index: 0 });
         }
         let direction = direction.try_normalize().unwrap_or(Vec3::NEG_Z);
+        let from = Vec3::new(from.x, -from.y, 0.0);
         Ok(Self { gravity: params.gravity.extend(0.0), floor: None, params, from, direction, energy, seed })
     }
 
@@ -180,6 +182,14 @@ impl Burst {
     #[must_use]
     pub fn with_gravity(mut self, gravity: Vec3) -> Self {
         self.gravity = if gravity.is_finite() { gravity } else { Vec3::ZERO };
+        self
+    }
+
+    /// The same burst from a point that need not lie in the picture (pattern units from its top left; x right, y up, z towards the viewer): a
+    /// piece of a body that is not flat lies in a plane of its own. One that is not finite changes nothing.
+    #[must_use]
+    pub fn with_origin(mut self, origin: Vec3) -> Self {
+        self.from = if origin.is_finite() { origin } else { self.from };
         self
     }
 
@@ -213,12 +223,12 @@ impl Burst {
     #[must_use]
     pub fn flight(&self, number: u32, shard: &ShardShape) -> Flight {
         let BurstParams { speed, falloff, along, scatter, .. } = self.params;
-        let away = shard.centroid - self.from;
+        let away = middle(shard) - self.from;
         let distance = away.length();
         let mut rng = Rng::new(self.seed).stream("burst").substream(u64::from(number));
         let mut noise = || Vec3::new(rng.signed(), rng.signed(), rng.signed());
         // Away from the hit; a piece right at the hit moves only along its direction.
-        let out = Vec3::new(away.x, -away.y, 0.0) / (distance * distance + 0.1 * falloff * falloff).sqrt();
+        let out = away / (distance * distance + 0.1 * falloff * falloff).sqrt();
         let direction = out * (1.0 - along) + self.direction * along + noise() * (0.5 * scatter);
         let unevenness = 1.0 + scatter * rng.signed();
         let strength = falloff * falloff / (falloff * falloff + distance * distance);
@@ -231,7 +241,7 @@ impl Burst {
     pub fn fall(&self, number: u32, shard: &ShardShape) -> Flight {
         let mut rng = Rng::new(self.seed).stream("fall").substream(u64::from(number));
         let velocity = Vec3::new(rng.signed(), 0.0, rng.signed()) * (0.04 * self.params.scatter);
-        let mut flight = self.released(shard, velocity, shard.centroid.distance(self.from), rng);
+        let mut flight = self.released(shard, velocity, middle(shard).distance(self.from), rng);
         flight.spin *= 0.25;
         flight
     }
@@ -261,6 +271,11 @@ impl Burst {
     }
 }
 
+/// The middle of a piece in its place, y up.
+fn middle(shard: &ShardShape) -> Vec3 {
+    Vec3::new(shard.centroid.x, -shard.centroid.y, 0.0)
+}
+
 /// How much faster a piece moves than one of the usual area: the fourth root of the ratio, within 0.5..=2.
 fn lightness(area: f32) -> f32 {
     (USUAL_AREA / area.max(1e-9)).sqrt().sqrt().clamp(0.5, 2.0)
@@ -285,7 +300,7 @@ impl Flight {
 
     /// Computes where the piece comes to rest if there is a floor. `must` is set for parts of a piece that lands.
     fn land(&mut self, shard: &ShardShape, must: bool) {
-        let start = Vec3::new(shard.centroid.x, -shard.centroid.y, 0.0) + self.offset;
+        let start = middle(shard) + self.offset;
         let size = shard.area.max(0.0).sqrt();
         self.landing = self.floor.and_then(|floor| {
             floor.landing(start, (size, must), self.gravity, |time| {

@@ -6,7 +6,7 @@
 //! the surface exactly, and neighbours share every vertex of their common edge.
 //!
 //! Shards have triangles, [meshes](Shards::flat_mesh), [convex pieces](Shards::convex_pieces) for colliders, and
-//! neighbours. [`Support`] computes what falls, [`Shards::break_again`] cuts a piece further, and [`Burst`] moves the
+//! neighbours. A surface that is not flat is cut where it is laid out, and its pieces are curved: [`Shell`]. [`Support`] computes what falls, [`Shards::break_again`] cuts a piece further, and [`Burst`] moves the
 //! pieces as a function of time, so that they can be shown at any speed, and backwards.
 //!
 //! ```
@@ -33,6 +33,7 @@ mod lattice;
 mod mesh;
 mod rim;
 mod shards;
+mod shell;
 mod support;
 #[cfg(test)]
 pub(crate) mod tests;
@@ -45,4 +46,5 @@ pub use floor::Floor;
 pub use mesh::{MeshFrame, ShardMesh};
 pub use rim::RimLook;
 pub use shards::{ConvexPiece, Neighbour, ShardShape, Shards};
+pub use shell::{Shell, ShellFrame, ShellMesh, ShellPart, ShellPlace, ShellTriangle};
 pub use support::{Anchor, Fallen, Support};

@@ -145,15 +145,48 @@ impl Support {
         if !at.is_finite() {
             return Err(ShatterError::NotFinite { index: 0 });
         }
+        self.hit_by(shards, reach, |shard| shards.distance(shard, at))
+    }
+
+    /// The same with distances that are measured in another way, of shards that are in their places: along a curved surface, or through
+    /// space.
+    ///
+    /// # Errors
+    /// [`ShatterError::OutOfRange`] if `reach` is not within 0..=64.
+    pub fn hit_by(
+        &mut self,
+        shards: &Shards,
+        reach: f32,
+        mut distance: impl FnMut(u32) -> f32,
+    ) -> Result<Fallen, ShatterError> {
+        in_range("reach", reach, 0.0, 64.0)?;
         let mut hit = Vec::new();
         for shard in 0..self.gone.len().min(shards.len()) as u32 {
-            let distance = if self.is_in_place(shard) { shards.distance(shard, at) } else { f32::INFINITY };
+            let distance = if self.is_in_place(shard) { distance(shard) } else { f32::INFINITY };
             if distance <= if self.anchored[shard as usize] { 0.0 } else { reach } {
                 hit.push(shard);
                 self.gone[shard as usize] = true;
             }
         }
         Ok(Fallen { hit, loose: self.drop_loose(shards) })
+    }
+
+    /// Holds these shards as well.
+    pub fn hold_these(&mut self, shards: impl IntoIterator<Item = u32>) {
+        for shard in shards {
+            if let Some(anchored) = self.anchored.get_mut(shard as usize) {
+                *anchored = true;
+            }
+        }
+    }
+
+    /// Removes shards; nothing falls for that.
+    pub fn remove(&mut self, shards: impl IntoIterator<Item = u32>) {
+        for shard in shards {
+            if let Some(gone) = self.gone.get_mut(shard as usize) {
+                *gone = true;
+            }
+        }
     }
 
     /// Removes the shards that no anchored shard holds, and returns them by number. Without anchored shards nothing

@@ -69,6 +69,8 @@ mod shards_life;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod shards_order;
 #[cfg(all(feature = "2d", feature = "3d"))]
+mod shells;
+#[cfg(all(feature = "2d", feature = "3d"))]
 mod solids;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod strands;

@@ -35,7 +35,7 @@ use bevy::prelude::*;
 /// Members lie anywhere in space, turned and scaled as they like. Where edges of two of them lie on one another, all along or in part, cracks run
 /// from one over to the other: from a wall over the floor, up a flight of stairs. The group is laid out flat around the first hit, as a box is, see
 /// [`CrackUnwrap`](super::CrackUnwrap), with the texels of the member that is finest, or fewer where that would be too many. All else of
-/// its material, such as the roughness, is that of the first member. It has no vertex colours and no maps but those two. It does not shatter.
+/// its material, such as the roughness, is that of the first member. It has no vertex colours and no maps but those two. It shatters as a shell.
 /// `CrackUnwrap::Always` allows for more texels; `Never` is as `Auto`.
 ///
 /// A member that goes or moves leaves a gap, and the cracks of the others as they are. One that comes, or shows something else, does so

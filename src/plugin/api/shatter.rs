@@ -32,6 +32,13 @@ use std::sync::Arc;
 ///     }
 /// }
 /// ```
+///
+/// # Bodies
+///
+/// A 3D mesh that is [laid out flat](super::CrackUnwrap), a box, a jar or a room, shatters as a hollow shell: its pieces are curved as it is, reach
+/// around its edges, and are `thickness` thick. Through the holes its inside is seen. Blows reach through space, and pieces fly away from where it
+/// was hit. Where its layout is cut, pieces are; those along the cut are held with [`Anchor::Border`] and [`Anchor::Sides`], so
+/// [`ShatterRequest::EVERYTHING`] is what takes it apart.
 #[derive(Component, Reflect, Clone, Debug, PartialEq)]
 #[type_path = "bevy_crack"]
 #[reflect(Component, Default, SerializeWithRegistry)]
@@ -46,7 +53,8 @@ pub struct ShatterCracks {
     /// What holds the surface: shards along it stay unless they are hit themselves. Default: the border, as a pane in its frame.
     pub anchor: Anchor,
     /// What holds the surface besides: where this image is lighter than half, stretched over the shown part of the surface's picture, lightness
-    /// as it is stored, times alpha. `None` (default) = nothing. It must be loaded, and readable on the CPU, when the surface shatters.
+    /// as it is stored, times alpha. `None` (default) = nothing. It must be loaded, and readable on the CPU, when the surface shatters. Not for
+    /// bodies.
     pub anchor_mask: Option<Handle<Image>>,
     /// How shards fly.
     pub burst: BurstParams,
@@ -68,7 +76,7 @@ pub struct ShatterCracks {
     /// others; time that runs backwards puts them together again. No more than [`CrackBudget::max_shards`](super::CrackBudget::max_shards)
     /// lets there be: a piece without room for its fragments stays whole.
     pub again: Option<BreakAgain>,
-    /// How thick shards of flat 3D surfaces are, pattern units, 0..=10; default 0.03. Those of a slab, a box at least four times as wide and
+    /// How thick shards of 3D surfaces are, pattern units, 0..=10; default 0.03. Those of a slab, a box at least four times as wide and
     /// high as thick, are as thick as it is.
     pub thickness: f32,
     /// How their rims look; `None` (default) = by the preset: [`RimLook::GLASS`] where cracks are frosted,
@@ -309,9 +317,11 @@ pub enum ShardsError {
     /// A parameter of [`ShatterCracks`] or [`ShatterRequest`] is out of its range.
     #[error(transparent)]
     Parameter(#[from] ShatterError),
-    /// Only sprites, flat meshes that show their picture once, and slabs can shatter: boxes at least four times as wide and high as thick,
-    /// each of whose broad faces shows all of the picture, as those of a `Cuboid` do.
-    #[error("only sprites, and flat meshes and slabs that show the whole picture can shatter: {reason}")]
+    /// Only sprites, flat meshes that show their picture once, slabs, and bodies that are [laid out flat](super::CrackUnwrap) can shatter. Slabs are
+    /// boxes at least four times as wide and high as thick, each of whose broad faces shows all of the picture, as those of a `Cuboid` do.
+    #[error(
+        "only sprites, flat meshes and slabs that show the whole picture, and meshes that are laid out flat can shatter: {reason}"
+    )]
     NotFlat {
         /// What is wrong with it.
         reason: &'static str,

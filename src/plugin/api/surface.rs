@@ -129,7 +129,7 @@ impl Default for CrackSurface {
 /// [`CrackStrands`](crate::plugin::CrackStrands), which have their places in its picture.
 ///
 /// While it is cracked, `Mesh3d` is a copy with other texture coordinates. Hits by texture coordinates are meant for those of the picture, as before. One that
-/// is laid out does not shatter.
+/// is laid out shatters as a shell: see [`ShatterCracks`](crate::plugin::ShatterCracks#bodies).
 #[derive(Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[type_path = "bevy_crack"]
 pub enum CrackUnwrap {

@@ -8,6 +8,7 @@ use crate::plugin::api::textures::{CrackTextures, Maps};
 use crate::plugin::source::layout::Layout;
 use crate::plugin::source::unfolding::Unfolding;
 use crate::raster::TexelRect;
+use crate::shatter::ShellTriangle;
 #[cfg(feature = "2d")]
 use bevy::sprite::SpriteImageMode;
 use bevy::{
@@ -132,6 +133,16 @@ pub(crate) trait CarrierKind: Send + Sync {
     /// The plane in which a place of a mesh lies that is laid out flat; what is nearby lies there as it is laid out. `texel` is a place of
     /// the layout.
     fn plane_at(&self, _world: &World, _entity: Entity, _texel: Vec2) -> Option<Plane> {
+        None
+    }
+
+    /// The triangles of a mesh that is laid out flat, in the entity's own space.
+    fn triangles(&self, _world: &World, _entity: Entity) -> Option<Vec<ShellTriangle>> {
+        None
+    }
+
+    /// The place of the layout, texels, of texture coordinates of the picture that a mesh had before it was laid out.
+    fn texel_of(&self, _world: &World, _entity: Entity, _uv: Vec2) -> Option<Vec2> {
         None
     }
 

@@ -18,6 +18,8 @@ use crate::plugin::api::textures::{CrackTextures, Maps};
 #[cfg(feature = "3d")]
 use crate::plugin::source::unfolding::Unfolding;
 use crate::raster::TexelRect;
+#[cfg(feature = "3d")]
+use crate::shatter::ShellTriangle;
 use bevy::{
     asset::{LoadState, UntypedHandle},
     math::Mat3A,
@@ -137,6 +139,9 @@ impl<S: MaterialSlot> CarrierKind for MaterialKind<S> {
                     None => read(original).and_then(|before| before.for_sides([0.0; 3], 0.0)),
                 };
                 cracked.open();
+                if self.unfolding(world, entity).is_some() {
+                    cracked.show_inside();
+                }
                 let mut shard = cracked.clone();
                 shard.for_shards(&white, 1.0);
                 let shape = Shape::Shard { has_colors: *has_rims, has_tangents: is_solid };
@@ -247,6 +252,16 @@ impl<S: MaterialSlot> CarrierKind for MaterialKind<S> {
         unfold::plane_at(world, entity, texel)
     }
 
+    #[cfg(feature = "3d")]
+    fn triangles(&self, world: &World, entity: Entity) -> Option<Vec<ShellTriangle>> {
+        unfold::triangles(world, entity)
+    }
+
+    #[cfg(feature = "3d")]
+    fn texel_of(&self, world: &World, entity: Entity, uv: Vec2) -> Option<Vec2> {
+        unfold::texel_of(world, entity, uv)
+    }
+
     #[cfg_attr(not(feature = "3d"), expect(unused_variables, reason = "only 3D meshes have sides"))]
     fn open(&self, world: &mut World, entity: Entity, carrier: &Carrier, has_holes: bool) {
         #[cfg(feature = "3d")]
@@ -259,6 +274,9 @@ impl<S: MaterialSlot> CarrierKind for MaterialKind<S> {
         };
         if let Some(mut material) = typed(own).and_then(|own| materials.get_mut(&own)) {
             material.open();
+            if carrier.unfolding.is_some() {
+                material.show_inside();
+            }
         }
     }
 

@@ -1,7 +1,7 @@
 //! [`Plane`]: where a flat surface lies in its own space.
 
 use crate::plugin::carrier::space;
-use crate::shatter::{Floor, Pose};
+use crate::shatter::{Floor, Pose, ShellPlace};
 use bevy::prelude::*;
 
 /// Where a flat surface lies in the entity's own space.
@@ -38,6 +38,17 @@ impl Plane {
         Ok(Self { middle: 0.5 * (origin + last), rotation, size, thickness: None })
     }
 
+    /// The plane in which a place of a body lies that is laid out flat in a plane of `extent`, `at` being where it is laid out. Exact there,
+    /// whatever is stretched. `None` if it has no size.
+    pub(crate) fn on(place: &ShellPlace, at: Vec2, extent: Vec2) -> Option<Self> {
+        let (side, scale) = (place.right.try_normalize()?, Vec2::new(place.right.length(), place.down.length()));
+        let up = place.normal.cross(side);
+        let to_middle = (0.5 * extent - at) * scale;
+        let middle = place.position + side * to_middle.x - up * to_middle.y;
+        let (rotation, size) = (Quat::from_mat3(&Mat3::from_cols(side, up, place.normal)), extent * scale);
+        (middle.is_finite() && size.is_finite()).then_some(Self { middle, rotation, size, thickness: None })
+    }
+
     /// How thick shards are, in the entity's units: as a slab is, else `thickness` (pattern units).
     pub(crate) fn thickness(&self, thickness: f32, extent: Vec2) -> f32 {
         self.thickness.unwrap_or(thickness * self.size.y.abs() / extent.y)
@@ -51,6 +62,13 @@ impl Plane {
         let out = pose.offset * scale.extend(scale.y.abs());
         let translation = self.middle + self.rotation * (Vec3::new(at.x, -at.y, -forward) + out);
         Transform::from_translation(translation).with_rotation(self.rotation * pose.rotation)
+    }
+
+    /// A point of the entity's own space in the axes of flights on a surface of `extent`, pattern units.
+    pub(crate) fn to_flight(&self, point: Vec3, extent: Vec2) -> Vec3 {
+        let scale = self.size / extent;
+        let way = self.rotation.inverse() * (point - self.middle) / scale.extend(scale.y.abs());
+        way + (0.5 * extent * Vec2::new(1.0, -1.0)).extend(0.0)
     }
 
     /// The acceleration `gravity`, given along the world's x and y, in the axes of the flights on a surface of `extent`, all in pattern

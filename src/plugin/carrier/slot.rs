@@ -26,6 +26,8 @@ pub(crate) trait CrackMaterial: Asset + Clone {
     fn show_all(&mut self) {}
     /// Becomes transparent where its picture is.
     fn open(&mut self);
+    /// Shows its faces from behind as well: through holes, the inside of a body is seen.
+    fn show_inside(&mut self) {}
     /// The same for shards: with this picture, the mesh's texture coordinates being the picture's, and so much of it there (0..=1).
     fn for_shards(&mut self, picture: &Handle<Image>, opacity: f32);
     /// The same for the sides of shards of a picture of this mean colour (sRGB), if they have any; see

@@ -58,6 +58,10 @@ impl CrackMaterial for StandardMaterial {
         }
     }
 
+    fn show_inside(&mut self) {
+        (self.double_sided, self.cull_mode) = (true, None);
+    }
+
     /// Shards in 3D shrink instead of fading.
     fn for_shards(&mut self, picture: &Handle<Image>, _opacity: f32) {
         self.base_color_texture = Some(picture.clone());

@@ -2,15 +2,17 @@
 
 use super::faces::Faces;
 use super::kind::{Carrier, UnfoldOrder};
-use super::mesh::{Triangles, is_flat, place_of};
+use super::mesh::{Triangles, closest, is_flat, place_of};
 use super::plane::Plane;
 use super::slot::{CrackMaterial, MaterialSlot, to_picture};
 use crate::plugin::api::hit::HitPoint;
 use crate::plugin::jobs::background::{BackgroundJob, PATIENCE, guarded};
 use crate::plugin::source::unfolding::Unfolding;
+use crate::shatter::{ShellPlace, ShellTriangle};
 use crate::unwrap::{LaidOut, MAX_TRIANGLES, MeshShape, Unwrap, UnwrapError};
 use bevy::{
     math::{Affine2, Mat2},
+    mesh::VertexAttributeValues,
     platform::time::Instant,
     prelude::*,
 };
@@ -343,14 +345,36 @@ pub(super) fn plane_at(world: &World, entity: Entity, texel: Vec2) -> Option<Pla
     let back = Mat2::from_cols(b - a, c - a).inverse();
     let along = |way: Vec2| (q - p) * (back * way).x + (r - p) * (back * way).y;
     let (right, down) = (along(Vec2::X), along(Vec2::Y));
-    let (side, normal) = (right.try_normalize()?, (q - p).cross(r - p).try_normalize()?);
-    let up = normal.cross(side);
-    let (scale, whole) = (Vec2::new(right.length(), down.length()), layout.size.as_vec2());
-    // Exact where the texel is, whatever is stretched.
-    let to_middle = (0.5 * whole - texel) * scale;
-    let middle = p + along(texel - a) + side * to_middle.x - up * to_middle.y;
-    let (rotation, size) = (Quat::from_mat3(&Mat3::from_cols(side, up, normal)), whole * scale);
-    (middle.is_finite() && size.is_finite()).then_some(Plane { middle, rotation, size, thickness: None })
+    let normal = (q - p).cross(r - p).try_normalize()?;
+    let place = ShellPlace { position: p + along(texel - a), normal, right, down };
+    Plane::on(&place, texel, layout.size.as_vec2())
+}
+
+/// The triangles of a mesh that is laid out, with their places in pattern space.
+pub(super) fn triangles(world: &World, entity: Entity) -> Option<Vec<ShellTriangle>> {
+    let unfolding = unfolding(world, entity)?;
+    let mesh = world.get_resource::<Assets<Mesh>>()?.get(&world.get::<Mesh3d>(entity)?.0)?;
+    let triangles = Triangles::of(mesh).ok()?;
+    let normals = match mesh.try_attribute_option(Mesh::ATTRIBUTE_NORMAL) {
+        Ok(Some(VertexAttributeValues::Float32x3(normals))) => normals.as_slice(),
+        _ => &[],
+    };
+    let all = unfolding.layout.corners.iter().enumerate().filter_map(|(i, laid)| {
+        let (flat, (corners, _)) = ((*laid)?, triangles.get(i)?);
+        let normal = |vertex: usize| normals.get(vertex).map_or(Vec3::ZERO, |normal| Vec3::from_array(*normal));
+        let normals = triangles.corners(i)?.map(normal);
+        Some(ShellTriangle { flat: flat.map(|at| at / unfolding.unit), corners, normals })
+    });
+    Some(all.collect())
+}
+
+/// Where the layout of a mesh has what its picture has at these texture coordinates, texels.
+pub(super) fn texel_of(world: &World, entity: Entity, uv: Vec2) -> Option<Vec2> {
+    let HitPoint::Local(point) = aim(world, entity, HitPoint::Uv(uv), None)? else { return None };
+    let unfolding = unfolding(world, entity)?;
+    let mesh = world.get_resource::<Assets<Mesh>>()?.get(&world.get::<Mesh3d>(entity)?.0)?;
+    let (_, uv) = closest(mesh, point).ok()?;
+    Some(uv * unfolding.layout.size.as_vec2())
 }
 
 /// The point that a hit is meant for on a mesh that is laid out: texture coordinates are those of its picture.

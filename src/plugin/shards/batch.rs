@@ -1,6 +1,7 @@
 //! [`Batch`]: pieces that leave a surface.
 
 use super::form::Form;
+use crate::plugin::carrier::plane::Plane;
 use crate::plugin::surface::cutouts::Span;
 use crate::raster::TexelRect;
 use crate::shatter::{BreakAgain, Flight};
@@ -20,6 +21,8 @@ pub(super) struct Batch {
 /// A piece that leaves its place.
 pub(super) struct Leaving {
     pub(super) number: u32,
+    /// Where it lies in the surface.
+    pub(super) plane: Plane,
     pub(super) flight: Flight,
     pub(super) seed: u64,
     /// How it breaks again, and how many seconds after the blow.

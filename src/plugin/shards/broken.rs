@@ -9,7 +9,7 @@ use crate::plugin::carrier::plane::Plane;
 use crate::plugin::gpu::memory::TextureBytes;
 use crate::plugin::surface::active::Active;
 use crate::plugin::surface::stamp::stamp_anew;
-use crate::shatter::{BreakAgain, Flight, RimLook, Shards, Support};
+use crate::shatter::{BreakAgain, Flight, RimLook, Shards, Shell, Support};
 use bevy::{asset::UntypedHandle, prelude::*};
 use std::{collections::VecDeque, sync::Arc};
 
@@ -25,6 +25,8 @@ pub(crate) struct Broken {
     /// The picture with its cracks and without holes.
     pub(super) whole: Handle<Image>,
     pub(super) plane: Plane,
+    /// The surface, if it is not flat.
+    pub(super) shell: Option<Arc<Shell>>,
     /// How the rims of shards look.
     pub(super) rim: RimLook,
     /// Pieces that are out of their places and fragments of them, by id: fragments come after what they were part of.
@@ -62,6 +64,8 @@ pub(super) struct Piece {
     /// The pieces it is one of, and its number among them.
     pub(super) cut: Arc<Shards>,
     pub(super) number: u32,
+    /// Where it lies in the surface: fragments lie where the whole does.
+    pub(super) plane: Plane,
     /// Tells it from all other pieces of the surface.
     pub(super) id: u32,
     /// Fixes what is random about it.
@@ -94,7 +98,7 @@ pub(super) struct Piece {
 impl Piece {
     /// What its form follows from.
     pub(super) fn shape(&self) -> Shape<'_> {
-        Shape { cut: &self.cut, number: self.number, uv: self.uv, seed: self.seed }
+        Shape { cut: &self.cut, number: self.number, uv: self.uv, seed: self.seed, plane: self.plane }
     }
 }
 
@@ -113,6 +117,7 @@ impl Broken {
             settings,
             whole,
             plane,
+            shell: None,
             rim: RimLook::PLAIN,
             pieces: Vec::new(),
             waiting: VecDeque::new(),

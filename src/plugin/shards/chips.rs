@@ -186,7 +186,7 @@ impl Chips {
         let thickness = active.carrier.is_solid.then(|| THICKNESS * pieces.shards.extent().y * scale.y.abs());
         let plane = Plane { size: pieces.shards.extent() * scale, ..surface.plane };
         let rim = rim_for(&ShatterCracks::default(), &active.preset.look);
-        let style = Style { plane, rim, thickness };
+        let style = Style { rim, thickness, shell: None };
         let uv = [pieces.corner, pieces.corner + pieces.shards.extent()].map(|pos| surface.uv(pos));
         for &number in &pieces.numbers {
             let Some(mut shape) = pieces.shards.get(number).cloned() else { continue };
@@ -199,7 +199,7 @@ impl Chips {
             };
             let chip = Flying { entity, surface: entity, place, flight: burst.flight(number, &shape), time: 0.0 };
             let Some(place) = chip.transform() else { continue };
-            let form = style.form(&pieces.shards, number, uv, seed ^ u64::from(number));
+            let form = style.form(&pieces.shards, number, &plane, uv, seed ^ u64::from(number));
             let Some(mut meshes) = world.get_resource_mut::<Assets<Mesh>>() else { return };
             let (mesh, side) = (meshes.add(form.picture), form.sides.map(|sides| meshes.add(sides)));
             let visual = ShardVisual { parent: entity, place, mesh, material: picture.clone() };
@@ -295,7 +295,7 @@ impl Surface {
         // What goes into the surface throws them back.
         let direction = if direction == Vec3::ZERO { Vec3::Z } else { direction.with_z(direction.z.abs()) };
         let throw = Throw {
-            params: &settings.burst,
+            params: settings.burst,
             gravity: settings.gravity,
             floor: settings.floor,
             thickness: active.carrier.is_solid.then_some(0.0),

@@ -6,7 +6,7 @@ use super::order::MOST_NEW;
 use super::release::{count_shown, evict_oldest, with_active};
 use super::request::ShardQueue;
 use super::show::ShownPiece;
-use super::spans::{bounds, spans_of};
+use super::spans::{add_fringe, bounds, spans_of};
 use crate::math::mix;
 use crate::plugin::api::{CrackBudget, Reassembled, ShatterCracks};
 use crate::plugin::carrier::kind::Carrier;
@@ -166,7 +166,11 @@ fn fly(
             continue;
         }
         if let Some(holes) = &mut active.drawing.cutouts {
-            holes.set(&spans_of(&piece.cut, piece.number, active.drawing.field.frame), false);
+            let mut spans = spans_of(&piece.cut, piece.number, active.drawing.field.frame);
+            if let Some(unfolding) = &active.carrier.unfolding {
+                add_fringe(&mut spans, unfolding);
+            }
+            holes.set(&spans, false);
         }
         broken.put_back(&piece);
         active.mark(bounds(&piece.cut, piece.number, active.drawing.field.frame));
@@ -251,6 +255,7 @@ impl Broken {
             parts.push(Piece {
                 cut: fragments.clone(),
                 number,
+                plane: piece.plane,
                 id: self.next + number,
                 seed,
                 start: piece.start,

@@ -1,7 +1,7 @@
 //! [`Form`]: the meshes of a shard, made on any thread.
 
 use crate::plugin::carrier::plane::Plane;
-use crate::shatter::{MeshFrame, RimLook, ShardMesh, Shards};
+use crate::shatter::{MeshFrame, Pose, RimLook, ShardMesh, Shards, Shell, ShellFrame, ShellMesh, ShellPart};
 use bevy::{
     asset::RenderAssetUsages,
     mesh::{Indices, PrimitiveTopology},
@@ -28,6 +28,7 @@ pub(super) struct Origin {
     number: u32,
     uv: [Vec2; 2],
     seed: u64,
+    plane: Plane,
     style: Style,
 }
 
@@ -41,36 +42,54 @@ pub(super) struct Shape<'a> {
     pub(super) uv: [Vec2; 2],
     /// Fixes what is random about it.
     pub(super) seed: u64,
+    /// Where it lies in the surface.
+    pub(super) plane: Plane,
 }
 
 impl Origin {
     pub(super) fn of(style: Style, shape: Shape<'_>) -> Self {
-        let Shape { cut, number, uv, seed } = shape;
-        Self { shards: Arc::downgrade(cut), number, uv, seed, style }
+        let Shape { cut, number, uv, seed, plane } = shape;
+        Self { shards: Arc::downgrade(cut), number, uv, seed, plane, style }
     }
 }
 
 impl PartialEq for Origin {
     fn eq(&self, other: &Self) -> bool {
         self.shards.ptr_eq(&other.shards)
-            && (self.number, self.uv, self.seed, self.style) == (other.number, other.uv, other.seed, other.style)
+            && (self.number, self.uv, self.seed, self.plane) == (other.number, other.uv, other.seed, other.plane)
+            && self.style == other.style
     }
 }
 
 /// How shards of a surface are formed.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone)]
 pub(super) struct Style {
-    pub(super) plane: Plane,
     pub(super) rim: RimLook,
     /// Units of the entity; `None` = flat.
     pub(super) thickness: Option<f32>,
+    /// The surface, if it is not flat.
+    pub(super) shell: Option<Arc<Shell>>,
+}
+
+impl PartialEq for Style {
+    fn eq(&self, other: &Self) -> bool {
+        let is_same = |a: &Arc<Shell>, b: &Arc<Shell>| Arc::ptr_eq(a, b);
+        (self.rim, self.thickness) == (other.rim, other.thickness)
+            && match (&self.shell, &other.shell) {
+                (Some(a), Some(b)) => is_same(a, b),
+                (a, b) => a.is_none() && b.is_none(),
+            }
+    }
 }
 
 impl Style {
     /// The meshes of a shard that shows the part `uv` of the texture.
-    pub(super) fn form(&self, shards: &Shards, number: u32, uv: [Vec2; 2], seed: u64) -> Form {
-        let frame = MeshFrame { size: self.plane.size, uv, centred: true, rim: self.rim, seed };
-        let is_mirrored = self.plane.is_mirrored();
+    pub(super) fn form(&self, shards: &Shards, number: u32, plane: &Plane, uv: [Vec2; 2], seed: u64) -> Form {
+        if let Some((shell, thickness)) = self.shell.as_ref().zip(self.thickness) {
+            return self.curved((shards, number), shell, plane, (uv, seed, thickness));
+        }
+        let frame = MeshFrame { size: plane.size, uv, centred: true, rim: self.rim, seed };
+        let is_mirrored = plane.is_mirrored();
         let Some(thickness) = self.thickness else {
             let ShardMesh { positions, normals, uvs, colors, indices, .. } = shards.flat_mesh(number, &frame);
             return Form { picture: mesh(positions, normals, uvs, colors, indices, is_mirrored), sides: None };
@@ -105,9 +124,30 @@ impl Style {
         }
     }
 
+    /// The meshes of a piece of what is not flat.
+    fn curved(
+        &self,
+        (shards, number): (&Shards, u32),
+        shell: &Shell,
+        plane: &Plane,
+        (uv, seed, thickness): ([Vec2; 2], u64, f32),
+    ) -> Form {
+        let centroid = shards.get(number).map_or(Vec2::ZERO, |shard| shard.centroid);
+        let at_rest = plane.place(centroid, shards.extent(), Pose::AT_REST, 0.5 * thickness);
+        let to_mesh = at_rest.compute_affine().inverse();
+        let frame = ShellFrame { to_mesh, uv, rim: self.rim, seed, thickness };
+        let ShellMesh { picture, inside } = shards.shell_mesh(number, shell, &frame);
+        let part = |part: ShellPart| {
+            let ShellPart { positions, normals, tangents, uvs, colors, indices } = part;
+            mesh(positions, normals, uvs, colors, indices, false)
+                .with_inserted_attribute(Mesh::ATTRIBUTE_TANGENT, tangents)
+        };
+        Form { picture: part(picture), sides: Some(part(inside)) }
+    }
+
     /// The meshes of pieces, by all threads that there are.
     pub(super) fn forms(&self, pieces: &[Shape<'_>]) -> Vec<Form> {
-        let form = |piece: &Shape<'_>| self.form(piece.cut, piece.number, piece.uv, piece.seed);
+        let form = |piece: &Shape<'_>| self.form(piece.cut, piece.number, &piece.plane, piece.uv, piece.seed);
         match ComputeTaskPool::try_get() {
             Some(pool) if pieces.len() > CHUNK => {
                 let chunks =

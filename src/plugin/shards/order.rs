@@ -4,8 +4,8 @@ use super::batch::{Batch, Leaving};
 use super::broken::{Broken, broken};
 use super::drawn::{Drawn, Sketch};
 use super::form::Style;
-use super::spans::{Scan, join_spans};
-use super::throw::{Throw, in_plane};
+use super::spans::{Scan, add_fringe, join_spans};
+use super::throw::{Throw, in_own_space};
 use crate::Grid;
 use crate::math::mix;
 use crate::pattern::{Network, SurfaceFrame};
@@ -15,10 +15,13 @@ use crate::plugin::carrier::plane::Plane;
 use crate::plugin::jobs::background::guarded_as;
 use crate::plugin::source::mask;
 use crate::plugin::source::picture::BasePicture;
+use crate::plugin::source::unfolding::Unfolding;
 use crate::plugin::surface::active::Active;
 use crate::plugin::surface::cutouts::{Holes, Span};
 use crate::raster::{DirtyTiles, TexelRect};
-use crate::shatter::{Anchor, Burst, Cuts, RimLook, Shards, ShatterError, Support, shatter};
+use crate::shatter::{
+    Anchor, Burst, Cuts, Fallen, RimLook, Shards, ShatterError, Shell, ShellTriangle, Support, shatter,
+};
 use bevy::prelude::*;
 use std::{collections::VecDeque, sync::Arc};
 
@@ -42,6 +45,8 @@ pub(super) struct ShatterJob {
     from: Vec2,
     reach: f32,
     burst: Burst,
+    /// What is not flat.
+    body: Option<Body>,
     /// The surface's.
     seed: u64,
     /// Nodes and links of the network.
@@ -61,6 +66,23 @@ pub(super) struct ShatterJob {
     alpha_mask: bool,
 }
 
+/// A surface that is not flat, and what throws its pieces.
+struct Body {
+    unfolding: Arc<Unfolding>,
+    shell: BodyShape,
+    throw: Throw,
+    place: Option<GlobalTransform>,
+    /// In the entity's own space.
+    direction: Vec3,
+    energy: f32,
+}
+
+enum BodyShape {
+    /// It has shattered before.
+    Known(Arc<Shell>),
+    New(Vec<ShellTriangle>),
+}
+
 /// Where the pieces come from.
 enum CutFrom {
     /// What has been cut stays cut, and what held it holds it.
@@ -77,6 +99,7 @@ pub(super) struct CutSurface {
     pub(super) settings: ShatterCracks,
     pub(super) rim: RimLook,
     pub(super) plane: Plane,
+    pub(super) shell: Option<Arc<Shell>>,
     pub(super) grown: (usize, usize),
     pub(super) cut: Arc<Shards>,
     /// Whether it was cut again.
@@ -122,6 +145,11 @@ impl ShatterJob {
             settings.cut.extend_cracks = true;
             (settings.anchor, settings.anchor_mask) = (Anchor::Nothing, None);
         }
+        let unfolding = active.carrier.unfolding.clone();
+        if unfolding.is_some() {
+            // It does not fit the layout.
+            settings.anchor_mask = None;
+        }
         // Fewer and larger ones, rather than some that nobody sees.
         settings.cut.max_shards =
             settings.cut.max_shards.min(u32::try_from(budget.max_shards).unwrap_or(u32::MAX).max(1));
@@ -141,16 +169,29 @@ impl ShatterJob {
         let extent = network.extent();
         let (pos, energy, direction) =
             active.cracks.last_hit.map_or((0.5 * extent, 1.0, Vec3::ZERO), |hit| (hit.pos, hit.energy, hit.direction));
-        let from = request.uv.map_or(pos, |uv| uv * extent);
-        let seen = active.canvas.seen().ok_or(ShardsError::NotFlat { reason: "it shows nothing" })?;
-        let plane = active.carrier.kind.plane(world, entity, seen).map_err(|reason| ShardsError::NotFlat { reason })?;
-        let direction = in_plane(world, entity, &plane, request.direction.unwrap_or(direction));
+        let refused = |reason| ShardsError::NotFlat { reason };
+        let seen = active.canvas.seen().ok_or(refused("it shows nothing"))?;
+        let kind = active.carrier.kind;
+        let (from, plane) = match &unfolding {
+            Some(unfolding) => {
+                let texel = match request.uv {
+                    Some(uv) => kind.texel_of(world, entity, uv),
+                    None => Some(pos * unfolding.unit),
+                };
+                let place = texel.and_then(|texel| Some((texel, kind.plane_at(world, entity, texel)?)));
+                let (texel, plane) = place.ok_or(refused("its mesh is not there"))?;
+                (texel / unfolding.unit, plane)
+            }
+            None => (request.uv.map_or(pos, |uv| uv * extent), kind.plane(world, entity, seen).map_err(refused)?),
+        };
+        let own_direction = in_own_space(world, entity, request.direction.unwrap_or(direction));
+        let direction = plane.rotation.inverse() * own_direction;
         let broken = broken(world, entity);
         let released = broken.map_or(0, |broken| broken.released);
         let seed = active.surface.seed;
         let energy = request.energy.unwrap_or(energy);
         let throw = Throw {
-            params: &settings.burst,
+            params: settings.burst,
             gravity: settings.gravity,
             floor: settings.floor,
             thickness: active.carrier.is_solid.then(|| plane.thickness(settings.thickness, extent)),
@@ -158,6 +199,17 @@ impl ShatterJob {
         };
         let place = world.get::<GlobalTransform>(entity);
         let burst = throw.burst(place, (&plane, extent), (from, direction, energy))?;
+        let body = match unfolding {
+            Some(unfolding) => {
+                let shell = match broken.and_then(|broken| broken.shell.clone()) {
+                    Some(known) => BodyShape::Known(known),
+                    None => BodyShape::New(kind.triangles(world, entity).ok_or(refused("its mesh cannot be read"))?),
+                };
+                let place = place.copied();
+                Some(Body { unfolding, shell, throw, place, direction: own_direction, energy })
+            }
+            None => None,
+        };
         let grown = (network.nodes().len(), network.links().len());
         let same = |broken: &Broken| broken.grown == grown && broken.settings.cut == settings.cut;
         let pieces = match broken {
@@ -184,6 +236,7 @@ impl ShatterJob {
             from,
             reach: if is_everything { MOST_REACH } else { request.reach },
             burst,
+            body,
             seed,
             grown,
             pieces,
@@ -213,6 +266,8 @@ impl ShatterJob {
     fn cut(self) -> Result<CutSurface, ShardsError> {
         let is_new = matches!(self.pieces, CutFrom::Lines(..));
         let is_kept = matches!(self.pieces, CutFrom::Cut(..));
+        let extent = self.frame.extent();
+        let body = self.body.map(|body| body.shaped(extent, self.from));
         let (cut, mut support) = match self.pieces {
             CutFrom::Cut(cut, support) => (cut, support),
             CutFrom::Held(cut, support) => {
@@ -223,6 +278,9 @@ impl ShatterJob {
                 let mut cuts = Cuts::from_network(&network)?;
                 for line in carried.iter().flat_map(|lines| lines.iter()) {
                     cuts.add_line(line)?;
+                }
+                for edge in body.iter().flat_map(|body| body.shell.border()) {
+                    cuts.add_line(&edge)?;
                 }
                 let cut = Arc::new(shatter(cuts, &self.settings.cut)?);
                 let support = match before {
@@ -239,12 +297,19 @@ impl ShatterJob {
                 held.get(texel.x, texel.y).is_some_and(|value| value > 0.5)
             });
         }
-        let fallen = support.hit(&cut, self.from, self.reach)?;
+        if let Some(body) = body.as_ref().filter(|_| !is_kept) {
+            body.hold(&cut, &mut support, self.settings.anchor);
+        }
+        let fallen = match &body {
+            Some(body) => body.hit(&cut, &mut support, self.from, self.reach)?,
+            None => support.hit(&cut, self.from, self.reach)?,
+        };
         let (frame, settings) = (self.frame, self.settings);
         let size = self.base.size.as_vec2();
         let uv = [self.view.min.as_vec2() / size, self.view.max.as_vec2() / size];
         let thickness = self.plane.thickness(settings.thickness, cut.extent());
-        let style = Style { plane: self.plane, rim: self.rim, thickness: self.is_solid.then_some(thickness) };
+        let shell = body.as_ref().map(|body| body.shell.clone());
+        let style = Style { rim: self.rim, thickness: self.is_solid.then_some(thickness), shell };
         let mut holes = self.holes.unwrap_or_else(|| Holes::new(frame.size()));
         let mut scan = Scan::new(frame);
         let is_seen = |&[y, from, to]: &Span| (from..to).any(|x| !self.base.is_hole(self.view.min + UVec2::new(x, y)));
@@ -252,14 +317,21 @@ impl ShatterJob {
         let mut leaving = Vec::with_capacity(fallen.hit.len() + fallen.loose.len());
         for ((&number, is_falling), nth) in fallen.hit.iter().chain(&fallen.loose).zip(falls).zip(self.released..) {
             let Some(shard) = cut.get(number) else { continue };
-            let flight = if is_falling { self.burst.fall(nth, shard) } else { self.burst.flight(nth, shard) };
+            let (plane, burst) = match &body {
+                Some(body) => body.thrown(&cut, number).ok_or(ShatterError::NoShard { shard: number })??,
+                None => (self.plane, self.burst.clone()),
+            };
+            let flight = if is_falling { burst.fall(nth, shard) } else { burst.flight(nth, shard) };
             let seed = mix(self.seed ^ mix(u64::from(nth)));
             let again = settings.again.and_then(|again| Some((again, flight.delay + again.due(shard.area, seed)?)));
             let mut spans = Vec::new();
             scan.find(&cut, number, &mut spans);
+            if let Some(body) = &body {
+                add_fringe(&mut spans, &body.unfolding);
+            }
             let is_shown = spans.is_empty() || spans.iter().any(is_seen);
-            let form = is_shown.then(|| Box::new(style.form(&cut, number, uv, seed)));
-            leaving.push(Leaving { number, flight, seed, again, form, spans });
+            let form = is_shown.then(|| Box::new(style.form(&cut, number, &plane, uv, seed)));
+            leaving.push(Leaving { number, plane, flight, seed, again, form, spans });
         }
         if leaving.len() > self.batch {
             // Those that move first leave first.
@@ -294,6 +366,7 @@ impl ShatterJob {
             settings,
             rim: self.rim,
             plane: self.plane,
+            shell: style.shell,
             grown: self.grown,
             cut,
             is_new,
@@ -303,5 +376,67 @@ impl ShatterJob {
             density,
             room,
         })
+    }
+}
+
+/// A body whose shape is known.
+struct Shaped {
+    unfolding: Arc<Unfolding>,
+    shell: Arc<Shell>,
+    throw: Throw,
+    place: Option<GlobalTransform>,
+    direction: Vec3,
+    energy: f32,
+    extent: Vec2,
+    /// Where it is hit, in the entity's own space; and a pattern unit there, in its units.
+    from: Vec2,
+    at: Vec3,
+    unit: f32,
+}
+
+impl Body {
+    fn shaped(self, extent: Vec2, from: Vec2) -> Shaped {
+        let Self { unfolding, shell, throw, place, direction, energy } = self;
+        let shell = match shell {
+            BodyShape::Known(shell) => shell,
+            BodyShape::New(triangles) => Arc::new(Shell::new(extent, triangles)),
+        };
+        let hit = shell.place(from);
+        let at = hit.map_or(Vec3::ZERO, |hit| hit.position);
+        let unit = hit.map_or(1.0, |hit| (hit.right.length() * hit.down.length()).sqrt());
+        Shaped { unfolding, shell, throw, place, direction, energy, extent, from, at, unit }
+    }
+}
+
+impl Shaped {
+    /// What lies where nothing is laid out is no piece; pieces beside that are held, unless nothing is to hold any.
+    fn hold(&self, cut: &Shards, support: &mut Support, anchor: Anchor) {
+        let is_piece = |shard: u32| cut.inner_point(shard).is_some_and(|at| self.shell.place(at).is_some());
+        let gaps: Vec<u32> = (0..cut.len() as u32).filter(|shard| !is_piece(*shard)).collect();
+        if !matches!(anchor, Anchor::Nothing | Anchor::Sides([false, false, false, false])) {
+            support.hold_these(gaps.iter().flat_map(|gap| cut.neighbours(*gap)).map(|neighbour| neighbour.shard));
+        }
+        support.remove(gaps);
+    }
+
+    /// Knocks out what lies within `reach` through space.
+    fn hit(&self, cut: &Shards, support: &mut Support, from: Vec2, reach: f32) -> Result<Fallen, ShatterError> {
+        support.hit_by(cut, reach, |shard| {
+            if cut.distance(shard, from) == 0.0 {
+                return 0.0;
+            }
+            let away = self.shell.distance(cut, shard, self.at).map_or(f32::INFINITY, |away| away / self.unit);
+            // All of it, however large.
+            if reach >= MOST_REACH { away.min(MOST_REACH) } else { away }
+        })
+    }
+
+    /// The plane of a piece, and what throws it; `None` where nothing is laid out.
+    fn thrown(&self, cut: &Shards, shard: u32) -> Option<Result<(Plane, Burst), ShatterError>> {
+        let at = cut.inner_point(shard)?;
+        let plane = Plane::on(&self.shell.place(at)?, at, self.extent)?;
+        let direction = plane.rotation.inverse() * self.direction;
+        let burst = self.throw.burst(self.place.as_ref(), (&plane, self.extent), (self.from, direction, self.energy));
+        Some(burst.map(|burst| (plane, burst.with_origin(plane.to_flight(self.at, self.extent)))))
     }
 }

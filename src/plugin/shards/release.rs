@@ -193,7 +193,8 @@ fn release(world: &mut World, entity: Entity, active: &mut Active, made: CutSurf
     }
     let before = broken::take(world, entity);
     let is_first = before.is_none();
-    let CutSurface { settings, rim, plane, grown, cut, is_new, support, batches, drawn, density, room, .. } = made;
+    let CutSurface { settings, rim, plane, shell, grown, cut, is_new, support, batches, drawn, density, room, .. } =
+        made;
     if is_first {
         can_copy_picture(world, active)?;
     }
@@ -220,7 +221,7 @@ fn release(world: &mut World, entity: Entity, active: &mut Active, made: CutSurf
     }
     broken.inside = inside(world, active, &settings, rim.bright, broken.inside.take());
     (broken.cut, broken.support, broken.grown) = (cut, support, grown);
-    (broken.settings, broken.plane, broken.rim) = (settings, plane, rim);
+    (broken.settings, broken.plane, broken.shell, broken.rim) = (settings, plane, shell, rim);
     broken.is_fresh = is_first;
     (broken.waiting, broken.since, broken.has_begun) = (batches, broken.time, false);
     broken.report(world, entity);
@@ -277,7 +278,7 @@ fn depart(
     punch(world, active, &spans, &rects);
     broken.pieces.reserve(leaving.len());
     let mut shown = Vec::with_capacity(leaving.len());
-    for Leaving { number, flight, seed, again, form, .. } in leaving {
+    for Leaving { number, plane, flight, seed, again, form, .. } in leaving {
         broken.end = broken.end.max(broken.since + f64::from(flight.end()));
         let is_spent = form.is_none() || shown.len() >= most;
         let pose = flight.pose((broken.time - broken.since) as f32);
@@ -287,6 +288,7 @@ fn depart(
         broken.pieces.push(Piece {
             cut: broken.cut.clone(),
             number,
+            plane,
             id: broken.next,
             seed,
             start: broken.since,

@@ -62,7 +62,7 @@ impl Broken {
             return Vec::new();
         }
         let style = self.style(carrier);
-        let origin = |piece: &Piece| Origin::of(style, piece.shape());
+        let origin = |piece: &Piece| Origin::of(style.clone(), piece.shape());
         // Its own first, so that none is taken by another.
         let own: Vec<Option<Body>> = shown
             .iter()
@@ -164,14 +164,15 @@ impl Broken {
     /// What the entity of a piece says that is to be shown once more.
     fn shard(&self, surface: Entity, index: usize) -> Option<Shard> {
         let piece = self.pieces.get(index)?;
-        let scale = self.plane.size / piece.cut.extent();
+        let plane = &piece.plane;
+        let scale = plane.size / piece.cut.extent();
         let flight = &piece.flight;
         Some(Shard {
             surface,
             pieces: piece.cut.clone(),
             number: piece.number,
-            velocity: self.plane.rotation * (flight.velocity * scale.extend(scale.y.abs())),
-            spin: self.plane.rotation * (flight.axis * flight.spin),
+            velocity: plane.rotation * (flight.velocity * scale.extend(scale.y.abs())),
+            spin: plane.rotation * (flight.axis * flight.spin),
             scale,
             piece: [piece.id, piece.times + 1],
         })
@@ -180,7 +181,7 @@ impl Broken {
     /// How its shards are formed.
     pub(super) fn style(&self, carrier: &Carrier) -> Style {
         let thickness = carrier.is_solid.then(|| self.thickness());
-        Style { plane: self.plane, rim: self.rim, thickness }
+        Style { rim: self.rim, thickness, shell: self.shell.clone() }
     }
 
     /// Thickness of shards in the entity's units.
@@ -206,7 +207,7 @@ impl Broken {
         let forward = if is_solid { 0.5 * self.thickness() } else { -IN_FRONT };
         let piece = self.pieces.get(index)?;
         let shard = piece.cut.get(piece.number)?;
-        let mut place = self.plane.place(shard.centroid, piece.cut.extent(), pose, forward);
+        let mut place = piece.plane.place(shard.centroid, piece.cut.extent(), pose, forward);
         if is_solid {
             place.scale = Vec3::splat(pose.opacity);
         }

@@ -1,6 +1,7 @@
 //! The texels of shards.
 
 use crate::pattern::SurfaceFrame;
+use crate::plugin::source::unfolding::Unfolding;
 use crate::plugin::surface::cutouts::Span;
 use crate::raster::TexelRect;
 use crate::shatter::Shards;
@@ -55,24 +56,42 @@ pub(super) fn spans_of(shards: &Shards, shard: u32, frame: SurfaceFrame) -> Vec<
     spans
 }
 
+/// How many of the texels around a mesh go with what is beside them: filtering mixes them with it.
+const FRINGE: u32 = 2;
+
+/// Adds to the texels of a piece of what is laid out flat those around the mesh that are shown with them at its border.
+pub(super) fn add_fringe(spans: &mut Vec<Span>, unfolding: &Unfolding) {
+    let size = unfolding.layout.size;
+    for i in 0..spans.len() {
+        let [y, from, to] = spans[i];
+        let (left, right) = (from.saturating_sub(FRINGE), (to + FRINGE).min(size.x));
+        for row in y.saturating_sub(FRINGE)..(y + FRINGE + 1).min(size.y) {
+            let is_beside = |x: &u32| unfolding.is_beside(UVec2::new(*x, row));
+            spans.extend((left..right).filter(is_beside).map(|x| [row, x, x + 1]));
+        }
+    }
+    spans.sort_unstable();
+    spans.dedup();
+}
+
 /// Puts spans in order, and makes one of those that touch.
 pub(super) fn join_spans(spans: &mut Vec<Span>) {
     spans.sort_unstable();
     spans.dedup_by(|[y, from, to], [last_y, _, end]| {
-        let touches = y == last_y && from == end;
+        let touches = y == last_y && *from <= *end;
         if touches {
-            *end = *to;
+            *end = (*end).max(*to);
         }
         touches
     });
 }
 
-/// The texels around a shard.
+/// The texels around a shard, and those of its fringe.
 pub(super) fn bounds(shards: &Shards, shard: u32, frame: SurfaceFrame) -> TexelRect {
     let places = shards.outline(shard).iter().map(|&corner| frame.to_texel(shards.positions()[corner as usize]));
     let (min, max) = places.fold((Vec2::INFINITY, Vec2::ZERO), |(min, max), at| (min.min(at), max.max(at)));
     let rect = TexelRect { min: min.max(Vec2::ZERO).as_uvec2(), max: max.ceil().as_uvec2() };
-    rect.intersect(TexelRect::whole(frame.size()))
+    rect.grow(FRINGE, frame.size()).intersect(TexelRect::whole(frame.size()))
 }
 
 #[cfg(test)]

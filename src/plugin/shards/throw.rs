@@ -7,8 +7,9 @@ use crate::shatter::{Burst, BurstParams, ShatterError};
 use bevy::prelude::*;
 
 /// How what leaves a surface is thrown, and falls.
-pub(super) struct Throw<'a> {
-    pub(super) params: &'a BurstParams,
+#[derive(Clone, Copy)]
+pub(super) struct Throw {
+    pub(super) params: BurstParams,
     pub(super) gravity: GravitySpace,
     /// Height of the floor in the world.
     pub(super) floor: Option<f32>,
@@ -17,14 +18,18 @@ pub(super) struct Throw<'a> {
     pub(super) seed: u64,
 }
 
-/// A direction in the world, of any length, in the axes of flights; zero if there is none.
-pub(super) fn in_plane(world: &World, entity: Entity, plane: &Plane, direction: Vec3) -> Vec3 {
+/// A direction in the world, of any length, in the entity's own space; zero if there is none.
+pub(super) fn in_own_space(world: &World, entity: Entity, direction: Vec3) -> Vec3 {
     let back = world.get::<GlobalTransform>(entity).and_then(space::to_local).unwrap_or_default();
-    let direction = back.transform_vector3(space::direction(direction));
-    plane.rotation.inverse() * space::direction(direction)
+    space::direction(back.transform_vector3(space::direction(direction)))
 }
 
-impl Throw<'_> {
+/// The same in the axes of flights.
+pub(super) fn in_plane(world: &World, entity: Entity, plane: &Plane, direction: Vec3) -> Vec3 {
+    plane.rotation.inverse() * in_own_space(world, entity, direction)
+}
+
+impl Throw {
     /// The burst from a place (pattern units) on a surface of `extent`, in a direction in the axes of flights.
     pub(super) fn burst(
         &self,
@@ -32,7 +37,7 @@ impl Throw<'_> {
         (plane, extent): (&Plane, Vec2),
         (from, direction, energy): (Vec2, Vec3, f32),
     ) -> Result<Burst, ShatterError> {
-        let mut burst = Burst::new(*self.params, from, direction, energy, self.seed)?;
+        let mut burst = Burst::new(self.params, from, direction, energy, self.seed)?;
         let Some(place) = place else { return Ok(burst) };
         if self.gravity == GravitySpace::World
             && let Some(gravity) = plane.down(extent, place, self.params.gravity)

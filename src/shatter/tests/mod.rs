@@ -1,9 +1,10 @@
 //! Shards against what they must be: that they tile ([`tiling`]) along the lines that they were cut along ([`lines`]), also where there are
-//! many ([`many`]), and what is to be known of each and becomes of it ([`pieces`]).
+//! many ([`many`]), what is to be known of each and becomes of it ([`pieces`]), and those that are curved ([`shells`]).
 
 mod lines;
 mod many;
 mod pieces;
+mod shells;
 mod tiling;
 
 use super::{
