@@ -3,6 +3,7 @@
 use super::batch::Batch;
 use super::body::{Body, LEVELS};
 use super::form::Shape;
+use crate::Grid;
 use crate::plugin::api::{CrackShards, ShatterCracks};
 use crate::plugin::carrier::kind::Carrier;
 use crate::plugin::carrier::plane::Plane;
@@ -27,6 +28,8 @@ pub(crate) struct Broken {
     pub(super) plane: Plane,
     /// The surface, if it is not flat.
     pub(super) shell: Option<Arc<Shell>>,
+    /// And its texels that are no piece's, see [`fringe`](super::spans::fringe).
+    pub(super) fringe: Option<Arc<Grid<bool>>>,
     /// How the rims of shards look.
     pub(super) rim: RimLook,
     /// Pieces that are out of their places and fragments of them, by id: fragments come after what they were part of.
@@ -118,6 +121,7 @@ impl Broken {
             whole,
             plane,
             shell: None,
+            fringe: None,
             rim: RimLook::PLAIN,
             pieces: Vec::new(),
             waiting: VecDeque::new(),

@@ -167,8 +167,8 @@ fn fly(
         }
         if let Some(holes) = &mut active.drawing.cutouts {
             let mut spans = spans_of(&piece.cut, piece.number, active.drawing.field.frame);
-            if let Some(unfolding) = &active.carrier.unfolding {
-                add_fringe(&mut spans, unfolding);
+            if let Some(fringe) = &broken.fringe {
+                add_fringe(&mut spans, fringe);
             }
             holes.set(&spans, false);
         }

@@ -4,7 +4,7 @@ use super::batch::{Batch, Leaving};
 use super::broken::{Broken, broken};
 use super::drawn::{Drawn, Sketch};
 use super::form::Style;
-use super::spans::{Scan, add_fringe, join_spans};
+use super::spans::{Scan, add_fringe, fringe, join_spans};
 use super::throw::{Throw, in_own_space};
 use crate::Grid;
 use crate::math::mix;
@@ -15,7 +15,6 @@ use crate::plugin::carrier::plane::Plane;
 use crate::plugin::jobs::background::guarded_as;
 use crate::plugin::source::mask;
 use crate::plugin::source::picture::BasePicture;
-use crate::plugin::source::unfolding::Unfolding;
 use crate::plugin::surface::active::Active;
 use crate::plugin::surface::cutouts::{Holes, Span};
 use crate::raster::{DirtyTiles, TexelRect};
@@ -68,8 +67,9 @@ pub(super) struct ShatterJob {
 
 /// A surface that is not flat, and what throws its pieces.
 struct Body {
-    unfolding: Arc<Unfolding>,
     shell: BodyShape,
+    /// If it has shattered before.
+    fringe: Option<Arc<Grid<bool>>>,
     throw: Throw,
     place: Option<GlobalTransform>,
     /// In the entity's own space.
@@ -100,6 +100,7 @@ pub(super) struct CutSurface {
     pub(super) rim: RimLook,
     pub(super) plane: Plane,
     pub(super) shell: Option<Arc<Shell>>,
+    pub(super) fringe: Option<Arc<Grid<bool>>>,
     pub(super) grown: (usize, usize),
     pub(super) cut: Arc<Shards>,
     /// Whether it was cut again.
@@ -200,13 +201,14 @@ impl ShatterJob {
         let place = world.get::<GlobalTransform>(entity);
         let burst = throw.burst(place, (&plane, extent), (from, direction, energy))?;
         let body = match unfolding {
-            Some(unfolding) => {
+            Some(_) => {
                 let shell = match broken.and_then(|broken| broken.shell.clone()) {
                     Some(known) => BodyShape::Known(known),
                     None => BodyShape::New(kind.triangles(world, entity).ok_or(refused("its mesh cannot be read"))?),
                 };
                 let place = place.copied();
-                Some(Body { unfolding, shell, throw, place, direction: own_direction, energy })
+                let fringe = broken.and_then(|broken| broken.fringe.clone());
+                Some(Body { shell, fringe, throw, place, direction: own_direction, energy })
             }
             None => None,
         };
@@ -267,7 +269,7 @@ impl ShatterJob {
         let is_new = matches!(self.pieces, CutFrom::Lines(..));
         let is_kept = matches!(self.pieces, CutFrom::Cut(..));
         let extent = self.frame.extent();
-        let body = self.body.map(|body| body.shaped(extent, self.from));
+        let mut body = self.body.map(|body| body.shaped(extent, self.from));
         let (cut, mut support) = match self.pieces {
             CutFrom::Cut(cut, support) => (cut, support),
             CutFrom::Held(cut, support) => {
@@ -297,8 +299,8 @@ impl ShatterJob {
                 held.get(texel.x, texel.y).is_some_and(|value| value > 0.5)
             });
         }
-        if let Some(body) = body.as_ref().filter(|_| !is_kept) {
-            body.hold(&cut, &mut support, self.settings.anchor);
+        if let Some(body) = body.as_mut().filter(|_| !is_kept) {
+            body.hold(&cut, &mut support, self.settings.anchor, self.frame);
         }
         let fallen = match &body {
             Some(body) => body.hit(&cut, &mut support, self.from, self.reach)?,
@@ -327,11 +329,14 @@ impl ShatterJob {
             let mut spans = Vec::new();
             scan.find(&cut, number, &mut spans);
             if let Some(body) = &body {
-                add_fringe(&mut spans, &body.unfolding);
+                add_fringe(&mut spans, &body.fringe);
             }
             let is_shown = spans.is_empty() || spans.iter().any(is_seen);
             let form = is_shown.then(|| Box::new(style.form(&cut, number, &plane, uv, seed)));
             leaving.push(Leaving { number, plane, flight, seed, again, form, spans });
+        }
+        if let (Some(body), Some(first), true) = (&body, leaving.first_mut(), self.is_first) {
+            body.add_gaps(&mut first.spans, &self.base);
         }
         if leaving.len() > self.batch {
             // Those that move first leave first.
@@ -367,6 +372,7 @@ impl ShatterJob {
             rim: self.rim,
             plane: self.plane,
             shell: style.shell,
+            fringe: body.map(|body| body.fringe),
             grown: self.grown,
             cut,
             is_new,
@@ -381,8 +387,8 @@ impl ShatterJob {
 
 /// A body whose shape is known.
 struct Shaped {
-    unfolding: Arc<Unfolding>,
     shell: Arc<Shell>,
+    fringe: Arc<Grid<bool>>,
     throw: Throw,
     place: Option<GlobalTransform>,
     direction: Vec3,
@@ -396,7 +402,7 @@ struct Shaped {
 
 impl Body {
     fn shaped(self, extent: Vec2, from: Vec2) -> Shaped {
-        let Self { unfolding, shell, throw, place, direction, energy } = self;
+        let Self { shell, fringe, throw, place, direction, energy } = self;
         let shell = match shell {
             BodyShape::Known(shell) => shell,
             BodyShape::New(triangles) => Arc::new(Shell::new(extent, triangles)),
@@ -404,19 +410,30 @@ impl Body {
         let hit = shell.place(from);
         let at = hit.map_or(Vec3::ZERO, |hit| hit.position);
         let unit = hit.map_or(1.0, |hit| (hit.right.length() * hit.down.length()).sqrt());
-        Shaped { unfolding, shell, throw, place, direction, energy, extent, from, at, unit }
+        let fringe = fringe.unwrap_or_else(|| Arc::new(Grid::new(UVec2::ONE, false)));
+        Shaped { shell, fringe, throw, place, direction, energy, extent, from, at, unit }
     }
 }
 
 impl Shaped {
     /// What lies where nothing is laid out is no piece; pieces beside that are held, unless nothing is to hold any.
-    fn hold(&self, cut: &Shards, support: &mut Support, anchor: Anchor) {
+    fn hold(&mut self, cut: &Shards, support: &mut Support, anchor: Anchor, frame: SurfaceFrame) {
         let is_piece = |shard: u32| cut.inner_point(shard).is_some_and(|at| self.shell.place(at).is_some());
         let gaps: Vec<u32> = (0..cut.len() as u32).filter(|shard| !is_piece(*shard)).collect();
         if !matches!(anchor, Anchor::Nothing | Anchor::Sides([false, false, false, false])) {
             support.hold_these(gaps.iter().flat_map(|gap| cut.neighbours(*gap)).map(|neighbour| neighbour.shard));
         }
+        self.fringe = Arc::new(fringe(cut, &gaps, frame));
         support.remove(gaps);
+    }
+
+    /// Adds the texels that show nothing of the mesh: seen at a low angle, parallax finds them beyond its border.
+    fn add_gaps(&self, spans: &mut Vec<Span>, base: &BasePicture) {
+        let size = self.fringe.size();
+        for y in 0..size.y {
+            let is_gap = |x: &u32| self.fringe.get(*x, y) == Some(true) && base.is_hole(UVec2::new(*x, y));
+            spans.extend((0..size.x).filter(is_gap).map(|x| [y, x, x + 1]));
+        }
     }
 
     /// Knocks out what lies within `reach` through space.

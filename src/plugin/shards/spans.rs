@@ -1,7 +1,7 @@
 //! The texels of shards.
 
+use crate::Grid;
 use crate::pattern::SurfaceFrame;
-use crate::plugin::source::unfolding::Unfolding;
 use crate::plugin::surface::cutouts::Span;
 use crate::raster::TexelRect;
 use crate::shatter::Shards;
@@ -56,18 +56,31 @@ pub(super) fn spans_of(shards: &Shards, shard: u32, frame: SurfaceFrame) -> Vec<
     spans
 }
 
-/// How many of the texels around a mesh go with what is beside them: filtering mixes them with it.
-const FRINGE: u32 = 2;
+/// How far from a piece texels go with it that are no piece's, texels: so far away parallax and filtering find them. Charts lie eight apart, and the
+/// one beside keeps two of them.
+const FRINGE: u32 = 6;
 
-/// Adds to the texels of a piece of what is laid out flat those around the mesh that are shown with them at its border.
-pub(super) fn add_fringe(spans: &mut Vec<Span>, unfolding: &Unfolding) {
-    let size = unfolding.layout.size;
+/// The texels of a mesh that is laid out that are no piece's, but shown at the border of one: those around it, and splinters of it that have become
+/// part of what lies beside it, `gaps`.
+pub(super) fn fringe(cut: &Shards, gaps: &[u32], frame: SurfaceFrame) -> Grid<bool> {
+    let mut fringe = Grid::new(frame.size(), false);
+    let (mut scan, mut spans) = (Scan::new(frame), Vec::new());
+    gaps.iter().for_each(|gap| scan.find(cut, *gap, &mut spans));
+    for [y, from, to] in spans {
+        fringe.row_mut(y as usize)[from as usize..to as usize].fill(true);
+    }
+    fringe
+}
+
+/// Adds to the texels of a piece those of the fringe beside it.
+pub(super) fn add_fringe(spans: &mut Vec<Span>, fringe: &Grid<bool>) {
+    let size = fringe.size();
     for i in 0..spans.len() {
         let [y, from, to] = spans[i];
         let (left, right) = (from.saturating_sub(FRINGE), (to + FRINGE).min(size.x));
         for row in y.saturating_sub(FRINGE)..(y + FRINGE + 1).min(size.y) {
-            let is_beside = |x: &u32| unfolding.is_beside(UVec2::new(*x, row));
-            spans.extend((left..right).filter(is_beside).map(|x| [row, x, x + 1]));
+            let beside = fringe.row(row as usize)[left as usize..right as usize].iter();
+            spans.extend((left..).zip(beside).filter(|(_, is)| **is).map(|(x, _)| [row, x, x + 1]));
         }
     }
     spans.sort_unstable();
@@ -98,7 +111,6 @@ pub(super) fn bounds(shards: &Shards, shard: u32, frame: SurfaceFrame) -> TexelR
 mod tests {
     use super::*;
     use crate::{
-        Grid,
         math::Rng,
         plugin::surface::cutouts::Holes,
         shatter::{Cuts, ShatterParams, shatter},

@@ -48,15 +48,6 @@ impl Unfolding {
         self.layout.owner(texel).is_none()
     }
 
-    /// Whether a texel is one of those around the mesh, which are there for filtering.
-    pub(crate) fn is_beside(&self, texel: UVec2) -> bool {
-        let Some([a, b, c]) = self.layout.owner(texel).and_then(|of| *self.layout.corners.get(of)?) else {
-            return false;
-        };
-        let (at, turn) = (texel.as_vec2() + 0.5, (b - a).perp_dot(c - a).signum());
-        [(a, b), (b, c), (c, a)].iter().any(|(p, q)| (*q - *p).perp_dot(at - *p) * turn < 0.0)
-    }
-
     /// What of a picture of `size` texels a texel shows: the place there, texels.
     pub(crate) fn place(&self, texel: UVec2, size: UVec2) -> Vec2 {
         let at = texel.as_vec2() + 0.5;
