@@ -31,9 +31,11 @@ enum Stage {
     Color,
     Lit,
     Standard,
+    /// A box, which is laid out.
+    Body,
 }
 
-const STAGES: [Stage; 4] = [Stage::Sprite, Stage::Color, Stage::Lit, Stage::Standard];
+const STAGES: [Stage; 5] = [Stage::Sprite, Stage::Color, Stage::Lit, Stage::Standard, Stage::Body];
 
 /// An app that makes pipelines beside the frames, and whose frames may not take any time.
 fn app() -> Option<(MutexGuard<'static, ()>, App)> {
@@ -66,7 +68,7 @@ fn set_up(app: &mut App, stage: Stage) -> (Handle<Image>, Entity) {
         Camera { clear_color: ClearColorConfig::Custom(Color::BLACK), ..default() },
         RenderTarget::Image(target.clone().into()),
     );
-    if stage == Stage::Standard {
+    if matches!(stage, Stage::Standard | Stage::Body) {
         app.world_mut().spawn((Camera3d::default(), camera, Transform::from_xyz(0.0, 0.0, 1.0)));
     } else {
         app.world_mut().spawn((Camera2d, camera));
@@ -86,10 +88,15 @@ fn set_up(app: &mut App, stage: Stage) -> (Handle<Image>, Entity) {
             let material = add(app, CrackLitMaterial::new(picture).with_ambient(LinearRgba::WHITE));
             app.world_mut().spawn((Mesh2d(quad), MeshMaterial2d(material))).id()
         }
-        Stage::Standard => {
+        Stage::Standard | Stage::Body => {
             let material = StandardMaterial { base_color_texture: Some(picture), unlit: true, ..default() };
-            let material = add(app, material);
-            app.world_mut().spawn((Mesh3d(wall), MeshMaterial3d(material))).id()
+            let material = MeshMaterial3d(add(app, material));
+            if stage == Stage::Standard {
+                app.world_mut().spawn((Mesh3d(wall), material)).id()
+            } else {
+                let body = add(app, Mesh::from(Cuboid::from_length(4.0)));
+                app.world_mut().spawn((Mesh3d(body), material, Transform::from_xyz(0.0, 0.0, -2.0))).id()
+            }
         }
     };
     (target, entity)
@@ -151,7 +158,8 @@ fn first_hit_and_shatter(stage: Stage, is_early: bool) {
     wait_until_seen(&mut app, &target);
 
     app.world_mut().entity_mut(entity).insert_if_new(cracks());
-    hit(&mut app, center(entity));
+    let middle = if stage == Stage::Body { CrackHit::local(entity, Vec3::new(0.0, 0.0, 2.0)) } else { center(entity) };
+    hit(&mut app, middle);
     let is_cracked = |app: &App| app.world().get::<CrackState>(entity).is_some_and(|s| s.status == CrackStatus::Done);
     let first = shares(&mut app, &target, 12, is_cracked);
     let least = first.iter().copied().fold(1.0, f32::min);

@@ -65,7 +65,7 @@ impl Plane {
     }
 
     /// A point of the entity's own space in the axes of flights on a surface of `extent`, pattern units.
-    pub(crate) fn to_flight(&self, point: Vec3, extent: Vec2) -> Vec3 {
+    pub(crate) fn flight_axes(&self, point: Vec3, extent: Vec2) -> Vec3 {
         let scale = self.size / extent;
         let way = self.rotation.inverse() * (point - self.middle) / scale.extend(scale.y.abs());
         way + (0.5 * extent * Vec2::new(1.0, -1.0)).extend(0.0)

@@ -454,6 +454,6 @@ impl Shaped {
         let plane = Plane::on(&self.shell.place(at)?, at, self.extent)?;
         let direction = plane.rotation.inverse() * self.direction;
         let burst = self.throw.burst(self.place.as_ref(), (&plane, self.extent), (self.from, direction, self.energy));
-        Some(burst.map(|burst| (plane, burst.with_origin(plane.to_flight(self.at, self.extent)))))
+        Some(burst.map(|burst| (plane, burst.with_origin(plane.flight_axes(self.at, self.extent)))))
     }
 }

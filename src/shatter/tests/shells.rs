@@ -1,6 +1,7 @@
 //! Pieces of surfaces that are not flat.
 
 use super::*;
+use crate::math::ops;
 use crate::unwrap::{MeshShape, Unwrap};
 use glam::Affine3A;
 
@@ -13,8 +14,8 @@ fn ball(n: u32) -> Mesh {
     let point = |row: u32, i: u32| {
         let (polar, around) =
             (row as f32 / n as f32 * core::f32::consts::PI, i as f32 / round as f32 * core::f32::consts::TAU);
-        let (sin, cos) = polar.sin_cos();
-        Vec3::new(sin * around.cos(), cos, -sin * around.sin())
+        let (sin, cos) = (ops::sin(polar), ops::cos(polar));
+        Vec3::new(sin * ops::cos(around), cos, -sin * ops::sin(around))
     };
     let mut positions = vec![Vec3::Y];
     (1..n).for_each(|row| positions.extend((0..round).map(|i| point(row, i))));
