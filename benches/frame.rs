@@ -868,6 +868,38 @@ fn groups(_: &mut Criterion) {
     }
 }
 
+/// A ball of 20,000 triangles, which is laid out, beside a flat wall: until its first hit has landed, while three hits grow, and while it falls to
+/// pieces.
+fn bodies(_: &mut Criterion) {
+    let ball = Sphere::new(0.7).mesh().uv(120, 85);
+    for (name, mesh) in [("a ball of 20,000 triangles", ball), ("a flat wall", Rectangle::new(1.0, 1.0).into())] {
+        let mut app = app();
+        measure_systems(&mut app);
+        Run::InARow.arrange(&mut app);
+        app.insert_resource(CrackBudget::default());
+        let mesh = app.world_mut().resource_mut::<Assets<Mesh>>().add(mesh);
+        let material = app.world_mut().resource_mut::<Assets<StandardMaterial>>().add(StandardMaterial::default());
+        let surface = CrackSurface::new(CrackPreset::CONCRETE).with_unwrap(CrackUnwrap::Always);
+        let body = app.world_mut().spawn((Mesh3d(mesh), MeshMaterial3d(material), surface)).id();
+        (0..10).for_each(|_| step(&mut app, &mut Vec::new()));
+        let [mut first, mut growing, mut falling] = [Frames::new(), Frames::new(), Frames::new()];
+        for i in 0..3 {
+            let at = Vec3::new(0.2 * i as f32 - 0.2, 0.1, 0.7);
+            app.world_mut().trigger(CrackHit::local(body, at).with_energy(2.0));
+            while app.world().get::<CrackState>(body).is_none_or(|state| state.hits <= i) {
+                step(&mut app, if i == 0 { &mut first } else { &mut growing });
+            }
+            (0..60).for_each(|_| step(&mut app, &mut growing));
+        }
+        println!("{name}, until the first hit, systems: {}", percentiles(&first, Run::InARow));
+        println!("{name}, growing, systems: {}", percentiles(&growing, Run::InARow));
+        app.world_mut().commands().entity(body).shatter_cracks(ShatterRequest::EVERYTHING);
+        (0..60).for_each(|_| step(&mut app, &mut falling));
+        let pieces = app.world_mut().query::<&Shard>().iter(app.world()).count();
+        println!("{name}, into {pieces} pieces, systems: {}", percentiles(&falling, Run::InARow));
+    }
+}
+
 /// Frames with cracked surfaces, which are at rest, in turns with frames of plain sprites.
 fn finished() {
     let mut apps = [many(true), many(false)];
@@ -885,5 +917,5 @@ fn finished() {
     }
 }
 
-criterion_group!(benches, analogies, shards, frame, groups);
+criterion_group!(benches, analogies, shards, frame, groups, bodies);
 criterion_main!(benches);

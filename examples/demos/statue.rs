@@ -1,7 +1,7 @@
 //! A stone pedestal with a clay jar on it, and a ball of plaster beside it, to shoot at: cracks run over the edges of the box and around the
-//! curves of the others. At last the ball falls to pieces, as a hollow shell.
+//! curves of the others. At last the ball falls to pieces, as a hollow shell, and time runs backwards.
 //!
-//! Click to shoot; B breaks the ball; H heals everything. The camera goes around them.
+//! Click to shoot; B breaks the ball; R lets time run backwards, and forwards again; H heals everything. The camera goes around them.
 //!
 //! Without a display (or with `--headless`) a script plays, and pictures and a GIF are written to `--out`.
 //! Try `--frames 120 --out film`.
@@ -61,7 +61,7 @@ fn main() -> AppExit {
     let arguments = DemoArguments::given("A pedestal, a jar and a ball whose cracks run all around them");
     let mut app = demo_app("bevy_crack: statue", &arguments);
     app.add_systems(Startup, setup).add_systems(Update, go_around);
-    play(app, (heal_on_h, break_on_b), play_script)
+    play(app, (heal_on_h, break_on_b, turn_time_on_r), play_script)
 }
 
 fn setup(
@@ -188,12 +188,31 @@ fn break_on_b(
     }
 }
 
-/// The scripted run: shots at all of them in turn; then the ball breaks.
-fn play_script(mut commands: Commands, script: Script, targets: Query<(Entity, &Target, &GlobalTransform)>) {
-    if script.is_at(0.7) {
+/// How fast pieces fly back to where they were.
+const BACKWARDS: f32 = -1.5;
+
+fn turn_time_on_r(keys: Res<ButtonInput<KeyCode>>, mut pieces: Query<&mut ShatterCracks>) {
+    if keys.just_pressed(KeyCode::KeyR) {
+        for mut pieces in &mut pieces {
+            pieces.speed = if pieces.speed > 0.0 { BACKWARDS } else { 1.0 };
+        }
+    }
+}
+
+/// The scripted run: shots at all of them in turn; then the ball breaks, and is whole again.
+fn play_script(
+    mut commands: Commands,
+    script: Script,
+    targets: Query<(Entity, &Target, &GlobalTransform)>,
+    mut pieces: Query<&mut ShatterCracks>,
+) {
+    if script.is_at(0.55) {
         break_ball(&mut commands, &targets);
     }
-    for i in script.due(SHOTS.len() as u32, 0.05..0.6) {
+    if script.is_at(0.85) {
+        pieces.iter_mut().for_each(|mut pieces| pieces.speed = BACKWARDS);
+    }
+    for i in script.due(SHOTS.len() as u32, 0.05..0.5) {
         let (which, angle, height, energy) = SHOTS[i as usize];
         let Some((entity, _, at)) = targets.iter().find(|(_, target, _)| target.0 == which) else { continue };
         let middle = at.translation() + Vec3::Y * (height + if which == 1 { 0.6 } else { 0.0 });

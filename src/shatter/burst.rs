@@ -201,7 +201,7 @@ impl Burst {
     ///
     /// let shards = shatter(Cuts::new([1.0, 1.0].into())?, &ShatterParams::DEFAULT)?;
     /// // Half a pattern unit below the lower edge of the picture.
-    /// let floor = Floor { up: Vec3::Y, height: -1.5, clearance: 0.0, lies_flat: true };
+    /// let floor = Floor { up: Vec3::Y, height: -1.5, clearance: 0.0, depth: 0.0, lies_flat: true };
     /// let burst = Burst::new(BurstParams::DEFAULT, [0.5, 0.5].into(), Vec3::ZERO, 1.0, 7)?.with_floor(floor)?;
     /// let whole = shards.get(0).expect("one piece");
     /// // The middle of the pane comes down by a whole unit, and stays there.
@@ -316,7 +316,8 @@ impl Flight {
         let (since, landed) = (time - landing.time, self.in_air(landing.time));
         let (offset, velocity) = landing.motion(since);
         let rotation = landing.rotation(landed.rotation, since);
-        Moving { offset: self.offset + offset, velocity, rotation, spin: 0.0 }
+        let lift = landing.lift(landed.rotation, since);
+        Moving { offset: self.offset + offset + lift, velocity, rotation, spin: 0.0 }
     }
 
     fn in_air(&self, time: f32) -> Moving {

@@ -18,6 +18,9 @@ pub struct Floor {
     /// Distance from the plane to the middle of a resting piece, pattern units, 0..=10: half its thickness. Pieces
     /// that stand upright are as high as they are large.
     pub clearance: f32,
+    /// How far a curved piece reaches behind its middle, pattern units, 0..=64; 0 = it is flat. Lying with its face up, it rests on what reaches
+    /// furthest.
+    pub depth: f32,
     /// Whether pieces come to lie flat on it; else they turn their faces to the viewer, as in a game with a side
     /// view.
     pub lies_flat: bool,
@@ -42,7 +45,8 @@ impl Floor {
             return Err(ShatterError::NotFinite { index: 0 });
         }
         in_range("floor.height", self.height, -1e6, 1e6)?;
-        in_range("floor.clearance", self.clearance, 0.0, 10.0)
+        in_range("floor.clearance", self.clearance, 0.0, 10.0)?;
+        in_range("floor.depth", self.depth, 0.0, 64.0)
     }
 
     /// Where a piece of this size that starts at `start` lands; `motion` gives its offset and velocity after some
@@ -80,7 +84,8 @@ impl Floor {
         let (offset, velocity) = motion(late);
         let fall = (-up.dot(velocity)).max(0.0);
         let (sunk, skid) = ((-above(late)).max(0.0), velocity - up * up.dot(velocity));
-        Some(Landing { time: late, offset, up, sunk, fall, pull, skid, lies_flat: self.lies_flat })
+        let depth = if self.lies_flat { self.depth } else { 0.0 };
+        Some(Landing { time: late, offset, up, sunk, fall, pull, skid, depth, lies_flat: self.lies_flat })
     }
 }
 
@@ -100,6 +105,7 @@ pub(super) struct Landing {
     pull: f32,
     /// Its velocity along the floor.
     skid: Vec3,
+    depth: f32,
     lies_flat: bool,
 }
 
@@ -121,6 +127,16 @@ impl Landing {
         }
         let offset = self.offset + self.skid * ((1.0 - left) / FRICTION) + self.up * (rise + self.sunk * (1.0 - left));
         (offset, self.skid * left + self.up * speed)
+    }
+
+    /// How far it is lifted `seconds` after it has landed with the rotation `landed`: as far as what reaches behind it needs.
+    pub(super) fn lift(&self, landed: Quat, seconds: f32) -> Vec3 {
+        let is_face_up = (landed * Vec3::Z).dot(self.up) >= 0.0;
+        if is_face_up && self.depth > 0.0 {
+            self.up * (self.depth * (1.0 - ops::exp(-SETTLING * seconds)))
+        } else {
+            Vec3::ZERO
+        }
     }
 
     /// Its rotation `seconds` after it has landed with the rotation `landed`.

@@ -106,7 +106,8 @@ impl Plane {
         }
         let (up, length) = (up.try_normalize()?, up.length());
         let clearance = thickness.map_or(0.0, |thickness| 0.5 * thickness / scale.y.abs());
-        let floor = Floor { up, height: (height - none) / length, clearance, lies_flat: thickness.is_some() };
+        let floor =
+            Floor { up, height: (height - none) / length, clearance, depth: 0.0, lies_flat: thickness.is_some() };
         floor.height.is_finite().then_some(floor)
     }
 

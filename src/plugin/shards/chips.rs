@@ -299,6 +299,7 @@ impl Surface {
             gravity: settings.gravity,
             floor: settings.floor,
             thickness: active.carrier.is_solid.then_some(0.0),
+            depth: 0.0,
             seed: active.surface.seed ^ u64::from(strike.impact),
         };
         let hit = (strike.pos, direction, strike.energy.clamp(0.0, 1000.0));

@@ -73,12 +73,8 @@ pub(super) struct Style {
 
 impl PartialEq for Style {
     fn eq(&self, other: &Self) -> bool {
-        let is_same = |a: &Arc<Shell>, b: &Arc<Shell>| Arc::ptr_eq(a, b);
-        (self.rim, self.thickness) == (other.rim, other.thickness)
-            && match (&self.shell, &other.shell) {
-                (Some(a), Some(b)) => is_same(a, b),
-                (a, b) => a.is_none() && b.is_none(),
-            }
+        let of = |style: &Self| style.shell.as_ref().map(Arc::as_ptr);
+        (self.rim, self.thickness, of(self)) == (other.rim, other.thickness, of(other))
     }
 }
 

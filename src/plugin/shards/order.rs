@@ -4,7 +4,8 @@ use super::batch::{Batch, Leaving};
 use super::broken::{Broken, broken};
 use super::drawn::{Drawn, Sketch};
 use super::form::Style;
-use super::spans::{Scan, add_fringe, fringe, join_spans};
+use super::shell::{MOST_REACH, ShellOrder};
+use super::spans::{Scan, add_fringe, join_spans};
 use super::throw::{Throw, in_own_space};
 use crate::Grid;
 use crate::math::mix;
@@ -18,18 +19,13 @@ use crate::plugin::source::picture::BasePicture;
 use crate::plugin::surface::active::Active;
 use crate::plugin::surface::cutouts::{Holes, Span};
 use crate::raster::{DirtyTiles, TexelRect};
-use crate::shatter::{
-    Anchor, Burst, Cuts, Fallen, RimLook, Shards, ShatterError, Shell, ShellTriangle, Support, shatter,
-};
+use crate::shatter::{Anchor, Burst, Cuts, RimLook, Shards, ShatterError, Shell, Support, shatter};
 use bevy::prelude::*;
 use std::{collections::VecDeque, sync::Arc};
 
 /// The most shards that become entities in one frame, of all surfaces together, unless frames may take any time. Fewer would be seen to
 /// come late: a burst stands for 0.15 s before its pieces move.
 pub(super) const MOST_NEW: usize = 256;
-
-/// The largest reach of a blow, pattern units: no surface is larger.
-const MOST_REACH: f32 = 64.0;
 
 /// What a surface is to lose, and all that was to be known of it when that was asked for.
 pub(super) struct ShatterJob {
@@ -44,8 +40,8 @@ pub(super) struct ShatterJob {
     from: Vec2,
     reach: f32,
     burst: Burst,
-    /// What is not flat.
-    body: Option<Body>,
+    /// The shape of what is not flat.
+    shell: Option<ShellOrder>,
     /// The surface's.
     seed: u64,
     /// Nodes and links of the network.
@@ -63,24 +59,6 @@ pub(super) struct ShatterJob {
     frame: SurfaceFrame,
     view: TexelRect,
     alpha_mask: bool,
-}
-
-/// A surface that is not flat, and what throws its pieces.
-struct Body {
-    shell: BodyShape,
-    /// If it has shattered before.
-    fringe: Option<Arc<Grid<bool>>>,
-    throw: Throw,
-    place: Option<GlobalTransform>,
-    /// In the entity's own space.
-    direction: Vec3,
-    energy: f32,
-}
-
-enum BodyShape {
-    /// It has shattered before.
-    Known(Arc<Shell>),
-    New(Vec<ShellTriangle>),
 }
 
 /// Where the pieces come from.
@@ -170,6 +148,7 @@ impl ShatterJob {
         let extent = network.extent();
         let (pos, energy, direction) =
             active.cracks.last_hit.map_or((0.5 * extent, 1.0, Vec3::ZERO), |hit| (hit.pos, hit.energy, hit.direction));
+        let broken = broken(world, entity);
         let refused = |reason| ShardsError::NotFlat { reason };
         let seen = active.canvas.seen().ok_or(refused("it shows nothing"))?;
         let kind = active.carrier.kind;
@@ -181,13 +160,18 @@ impl ShatterJob {
                 };
                 let place = texel.and_then(|texel| Some((texel, kind.plane_at(world, entity, texel)?)));
                 let (texel, plane) = place.ok_or(refused("its mesh is not there"))?;
-                (texel / unfolding.unit, plane)
+                // Pieces that are out already keep theirs.
+                let same = broken.filter(|broken| broken.settings.thickness == settings.thickness);
+                let thickness = same.map_or_else(
+                    || plane.thickness(settings.thickness, extent),
+                    |same| same.plane.thickness(0.0, extent),
+                );
+                (texel / unfolding.unit, Plane { thickness: Some(thickness), ..plane })
             }
             None => (request.uv.map_or(pos, |uv| uv * extent), kind.plane(world, entity, seen).map_err(refused)?),
         };
         let own_direction = in_own_space(world, entity, request.direction.unwrap_or(direction));
         let direction = plane.rotation.inverse() * own_direction;
-        let broken = broken(world, entity);
         let released = broken.map_or(0, |broken| broken.released);
         let seed = active.surface.seed;
         let energy = request.energy.unwrap_or(energy);
@@ -196,22 +180,13 @@ impl ShatterJob {
             gravity: settings.gravity,
             floor: settings.floor,
             thickness: active.carrier.is_solid.then(|| plane.thickness(settings.thickness, extent)),
+            depth: 0.0,
             seed: seed ^ u64::from(released),
         };
         let place = world.get::<GlobalTransform>(entity);
         let burst = throw.burst(place, (&plane, extent), (from, direction, energy))?;
-        let body = match unfolding {
-            Some(_) => {
-                let shell = match broken.and_then(|broken| broken.shell.clone()) {
-                    Some(known) => BodyShape::Known(known),
-                    None => BodyShape::New(kind.triangles(world, entity).ok_or(refused("its mesh cannot be read"))?),
-                };
-                let place = place.copied();
-                let fringe = broken.and_then(|broken| broken.fringe.clone());
-                Some(Body { shell, fringe, throw, place, direction: own_direction, energy })
-            }
-            None => None,
-        };
+        let order = |_| ShellOrder::of(world, entity, kind, broken, (throw, own_direction, energy));
+        let shell = unfolding.map(order).transpose().map_err(refused)?;
         let grown = (network.nodes().len(), network.links().len());
         let same = |broken: &Broken| broken.grown == grown && broken.settings.cut == settings.cut;
         let pieces = match broken {
@@ -238,7 +213,7 @@ impl ShatterJob {
             from,
             reach: if is_everything { MOST_REACH } else { request.reach },
             burst,
-            body,
+            shell,
             seed,
             grown,
             pieces,
@@ -269,7 +244,7 @@ impl ShatterJob {
         let is_new = matches!(self.pieces, CutFrom::Lines(..));
         let is_kept = matches!(self.pieces, CutFrom::Cut(..));
         let extent = self.frame.extent();
-        let mut body = self.body.map(|body| body.shaped(extent, self.from));
+        let mut shell = self.shell.map(|order| order.shape(extent, self.from));
         let (cut, mut support) = match self.pieces {
             CutFrom::Cut(cut, support) => (cut, support),
             CutFrom::Held(cut, support) => {
@@ -281,7 +256,7 @@ impl ShatterJob {
                 for line in carried.iter().flat_map(|lines| lines.iter()) {
                     cuts.add_line(line)?;
                 }
-                for edge in body.iter().flat_map(|body| body.shell.border()) {
+                for edge in shell.iter().flat_map(|shell| shell.shape.border()) {
                     cuts.add_line(&edge)?;
                 }
                 let cut = Arc::new(shatter(cuts, &self.settings.cut)?);
@@ -299,19 +274,19 @@ impl ShatterJob {
                 held.get(texel.x, texel.y).is_some_and(|value| value > 0.5)
             });
         }
-        if let Some(body) = body.as_mut().filter(|_| !is_kept) {
-            body.hold(&cut, &mut support, self.settings.anchor, self.frame);
+        if let Some(shell) = shell.as_mut().filter(|_| !is_kept) {
+            shell.hold(&cut, &mut support, self.settings.anchor, self.frame);
         }
-        let fallen = match &body {
-            Some(body) => body.hit(&cut, &mut support, self.from, self.reach)?,
+        let fallen = match &shell {
+            Some(shell) => shell.hit(&cut, &mut support, self.from, self.reach)?,
             None => support.hit(&cut, self.from, self.reach)?,
         };
         let (frame, settings) = (self.frame, self.settings);
         let size = self.base.size.as_vec2();
         let uv = [self.view.min.as_vec2() / size, self.view.max.as_vec2() / size];
         let thickness = self.plane.thickness(settings.thickness, cut.extent());
-        let shell = body.as_ref().map(|body| body.shell.clone());
-        let style = Style { rim: self.rim, thickness: self.is_solid.then_some(thickness), shell };
+        let shape = shell.as_ref().map(|shell| shell.shape.clone());
+        let style = Style { rim: self.rim, thickness: self.is_solid.then_some(thickness), shell: shape };
         let mut holes = self.holes.unwrap_or_else(|| Holes::new(frame.size()));
         let mut scan = Scan::new(frame);
         let is_seen = |&[y, from, to]: &Span| (from..to).any(|x| !self.base.is_hole(self.view.min + UVec2::new(x, y)));
@@ -319,24 +294,22 @@ impl ShatterJob {
         let mut leaving = Vec::with_capacity(fallen.hit.len() + fallen.loose.len());
         for ((&number, is_falling), nth) in fallen.hit.iter().chain(&fallen.loose).zip(falls).zip(self.released..) {
             let Some(shard) = cut.get(number) else { continue };
-            let (plane, burst) = match &body {
-                Some(body) => body.thrown(&cut, number).ok_or(ShatterError::NoShard { shard: number })??,
-                None => (self.plane, self.burst.clone()),
-            };
+            let thrown = shell.as_ref().and_then(|shell| shell.thrown(&cut, number)).transpose()?;
+            let (plane, burst) = thrown.unwrap_or_else(|| (self.plane, self.burst.clone()));
             let flight = if is_falling { burst.fall(nth, shard) } else { burst.flight(nth, shard) };
             let seed = mix(self.seed ^ mix(u64::from(nth)));
             let again = settings.again.and_then(|again| Some((again, flight.delay + again.due(shard.area, seed)?)));
             let mut spans = Vec::new();
             scan.find(&cut, number, &mut spans);
-            if let Some(body) = &body {
-                add_fringe(&mut spans, &body.fringe);
+            if let Some(shell) = &shell {
+                add_fringe(&mut spans, &shell.fringe);
             }
             let is_shown = spans.is_empty() || spans.iter().any(is_seen);
             let form = is_shown.then(|| Box::new(style.form(&cut, number, &plane, uv, seed)));
             leaving.push(Leaving { number, plane, flight, seed, again, form, spans });
         }
-        if let (Some(body), Some(first), true) = (&body, leaving.first_mut(), self.is_first) {
-            body.add_gaps(&mut first.spans, &self.base);
+        if let (Some(shell), Some(first), true) = (&shell, leaving.first_mut(), self.is_first) {
+            shell.add_gaps(&mut first.spans, &self.base);
         }
         if leaving.len() > self.batch {
             // Those that move first leave first.
@@ -372,7 +345,7 @@ impl ShatterJob {
             rim: self.rim,
             plane: self.plane,
             shell: style.shell,
-            fringe: body.map(|body| body.fringe),
+            fringe: shell.map(|shell| shell.fringe),
             grown: self.grown,
             cut,
             is_new,
@@ -382,78 +355,5 @@ impl ShatterJob {
             density,
             room,
         })
-    }
-}
-
-/// A body whose shape is known.
-struct Shaped {
-    shell: Arc<Shell>,
-    fringe: Arc<Grid<bool>>,
-    throw: Throw,
-    place: Option<GlobalTransform>,
-    direction: Vec3,
-    energy: f32,
-    extent: Vec2,
-    /// Where it is hit, in the entity's own space; and a pattern unit there, in its units.
-    from: Vec2,
-    at: Vec3,
-    unit: f32,
-}
-
-impl Body {
-    fn shaped(self, extent: Vec2, from: Vec2) -> Shaped {
-        let Self { shell, fringe, throw, place, direction, energy } = self;
-        let shell = match shell {
-            BodyShape::Known(shell) => shell,
-            BodyShape::New(triangles) => Arc::new(Shell::new(extent, triangles)),
-        };
-        let hit = shell.place(from);
-        let at = hit.map_or(Vec3::ZERO, |hit| hit.position);
-        let unit = hit.map_or(1.0, |hit| (hit.right.length() * hit.down.length()).sqrt());
-        let fringe = fringe.unwrap_or_else(|| Arc::new(Grid::new(UVec2::ONE, false)));
-        Shaped { shell, fringe, throw, place, direction, energy, extent, from, at, unit }
-    }
-}
-
-impl Shaped {
-    /// What lies where nothing is laid out is no piece; pieces beside that are held, unless nothing is to hold any.
-    fn hold(&mut self, cut: &Shards, support: &mut Support, anchor: Anchor, frame: SurfaceFrame) {
-        let is_piece = |shard: u32| cut.inner_point(shard).is_some_and(|at| self.shell.place(at).is_some());
-        let gaps: Vec<u32> = (0..cut.len() as u32).filter(|shard| !is_piece(*shard)).collect();
-        if !matches!(anchor, Anchor::Nothing | Anchor::Sides([false, false, false, false])) {
-            support.hold_these(gaps.iter().flat_map(|gap| cut.neighbours(*gap)).map(|neighbour| neighbour.shard));
-        }
-        self.fringe = Arc::new(fringe(cut, &gaps, frame));
-        support.remove(gaps);
-    }
-
-    /// Adds the texels that show nothing of the mesh: seen at a low angle, parallax finds them beyond its border.
-    fn add_gaps(&self, spans: &mut Vec<Span>, base: &BasePicture) {
-        let size = self.fringe.size();
-        for y in 0..size.y {
-            let is_gap = |x: &u32| self.fringe.get(*x, y) == Some(true) && base.is_hole(UVec2::new(*x, y));
-            spans.extend((0..size.x).filter(is_gap).map(|x| [y, x, x + 1]));
-        }
-    }
-
-    /// Knocks out what lies within `reach` through space.
-    fn hit(&self, cut: &Shards, support: &mut Support, from: Vec2, reach: f32) -> Result<Fallen, ShatterError> {
-        support.hit_by(cut, reach, |shard| {
-            if cut.distance(shard, from) == 0.0 {
-                return 0.0;
-            }
-            let away = self.shell.distance(cut, shard, self.at).map_or(f32::INFINITY, |away| away / self.unit);
-            // All of it, however large.
-            if reach >= MOST_REACH { away.min(MOST_REACH) } else { away }
-        })
-    }
-
-    /// The plane of a piece, and what throws it; `None` where nothing is laid out.
-    fn thrown(&self, cut: &Shards, shard: u32) -> Option<Result<(Plane, Burst), ShatterError>> {
-        let at = cut.inner_point(shard)?;
-        let plane = Plane::on(&self.shell.place(at)?, at, self.extent)?;
-        let direction = plane.rotation.inverse() * self.direction;
-        let burst = self.throw.burst(self.place.as_ref(), (&plane, self.extent), (self.from, direction, self.energy));
-        Some(burst.map(|burst| (plane, burst.with_origin(plane.flight_axes(self.at, self.extent)))))
     }
 }

@@ -3,7 +3,7 @@
 use crate::plugin::api::GravitySpace;
 use crate::plugin::carrier::plane::Plane;
 use crate::plugin::carrier::space;
-use crate::shatter::{Burst, BurstParams, ShatterError};
+use crate::shatter::{Burst, BurstParams, Floor, ShatterError};
 use bevy::prelude::*;
 
 /// How what leaves a surface is thrown, and falls.
@@ -15,6 +15,8 @@ pub(super) struct Throw {
     pub(super) floor: Option<f32>,
     /// How thick pieces are that lie flat on it, in the entity's units; `None` in 2D.
     pub(super) thickness: Option<f32>,
+    /// How far the piece reaches behind its middle, pattern units.
+    pub(super) depth: f32,
     pub(super) seed: u64,
 }
 
@@ -47,7 +49,7 @@ impl Throw {
         if let Some(height) = self.floor.filter(|height| height.is_finite())
             && let Some(floor) = plane.floor(extent, place, height, self.thickness)
         {
-            burst = burst.with_floor(floor)?;
+            burst = burst.with_floor(Floor { depth: self.depth, ..floor })?;
         }
         Ok(burst)
     }

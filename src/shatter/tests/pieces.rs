@@ -334,7 +334,7 @@ fn pieces_come_to_rest_on_the_floor() {
         let mut rng = Rng::new(case).stream("floor");
         let up = Vec3::new(0.4 * rng.signed(), 1.0, 0.4 * rng.signed()) * rng.range(0.5, 2.0);
         let lies_flat = rng.unit() < 0.5;
-        let floor = Floor { up, height: rng.range(-3.0, 0.3) * up.length(), clearance: 0.01, lies_flat };
+        let floor = Floor { up, height: rng.range(-3.0, 0.3) * up.length(), clearance: 0.01, depth: 0.0, lies_flat };
         let params = BurstParams { fade_after: 100.0, drag: rng.range(0.0, 2.0), ..BurstParams::DEFAULT };
         let burst = Burst::new(params, Vec2::splat(0.5), Vec3::ZERO, 1.0, case).unwrap().with_floor(floor).unwrap();
         let gravity = params.gravity.extend(0.0);
@@ -380,13 +380,14 @@ fn pieces_come_to_rest_on_the_floor() {
 #[test]
 fn floors_that_are_none_are_refused() {
     let burst = Burst::new(BurstParams::DEFAULT, Vec2::ZERO, Vec3::ZERO, 1.0, 1).unwrap();
-    let good = Floor { up: Vec3::Y, height: -2.0, clearance: 0.0, lies_flat: true };
+    let good = Floor { up: Vec3::Y, height: -2.0, clearance: 0.0, depth: 0.0, lies_flat: true };
     assert!(burst.clone().with_floor(good).is_ok());
     for bad in [
         Floor { up: Vec3::ZERO, ..good },
         Floor { up: Vec3::NAN, ..good },
         Floor { height: f32::INFINITY, ..good },
         Floor { clearance: -1.0, ..good },
+        Floor { depth: f32::NAN, ..good },
     ] {
         assert!(burst.clone().with_floor(bad).is_err(), "{bad:?}");
     }
