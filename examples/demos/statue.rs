@@ -14,7 +14,10 @@ use bevy::{
     mesh::{Indices, PrimitiveTopology},
     prelude::*,
 };
-use bevy_crack::{prelude::*, shatter::BurstParams};
+use bevy_crack::{
+    prelude::*,
+    shatter::{BreakAgain, BurstParams, SizeClasses},
+};
 use bevy_crack_demos::{DemoArguments, Script, demo_app, heal_on_h, hit_on_press, play, with_normals};
 use std::f32::consts::TAU;
 
@@ -102,7 +105,7 @@ fn setup(
     // It has a picture of its own, which is laid out with it.
     let pedestal = CrackSurface::new(CrackPreset::CONCRETE).with_unwrap(CrackUnwrap::Always);
     let jar = CrackSurface::new(CrackPreset::CLAY).with_seed(1);
-    let ball = CrackSurface::new(CrackPreset::PLASTER).with_seed(2);
+    let ball = CrackSurface::new(CrackPreset::CONCRETE).with_seed(2);
     let turned = Quat::from_rotation_y(0.5);
     let targets = [
         (
@@ -116,9 +119,10 @@ fn setup(
     ];
     for (i, (mesh, material, place, surface)) in targets.into_iter().enumerate() {
         let pieces = ShatterCracks {
-            thickness: 0.07,
+            thickness: 0.1,
             floor: Some(0.0),
             burst: BurstParams { fade_after: 30.0, ..BurstParams::DEFAULT },
+            again: Some(BreakAgain { classes: SizeClasses { largest: [0.1, 0.3, 0.8] }, after: 0.15, apart: 0.1 }),
             ..default()
         };
         commands

@@ -1,6 +1,7 @@
 //! Shards of a surface that is not flat: it is cut where it is laid out in a plane, and its pieces are curved.
 
 use super::{MeshFrame, RimLook, Shards};
+use crate::math::mix;
 use glam::{Affine3A, DVec2, UVec2, Vec2, Vec3};
 use std::collections::HashMap;
 
@@ -57,6 +58,8 @@ pub struct Shell {
     ends: Vec<[bool; 3]>,
     /// Triangles of each cell, row by row.
     grid: CellLists,
+    /// Length of a pattern unit in space, on the whole.
+    unit: f32,
 }
 
 /// A place on a [`Shell`].
@@ -85,11 +88,20 @@ pub struct ShellFrame {
     pub seed: u64,
     /// How far pieces reach inward from the surface, in the shell's units.
     pub thickness: f32,
+    /// How uneven their inside and the faces along which they broke are, 0..=1; pieces fit all the same.
+    pub roughness: f32,
 }
 
 impl Default for ShellFrame {
     fn default() -> Self {
-        Self { to_mesh: Affine3A::IDENTITY, uv: [Vec2::ZERO, Vec2::ONE], rim: RimLook::PLAIN, seed: 0, thickness: 0.0 }
+        Self {
+            to_mesh: Affine3A::IDENTITY,
+            uv: [Vec2::ZERO, Vec2::ONE],
+            rim: RimLook::PLAIN,
+            seed: 0,
+            thickness: 0.0,
+            roughness: 0.0,
+        }
     }
 }
 
@@ -159,7 +171,13 @@ impl Shell {
         };
         let ends = triangles.iter().map(|triangle| [0, 1, 2].map(|i| is_end(triangle, i))).collect();
         let grid = CellLists::new(extent, triangles.iter().map(|triangle| triangle.flat));
-        Self { extent, triangles, ends, grid }
+        let area = |of: fn(&ShellTriangle) -> f32| triangles.iter().map(of).sum::<f32>();
+        let [space, flat] = [
+            area(|of| (of.corners[1] - of.corners[0]).cross(of.corners[2] - of.corners[0]).length()),
+            area(|of| (of.flat[1] - of.flat[0]).perp_dot(of.flat[2] - of.flat[0]).abs()),
+        ];
+        let unit = (space / flat.max(f32::MIN_POSITIVE)).sqrt();
+        Self { extent, triangles, ends, grid, unit }
     }
 
     /// Whether there is nothing of it.
@@ -348,7 +366,7 @@ impl Shards {
                     };
                     let uv = |weights| [0, 1].map(|axis| mix(weights, &|i| flat.uvs[i][axis]));
                     let color = |weights| [0, 1, 2, 3].map(|axis| mix(weights, &|i| flat.colors[i][axis]));
-                    made.add(of, &polygon, frame, uv);
+                    made.add(of, &polygon, (frame, shell.unit), uv);
                     if !flat.colors.is_empty() {
                         made.picture.colors.extend(polygon.iter().map(|corner| color(corner.weights)));
                     }
@@ -377,7 +395,13 @@ fn area(polygon: &[Corner]) -> f64 {
 
 impl ShellMesh {
     /// Adds the part of a triangle.
-    fn add(&mut self, of: &ShellTriangle, polygon: &[Corner], frame: &ShellFrame, uv: impl Fn([f64; 3]) -> [f32; 2]) {
+    fn add(
+        &mut self,
+        of: &ShellTriangle,
+        polygon: &[Corner],
+        (frame, unit): (&ShellFrame, f32),
+        uv: impl Fn([f64; 3]) -> [f32; 2],
+    ) {
         let turn = (of.flat[1] - of.flat[0]).perp_dot(of.flat[2] - of.flat[0]);
         // A polygon turns from x to y, the triangle counter-clockwise as seen from outside.
         let is_turned = turn < 0.0;
@@ -409,28 +433,75 @@ impl ShellMesh {
             .map(|vertex| self.picture.push(vertex.at, vertex.normal, tangent(vertex.normal, along), vertex.uv))
             .collect();
         self.picture.fill(&outside, is_turned);
-        let below = |vertex: &Vertex| vertex.at - vertex.normal * frame.thickness;
+        // What is uneven is lit face by face.
+        let is_rough = frame.roughness > 0.0;
+        let below = |vertex: &Vertex| {
+            let [x, y, z] = unevenness(vertex.flat, frame.thickness / unit);
+            let (aside, rough) = (Vec3::new(x, y, z), frame.roughness * frame.thickness);
+            let along = aside.reject_from_normalized(vertex.normal);
+            vertex.at - vertex.normal * (frame.thickness + 0.35 * rough * aside.dot(vertex.normal)) + along * rough
+        };
+        let under: Vec<Vec3> = vertices.iter().map(below).collect();
+        let bottom = facing(&under).map(|facing| if is_turned { facing } else { -facing });
         let inside: Vec<u32> = vertices
             .iter()
-            .map(|vertex| {
-                let tangent = tangent(vertex.normal, along);
-                self.inside.push(below(vertex), -vertex.normal, tangent, vertex.flat.to_array())
+            .zip(&under)
+            .map(|(vertex, under)| {
+                let normal = bottom.filter(|_| is_rough).unwrap_or(-vertex.normal);
+                self.inside.push(*under, normal, tangent(normal, along), vertex.flat.to_array())
             })
             .collect();
         self.inside.fill(&inside, !is_turned);
         for (i, corner) in polygon.iter().enumerate().filter(|(_, corner)| corner.is_edge) {
-            let (a, b) = (&vertices[i], &vertices[(i + 1) % vertices.len()]);
+            let k = (i + 1) % vertices.len();
+            let (a, b) = (&vertices[i], &vertices[k]);
             let way = b.at - a.at;
-            let out = if is_turned { a.normal.cross(way) } else { way.cross(a.normal) };
-            let Some(out) = out.try_normalize() else { continue };
-            let length = corner.at.distance(polygon[(i + 1) % polygon.len()].at) as f32;
+            let smooth = if is_turned { a.normal.cross(way) } else { way.cross(a.normal) };
+            let Some(smooth) = smooth.try_normalize() else { continue };
+            let corners = [a.at, b.at, under[k], under[i]];
+            let rough = facing(&corners).map(|facing| if is_turned { facing } else { -facing });
+            let out = rough.filter(|_| is_rough).unwrap_or(smooth);
+            let length = corner.at.distance(polygon[k].at) as f32;
             let tangent = way.normalize_or_zero().extend(1.0).to_array();
-            let corners =
-                [(a.at, [0.0, 0.0]), (b.at, [length, 0.0]), (below(b), [length, 1.0]), (below(a), [0.0, 1.0])]
-                    .map(|(at, uv)| self.inside.push(at, out, tangent, uv));
+            let uvs = [[0.0, 0.0], [length, 0.0], [length, 1.0], [0.0, 1.0]];
+            let mut uvs = uvs.into_iter();
+            let corners = corners.map(|at| self.inside.push(at, out, tangent, uvs.next().unwrap_or_default()));
             self.inside.fill(&corners, !is_turned);
         }
     }
+}
+
+/// The unit normal of a polygon on the side from which it runs counter-clockwise (Newell's method); `None` if it has no area.
+fn facing(corners: &[Vec3]) -> Option<Vec3> {
+    let first = *corners.first()?;
+    corners.windows(2).map(|pair| (pair[0] - first).cross(pair[1] - first)).sum::<Vec3>().try_normalize()
+}
+
+/// Lengths of the waves of uneven faces, thicknesses; and how high each is.
+const WAVES: [(f32, f32); 2] = [(1.7, 0.6), (0.6, 0.3)];
+
+/// How far a place of the inside is moved, thicknesses: the same for all pieces that meet there. The thickness is in pattern units.
+fn unevenness(at: Vec2, thickness: f32) -> [f32; 3] {
+    let mut sum = [0.0; 3];
+    for ((length, height), wave) in WAVES.into_iter().zip(0u64..) {
+        let at = at / (length * thickness).max(1e-6);
+        let (cell, share) = (at.floor(), at - at.floor());
+        let share = share * share * (3.0 - 2.0 * share);
+        for (axis, sum) in (0u64..).zip(&mut sum) {
+            let corner = |x: f32, y: f32| {
+                let [x, y] = [cell.x + x, cell.y + y].map(|value| u64::from(value.to_bits()));
+                let bits = mix(mix(x ^ (axis << 40) ^ (wave << 44)) ^ y);
+                (bits >> 40) as f32 / (1u32 << 23) as f32 - 1.0
+            };
+            let blend = |a: f32, b: f32, share: f32| a + (b - a) * share;
+            let (top, bottom) = (
+                blend(corner(0.0, 0.0), corner(1.0, 0.0), share.x),
+                blend(corner(0.0, 1.0), corner(1.0, 1.0), share.x),
+            );
+            *sum += height * blend(top, bottom, share.y);
+        }
+    }
+    sum
 }
 
 /// Which triangles lie in which cells of a plane.

@@ -109,7 +109,28 @@ pub(super) fn lay_out(shape: &MeshShape, points: &Points, start: Start, is_free:
             }
         }
     }
+    trim(shape, &mut chart);
     chart
+}
+
+/// How often triangles that stick out are taken away.
+const TRIMS: u32 = 2;
+
+/// Takes away triangles that hang on to a chart by one edge, so that it does not end in steps: cracks and pieces end there, too.
+fn trim(shape: &MeshShape, chart: &mut Chart) {
+    let mut is_in = vec![false; shape.len()];
+    chart.triangles.iter().for_each(|(triangle, _)| is_in[*triangle] = true);
+    for _ in 0..TRIMS {
+        let sticks_out = |triangle: usize| {
+            let beside = || shape.across(triangle).into_iter().flatten();
+            beside().filter(|(other, _)| is_in[*other as usize]).count() == 1 && beside().count() == 3
+        };
+        // The first one stays.
+        let out: Vec<usize> =
+            chart.triangles.iter().skip(1).map(|(triangle, _)| *triangle).filter(|i| sticks_out(*i)).collect();
+        out.iter().for_each(|triangle| is_in[*triangle] = false);
+        chart.triangles.retain(|(triangle, _)| is_in[*triangle]);
+    }
 }
 
 /// Distance and direction of all points that can be reached, the nearest first.

@@ -14,6 +14,9 @@ use std::sync::{Arc, Weak};
 /// Shards that are worth a task.
 const CHUNK: usize = 32;
 
+/// How uneven the faces are along which a shell breaks.
+const ROUGHNESS: f32 = 0.6;
+
 /// The meshes of a shard.
 pub(super) struct Form {
     /// What shows the picture.
@@ -131,7 +134,7 @@ impl Style {
         let centroid = shards.get(number).map_or(Vec2::ZERO, |shard| shard.centroid);
         let at_rest = plane.place(centroid, shards.extent(), Pose::AT_REST, 0.5 * thickness);
         let to_mesh = at_rest.compute_affine().inverse();
-        let frame = ShellFrame { to_mesh, uv, rim: self.rim, seed, thickness };
+        let frame = ShellFrame { to_mesh, uv, rim: self.rim, seed, thickness, roughness: ROUGHNESS };
         let ShellMesh { picture, inside } = shards.shell_mesh(number, shell, &frame);
         let part = |part: ShellPart| {
             let ShellPart { positions, normals, tangents, uvs, colors, indices } = part;
