@@ -10,6 +10,7 @@ use bevy::{
     asset::RenderAssetUsages,
     camera::Hdr,
     core_pipeline::tonemapping::Tonemapping,
+    light::CascadeShadowConfigBuilder,
     math::ops,
     mesh::{Indices, PrimitiveTopology},
     prelude::*,
@@ -47,10 +48,10 @@ const AROUND: u32 = 96;
 const SHOTS: [(usize, f32, f32, f32); 7] = [
     (0, 0.75, 0.42, 4.0),
     (1, 0.6, 0.05, 2.5),
-    (2, 0.5, 0.15, 2.0),
+    (2, 0.5, 0.15, 6.0),
     (0, 1.2, -0.05, 3.0),
     (1, -0.3, 0.2, 1.5),
-    (2, 1.2, -0.1, 1.5),
+    (2, 1.2, -0.1, 5.0),
     (0, 0.35, -0.3, 1.5),
 ];
 
@@ -83,7 +84,13 @@ fn setup(
         Transform::default(),
     ));
     commands.spawn((
-        DirectionalLight { illuminance: 7_000.0, color: Color::srgb(1.0, 0.95, 0.86), ..default() },
+        DirectionalLight {
+            illuminance: 7_000.0,
+            color: Color::srgb(1.0, 0.95, 0.86),
+            shadow_maps_enabled: true,
+            ..default()
+        },
+        CascadeShadowConfigBuilder { num_cascades: 1, maximum_distance: 9.0, ..default() }.build(),
         Transform::from_xyz(2.4, 3.0, 1.8).looking_at(Vec3::ZERO, Vec3::Y),
     ));
     let (picture, normals) = with_normals(&assets, "concrete_fine");
@@ -100,12 +107,15 @@ fn setup(
     };
     let floor = materials.add(plain(Color::srgb(0.36, 0.34, 0.33), 0.95));
     let clay = materials.add(plain(Color::srgb(0.72, 0.42, 0.28), 0.6));
-    let plaster = materials.add(plain(Color::srgb(0.86, 0.84, 0.8), 0.85));
+    let plaster = materials.add(StandardMaterial {
+        base_color_texture: Some(assets.load("textures/plaster.png")),
+        ..plain(Color::WHITE, 0.95)
+    });
     commands.spawn((Mesh3d(meshes.add(Plane3d::new(Vec3::Y, Vec2::splat(8.0)))), MeshMaterial3d(floor)));
     // It has a picture of its own, which is laid out with it.
     let pedestal = CrackSurface::new(CrackPreset::CONCRETE).with_unwrap(CrackUnwrap::Always);
     let jar = CrackSurface::new(CrackPreset::CLAY).with_seed(1);
-    let ball = CrackSurface::new(CrackPreset::CONCRETE).with_seed(2);
+    let ball = CrackSurface::new(CrackPreset::CLAY.scaled(1.5)).with_seed(2).with_unwrap(CrackUnwrap::Always);
     let turned = Quat::from_rotation_y(0.5);
     let targets = [
         (
@@ -119,10 +129,10 @@ fn setup(
     ];
     for (i, (mesh, material, place, surface)) in targets.into_iter().enumerate() {
         let pieces = ShatterCracks {
-            thickness: 0.1,
+            thickness: 0.15,
             floor: Some(0.0),
             burst: BurstParams { fade_after: 30.0, ..BurstParams::DEFAULT },
-            again: Some(BreakAgain { classes: SizeClasses { largest: [0.1, 0.3, 0.8] }, after: 0.15, apart: 0.1 }),
+            again: Some(BreakAgain { classes: SizeClasses { largest: [0.25, 0.6, 1.5] }, after: 0.15, apart: 0.1 }),
             ..default()
         };
         commands
