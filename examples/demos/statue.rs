@@ -17,7 +17,7 @@ use bevy::{
 };
 use bevy_crack::{
     prelude::*,
-    shatter::{BreakAgain, BurstParams, SizeClasses},
+    shatter::{BreakAgain, BurstParams, ShatterParams, SizeClasses},
 };
 use bevy_crack_demos::{DemoArguments, Script, demo_app, heal_on_h, hit_on_press, play, with_normals};
 use std::f32::consts::TAU;
@@ -127,9 +127,13 @@ fn setup(
         (turned_on_a_lathe(&JAR, AROUND), clay, Transform::from_xyz(-0.3, PEDESTAL, 0.0), jar),
         (Sphere::new(0.42).mesh().uv(96, 64), plaster, Transform::from_xyz(0.75, 0.42, -0.35), ball),
     ];
+    let inside = materials.add(plain(Color::srgb(0.82, 0.79, 0.73), 1.0));
     for (i, (mesh, material, place, surface)) in targets.into_iter().enumerate() {
         let pieces = ShatterCracks {
-            thickness: 0.15,
+            thickness: 0.11,
+            // No piece is narrower than it is thick.
+            cut: ShatterParams { min_area: 0.012, ..ShatterParams::DEFAULT },
+            inside: Some(inside.clone()),
             floor: Some(0.0),
             burst: BurstParams { fade_after: 30.0, ..BurstParams::DEFAULT },
             again: Some(BreakAgain { classes: SizeClasses { largest: [0.25, 0.6, 1.5] }, after: 0.15, apart: 0.1 }),
