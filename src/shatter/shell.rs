@@ -360,16 +360,15 @@ impl Shards {
                 polygon.clear();
                 polygon.extend(whole);
                 of.clip(shell.ends[i as usize], &mut polygon, &mut spare);
-                if area(&polygon) >= LEAST_AREA {
-                    let mix = |weights: [f64; 3], of: &dyn Fn(usize) -> f32| {
-                        (0..3).map(|k| weights[k] as f32 * of(corners[k])).sum::<f32>()
-                    };
-                    let uv = |weights| [0, 1].map(|axis| mix(weights, &|i| flat.uvs[i][axis]));
-                    let color = |weights| [0, 1, 2, 3].map(|axis| mix(weights, &|i| flat.colors[i][axis]));
-                    made.add(of, &polygon, (frame, shell.unit), uv);
-                    if !flat.colors.is_empty() {
-                        made.picture.colors.extend(polygon.iter().map(|corner| color(corner.weights)));
-                    }
+                let has_area = area(&polygon) >= LEAST_AREA;
+                let mix = |weights: [f64; 3], of: &dyn Fn(usize) -> f32| {
+                    (0..3).map(|k| weights[k] as f32 * of(corners[k])).sum::<f32>()
+                };
+                let uv = |weights| [0, 1].map(|axis| mix(weights, &|i| flat.uvs[i][axis]));
+                let color = |weights| [0, 1, 2, 3].map(|axis| mix(weights, &|i| flat.colors[i][axis]));
+                made.add(of, (&polygon, has_area), (frame, shell.unit), uv);
+                if has_area && !flat.colors.is_empty() {
+                    made.picture.colors.extend(polygon.iter().map(|corner| color(corner.weights)));
                 }
             });
         }
@@ -394,11 +393,11 @@ fn area(polygon: &[Corner]) -> f64 {
 }
 
 impl ShellMesh {
-    /// Adds the part of a triangle.
+    /// Adds the part of a triangle; of one without area, as rims have them, the sides.
     fn add(
         &mut self,
         of: &ShellTriangle,
-        polygon: &[Corner],
+        (polygon, has_area): (&[Corner], bool),
         (frame, unit): (&ShellFrame, f32),
         uv: impl Fn([f64; 3]) -> [f32; 2],
     ) {
@@ -428,11 +427,6 @@ impl ShellMesh {
             along.extend(side).to_array()
         };
         let along = turned(right);
-        let outside: Vec<u32> = vertices
-            .iter()
-            .map(|vertex| self.picture.push(vertex.at, vertex.normal, tangent(vertex.normal, along), vertex.uv))
-            .collect();
-        self.picture.fill(&outside, is_turned);
         // What is uneven is lit face by face.
         let is_rough = frame.roughness > 0.0;
         let below = |vertex: &Vertex| {
@@ -442,16 +436,23 @@ impl ShellMesh {
             vertex.at - vertex.normal * (frame.thickness + 0.35 * rough * aside.dot(vertex.normal)) + along * rough
         };
         let under: Vec<Vec3> = vertices.iter().map(below).collect();
-        let bottom = facing(&under).map(|facing| if is_turned { facing } else { -facing });
-        let inside: Vec<u32> = vertices
-            .iter()
-            .zip(&under)
-            .map(|(vertex, under)| {
-                let normal = bottom.filter(|_| is_rough).unwrap_or(-vertex.normal);
-                self.inside.push(*under, normal, tangent(normal, along), vertex.flat.to_array())
-            })
-            .collect();
-        self.inside.fill(&inside, !is_turned);
+        if has_area {
+            let outside: Vec<u32> = vertices
+                .iter()
+                .map(|vertex| self.picture.push(vertex.at, vertex.normal, tangent(vertex.normal, along), vertex.uv))
+                .collect();
+            self.picture.fill(&outside, is_turned);
+            let bottom = facing(&under).map(|facing| if is_turned { facing } else { -facing });
+            let inside: Vec<u32> = vertices
+                .iter()
+                .zip(&under)
+                .map(|(vertex, under)| {
+                    let normal = bottom.filter(|_| is_rough).unwrap_or(-vertex.normal);
+                    self.inside.push(*under, normal, tangent(normal, along), vertex.flat.to_array())
+                })
+                .collect();
+            self.inside.fill(&inside, !is_turned);
+        }
         for (i, corner) in polygon.iter().enumerate().filter(|(_, corner)| corner.is_edge) {
             let k = (i + 1) % vertices.len();
             let (a, b) = (&vertices[i], &vertices[k]);
@@ -477,8 +478,9 @@ fn facing(corners: &[Vec3]) -> Option<Vec3> {
     corners.windows(2).map(|pair| (pair[0] - first).cross(pair[1] - first)).sum::<Vec3>().try_normalize()
 }
 
-/// Lengths of the waves of uneven faces, thicknesses; and how high each is.
-const WAVES: [(f32, f32); 2] = [(1.7, 0.6), (0.6, 0.3)];
+/// Lengths of the waves of uneven faces, thicknesses; and how high each is. Together they are nowhere steeper than 0.7, or faces would fold: a wave
+/// rises by three times its height over its length at the most.
+const WAVES: [(f32, f32); 2] = [(3.0, 0.4), (1.5, 0.13)];
 
 /// How far a place of the inside is moved, thicknesses: the same for all pieces that meet there. The thickness is in pattern units.
 fn unevenness(at: Vec2, thickness: f32) -> [f32; 3] {

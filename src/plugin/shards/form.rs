@@ -15,7 +15,7 @@ use std::sync::{Arc, Weak};
 const CHUNK: usize = 32;
 
 /// How uneven the faces are along which a shell breaks.
-const ROUGHNESS: f32 = 0.6;
+const ROUGHNESS: f32 = 0.8;
 
 /// The meshes of a shard.
 pub(super) struct Form {
