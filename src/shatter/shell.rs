@@ -127,7 +127,8 @@ pub struct ShellPart {
 pub struct ShellMesh {
     /// Its outside, which shows the picture.
     pub picture: ShellPart,
-    /// Its inside and its sides. Texture coordinates are lengths in pattern units.
+    /// Its inside, whose texture coordinates are places in the plane, and its sides, where u is the length along the edge, both in pattern units,
+    /// and v goes from 0 outside to 1 inside.
     pub inside: ShellPart,
 }
 
@@ -260,13 +261,18 @@ impl ShellTriangle {
         [1.0 - v - w, v, w]
     }
 
-    fn place(&self, [u, v, w]: [f32; 3]) -> ShellPlace {
+    fn position(&self, [u, v, w]: [f32; 3]) -> Vec3 {
+        let [a, b, c] = self.corners;
+        a * u + b * v + c * w
+    }
+
+    fn place(&self, weights: [f32; 3]) -> ShellPlace {
         let ([a, b, c], [p, q, r]) = (self.corners, self.flat);
         let area = (q - p).perp_dot(r - p);
         // How the weights of the second and third corner grow to the right and downward.
         let along = |way: Vec2| (b - a) * (way.perp_dot(r - p) / area) + (c - a) * ((q - p).perp_dot(way) / area);
         ShellPlace {
-            position: a * u + b * v + c * w,
+            position: self.position(weights),
             normal: self.normal(),
             right: along(Vec2::X),
             down: along(Vec2::Y),
@@ -413,7 +419,7 @@ impl ShellMesh {
                 let weights = of.weights(flat);
                 let normal = (0..3).map(|i| of.normals[i] * weights[i]).sum::<Vec3>();
                 Vertex {
-                    at: frame.to_mesh.transform_point3(of.place(weights).position),
+                    at: frame.to_mesh.transform_point3(of.position(weights)),
                     normal: turned(normal.try_normalize().unwrap_or(of.normals[0])),
                     uv: uv(corner.weights),
                     flat,
@@ -459,20 +465,24 @@ impl ShellMesh {
             let way = b.at - a.at;
             let smooth = if is_turned { a.normal.cross(way) } else { way.cross(a.normal) };
             let Some(smooth) = smooth.try_normalize() else { continue };
-            let corners = [a.at, b.at, under[k], under[i]];
-            let rough = facing(&corners).map(|facing| if is_turned { facing } else { -facing });
+            let rough =
+                facing(&[a.at, b.at, under[k], under[i]]).map(|facing| if is_turned { facing } else { -facing });
             let out = rough.filter(|_| is_rough).unwrap_or(smooth);
             let length = corner.at.distance(polygon[k].at) as f32;
             let tangent = way.normalize_or_zero().extend(1.0).to_array();
-            let uvs = [[0.0, 0.0], [length, 0.0], [length, 1.0], [0.0, 1.0]];
-            let mut uvs = uvs.into_iter();
-            let corners = corners.map(|at| self.inside.push(at, out, tangent, uvs.next().unwrap_or_default()));
+            let mut corner = |at: Vec3, uv: [f32; 2]| self.inside.push(at, out, tangent, uv);
+            let corners = [
+                corner(a.at, [0.0, 0.0]),
+                corner(b.at, [length, 0.0]),
+                corner(under[k], [length, 1.0]),
+                corner(under[i], [0.0, 1.0]),
+            ];
             self.inside.fill(&corners, !is_turned);
         }
     }
 }
 
-/// The unit normal of a polygon on the side from which it runs counter-clockwise (Newell's method); `None` if it has no area.
+/// The unit normal of a polygon on the side from which it runs counter-clockwise: the mean of its triangles'. `None` if it has no area.
 fn facing(corners: &[Vec3]) -> Option<Vec3> {
     let first = *corners.first()?;
     corners.windows(2).map(|pair| (pair[0] - first).cross(pair[1] - first)).sum::<Vec3>().try_normalize()

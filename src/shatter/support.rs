@@ -148,8 +148,8 @@ impl Support {
         self.hit_by(shards, reach, |shard| shards.distance(shard, at))
     }
 
-    /// The same with distances that are measured in another way, of shards that are in their places: along a curved surface, or through
-    /// space.
+    /// The same as [`hit`](Self::hit) with distances that are measured in another way, as through space. `distance` gives that of a shard, by
+    /// number, in the unit of `reach`; it is asked of those in their places only. What is not a number is out of reach.
     ///
     /// # Errors
     /// [`ShatterError::OutOfRange`] if `reach` is not within 0..=64.
@@ -171,8 +171,8 @@ impl Support {
         Ok(Fallen { hit, loose: self.drop_loose(shards) })
     }
 
-    /// Holds these shards as well.
-    pub fn hold_these(&mut self, shards: impl IntoIterator<Item = u32>) {
+    /// Holds these shards as well, by number; those that there are not do not count.
+    pub fn hold_shards(&mut self, shards: impl IntoIterator<Item = u32>) {
         for shard in shards {
             if let Some(anchored) = self.anchored.get_mut(shard as usize) {
                 *anchored = true;
@@ -180,7 +180,7 @@ impl Support {
         }
     }
 
-    /// Removes shards; nothing falls for that.
+    /// Removes shards, by number; nothing falls for that, and those that there are not do not count.
     pub fn remove(&mut self, shards: impl IntoIterator<Item = u32>) {
         for shard in shards {
             if let Some(gone) = self.gone.get_mut(shard as usize) {

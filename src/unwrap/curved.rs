@@ -109,21 +109,25 @@ pub(super) fn lay_out(shape: &MeshShape, points: &Points, start: Start, is_free:
             }
         }
     }
-    trim(shape, &mut chart);
+    trim(shape, &mut chart, is_free);
     chart
 }
 
 /// How often triangles that stick out are taken away.
 const TRIMS: u32 = 2;
 
-/// Takes away triangles that hang on to a chart by one edge, so that it does not end in steps: cracks and pieces end there, too.
-fn trim(shape: &MeshShape, chart: &mut Chart) {
+/// Takes away triangles that hang on to a chart by one edge, so that it does not end in steps: cracks and pieces end there, too. Only those that
+/// another chart can have, or each would be one of its own.
+fn trim(shape: &MeshShape, chart: &mut Chart, is_free: &[bool]) {
     let mut is_in = vec![false; shape.len()];
     chart.triangles.iter().for_each(|(triangle, _)| is_in[*triangle] = true);
     for _ in 0..TRIMS {
         let sticks_out = |triangle: usize| {
-            let beside = || shape.across(triangle).into_iter().flatten();
-            beside().filter(|(other, _)| is_in[*other as usize]).count() == 1 && beside().count() == 3
+            let beside = shape.across(triangle).map(|other| other.map(|(other, _)| other as usize));
+            let [own, free] = beside.into_iter().flatten().fold([0, 0], |[own, free], other| {
+                if is_in[other] { [own + 1, free] } else { [own, free + u32::from(is_free[other])] }
+            });
+            (own, free) == (1, 2)
         };
         // The first one stays.
         let out: Vec<usize> =

@@ -27,9 +27,7 @@ pub(crate) struct Broken {
     pub(super) whole: Handle<Image>,
     pub(super) plane: Plane,
     /// The surface, if it is not flat.
-    pub(super) shell: Option<Arc<Shell>>,
-    /// And its texels that are no piece's, see [`fringe`](super::spans::fringe).
-    pub(super) fringe: Option<Arc<Grid<bool>>>,
+    pub(super) shell: Option<BrokenShell>,
     /// How the rims of shards look.
     pub(super) rim: RimLook,
     /// Pieces that are out of their places and fragments of them, by id: fragments come after what they were part of.
@@ -60,6 +58,14 @@ pub(crate) struct Broken {
     pub(super) inside: Option<UntypedHandle>,
     /// Bytes of the picture.
     pub(super) _bytes: TextureBytes,
+}
+
+/// A surface that is not flat.
+#[derive(Clone)]
+pub(super) struct BrokenShell {
+    pub(super) shape: Arc<Shell>,
+    /// Its texels that are no piece's, see [`fringe`](super::spans::fringe).
+    pub(super) fringe: Arc<Grid<bool>>,
 }
 
 /// A piece that is out of its place, or a fragment of one.
@@ -121,7 +127,6 @@ impl Broken {
             whole,
             plane,
             shell: None,
-            fringe: None,
             rim: RimLook::PLAIN,
             pieces: Vec::new(),
             waiting: VecDeque::new(),

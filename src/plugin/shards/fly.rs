@@ -167,8 +167,8 @@ fn fly(
         }
         if let Some(holes) = &mut active.drawing.cutouts {
             let mut spans = spans_of(&piece.cut, piece.number, active.drawing.field.frame);
-            if let Some(fringe) = &broken.fringe {
-                add_fringe(&mut spans, fringe);
+            if let Some(shell) = &broken.shell {
+                add_fringe(&mut spans, &shell.fringe);
             }
             holes.set(&spans, false);
         }

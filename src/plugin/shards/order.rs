@@ -1,7 +1,7 @@
 //! From a surface to its shards, in the background: nothing here touches the world but [`ShatterJob::of`], which looks at it.
 
 use super::batch::{Batch, Leaving};
-use super::broken::{Broken, broken};
+use super::broken::{Broken, BrokenShell, broken};
 use super::drawn::{Drawn, Sketch};
 use super::form::Style;
 use super::shell::{MOST_REACH, ShellOrder};
@@ -19,7 +19,7 @@ use crate::plugin::source::picture::BasePicture;
 use crate::plugin::surface::active::Active;
 use crate::plugin::surface::cutouts::{Holes, Span};
 use crate::raster::{DirtyTiles, TexelRect};
-use crate::shatter::{Anchor, Burst, Cuts, RimLook, Shards, ShatterError, Shell, Support, shatter};
+use crate::shatter::{Anchor, Burst, Cuts, RimLook, Shards, ShatterError, Support, shatter};
 use bevy::prelude::*;
 use std::{collections::VecDeque, sync::Arc};
 
@@ -77,8 +77,7 @@ pub(super) struct CutSurface {
     pub(super) settings: ShatterCracks,
     pub(super) rim: RimLook,
     pub(super) plane: Plane,
-    pub(super) shell: Option<Arc<Shell>>,
-    pub(super) fringe: Option<Arc<Grid<bool>>>,
+    pub(super) shell: Option<BrokenShell>,
     pub(super) grown: (usize, usize),
     pub(super) cut: Arc<Shards>,
     /// Whether it was cut again.
@@ -159,7 +158,7 @@ impl ShatterJob {
                     None => Some(pos * unfolding.unit),
                 };
                 let place = texel.and_then(|texel| Some((texel, kind.plane_at(world, entity, texel)?)));
-                let (texel, plane) = place.ok_or(refused("its mesh is not there"))?;
+                let (texel, plane) = place.ok_or(refused("nothing of its mesh is there"))?;
                 // Pieces that are out already keep theirs.
                 let same = broken.filter(|broken| broken.settings.thickness == settings.thickness);
                 let thickness = same.map_or_else(
@@ -244,7 +243,7 @@ impl ShatterJob {
         let is_new = matches!(self.pieces, CutFrom::Lines(..));
         let is_kept = matches!(self.pieces, CutFrom::Cut(..));
         let extent = self.frame.extent();
-        let mut shell = self.shell.map(|order| order.shape(extent, self.from));
+        let mut curved = self.shell.map(|order| order.shape(extent, self.from));
         let (cut, mut support) = match self.pieces {
             CutFrom::Cut(cut, support) => (cut, support),
             CutFrom::Held(cut, support) => {
@@ -256,7 +255,7 @@ impl ShatterJob {
                 for line in carried.iter().flat_map(|lines| lines.iter()) {
                     cuts.add_line(line)?;
                 }
-                for edge in shell.iter().flat_map(|shell| shell.shape.border()) {
+                for edge in curved.iter().flat_map(|curved| curved.shell.shape.border()) {
                     cuts.add_line(&edge)?;
                 }
                 let cut = Arc::new(shatter(cuts, &self.settings.cut)?);
@@ -274,18 +273,18 @@ impl ShatterJob {
                 held.get(texel.x, texel.y).is_some_and(|value| value > 0.5)
             });
         }
-        if let Some(shell) = shell.as_mut().filter(|_| !is_kept) {
-            shell.hold(&cut, &mut support, self.settings.anchor, self.frame);
+        if let Some(curved) = curved.as_mut().filter(|_| !is_kept) {
+            curved.hold(&cut, &mut support, self.settings.anchor, self.frame);
         }
-        let fallen = match &shell {
-            Some(shell) => shell.hit(&cut, &mut support, self.from, self.reach)?,
+        let fallen = match &curved {
+            Some(curved) => curved.hit(&cut, &mut support, self.from, self.reach)?,
             None => support.hit(&cut, self.from, self.reach)?,
         };
         let (frame, settings) = (self.frame, self.settings);
         let size = self.base.size.as_vec2();
         let uv = [self.view.min.as_vec2() / size, self.view.max.as_vec2() / size];
         let thickness = self.plane.thickness(settings.thickness, cut.extent());
-        let shape = shell.as_ref().map(|shell| shell.shape.clone());
+        let shape = curved.as_ref().map(|curved| curved.shell.shape.clone());
         let style = Style { rim: self.rim, thickness: self.is_solid.then_some(thickness), shell: shape };
         let mut holes = self.holes.unwrap_or_else(|| Holes::new(frame.size()));
         let mut scan = Scan::new(frame);
@@ -294,22 +293,22 @@ impl ShatterJob {
         let mut leaving = Vec::with_capacity(fallen.hit.len() + fallen.loose.len());
         for ((&number, is_falling), nth) in fallen.hit.iter().chain(&fallen.loose).zip(falls).zip(self.released..) {
             let Some(shard) = cut.get(number) else { continue };
-            let thrown = shell.as_ref().and_then(|shell| shell.thrown(&cut, number)).transpose()?;
+            let thrown = curved.as_ref().and_then(|curved| curved.thrown(&cut, number)).transpose()?;
             let (plane, burst) = thrown.unwrap_or_else(|| (self.plane, self.burst.clone()));
             let flight = if is_falling { burst.fall(nth, shard) } else { burst.flight(nth, shard) };
             let seed = mix(self.seed ^ mix(u64::from(nth)));
             let again = settings.again.and_then(|again| Some((again, flight.delay + again.due(shard.area, seed)?)));
             let mut spans = Vec::new();
             scan.find(&cut, number, &mut spans);
-            if let Some(shell) = &shell {
-                add_fringe(&mut spans, &shell.fringe);
+            if let Some(curved) = &curved {
+                add_fringe(&mut spans, &curved.shell.fringe);
             }
             let is_shown = spans.is_empty() || spans.iter().any(is_seen);
             let form = is_shown.then(|| Box::new(style.form(&cut, number, &plane, uv, seed)));
             leaving.push(Leaving { number, plane, flight, seed, again, form, spans });
         }
-        if let (Some(shell), Some(first), true) = (&shell, leaving.first_mut(), self.is_first) {
-            shell.add_gaps(&mut first.spans, &self.base);
+        if let (Some(curved), Some(first), true) = (&curved, leaving.first_mut(), self.is_first) {
+            curved.add_gaps(&mut first.spans, &self.base);
         }
         if leaving.len() > self.batch {
             // Those that move first leave first.
@@ -344,8 +343,7 @@ impl ShatterJob {
             settings,
             rim: self.rim,
             plane: self.plane,
-            shell: style.shell,
-            fringe: shell.map(|shell| shell.fringe),
+            shell: curved.map(|curved| curved.shell),
             grown: self.grown,
             cut,
             is_new,

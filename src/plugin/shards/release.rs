@@ -193,22 +193,8 @@ fn release(world: &mut World, entity: Entity, active: &mut Active, made: CutSurf
     }
     let before = broken::take(world, entity);
     let is_first = before.is_none();
-    let CutSurface {
-        settings,
-        rim,
-        plane,
-        shell,
-        fringe,
-        grown,
-        cut,
-        is_new,
-        support,
-        batches,
-        drawn,
-        density,
-        room,
-        ..
-    } = made;
+    let CutSurface { settings, rim, plane, shell, grown, cut, is_new, support, batches, drawn, density, room, .. } =
+        made;
     if is_first {
         can_copy_picture(world, active)?;
     }
@@ -235,8 +221,7 @@ fn release(world: &mut World, entity: Entity, active: &mut Active, made: CutSurf
     }
     broken.inside = inside(world, active, &settings, rim.bright, broken.inside.take());
     (broken.cut, broken.support, broken.grown) = (cut, support, grown);
-    (broken.settings, broken.plane, broken.rim) = (settings, plane, rim);
-    (broken.shell, broken.fringe) = (shell, fringe);
+    (broken.settings, broken.plane, broken.shell, broken.rim) = (settings, plane, shell, rim);
     broken.is_fresh = is_first;
     (broken.waiting, broken.since, broken.has_begun) = (batches, broken.time, false);
     broken.report(world, entity);

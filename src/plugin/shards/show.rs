@@ -181,7 +181,7 @@ impl Broken {
     /// How its shards are formed.
     pub(super) fn style(&self, carrier: &Carrier) -> Style {
         let thickness = carrier.is_solid.then(|| self.thickness());
-        Style { rim: self.rim, thickness, shell: self.shell.clone() }
+        Style { rim: self.rim, thickness, shell: self.shell.as_ref().map(|shell| shell.shape.clone()) }
     }
 
     /// Thickness of shards in the entity's units.
