@@ -83,8 +83,8 @@ fn setup(
     let right = Quat::from_rotation_y(-std::f32::consts::FRAC_PI_2);
     let floor = Quat::from_rotation_x(-std::f32::consts::FRAC_PI_2);
     // Walls crack along their mortar, the light lines of the picture.
-    let of_brick = CrackSurface::new(CrackPreset::BRICK);
-    let of_concrete = CrackSurface::new(CrackPreset::CONCRETE);
+    let of_brick = CrackSurface::new(CrackPreset::BRICK).with_mips(CrackMips::Always);
+    let of_concrete = CrackSurface::new(CrackPreset::CONCRETE).with_mips(CrackMips::Always);
     // They come to rest on the floor.
     let mut chips = CrackChips { floor: Some(-HALF), ..default() };
     chips.burst.fade_after = 4.0;

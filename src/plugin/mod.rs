@@ -38,11 +38,11 @@ mod surface;
 pub use api::{
     AnalogyExamples, AnalogyFailed, AnalogyMade, AnalogyProgress, BakeProgress, CellClosed, CrackAnalogy, CrackBaked,
     CrackBudget, CrackChip, CrackChips, CrackClock, CrackDrive, CrackError, CrackFailed, CrackFinished, CrackGuide,
-    CrackHit, CrackMaps, CrackMaskSource, CrackRecord, CrackRelief, CrackResolution, CrackScript, CrackShards,
-    CrackState, CrackStats, CrackStatus, CrackStrands, CrackSurface, CrackSystems, CrackTextures, CrackTip,
-    CrackUnwrap, CrackUploadStats, GravitySpace, GuideSource, GuidedAppearance, GuidedCracks, HitPoint, PresetSource,
-    Reassembled, ReliefFailed, ReliefMade, ReliefProgress, ScriptedHit, Shard, ShardsError, ShatterCracks,
-    ShatterFailed, ShatterRequest, ShatterWhen, Shattered, StrandField,
+    CrackHit, CrackMaps, CrackMaskSource, CrackMips, CrackRecord, CrackRelief, CrackResolution, CrackScript,
+    CrackShards, CrackState, CrackStats, CrackStatus, CrackStrands, CrackSurface, CrackSystems, CrackTextures,
+    CrackTip, CrackUnwrap, CrackUploadStats, GravitySpace, GuideSource, GuidedAppearance, GuidedCracks, HitPoint,
+    PresetSource, Reassembled, ReliefFailed, ReliefMade, ReliefProgress, ScriptedHit, Shard, ShardsError,
+    ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen, Shattered, StrandField,
 };
 #[cfg(any(feature = "2d", feature = "3d"))]
 pub use api::{CrackGroup, CrackMemberOf};
@@ -64,12 +64,12 @@ pub mod prelude {
     pub use super::{
         AnalogyExamples, AnalogyFailed, AnalogyMade, AnalogyProgress, BakeProgress, CellClosed, CrackAnalogy,
         CrackBaked, CrackBudget, CrackChip, CrackChips, CrackClock, CrackCommandsExt, CrackDrive, CrackError,
-        CrackFailed, CrackFinished, CrackGuide, CrackHit, CrackMaps, CrackMaskSource, CrackPlugin, CrackPlugins,
-        CrackRecord, CrackRecords, CrackRelief, CrackResolution, CrackScript, CrackShards, CrackState, CrackStats,
-        CrackStatus, CrackStrands, CrackSurface, CrackSystems, CrackTextures, CrackTip, CrackUnwrap, GravitySpace,
-        GuideSource, GuidedAppearance, GuidedCracks, HitPoint, PresetSource, Reassembled, ReliefFailed, ReliefMade,
-        ReliefProgress, ScriptedHit, Shard, ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen, Shattered,
-        StrandField,
+        CrackFailed, CrackFinished, CrackGuide, CrackHit, CrackMaps, CrackMaskSource, CrackMips, CrackPlugin,
+        CrackPlugins, CrackRecord, CrackRecords, CrackRelief, CrackResolution, CrackScript, CrackShards, CrackState,
+        CrackStats, CrackStatus, CrackStrands, CrackSurface, CrackSystems, CrackTextures, CrackTip, CrackUnwrap,
+        GravitySpace, GuideSource, GuidedAppearance, GuidedCracks, HitPoint, PresetSource, Reassembled, ReliefFailed,
+        ReliefMade, ReliefProgress, ScriptedHit, Shard, ShatterCracks, ShatterFailed, ShatterRequest, ShatterWhen,
+        Shattered, StrandField,
     };
     #[cfg(any(feature = "2d", feature = "3d"))]
     pub use super::{CrackGroup, CrackMemberOf, CrackPlace, CrackPlaces};
@@ -218,7 +218,9 @@ impl Plugin for CrackPlugin {
                     )
                         .chain()
                         .in_set(Paint),
-                    (gpu::uploads::drop_unwanted, jobs::frame_time::end_frame).chain().in_set(Upload),
+                    (gpu::mips::follow_up, gpu::uploads::drop_unwanted, jobs::frame_time::end_frame)
+                        .chain()
+                        .in_set(Upload),
                 ),
             );
         // What a sprite shows changes by hits, by bakes and when cracks have closed, and then the engine cuts it into parts.

@@ -97,3 +97,51 @@ fn channels_that_are_missing_stay_dark() {
         app.world_mut().despawn(entity);
     }
 }
+
+/// A sprite that is drawn at a quarter of its size shows the third of its mip levels, as the CPU has it, while cracks grow; so does one whose
+/// textures are made by tasks, and one that gets another picture.
+#[test]
+fn mip_levels_on_the_gpu_equal_the_cpu_copy() {
+    for side in [64, 1024] {
+        let Some((_one, mut app)) = gpu_app() else { return };
+        app.insert_resource(CrackBudget::default());
+        let size = UVec2::new(side, side / 2);
+        let target = spawn_camera(&mut app, size / 4);
+        let image = add(&mut app, picture(size));
+        let mut sprite = Sprite::from_image(image);
+        sprite.custom_size = Some(size.as_vec2() / 4.0);
+        let surface = CrackSurface::new(CrackPreset::CONCRETE).with_mips(CrackMips::Always);
+        let entity = app.world_mut().spawn((sprite, surface)).id();
+        let mut checked = 0;
+        let mut rng = Rng::new(3);
+        for frame in 0..60 {
+            if frame % 6 == 0 {
+                let at = Vec2::new(rng.unit(), rng.unit());
+                hit(&mut app, CrackHit::uv(entity, at).with_energy(2.0));
+            }
+            if frame == 40 {
+                let other = add(&mut app, solid(size, [90, 160, 220, 255]));
+                app.world_mut().get_mut::<Sprite>(entity).expect("a sprite").image = other;
+            }
+            app.world_mut().resource_mut::<Time<Virtual>>().unpause();
+            steps(&mut app, 2);
+            app.world_mut().resource_mut::<Time<Virtual>>().pause();
+            // What is being made arrives.
+            steps(&mut app, 3);
+            if app.world().get::<CrackTextures>(entity).is_none() {
+                continue;
+            }
+            let shown = shown(&app, entity);
+            let area = size.element_product() as usize * 4;
+            if shown.len() == area {
+                continue;
+            }
+            let level = &shown[area * 5 / 4..][..area / 16];
+            let drawn = drawn(&mut app, &target);
+            let worst = difference(&drawn, level);
+            assert!(worst <= 1, "frame {frame} of {side}: {worst}");
+            checked += 1;
+        }
+        assert!(checked > 30, "{checked}");
+    }
+}

@@ -248,7 +248,9 @@ pub(crate) fn assert_sound(app: &App, entity: Entity) {
         let texel = image.texture_descriptor.format.block_copy_size(None).expect("a plain format") as usize;
         let size = image.size();
         assert!(size.min_element() > 0, "{size}");
-        assert_eq!(texels(app, handle).len(), size.x as usize * size.y as usize * texel);
+        let levels = (0..image.texture_descriptor.mip_level_count).map(|level| (size >> level).max(UVec2::ONE));
+        let all: u32 = levels.map(UVec2::element_product).sum();
+        assert_eq!(texels(app, handle).len(), all as usize * texel);
     }
     if let Some(normal) = &textures.normal {
         for texel in texels(app, normal).chunks(4) {

@@ -43,6 +43,6 @@ pub use shatter::{
 };
 pub use state::{CellClosed, CrackFailed, CrackFinished, CrackState, CrackStatus, CrackTip};
 pub use strands::{CrackStrands, StrandField};
-pub use surface::{CrackMaps, CrackResolution, CrackSurface, CrackUnwrap};
+pub use surface::{CrackMaps, CrackMips, CrackResolution, CrackSurface, CrackUnwrap};
 pub use systems::CrackSystems;
 pub use textures::CrackTextures;

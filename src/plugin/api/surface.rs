@@ -49,6 +49,8 @@ pub struct CrackSurface {
     /// Whether a 3D mesh is laid out flat around its first hit, so that cracks run over its edges and around its curves. A change takes effect
     /// after healing.
     pub unwrap: CrackUnwrap,
+    /// Whether the textures have mip levels. A change takes effect as one of `resolution`.
+    pub mips: CrackMips,
 }
 
 impl CrackSurface {
@@ -65,6 +67,7 @@ impl CrackSurface {
             mask: CrackMaskSource::Auto,
             density: None,
             unwrap: CrackUnwrap::Auto,
+            mips: CrackMips::Auto,
         }
     }
 
@@ -100,6 +103,13 @@ impl CrackSurface {
     #[must_use]
     pub fn with_unwrap(mut self, unwrap: CrackUnwrap) -> Self {
         self.unwrap = unwrap;
+        self
+    }
+
+    /// The same with mip levels or without.
+    #[must_use]
+    pub fn with_mips(mut self, mips: CrackMips) -> Self {
+        self.mips = mips;
         self
     }
 
@@ -139,6 +149,34 @@ pub enum CrackUnwrap {
     /// Always, with up to eight million texels and as many a side as the budget allows; fewer for a unit of length where that is not enough.
     Always,
     /// Cracks are where the mesh's own texture coordinates have them.
+    Never,
+}
+
+/// Whether the textures of a surface have mip levels: smaller versions of themselves that the renderer shows from afar, where fine cracks and
+/// rough picture would flicker otherwise.
+///
+/// Levels follow the cracks frame by frame, where they change, down to a single texel; see [`MipLevels`](crate::paint::MipLevels). They take a third more
+/// memory. How they are shown is up to the sampler of the picture: the default one of
+/// [`ImagePlugin`](bevy::prelude::ImagePlugin) blends between levels. Beside a frame of an atlas, coarse levels show some of its neighbours.
+///
+/// ```
+/// use bevy_crack::prelude::*;
+///
+/// // A wall that is also seen from far away.
+/// let wall = CrackSurface::new(CrackPreset::BRICK).with_mips(CrackMips::Always);
+/// assert_eq!(CrackSurface::default().mips, CrackMips::Auto);
+/// # assert_ne!(wall.mips, CrackMips::Auto);
+/// ```
+#[derive(Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[type_path = "bevy_crack"]
+#[reflect(Default)]
+pub enum CrackMips {
+    /// If its picture has them, so that it looks as before from afar.
+    #[default]
+    Auto,
+    /// Whether its picture has them or not.
+    Always,
+    /// The textures alone.
     Never,
 }
 

@@ -46,12 +46,14 @@ pub(crate) struct Maps {
     pub(crate) normal: bool,
     pub(crate) depth: bool,
     pub(crate) emissive: bool,
+    /// Whether they have mip levels.
+    pub(crate) mips: bool,
 }
 
 impl Maps {
-    /// Those that are to be written with a look.
+    /// Those that are to be written with a look; with mip levels, unless the surface is to have none.
     pub(crate) fn wanted(CrackMaps { diffuse, normal, depth }: CrackMaps, look: &Look) -> Self {
-        Self { diffuse, normal, depth, emissive: !look.glow.is_empty() }
+        Self { diffuse, normal, depth, emissive: !look.glow.is_empty(), mips: true }
     }
 
     /// Those that are in both.
@@ -61,6 +63,7 @@ impl Maps {
             normal: self.normal && other.normal,
             depth: self.depth && other.depth,
             emissive: self.emissive && other.emissive,
+            mips: self.mips && other.mips,
         }
     }
 }

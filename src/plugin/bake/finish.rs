@@ -65,7 +65,7 @@ impl FinishInputs {
             base: active.canvas.base.clone(),
             mask: active.cracks.growth.mask().clone(),
             rect: active.canvas.views.get(active.canvas.view)?.rect,
-            maps: Maps { diffuse, normal, depth, emissive },
+            maps: Maps { diffuse, normal, depth, emissive, mips: active.canvas.has_mips },
             past,
             seen: Seen::of(active),
             first,
@@ -251,8 +251,7 @@ impl FinishInputs {
         let size = self.rect.size();
         let end = size.y.min(row + (SLICE / size.x).max(1));
         let band = TexelRect { min: UVec2::new(0, row), max: UVec2::new(size.x, end) };
-        let texels = texels.each_mut().map(Option::as_deref_mut);
-        textures::paint(&self.base, None, &drawn.field, &drawn.look, &[band], self.rect.min, texels);
+        textures::paint_all(&self.base, None, &drawn.field, &drawn.look, &[band], self.rect.min, texels);
         end
     }
 }

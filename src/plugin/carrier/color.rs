@@ -9,7 +9,7 @@ use bevy::{
 };
 
 impl CrackMaterial for ColorMaterial {
-    const MAPS: Maps = Maps { diffuse: true, normal: true, depth: false, emissive: false };
+    const MAPS: Maps = Maps { diffuse: true, normal: true, depth: false, emissive: false, mips: true };
 
     fn pictures(&self) -> [Option<Handle<Image>>; 3] {
         [self.texture.clone(), None, None]

@@ -81,7 +81,7 @@ impl Material2d for CrackLitMaterial {
 }
 
 impl CrackMaterial for CrackLitMaterial {
-    const MAPS: Maps = Maps { diffuse: true, normal: true, depth: false, emissive: false };
+    const MAPS: Maps = Maps { diffuse: true, normal: true, depth: false, emissive: false, mips: true };
 
     fn pictures(&self) -> [Option<Handle<Image>>; 3] {
         [self.diffuse.clone(), self.normal.clone(), None]

@@ -54,7 +54,7 @@ impl CarrierKind for SpriteKind {
                 Arc::new(Layout { keeps_size, ..layout })
             }),
             size: sprite.custom_size,
-            maps: Maps { diffuse: true, normal: true, depth: false, emissive: false },
+            maps: Maps { diffuse: true, normal: true, depth: false, emissive: false, mips: true },
         }))
     }
 

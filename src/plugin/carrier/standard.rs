@@ -11,7 +11,7 @@ use core::hash::{Hash, Hasher};
 use std::collections::hash_map::DefaultHasher;
 
 impl CrackMaterial for StandardMaterial {
-    const MAPS: Maps = Maps { diffuse: true, normal: true, depth: true, emissive: true };
+    const MAPS: Maps = Maps { diffuse: true, normal: true, depth: true, emissive: true, mips: true };
 
     fn pictures(&self) -> [Option<Handle<Image>>; 3] {
         [self.base_color_texture.clone(), self.normal_map_texture.clone(), self.depth_map.clone()]

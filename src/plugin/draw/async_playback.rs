@@ -140,6 +140,7 @@ impl AsyncPlayback {
             analogy: canvas.analogy.clone(),
             look: canvas.look.clone(),
             maps: canvas.textures.all().map(|texture| texture.is_some()),
+            has_mips: canvas.has_mips,
             rect: view.rect,
             stager: self.stager.clone(),
             field: field.take(),

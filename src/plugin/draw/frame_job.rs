@@ -6,7 +6,6 @@ use crate::pattern::{Moment, Network, Timeline};
 use crate::plugin::api::textures::MAPS;
 use crate::plugin::gpu::buffer::{Staged, Stager};
 use crate::plugin::gpu::textures;
-use crate::plugin::gpu::textures::TextureKind;
 use crate::plugin::source::analogy::AnalogyPicture;
 use crate::plugin::source::picture::BasePicture;
 use crate::plugin::surface::motion::MotionFrame;
@@ -56,6 +55,7 @@ pub(crate) struct FrameJob {
     pub(crate) look: LookTable,
     /// Which textures there are, and the part of them that is shown.
     pub(crate) maps: [bool; MAPS],
+    pub(crate) has_mips: bool,
     pub(crate) rect: TexelRect,
     pub(crate) stager: Option<Stager>,
     pub(crate) field: DepthField,
@@ -163,7 +163,7 @@ impl FrameJob {
                 let mut kinds = textures::KINDS.iter().zip(self.maps);
                 let texels = [(); MAPS].map(|()| {
                     let (kind, _) = kinds.next().filter(|(_, is_wanted)| *is_wanted)?;
-                    Some((kind.texels)(&self.base))
+                    Some(kind.texels(&self.base, self.has_mips))
                 });
                 self.back = Some(Back { texels, behind: Vec::new() });
                 rects.push(TexelRect::whole(size));
@@ -175,18 +175,18 @@ impl FrameJob {
 
     fn paint(&mut self, rects: &[TexelRect]) {
         let Some(back) = &mut self.back else { return };
-        let texels = back.texels.each_mut().map(Option::as_deref_mut);
-        textures::paint(&self.base, self.analogy.as_deref(), &self.field, &self.look, rects, self.rect.min, texels);
+        let (analogy, texels) = (self.analogy.as_deref(), &mut back.texels);
+        textures::paint_all(&self.base, analogy, &self.field, &self.look, rects, self.rect.min, texels);
     }
 
     /// Brings what has changed to where the renderer can read it.
     fn stage(&mut self) {
         let (Some(stager), Some(back)) = (&self.stager, &self.back) else { return };
         let rects = self.in_image(&gather(&self.changed, self.field.frame.size()));
-        let mut kinds = textures::KINDS.iter().map(TextureKind::texel);
+        let mut kinds = textures::KINDS.iter();
         self.staged = back.texels.each_ref().map(|texels| {
-            let texel = kinds.next()?;
-            stager.stage(texels.as_ref()?, self.base.size, texel, &rects)
+            let kind = kinds.next()?;
+            stager.stage(texels.as_ref()?, self.base.size, kind, &rects)
         });
     }
 

@@ -188,8 +188,9 @@ impl Texels {
             }
             let rect = TexelRect { min: rect.min + origin, max: rect.max + origin }.intersect(TexelRect::whole(size));
             let data = self.0.each_ref().map(Option::as_deref);
-            let pictures = active.canvas.textures.all().into_iter().zip(data);
-            packer.push(pictures.map(|(texture, data)| Some((texture?.id(), data?))), size, rect);
+            let pictures = active.canvas.textures.all().into_iter().zip(data).zip(&textures::KINDS);
+            let pictures = pictures.map(|((texture, data), kind)| Some((texture?.id(), data?, kind.texel())));
+            packer.push(pictures, size, rect);
         }
     }
 }

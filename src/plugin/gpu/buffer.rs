@@ -1,6 +1,7 @@
 //! Memory that the GPU reads.
 
 use crate::plugin::gpu::pack::{Memory, Place, ROW_ALIGNMENT, Source, Write};
+use crate::plugin::gpu::textures::TextureKind;
 use crate::raster::TexelRect;
 use bevy::{
     prelude::*,
@@ -113,8 +114,8 @@ pub(crate) struct Staged {
     pub(crate) buffer: Buffer,
     /// Where it is to go then.
     pub(crate) home: Weak<Mutex<Vec<Buffer>>>,
-    /// Each with its place there.
-    pub(crate) parts: Vec<(TexelRect, Place)>,
+    /// Each with its mip level and its place there.
+    pub(crate) parts: Vec<(u32, TexelRect, Place)>,
 }
 
 impl Staged {
@@ -139,29 +140,32 @@ impl Stager {
         is_same(&self.device, device)
     }
 
-    /// Parts of a picture of `size` texels of so many bytes; `None` if there are none, they are not in the picture, or the device has
-    /// no buffer so large.
-    pub(crate) fn stage(&self, texels: &[u8], size: UVec2, texel: usize, rects: &[TexelRect]) -> Option<Staged> {
-        let whole = TexelRect::whole(size);
-        if texels.len() as u64 != whole.area() * texel as u64 || rects.iter().any(|rect| rect.intersect(whole) != *rect)
-        {
+    /// Parts of a texture of `size` texels, with what depends on them in its mip levels if it has any; `None` if there are none, they are not in it, or
+    /// the device has no buffer so large.
+    pub(crate) fn stage(&self, texels: &[u8], size: UVec2, kind: &TextureKind, rects: &[TexelRect]) -> Option<Staged> {
+        let (whole, levels) = (TexelRect::whole(size), kind.levels(size));
+        let has_mips = texels.len() == levels.bytes();
+        let has_all = has_mips || texels.len() == levels.range(0).end;
+        if !has_all || rects.iter().any(|rect| rect.intersect(whole) != *rect) {
             return None;
         }
+        let above = if has_mips { levels.above(rects) } else { Vec::new() };
         let mut end = 0;
-        let place = |rect: &TexelRect| {
-            let row = rect.size().x as usize * texel;
+        let place = |(level, rect): (u32, TexelRect)| {
+            let row = rect.size().x as usize * kind.texel();
             let place = Place { offset: end, pitch: row.next_multiple_of(ROW_ALIGNMENT), row };
             end += place.pitch * rect.size().y as usize;
-            (*rect, place)
+            (level, rect, place)
         };
-        let parts: Vec<_> = rects.iter().map(place).collect();
+        let parts: Vec<_> = rects.iter().map(|rect| (0, *rect)).chain(above).map(place).collect();
         if end == 0 || (end as u64).next_power_of_two() > self.device.limits().max_buffer_size {
             return None;
         }
         let buffer = self.buffers.take(end as u64, &self.device);
         let mut write = writer(&buffer, 0..end);
-        for &(rect, place) in &parts {
-            write(place, Source::new(texels, size.x as usize, texel, rect));
+        for &(level, rect, place) in &parts {
+            let (texels, width) = (&texels[levels.range(level)], levels.size(level).x as usize);
+            write(place, Source::new(texels, width, kind.texel(), rect));
         }
         drop(write);
         buffer.unmap();

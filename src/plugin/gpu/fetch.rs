@@ -1,8 +1,10 @@
 //! The render world's side: rectangles to textures.
 
+use crate::paint::MipLevels;
 use crate::plugin::api::budget::CrackUploadStats;
 use crate::plugin::gpu::buffer::{Buffers, MAX_KEPT, Packed, Staged, writer};
 use crate::plugin::gpu::pack::{Changed, PER_PACKER, PackLayout, Place, ROW_ALIGNMENT, Source};
+use crate::plugin::gpu::textures;
 use crate::plugin::gpu::uploads::Uploads;
 use crate::plugin::jobs::background::BackgroundJob;
 use crate::raster::TexelRect;
@@ -43,6 +45,9 @@ pub(crate) fn connect(app: &mut App) {
 struct Copy {
     image: AssetId<Image>,
     texture: Texture,
+    /// All levels of the image, and which one it is of.
+    levels: MipLevels,
+    level: u32,
     rect: TexelRect,
     texel: usize,
     /// Where it is packed, if it is: in which of the buffers, and where there.
@@ -62,8 +67,8 @@ impl Copy {
 
     /// Its texels, if the image is there.
     fn source<'a>(&self, images: &'a Assets<Image>) -> Option<Source<'a>> {
-        let image = images.get(self.image)?;
-        Some(Source::new(image.data.as_ref()?, image.width() as usize, self.texel, self.rect))
+        let texels = images.get(self.image)?.data.as_ref()?.get(self.levels.range(self.level))?;
+        Some(Source::new(texels, self.levels.size(self.level).x as usize, self.texel, self.rect))
     }
 }
 
@@ -96,7 +101,7 @@ impl Staging {
     ) {
         let Self { rects, copies, .. } = self;
         let mut bytes = 0;
-        rects.retain(|Changed { image, rect, place }| match plan(*image, *rect, images, gpu_images) {
+        rects.retain(|Changed { image, level, rect, place }| match plan(*image, *level, *rect, images, gpu_images) {
             Plan::Copy(copy) if bytes > 0 && bytes + copy.bytes() > MAX_STAGED => true,
             Plan::Copy(copy) => {
                 bytes += copy.bytes();
@@ -181,7 +186,7 @@ fn upload_rects(
     let mut whole = core::mem::take(&mut uploads.staged);
     // What a device that was lost was to bring there.
     for (image, lost) in whole.extract_if(.., |(_, staged)| !staged.is_of(&device)) {
-        lost.parts.iter().for_each(|(rect, _)| uploads.push(image, *rect));
+        lost.parts.iter().for_each(|(level, rect, _)| uploads.push_level(image, *level, *rect));
     }
     if !whole.is_empty()
         && let Some(images) = main.get_resource::<Assets<Image>>()
@@ -204,6 +209,8 @@ fn upload_rects(
         staging.rects.iter_mut().for_each(|changed| changed.place = None);
         uploads.rects.append(&mut staging.rects);
     }
+    let mut uploads = main.resource_mut::<Uploads>();
+    uploads.levelled = uploads.rects.len();
     *main.resource_mut::<CrackUploadStats>() = stats;
 }
 
@@ -222,8 +229,8 @@ fn copy_whole(
         .into_iter()
         .filter_map(|(id, staged)| {
             let mut waits = false;
-            for &(rect, place) in &staged.parts {
-                match plan(id, rect, images, gpu_images) {
+            for &(level, rect, place) in &staged.parts {
+                match plan(id, level, rect, images, gpu_images) {
                     Plan::Copy(copy) if copy.rect == rect && copy.row() == place.row => {
                         copy_one(&mut encoder, &copy, place, &staged.buffer);
                         stats.rects += 1;
@@ -262,30 +269,40 @@ enum Plan {
 }
 
 /// A copy out of bounds is a validation error, which ends the app: everything is compared first.
-fn plan(id: AssetId<Image>, rect: TexelRect, images: &Assets<Image>, gpu_images: &RenderAssets<GpuImage>) -> Plan {
+fn plan(
+    id: AssetId<Image>,
+    level: u32,
+    rect: TexelRect,
+    images: &Assets<Image>,
+    gpu_images: &RenderAssets<GpuImage>,
+) -> Plan {
     let Some(image) = images.get(id) else { return Plan::Drop };
     let Some(gpu) = gpu_images.get(id) else { return Plan::Wait };
     let (cpu_texture, gpu_texture) = (&image.texture_descriptor, &gpu.texture_descriptor);
-    if cpu_texture.size != gpu_texture.size || cpu_texture.format != gpu_texture.format {
+    if (cpu_texture.size, cpu_texture.format, cpu_texture.mip_level_count)
+        != (gpu_texture.size, gpu_texture.format, gpu_texture.mip_level_count)
+    {
         // The asset was replaced in this frame: all of it is on its way.
         return Plan::Wait;
     }
-    let Some(texel) = gpu_texture.format.block_copy_size(None) else { return Plan::Drop };
-    let size = image.size();
-    let rect = rect.intersect(TexelRect::whole(size));
-    let needed = size.x as usize * size.y as usize * texel as usize;
-    if rect.is_empty() || image.data.as_ref().is_none_or(|data| data.len() < needed) {
+    let (Some(texel), Some(levels)) = (gpu_texture.format.block_copy_size(None), textures::levels(image)) else {
+        return Plan::Drop;
+    };
+    let rect = rect.intersect(TexelRect::whole(levels.size(level)));
+    let has_level = level < gpu_texture.mip_level_count;
+    let needed = levels.range(level).end;
+    if rect.is_empty() || !has_level || image.data.as_ref().is_none_or(|data| data.len() < needed) {
         return Plan::Drop;
     }
     let (texture, texel) = (gpu.texture.clone(), texel as usize);
-    Plan::Copy(Copy { image: id, texture, rect, texel, place: None })
+    Plan::Copy(Copy { image: id, texture, levels, level, rect, texel, place: None })
 }
 
 fn destination(copy: &Copy) -> (TexelCopyTextureInfo<'_>, Extent3d) {
     let (min, size) = (copy.rect.min, copy.rect.size());
     let origin = Origin3d { x: min.x, y: min.y, z: 0 };
     (
-        TexelCopyTextureInfo { texture: &copy.texture, mip_level: 0, origin, aspect: TextureAspect::All },
+        TexelCopyTextureInfo { texture: &copy.texture, mip_level: copy.level, origin, aspect: TextureAspect::All },
         Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 },
     )
 }

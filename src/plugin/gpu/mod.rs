@@ -3,6 +3,7 @@
 pub(crate) mod buffer;
 pub(crate) mod fetch;
 pub(crate) mod memory;
+pub(crate) mod mips;
 pub(crate) mod pack;
 pub(crate) mod textures;
 pub(crate) mod uploads;

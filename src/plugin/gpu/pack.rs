@@ -30,6 +30,8 @@ pub(crate) const PER_PACKER: usize = 4 * BLOCK_ROWS * PITCH;
 /// Texels of an image that have changed.
 pub(crate) struct Changed {
     pub(crate) image: AssetId<Image>,
+    /// The mip level.
+    pub(crate) level: u32,
     pub(crate) rect: TexelRect,
     /// Where they are packed, if they are.
     pub(crate) place: Option<Place>,
@@ -189,20 +191,19 @@ impl Packer {
     }
 
     /// Notes that the same texels have changed in the images of a surface of `size` texels, and packs them: they have just been
-    /// written, so that the cache still has them.
+    /// written, so that the cache still has them. With each image come its texels, and the bytes of one.
     pub(crate) fn push<'a>(
         &mut self,
-        images: impl Iterator<Item = Option<(AssetId<Image>, &'a [u8])>>,
+        images: impl Iterator<Item = Option<(AssetId<Image>, &'a [u8], usize)>>,
         size: UVec2,
         rect: TexelRect,
     ) {
         if !self.is_wanted || rect.is_empty() {
             return;
         }
-        let [width, height] = size.as_usizevec2().to_array();
-        for (image, data) in images.flatten() {
-            let place = self.pack(Source::new(data, width, data.len() / (width * height), rect));
-            self.rects.push(Changed { image, rect, place });
+        for (image, data, texel) in images.flatten() {
+            let place = self.pack(Source::new(data, size.x as usize, texel, rect));
+            self.rects.push(Changed { image, level: 0, rect, place });
         }
     }
 
@@ -262,7 +263,8 @@ pub(crate) mod tests {
                 rects.push(TexelRect { min: a.min(b), max: a.max(b) + 1 });
             }
             for (i, rect) in rects.iter().enumerate() {
-                let pictures = data.iter().map(|data| Some((AssetId::default(), &data[..])));
+                let pictures =
+                    data.iter().zip([4, 4, 1]).map(|(data, texel)| Some((AssetId::default(), &data[..], texel)));
                 packers[i % 3].push(pictures, size, *rect);
             }
             let mut packed = 0;

@@ -1,6 +1,6 @@
 //! The kinds of textures that a surface has, and their texels.
 
-use crate::paint::{BaseTexels, LookTable, PaintTargets, paint_glow, paint_new, paint_rects};
+use crate::paint::{BaseTexels, LookTable, MipLevels, PaintTargets, TexelKind, paint_glow, paint_new, paint_rects};
 use crate::plugin::api::textures::{CrackTextures, MAPS, Maps};
 use crate::plugin::gpu::buffer::{Staged, Stager};
 use crate::plugin::gpu::uploads::Uploads;
@@ -18,31 +18,36 @@ use bevy::{
 pub(crate) struct TextureKind {
     pub(crate) is_wanted: fn(Maps) -> bool,
     /// The texels of an uncracked surface.
-    pub(crate) texels: fn(&BasePicture) -> Vec<u8>,
+    uncracked: fn(&BasePicture) -> Vec<u8>,
+    texel: TexelKind,
     format: TextureFormat,
 }
 
 pub(crate) const DIFFUSE: TextureKind = TextureKind {
     is_wanted: |maps| maps.diffuse,
-    texels: |base| base.diffuse.clone(),
+    uncracked: |base| base.diffuse.clone(),
+    texel: TexelKind::Color,
     format: TextureFormat::Rgba8UnormSrgb,
 };
 
 pub(crate) const NORMAL: TextureKind = TextureKind {
     is_wanted: |maps| maps.normal,
-    texels: |base| base.normal.clone().unwrap_or_else(|| [128, 128, 255, 255].repeat(base.area())),
+    uncracked: |base| base.normal.clone().unwrap_or_else(|| [128, 128, 255, 255].repeat(base.area())),
+    texel: TexelKind::Linear,
     format: TextureFormat::Rgba8Unorm,
 };
 
 pub(crate) const DEPTH: TextureKind = TextureKind {
     is_wanted: |maps| maps.depth,
-    texels: |base| base.depth.clone().unwrap_or_else(|| vec![0; base.area()]),
+    uncracked: |base| base.depth.clone().unwrap_or_else(|| vec![0; base.area()]),
+    texel: TexelKind::Single,
     format: TextureFormat::R8Unorm,
 };
 
 pub(crate) const EMISSIVE: TextureKind = TextureKind {
     is_wanted: |maps| maps.emissive,
-    texels: |base| [0, 0, 0, 255].repeat(base.area()),
+    uncracked: |base| [0, 0, 0, 255].repeat(base.area()),
+    texel: TexelKind::Color,
     format: TextureFormat::Rgba8UnormSrgb,
 };
 
@@ -81,23 +86,42 @@ pub(crate) fn paint(
 
 impl TextureKind {
     /// Bytes of a texel.
-    pub(crate) fn texel(&self) -> usize {
-        self.format.block_copy_size(None).map_or(0, |size| size as usize)
+    pub(crate) const fn texel(&self) -> usize {
+        self.texel.bytes()
     }
 
-    /// The only place where textures are made. `None` if the data has not the length that size and format need, or there
-    /// is no texel: the renderer ends the app over such an image.
+    /// The mip levels that a texture may have.
+    pub(crate) const fn levels(&self, size: UVec2) -> MipLevels {
+        MipLevels::new(size, self.texel)
+    }
+
+    /// The texels of an uncracked surface, with those of the mip levels if there are to be any.
+    pub(crate) fn texels(&self, base: &BasePicture, has_mips: bool) -> Vec<u8> {
+        let mut texels = (self.uncracked)(base);
+        if has_mips {
+            let levels = self.levels(base.size);
+            texels.resize(levels.bytes(), 0);
+            levels.update(&mut texels, &[TexelRect::whole(base.size)]);
+        }
+        texels
+    }
+
+    /// The only place where textures are made, with mip levels if the data has them. `None` if the data has not the length that size and format
+    /// need, or there is no texel: the renderer ends the app over such an image.
     pub(crate) fn image(&self, size: UVec2, data: Vec<u8>, sampler: &ImageSampler) -> Option<Image> {
-        let length = (size.x as usize).checked_mul(size.y as usize)?.checked_mul(self.texel())?;
-        let mut image = self.empty(size, sampler).filter(|_| data.len() == length)?;
+        let levels = self.levels(size);
+        let has_mips = data.len() == levels.bytes();
+        let mut image =
+            self.empty(size, sampler, has_mips).filter(|_| has_mips || data.len() == levels.range(0).end)?;
         image.data = Some(data);
         Some(image)
     }
 
     /// The same without texels yet; the renderer makes room for them.
-    pub(crate) fn empty(&self, size: UVec2, sampler: &ImageSampler) -> Option<Image> {
+    pub(crate) fn empty(&self, size: UVec2, sampler: &ImageSampler, has_mips: bool) -> Option<Image> {
         let extent = Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 };
         let mut image = Image::new_uninit(extent, TextureDimension::D2, self.format, RenderAssetUsages::default());
+        image.texture_descriptor.mip_level_count = if has_mips { self.levels(size).count() } else { 1 };
         image.sampler = sampler.clone();
         (size.min_element() > 0).then_some(image)
     }
@@ -105,7 +129,31 @@ impl TextureKind {
 
 /// The texels of the uncracked textures that are wanted, in the order of [`KINDS`].
 pub(crate) fn texels(maps: Maps, base: &BasePicture) -> [Option<Vec<u8>>; MAPS] {
-    KINDS.each_ref().map(|kind| (kind.is_wanted)(maps).then(|| (kind.texels)(base)))
+    KINDS.each_ref().map(|kind| (kind.is_wanted)(maps).then(|| kind.texels(base, maps.mips)))
+}
+
+/// The mip levels that one of the textures may have; `None` of other images.
+pub(crate) fn levels(image: &Image) -> Option<MipLevels> {
+    let kind = KINDS.iter().find(|kind| kind.format == image.texture_descriptor.format)?;
+    Some(kind.levels(image.size()))
+}
+
+/// [`paint`] into texels that may have mip levels, which follow.
+pub(crate) fn paint_all(
+    base: &BasePicture,
+    analogy: Option<&AnalogyPicture>,
+    field: &DepthField,
+    look: &LookTable,
+    rects: &[TexelRect],
+    origin: UVec2,
+    texels: &mut [Option<Vec<u8>>; MAPS],
+) {
+    paint(base, analogy, field, look, rects, origin, texels.each_mut().map(Option::as_deref_mut));
+    let painted = rects.iter().map(|rect| TexelRect { min: rect.min + origin, max: rect.max + origin });
+    let painted: Vec<_> = painted.collect();
+    for (kind, texels) in KINDS.iter().zip(texels) {
+        texels.as_mut().map(|texels| kind.levels(base.size).update(texels, &painted));
+    }
 }
 
 /// The texels of a texture, and the same where the renderer can read them.
@@ -118,9 +166,8 @@ pub(crate) struct Picture {
 pub(crate) fn stage(texels: [Option<Vec<u8>>; MAPS], size: UVec2, stager: Option<&Stager>) -> [Option<Picture>; MAPS] {
     let mut kinds = KINDS.iter();
     texels.map(|texels| {
-        let texel = kinds.next().map_or(0, TextureKind::texel);
-        let texels = texels?;
-        let staged = stager.and_then(|stager| stager.stage(&texels, size, texel, &[TexelRect::whole(size)]));
+        let (kind, texels) = (kinds.next()?, texels?);
+        let staged = stager.and_then(|stager| stager.stage(&texels, size, kind, &[TexelRect::whole(size)]));
         Some(Picture { texels, staged })
     })
 }

@@ -28,6 +28,8 @@ pub(crate) struct Uploads {
     pub(super) packed: Option<Packed>,
     /// Number of rectangles up to which they are not thinned out again.
     limit: usize,
+    /// How many of `rects` have been followed up in the mip levels of their images.
+    pub(super) levelled: usize,
     /// Whether the renderer has fetched them since they were last looked at.
     pub(super) is_fetched: bool,
     /// Whether whole textures are on their way.
@@ -46,15 +48,20 @@ impl Uploads {
 
     /// Notes that texels of an image have changed.
     pub(crate) fn push(&mut self, image: AssetId<Image>, rect: TexelRect) {
+        self.push_level(image, 0, rect);
+    }
+
+    /// Notes that texels of one of its mip levels have changed.
+    pub(crate) fn push_level(&mut self, image: AssetId<Image>, level: u32, rect: TexelRect) {
         if self.is_wanted && !rect.is_empty() {
-            self.rects.push(Changed { image, rect, place: None });
+            self.rects.push(Changed { image, level, rect, place: None });
         }
     }
 
     /// The rectangles that nobody has fetched yet.
     #[cfg(feature = "editor")]
     pub(crate) fn changed(&self) -> impl Iterator<Item = (AssetId<Image>, TexelRect)> + '_ {
-        self.rects.iter().map(|changed| (changed.image, changed.rect))
+        self.rects.iter().filter(|changed| changed.level == 0).map(|changed| (changed.image, changed.rect))
     }
 
     /// Lends some packers to `paint`, and takes what they have packed, one after the other. What they have no room for is packed when
@@ -115,19 +122,20 @@ impl Uploads {
         self.staged.iter().any(|(other, _)| *other == image)
     }
 
-    /// Replaces the rectangles of each image by the one around them.
+    /// Replaces the rectangles of each level of an image by the one around them.
     fn thin_out(&mut self) {
-        let mut places = HashMap::<AssetId<Image>, usize>::default();
+        let mut places = HashMap::<(AssetId<Image>, u32), usize>::default();
         let mut thin = Vec::<Changed>::new();
-        for Changed { image, rect, .. } in self.rects.drain(..) {
-            match places.get(&image) {
+        for Changed { image, level, rect, .. } in self.rects.drain(..) {
+            match places.get(&(image, level)) {
                 Some(place) => thin[*place].rect = thin[*place].rect.union(rect),
                 None => {
-                    places.insert(image, thin.len());
-                    thin.push(Changed { image, rect, place: None });
+                    places.insert((image, level), thin.len());
+                    thin.push(Changed { image, level, rect, place: None });
                 }
             }
         }
+        self.levelled = thin.len();
         self.rects = thin;
         if let Some(packed) = self.close() {
             self.packed = Some(packed.anew());
@@ -159,7 +167,7 @@ mod tests {
             uploads.lend(2, Some(&super::super::pack::tests::memory(1 << 18).0));
             uploads.pack(2, |packers| {
                 for (packer, x) in packers.iter_mut().zip([4, 9]) {
-                    packer.push(ids.into_iter().map(|id| Some((id, &data[..]))), size, rect(x));
+                    packer.push(ids.into_iter().map(|id| Some((id, &data[..], 4))), size, rect(x));
                 }
             });
         };

@@ -278,6 +278,7 @@ fn update_picture(
     active.cracks.growth.set_mask(mask.clone());
     active.bytes = world.resource::<TextureMemory>().count(draft.plan.bytes);
     active.canvas.unstretched = draft.plan.unstretched;
+    active.canvas.has_mips = draft.plan.maps.mips;
     let profile = profile(&active.preset, draft.base.is_nearest);
     active.canvas.base = draft.base;
     active.canvas.look = look;

@@ -72,6 +72,8 @@ pub(crate) struct SurfaceParts {
     pub(crate) look: LookTable,
     pub(crate) base: Arc<BasePicture>,
     pub(crate) textures: CrackTextures,
+    /// Whether they have mip levels.
+    pub(crate) has_mips: bool,
     pub(crate) carrier: Carrier,
     pub(crate) bytes: TextureBytes,
     pub(crate) rect: TexelRect,
@@ -82,7 +84,19 @@ pub(crate) struct SurfaceParts {
 impl Active {
     /// A surface whose textures show what is in the field.
     pub(crate) fn new(ground: SurfaceParts, growth: CrackGrowth, field: DepthField) -> Self {
-        let SurfaceParts { surface, preset, look, base, textures, carrier, bytes, rect, unstretched, read_at } = ground;
+        let SurfaceParts {
+            surface,
+            preset,
+            look,
+            base,
+            textures,
+            has_mips,
+            carrier,
+            bytes,
+            rect,
+            unstretched,
+            read_at,
+        } = ground;
         let profile = profile(&preset, base.is_nearest);
         let mut canvas = Canvas {
             look,
@@ -90,6 +104,7 @@ impl Active {
             analogy: None,
             new_depths: DirtyTiles::default(),
             textures,
+            has_mips,
             views: Vec::new(),
             view: 0,
             unstretched,

@@ -20,6 +20,8 @@ pub(crate) struct Canvas {
     /// Texels of the field whose depths an analogy has not taken over; nothing without one.
     pub(crate) new_depths: DirtyTiles,
     pub(crate) textures: CrackTextures,
+    /// Whether they have mip levels.
+    pub(crate) has_mips: bool,
     pub(crate) views: Vec<View>,
     /// Index of the view that is shown.
     pub(crate) view: usize,

@@ -10,6 +10,7 @@ use crate::plugin::api::error::EntityLabel;
 use crate::plugin::api::{CrackClock, CrackError, CrackFailed, CrackState, CrackStatus, CrackTextures};
 use crate::plugin::gpu::textures::{self, TextureKind};
 use crate::plugin::gpu::uploads::Uploads;
+use crate::raster::TexelRect;
 use bevy::prelude::*;
 
 /// The largest depth of parallax that still looks like depth, in units of the texture.
@@ -94,8 +95,8 @@ pub(crate) fn make_textures(
             return Ok(None);
         }
         let UVec2 { x: width, y: height } = base.size;
-        let image =
-            kind.image(base.size, (kind.texels)(base), &plan.sampler).ok_or(CrackError::Size { width, height })?;
+        let texels = kind.texels(base, plan.maps.mips);
+        let image = kind.image(base.size, texels, &plan.sampler).ok_or(CrackError::Size { width, height })?;
         if let Some(Some(old)) = old
             && let Some(mut place) = images.get_mut(old)
         {
@@ -104,10 +105,24 @@ pub(crate) fn make_textures(
         }
         Ok(Some(images.add(image)))
     };
-    Ok(CrackTextures {
+    let made = CrackTextures {
         diffuse: add(&textures::DIFFUSE, reuse.map(|t| &t.diffuse))?,
         normal: add(&textures::NORMAL, reuse.map(|t| &t.normal))?,
         depth: add(&textures::DEPTH, reuse.map(|t| &t.depth))?,
         emissive: add(&textures::EMISSIVE, reuse.map(|t| &t.emissive))?,
-    })
+    };
+    if plan.maps.mips && reuse.is_some() {
+        push_mips(&mut world.resource_mut::<Uploads>(), &made, base.size);
+    }
+    Ok(made)
+}
+
+/// Asks for the upload of all mip levels: of an image that has changed, the renderer uploads only the first.
+fn push_mips(uploads: &mut Uploads, made: &CrackTextures, size: UVec2) {
+    for (texture, kind) in made.all().into_iter().zip(&textures::KINDS) {
+        let Some(texture) = texture else { continue };
+        for (level, rect) in kind.levels(size).above(&[TexelRect::whole(size)]) {
+            uploads.push_level(texture.id(), level, rect);
+        }
+    }
 }

@@ -1,7 +1,7 @@
 //! [`PicturePlan`]: what the pictures of a surface will be.
 
 use crate::plugin::api::textures::Maps;
-use crate::plugin::api::{CrackBudget, CrackError, CrackResolution, CrackSurface};
+use crate::plugin::api::{CrackBudget, CrackError, CrackMips, CrackResolution, CrackSurface};
 use crate::plugin::carrier::kind::Shown;
 use crate::plugin::gpu::memory::TextureMemory;
 use crate::plugin::source::layout::{Layout, MOST_TEXELS};
@@ -153,8 +153,13 @@ pub(super) fn plan_pictures(
             return Ok(None);
         }
     }
-    let maps = wanted.and(shown.maps);
     let image = shown.diffuse.as_ref().and_then(|picture| images.get(picture));
+    let mut maps = wanted.and(shown.maps);
+    maps.mips &= match surface.mips {
+        CrackMips::Auto => image.is_some_and(|image| image.texture_descriptor.mip_level_count > 1),
+        CrackMips::Always => true,
+        CrackMips::Never => false,
+    };
     let is_nearest = image.is_some_and(|image| picture::is_nearest(world, image));
     let sampler = image.map_or(ImageSampler::Default, |image| image.sampler.clone());
     if let Some(unfolding) = &stretch.unfolding {
@@ -211,7 +216,9 @@ fn bytes(size: UVec2, (maps, layer): (Maps, u64)) -> u64 {
 /// The same of one texel.
 pub(super) fn texel_bytes(maps: Maps, layer: u64) -> u64 {
     let whole = [maps.diffuse, maps.normal, maps.emissive].map(u64::from).iter().sum::<u64>();
-    4 + 2 + layer + 8 * whole + 2 * u64::from(maps.depth)
+    let textures = 8 * whole + 2 * u64::from(maps.depth);
+    // A third more for mip levels.
+    4 + 2 + layer + if maps.mips { (4 * textures).div_ceil(3) } else { textures }
 }
 
 /// Size of the textures: what is asked for, made smaller until it fits device and budget; and what it would be if the picture were not

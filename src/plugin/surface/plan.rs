@@ -130,7 +130,7 @@ impl Plan {
                 return Ok(None);
             }
             let UVec2 { x: width, y: height } = *size;
-            let image = kind.empty(*size, sampler).ok_or(CrackError::Size { width, height })?;
+            let image = kind.empty(*size, sampler, maps.mips).ok_or(CrackError::Size { width, height })?;
             Ok(Some(images.add(image)))
         };
         let [diffuse, normal, depth, emissive] = textures::KINDS.each_ref().map(&mut add);
@@ -186,10 +186,22 @@ impl Plan {
                 world.resource_mut::<PictureMasks>().remember(pictures.mask_key(picture, part), &mask);
             }
         }
-        let PicturePlan { bytes, rect, unstretched, is_twofold, unfolding, .. } = pictures;
+        let PicturePlan { bytes, rect, maps, unstretched, is_twofold, unfolding, .. } = pictures;
         let carrier = Carrier { is_twofold, unfolding, ..Carrier::new(kind, shown) };
         let bytes = world.resource::<TextureMemory>().count(bytes);
-        SurfaceParts { surface, preset, look, base, textures, carrier, bytes, rect, unstretched, read_at }
+        SurfaceParts {
+            surface,
+            preset,
+            look,
+            base,
+            textures,
+            has_mips: maps.mips,
+            carrier,
+            bytes,
+            rect,
+            unstretched,
+            read_at,
+        }
     }
 }
 
