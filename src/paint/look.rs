@@ -28,11 +28,23 @@ pub struct ColorStop {
 /// How cracks change the picture.
 ///
 /// ```
-/// use bevy_crack::paint::Look;
+/// use bevy_crack::paint::{Cel, ColorStop, Facets, Look};
 ///
 /// let shiny = Look { glint: 2.0, ..Look::GROOVE };
 /// assert_eq!(shiny.validate(), Ok(()));
 /// assert_eq!(Look::named("groove"), Some(Look::GROOVE));
+///
+/// // Blue where cracks are shallow, black where they are deep; the plates between them are tilted.
+/// let stop = |depth, color, cover| ColorStop { depth, color, cover };
+/// let ice = Look {
+///     ramp: vec![stop(0.1, [0.4, 0.6, 0.9], 0.5), stop(1.0, [0.0, 0.0, 0.1], 1.0)].into(),
+///     facets: Some(Facets { tilt: 0.3, ..Facets::DEFAULT }),
+///     ..Look::GROOVE
+/// };
+/// assert_eq!(ice.validate(), Ok(()));
+/// // Drawn with a thick line of ink.
+/// let drawn = Look { cel: Some(Cel { outline: 0.006, ..Cel::DEFAULT }), ..Look::TOON };
+/// assert_eq!(drawn.validate(), Ok(()));
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]

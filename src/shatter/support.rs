@@ -35,6 +35,44 @@ pub enum Anchor {
 /// assert_eq!((fallen.hit, fallen.loose), (number(0.45), number(0.8)));
 /// # Ok::<(), bevy_crack::shatter::ShatterError>(())
 /// ```
+///
+/// What is held can be said shard by shard, and distances may be your own:
+///
+/// ```
+/// # use bevy_crack::shatter::{Anchor, Cuts, ShatterParams, Support, shatter};
+/// // Four squares in a row, held at the left: a shelf.
+/// let mut cuts = Cuts::new([4.0, 1.0].into())?;
+/// for x in [1.0, 2.0, 3.0] {
+///     cuts.add_line(&[[x, 0.0].into(), [x, 1.0].into()])?;
+/// }
+/// let shards = shatter(cuts, &ShatterParams::DEFAULT)?;
+/// let mut shelf = Support::new(&shards, Anchor::Sides([true, false, false, false]));
+/// // Without the second square the two beyond it fall.
+/// assert_eq!(shelf.take(&shards, 1), [2, 3]);
+/// assert_eq!(shelf.missing().collect::<Vec<_>>(), [1, 2, 3]);
+/// shelf.put_back(1);
+/// assert!(shelf.is_in_place(1));
+///
+/// // A post under the last square: it no longer falls.
+/// shelf.restore();
+/// shelf.hold_shards([3]);
+/// assert_eq!(shelf.take(&shards, 1), [0; 0]);
+/// // A blow from below that reaches the third square only.
+/// let fallen = shelf.hit_by(&shards, 0.5, |shard| if shard == 2 { 0.2 } else { 0.9 })?;
+/// assert_eq!((fallen.hit, fallen.loose), (vec![2], vec![]));
+///
+/// // Squares that something else has removed make nothing fall before it is asked for.
+/// let mut shelf = Support::from_mask(&shards, |pos| pos.x < 0.1);
+/// shelf.remove([2]);
+/// assert!(shelf.is_in_place(3));
+/// assert_eq!(shelf.drop_loose(&shards), [3]);
+/// // The same gaps, held by nothing, then by all that lies to the left.
+/// let mut loose = shelf.held_by(&shards, Anchor::Nothing);
+/// assert_eq!(loose.missing().collect::<Vec<_>>(), [2, 3]);
+/// loose.hold(&shards, |pos| pos.x < 0.1);
+/// assert_eq!(loose, shelf);
+/// # Ok::<(), bevy_crack::shatter::ShatterError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Support {
     anchored: Vec<bool>,
@@ -87,6 +125,25 @@ impl Support {
 
     /// The support of a surface that has been cracked further: shards that lie where an old shard was missing are
     /// missing too.
+    ///
+    /// ```
+    /// use bevy_crack::shatter::{Anchor, Cuts, ShatterParams, Support, shatter};
+    ///
+    /// let halves = |lines: &[f32]| {
+    ///     let mut cuts = Cuts::new([2.0, 1.0].into())?;
+    ///     for &x in lines {
+    ///         cuts.add_line(&[[x, 0.0].into(), [x, 1.0].into()])?;
+    ///     }
+    ///     shatter(cuts, &ShatterParams::DEFAULT)
+    /// };
+    /// let (old, new) = (halves(&[1.0])?, halves(&[0.5, 1.0])?);
+    /// let mut support = Support::new(&old, Anchor::Border);
+    /// support.remove([0]);
+    /// // The left half is missing, so both of its parts are.
+    /// let support = support.after_new_cracks(&old, &new, Anchor::Border);
+    /// assert_eq!(support.missing().collect::<Vec<_>>(), [0, 1]);
+    /// # Ok::<(), bevy_crack::shatter::ShatterError>(())
+    /// ```
     #[must_use]
     pub fn after_new_cracks(&self, old: &Shards, new: &Shards, anchor: Anchor) -> Self {
         let mut support = Self::new(new, anchor);

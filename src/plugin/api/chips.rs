@@ -27,6 +27,13 @@ use bevy::prelude::*;
 ///         CrackChips::default(),
 ///     ));
 /// }
+///
+/// /// A light clatter where chips come off.
+/// fn clatter(chips: Query<&CrackChip, Added<CrackChip>>) {
+///     for chip in &chips {
+///         info!("a chip of {}", chip.surface);
+///     }
+/// }
 /// ```
 #[derive(Component, Reflect, Clone, Debug, PartialEq)]
 #[type_path = "bevy_crack"]

@@ -27,6 +27,12 @@ use bevy::prelude::*;
 ///         clock.set_if_neq(CrackClock::value(1.0 - health.0));
 ///     }
 /// }
+///
+/// // Twice as fast and backwards; the same, but it waits at the end of the third step.
+/// let backwards = CrackClock::speed(-2.0);
+/// assert_eq!((backwards.drive, backwards.paused), (CrackDrive::Speed(-2.0), false));
+/// let waiting = CrackClock { paused: true, seek: Some(3.0), ..backwards };
+/// # let _ = waiting;
 /// ```
 #[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq)]
 #[type_path = "bevy_crack"]

@@ -23,6 +23,10 @@ use bevy::prelude::*;
 ///         },
 ///     ));
 /// }
+///
+/// // Ordinary hits.
+/// let drum = CrackScript::new([(0.5, Vec2::new(0.3, 0.5)), (1.0, Vec2::new(0.7, 0.5))]);
+/// assert_eq!(drum.hits[1], ScriptedHit { at: 1.0, uv: Vec2::new(0.7, 0.5), energy: 1.0, direction: Vec3::ZERO });
 /// ```
 #[derive(Component, Reflect, Clone, Debug, Default, PartialEq)]
 #[type_path = "bevy_crack"]

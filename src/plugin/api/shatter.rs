@@ -112,6 +112,16 @@ impl Default for ShatterCracks {
 }
 
 /// In which axes [`BurstParams::gravity`] is meant.
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_crack::{prelude::*, shatter::BurstParams};
+///
+/// // A floor that is seen from above: pieces slide apart, and nothing pulls them down the picture.
+/// let burst = BurstParams { gravity: Vec2::ZERO, drag: 3.0, ..default() };
+/// let floor = ShatterCracks { gravity: GravitySpace::Surface, burst, ..default() };
+/// # let _ = floor;
+/// ```
 #[derive(Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[type_path = "bevy_crack"]
 #[reflect(Default)]
@@ -143,6 +153,16 @@ pub enum ShatterWhen {
 }
 
 /// What [`shatter_cracks`](crate::plugin::CrackCommandsExt::shatter_cracks) is to knock out of a surface.
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_crack::plugin::ShatterRequest;
+///
+/// // A kick at the lower edge.
+/// let kick = ShatterRequest::around(Vec2::new(0.5, 0.9), 0.2).with_energy(4.0);
+/// assert!(kick.validate().is_ok() && ShatterRequest::EVERYTHING.validate().is_ok());
+/// assert!(ShatterRequest { reach: -1.0, ..kick }.validate().is_err());
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShatterRequest {
     /// Where the blow lands, texture coordinates of the surface's picture or sprite frame, 0..=1, v down; from beside it no further than
@@ -218,6 +238,41 @@ impl Default for ShatterRequest {
 /// was made for it.
 ///
 /// With [`ShatterCracks::fly`] off, this is what a physics engine needs: colliders, mass and the velocity of the blow.
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_crack::{plugin::ShardsError, prelude::*};
+///
+/// /// Hands shards over to a physics engine.
+/// fn embody(shattered: On<Shattered>, shards: Query<&Shard>) {
+///     for shard in shards.iter_many(&shattered.shards) {
+///         let (colliders, mass) = (shard.convex_pieces(0.004), 2.5 * shard.area());
+///         info!("{} colliders, mass {mass}, {} units a second", colliders.len(), shard.velocity);
+///     }
+/// }
+///
+/// fn refused(failed: On<ShatterFailed>) {
+///     match &failed.error {
+///         ShardsError::NoDiffuse => warn!("{} has no texture for holes", failed.entity),
+///         error => warn!("{} stays whole: {error}", failed.entity),
+///     }
+/// }
+///
+/// fn count(walls: Query<&CrackShards, Changed<CrackShards>>) {
+///     for shards in &walls {
+///         info!("{} of {} pieces are out of their places", shards.gone, shards.pieces.len());
+///     }
+/// }
+///
+/// fn mended(mended: On<Reassembled>, mut commands: Commands) {
+///     commands.entity(mended.entity).heal_cracks();
+/// }
+/// # bevy::ecs::system::assert_is_system(count);
+/// # let mut world = World::new();
+/// # world.add_observer(embody);
+/// # world.add_observer(refused);
+/// # world.add_observer(mended);
+/// ```
 #[derive(Component, Reflect, Clone, Debug)]
 #[type_path = "bevy_crack"]
 #[reflect(Component, Clone, Debug, Default)]

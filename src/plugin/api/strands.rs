@@ -49,6 +49,18 @@ pub struct CrackStrands {
 }
 
 /// The directions of [`CrackStrands`], before noise turns them.
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_crack::prelude::*;
+///
+/// // Three cracks that run down from the upper edge, and one that winds out from the middle.
+/// let starts = [0.2, 0.5, 0.8].map(|u| HitPoint::Uv(Vec2::new(u, 0.0)));
+/// let down = CrackStrands::new(starts, StrandField::Linear(Vec2::Y)).with_seed(3);
+/// let middle = HitPoint::Uv(Vec2::splat(0.5));
+/// let whirl = CrackStrands::new([], StrandField::Swirl { center: middle, turn: 1.2 });
+/// assert!(down.validate().is_ok() && whirl.validate().is_ok());
+/// ```
 #[derive(Reflect, Clone, Debug, PartialEq)]
 #[type_path = "bevy_crack"]
 #[reflect(Clone, Debug, PartialEq, SerializeWithRegistry)]

@@ -23,6 +23,29 @@ use bevy::{prelude::*, reflect::serde::ReflectSerializeWithRegistry};
 /// coordinates while it is cracked. A face is what hangs together in the texture coordinates, or a side of a box. Where a face shows a part of the
 /// picture twice itself, where the picture repeats, faces share vertices, or there are more than 65,536 triangles, the mesh stays as it is, and cracks
 /// show wherever their place of the picture does.
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_crack::prelude::*;
+///
+/// fn setup(mut commands: Commands, assets: Res<AssetServer>) {
+///     // Most cracks where the first image is light, none where the second one is. There is no use for its normals.
+///     let wall = CrackSurface::new(CrackPreset::PLASTER)
+///         .with_seed(3)
+///         .with_density(assets.load("density.png"))
+///         .with_mask(CrackMaskSource::Images { weak: None, strong: None, forbidden: Some(assets.load("frame.png")) })
+///         .with_maps(CrackMaps { normal: false, ..default() });
+///     commands.spawn((Sprite::from_image(assets.load("wall.png")), wall));
+///     // A coin is small.
+///     let coin = CrackSurface::new(CrackPreset::GLASS).with_resolution(CrackResolution::Fixed(UVec2::splat(64)));
+///     commands.spawn((Sprite::from_image(assets.load("coin.png")), coin));
+/// }
+///
+/// // A large vase, to be laid out flat in any case.
+/// let vase = CrackSurface::new(CrackPreset::CLAY).with_unwrap(CrackUnwrap::Always);
+/// assert_eq!((vase.mask, vase.write), (CrackMaskSource::Auto, CrackMaps::default()));
+/// # bevy::ecs::system::assert_is_system(setup);
+/// ```
 #[derive(Component, Reflect, Clone, Debug, PartialEq)]
 #[type_path = "bevy_crack"]
 #[reflect(Component, Default, SerializeWithRegistry)]

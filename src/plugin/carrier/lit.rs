@@ -19,6 +19,31 @@ use bevy::{
 pub const MAX_LIGHTS: usize = 4;
 
 /// A picture on a `Mesh2d`, lit by up to [`MAX_LIGHTS`] [`CrackLight2d`].
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_crack::prelude::*;
+///
+/// fn setup(
+///     mut commands: Commands,
+///     assets: Res<AssetServer>,
+///     mut meshes: ResMut<Assets<Mesh>>,
+///     mut materials: ResMut<Assets<CrackLitMaterial>>,
+/// ) {
+///     // A wall at night, and a lamp above it.
+///     let wall = CrackLitMaterial::new(assets.load("wall.png")).with_ambient(LinearRgba::rgb(0.02, 0.02, 0.05));
+///     commands.spawn((
+///         Mesh2d(meshes.add(Rectangle::new(400.0, 400.0))),
+///         MeshMaterial2d(materials.add(wall)),
+///         CrackSurface::new(CrackPreset::CONCRETE),
+///     ));
+///     commands.spawn((CrackLight2d { range: 300.0, ..default() }, Transform::from_xyz(-80.0, 160.0, 0.0)));
+/// }
+///
+/// let lit = CrackLitMaterial::default().with_ambient(LinearRgba::WHITE).lit;
+/// assert_eq!((lit.ambient, lit.tint), (Vec4::ONE, Vec4::ONE));
+/// # bevy::ecs::system::assert_is_system(setup);
+/// ```
 #[derive(Asset, AsBindGroup, Reflect, Clone, Debug)]
 #[reflect(Default)]
 pub struct CrackLitMaterial {
