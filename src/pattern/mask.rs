@@ -7,7 +7,7 @@ use glam::{UVec2, Vec2};
 /// Where cracks prefer to run, avoid to run, and never run; each as values of 0..=1 over the whole surface.
 ///
 /// The layers may have any size, each its own: they are sampled by texture coordinates (0..1, v down). A missing
-/// layer counts as 0 everywhere; NaN counts as 0 too.
+/// layer counts as 0 everywhere; NaN counts as 0 too. By default there is no layer.
 ///
 /// ```
 /// use bevy_crack::pattern::CrackMask;

@@ -33,7 +33,7 @@ use glam::UVec2;
 pub struct ReliefSettings {
     /// Where the contours begin; default [`ReliefShape::Wall`].
     pub shape: ReliefShape,
-    /// How contours are made from each other.
+    /// How contours are made from each other. Default, as of the other fields: that of [`rock_wall`](Self::rock_wall).
     pub contours: ReliefParams,
     /// How contours become heights.
     pub heights: HeightParams,

@@ -78,7 +78,8 @@ pub struct Rivers {
 
 /// What the ground looks like, by its height, slope and shape.
 ///
-/// Rock shows where the ground is steep. It has layers, strata, along its heights. Hollows are darker than edges.
+/// Rock shows where the ground is steep. It has layers, strata, along its heights. Hollows are darker than edges. By default
+/// all is as in [`ROCK`](Self::ROCK).
 ///
 /// ```
 /// use bevy_crack::relief::{Ground, Patches, Rivers, Sea, StoneColors, TerrainColors, Woods};

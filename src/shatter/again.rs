@@ -9,7 +9,7 @@ use crate::math::{Rng, ops};
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct SizeClasses {
     /// The largest area of each class, the smallest class first; pattern units squared. A piece above the last value
-    /// belongs to one more class.
+    /// belongs to one more class. 1e-6..=4096; default 0.001, 0.006 and 0.036.
     pub largest: [f32; 3],
 }
 
@@ -50,7 +50,7 @@ impl Default for SizeClasses {
 #[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct BreakAgain {
-    /// Which pieces break, and how small.
+    /// Which pieces break, and how small. Default: [`SizeClasses::DEFAULT`].
     pub classes: SizeClasses,
     /// Time after its release, or after it broke off itself, at which a piece breaks, seconds, plus or minus a third.
     /// 0.01..=600; default: 0.35.

@@ -65,6 +65,7 @@ pub type ConvexPiece = Vec<Vec2>;
 /// assert_eq!((shards.distance(frame, inner), shards.distance(frame, [0.5, 0.5].into())), (0.0, 0.25));
 /// let pieces: Vec<ConvexPiece> = shards.convex_pieces(frame, 0.0);
 /// assert!(pieces.len() >= 4);
+/// assert!(!shards.is_empty() && Shards::default().is_empty());
 /// # Ok::<(), bevy_crack::shatter::ShatterError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]

@@ -82,7 +82,8 @@ pub struct ShellPlace {
     pub down: Vec3,
 }
 
-/// How the shards of a [`Shell`] become meshes.
+/// How the shards of a [`Shell`] become meshes. By default nothing is moved, a whole texture is shown, rims are
+/// [plain](RimLook::PLAIN), and all numbers are 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShellFrame {
     /// From the shell's space to the mesh's: turned and moved, not scaled.
@@ -93,7 +94,7 @@ pub struct ShellFrame {
     pub rim: RimLook,
     /// Seed as that of [`MeshFrame::seed`].
     pub seed: u64,
-    /// How far pieces reach inward from the surface, in the shell's units.
+    /// How far pieces reach inward from the surface, in the shell's units, 0 or more.
     pub thickness: f32,
     /// How uneven their inside and the faces along which they broke are, 0..=1; pieces fit all the same.
     pub roughness: f32,

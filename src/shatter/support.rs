@@ -22,7 +22,7 @@ pub enum Anchor {
 /// A held shard holds its neighbours, and so on; shards that are no longer held fall.
 ///
 /// ```
-/// use bevy_crack::shatter::{Anchor, Cuts, ShatterParams, Support, shatter};
+/// use bevy_crack::shatter::{Anchor, Cuts, Fallen, ShatterParams, Support, shatter};
 ///
 /// // Three shelves; only the top is fixed.
 /// let mut cuts = Cuts::new([1.0, 1.0].into())?;
@@ -30,9 +30,9 @@ pub enum Anchor {
 /// cuts.add_line(&[[0.0, 0.6].into(), [1.0, 0.6].into()])?;
 /// let shards = shatter(cuts, &ShatterParams::DEFAULT)?;
 /// let mut support = Support::new(&shards, Anchor::Sides([false, false, true, false]));
-/// let fallen = support.hit(&shards, [0.5, 0.45].into(), 0.1)?;
+/// let Fallen { hit, loose } = support.hit(&shards, [0.5, 0.45].into(), 0.1)?;
 /// let number = |y: f32| shards.at([0.5, y].into()).into_iter().collect::<Vec<u32>>();
-/// assert_eq!((fallen.hit, fallen.loose), (number(0.45), number(0.8)));
+/// assert_eq!((hit, loose), (number(0.45), number(0.8)));
 /// # Ok::<(), bevy_crack::shatter::ShatterError>(())
 /// ```
 ///

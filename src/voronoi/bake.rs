@@ -449,6 +449,24 @@ impl VoronoiMap {
     }
 
     /// Makes the most expensive cracks of the current map the widest, as they were when the map was made.
+    ///
+    /// ```
+    /// use bevy_crack::{Grid, voronoi::{Guide, VoronoiBake, VoronoiMap, VoronoiParams}};
+    ///
+    /// // All of the surface is expensive, and then only half as much.
+    /// let guide = Guide::new(Grid::new([1, 1].into(), 1.0));
+    /// let params = VoronoiParams { stroke_width: 0.0, ..VoronoiParams::DEFAULT };
+    /// let mut map = VoronoiBake::new(params, vec![guide], [64, 64].into(), 1)?.finish().0;
+    /// map.set_gammas(&[14.0])?;
+    /// let widest = |map: &VoronoiMap| {
+    ///     let seams = map.seams().seams;
+    ///     seams.iter().flat_map(|seam| &seam.points).map(|point| point.width).fold(0.0, f32::max)
+    /// };
+    /// let before = widest(&map);
+    /// map.rescale_widths();
+    /// assert!(widest(&map) > before);
+    /// # Ok::<(), bevy_crack::voronoi::VoronoiError>(())
+    /// ```
     pub fn rescale_widths(&mut self) {
         self.full_cost = None;
         if let Some(level) = self.levels.last() {

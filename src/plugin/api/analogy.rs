@@ -70,7 +70,7 @@ pub struct CrackAnalogy {
     /// Whether the surface keeps its own picture away from its cracks, texel for texel. If false it takes the material of
     /// the photographs everywhere. Default true.
     pub keeps_picture: bool,
-    /// Seed of the search.
+    /// Seed of the search. Default 0.
     pub seed: u64,
 }
 

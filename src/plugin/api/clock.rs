@@ -38,11 +38,11 @@ use bevy::prelude::*;
 #[type_path = "bevy_crack"]
 #[reflect(Component, Default)]
 pub struct CrackClock {
-    /// What makes time pass.
+    /// What makes time pass. Default: as without a clock, [`CrackDrive::Speed`] of 1.
     pub drive: CrackDrive,
-    /// Whether time stands still. Growth stands still as well then.
+    /// Whether time stands still. Growth stands still as well then. Default false.
     pub paused: bool,
-    /// Where time is to jump to, steps, also when paused; `None` again when it has. What lies beyond the end is grown as fast as the
+    /// Where time is to jump to, steps, also when paused; `None` (default) again when it has. What lies beyond the end is grown as fast as the
     /// budget allows until the cracks come to their end: infinity jumps there. Not a number = no jump. A
     /// [`CrackDrive::Value`] that is not paused has the last word.
     pub seek: Option<f32>,

@@ -38,13 +38,13 @@ use std::sync::Arc;
 #[reflect(Component, Default, Clone, Debug, PartialEq)]
 #[require(BakeProgress)]
 pub struct GuidedCracks {
-    /// The pictures that the cracks follow, at most 64; none = cracks of plain mud or pavement.
+    /// The pictures that the cracks follow, at most 64; none (default) = cracks of plain mud or pavement.
     pub guides: Vec<CrackGuide>,
-    /// Sites, their layout, levels, noise and widths.
+    /// Sites, their layout, levels, noise and widths. Default: [`VoronoiParams::DEFAULT`]; [`new`](Self::new) lays out sites in pairs.
     pub params: VoronoiParams,
-    /// Seed of the sites and the noise.
+    /// Seed of the sites and the noise. Default 0.
     pub seed: u64,
-    /// How the cracks come when the bake is done.
+    /// How the cracks come when the bake is done. Default: at once.
     pub appearance: GuidedAppearance,
     /// Longer side of the map, texels; 0 counts as 1; default 1024. The map has the surface's own size if that is smaller; its
     /// cracks are lines, as sharp as the surface's textures in any case. A map takes some 12 bytes a texel.
@@ -145,7 +145,7 @@ impl Default for GuidedCracks {
 /// let guides = vec![CrackGuide::new(cross), CrackGuide::own_edges().with_gamma(8.0)];
 /// assert!(matches!(guides[0].source, GuideSource::Grid(_)));
 /// assert_eq!((guides[1].source.clone(), guides[1].gamma), (GuideSource::OwnEdges, 8.0));
-/// assert!(GuidedCracks { guides, ..GuidedCracks::default() }.validate().is_ok());
+/// assert!(GuidedCracks { guides, ..GuidedCracks::default() }.with_seed(3).validate().is_ok());
 /// ```
 #[derive(Reflect, Clone, Debug, PartialEq)]
 #[type_path = "bevy_crack"]

@@ -59,7 +59,7 @@ pub struct CrackRelief {
     pub settings: ReliefSettings,
     /// Size of the textures, texels, 16..=4096 a side; default 1024 x 1024. It should have the proportions of the surface.
     pub size: UVec2,
-    /// Seed of everything that is random.
+    /// Seed of everything that is random. Default 0.
     pub seed: u64,
     /// For 3D meshes: how high the relief stands out of the surface, in units of its real height. Above 0 the mesh, which should be a
     /// rectangle that faces along z or y, is replaced by one of the relief. 0 = the mesh stays. 0..=16; default 0.

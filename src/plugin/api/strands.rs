@@ -31,19 +31,19 @@ use bevy::{prelude::*, reflect::serde::ReflectSerializeWithRegistry};
 #[reflect(Component, Default, Clone, Debug, PartialEq, SerializeWithRegistry)]
 #[require(BakeProgress)]
 pub struct CrackStrands {
-    /// Where strands start, on the surface; at most [`MAX_STARTS`](crate::strands::MAX_STARTS). None = at the first point of the
+    /// Where strands start, on the surface; at most [`MAX_STARTS`](crate::strands::MAX_STARTS). None (default) = at the first point of the
     /// line, or at the center of the field.
     pub starts: Vec<HitPoint>,
-    /// The directions in which they run.
+    /// The directions in which they run. Default: away from the middle.
     pub field: StrandField,
     /// Noise, inertia, branches, distances and widths; default [`StrandParams::ASPHALT`].
     pub params: StrandParams,
     /// Images of cracks to be joined along the strands, dark on light: at most 64, at most 1024 texels a side, readable on the CPU.
-    /// See [`Primitive::from_image`](crate::strands::Primitive::from_image). None = those of [`StrandParams::material`].
+    /// See [`Primitive::from_image`](crate::strands::Primitive::from_image). None (default) = those of [`StrandParams::material`].
     pub primitives: Vec<Handle<Image>>,
-    /// Seed of the noise and of the choice of primitives.
+    /// Seed of the noise and of the choice of primitives. Default 0.
     pub seed: u64,
-    /// Seconds until all of them are there, up to 1e6. Not a number, zero or below: at once. On a surface that has been hit before they
+    /// Seconds until all of them are there, up to 1e6; default 0. Not a number, zero or below: at once. On a surface that has been hit before they
     /// come at once.
     pub seconds: f32,
 }

@@ -52,13 +52,14 @@ use bevy::{prelude::*, reflect::serde::ReflectSerializeWithRegistry};
 #[require(CrackState)]
 pub struct CrackSurface {
     /// How cracks grow and look, here or in a file. A changed look and profile show on all cracks at once, changed growth on what
-    /// grows from then on; invalid changes are refused with one warning.
+    /// grows from then on; invalid changes are refused with one warning. Default: [`CrackPreset::CONCRETE`](crate::CrackPreset::CONCRETE).
     pub preset: PresetSource,
-    /// Seed of the pattern. A change takes effect after healing.
+    /// Seed of the pattern; default 0. A change takes effect after healing.
     pub seed: u64,
-    /// Size of the textures. A change takes effect when they are made again: after healing, or with another picture.
+    /// Size of the textures; default [`Picture`](CrackResolution::Picture). A change takes effect when they are made again: after healing, or with
+    /// another picture.
     pub resolution: CrackResolution,
-    /// Which maps are written. A change takes effect as one of `resolution`.
+    /// Which maps are written; default all. A change takes effect as one of `resolution`.
     pub write: CrackMaps,
     /// Whether transparent texels refuse hits and attract no cracks; default true.
     pub alpha_mask: bool,
@@ -69,8 +70,8 @@ pub struct CrackSurface {
     /// there (lightness as it is stored, times alpha). `None` (default) = everywhere alike. The first hit waits until it is loaded. A change takes
     /// effect as one of `resolution`.
     pub density: Option<Handle<Image>>,
-    /// Whether a 3D mesh is laid out flat around its first hit, so that cracks run over its edges and around its curves. A change takes effect
-    /// after healing.
+    /// Whether a 3D mesh is laid out flat around its first hit, so that cracks run over its edges and around its curves; default
+    /// [`Auto`](CrackUnwrap::Auto). A change takes effect after healing.
     pub unwrap: CrackUnwrap,
 }
 
@@ -182,7 +183,7 @@ pub enum CrackResolution {
     Fixed(UVec2),
 }
 
-/// Which maps of a surface are written.
+/// Which maps of a surface are written; by default all of them.
 ///
 /// With a look that [glows](crate::paint::Look::glow) when a surface first cracks, 3D meshes whose material has no emissive picture of its own get an
 /// emissive map as well.
