@@ -82,7 +82,7 @@ pub struct Cell {
 /// assert_eq!(tracker.cell_at([0.0, 0.0].into()), Some(0));
 /// assert!(tracker.outline(0).contains(&CORNERS));
 /// assert_eq!(tracker.pos(CORNERS + 2), Some([1.0, 1.0].into()));
-/// // What lies in it without touching its outline is its holes: the cracks around the hit.
+/// // The cracks around the hit do not touch its outline: they are a hole in it.
 /// assert_eq!(tracker.holes(0).count(), 1);
 /// # Ok::<(), bevy_crack::growth::ParamError>(())
 /// ```

@@ -98,12 +98,12 @@ pub enum SegmentId {
 ///     let points = network.path(segment).expect("the segment exists").points().len();
 ///     assert!(points >= 2);
 /// }
-/// // Cracks start at the hit. Links join what has grown apart.
+/// // Cracks start at the hit.
 /// let is_start = |node: &&Node| node.parent == NO_PARENT;
 /// assert!(network.nodes().iter().filter(is_start).all(|node| node.pos.distance([0.5, 0.5].into()) < 0.1));
 /// let node = network.nodes()[9];
 /// assert_eq!(network.ends(SegmentId::Branch(9)), Some((node.parent, 9)));
-/// // A network of one's own begins without nodes.
+/// // A new network is empty.
 /// assert_eq!(Network::new([2.0, 1.0].into(), 0.1, 7).segments().count(), 0);
 /// # Ok::<(), bevy_crack::growth::ParamError>(())
 /// ```

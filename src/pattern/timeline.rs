@@ -331,15 +331,16 @@ impl Timeline {
     /// Disc number `index` at `moment`; `None` if it does not exist (yet).
     ///
     /// ```
-    /// use bevy_crack::{CrackPreset, growth::CrackGrowth, pattern::{Dot, Moment}};
+    /// use bevy_crack::{growth::{CrackGrowth, GrowthParams}, pattern::{Dot, Moment}};
     ///
-    /// // Some looks show markers as dots.
-    /// let params = bevy_crack::growth::GrowthParams { draw_markers: true, ..CrackPreset::SAND.growth };
+    /// let params = GrowthParams { draw_markers: true, ..GrowthParams::DEFAULT };
     /// let mut growth = CrackGrowth::new(params, [1.0, 1.0].into(), 7)?;
     /// growth.hit([0.5, 0.5].into(), 1.0);
     /// while growth.step().grew() {}
     /// let timeline = growth.timeline();
-    /// let dot: Option<Dot> = timeline.dot_at(0, Moment::after(timeline.end()));
+    /// let Dot { pos, radius } = timeline.dot_at(0, Moment::after(timeline.end())).expect("a marker");
+    /// assert!(pos.distance([0.5, 0.5].into()) < 1.0 && radius > 0.0);
+    /// // At first there is none.
     /// assert_eq!(timeline.dot_at(0, Moment::START), None);
     /// # Ok::<(), bevy_crack::growth::ParamError>(())
     /// ```

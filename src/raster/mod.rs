@@ -65,7 +65,7 @@ use std::sync::Arc;
 /// };
 ///
 /// let frame = SurfaceFrame::new([8, 4].into())?;
-/// // A surface of a whole game may be too large for the memory there is.
+/// // An error where there is no memory.
 /// let mut field: DepthField = DepthField::try_new(frame).map_err(|OutOfMemory { bytes }| format!("{bytes} bytes"))?;
 /// // The right half is a frame of metal.
 /// let forbidden = CrackMask::layer([2, 1].into(), &[0, 255])?;

@@ -60,7 +60,7 @@ pub type ConvexPiece = Vec<Vec2>;
 /// assert!(corners.clone().any(|corner| corner == shards.extent()));
 /// assert_eq!((corners.len(), shards.triangles(frame).len()), (8, 8));
 ///
-/// // Its middle is not in it, but this is.
+/// // A point that lies in the frame, unlike its middle.
 /// let inner = shards.inner_point(frame).expect("a shard");
 /// assert_eq!((shards.distance(frame, inner), shards.distance(frame, [0.5, 0.5].into())), (0.0, 0.25));
 /// let pieces: Vec<ConvexPiece> = shards.convex_pieces(frame, 0.0);

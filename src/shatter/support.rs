@@ -36,7 +36,7 @@ pub enum Anchor {
 /// # Ok::<(), bevy_crack::shatter::ShatterError>(())
 /// ```
 ///
-/// What is held can be said shard by shard, and distances may be your own:
+/// Shards can be held, removed and put back one by one, and hit by distances of your own:
 ///
 /// ```
 /// # use bevy_crack::shatter::{Anchor, Cuts, ShatterParams, Support, shatter};
@@ -61,12 +61,12 @@ pub enum Anchor {
 /// let fallen = shelf.hit_by(&shards, 0.5, |shard| if shard == 2 { 0.2 } else { 0.9 })?;
 /// assert_eq!((fallen.hit, fallen.loose), (vec![2], vec![]));
 ///
-/// // Squares that something else has removed make nothing fall before it is asked for.
+/// // A square that the game removes itself: nothing falls before it is asked for.
 /// let mut shelf = Support::from_mask(&shards, |pos| pos.x < 0.1);
 /// shelf.remove([2]);
 /// assert!(shelf.is_in_place(3));
 /// assert_eq!(shelf.drop_loose(&shards), [3]);
-/// // The same gaps, held by nothing, then by all that lies to the left.
+/// // The same squares in their places, held by nothing, then at the left again.
 /// let mut loose = shelf.held_by(&shards, Anchor::Nothing);
 /// assert_eq!(loose.missing().collect::<Vec<_>>(), [2, 3]);
 /// loose.hold(&shards, |pos| pos.x < 0.1);

@@ -62,7 +62,7 @@ const FIRST_COUNTED: usize = 2;
 /// # Ok::<(), bevy_crack::paint::analogy::AnalogyError>(())
 /// ```
 ///
-/// The work in slices, and what can be read of it:
+/// The work in slices, and all that can be read of the result:
 ///
 /// ```
 /// use bevy_crack::{Grid, paint::analogy::{Analogy, AnalogyPair, AnalogyParams, Examples, TexelSource}};

@@ -22,7 +22,7 @@ pub const MAX_LIGHTS: usize = 4;
 ///
 /// ```
 /// use bevy::prelude::*;
-/// use bevy_crack::prelude::*;
+/// use bevy_crack::{plugin::CrackLitUniform, prelude::*};
 ///
 /// fn setup(
 ///     mut commands: Commands,
@@ -40,8 +40,8 @@ pub const MAX_LIGHTS: usize = 4;
 ///     commands.spawn((CrackLight2d { range: 300.0, ..default() }, Transform::from_xyz(-80.0, 160.0, 0.0)));
 /// }
 ///
-/// let lit = CrackLitMaterial::default().with_ambient(LinearRgba::WHITE).lit;
-/// assert_eq!((lit.ambient, lit.tint), (Vec4::ONE, Vec4::ONE));
+/// let CrackLitUniform { ambient, tint, .. } = CrackLitMaterial::default().with_ambient(LinearRgba::WHITE).lit;
+/// assert_eq!((ambient, tint), (Vec4::ONE, Vec4::ONE));
 /// # bevy::ecs::system::assert_is_system(setup);
 /// ```
 #[derive(Asset, AsBindGroup, Reflect, Clone, Debug)]
