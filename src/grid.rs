@@ -33,6 +33,13 @@ pub(crate) fn ask_for(bytes: u64) -> Result<(), OutOfMemory> {
 /// assert_eq!(grid.as_slice(), [0, 0, 0, 0, 0, 9]);
 /// assert_eq!(grid.get(2, 1), Some(9));
 /// assert_eq!(grid.get(3, 1), None);
+/// grid.as_mut_slice()[..3].copy_from_slice(&[1, 2, 3]);
+/// assert_eq!(grid.row(0), [1, 2, 3]);
+/// assert_eq!((grid.width(), grid.height()), (3, 2));
+///
+/// // Over values that are there already, if there are as many as the size asks for.
+/// assert_eq!(Grid::from_vec(grid.size(), vec![1, 2, 3, 0, 0, 9]), Some(grid));
+/// assert_eq!(Grid::from_vec([3, 2].into(), vec![0; 5]), None);
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
@@ -69,6 +76,14 @@ impl<T: Copy> Grid<T> {
     }
 
     /// Like [`new`](Self::new), which ends the program where there is no memory.
+    ///
+    /// ```
+    /// use bevy_crack::{Grid, OutOfMemory};
+    ///
+    /// assert_eq!(Grid::try_new([3, 2].into(), 0u8), Ok(Grid::new([3, 2].into(), 0)));
+    /// let huge = Grid::try_new([u32::MAX, u32::MAX].into(), 0u8);
+    /// assert_eq!(huge, Err(OutOfMemory { bytes: 18_446_744_065_119_617_025 }));
+    /// ```
     ///
     /// # Errors
     /// [`OutOfMemory`] if there is no memory for all values.

@@ -27,7 +27,7 @@ use crate::{
 #[cfg_attr(feature = "bevy", derive(bevy::asset::Asset, bevy::reflect::Reflect))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct CrackPreset {
-    /// How cracks grow.
+    /// How cracks grow. Default, as of the other fields: that of [`CONCRETE`](Self::CONCRETE).
     pub growth: GrowthParams,
     /// The cross-section of cracks.
     pub profile: Profile,

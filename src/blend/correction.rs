@@ -30,6 +30,8 @@ const FAINT: f32 = 1.0;
 /// The result depends on the arguments only, whatever was drawn before. `normals` is RGBA8 with +Y up, row-major, of
 /// `size` texels; normals that point into the surface count as flat. The field's top left is at `origin` in it.
 ///
+/// See [`SlopeCorrection`] for an example.
+///
 /// # Errors
 /// [`BlendError::Length`] if `normals` does not have four bytes for each texel; [`BlendError::Outside`] if the field
 /// does not lie in it.

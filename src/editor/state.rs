@@ -4,6 +4,19 @@ use super::{history::History, overlay::Flash, panel::Panel};
 use bevy::{prelude::*, tasks::Task};
 
 /// The state of the workbench. A game may choose a surface, open the panel or set an energy.
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_crack::{editor::{CrackEditor, Overlays}, prelude::*};
+///
+/// /// Opens the panel for a wall, with its network drawn over it.
+/// fn inspect(mut editor: ResMut<CrackEditor>, wall: Single<Entity, With<CrackSurface>>) {
+///     editor.is_open = true;
+///     editor.chosen = Some(*wall);
+///     editor.panel.overlays = Overlays { network: true, ..default() };
+/// }
+/// # bevy::ecs::system::assert_is_system(inspect);
+/// ```
 #[derive(Resource, Default)]
 pub struct CrackEditor {
     /// Whether the panel is shown.

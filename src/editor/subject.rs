@@ -101,6 +101,13 @@ pub enum EditorCommand {
 }
 
 /// What can be written to files.
+///
+/// ```
+/// use bevy_crack::editor::Export;
+///
+/// let labels = Export::ALL.map(Export::label);
+/// assert_eq!(labels[0], "Maps as PNG");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Export {
     /// Every texture as a PNG file.

@@ -18,6 +18,13 @@ impl GrowthParams {
     /// venation a marker attracts at most six nodes at once, for at most twice as many steps. With arrest a marker
     /// counts for each time that it can be given up, and every node can be a tip that runs on. With nucleation every
     /// marker can be a start. Each node can fork. Strands have a largest number of points.
+    ///
+    /// ```
+    /// use bevy_crack::growth::GrowthParams;
+    ///
+    /// // Steps of 0.02 towards markers that attract over 0.2: 2 + 100 / 0.25 nodes for each, at most.
+    /// assert_eq!(GrowthParams::DEFAULT.most_nodes(10, 1), 1 + 10 * 402);
+    /// ```
     #[must_use]
     pub fn most_nodes(&self, markers: u64, starts: u64) -> u64 {
         let approaches = ((self.crack_radius / self.step_length).powi(2) / PROGRESS).ceil() as u64;

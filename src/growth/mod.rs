@@ -10,7 +10,7 @@
 //! shorter side is 1.
 //!
 //! ```
-//! use bevy_crack::growth::{CrackGrowth, GrowthParams, MarkerLayout};
+//! use bevy_crack::growth::{CrackGrowth, GrowthParams, MarkerLayout, Venation};
 //!
 //! // A marker in each square of a row of six, and a hit in the first: the crack runs to the right.
 //! let params = GrowthParams {
@@ -21,6 +21,7 @@
 //!     crack_radius: 1.5,
 //!     step_length: 0.5,
 //!     wander: 0.0,
+//!     venation: Venation::Open,
 //!     ..GrowthParams::DEFAULT
 //! };
 //! let mut growth = CrackGrowth::new(params, [6.0, 1.0].into(), 1)?;

@@ -132,103 +132,103 @@ pub enum StartLayout {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct GrowthParams {
     /// Distance at which a marker counts as reached and is removed. Pattern units, 0.0005..=4, at most
-    /// [`crack_radius`](Self::crack_radius).
+    /// [`crack_radius`](Self::crack_radius); default 0.03.
     pub kill_distance: f32,
-    /// Length of a segment: the distance `D` from a node to the node that grows from it. Pattern units, 0.001..=4.
+    /// Length of a segment: the distance `D` from a node to the node that grows from it. Pattern units, 0.001..=4; default 0.02.
     pub step_length: f32,
     /// Largest distance at which a marker attracts a node. Pattern units, 0.001..=32, at most 256 times
-    /// [`step_length`](Self::step_length).
+    /// [`step_length`](Self::step_length); default 0.2.
     pub crack_radius: f32,
-    /// Largest number of growth steps after each hit, 1..=100000.
+    /// Largest number of growth steps after each hit, 1..=100000; default 200.
     pub num_iterations: u32,
-    /// Rows of the marker grid on a square surface, 1..=512. A taller surface has proportionally more, up to 4096.
+    /// Rows of the marker grid on a square surface, 1..=512; default 20. A taller surface has proportionally more, up to 4096.
     pub num_lines_grid: u32,
-    /// Columns of the marker grid on a square surface, 1..=512. A wider surface has proportionally more, up to 4096.
+    /// Columns of the marker grid on a square surface, 1..=512; default 20. A wider surface has proportionally more, up to 4096.
     pub num_columns_grid: u32,
-    /// How markers are laid out.
+    /// How markers are laid out. Default: a [`PseudoGrid`](MarkerLayout::PseudoGrid) of occupancy 0.7 and jitter 0.8.
     pub markers: MarkerLayout,
-    /// How cracks compete for markers, and whether they close loops.
+    /// How cracks compete for markers, and whether they close loops. Default: [`Open`](Venation::Open).
     pub venation: Venation,
     /// How much denser markers and forks are near the hit: 0 = the same everywhere, 4 = nearly all in the inner half.
-    /// 0..=4.
+    /// 0..=4; default 0.
     pub focus: f32,
     /// Radius around a hit of energy 1 that is filled with markers. It is proportional to the root of the energy.
-    /// Pattern units, 0.01..=64.
+    /// Pattern units, 0.01..=64; default 0.6.
     pub reach: f32,
     /// How much the reach varies with direction: it is shorter by up to this share of it, for all layouts but rays.
-    /// With [`Venation::Subdivision`] the reach is uneven even at 0. 0..=0.9.
+    /// With [`Venation::Subdivision`] the reach is uneven even at 0. 0..=0.9; default 0.
     pub reach_variation: f32,
-    /// The nodes from which the cracks of a hit start.
+    /// The nodes from which the cracks of a hit start. Default: [`Point`](StartLayout::Point).
     pub starts: StartLayout,
-    /// Width of a crack at its tip. Pattern units, 0.0005..=0.2.
+    /// Width of a crack at its tip. Pattern units, 0.0005..=0.2; default 0.004.
     pub line_width: f32,
     /// How fast cracks widen with the number of nodes that have grown from them; 0 = not at all. A node with `n`
     /// nodes behind it, itself included, is `1 + line_growth (n^(1/murray) - 1)` times as wide as
-    /// [`line_width`](Self::line_width). 0..=16.
+    /// [`line_width`](Self::line_width). 0..=16; default 0.4.
     pub line_growth: f32,
     /// Exponent of the pipe model: at a `line_growth` of 1 a node with `n` nodes behind it is `n^(1/murray)` times as
-    /// wide as a tip. 1..=8.
+    /// wide as a tip. 1..=8; default 3.
     pub murray: f32,
     /// Largest width that [`line_growth`](Self::line_growth) gives a crack at energy 1; at least `line_width`. Pattern
-    /// units, 0.0005..=0.4. All widths are proportional to the fourth root of the energy: 16 makes them twice as wide.
+    /// units, 0.0005..=0.4; default 0.03. All widths are proportional to the fourth root of the energy: 16 makes them twice as wide.
     pub max_width: f32,
     /// Number of segments over which a free end narrows to a point. An end that meets another crack does not narrow.
-    /// 0 = ends are as wide as `line_width`. 0..=64.
+    /// 0 = ends are as wide as `line_width`. 0..=64; default 4.
     pub tip_taper: f32,
-    /// How much the width varies along a crack: it is reduced by up to this share. 0..=0.9.
+    /// How much the width varies along a crack: it is reduced by up to this share. 0..=0.9; default 0.
     pub unevenness: f32,
     /// How strongly a crack keeps its direction against the pull of the markers: 0 = not at all, 1 = as strongly as
     /// it follows them. In areas that a [mask](crate::pattern::CrackMask) marks as weak the value is lower, down to
-    /// 0: there the crack follows the joint. 0..=8.
+    /// 0: there the crack follows the joint. 0..=8; default 0.
     pub inertia: f32,
     /// Preferred direction of cracks, radians from the x axis (y points down): perpendicular to the tension in the
-    /// surface. -7..=7.
+    /// surface. -7..=7; default 0.
     pub axis: f32,
-    /// How strongly cracks follow [`axis`](Self::axis): 0 = not at all, 1 = nearly straight along it. 0..=1.
+    /// How strongly cracks follow [`axis`](Self::axis): 0 = not at all, 1 = nearly straight along it. 0..=1; default 0.
     pub directed: f32,
-    /// Random deviation of the direction of growth, radians, 0..=1.
+    /// Random deviation of the direction of growth, radians, 0..=1; default 0.1.
     pub wander: f32,
     /// Size of the grains that cracks go around: within a grain a crack runs straight, and at the border of a grain
     /// it kinks by up to twice [`wander`](Self::wander). Pattern units, 0..=1; 0 = no grains, cracks deviate at every
-    /// node.
+    /// node; default 0.
     pub grain: f32,
     /// How regularly cracks deviate left and right in turn instead of at random (drawn cracks): 0 = not at all, 1 =
-    /// at every node. The overall direction of the crack stays the same. 0..=1.
+    /// at every node. The overall direction of the crack stays the same. 0..=1; default 0.
     pub zigzag: f32,
-    /// Share of nodes at which a tip forks, 0..=1: a side branch starts ahead if there are markers in its direction.
+    /// Share of nodes at which a tip forks, 0..=1; default 0. A side branch starts ahead if there are markers in its direction.
     /// [`focus`](Self::focus) makes forks rarer away from the hit, as it does markers. Only with
     /// [`arrest`](Self::arrest). With [rays](MarkerLayout::Rays) the share is proportional to the energy to the power
     /// of 0.6, forks fork again half as often, and the angle is at least 0.42.
     pub forks: f32,
-    /// Angle between the two branches of a fork, radians, 0.2..=1.6. Each fork deviates from it by up to a quarter.
+    /// Angle between the two branches of a fork, radians, 0.2..=1.6; default 0.7. Each fork deviates from it by up to a quarter.
     pub fork_angle: f32,
-    /// Roughness of the line between two nodes, as a share of its length, 0..=0.5.
+    /// Roughness of the line between two nodes, as a share of its length, 0..=0.5; default 0.12.
     pub roughness: f32,
-    /// Whether nodes whose parents have the same generation are joined (the rings of glass).
+    /// Whether nodes whose parents have the same generation are joined (the rings of glass); default false.
     pub draw_connections: bool,
-    /// Share of the possible connections that are left out, 0..=1.
+    /// Share of the possible connections that are left out, 0..=1; default 0.3.
     pub connection_gaps: f32,
     /// Number of generations to the first ring of connections. The following rings are 2, 3, 4 ... times as far
-    /// apart. 1..=1000.
+    /// apart. 1..=1000; default 1.
     pub connection_every: u32,
-    /// Whether nodes of different branches are joined where they are close (the cells of clay).
+    /// Whether nodes of different branches are joined where they are close (the cells of clay); default false.
     pub draw_islands: bool,
-    /// Largest distance at which [`draw_islands`](Self::draw_islands) joins two nodes. Pattern units, 0..=1.
+    /// Largest distance at which [`draw_islands`](Self::draw_islands) joins two nodes. Pattern units, 0..=1; default 0.03.
     pub island_distance: f32,
-    /// Distance at which a tip reacts to an older crack or the border ahead of it, pattern units, 0..=1. The tip
+    /// Distance at which a tip reacts to an older crack or the border ahead of it, pattern units, 0..=1; default 0. The tip
     /// turns to meet it at a steep angle and stops there. The distance used is at least 2.5 segment lengths, which
     /// the turn needs. No two cracks cross then. 0 = off: cracks ignore each other, as in the papers.
     pub arrest: f32,
-    /// Share of tips that stop before they reach the crack that they would have met, 0..=1.
+    /// Share of tips that stop before they reach the crack that they would have met, 0..=1; default 0.
     pub open_ends: f32,
-    /// Number of new cracks for each step of growth that start where markers are out of reach of all cracks, 0..=64.
+    /// Number of new cracks for each step of growth that start where markers are out of reach of all cracks, 0..=64; default 0.
     /// They start late, so they end at the older cracks.
     pub nucleation: f32,
     /// With [`Venation::Subdivision`]: number of generations of cracks. The domains of each generation are 1.6 times
-    /// smaller, and its cracks half as wide, as those of the generation before. 1..=4.
+    /// smaller, and its cracks half as wide, as those of the generation before. 1..=4; default 1.
     pub generations: u32,
     /// With [`Venation::Subdivision`]: share of the cracks that start with three arms, 120 degrees apart, instead of
-    /// two. This happens where a domain is about as wide as long; more cells have five and six sides then. 0..=1.
+    /// two. This happens where a domain is about as wide as long; more cells have five and six sides then. 0..=1; default 0.
     pub three_arm_share: f32,
     /// With [`Venation::Subdivision`]: how strongly a crack keeps the direction in which it started, with kinks instead
     /// of bends, straight across the widest place of its domain. Plates become polygons, and no two cracks meet a
@@ -241,25 +241,25 @@ pub struct GrowthParams {
     /// than the widest ones by up to this share. 0..=0.9; default 0.
     pub width_variation: f32,
     /// With [`Venation::Subdivision`]: speed of the front that runs outward from the hit; cracks start behind it.
-    /// Pattern units for each step since the hit; 0 = cracks start anywhere at once. 0..=1.
+    /// Pattern units for each step since the hit; 0 = cracks start anywhere at once. 0..=1; default 0.
     pub front: f32,
     /// With [`Venation::Subdivision`]: how much larger domains are in random patches of a few domains each: the size is
-    /// multiplied by up to 1 plus this value. 0..=4.
+    /// multiplied by up to 1 plus this value. 0..=4; default 0.
     pub patchiness: f32,
     /// How much surfaces differ from each other by their seed: widths, roughness, the spacing of markers, the number
     /// of starts and of free ends, the axis. 0 = not at all; at 1 each value differs by a factor of up to 2 either
-    /// way, mostly much less. 0..=1.
+    /// way, mostly much less. 0..=1; default 0.
     pub variety: f32,
     /// Height of the courses of bricks. Cracks run in the joints between them. It is used where the
     /// [mask](crate::pattern::CrackMask) shows no lines; where the mask shows courses, those are used. No crack is
-    /// wider than a joint then. Pattern units, 0..=1; 0 = the surface is not masonry.
+    /// wider than a joint then. Pattern units, 0..=1; 0 = the surface is not masonry; default 0.
     pub courses: f32,
     /// How far lines are displaced by smooth noise, together with everything that follows them: uneven joints.
-    /// Pattern units, 0..=0.05; 0 = not at all.
+    /// Pattern units, 0..=0.05; 0 = not at all; default 0.
     pub distortion: f32,
-    /// Whether the markers themselves are drawn, as dots.
+    /// Whether the markers themselves are drawn, as dots; default false.
     pub draw_markers: bool,
-    /// Largest number of nodes that a surface has at once, 1..=1000000. In the plugin a hit that finds less than a
+    /// Largest number of nodes that a surface has at once, 1..=1000000; default 20000. In the plugin a hit that finds less than a
     /// quarter of them left freezes the oldest cracks: see
     /// [`CrackGrowth::remove_oldest`](super::CrackGrowth::remove_oldest).
     pub max_nodes: u32,

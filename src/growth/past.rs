@@ -10,7 +10,7 @@ use glam::Vec2;
 /// [added cracks](CrackGrowth::add_cracks) are not in it either; those of the new growth count.
 ///
 /// ```
-/// use bevy_crack::{CrackPreset, growth::CrackGrowth};
+/// use bevy_crack::{CrackPreset, growth::{CrackGrowth, Past, PastError, PastEvent}};
 /// use glam::Vec2;
 ///
 /// let grow = || CrackGrowth::new(CrackPreset::GLASS.growth, Vec2::ONE, 7);
@@ -28,6 +28,14 @@ use glam::Vec2;
 /// let mut again = grow()?;
 /// again.replay(&past);
 /// assert_eq!(again.network().nodes(), growth.network().nodes());
+///
+/// // Two hits, the second after twenty steps. If the same happens twice, there are four.
+/// assert_eq!(past.events.iter().map(PastEvent::after).collect::<Vec<u32>>(), [0, 20]);
+/// let both = past.followed_by(&past);
+/// assert_eq!((both.events.len(), both.steps, both.is_empty()), (4, 2 * past.steps, false));
+/// // One that was read from a file should be checked.
+/// let cut = Past { steps: 10, ..past };
+/// assert_eq!(cut.validate(), Err(PastError::Order(1)));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -214,6 +222,23 @@ impl CrackGrowth {
 
     /// Like [`replay`](Self::replay), but leaves it to `remove` to call [`remove_oldest`](Self::remove_oldest) with the number of
     /// nodes to keep: what goes can be drawn before.
+    ///
+    /// ```
+    /// use bevy_crack::growth::{CrackGrowth, GrowthParams};
+    ///
+    /// let begin = || CrackGrowth::new(GrowthParams::DEFAULT, [1.0, 1.0].into(), 7);
+    /// let mut growth = begin()?;
+    /// growth.hit([0.3, 0.4].into(), 1.0);
+    /// while growth.step().grew() {}
+    /// growth.remove_oldest(20);
+    /// let mut again = begin()?;
+    /// again.replay_with(&growth.past().expect("few hits"), |growth, keep| {
+    ///     assert!(growth.network().nodes().len() > 20, "a game draws these now");
+    ///     growth.remove_oldest(keep);
+    /// });
+    /// assert_eq!(again.network(), growth.network());
+    /// # Ok::<(), bevy_crack::growth::ParamError>(())
+    /// ```
     pub fn replay_with(&mut self, past: &Past, mut remove: impl FnMut(&mut Self, u32)) {
         let (stretch, before) = (past.stretch(self.network.extent()), self.steps_made());
         for event in &past.events {

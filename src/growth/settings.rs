@@ -31,6 +31,30 @@ impl CrackGrowth {
 
     /// Replaces the parameters for later hits and steps. Existing cracks stay, and so do `roughness` and `sway`.
     ///
+    /// ```
+    /// use bevy_crack::{
+    ///     Grid,
+    ///     growth::{CrackGrowth, GrowthParams, HitOutcome, Rejected},
+    ///     pattern::CrackMask,
+    /// };
+    ///
+    /// let mut growth = CrackGrowth::new(GrowthParams::default(), [1.0, 1.0].into(), 7)?;
+    /// // No markers in the right half: no cracks grow there.
+    /// growth.set_density(Grid::from_vec([2, 1].into(), vec![1.0, 0.0]));
+    /// growth.hit([0.25, 0.5].into(), 1.0);
+    /// while growth.step().grew() {}
+    /// assert!(growth.network().nodes().iter().all(|node| node.pos.x < 0.55));
+    ///
+    /// // From now on cracks may be there, but not in the lower half, and they are wider.
+    /// growth.set_density(None);
+    /// growth.set_mask(CrackMask { forbidden: Some(CrackMask::layer([1, 2].into(), &[0, 255])?), ..CrackMask::default() });
+    /// growth.set_params(GrowthParams { line_width: 0.01, ..GrowthParams::default() })?;
+    /// assert_eq!(growth.params().line_width, 0.01);
+    /// assert_eq!(growth.hit([0.75, 0.75].into(), 1.0), HitOutcome::Rejected(Rejected::Forbidden));
+    /// assert_eq!(growth.hit([0.75, 0.25].into(), 1.0), HitOutcome::Started(1));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// [`ParamError::OutOfRange`] if a parameter is out of its range; nothing changes then.
     pub fn set_params(&mut self, params: GrowthParams) -> Result<(), ParamError> {

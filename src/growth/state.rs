@@ -49,6 +49,38 @@ pub struct MarkerCounts {
 /// assert_eq!(growth.marker_counts().attracting, 0);
 /// # Ok::<(), bevy_crack::growth::ParamError>(())
 /// ```
+///
+/// What each call does, and what it says:
+///
+/// ```
+/// use bevy_crack::growth::{CrackGrowth, GrowthParams, HitOutcome, Impact, MarkerCounts, Rejected, StepReport};
+///
+/// let mut growth = CrackGrowth::new(GrowthParams::default(), [1.0, 1.0].into(), 7)?;
+/// assert_eq!(growth.hit([1.5, 0.5].into(), 1.0), HitOutcome::Rejected(Rejected::OffSurface));
+/// assert_eq!(growth.hit([0.5, 0.5].into(), 0.0), HitOutcome::Nothing);
+/// assert_eq!(growth.hit([0.5, 0.5].into(), 1.0), HitOutcome::Started(0));
+/// // A second hit on the same spot adds its energy.
+/// assert_eq!(growth.hit([0.5, 0.5].into(), 3.0), HitOutcome::Merged(0));
+/// let impact: Impact = growth.impacts()[0];
+/// assert_eq!((impact.energy, impact.first_energy), (4.0, 1.0));
+///
+/// // Each step adds nodes, and their segments are to be drawn.
+/// assert!(growth.is_growing() && !growth.is_laying_out());
+/// let StepReport { born } = growth.step();
+/// assert_eq!(growth.new_nodes(), 1..1 + born);
+/// let mut changed = Vec::new();
+/// growth.take_changed(&mut changed);
+/// assert_eq!(changed.len(), born as usize);
+/// while growth.step().grew() {}
+/// assert!(!growth.is_growing());
+/// // The last call found nothing to grow.
+/// assert!(growth.steps_made() >= growth.steps());
+///
+/// let MarkerCounts { total, killed, attracting, waiting } = growth.marker_counts();
+/// assert_eq!(killed + attracting + waiting, total);
+/// assert_eq!(growth.living_markers().count() as u32, attracting + waiting);
+/// # Ok::<(), bevy_crack::growth::ParamError>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct CrackGrowth {
     pub(super) params: GrowthParams,
@@ -230,6 +262,18 @@ impl CrackGrowth {
     }
 
     /// Appends the positions of markers created since the last call, if `draw_markers` is set.
+    ///
+    /// ```
+    /// use bevy_crack::growth::{CrackGrowth, GrowthParams};
+    ///
+    /// let params = GrowthParams { draw_markers: true, ..GrowthParams::DEFAULT };
+    /// let mut growth = CrackGrowth::new(params, [1.0, 1.0].into(), 7)?;
+    /// growth.hit([0.5, 0.5].into(), 1.0);
+    /// let mut markers = Vec::new();
+    /// growth.take_markers(&mut markers);
+    /// assert_eq!(markers.len() as u32, growth.marker_counts().total);
+    /// # Ok::<(), bevy_crack::growth::ParamError>(())
+    /// ```
     pub fn take_markers(&mut self, markers: &mut Vec<Vec2>) {
         markers.append(&mut self.shown_markers);
     }

@@ -7,6 +7,9 @@
 //!
 //! assert_eq!(ops::unit(0.0), [1.0, 0.0].into());
 //! assert_eq!(ops::atan2(0.0, 1.0), 0.0);
+//! assert_eq!((ops::sin(0.0), ops::cos(0.0), ops::exp(0.0), ops::powf(2.0, 3.0)), (0.0, 1.0, 1.0, 8.0));
+//! // The same bits on every machine.
+//! assert_eq!(ops::sin(1.0).to_bits(), 0x3F57_6AA4);
 //! ```
 
 use glam::Vec2;

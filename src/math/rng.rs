@@ -16,6 +16,11 @@ use rand_pcg::Pcg32;
 /// let mut again = Rng::new(7).stream("markers");
 /// assert_eq!(markers.next_u32(), again.next_u32());
 /// assert!((0.0..1.0).contains(&markers.unit()));
+/// assert!((-1.0..1.0).contains(&markers.signed()));
+/// assert!((2.0..5.0).contains(&markers.range(2.0, 5.0)));
+/// // One for each element: what others draw does not change it.
+/// assert_eq!(markers.substream(3), again.substream(3));
+/// assert_ne!(markers.substream(3), markers.substream(4));
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Rng {

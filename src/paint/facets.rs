@@ -21,7 +21,7 @@ pub struct Facets {
     /// Colour of reflections, sRGB 0..=1; default the colour of a bright sky.
     pub reflection_color: [f32; 3],
     /// How much tone, tilt, shift and reflections fall off with the distance from the hit: 0 = the same everywhere, 1
-    /// = next to nothing far away. Default 0.
+    /// = next to nothing far away. 0..=1; default 0.
     pub falloff: f32,
     /// How much plates are dished, with rims that curl up: they are darker by up to this share on the side towards
     /// the light, and brighter on the other. 0..=1; default 0.

@@ -12,6 +12,26 @@ use glam::UVec2;
 ///
 /// `rects` and `origin` are those of [`paint_rects`](super::paint_rects). Slices that are shorter than `size`
 /// requires are left unchanged.
+///
+/// ```
+/// use bevy_crack::{
+///     paint::{Look, LookTable, paint_glow},
+///     pattern::SurfaceFrame,
+///     raster::{DepthField, TexelRect},
+/// };
+/// use glam::UVec2;
+///
+/// // Four texels, of which the third is cracked.
+/// let size = UVec2::new(4, 1);
+/// let mut field = DepthField::new(SurfaceFrame::new(size)?);
+/// field.depth.row_mut(0)[2] = u16::MAX;
+/// let look = LookTable::new(&Look::GLOWING, field.frame.texels_per_unit())?;
+/// let mut light = [0; 16];
+/// paint_glow(None, size, &field, &look, &[TexelRect::whole(size)], UVec2::ZERO, &mut light);
+/// assert_eq!(light[..8], [0, 0, 0, 255, 0, 0, 0, 255]);
+/// assert_eq!(light[8], 255);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn paint_glow(
     base: Option<&[u8]>,
     size: UVec2,

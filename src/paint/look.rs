@@ -28,25 +28,40 @@ pub struct ColorStop {
 /// How cracks change the picture.
 ///
 /// ```
-/// use bevy_crack::paint::Look;
+/// use bevy_crack::paint::{Cel, ColorStop, Facets, Look, LookError};
 ///
 /// let shiny = Look { glint: 2.0, ..Look::GROOVE };
 /// assert_eq!(shiny.validate(), Ok(()));
+/// let error = Look { glint: 9.0, ..Look::GROOVE }.validate();
+/// assert_eq!(error, Err(LookError::OutOfRange { field: "glint", value: 9.0, range: "0..=4" }));
 /// assert_eq!(Look::named("groove"), Some(Look::GROOVE));
+///
+/// // Blue where cracks are shallow, black where they are deep; the plates between them are tilted.
+/// let stop = |depth, color, cover| ColorStop { depth, color, cover };
+/// let ice = Look {
+///     ramp: vec![stop(0.1, [0.4, 0.6, 0.9], 0.5), stop(1.0, [0.0, 0.0, 0.1], 1.0)].into(),
+///     facets: Some(Facets { tilt: 0.3, ..Facets::DEFAULT }),
+///     ..Look::GROOVE
+/// };
+/// assert_eq!(ice.validate(), Ok(()));
+/// // Drawn with a thick line of ink.
+/// let drawn = Look { cel: Some(Cel { outline: 0.006, ..Cel::DEFAULT }), ..Look::TOON };
+/// assert_eq!(drawn.validate(), Ok(()));
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct Look {
     /// Colour of a crack by its depth: at most 16 stops, sorted by depth, linear between them, nothing at depth 0.
+    /// Default: the four stops of [`GROOVE`](Self::GROOVE).
     ///
     /// Below the first stop its cover falls to zero. Beyond the last stop colour and cover stay the same.
     pub ramp: Cow<'static, [ColorStop]>,
     /// How far the colours of the ramp are multiplied by the picture: 0 = the colours are used as they are, 1 = each
-    /// is multiplied by the picture's colour. Default 1: a crack in brown clay is brown.
+    /// is multiplied by the picture's colour: a crack in brown clay is brown. 0..=1; default 1.
     pub tint: f32,
     /// How much walls that face the light (from the upper left) brighten and walls that face away darken, by their
-    /// slope. 0..=4.
+    /// slope. 0..=4; default 0.9.
     pub glint: f32,
     /// How much of the light on walls is an added highlight instead of a share of the colour below it (glass). 0..=4;
     /// default 0.
@@ -59,12 +74,12 @@ pub struct Look {
     /// How much fainter cracks are that do not catch the light, depending on their direction and slowly varying along
     /// each crack (glass): up to this share of their depth is removed. 0..=1; default 0.
     pub directionality: f32,
-    /// How much the cover varies from texel to texel (frosted glass): up to this share of it is removed. 0..=1.
+    /// How much the cover varies from texel to texel (frosted glass): up to this share of it is removed. 0..=1; default 0.12.
     pub grain: f32,
     /// Displacement of the picture where the crack tilts the surface (refraction), texels at the steepest slope.
-    /// 0..=16.
+    /// 0..=16; default 0.
     pub shift: f32,
-    /// Height of the walls: depth 1 is this many pattern units deep. 0..=1.
+    /// Height of the walls: depth 1 is this many pattern units deep. 0..=1; default 0.012.
     ///
     /// It sets the slopes of the normal map, and the slopes that [`glint`](Self::glint) and [`shift`](Self::shift)
     /// use.
@@ -96,7 +111,7 @@ pub struct Look {
     /// In how many shades cracks show, for pixel art: `Auto`, `Smooth` or `Steps`; default [`Auto`](Shades::Auto).
     pub shades: Shades,
     /// Whether the cover of cracks makes a translucent picture opaque (glass panes). Fully transparent texels stay
-    /// transparent.
+    /// transparent. Default false.
     pub opaque: bool,
 }
 

@@ -63,7 +63,7 @@ pub struct Cell {
 /// the border, or crosses from one cell into another, closes nothing and is ignored.
 ///
 /// ```
-/// use bevy_crack::{CrackPreset, growth::CrackGrowth, pattern::CellTracker};
+/// use bevy_crack::{CrackPreset, growth::CrackGrowth, pattern::{CORNERS, Cell, CellTracker}};
 ///
 /// let mut growth = CrackGrowth::new(CrackPreset::CLAY.growth, [1.0, 1.0].into(), 1)?;
 /// growth.hit([0.5, 0.5].into(), 1.0);
@@ -75,6 +75,15 @@ pub struct Cell {
 ///     }
 /// }
 /// assert!(tracker.closed() > 4);
+///
+/// // Cells tile the surface. The first one is what no crack has cut off: it begins at the corners.
+/// let cells: &[Cell] = tracker.cells();
+/// assert!((cells.iter().map(|cell| cell.area).sum::<f32>() - 1.0).abs() < 1e-4);
+/// assert_eq!(tracker.cell_at([0.0, 0.0].into()), Some(0));
+/// assert!(tracker.outline(0).contains(&CORNERS));
+/// assert_eq!(tracker.pos(CORNERS + 2), Some([1.0, 1.0].into()));
+/// // The cracks around the hit do not touch its outline: they are a hole in it.
+/// assert_eq!(tracker.holes(0).count(), 1);
 /// # Ok::<(), bevy_crack::growth::ParamError>(())
 /// ```
 #[derive(Clone, Debug)]

@@ -16,7 +16,14 @@ pub const MAX_ASPECT: f32 = 64.0;
 /// let frame = SurfaceFrame::new([512, 256].into())?;
 /// assert_eq!(frame.extent(), [2.0, 1.0].into());
 /// assert_eq!(frame.to_texel([1.0, 0.5].into()), [256.0, 128.0].into());
+/// assert_eq!(frame.to_pos([256.0, 128.0].into()), [1.0, 0.5].into());
 /// assert_eq!(frame.uv_to_pos([0.5, 0.5].into()), [1.0, 0.5].into());
+/// assert_eq!(frame.pos_to_uv([1.0, 0.5].into()), [0.5, 0.5].into());
+///
+/// // A poster of the same texels on a wall where 1024 of them are a unit: cracks are as large as on the wall.
+/// let poster = SurfaceFrame::with_unit(frame.size(), 1024.0)?;
+/// assert_eq!((frame.texels_per_unit(), poster.texels_per_unit()), (256.0, 1024.0));
+/// assert_eq!(poster.extent(), [0.5, 0.25].into());
 /// # Ok::<(), bevy_crack::pattern::FrameError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]

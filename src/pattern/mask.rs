@@ -7,7 +7,7 @@ use glam::{UVec2, Vec2};
 /// Where cracks prefer to run, avoid to run, and never run; each as values of 0..=1 over the whole surface.
 ///
 /// The layers may have any size, each its own: they are sampled by texture coordinates (0..1, v down). A missing
-/// layer counts as 0 everywhere; NaN counts as 0 too.
+/// layer counts as 0 everywhere; NaN counts as 0 too. By default there is no layer.
 ///
 /// ```
 /// use bevy_crack::pattern::CrackMask;
@@ -23,6 +23,9 @@ use glam::{UVec2, Vec2};
 /// assert!(!mask.is_forbidden([0.5, 0.49].into()));
 /// assert!(mask.is_forbidden([0.5, 0.51].into()));
 /// assert!(mask.blocks([0.2, 0.1].into(), [0.3, 0.9].into()));
+/// // Layers that are not there: nothing is strong, and markers are everywhere.
+/// assert_eq!((mask.strong_at([0.5, 0.5].into()), mask.density_at([0.5, 0.5].into())), (0.0, 1.0));
+/// assert!(!mask.is_empty() && CrackMask::default().is_empty());
 /// # Ok::<(), bevy_crack::pattern::MaskError>(())
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -71,6 +74,27 @@ impl CrackMask {
 
     /// A mask from a picture's RGBA texels: [`weak_from_picture`](Self::weak_from_picture) and
     /// [`forbidden_from_alpha`](Self::forbidden_from_alpha).
+    ///
+    /// ```
+    /// use bevy_crack::pattern::CrackMask;
+    ///
+    /// // Dark tiles with light joints; the right half is transparent.
+    /// let size = 256u32;
+    /// let texel = |x: u32, y: u32| match (x % 64 < 4 || y % 64 < 4, x < 128) {
+    ///     (true, true) => [220, 220, 220, 255],
+    ///     (false, true) => [60, 60, 60, 255],
+    ///     (_, false) => [0; 4],
+    /// };
+    /// let rgba: Vec<u8> = (0..size * size).flat_map(|i| texel(i % size, i / size)).collect();
+    /// let mask = CrackMask::from_picture([size, size].into(), &rgba)?;
+    /// let at = |x: f32, y: f32| [x / 256.0, y / 256.0].into();
+    /// assert!(mask.weak_at(at(66.0, 32.0)) > mask.weak_at(at(96.0, 32.0)));
+    /// assert!(mask.is_forbidden(at(200.0, 32.0)) && !mask.is_forbidden(at(96.0, 32.0)));
+    /// // The same, layer by layer.
+    /// assert_eq!(mask.weak, CrackMask::weak_from_picture([size, size].into(), &rgba)?);
+    /// assert_eq!(mask.forbidden, CrackMask::forbidden_from_alpha([size, size].into(), &rgba)?);
+    /// # Ok::<(), bevy_crack::pattern::MaskError>(())
+    /// ```
     ///
     /// # Errors
     /// [`MaskError`] if there are not four bytes per texel, or a side is 0 or above [`MAX_SIDE`](super::MAX_SIDE).

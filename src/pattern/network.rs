@@ -42,6 +42,21 @@ pub enum LinkKind {
 }
 
 /// A segment between two nodes of which neither is the parent of the other.
+///
+/// ```
+/// use bevy_crack::{CrackPreset, growth::CrackGrowth, pattern::{Link, LinkKind, SegmentId}};
+///
+/// let mut growth = CrackGrowth::new(CrackPreset::GLASS.growth, [1.0, 1.0].into(), 7)?;
+/// growth.hit([0.5, 0.5].into(), 1.0);
+/// while growth.step().grew() {}
+/// // The rings of glass join its rays.
+/// let network = growth.network();
+/// let is_ring = |link: &Link| link.kind == LinkKind::Connection;
+/// assert!(network.links().iter().any(is_ring));
+/// let Link { a, b, .. } = network.links()[0];
+/// assert_eq!(network.ends(SegmentId::Link(0)), Some((a, b)));
+/// # Ok::<(), bevy_crack::growth::ParamError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Link {
     /// Index of one end.
@@ -73,16 +88,23 @@ pub enum SegmentId {
 /// above zero.
 ///
 /// ```
-/// use bevy_crack::growth::{CrackGrowth, GrowthParams};
+/// use bevy_crack::{growth::{CrackGrowth, GrowthParams}, pattern::{NO_PARENT, Network, Node, SegmentId}};
 ///
 /// let mut growth = CrackGrowth::new(GrowthParams::DEFAULT, [1.0, 1.0].into(), 7)?;
 /// growth.hit([0.5, 0.5].into(), 1.0);
 /// while growth.step().grew() {}
-/// let network = growth.network();
+/// let network: &Network = growth.network();
 /// for segment in network.segments() {
 ///     let points = network.path(segment).expect("the segment exists").points().len();
 ///     assert!(points >= 2);
 /// }
+/// // Cracks start at the hit.
+/// let is_start = |node: &&Node| node.parent == NO_PARENT;
+/// assert!(network.nodes().iter().filter(is_start).all(|node| node.pos.distance([0.5, 0.5].into()) < 0.1));
+/// let node = network.nodes()[9];
+/// assert_eq!(network.ends(SegmentId::Branch(9)), Some((node.parent, 9)));
+/// // A new network is empty.
+/// assert_eq!(Network::new([2.0, 1.0].into(), 0.1, 7).segments().count(), 0);
 /// # Ok::<(), bevy_crack::growth::ParamError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]

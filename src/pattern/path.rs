@@ -17,6 +17,16 @@ pub struct PathPoint {
 
 /// The line of one segment of a network: 2 to [`MAX_PATH_POINTS`] points, of which the first and the last are its
 /// nodes.
+///
+/// ```
+/// use bevy_crack::pattern::{PathPoint, SegmentPath};
+///
+/// let point = |x, width| PathPoint { pos: [x, 0.5].into(), width };
+/// let path = SegmentPath::straight(point(0.2, 0.01), point(0.8, 0.0));
+/// assert_eq!(path.points(), [point(0.2, 0.01), point(0.8, 0.0)]);
+/// let lower = path.moved([0.0, 0.25].into());
+/// assert_eq!(lower.points()[0], PathPoint { pos: [0.2, 0.75].into(), width: 0.01 });
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SegmentPath {
     points: [PathPoint; MAX_PATH_POINTS],

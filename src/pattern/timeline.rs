@@ -12,6 +12,8 @@ use std::ops::Range;
 /// assert_eq!(Moment::after(3).steps(), 3.0);
 /// assert_eq!(Moment::nearest(2.251), Moment::nearest(2.25));
 /// assert_eq!(Moment::nearest(f64::NAN), Moment::START);
+/// // In the middle of the third step.
+/// assert_eq!((Moment::nearest(2.5).whole(), Moment::nearest(2.5).begun()), (2, 3));
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Moment(u32);
@@ -93,6 +95,10 @@ pub struct Dot {
 /// let width = |moment| timeline.path_at(network, segment, moment).map(|path| path.points()[0].width);
 /// assert!(width(young) < width(old));
 /// assert_eq!(timeline.path_at(network, segment, old), network.path(segment));
+/// assert_eq!(timeline.width_at(1, old), Some(network.nodes()[1].width));
+/// // The nodes of the second step follow those of the first.
+/// assert_eq!(timeline.born(0, 1).end, timeline.born(1, 2).start);
+/// assert_eq!(timeline.born(0, timeline.end()).len(), network.nodes().len());
 /// # Ok::<(), bevy_crack::growth::ParamError>(())
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -323,6 +329,21 @@ impl Timeline {
     }
 
     /// Disc number `index` at `moment`; `None` if it does not exist (yet).
+    ///
+    /// ```
+    /// use bevy_crack::{growth::{CrackGrowth, GrowthParams}, pattern::{Dot, Moment}};
+    ///
+    /// let params = GrowthParams { draw_markers: true, ..GrowthParams::DEFAULT };
+    /// let mut growth = CrackGrowth::new(params, [1.0, 1.0].into(), 7)?;
+    /// growth.hit([0.5, 0.5].into(), 1.0);
+    /// while growth.step().grew() {}
+    /// let timeline = growth.timeline();
+    /// let Dot { pos, radius } = timeline.dot_at(0, Moment::after(timeline.end())).expect("a marker");
+    /// assert!(pos.distance([0.5, 0.5].into()) < 1.0 && radius > 0.0);
+    /// // At first there is none.
+    /// assert_eq!(timeline.dot_at(0, Moment::START), None);
+    /// # Ok::<(), bevy_crack::growth::ParamError>(())
+    /// ```
     #[must_use]
     pub fn dot_at(&self, index: u32, moment: Moment) -> Option<Dot> {
         let &(step, dot) = self.dots.get(index as usize)?;

@@ -79,6 +79,15 @@ pub mod prelude {
 }
 
 /// Everything that the crate brings into an app: [`CrackPlugin`].
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_crack::prelude::*;
+///
+/// let mut app = App::new();
+/// app.add_plugins(CrackPlugins);
+/// assert!(app.is_plugin_added::<CrackPlugin>());
+/// ```
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CrackPlugins;
 

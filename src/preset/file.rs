@@ -137,6 +137,14 @@ impl CrackPreset {
 
     /// Writes the preset as a file with every field.
     ///
+    /// ```
+    /// use bevy_crack::CrackPreset;
+    ///
+    /// let text = CrackPreset::GLASS.to_ron()?;
+    /// assert_eq!(CrackPreset::from_ron(&text)?, CrackPreset::GLASS);
+    /// # Ok::<(), bevy_crack::preset::PresetError>(())
+    /// ```
+    ///
     /// # Errors
     /// If the preset does not [`validate`](Self::validate), and so could not be read again.
     pub fn to_ron(&self) -> Result<String, PresetError> {

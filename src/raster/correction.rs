@@ -8,15 +8,25 @@ use glam::UVec2;
 /// outside of it. They are made by [`solve_correction`](crate::blend::solve_correction).
 ///
 /// ```
-/// use bevy_crack::{Grid, blend::solve_correction, raster::TexelRect};
+/// use bevy_crack::{Grid, blend::solve_correction, pattern::SurfaceFrame, raster::{DepthField, SlopeCorrection}};
+/// use std::sync::Arc;
 ///
 /// // A slope with a crack across it.
 /// let normals = [170, 128, 240, 255].repeat(64 * 64);
 /// let mut depth = Grid::new([64, 64].into(), 0);
 /// depth.row_mut(32).fill(u16::MAX);
-/// let correction = solve_correction(&normals, [64, 64].into(), [0, 0].into(), &depth)?;
-/// assert!(correction.is_some_and(|correction| !correction.rect().is_empty()));
-/// # Ok::<(), bevy_crack::blend::BlendError>(())
+/// let correction = solve_correction(&normals, [64, 64].into(), [0, 0].into(), &depth)?.expect("there is a slope");
+/// let rect = correction.rect();
+/// assert!(!rect.is_empty());
+/// assert_eq!(correction.at(rect.max.x, rect.max.y), [0.0, 0.0]);
+/// // Its texels are to be painted again when a field gets it.
+/// let changes = SlopeCorrection::changes(None, Some(&correction), [64, 64].into());
+/// assert!(changes.iter().all(|change| !change.intersect(rect).is_empty()));
+/// let mut field = DepthField::new(SurfaceFrame::new([64, 64].into())?);
+/// field.depth = depth;
+/// field.correct(Some(Arc::new(correction)));
+/// assert_eq!(field.correction().map(|correction| correction.rect()), Some(rect));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct SlopeCorrection {

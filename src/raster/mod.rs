@@ -56,6 +56,38 @@ use glam::{UVec2, Vec2};
 use std::sync::Arc;
 
 /// How deep the crack is at each texel: 0 = untouched, 65535 = the deepest; row-major from the top left.
+///
+/// ```
+/// use bevy_crack::{
+///     OutOfMemory,
+///     pattern::{CrackMask, PathPoint, SegmentPath, SurfaceFrame},
+///     raster::{DepthField, Profile, TexelRect, stamp_dot, stamp_path_with},
+/// };
+///
+/// let frame = SurfaceFrame::new([8, 4].into())?;
+/// // An error where there is no memory.
+/// let mut field: DepthField = DepthField::try_new(frame).map_err(|OutOfMemory { bytes }| format!("{bytes} bytes"))?;
+/// // The right half is a frame of metal.
+/// let forbidden = CrackMask::layer([2, 1].into(), &[0, 255])?;
+/// field.set_forbidden(&CrackMask { forbidden: Some(forbidden), ..CrackMask::default() });
+///
+/// // A straight line through the second row.
+/// let point = |x| PathPoint { pos: [x, 0.375].into(), width: 0.25 };
+/// let mut changed = TexelRect::default();
+/// let slot = Profile { wall: 0.0, full_width: 0.1, ..Profile::DEFAULT };
+/// let path = SegmentPath::straight(point(0.0), point(2.0));
+/// stamp_path_with(&mut field, &slot, &path, &mut |rect| changed = changed.union(rect));
+/// assert_eq!(field.depth.row(1), [65535, 65535, 65535, 65535, 0, 0, 0, 0]);
+/// assert_eq!(field.depth.row(3), [0; 8]);
+/// assert!(changed.min.y <= 1 && changed.max.y >= 2);
+///
+/// // A disc of half the depth on the last row.
+/// stamp_dot(&mut field, [0.125, 0.875].into(), 0.125, 0.5);
+/// assert_eq!(field.depth.row(3)[0], 32768);
+/// field.clear();
+/// assert!(field.depth.as_slice().iter().all(|depth| *depth == 0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct DepthField {
     /// The position of the field in pattern space.

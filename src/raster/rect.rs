@@ -3,6 +3,20 @@
 use glam::UVec2;
 
 /// Texels from `min` (included) to `max` (excluded).
+///
+/// ```
+/// use bevy_crack::raster::TexelRect;
+///
+/// let rect = |x: u32, y: u32, w: u32, h: u32| TexelRect { min: [x, y].into(), max: [x + w, y + h].into() };
+/// let (a, b) = (rect(2, 2, 6, 4), rect(6, 4, 8, 8));
+/// assert_eq!((a.size(), a.area()), ([6, 4].into(), 24));
+/// assert_eq!(a.union(b), rect(2, 2, 12, 10));
+/// assert_eq!(a.intersect(b), rect(6, 4, 2, 2));
+/// assert!(a.intersect(rect(20, 2, 4, 4)).is_empty());
+/// // A normal depends on the texels around its own, so a little more is to be painted, within the picture.
+/// assert_eq!(b.grow(3, [16, 16].into()), rect(3, 1, 13, 14));
+/// assert_eq!(TexelRect::whole([16, 16].into()), rect(0, 0, 16, 16));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct TexelRect {
     /// First column and row.

@@ -156,6 +156,23 @@ impl Replay {
     }
 
     /// A replay for a field with any content: the first move redraws all of it.
+    ///
+    /// ```
+    /// use bevy_crack::{growth::{CrackGrowth, GrowthParams}, pattern::{Moment, SurfaceFrame}, raster::{DepthField, Profile, Replay, ReplayChanges}};
+    ///
+    /// let frame = SurfaceFrame::new([64, 64].into())?;
+    /// let mut growth = CrackGrowth::new(GrowthParams::default(), frame.extent(), 7)?;
+    /// growth.hit([0.5, 0.5].into(), 1.0);
+    /// while growth.step().grew() {}
+    /// // The field was drawn on by others.
+    /// let (mut field, mut redrawn) = (DepthField::new(frame), ReplayChanges::default());
+    /// field.depth.as_mut_slice().fill(9);
+    /// let mut replay = Replay::stale(frame.size(), Profile::default());
+    /// replay.show(&mut field, growth.network(), growth.timeline(), Moment::START, &mut redrawn);
+    /// assert_eq!(replay.at(), Moment::START);
+    /// assert_eq!(field, DepthField::new(frame));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     #[must_use]
     pub fn stale(size: UVec2, profile: Profile) -> Self {
         Self { is_stale: true, ..Self::new(size, profile) }

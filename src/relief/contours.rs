@@ -6,6 +6,15 @@ use glam::Vec2;
 ///
 /// The last corner is joined to the first. Seen with x to the right and y *down*, as everywhere in pattern space, a ring
 /// around higher ground has a positive [`Ring::signed_area`], and a hole in such a region a negative one.
+///
+/// ```
+/// use bevy_crack::relief::Ring;
+///
+/// let square = Ring { points: [[0.0, 0.0], [0.5, 0.0], [0.5, 0.5], [0.0, 0.5]].map(Into::into).to_vec(), level: 0 };
+/// assert_eq!((square.signed_area(), square.is_hole()), (0.25, false));
+/// let hole = Ring { points: square.points.into_iter().rev().collect(), level: 0 };
+/// assert_eq!((hole.signed_area(), hole.is_hole()), (-0.25, true));
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Ring {
     /// Corners in order, pattern units. Three at least, all of them different from their neighbors.

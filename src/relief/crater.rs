@@ -77,7 +77,8 @@ impl Default for CraterParams {
 /// use bevy_crack::relief::{Crater, CraterParams};
 ///
 /// let crater = Crater::new([0.5, 0.5].into(), &CraterParams::DEFAULT, 7)?;
-/// assert_eq!(crater.depth_at([0.5, 0.5].into()), 1.0);
+/// assert_eq!(crater.depth_at(crater.center()), 1.0);
+/// assert!((0.05..0.2).contains(&crater.reach()));
 /// assert_eq!(crater.depth_at([0.7, 0.5].into()), 0.0);
 /// assert_eq!(crater.contours().rings.len(), 3);
 /// # Ok::<(), bevy_crack::relief::ReliefError>(())

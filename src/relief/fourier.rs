@@ -105,6 +105,7 @@ impl Transform {
 /// let square = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(Vec2::from_array);
 /// let mut descriptors = Descriptors::new(&square, 1024)?;
 /// assert!(descriptors.points()[256].distance([1.0, 0.0].into()) < 1e-9);
+/// assert!((descriptors.spacing() - 4.0 / 1024.0).abs() < 1e-12);
 ///
 /// // Another line, equally rough, which is the same for all waves below the 256th.
 /// let before = descriptors.clone();

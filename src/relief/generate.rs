@@ -138,6 +138,19 @@ impl ContourJob {
     /// A job whose distance varies: `factors` covers a surface of the size `extent` from the origin of pattern space, row by row
     /// from the top left. Each value multiplies the distance there, 0.1..=8: small values make steep places.
     ///
+    /// ```
+    /// use bevy_crack::{Grid, relief::{ContourJob, ReliefParams}};
+    ///
+    /// let square = vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].into_iter().map(Into::into).collect();
+    /// let params = ReliefParams { distance: 0.1, ..ReliefParams::SIMPLE };
+    /// // Twice as steep everywhere: twice as many levels.
+    /// let steep = Grid::new([4, 4].into(), 0.5);
+    /// let mut job = ContourJob::with_factors(&params, &[square], 1, steep, [1.0, 1.0].into())?;
+    /// while job.step()? {}
+    /// assert_eq!(job.finish().levels(), Some((0, 9)));
+    /// # Ok::<(), bevy_crack::relief::ReliefError>(())
+    /// ```
+    ///
     /// # Errors
     /// Those of [`ContourJob::new`]; [`ReliefError::Image`], [`ReliefError::Texel`].
     pub fn with_factors(

@@ -59,6 +59,9 @@ const SIDES: [usize; 3] = [128, 32, 8];
 /// assert_eq!(rows[50 * 100 + 5], 0.0);
 /// assert!((rows[50 * 100 + 20] - 0.05).abs() < 0.005);
 /// assert!((0.1..0.2).contains(&rows[50 * 100 + 50]));
+/// assert_eq!((map.level_height(1), map.stripes()), (0.1, 1));
+/// // The whole field by four threads.
+/// assert_eq!(map.heights(4).as_slice(), rows);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]

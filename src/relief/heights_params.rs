@@ -15,6 +15,11 @@ macro_rules! params {
         /// assert_eq!(params.validate(), Ok(()));
         /// let error = HeightParams { summit: 2.0, ..params }.validate().unwrap_err();
         /// assert_eq!(error.to_string(), "`summit` is 2, must lie in 0..=1");
+        /// // From text, as in a console.
+        /// let mut params = params;
+        /// params.set("step", "0.05")?;
+        /// assert_eq!(params.step, 0.05);
+        /// # Ok::<(), bevy_crack::relief::ReliefError>(())
         /// ```
         #[derive(Clone, Copy, Debug, PartialEq)]
         #[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]

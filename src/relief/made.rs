@@ -22,6 +22,10 @@ use glam::UVec2;
 /// use bevy_crack::relief::ReliefSettings;
 ///
 /// assert_eq!(ReliefSettings::rock_wall().validate(), Ok(()));
+/// // A mountain is an island without sea.
+/// let (mountain, island) = (ReliefSettings::mountain(), ReliefSettings::island());
+/// assert_eq!((mountain.shape, mountain.contours), (island.shape, island.contours));
+/// assert!(island.colors.sea.is_some() && mountain.colors.sea.is_none());
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]
@@ -29,7 +33,7 @@ use glam::UVec2;
 pub struct ReliefSettings {
     /// Where the contours begin; default [`ReliefShape::Wall`].
     pub shape: ReliefShape,
-    /// How contours are made from each other.
+    /// How contours are made from each other. Default, as of the other fields: that of [`rock_wall`](Self::rock_wall).
     pub contours: ReliefParams,
     /// How contours become heights.
     pub heights: HeightParams,
@@ -133,16 +137,22 @@ enum Stage {
 /// Results depend on settings, size and seed alone.
 ///
 /// ```
-/// use bevy_crack::relief::{ReliefJob, ReliefSettings};
+/// use bevy_crack::relief::{Relief, ReliefJob, ReliefSettings};
 ///
 /// let mut job = ReliefJob::new(ReliefSettings::island(), [96, 64].into(), 7)?;
-/// let relief = loop {
+/// let relief: Relief = loop {
 ///     if let Some(relief) = job.step()? {
 ///         break relief;
 ///     }
 ///     assert!(job.progress() < 1.0);
 /// };
 /// assert_eq!(relief.diffuse.size(), [96, 64].into());
+/// // The sea is level, the island is not.
+/// let steepness = relief.steepness();
+/// assert!(steepness.get(0, 0) < Some(5));
+/// assert!(steepness.as_slice().iter().any(|steep| *steep > 60));
+/// // The same at once.
+/// assert_eq!(ReliefJob::new(ReliefSettings::island(), [96, 64].into(), 7)?.finish()?, relief);
 /// # Ok::<(), bevy_crack::relief::ReliefError>(())
 /// ```
 #[derive(Clone, Debug)]

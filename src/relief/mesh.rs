@@ -22,10 +22,10 @@ pub const MAX_DETAIL: u32 = 10;
 pub struct ReliefFrame {
     /// Size of the whole surface in the mesh's units.
     pub size: Vec2,
-    /// Texture coordinates of the surface's top left and bottom right corner.
+    /// Texture coordinates of the surface's top left and bottom right corner; default 0 and 1.
     pub uv: [Vec2; 2],
     /// Depth of the wall that hangs down from the border, pattern units: it hides gaps between meshes of different
-    /// detail. 0 = none.
+    /// detail. 0 or more; default 0 = none.
     pub skirt: f32,
 }
 

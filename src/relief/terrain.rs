@@ -78,13 +78,32 @@ pub struct Rivers {
 
 /// What the ground looks like, by its height, slope and shape.
 ///
-/// Rock shows where the ground is steep. It has layers, strata, along its heights. Hollows are darker than edges.
+/// Rock shows where the ground is steep. It has layers, strata, along its heights. Hollows are darker than edges. By default
+/// all is as in [`ROCK`](Self::ROCK).
 ///
 /// ```
-/// use bevy_crack::relief::TerrainColors;
+/// use bevy_crack::relief::{Ground, Patches, Rivers, Sea, StoneColors, TerrainColors, Woods};
 ///
 /// let dark = TerrainColors { light: 0.0, ..TerrainColors::ROCK };
 /// assert_eq!(dark.validate(), Ok(()));
+///
+/// // A red wall: one kind of ground, stones with dark gaps, much moss, no stains.
+/// let wall = TerrainColors {
+///     ground: [Ground { from: 0.0, color: [120, 70, 60] }; 5],
+///     stones: Some(StoneColors { gap: [30, 25, 20], tone: 0.4 }),
+///     lichen: Some(Patches { color: [90, 110, 60], share: 0.5 }),
+///     stains: None,
+///     ..TerrainColors::ROCK
+/// };
+/// assert_eq!(wall.validate(), Ok(()));
+/// // An island in a dark sea, with wide rivers and woods up to its top.
+/// let island = TerrainColors {
+///     sea: Some(Sea { shallow: [30, 60, 70], deep: [5, 15, 30], half: 0.01 }),
+///     woods: Some(Woods { color: [40, 60, 40], spread: 1.0, top: 1.0, crown: 0.005 }),
+///     rivers: Some(Rivers { color: [40, 70, 90], gather: 0.02, width: 0.01 }),
+///     ..TerrainColors::ISLAND
+/// };
+/// assert_eq!(island.validate(), Ok(()));
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]

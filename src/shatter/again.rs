@@ -9,7 +9,7 @@ use crate::math::{Rng, ops};
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct SizeClasses {
     /// The largest area of each class, the smallest class first; pattern units squared. A piece above the last value
-    /// belongs to one more class.
+    /// belongs to one more class. 1e-6..=4096; default 0.001, 0.006 and 0.036.
     pub largest: [f32; 3],
 }
 
@@ -44,12 +44,13 @@ impl Default for SizeClasses {
 /// let again = BreakAgain::DEFAULT;
 /// assert_eq!(again.classes.next(0.1), Some(0.036));
 /// assert_eq!(again.due(0.0005, 7), None, "splinters do not break");
+/// assert!(BreakAgain { after: 0.0, ..again }.validate().is_err());
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct BreakAgain {
-    /// Which pieces break, and how small.
+    /// Which pieces break, and how small. Default: [`SizeClasses::DEFAULT`].
     pub classes: SizeClasses,
     /// Time after its release, or after it broke off itself, at which a piece breaks, seconds, plus or minus a third.
     /// 0.01..=600; default: 0.35.
@@ -96,6 +97,20 @@ impl Shards {
     ///
     /// A piece is cut across its length, at a slightly random angle, until it is small enough or was cut 12 times.
     /// Positions remain those of the surface, and so do texture coordinates.
+    ///
+    /// ```
+    /// use bevy_crack::shatter::{Cuts, ShatterParams, SizeClasses, shatter};
+    ///
+    /// // A whole pane is of the largest class; its pieces are of the next one.
+    /// let classes = SizeClasses::DEFAULT;
+    /// let pane = shatter(Cuts::new([1.0, 1.0].into())?, &ShatterParams::DEFAULT)?;
+    /// assert_eq!((classes.class(1.0), classes.next(1.0)), (3, Some(0.036)));
+    /// let pieces = pane.break_again(0, 0.036, 7)?;
+    /// assert!(pieces.len() >= 28 && pieces.iter().all(|piece| classes.class(piece.area) < 3));
+    /// let area: f32 = pieces.iter().map(|piece| piece.area).sum();
+    /// assert!((area - 1.0).abs() < 1e-4);
+    /// # Ok::<(), bevy_crack::shatter::ShatterError>(())
+    /// ```
     ///
     /// # Errors
     /// [`ShatterError::NoShard`] if there is no such shard, [`ShatterError::OutOfRange`] if the area is not within

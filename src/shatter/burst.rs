@@ -106,6 +106,29 @@ pub struct Burst {
 }
 
 /// The flight of one piece.
+///
+/// ```
+/// use bevy_crack::shatter::{Burst, BurstParams, Cuts, Flight, ShatterParams, shatter};
+/// use glam::Vec3;
+///
+/// let pane = shatter(Cuts::new([1.0, 1.0].into())?, &ShatterParams::DEFAULT)?;
+/// let whole = pane.get(0).expect("one shard");
+/// // A surface that hangs sideways in the world: its pieces fall to its right.
+/// let burst = Burst::new(BurstParams::DEFAULT, [0.5, 0.5].into(), Vec3::Z, 1.0, 7)?.with_gravity(2.0 * Vec3::X);
+/// let falling: Flight = burst.fall(0, whole);
+/// assert!(falling.pose(1.0).offset.x > 0.1);
+/// // What bursts from a place behind it flies towards the viewer.
+/// let behind = burst.with_origin(Vec3::new(0.5, -0.5, -1.0)).flight(0, whole);
+/// assert!(behind.velocity.z > 0.0);
+/// // A second after the hit it breaks. Its parts go on from where it is then, and fade when it would have.
+/// let parts = pane.break_again(0, 0.25, 7)?;
+/// let part = behind.fragment(1.0, whole, parts.get(0).expect("parts"), 0.2, 1);
+/// assert_eq!(part.delay, 1.0);
+/// assert!(part.pose(1.5).offset.x > part.pose(1.0).offset.x);
+/// assert!((part.end() - behind.end()).abs() < 1e-5);
+/// assert_eq!(behind.pose(behind.end() + 0.01).opacity, 0.0);
+/// # Ok::<(), bevy_crack::shatter::ShatterError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Flight {
     /// Seconds until it leaves its place.
@@ -211,8 +234,7 @@ impl Burst {
     ///
     /// # Errors
     /// [`ShatterError::NotFinite`] if the floor's normal is zero or not finite, [`ShatterError::OutOfRange`] if
-    /// another number of it is
-    /// zero.
+    /// another number of it is out of its range.
     pub fn with_floor(mut self, floor: Floor) -> Result<Self, ShatterError> {
         floor.validate()?;
         self.floor = Some(floor);

@@ -132,7 +132,7 @@ pub struct ShatterParams {
     pub min_area: f32,
     /// Largest number of shards, 1..=1000000; the smallest are merged into their neighbours. Default: 10,000.
     pub max_shards: u32,
-    /// Seed of the extended lines.
+    /// Seed of the extended lines. Default: 0.
     pub seed: u64,
 }
 

@@ -38,6 +38,37 @@ impl MeshFrame {
 }
 
 /// A triangle list. x points right, y up, z towards the viewer; triangles are counter-clockwise as seen from outside.
+///
+/// ```
+/// use bevy_crack::shatter::{Cuts, MeshFrame, RimLook, ShardMesh, ShatterParams, shatter};
+///
+/// let mut cuts = Cuts::new([2.0, 1.0].into())?;
+/// cuts.add_line(&[[1.0, 0.0].into(), [1.0, 1.0].into()])?;
+/// let shards = shatter(cuts, &ShatterParams::DEFAULT)?;
+/// let frame = MeshFrame::new([2.0, 1.0].into());
+/// // A square plate: two triangles in front, two behind, two on each of its four sides.
+/// let plate = shards.solid_mesh(0, &frame, 0.1);
+/// assert_eq!((plate.indices.len() / 3, plate.sides / 3), (12, 4));
+/// assert!(plate.positions.iter().all(|[_, _, z]| z.abs() == 0.05));
+///
+/// // Both squares in one mesh, each in its place, then the first one as a plate in the same memory.
+/// let mut mesh = ShardMesh::default();
+/// let whole = MeshFrame { centred: false, ..frame };
+/// shards.flat_mesh_into(0, &whole, &mut mesh);
+/// shards.flat_mesh_into(1, &whole, &mut mesh);
+/// assert_eq!(mesh.positions.len(), 8);
+/// shards.solid_mesh_into(0, &frame, 0.1, &mut mesh);
+/// assert_eq!(mesh, plate);
+/// mesh.clear();
+/// assert_eq!(mesh, ShardMesh::default());
+///
+/// // With a rim of glass, vertices have colours: the outer ones are brighter.
+/// let glass = shards.flat_mesh(0, &MeshFrame { rim: RimLook::GLASS, ..frame });
+/// assert_eq!(glass.colors.len(), 8);
+/// assert!(glass.colors[0][3] > glass.colors[7][3]);
+/// assert!(RimLook { width: 0.5, ..RimLook::GLASS }.validate().is_err());
+/// # Ok::<(), bevy_crack::shatter::ShatterError>(())
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ShardMesh {
     /// Positions of the vertices.

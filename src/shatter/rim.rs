@@ -4,7 +4,7 @@ use super::{Shards, ShatterError, cuts::in_range};
 use crate::math::Rng;
 use glam::{DVec2, Vec2};
 
-/// The look of the rims of shards.
+/// The look of the rims of shards. All numbers are 0 by default, as in [`PLAIN`](Self::PLAIN).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]

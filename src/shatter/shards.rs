@@ -40,6 +40,34 @@ pub struct Neighbour {
 pub type ConvexPiece = Vec<Vec2>;
 
 /// The pieces of a surface, by number. They tile it.
+///
+/// ```
+/// use bevy_crack::shatter::{ConvexPiece, Cuts, Neighbour, ShardShape, ShatterParams, Shards, shatter};
+///
+/// // A square in the middle of a pane, and the frame around it.
+/// let mut cuts = Cuts::new([1.0, 1.0].into())?;
+/// cuts.add_line(&[[0.25, 0.25], [0.75, 0.25], [0.75, 0.75], [0.25, 0.75], [0.25, 0.25]].map(Into::into))?;
+/// let shards: Shards = shatter(cuts, &ShatterParams::DEFAULT)?;
+/// let (middle, frame) = (shards.at([0.5, 0.5].into()).expect("a shard"), shards.at([0.1, 0.5].into()).expect("a shard"));
+/// let area = |shard: &ShardShape| shard.area;
+/// assert_eq!([middle, frame].map(|shard| shards.get(shard).map(area)), [Some(0.25), Some(0.75)]);
+/// assert_eq!(shards.neighbours(middle), [Neighbour { shard: frame, length: 2.0 }]);
+///
+/// // The frame has four corners outside and four around its hole, and eight triangles that name them.
+/// assert_eq!(shards.outline(frame).len(), 4);
+/// assert_eq!(shards.holes(frame).count(), 1);
+/// let corners = shards.corners(frame).iter().map(|&corner| shards.positions()[corner as usize]);
+/// assert!(corners.clone().any(|corner| corner == shards.extent()));
+/// assert_eq!((corners.len(), shards.triangles(frame).len()), (8, 8));
+///
+/// // A point that lies in the frame, unlike its middle.
+/// let inner = shards.inner_point(frame).expect("a shard");
+/// assert_eq!((shards.distance(frame, inner), shards.distance(frame, [0.5, 0.5].into())), (0.0, 0.25));
+/// let pieces: Vec<ConvexPiece> = shards.convex_pieces(frame, 0.0);
+/// assert!(pieces.len() >= 4);
+/// assert!(!shards.is_empty() && Shards::default().is_empty());
+/// # Ok::<(), bevy_crack::shatter::ShatterError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shards {
     pub(super) lattice: Lattice,
@@ -177,6 +205,19 @@ impl Shards {
     }
 
     /// The lines by which cracks were extended, pattern units. They are cracks too and should be drawn.
+    ///
+    /// ```
+    /// use bevy_crack::shatter::{Cuts, ShatterParams, shatter};
+    ///
+    /// // A crack that ends in the middle of the pane.
+    /// let mut cuts = Cuts::new([1.0, 1.0].into())?;
+    /// cuts.add_line(&[[0.5, 0.0].into(), [0.5, 0.5].into()])?;
+    /// let shards = shatter(cuts.clone(), &ShatterParams::DEFAULT)?;
+    /// assert_eq!((shards.len(), shards.extended_lines().len()), (1, 0));
+    /// let shards = shatter(cuts, &ShatterParams { extend_cracks: true, ..ShatterParams::DEFAULT })?;
+    /// assert_eq!((shards.len(), shards.extended_lines().len()), (2, 1));
+    /// # Ok::<(), bevy_crack::shatter::ShatterError>(())
+    /// ```
     #[must_use]
     pub fn extended_lines(&self) -> &[Vec<Vec2>] {
         &self.carried

@@ -22,7 +22,7 @@ pub struct ShellTriangle {
 /// [`border`](Self::border), it has to be cut as well, or pieces of different parts of the surface would be one.
 ///
 /// ```
-/// use bevy_crack::shatter::{Cuts, Shell, ShellFrame, ShellTriangle, ShatterParams, shatter};
+/// use bevy_crack::shatter::{Cuts, Shell, ShellFrame, ShellMesh, ShellPart, ShellPlace, ShellTriangle, ShatterParams, shatter};
 /// use glam::{Vec2, Vec3};
 ///
 /// // Two squares that meet at a right angle, laid out side by side, and cut across the edge.
@@ -44,10 +44,17 @@ pub struct ShellTriangle {
 /// }
 /// let shards = shatter(cuts, &ShatterParams::DEFAULT)?;
 /// assert_eq!(shards.len(), 2);
-/// let mesh = shards.shell_mesh(0, &shell, &ShellFrame { thickness: 0.1, ..Default::default() });
-/// // It reaches around the edge.
-/// assert!(mesh.picture.positions.iter().any(|[x, _, _]| *x == 0.0));
-/// assert!(mesh.picture.positions.iter().any(|[_, _, z]| *z == -1.0));
+/// let mesh: ShellMesh = shards.shell_mesh(0, &shell, &ShellFrame { thickness: 0.1, ..Default::default() });
+/// // It reaches around the edge, and has an inside.
+/// let ShellPart { positions, .. } = &mesh.picture;
+/// assert!(positions.iter().any(|[x, _, _]| *x == 0.0) && positions.iter().any(|[_, _, z]| *z == -1.0));
+/// assert!(!mesh.inside.indices.is_empty() && !shell.is_empty());
+/// // A place of the second square: there the plane goes on to the back, not to the right.
+/// let ShellPlace { position, normal, right, .. } = shell.place([1.5, 0.5].into()).expect("it is laid out");
+/// assert_eq!((position, normal, right), (Vec3::new(1.0, 0.5, -0.5), Vec3::X, Vec3::NEG_Z));
+/// // From a point above its left corner to the upper half.
+/// let upper = shards.at([0.5, 0.25].into()).expect("a shard");
+/// assert_eq!(shell.distance(&shards, upper, Vec3::new(0.0, 1.5, 0.0)), Some(0.5));
 /// # Ok::<(), bevy_crack::shatter::ShatterError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
@@ -75,7 +82,8 @@ pub struct ShellPlace {
     pub down: Vec3,
 }
 
-/// How the shards of a [`Shell`] become meshes.
+/// How the shards of a [`Shell`] become meshes. By default nothing is moved, a whole texture is shown, rims are
+/// [plain](RimLook::PLAIN), and all numbers are 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShellFrame {
     /// From the shell's space to the mesh's: turned and moved, not scaled.
@@ -86,7 +94,7 @@ pub struct ShellFrame {
     pub rim: RimLook,
     /// Seed as that of [`MeshFrame::seed`].
     pub seed: u64,
-    /// How far pieces reach inward from the surface, in the shell's units.
+    /// How far pieces reach inward from the surface, in the shell's units, 0 or more.
     pub thickness: f32,
     /// How uneven their inside and the faces along which they broke are, 0..=1; pieces fit all the same.
     pub roughness: f32,

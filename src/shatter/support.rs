@@ -22,7 +22,7 @@ pub enum Anchor {
 /// A held shard holds its neighbours, and so on; shards that are no longer held fall.
 ///
 /// ```
-/// use bevy_crack::shatter::{Anchor, Cuts, ShatterParams, Support, shatter};
+/// use bevy_crack::shatter::{Anchor, Cuts, Fallen, ShatterParams, Support, shatter};
 ///
 /// // Three shelves; only the top is fixed.
 /// let mut cuts = Cuts::new([1.0, 1.0].into())?;
@@ -30,9 +30,47 @@ pub enum Anchor {
 /// cuts.add_line(&[[0.0, 0.6].into(), [1.0, 0.6].into()])?;
 /// let shards = shatter(cuts, &ShatterParams::DEFAULT)?;
 /// let mut support = Support::new(&shards, Anchor::Sides([false, false, true, false]));
-/// let fallen = support.hit(&shards, [0.5, 0.45].into(), 0.1)?;
+/// let Fallen { hit, loose } = support.hit(&shards, [0.5, 0.45].into(), 0.1)?;
 /// let number = |y: f32| shards.at([0.5, y].into()).into_iter().collect::<Vec<u32>>();
-/// assert_eq!((fallen.hit, fallen.loose), (number(0.45), number(0.8)));
+/// assert_eq!((hit, loose), (number(0.45), number(0.8)));
+/// # Ok::<(), bevy_crack::shatter::ShatterError>(())
+/// ```
+///
+/// Shards can be held, removed and put back one by one, and hit by distances of your own:
+///
+/// ```
+/// # use bevy_crack::shatter::{Anchor, Cuts, ShatterParams, Support, shatter};
+/// // Four squares in a row, held at the left: a shelf.
+/// let mut cuts = Cuts::new([4.0, 1.0].into())?;
+/// for x in [1.0, 2.0, 3.0] {
+///     cuts.add_line(&[[x, 0.0].into(), [x, 1.0].into()])?;
+/// }
+/// let shards = shatter(cuts, &ShatterParams::DEFAULT)?;
+/// let mut shelf = Support::new(&shards, Anchor::Sides([true, false, false, false]));
+/// // Without the second square the two beyond it fall.
+/// assert_eq!(shelf.take(&shards, 1), [2, 3]);
+/// assert_eq!(shelf.missing().collect::<Vec<_>>(), [1, 2, 3]);
+/// shelf.put_back(1);
+/// assert!(shelf.is_in_place(1));
+///
+/// // A post under the last square: it no longer falls.
+/// shelf.restore();
+/// shelf.hold_shards([3]);
+/// assert_eq!(shelf.take(&shards, 1), [0; 0]);
+/// // A blow from below that reaches the third square only.
+/// let fallen = shelf.hit_by(&shards, 0.5, |shard| if shard == 2 { 0.2 } else { 0.9 })?;
+/// assert_eq!((fallen.hit, fallen.loose), (vec![2], vec![]));
+///
+/// // A square that the game removes itself: nothing falls before it is asked for.
+/// let mut shelf = Support::from_mask(&shards, |pos| pos.x < 0.1);
+/// shelf.remove([2]);
+/// assert!(shelf.is_in_place(3));
+/// assert_eq!(shelf.drop_loose(&shards), [3]);
+/// // The same squares in their places, held by nothing, then at the left again.
+/// let mut loose = shelf.held_by(&shards, Anchor::Nothing);
+/// assert_eq!(loose.missing().collect::<Vec<_>>(), [2, 3]);
+/// loose.hold(&shards, |pos| pos.x < 0.1);
+/// assert_eq!(loose, shelf);
 /// # Ok::<(), bevy_crack::shatter::ShatterError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -87,6 +125,25 @@ impl Support {
 
     /// The support of a surface that has been cracked further: shards that lie where an old shard was missing are
     /// missing too.
+    ///
+    /// ```
+    /// use bevy_crack::shatter::{Anchor, Cuts, ShatterParams, Support, shatter};
+    ///
+    /// let halves = |lines: &[f32]| {
+    ///     let mut cuts = Cuts::new([2.0, 1.0].into())?;
+    ///     for &x in lines {
+    ///         cuts.add_line(&[[x, 0.0].into(), [x, 1.0].into()])?;
+    ///     }
+    ///     shatter(cuts, &ShatterParams::DEFAULT)
+    /// };
+    /// let (old, new) = (halves(&[1.0])?, halves(&[0.5, 1.0])?);
+    /// let mut support = Support::new(&old, Anchor::Border);
+    /// support.remove([0]);
+    /// // The left half is missing, so both of its parts are.
+    /// let support = support.after_new_cracks(&old, &new, Anchor::Border);
+    /// assert_eq!(support.missing().collect::<Vec<_>>(), [0, 1]);
+    /// # Ok::<(), bevy_crack::shatter::ShatterError>(())
+    /// ```
     #[must_use]
     pub fn after_new_cracks(&self, old: &Shards, new: &Shards, anchor: Anchor) -> Self {
         let mut support = Self::new(new, anchor);

@@ -46,6 +46,17 @@ pub enum Directions {
 impl Directions {
     /// Directions from a picture: red is x and green is y, 128 is zero. `rgba` has four bytes for each texel.
     ///
+    /// ```
+    /// use bevy_crack::strands::{Directions, GuidanceField};
+    ///
+    /// // Two texels: to the right, and down.
+    /// let painted = Directions::from_picture([2, 1].into(), &[255, 128, 0, 255, 128, 255, 0, 255])?;
+    /// let field = GuidanceField::new(painted, 0.0, 0.0, [2.0, 1.0].into(), 7)?;
+    /// assert_eq!(field.at([0.5, 0.5].into()), [1.0, 0.0].into());
+    /// assert_eq!(field.at([1.5, 0.5].into()), [0.0, 1.0].into());
+    /// # Ok::<(), bevy_crack::strands::StrandError>(())
+    /// ```
+    ///
     /// # Errors
     /// [`StrandError::EmptyField`] if there are no texels, [`StrandError::PictureSize`] if the bytes do not fit `size`.
     pub fn from_picture(size: UVec2, rgba: &[u8]) -> Result<Self, StrandError> {
@@ -166,6 +177,7 @@ fn along(line: &[Vec2], hold: f32, pos: Vec2) -> Vec2 {
 /// let down = Directions::Linear([0.0, 2.0].into());
 /// let field = GuidanceField::new(down, 8.0, 0.0, [1.0, 1.0].into(), 7)?;
 /// assert_eq!(field.at([0.3, 0.4].into()), [0.0, 1.0].into());
+/// assert_eq!(field.extent(), [1.0, 1.0].into());
 /// # Ok::<(), bevy_crack::strands::StrandError>(())
 /// ```
 #[derive(Clone, Debug)]

@@ -17,6 +17,7 @@ use glam::{UVec2, Vec2};
 /// ```
 /// use bevy_crack::strands::Material;
 ///
+/// assert_eq!(Material::Sand.name(), "sand");
 /// assert_eq!(Material::Sand.primitives().len(), 6);
 /// assert!(Material::Sand.nets().iter().all(|primitive| primitive.has_sides()));
 /// ```

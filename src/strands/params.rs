@@ -32,6 +32,11 @@ macro_rules! params {
         /// assert_eq!(params.validate(), Ok(()));
         /// let error = StrandParams { inertia: 2.0, ..params }.validate().unwrap_err();
         /// assert_eq!(error.to_string(), "`inertia` is 2, must lie in 0..=1");
+        /// // From text, as in a console.
+        /// let mut params = params;
+        /// params.set("inertia", "0.7")?;
+        /// assert_eq!(params.inertia, 0.7);
+        /// # Ok::<(), bevy_crack::strands::StrandError>(())
         /// ```
         #[derive(Clone, Copy, Debug, PartialEq)]
         #[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]

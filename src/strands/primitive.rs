@@ -12,14 +12,19 @@ pub const PRIMITIVE_SIDES: (u32, u32) = (8, 1024);
 /// The shipped ones are in [`Material`](super::Material). Own ones come from height images:
 ///
 /// ```
-/// use bevy_crack::{Grid, strands::Primitive};
+/// use bevy_crack::{Grid, strands::{Primitive, PrimitiveLine, PrimitivePoint}};
 ///
 /// // A straight crack, three texels wide.
 /// let mut image = Grid::new([16, 32].into(), 0);
 /// (0..32).for_each(|y| image.row_mut(y)[7..10].fill(65535));
 /// let primitive = Primitive::from_image(image)?;
-/// assert_eq!(primitive.lines().len(), 1);
+/// assert_eq!(primitive.image().size(), [16, 32].into());
 /// assert!(!primitive.has_sides());
+/// // One line, the main one. It runs from the head down to the tail.
+/// let [PrimitiveLine { from: None, points }] = primitive.lines() else { panic!("a single line") };
+/// let PrimitivePoint { at, width } = points[points.len() / 2];
+/// assert_eq!((points[0].at.y, points[points.len() - 1].at.y), (0.0, 1.0));
+/// assert!(at.x.abs() < 0.05 && (width - 3.0 / 32.0).abs() < 0.05);
 /// # Ok::<(), bevy_crack::strands::PrimitiveError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]

@@ -15,13 +15,19 @@ use glam::Vec2;
 /// The paths of a set of strands.
 ///
 /// ```
-/// use bevy_crack::strands::{Directions, StrandParams, StrandStart, Strands};
+/// use bevy_crack::strands::{Directions, Propagation, Strand, StrandEnd, StrandParams, StrandStart, Strands};
 ///
 /// let starts = [StrandStart::new([0.25, 0.5].into())];
 /// let params = StrandParams { rotation: 0.0, inertia: 0.0, length: 0.25, ..StrandParams::DEFAULT };
 /// let strands = Strands::new(&params, Directions::Linear([1.0, 0.0].into()), &starts, [1.0, 1.0].into(), 7)?;
-/// let end = strands.strands()[0].points.last().copied();
-/// assert_eq!(end, Some([0.5, 0.5].into()));
+/// let strand: &Strand = &strands.strands()[0];
+/// assert_eq!(strand.points.last().copied(), Some([0.5, 0.5].into()));
+/// assert_eq!((strand.end, strand.parent, strands.extent()), (StrandEnd::Length, None, [1.0, 1.0].into()));
+///
+/// // A long one that may turn in any direction runs to the border.
+/// let params = StrandParams { length: 2.0, propagation: Propagation::Continuous, ..params };
+/// let strands = Strands::new(&params, Directions::Linear([1.0, 0.2].into()), &starts, [1.0, 1.0].into(), 7)?;
+/// assert_eq!(strands.strands()[0].end, StrandEnd::Border);
 /// # Ok::<(), bevy_crack::strands::StrandError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]

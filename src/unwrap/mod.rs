@@ -10,7 +10,7 @@
 //!   (2006), with means over neighbours as Schmidt (2013) has them, in which those count the most that lie straight before a vertex.
 //!
 //! ```
-//! use bevy_crack::unwrap::{MeshShape, Unwrap};
+//! use bevy_crack::unwrap::{LaidOut, MeshShape, Unwrap};
 //! use glam::{UVec2, Vec3};
 //!
 //! // Two squares that meet at a right angle.
@@ -21,14 +21,20 @@
 //! ];
 //! let triangles = [[0, 1, 2], [0, 2, 3], [1, 4, 5], [1, 5, 2]];
 //! let shape = MeshShape::new(&positions, &triangles)?;
+//! assert_eq!((shape.len(), shape.faces(), shape.area()), (4, 2, 2.0));
+//! assert!(!shape.is_empty() && shape.has_area(3) && !shape.has_area(4));
 //! let around = Vec3::new(0.5, 0.5, 0.);
 //! let unwrap = Unwrap { around, triangle: 0, right: Vec3::X, texels: 64.0, most_side: 4096, most_texels: 1 << 20 };
-//! let laid_out = unwrap.apply(&shape)?;
+//! let laid_out: LaidOut = unwrap.apply(&shape)?;
 //! // Side by side, with some texels around them.
 //! assert!(laid_out.size.x >= 128 && laid_out.size.y >= 64);
 //! let [corners, beside] = [0, 2].map(|triangle| laid_out.corners[triangle].unwrap());
 //! // They share an edge.
 //! assert!(corners[1].distance(beside[0]) < 1e-3);
+//! // The texel in the middle of a triangle is one of its own.
+//! let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
+//! assert_eq!(laid_out.owner(middle.as_uvec2()), Some(0));
+//! assert_eq!(laid_out.owner(laid_out.size), None);
 //! # Ok::<(), bevy_crack::unwrap::UnwrapError>(())
 //! ```
 

@@ -77,6 +77,29 @@ pub struct VoronoiBake {
 ///
 /// It keeps everything that a later change needs: about 12 bytes a texel with one level and one guide, 8 more for
 /// each further level and 2 for each further guide.
+///
+/// ```
+/// use bevy_crack::voronoi::{SiteLayout, VoronoiMap, VoronoiParams, voronoi_map};
+/// use std::ops::ControlFlow;
+///
+/// // Two sites on 7 x 5 texels, no noise: every edge costs β, which is 256 units.
+/// let sites = SiteLayout::Given(vec![[0.1, 0.3].into(), [0.5, 0.3].into()]);
+/// let params = VoronoiParams { alpha: 0.0, layout: sites, ..VoronoiParams::DEFAULT };
+/// let mut map: VoronoiMap = voronoi_map(&params, &[], [7, 5].into(), 1, |_| ControlFlow::Continue(()))?;
+/// assert_eq!(map.sites(), [[0, 1].into(), [2, 1].into()]);
+/// assert_eq!((map.params(), map.frame().size()), (&params, [7, 5].into()));
+/// let regions = map.regions().expect("there are sites");
+/// assert_eq!(regions.row(3), [0, 0, 1, 1, 1, 1, 1]);
+/// assert_eq!((map.region(1, 3), map.cost(1, 3)), (Some(0), Some(3 * 256)));
+/// // Nothing lies to the right of the last column or below the last row.
+/// assert_eq!((map.edges(3, 3), map.edges(6, 4)), ((Some(256), Some(256)), (None, None)));
+/// // Only strokes of guides are reported on.
+/// assert_eq!(map.strokes(), None);
+/// let before = map.clone();
+/// map.search_again();
+/// assert_eq!(map.regions(), before.regions());
+/// # Ok::<(), bevy_crack::voronoi::VoronoiError>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct VoronoiMap {
     params: VoronoiParams,
@@ -426,6 +449,24 @@ impl VoronoiMap {
     }
 
     /// Makes the most expensive cracks of the current map the widest, as they were when the map was made.
+    ///
+    /// ```
+    /// use bevy_crack::{Grid, voronoi::{Guide, VoronoiBake, VoronoiMap, VoronoiParams}};
+    ///
+    /// // All of the surface is expensive, and then only half as much.
+    /// let guide = Guide::new(Grid::new([1, 1].into(), 1.0));
+    /// let params = VoronoiParams { stroke_width: 0.0, ..VoronoiParams::DEFAULT };
+    /// let mut map = VoronoiBake::new(params, vec![guide], [64, 64].into(), 1)?.finish().0;
+    /// map.set_gammas(&[14.0])?;
+    /// let widest = |map: &VoronoiMap| {
+    ///     let seams = map.seams().seams;
+    ///     seams.iter().flat_map(|seam| &seam.points).map(|point| point.width).fold(0.0, f32::max)
+    /// };
+    /// let before = widest(&map);
+    /// map.rescale_widths();
+    /// assert!(widest(&map) > before);
+    /// # Ok::<(), bevy_crack::voronoi::VoronoiError>(())
+    /// ```
     pub fn rescale_widths(&mut self) {
         self.full_cost = None;
         if let Some(level) = self.levels.last() {

@@ -13,6 +13,14 @@ fn cover(texel: &[u8; 4]) -> f32 {
 
 /// Lightness of a picture (rows of RGBA), 0..=1, 0 where it is transparent; `None` if it does not have exactly `size`
 /// texels.
+///
+/// ```
+/// use bevy_crack::voronoi::lightness;
+///
+/// let (white, glass) = ([255, 255, 255, 255], [255, 255, 255, 0]);
+/// let light = lightness([2, 1].into(), [white, glass].as_flattened()).unwrap();
+/// assert_eq!(light.as_slice(), [1.0, 0.0]);
+/// ```
 #[must_use]
 pub fn lightness(size: UVec2, rgba: &[u8]) -> Option<Grid<f32>> {
     let texels = rgba.as_chunks::<4>().0;

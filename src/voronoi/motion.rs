@@ -17,6 +17,7 @@ use super::{Seams, VoronoiError, VoronoiMap};
 /// let mut emerging = SeamMotion::new(map, vec![0.0], vec![28.0])?;
 /// assert_ne!(emerging.at(0.0)?, last);
 /// assert_eq!(emerging.at(1.0)?, last);
+/// assert_eq!(emerging.into_map().seams(), last);
 /// # Ok::<(), bevy_crack::voronoi::VoronoiError>(())
 /// ```
 #[derive(Clone, Debug)]

@@ -73,6 +73,15 @@ impl Guide {
 }
 
 /// All settings of a map of cracks except size, seed and guides.
+///
+/// ```
+/// use bevy_crack::voronoi::VoronoiParams;
+///
+/// let params = VoronoiParams { sites: 40, ..VoronoiParams::DEFAULT };
+/// assert!(params.validate(&[]).is_ok());
+/// let error = VoronoiParams { taper: 9.0, ..params }.validate(&[]).unwrap_err();
+/// assert_eq!(error.to_string(), "`taper` is 9, must lie in 0..=8");
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]
 pub struct VoronoiParams {

@@ -32,12 +32,34 @@ pub struct Seam {
 /// All boundaries of a map: a planar graph whose lines meet only in its vertices.
 ///
 /// ```
-/// use bevy_crack::voronoi::{VoronoiBake, VoronoiParams};
+/// use bevy_crack::{
+///     pattern::SurfaceFrame,
+///     raster::{DepthField, Profile},
+///     voronoi::{Front, Seam, SeamVertex, VoronoiBake, VoronoiParams},
+/// };
 ///
 /// let (_, seams) = VoronoiBake::new(VoronoiParams::DEFAULT, Vec::new(), [64, 64].into(), 7)?.finish();
-/// let first = &seams.seams[0];
-/// assert_eq!(first.points[0].pos, seams.vertices[first.from as usize].pos);
-/// # Ok::<(), bevy_crack::voronoi::VoronoiError>(())
+/// let first: &Seam = &seams.seams[0];
+/// let SeamVertex { pos, .. } = seams.vertices[first.from as usize];
+/// assert_eq!(first.points[0].pos, pos);
+///
+/// // All of them at once, or as a front that runs out from an impact has opened them.
+/// let frame = SurfaceFrame::new([64, 64].into())?;
+/// let (mut whole, mut grown, mut young) = (DepthField::new(frame), DepthField::new(frame), DepthField::new(frame));
+/// seams.stamp(&mut whole, &Profile::DEFAULT);
+/// let front = Front::new(&seams, [0.5, 0.5].into());
+/// seams.stamp_front(&mut grown, &Profile::DEFAULT, &front, front.reach());
+/// seams.stamp_front(&mut young, &Profile::DEFAULT, &front, 0.2 * front.reach());
+/// assert_eq!(grown, whole);
+/// assert_ne!(young, whole);
+/// // Or all of them, half as wide.
+/// let mut narrow = DepthField::new(frame);
+/// seams.stamp_share(&mut narrow, &Profile::DEFAULT, 0.5);
+/// assert!(narrow.depth.as_slice().iter().zip(whole.depth.as_slice()).all(|(narrow, whole)| narrow <= whole));
+/// // As a network they can be added to other cracks, or cut a surface into shards.
+/// let network = seams.network([0.5, 0.5].into());
+/// assert!(network.nodes().iter().any(|node| node.pos == pos));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Seams {

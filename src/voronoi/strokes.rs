@@ -29,6 +29,19 @@ const GAP: f32 = 2.5;
 const ROUNDS: usize = 10;
 
 /// How well cracks cover the strokes of the guides.
+///
+/// ```
+/// use bevy_crack::{Grid, voronoi::{Guide, SiteLayout, StrokeReport, VoronoiBake, VoronoiParams}};
+///
+/// // A stroke from top to bottom, with sites on both of its sides.
+/// let mut line = Grid::new([64, 64].into(), 0.0);
+/// (0..64).for_each(|y| line.row_mut(y)[30..34].fill(1.0));
+/// let params = VoronoiParams { layout: SiteLayout::StrokePairs, ..VoronoiParams::DEFAULT };
+/// let map = VoronoiBake::new(params, vec![Guide::new(line)], [128, 128].into(), 1)?.finish().0;
+/// let StrokeReport { length, covered } = map.strokes().expect("there is a stroke");
+/// assert!((length - 1.0).abs() < 0.1 && covered > 0.95);
+/// # Ok::<(), bevy_crack::voronoi::VoronoiError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StrokeReport {
     /// Length of the middle lines of all strokes, pattern units.

@@ -21,13 +21,14 @@ impl Panel {
     /// returned.
     ///
     /// ```
-    /// use bevy_crack::editor::{Costs, Panel, Subject};
+    /// use bevy_crack::editor::{AnalogyChoice, Costs, EditorCommand, Panel, Subject};
     /// use bevy_egui::egui;
     ///
-    /// let (mut panel, mut subject) = (Panel::default(), Subject::default());
+    /// let like = AnalogyChoice { file: "clay.analogy.ron".into(), keeps_picture: true, seed: 0 };
+    /// let (mut panel, mut subject) = (Panel::default(), Subject { analogy: Some(like), ..Subject::default() });
     /// let ctx = egui::Context::default();
     /// let mut output = ctx.run_ui(egui::RawInput::default(), |ui| {
-    ///     let asked = panel.show(ui, &[], Some(&mut subject), &Costs::default());
+    ///     let asked: Vec<EditorCommand> = panel.show(ui, &[], Some(&mut subject), &Costs::default());
     ///     assert!(asked.is_empty());
     /// });
     /// assert!(!output.shapes.is_empty());

@@ -6,11 +6,12 @@ use crate::plugin::{CrackGuide, CrackRelief, CrackStrands, GuidedCracks};
 /// What the panel remembers: tools, overlays and drafts. The settings of surfaces are in their components alone.
 #[derive(Clone, Debug)]
 pub struct Panel {
-    /// Energy of a hit by a click.
+    /// Energy of a hit by a click, 0..=16; default 1.
     pub energy: f32,
-    /// Whether a click on a surface hits it; it is chosen in any case.
+    /// Whether a click on a surface hits it; it is chosen in any case. Default true.
     pub hits_on_click: bool,
     /// Whether a click hits all surfaces at the same texture coordinates: with other presets and one seed they can be compared.
+    /// Default false.
     pub hits_all: bool,
     /// What is drawn over the chosen surface.
     pub overlays: Overlays,
@@ -34,7 +35,7 @@ pub struct Panel {
     pub can_undo: (bool, bool),
 }
 
-/// What is drawn over the chosen surface.
+/// What is drawn over the chosen surface; nothing by default.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Overlays {
     /// The network; colours are ages.

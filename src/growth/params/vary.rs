@@ -56,6 +56,16 @@ impl GrowthParams {
 
     /// The parameters of the surface with this seed, changed at random by [`variety`](Self::variety). The result is
     /// valid if `self` is.
+    ///
+    /// ```
+    /// use bevy_crack::growth::GrowthParams;
+    ///
+    /// let params = GrowthParams { variety: 0.5, ..GrowthParams::DEFAULT };
+    /// assert_ne!(params.varied(1), params.varied(2));
+    /// params.varied(1).validate()?;
+    /// assert_eq!(GrowthParams::DEFAULT.varied(1), GrowthParams::DEFAULT);
+    /// # Ok::<(), bevy_crack::growth::ParamError>(())
+    /// ```
     #[must_use]
     pub fn varied(&self, seed: u64) -> Self {
         let mut varied = self.clone();

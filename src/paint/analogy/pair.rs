@@ -51,6 +51,20 @@ impl AnalogyPair {
     /// A pair whose guide is the lines that stand out from the photograph:
     /// [`CrackMask::weak_from_picture`], with half its range or more as crack.
     ///
+    /// ```
+    /// use bevy_crack::paint::analogy::{AnalogyError, AnalogyPair};
+    ///
+    /// // Dark tiles of 64 texels with light joints.
+    /// let size = 256;
+    /// let shade = |i: u32| if (i % size) % 64 < 4 || (i / size) % 64 < 4 { 220 } else { 60 };
+    /// let photo: Vec<u8> = (0..size * size).flat_map(|i| [shade(i), shade(i), shade(i), 255]).collect();
+    /// let pair = AnalogyPair::from_lines([size, size].into(), &photo)?;
+    /// assert_eq!((pair.cracks().get(66, 32), pair.cracks().get(96, 32)), (Some(1.0), Some(0.0)));
+    /// let even = [128; 64 * 64 * 4];
+    /// assert_eq!(AnalogyPair::from_lines([64, 64].into(), &even), Err(AnalogyError::NoLines));
+    /// # Ok::<(), AnalogyError>(())
+    /// ```
+    ///
     /// # Errors
     /// As [`new`](Self::new), and [`AnalogyError::NoLines`] if none stand out.
     pub fn from_lines(size: UVec2, rgba: &[u8]) -> Result<Self, AnalogyError> {
@@ -99,6 +113,24 @@ impl AnalogyPair {
     }
 
     /// The photograph can be repeated without seams: what is copied may run across its borders.
+    ///
+    /// ```
+    /// use bevy_crack::{Grid, paint::analogy::AnalogyPair};
+    ///
+    /// // A photograph without seams, with a light joint in column 8 and uneven light from left to right.
+    /// let size = [64, 64].into();
+    /// let shade = |i: u32| if i % 64 == 8 { 220 } else { 60 + (i % 64) as u8 };
+    /// let photo: Vec<u8> = (0..64 * 64).flat_map(|i| [shade(i), shade(i), shade(i), 255]).collect();
+    /// let wet = Grid::new(size, 0.5);
+    /// let cracks = Grid::from_vec(size, (0..64 * 64).map(|i| f32::from(i % 64 == 8)).collect()).unwrap();
+    /// let pair = AnalogyPair::new(size, &photo, cracks)?.with_channel(wet)?.tileable().flattened(8)?;
+    /// assert!(pair.is_tileable());
+    /// assert_eq!((pair.size(), pair.channels().len()), (size, 1));
+    /// // The slope of the light is gone.
+    /// let [dark, light] = [24, 40].map(|x| pair.picture().get(x, 30).unwrap()[0]);
+    /// assert!(light.abs_diff(dark) < 4);
+    /// # Ok::<(), bevy_crack::paint::analogy::AnalogyError>(())
+    /// ```
     #[must_use]
     pub const fn tileable(mut self) -> Self {
         self.is_tileable = true;

@@ -15,6 +15,11 @@ macro_rules! params {
         /// assert_eq!(params.validate(), Ok(()));
         /// let error = AnalogyParams { reach: 0, ..params }.validate().unwrap_err();
         /// assert_eq!(error.to_string(), "`reach` is 0, must lie in 2..=60");
+        /// // From text, as in a console.
+        /// let mut params = params;
+        /// params.set("reach", "12")?;
+        /// assert_eq!(params.reach, 12);
+        /// # Ok::<(), bevy_crack::paint::analogy::AnalogyError>(())
         /// ```
         #[derive(Clone, Copy, Debug, PartialEq)]
         #[cfg_attr(feature = "bevy", derive(bevy::reflect::Reflect))]

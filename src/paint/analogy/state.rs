@@ -61,6 +61,52 @@ const FIRST_COUNTED: usize = 2;
 /// assert_eq!(wall.color(30, 20), [200, 200, 200, 255]);
 /// # Ok::<(), bevy_crack::paint::analogy::AnalogyError>(())
 /// ```
+///
+/// The work in slices, and all that can be read of the result:
+///
+/// ```
+/// use bevy_crack::{Grid, paint::analogy::{Analogy, AnalogyPair, AnalogyParams, Examples, TexelSource}};
+/// use std::sync::Arc;
+///
+/// let size = [40, 40].into();
+/// let shade = |i: u32| if i % 40 == 20 || i / 40 == 20 { 10 } else { 200 };
+/// let photo: Vec<u8> = (0..1600).flat_map(|i| [shade(i), shade(i), shade(i), 255]).collect();
+/// let pair = AnalogyPair::from_darkness(size, &photo, 0.3)?;
+/// let examples = Arc::new(Examples::new(std::slice::from_ref(&pair), &AnalogyParams::DEFAULT)?);
+/// assert_eq!((examples.sizes().collect::<Vec<_>>(), examples.params()), (vec![size], &AnalogyParams::DEFAULT));
+///
+/// let mut depth = Grid::new(size, 0);
+/// depth.row_mut(9).fill(u16::MAX);
+/// let mut wall = Analogy::new(examples, &depth, &[], 7)?;
+/// assert_eq!((wall.is_busy(), wall.progress(), wall.size()), (true, 0.0, size));
+/// assert_eq!(wall.source(30, 9).map(|source| source.pair), Some(TexelSource::NONE));
+/// while wall.step(1000) {}
+/// assert_eq!((wall.is_busy(), wall.progress()), (false, 1.0));
+/// // All of it is new. Later cracks change texels up to 40 or so away from them.
+/// assert!(!wall.take_changed().is_empty());
+/// assert!(wall.window() < 60);
+///
+/// // Each texel is a copy: its colour, and whatever else belongs to the photograph.
+/// let TexelSource { pair: _, texel: [x, y] } = wall.source(30, 9).expect("it is on the surface");
+/// assert_eq!(pair.cracks().get(x.into(), y.into()), Some(1.0));
+/// assert_eq!(wall.sources().get(30, 9), wall.source(30, 9));
+/// let heights = Grid::from_vec(size, (0..1600).map(|i| if shade(i) == 10 { -1.0 } else { 0.5 }).collect()).unwrap();
+/// let carried = wall.carry(&[&heights], 0.0)?;
+/// assert_eq!((carried.get(30, 9), carried.get(30, 30)), (Some(-1.0), Some(0.5)));
+/// let (whole, mut texels) = (bevy_crack::raster::TexelRect::whole(size), vec![0; 40 * 40 * 4]);
+/// wall.paint_into(whole, &mut texels);
+/// assert_eq!(texels, wall.colors().as_slice().as_flattened());
+/// let mut into = Grid::new(size, 0.0);
+/// wall.carry_into(&[&heights], whole, &mut into)?;
+/// assert_eq!(into, carried);
+///
+/// // The guides of surface and photograph: low in cracks. Texels come from places where the guide is alike.
+/// assert!(wall.ramp().get(30, 9) < wall.ramp().get(30, 30));
+/// let guide = wall.examples().ramp(0).expect("there is a pair");
+/// assert!(guide.get(20, 5) < guide.get(5, 5));
+/// assert!(wall.is_near_crack(30, 9) && wall.agreement(0.1) > 0.5);
+/// # Ok::<(), bevy_crack::paint::analogy::AnalogyError>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Analogy {
     examples: Arc<Examples>,

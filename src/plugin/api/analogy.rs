@@ -36,7 +36,29 @@ use std::{
 ///     let analogy = CrackAnalogy::new(assets.load("analogies/concrete.analogy.ron"));
 ///     commands.spawn((wall, CrackSurface::new(CrackPreset::CONCRETE), analogy));
 /// }
-/// bevy::ecs::system::assert_is_system(setup);
+///
+/// fn bar(analogies: Query<&AnalogyProgress, Changed<AnalogyProgress>>) {
+///     for AnalogyProgress(share) in &analogies {
+///         info!("{:.0} % done", 100.0 * share);
+///     }
+/// }
+///
+/// fn made(made: On<AnalogyMade>, mut commands: Commands) {
+///     commands.entity(made.entity).insert(Visibility::Visible);
+/// }
+///
+/// fn failed(failed: On<AnalogyFailed>) {
+///     warn!("{} keeps its look: {}", failed.entity, failed.error);
+/// }
+///
+/// // All of the wall in the material of the photographs.
+/// let analogy = CrackAnalogy::new(Handle::default()).with_their_material().with_seed(3);
+/// assert!(!analogy.keeps_picture);
+/// # bevy::ecs::system::assert_is_system(setup);
+/// # bevy::ecs::system::assert_is_system(bar);
+/// # let mut world = World::new();
+/// # world.add_observer(made);
+/// # world.add_observer(failed);
 /// ```
 #[derive(Component, Reflect, Clone, Debug, PartialEq)]
 #[type_path = "bevy_crack"]
@@ -48,7 +70,7 @@ pub struct CrackAnalogy {
     /// Whether the surface keeps its own picture away from its cracks, texel for texel. If false it takes the material of
     /// the photographs everywhere. Default true.
     pub keeps_picture: bool,
-    /// Seed of the search.
+    /// Seed of the search. Default 0.
     pub seed: u64,
 }
 
@@ -159,11 +181,16 @@ impl AnalogyExamples {
     /// Those of [`Examples::new`].
     ///
     /// ```
-    /// use bevy_crack::{paint::analogy::{AnalogyPair, AnalogyParams}, plugin::AnalogyExamples};
+    /// use bevy_crack::{Grid, paint::analogy::{AnalogyPair, AnalogyParams}, plugin::AnalogyExamples};
     ///
     /// let photo: Vec<u8> = (0..1024).flat_map(|i| if i % 32 == 12 { [20, 20, 20, 255] } else { [200, 200, 200, 255] }).collect();
     /// let pair = AnalogyPair::from_darkness([32, 32].into(), &photo, 0.2)?;
     /// let examples = AnalogyExamples::new(vec![pair], &AnalogyParams::DEFAULT)?;
+    /// assert_eq!((examples.pairs().len(), examples.params()), (1, &AnalogyParams::DEFAULT));
+    /// // With the normals of the photograph, which is even here.
+    /// let even = Grid::new([32, 32].into(), [128, 128, 255, 255]);
+    /// let examples = examples.with_normals(vec![even])?;
+    /// assert!(examples.with_normals(vec![]).is_err());
     /// # Ok::<(), bevy_crack::paint::analogy::AnalogyError>(())
     /// ```
     pub fn new(pairs: Vec<AnalogyPair>, params: &AnalogyParams) -> Result<Self, AnalogyError> {

@@ -6,6 +6,31 @@ use core::time::Duration;
 /// What all surfaces together may cost.
 ///
 /// A clock decides only *when* something happens, never *what*: the cracks of a surface are the same on a slow machine.
+///
+/// ```
+/// use bevy::{image::TextureAtlasLayout, prelude::*};
+/// use bevy_crack::{plugin::CrackUploadStats, prelude::*};
+///
+/// // A game without a window, as in tests. It may take any time for a frame.
+/// let mut app = App::new();
+/// app.add_plugins((MinimalPlugins, TransformPlugin, AssetPlugin::default(), ImagePlugin::default(), CrackPlugins))
+///     .init_asset::<TextureAtlasLayout>()
+///     .init_asset::<Mesh>()
+///     .init_asset::<ColorMaterial>()
+///     .insert_resource(CrackBudget { milliseconds: 1e6, ..default() });
+/// app.finish();
+/// app.cleanup();
+///
+/// let pane = (Sprite::from_color(Color::WHITE, Vec2::splat(64.0)), CrackSurface::new(CrackPreset::GLASS));
+/// let pane = app.world_mut().spawn(pane).id();
+/// app.world_mut().trigger(CrackHit::uv(pane, Vec2::splat(0.5)));
+/// app.world_mut().trigger(CrackHit::uv(pane, Vec2::splat(7.0)));
+/// app.update();
+/// let stats = app.world().resource::<CrackStats>();
+/// assert_eq!((stats.sent, stats.applied, stats.rejected), (2, 1, 1));
+/// // Nothing goes to a GPU that is not there.
+/// assert_eq!(*app.world().resource::<CrackUploadStats>(), CrackUploadStats::default());
+/// ```
 #[derive(Resource, Reflect, Clone, Debug, PartialEq)]
 #[type_path = "bevy_crack"]
 #[reflect(Resource, Default)]

@@ -27,6 +27,13 @@ use bevy::prelude::*;
 ///         CrackChips::default(),
 ///     ));
 /// }
+///
+/// /// A light clatter where chips come off.
+/// fn clatter(chips: Query<&CrackChip, Added<CrackChip>>) {
+///     for chip in &chips {
+///         info!("a chip of {}", chip.surface);
+///     }
+/// }
 /// ```
 #[derive(Component, Reflect, Clone, Debug, PartialEq)]
 #[type_path = "bevy_crack"]
@@ -34,7 +41,8 @@ use bevy::prelude::*;
 pub struct CrackChips {
     /// About how many come off at a hit of energy 1; more by the root of the energy, 64 at the most. 0..=64; default 12.
     pub count: u32,
-    /// How they fly. A hit that goes into the surface throws them back.
+    /// How they fly. A hit that goes into the surface throws them back. Default: at once, slower and shorter than
+    /// [`BurstParams::DEFAULT`].
     pub burst: BurstParams,
     /// Whose down they fall. Default: the world's.
     pub gravity: GravitySpace,

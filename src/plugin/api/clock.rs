@@ -27,16 +27,22 @@ use bevy::prelude::*;
 ///         clock.set_if_neq(CrackClock::value(1.0 - health.0));
 ///     }
 /// }
+///
+/// // Twice as fast and backwards; the same, but it waits at the end of the third step.
+/// let backwards = CrackClock::speed(-2.0);
+/// assert_eq!((backwards.drive, backwards.paused), (CrackDrive::Speed(-2.0), false));
+/// let waiting = CrackClock { paused: true, seek: Some(3.0), ..backwards };
+/// # let _ = waiting;
 /// ```
 #[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq)]
 #[type_path = "bevy_crack"]
 #[reflect(Component, Default)]
 pub struct CrackClock {
-    /// What makes time pass.
+    /// What makes time pass. Default: as without a clock, [`CrackDrive::Speed`] of 1.
     pub drive: CrackDrive,
-    /// Whether time stands still. Growth stands still as well then.
+    /// Whether time stands still. Growth stands still as well then. Default false.
     pub paused: bool,
-    /// Where time is to jump to, steps, also when paused; `None` again when it has. What lies beyond the end is grown as fast as the
+    /// Where time is to jump to, steps, also when paused; `None` (default) again when it has. What lies beyond the end is grown as fast as the
     /// budget allows until the cracks come to their end: infinity jumps there. Not a number = no jump. A
     /// [`CrackDrive::Value`] that is not paused has the last word.
     pub seek: Option<f32>,

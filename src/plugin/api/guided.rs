@@ -38,13 +38,13 @@ use std::sync::Arc;
 #[reflect(Component, Default, Clone, Debug, PartialEq)]
 #[require(BakeProgress)]
 pub struct GuidedCracks {
-    /// The pictures that the cracks follow, at most 64; none = cracks of plain mud or pavement.
+    /// The pictures that the cracks follow, at most 64; none (default) = cracks of plain mud or pavement.
     pub guides: Vec<CrackGuide>,
-    /// Sites, their layout, levels, noise and widths.
+    /// Sites, their layout, levels, noise and widths. Default: [`VoronoiParams::DEFAULT`]; [`new`](Self::new) lays out sites in pairs.
     pub params: VoronoiParams,
-    /// Seed of the sites and the noise.
+    /// Seed of the sites and the noise. Default 0.
     pub seed: u64,
-    /// How the cracks come when the bake is done.
+    /// How the cracks come when the bake is done. Default: at once.
     pub appearance: GuidedAppearance,
     /// Longer side of the map, texels; 0 counts as 1; default 1024. The map has the surface's own size if that is smaller; its
     /// cracks are lines, as sharp as the surface's textures in any case. A map takes some 12 bytes a texel.
@@ -134,6 +134,19 @@ impl Default for GuidedCracks {
 }
 
 /// One picture that cracks follow.
+///
+/// ```
+/// use bevy_crack::{Grid, plugin::{CrackGuide, GuideSource, GuidedCracks}};
+///
+/// // A picture of one's own, and more faintly what the surface shows anyway.
+/// let mut cross = Grid::new([9, 9].into(), 0.0);
+/// cross.row_mut(4).fill(1.0);
+/// (0..9).for_each(|y| cross.row_mut(y)[4] = 1.0);
+/// let guides = vec![CrackGuide::new(cross), CrackGuide::own_edges().with_gamma(8.0)];
+/// assert!(matches!(guides[0].source, GuideSource::Grid(_)));
+/// assert_eq!((guides[1].source.clone(), guides[1].gamma), (GuideSource::OwnEdges, 8.0));
+/// assert!(GuidedCracks { guides, ..GuidedCracks::default() }.with_seed(3).validate().is_ok());
+/// ```
 #[derive(Reflect, Clone, Debug, PartialEq)]
 #[type_path = "bevy_crack"]
 #[reflect(Clone, Debug, PartialEq)]
@@ -269,6 +282,14 @@ pub enum GuidedAppearance {
 
 impl GuidedAppearance {
     /// The time that it takes, seconds; `None` = at once.
+    ///
+    /// ```
+    /// use bevy_crack::plugin::GuidedAppearance;
+    ///
+    /// assert_eq!(GuidedAppearance::Widen { seconds: 3.0 }.seconds(), Some(3.0));
+    /// assert_eq!(GuidedAppearance::Widen { seconds: -1.0 }.seconds(), None);
+    /// assert_eq!(GuidedAppearance::AtOnce.seconds(), None);
+    /// ```
     #[must_use]
     pub fn seconds(&self) -> Option<f32> {
         match *self {
@@ -285,6 +306,25 @@ impl GuidedAppearance {
 /// How far the bake of a [`GuidedCracks`] is: 0 while its pictures load, 1 when its cracks are on the surface, and as long as they are,
 /// without the component as well. Falls only when a new bake begins, or to 0 when one is cancelled or the surface is healed. Written by the
 /// crate.
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_crack::prelude::*;
+///
+/// fn bar(bakes: Query<&BakeProgress, Changed<BakeProgress>>) {
+///     for BakeProgress(share) in &bakes {
+///         info!("{:.0} % done", 100.0 * share);
+///     }
+/// }
+///
+/// fn baked(baked: On<CrackBaked>) {
+///     if let Some(share) = baked.covered {
+///         info!("{:.0} % of the strokes have become cracks", 100.0 * share);
+///     }
+/// }
+/// # bevy::ecs::system::assert_is_system(bar);
+/// # World::new().add_observer(baked);
+/// ```
 #[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq)]
 #[type_path = "bevy_crack"]
 #[reflect(Component, Default)]

@@ -13,6 +13,14 @@ use bevy::prelude::*;
 ///         hits.write(CrackHit::uv(wall, Vec2::splat(0.5)).with_energy(1.5));
 ///     }
 /// }
+///
+/// /// A bullet that comes from the right.
+/// fn shoot(In((wall, point)): In<(Entity, Vec3)>, mut commands: Commands) {
+///     commands.trigger(CrackHit::world(wall, point).with_direction(Vec3::NEG_X));
+/// }
+///
+/// let hit = CrackHit::local(Entity::PLACEHOLDER, Vec3::ZERO);
+/// assert_eq!((hit.at, hit.energy, hit.direction), (HitPoint::Local(Vec3::ZERO), 1.0, Vec3::ZERO));
 /// ```
 #[derive(EntityEvent, Message, Reflect, Clone, Copy, Debug, PartialEq)]
 #[type_path = "bevy_crack"]

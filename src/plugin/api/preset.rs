@@ -31,6 +31,18 @@ pub enum PresetSource {
 
 impl PresetSource {
     /// The preset, to change it; `None` if it is an asset.
+    ///
+    /// ```
+    /// use bevy::prelude::*;
+    /// use bevy_crack::prelude::*;
+    ///
+    /// let mut surface = CrackSurface::new(CrackPreset::GLASS);
+    /// if let Some(preset) = surface.preset.as_mut() {
+    ///     preset.growth.reach = 0.3;
+    /// }
+    /// assert_eq!(surface.preset.as_mut().map(|preset| preset.growth.reach), Some(0.3));
+    /// assert_eq!(PresetSource::Asset(Handle::default()).as_mut(), None);
+    /// ```
     #[must_use]
     pub const fn as_mut(&mut self) -> Option<&mut CrackPreset> {
         match self {

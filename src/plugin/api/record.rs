@@ -95,6 +95,18 @@ impl CrackRecord {
     }
 
     /// Its hits: places (pattern units) and energies, in order.
+    ///
+    /// ```
+    /// use bevy::prelude::*;
+    /// use bevy_crack::{growth::PastEvent, prelude::*};
+    ///
+    /// let mut record = CrackRecord::default();
+    /// record.past.events = vec![PastEvent::Hit { after: 0, pos: Vec2::splat(0.5), energy: 2.0 }];
+    /// assert_eq!(record.hits().last(), Some((Vec2::splat(0.5), 2.0)));
+    /// assert!(record.validate().is_ok());
+    /// record.version += 1;
+    /// assert!(record.validate().is_err());
+    /// ```
     pub fn hits(&self) -> impl DoubleEndedIterator<Item = (Vec2, f32)> + '_ {
         self.past.events.iter().filter_map(|event| match event {
             PastEvent::Hit { pos, energy, .. } => Some((*pos, *energy)),

@@ -25,6 +25,30 @@ use bevy::prelude::*;
 ///     let relief = CrackRelief::rock_wall().with_size(UVec2::new(768, 512)).with_seed(3);
 ///     commands.spawn((wall, relief, CrackSurface::new(CrackPreset::CONCRETE)));
 /// }
+///
+/// fn bar(reliefs: Query<&ReliefProgress, Changed<ReliefProgress>>) {
+///     for ReliefProgress(share) in &reliefs {
+///         info!("{:.0} % done", 100.0 * share);
+///     }
+/// }
+///
+/// fn made(made: On<ReliefMade>, mut commands: Commands) {
+///     commands.entity(made.entity).insert(Visibility::Visible);
+/// }
+///
+/// fn failed(failed: On<ReliefFailed>) {
+///     warn!("{} stays flat: {}", failed.entity, failed.error);
+/// }
+///
+/// // Landscapes for meshes in 3D. The cracks of the second one keep to its cliffs.
+/// let island = CrackRelief::island().with_displacement(1.0);
+/// let mountain = CrackRelief::mountain().with_displacement(1.5).with_steep_cracks(1.0);
+/// assert!(island.validate().is_ok() && mountain.validate().is_ok());
+/// assert!(island.with_size(UVec2::ZERO).validate().is_err());
+/// # bevy::ecs::system::assert_is_system(bar);
+/// # let mut world = World::new();
+/// # world.add_observer(made);
+/// # world.add_observer(failed);
 /// ```
 #[derive(Component, Reflect, Clone, Debug, PartialEq)]
 #[type_path = "bevy_crack"]
@@ -35,7 +59,7 @@ pub struct CrackRelief {
     pub settings: ReliefSettings,
     /// Size of the textures, texels, 16..=4096 a side; default 1024 x 1024. It should have the proportions of the surface.
     pub size: UVec2,
-    /// Seed of everything that is random.
+    /// Seed of everything that is random. Default 0.
     pub seed: u64,
     /// For 3D meshes: how high the relief stands out of the surface, in units of its real height. Above 0 the mesh, which should be a
     /// rectangle that faces along z or y, is replaced by one of the relief. 0 = the mesh stays. 0..=16; default 0.

@@ -23,19 +23,23 @@ use bevy::prelude::*;
 ///         },
 ///     ));
 /// }
+///
+/// // Ordinary hits.
+/// let drum = CrackScript::new([(0.5, Vec2::new(0.3, 0.5)), (1.0, Vec2::new(0.7, 0.5))]);
+/// assert_eq!(drum.hits[1], ScriptedHit { at: 1.0, uv: Vec2::new(0.7, 0.5), energy: 1.0, direction: Vec3::ZERO });
 /// ```
 #[derive(Component, Reflect, Clone, Debug, Default, PartialEq)]
 #[type_path = "bevy_crack"]
 #[reflect(Component, Default, Clone, Debug, PartialEq)]
 pub struct CrackScript {
-    /// The hits, in any order.
+    /// The hits, in any order; default none.
     pub hits: Vec<ScriptedHit>,
     /// When all of the surface that nothing holds falls, seconds; `None` (default) = never. See
     /// [`ShatterCracks`](super::ShatterCracks).
     pub shatter_at: Option<f32>,
     /// When the surface is healed and the script begins again, seconds; `None` (default) = never.
     pub repeat_after: Option<f32>,
-    /// Seconds that have passed.
+    /// Seconds that have passed; default 0.
     pub time: f32,
 }
 
@@ -44,7 +48,7 @@ pub struct CrackScript {
 #[type_path = "bevy_crack"]
 #[reflect(Default, Clone, Debug, PartialEq)]
 pub struct ScriptedHit {
-    /// When it comes, seconds; a time that is not a number or below zero never comes.
+    /// When it comes, seconds; a time that is not a number or below zero never comes; default 0.
     pub at: f32,
     /// Where, texture coordinates, 0..=1, v down; default the middle.
     pub uv: Vec2,

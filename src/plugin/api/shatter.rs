@@ -43,12 +43,12 @@ use std::sync::Arc;
 #[type_path = "bevy_crack"]
 #[reflect(Component, Default, SerializeWithRegistry)]
 pub struct ShatterCracks {
-    /// When shards fall by themselves.
+    /// When shards fall by themselves. Default: never.
     pub when: ShatterWhen,
     /// How far around the hit shards are knocked out when they fall by themselves, pattern units, 0..=64 (the surface's shorter side is
     /// 1); infinite as in [`ShatterRequest::EVERYTHING`]. Default: 64, everywhere.
     pub reach: f32,
-    /// How lines become shards.
+    /// How lines become shards. Default: [`ShatterParams::DEFAULT`].
     pub cut: ShatterParams,
     /// What holds the surface: shards along it stay unless they are hit themselves. Default: the border, as a pane in its frame.
     pub anchor: Anchor,
@@ -56,7 +56,7 @@ pub struct ShatterCracks {
     /// as it is stored, times alpha. `None` (default) = nothing. It must be loaded, and readable on the CPU, when the surface shatters. Not for
     /// bodies.
     pub anchor_mask: Option<Handle<Image>>,
-    /// How shards fly.
+    /// How shards fly. Default: [`BurstParams::DEFAULT`].
     pub burst: BurstParams,
     /// Whose down they fall. Default: the world's.
     pub gravity: GravitySpace,
@@ -69,7 +69,7 @@ pub struct ShatterCracks {
     /// Seconds of the shards for each second of the app's [`Time`]; default 1. 0 = they stand still; below zero time runs backwards,
     /// each shard returns to its place and is part of the surface again. Not finite = 0.
     pub speed: f32,
-    /// Where the shards' time is to jump to, seconds since the surface broke; `None` again when it has. Below zero and not a number
+    /// Where the shards' time is to jump to, seconds since the surface broke; `None` (default) again when it has. Below zero and not a number
     /// = 0.
     pub seek: Option<f32>,
     /// How pieces break again on their way, where the crate moves them; `None` (default) = they stay whole. Fragments are shards as all
@@ -82,7 +82,7 @@ pub struct ShatterCracks {
     /// How their rims look; `None` (default) = by the preset: [`RimLook::GLASS`] where cracks are frosted,
     /// [`RimLook::PLAIN`] where they are drawn as in a cartoon, else [`RimLook::STONE`].
     pub rim: Option<RimLook>,
-    /// What the sides of 3D shards look like; `None` = the mean colour of the picture, darker, or like the edge of a pane where the rim
+    /// What the sides of 3D shards look like; `None` (default) = the mean colour of the picture, darker, or like the edge of a pane where the rim
     /// is bright.
     #[cfg(feature = "3d")]
     pub inside: Option<Handle<StandardMaterial>>,
@@ -112,6 +112,16 @@ impl Default for ShatterCracks {
 }
 
 /// In which axes [`BurstParams::gravity`] is meant.
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_crack::{prelude::*, shatter::BurstParams};
+///
+/// // A floor that is seen from above: pieces slide apart, and nothing pulls them down the picture.
+/// let burst = BurstParams { gravity: Vec2::ZERO, drag: 3.0, ..default() };
+/// let floor = ShatterCracks { gravity: GravitySpace::Surface, burst, ..default() };
+/// # let _ = floor;
+/// ```
 #[derive(Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[type_path = "bevy_crack"]
 #[reflect(Default)]
@@ -142,7 +152,18 @@ pub enum ShatterWhen {
     CellsAsTheyClose,
 }
 
-/// What [`shatter_cracks`](crate::plugin::CrackCommandsExt::shatter_cracks) is to knock out of a surface.
+/// What [`shatter_cracks`](crate::plugin::CrackCommandsExt::shatter_cracks) is to knock out of a surface; by default
+/// [`ALL`](Self::ALL).
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_crack::plugin::ShatterRequest;
+///
+/// // A kick at the lower edge.
+/// let kick = ShatterRequest::around(Vec2::new(0.5, 0.9), 0.2).with_energy(4.0);
+/// assert!(kick.validate().is_ok() && ShatterRequest::EVERYTHING.validate().is_ok());
+/// assert!(ShatterRequest { reach: -1.0, ..kick }.validate().is_err());
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShatterRequest {
     /// Where the blow lands, texture coordinates of the surface's picture or sprite frame, 0..=1, v down; from beside it no further than
@@ -218,6 +239,41 @@ impl Default for ShatterRequest {
 /// was made for it.
 ///
 /// With [`ShatterCracks::fly`] off, this is what a physics engine needs: colliders, mass and the velocity of the blow.
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_crack::{plugin::ShardsError, prelude::*};
+///
+/// /// Hands shards over to a physics engine.
+/// fn embody(shattered: On<Shattered>, shards: Query<&Shard>) {
+///     for shard in shards.iter_many(&shattered.shards) {
+///         let (colliders, mass) = (shard.convex_pieces(0.004), 2.5 * shard.area());
+///         info!("{} colliders, mass {mass}, {} units a second", colliders.len(), shard.velocity);
+///     }
+/// }
+///
+/// fn refused(failed: On<ShatterFailed>) {
+///     match &failed.error {
+///         ShardsError::NoDiffuse => warn!("{} has no texture for holes", failed.entity),
+///         error => warn!("{} stays whole: {error}", failed.entity),
+///     }
+/// }
+///
+/// fn count(walls: Query<&CrackShards, Changed<CrackShards>>) {
+///     for shards in &walls {
+///         info!("{} of {} pieces are out of their places", shards.gone, shards.pieces.len());
+///     }
+/// }
+///
+/// fn mended(mended: On<Reassembled>, mut commands: Commands) {
+///     commands.entity(mended.entity).heal_cracks();
+/// }
+/// # bevy::ecs::system::assert_is_system(count);
+/// # let mut world = World::new();
+/// # world.add_observer(embody);
+/// # world.add_observer(refused);
+/// # world.add_observer(mended);
+/// ```
 #[derive(Component, Reflect, Clone, Debug)]
 #[type_path = "bevy_crack"]
 #[reflect(Component, Clone, Debug, Default)]

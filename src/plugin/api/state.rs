@@ -7,6 +7,52 @@ use bevy::prelude::*;
 ///
 /// Damage, time, tips and the end are written in [`CrackSystems::Paint`](super::CrackSystems::Paint), the status also in the sets before it, all
 /// in `PostUpdate`: a system in `Update` reads what was so at the end of the frame before. Healing sets it back at once.
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_crack::prelude::*;
+///
+/// fn describe(walls: Query<(NameOrEntity, &CrackState)>) {
+///     for (wall, state) in &walls {
+///         match &state.status {
+///             CrackStatus::Untouched | CrackStatus::Waiting => {}
+///             CrackStatus::Growing => info!("{wall} cracks in {} places", state.tips.len()),
+///             CrackStatus::Done => info!("{wall}: {:.0} % damage", 100.0 * state.damage),
+///             CrackStatus::Failed(error) => warn!("{wall} cannot crack: {error}"),
+///         }
+///     }
+/// }
+///
+/// /// The sound of the longest crack of this frame.
+/// fn creak(walls: Query<&CrackState>) {
+///     let tips = walls.iter().flat_map(|state| &state.tips);
+///     if let Some(CrackTip { length, .. }) = tips.max_by(|a, b| a.length.total_cmp(&b.length)) {
+///         info!("{length} pattern units");
+///     }
+/// }
+///
+/// // The same as events.
+/// fn cut_out(cell: On<CellClosed>) {
+///     info!("a piece of {} pattern units squared is loose in {}", cell.area, cell.entity);
+/// }
+///
+/// fn finished(finished: On<CrackFinished>, mut commands: Commands) {
+///     commands.entity(finished.entity).close_cracks(5.0);
+/// }
+///
+/// fn failed(failed: On<CrackFailed>) {
+///     match &failed.error {
+///         CrackError::TextureBudget { needed, left } => warn!("{needed} bytes, {left} are left"),
+///         error => error!("{} cannot crack: {error}", failed.entity),
+///     }
+/// }
+/// # bevy::ecs::system::assert_is_system(describe);
+/// # bevy::ecs::system::assert_is_system(creak);
+/// # let mut world = World::new();
+/// # world.add_observer(cut_out);
+/// # world.add_observer(finished);
+/// # world.add_observer(failed);
+/// ```
 #[derive(Component, Reflect, Clone, Debug, Default, PartialEq)]
 #[type_path = "bevy_crack"]
 #[reflect(Component, Default)]

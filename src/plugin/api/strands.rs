@@ -31,24 +31,36 @@ use bevy::{prelude::*, reflect::serde::ReflectSerializeWithRegistry};
 #[reflect(Component, Default, Clone, Debug, PartialEq, SerializeWithRegistry)]
 #[require(BakeProgress)]
 pub struct CrackStrands {
-    /// Where strands start, on the surface; at most [`MAX_STARTS`](crate::strands::MAX_STARTS). None = at the first point of the
+    /// Where strands start, on the surface; at most [`MAX_STARTS`](crate::strands::MAX_STARTS). None (default) = at the first point of the
     /// line, or at the center of the field.
     pub starts: Vec<HitPoint>,
-    /// The directions in which they run.
+    /// The directions in which they run. Default: away from the middle.
     pub field: StrandField,
     /// Noise, inertia, branches, distances and widths; default [`StrandParams::ASPHALT`].
     pub params: StrandParams,
     /// Images of cracks to be joined along the strands, dark on light: at most 64, at most 1024 texels a side, readable on the CPU.
-    /// See [`Primitive::from_image`](crate::strands::Primitive::from_image). None = those of [`StrandParams::material`].
+    /// See [`Primitive::from_image`](crate::strands::Primitive::from_image). None (default) = those of [`StrandParams::material`].
     pub primitives: Vec<Handle<Image>>,
-    /// Seed of the noise and of the choice of primitives.
+    /// Seed of the noise and of the choice of primitives. Default 0.
     pub seed: u64,
-    /// Seconds until all of them are there, up to 1e6. Not a number, zero or below: at once. On a surface that has been hit before they
+    /// Seconds until all of them are there, up to 1e6; default 0. Not a number, zero or below: at once. On a surface that has been hit before they
     /// come at once.
     pub seconds: f32,
 }
 
 /// The directions of [`CrackStrands`], before noise turns them.
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_crack::prelude::*;
+///
+/// // Three cracks that run down from the upper edge, and one that winds out from the middle.
+/// let starts = [0.2, 0.5, 0.8].map(|u| HitPoint::Uv(Vec2::new(u, 0.0)));
+/// let down = CrackStrands::new(starts, StrandField::Linear(Vec2::Y)).with_seed(3);
+/// let middle = HitPoint::Uv(Vec2::splat(0.5));
+/// let whirl = CrackStrands::new([], StrandField::Swirl { center: middle, turn: 1.2 });
+/// assert!(down.validate().is_ok() && whirl.validate().is_ok());
+/// ```
 #[derive(Reflect, Clone, Debug, PartialEq)]
 #[type_path = "bevy_crack"]
 #[reflect(Clone, Debug, PartialEq, SerializeWithRegistry)]

@@ -23,19 +23,43 @@ use bevy::{prelude::*, reflect::serde::ReflectSerializeWithRegistry};
 /// coordinates while it is cracked. A face is what hangs together in the texture coordinates, or a side of a box. Where a face shows a part of the
 /// picture twice itself, where the picture repeats, faces share vertices, or there are more than 65,536 triangles, the mesh stays as it is, and cracks
 /// show wherever their place of the picture does.
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_crack::prelude::*;
+///
+/// fn setup(mut commands: Commands, assets: Res<AssetServer>) {
+///     // Most cracks where the first image is light, none where the second one is. There is no use for its normals.
+///     let wall = CrackSurface::new(CrackPreset::PLASTER)
+///         .with_seed(3)
+///         .with_density(assets.load("density.png"))
+///         .with_mask(CrackMaskSource::Images { weak: None, strong: None, forbidden: Some(assets.load("frame.png")) })
+///         .with_maps(CrackMaps { normal: false, ..default() });
+///     commands.spawn((Sprite::from_image(assets.load("wall.png")), wall));
+///     // A coin is small.
+///     let coin = CrackSurface::new(CrackPreset::GLASS).with_resolution(CrackResolution::Fixed(UVec2::splat(64)));
+///     commands.spawn((Sprite::from_image(assets.load("coin.png")), coin));
+/// }
+///
+/// // A large vase, to be laid out flat in any case.
+/// let vase = CrackSurface::new(CrackPreset::CLAY).with_unwrap(CrackUnwrap::Always);
+/// assert_eq!((vase.mask, vase.write), (CrackMaskSource::Auto, CrackMaps::default()));
+/// # bevy::ecs::system::assert_is_system(setup);
+/// ```
 #[derive(Component, Reflect, Clone, Debug, PartialEq)]
 #[type_path = "bevy_crack"]
 #[reflect(Component, Default, SerializeWithRegistry)]
 #[require(CrackState)]
 pub struct CrackSurface {
     /// How cracks grow and look, here or in a file. A changed look and profile show on all cracks at once, changed growth on what
-    /// grows from then on; invalid changes are refused with one warning.
+    /// grows from then on; invalid changes are refused with one warning. Default: [`CrackPreset::CONCRETE`](crate::CrackPreset::CONCRETE).
     pub preset: PresetSource,
-    /// Seed of the pattern. A change takes effect after healing.
+    /// Seed of the pattern; default 0. A change takes effect after healing.
     pub seed: u64,
-    /// Size of the textures. A change takes effect when they are made again: after healing, or with another picture.
+    /// Size of the textures; default [`Picture`](CrackResolution::Picture). A change takes effect when they are made again: after healing, or with
+    /// another picture.
     pub resolution: CrackResolution,
-    /// Which maps are written. A change takes effect as one of `resolution`.
+    /// Which maps are written; default all. A change takes effect as one of `resolution`.
     pub write: CrackMaps,
     /// Whether transparent texels refuse hits and attract no cracks; default true.
     pub alpha_mask: bool,
@@ -46,8 +70,8 @@ pub struct CrackSurface {
     /// there (lightness as it is stored, times alpha). `None` (default) = everywhere alike. The first hit waits until it is loaded. A change takes
     /// effect as one of `resolution`.
     pub density: Option<Handle<Image>>,
-    /// Whether a 3D mesh is laid out flat around its first hit, so that cracks run over its edges and around its curves. A change takes effect
-    /// after healing.
+    /// Whether a 3D mesh is laid out flat around its first hit, so that cracks run over its edges and around its curves; default
+    /// [`Auto`](CrackUnwrap::Auto). A change takes effect after healing.
     pub unwrap: CrackUnwrap,
     /// Whether the textures have mip levels. A change takes effect as one of `resolution`.
     pub mips: CrackMips,
@@ -197,7 +221,7 @@ pub enum CrackResolution {
     Fixed(UVec2),
 }
 
-/// Which maps of a surface are written.
+/// Which maps of a surface are written; by default all of them.
 ///
 /// With a look that [glows](crate::paint::Look::glow) when a surface first cracks, 3D meshes whose material has no emissive picture of its own get an
 /// emissive map as well.

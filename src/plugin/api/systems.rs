@@ -3,6 +3,20 @@
 use bevy::prelude::*;
 
 /// The stages of a frame, in order, in `PostUpdate`, all but the first after transforms are propagated and before asset events.
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_crack::prelude::*;
+///
+/// /// Dust in the frame of the crack, not in the one after it.
+/// fn dust(walls: Query<&CrackState, Changed<CrackState>>) {
+///     for state in &walls {
+///         info!("{} tips", state.tips.len());
+///     }
+/// }
+///
+/// App::new().add_plugins(CrackPlugins).add_systems(PostUpdate, dust.after(CrackSystems::Paint));
+/// ```
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum CrackSystems {
     /// After this set, which comes before transforms are propagated, shards are where they belong in this frame.

@@ -5,6 +5,22 @@ use crate::paint::Look;
 use bevy::prelude::*;
 
 /// The private textures of a cracked surface, for materials of your own. Written by the crate, gone after healing.
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_crack::prelude::*;
+///
+/// /// Tells a material of one's own what to show.
+/// fn show(walls: Query<(Entity, &CrackTextures), Changed<CrackTextures>>) {
+///     for (wall, textures) in &walls {
+///         info!("{wall} shows {:?}, one of {} textures", textures.diffuse, textures.handles().count());
+///     }
+/// }
+///
+/// let textures = CrackTextures { diffuse: Some(Handle::default()), ..default() };
+/// assert!(textures.handles().eq(textures.diffuse.iter()));
+/// # bevy::ecs::system::assert_is_system(show);
+/// ```
 #[derive(Component, Reflect, Clone, Debug, Default, PartialEq)]
 #[type_path = "bevy_crack"]
 #[reflect(Component, Default)]

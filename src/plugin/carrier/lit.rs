@@ -19,17 +19,42 @@ use bevy::{
 pub const MAX_LIGHTS: usize = 4;
 
 /// A picture on a `Mesh2d`, lit by up to [`MAX_LIGHTS`] [`CrackLight2d`].
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_crack::{plugin::CrackLitUniform, prelude::*};
+///
+/// fn setup(
+///     mut commands: Commands,
+///     assets: Res<AssetServer>,
+///     mut meshes: ResMut<Assets<Mesh>>,
+///     mut materials: ResMut<Assets<CrackLitMaterial>>,
+/// ) {
+///     // A wall at night, and a lamp above it.
+///     let wall = CrackLitMaterial::new(assets.load("wall.png")).with_ambient(LinearRgba::rgb(0.02, 0.02, 0.05));
+///     commands.spawn((
+///         Mesh2d(meshes.add(Rectangle::new(400.0, 400.0))),
+///         MeshMaterial2d(materials.add(wall)),
+///         CrackSurface::new(CrackPreset::CONCRETE),
+///     ));
+///     commands.spawn((CrackLight2d { range: 300.0, ..default() }, Transform::from_xyz(-80.0, 160.0, 0.0)));
+/// }
+///
+/// let CrackLitUniform { ambient, tint, .. } = CrackLitMaterial::default().with_ambient(LinearRgba::WHITE).lit;
+/// assert_eq!((ambient, tint), (Vec4::ONE, Vec4::ONE));
+/// # bevy::ecs::system::assert_is_system(setup);
+/// ```
 #[derive(Asset, AsBindGroup, Reflect, Clone, Debug)]
 #[reflect(Default)]
 pub struct CrackLitMaterial {
     /// Lights, ambient light and tint. The lights are written by the crate.
     #[uniform(0)]
     pub lit: CrackLitUniform,
-    /// The picture; `None` = white.
+    /// The picture; `None` (default) = white.
     #[texture(1)]
     #[sampler(2)]
     pub diffuse: Option<Handle<Image>>,
-    /// Tangent-space normals, +Y up, linear; `None` = even.
+    /// Tangent-space normals, +Y up, linear; `None` (default) = even.
     #[texture(3)]
     #[sampler(4)]
     pub normal: Option<Handle<Image>>,
@@ -64,9 +89,9 @@ pub struct CrackLitUniform {
     pub position: [Vec4; MAX_LIGHTS],
     /// Colours of the lights, linear, times intensity.
     pub color: [Vec4; MAX_LIGHTS],
-    /// Light that is everywhere, linear.
+    /// Light that is everywhere, linear; 0.2 in a new material.
     pub ambient: Vec4,
-    /// Colour that the picture is multiplied with, linear.
+    /// Colour that the picture is multiplied with, linear; white in a new material.
     pub tint: Vec4,
 }
 
@@ -132,13 +157,13 @@ impl MaterialSlot for MeshMaterial2d<CrackLitMaterial> {
 #[reflect(Component, Default)]
 #[require(Transform)]
 pub struct CrackLight2d {
-    /// Colour.
+    /// Colour; default white.
     pub color: Color,
-    /// Brightness right below it; 1 shows the picture as it is.
+    /// Brightness right below it; 1 shows the picture as it is. 0 or more; default 1.5.
     pub intensity: f32,
-    /// How far it reaches, world units.
+    /// How far it reaches, world units, 0 or more; default 600.
     pub range: f32,
-    /// How far it is in front of the entity, world units. Low light shows cracks best.
+    /// How far it is in front of the entity, world units; default 80. Low light shows cracks best.
     pub height: f32,
 }
 

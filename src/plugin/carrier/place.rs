@@ -26,8 +26,8 @@ pub struct CrackPlace {
 /// fn dust(walls: Query<(Entity, &CrackState)>, places: CrackPlaces, mut commands: Commands) {
 ///     for (wall, state) in &walls {
 ///         for tip in &state.tips {
-///             if let Some(place) = places.at(wall, tip.uv) {
-///                 commands.spawn(Transform::from_translation(place.position + 0.1 * place.normal));
+///             if let Some(CrackPlace { position, normal }) = places.at(wall, tip.uv) {
+///                 commands.spawn(Transform::from_translation(position + 0.1 * normal));
 ///             }
 ///         }
 ///     }

@@ -7,6 +7,24 @@ use crate::plugin::{
 use bevy::{ecs::system::EntityCommands, prelude::*};
 
 /// Commands for surfaces.
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_crack::prelude::*;
+///
+/// /// What becomes of the walls when a round is over.
+/// fn end_round(mut commands: Commands, walls: Query<(Entity, &CrackState)>) {
+///     for (wall, state) in &walls {
+///         let mut wall = commands.entity(wall);
+///         match state.damage {
+///             0.8.. => wall.shatter_cracks(ShatterRequest::EVERYTHING),
+///             0.2.. => wall.close_cracks(1.5),
+///             _ => wall.heal_cracks(),
+///         };
+///     }
+/// }
+/// # bevy::ecs::system::assert_is_system(end_round);
+/// ```
 pub trait CrackCommandsExt {
     /// Makes a surface ready for its first hit: for what is sure to be hit, while a level loads.
     ///

@@ -34,6 +34,32 @@ use plates::PlateField;
 
 /// The layers that a [`DepthField`](super::DepthField) holds in addition to depths.
 /// [`Look::layer`](crate::paint::Look::layer) returns the plan that a look needs.
+///
+/// ```
+/// use bevy_crack::{
+///     CrackPreset,
+///     growth::CrackGrowth,
+///     pattern::{Moment, SurfaceFrame},
+///     raster::{CrushedZone, DepthField, LayerPlan, Veil},
+/// };
+///
+/// let mut growth = CrackGrowth::new(CrackPreset::CLAY.growth, [1.0, 1.0].into(), 1)?;
+/// growth.hit([0.5, 0.5].into(), 1.0);
+/// while growth.step().grew() {}
+///
+/// // Plates, and crushed stone where the surface was hit; with a veil it would take a byte more.
+/// let plan = LayerPlan { plates: true, crushed: Some(CrushedZone::DEFAULT), ..LayerPlan::default() };
+/// let veiled = LayerPlan { veil: Some(Veil::DEFAULT), ..plan.clone() };
+/// assert_eq!((plan.bytes_per_texel(), veiled.bytes_per_texel()), (2, 3));
+/// let mut field = DepthField::new(SurfaceFrame::new([64, 64].into())?);
+/// field.set_layers(plan.clone());
+/// assert_eq!(field.plan(), &plan);
+/// let (network, timeline) = (growth.network(), growth.timeline());
+/// let mut changed = Vec::new();
+/// field.show_layers(network, timeline, Moment::after(timeline.end()), &mut changed);
+/// assert!(!changed.is_empty(), "these are to be painted");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LayerPlan {
     /// Whether to record which closed cell each texel lies in; default no.
