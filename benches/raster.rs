@@ -7,7 +7,7 @@ use bevy_crack::{
     CrackPreset,
     growth::CrackGrowth,
     math::{Rng, ops},
-    paint::{BaseTexels, Look, LookTable, PaintTargets, paint_into, paint_rects},
+    paint::{BaseTexels, Look, LookTable, MipLevels, PaintTargets, TexelKind, paint_into, paint_rects},
     pattern::{Moment, PathPoint, SegmentPath, SurfaceFrame},
     raster::{DepthField, DirtyTiles, Profile, TexelRect, stamp_path},
 };
@@ -192,5 +192,26 @@ fn craters(c: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, stamps, paints, dirty, craters);
+/// Mip levels that follow a rectangle, and the naive way: all of them made anew.
+fn mips(c: &mut Criterion) {
+    let mut group = c.benchmark_group("mips");
+    let size = UVec2::splat(1024);
+    for (name, kind) in [("color", TexelKind::Color), ("normal", TexelKind::Linear), ("depth", TexelKind::Single)] {
+        let levels = MipLevels::new(size, kind);
+        let mut rng = Rng::new(5);
+        let mut texels: Vec<u8> =
+            (0..levels.bytes()).map(|i| if i % 4 == 3 { 255 } else { rng.next_u32() as u8 }).collect();
+        for side in [16, 128, 1024] {
+            let min = UVec2::splat((size.x - side) / 2);
+            let rect = TexelRect { min, max: min + side };
+            group.throughput(Throughput::Elements(rect.area()));
+            group.bench_function(BenchmarkId::new(name, format!("{side}^2")), |b| {
+                b.iter(|| black_box(levels.update(&mut texels, &[rect])));
+            });
+        }
+    }
+    group.finish();
+}
+
+criterion_group!(benches, stamps, paints, dirty, craters, mips);
 criterion_main!(benches);

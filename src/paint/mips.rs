@@ -63,6 +63,12 @@ impl MipLevels {
         Self { size, kind }
     }
 
+    /// What its bytes mean.
+    #[must_use]
+    pub const fn kind(self) -> TexelKind {
+        self.kind
+    }
+
     /// How many levels there are, the texture itself included; at least 1.
     #[must_use]
     pub fn count(self) -> u32 {

@@ -131,17 +131,15 @@ fn mip_levels_on_the_gpu_equal_the_cpu_copy() {
             if app.world().get::<CrackTextures>(entity).is_none() {
                 continue;
             }
-            let shown = shown(&app, entity);
+            // What there was no time for is painted meanwhile.
+            let (before, drawn, after) = (shown(&app, entity), drawn(&mut app, &target), shown(&app, entity));
             let area = size.element_product() as usize * 4;
-            if shown.len() == area {
-                continue;
+            if before == after && before.len() > area {
+                let worst = difference(&drawn, &before[area * 5 / 4..][..area / 16]);
+                assert!(worst <= 1, "frame {frame} of {side}: {worst}");
+                checked += 1;
             }
-            let level = &shown[area * 5 / 4..][..area / 16];
-            let drawn = drawn(&mut app, &target);
-            let worst = difference(&drawn, level);
-            assert!(worst <= 1, "frame {frame} of {side}: {worst}");
-            checked += 1;
         }
-        assert!(checked > 30, "{checked}");
+        assert!(checked > 20, "{checked}");
     }
 }

@@ -186,7 +186,7 @@ impl FrameJob {
         let mut kinds = textures::KINDS.iter();
         self.staged = back.texels.each_ref().map(|texels| {
             let kind = kinds.next()?;
-            stager.stage(texels.as_ref()?, self.base.size, kind, &rects)
+            stager.stage(texels.as_ref()?, kind.levels(self.base.size), &rects)
         });
     }
 

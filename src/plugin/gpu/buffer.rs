@@ -1,7 +1,7 @@
 //! Memory that the GPU reads.
 
+use crate::paint::MipLevels;
 use crate::plugin::gpu::pack::{Memory, Place, ROW_ALIGNMENT, Source, Write};
-use crate::plugin::gpu::textures::TextureKind;
 use crate::raster::TexelRect;
 use bevy::{
     prelude::*,
@@ -140,10 +140,10 @@ impl Stager {
         is_same(&self.device, device)
     }
 
-    /// Parts of a texture of `size` texels, with what depends on them in its mip levels if it has any; `None` if there are none, they are not in it, or
+    /// Parts of a texture, with what depends on them in its mip levels if it has any; `None` if there are none, they are not in it, or
     /// the device has no buffer so large.
-    pub(crate) fn stage(&self, texels: &[u8], size: UVec2, kind: &TextureKind, rects: &[TexelRect]) -> Option<Staged> {
-        let (whole, levels) = (TexelRect::whole(size), kind.levels(size));
+    pub(crate) fn stage(&self, texels: &[u8], levels: MipLevels, rects: &[TexelRect]) -> Option<Staged> {
+        let (whole, texel) = (TexelRect::whole(levels.size(0)), levels.kind().bytes());
         let has_mips = texels.len() == levels.bytes();
         let has_all = has_mips || texels.len() == levels.range(0).end;
         if !has_all || rects.iter().any(|rect| rect.intersect(whole) != *rect) {
@@ -152,7 +152,7 @@ impl Stager {
         let above = if has_mips { levels.above(rects) } else { Vec::new() };
         let mut end = 0;
         let place = |(level, rect): (u32, TexelRect)| {
-            let row = rect.size().x as usize * kind.texel();
+            let row = rect.size().x as usize * texel;
             let place = Place { offset: end, pitch: row.next_multiple_of(ROW_ALIGNMENT), row };
             end += place.pitch * rect.size().y as usize;
             (level, rect, place)
@@ -165,7 +165,7 @@ impl Stager {
         let mut write = writer(&buffer, 0..end);
         for &(level, rect, place) in &parts {
             let (texels, width) = (&texels[levels.range(level)], levels.size(level).x as usize);
-            write(place, Source::new(texels, width, kind.texel(), rect));
+            write(place, Source::new(texels, width, texel, rect));
         }
         drop(write);
         buffer.unmap();

@@ -167,7 +167,7 @@ pub(crate) fn stage(texels: [Option<Vec<u8>>; MAPS], size: UVec2, stager: Option
     let mut kinds = KINDS.iter();
     texels.map(|texels| {
         let (kind, texels) = (kinds.next()?, texels?);
-        let staged = stager.and_then(|stager| stager.stage(&texels, size, kind, &[TexelRect::whole(size)]));
+        let staged = stager.and_then(|stager| stager.stage(&texels, kind.levels(size), &[TexelRect::whole(size)]));
         Some(Picture { texels, staged })
     })
 }
