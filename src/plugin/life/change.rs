@@ -519,6 +519,8 @@ mod tests {
             *image = blank(size);
             image.data.iter_mut().flatten().for_each(|value| *value = value.saturating_add(20));
         }
+        // The engine tells of it at the end of the frame.
+        app.update();
     }
 
     fn settle(app: &mut App, entity: Entity) {
