@@ -122,11 +122,17 @@ impl DepthField {
         Self { frame, depth, forbidden: None, layer: Layer::default(), correction: None }
     }
 
-    /// Moves the field out and leaves one without texels, on which nothing is drawn.
+    /// A field without texels, on which nothing is drawn.
+    #[cfg(feature = "bevy")]
+    pub(crate) fn without_texels(frame: SurfaceFrame) -> Self {
+        let depth = Grid::new(UVec2::ZERO, 0);
+        Self { frame, depth, forbidden: None, layer: Layer::default(), correction: None }
+    }
+
+    /// Moves the field out and leaves one without texels.
     #[cfg(feature = "bevy")]
     pub(crate) fn take(&mut self) -> Self {
-        let (frame, depth) = (self.frame, Grid::new(UVec2::ZERO, 0));
-        let empty = Self { frame, depth, forbidden: None, layer: Layer::default(), correction: None };
+        let empty = Self::without_texels(self.frame);
         std::mem::replace(self, empty)
     }
 

@@ -6,6 +6,7 @@ use super::work::{Bake, BakeJob, Baked, Work};
 use crate::growth::Past;
 use crate::plugin::api::{CrackClock, CrackError, CrackStatus, CrackStrands, CrackTextures, GuidedCracks};
 use crate::plugin::draw::async_playback::{self, AsyncPlayback};
+use crate::plugin::draw::next_picture;
 use crate::plugin::gpu::uploads::Uploads;
 use crate::plugin::jobs::background::drop_in_background;
 use crate::plugin::shards::broken::drop_shards;
@@ -174,6 +175,7 @@ fn settle(world: &mut World, entity: Entity, kind: Baked, plan: Plan, textures: 
 fn replace(world: &mut World, entity: Entity, kind: Baked, mut active: Box<Active>, mut finished: Finished) {
     let seconds = seconds(world, entity, kind);
     async_playback::stop(world, entity, &mut active);
+    next_picture::give_up(world, entity);
     // Shards are of the cells that were.
     drop_shards(world, entity, &mut active);
     let textures = active.canvas.textures.clone();
@@ -192,6 +194,7 @@ fn replace(world: &mut World, entity: Entity, kind: Baked, mut active: Box<Activ
         core::mem::replace(&mut active.cracks.added, added),
         pictures,
     );
+    active.drawing.is_stale = false;
     let is_untouched = order.past.is_empty();
     let shown_before = active.show_made(replay, seconds.filter(|_| is_untouched));
     active.resume(record.as_deref(), frozen);

@@ -251,7 +251,9 @@ impl FinishInputs {
         let size = self.rect.size();
         let end = size.y.min(row + (SLICE / size.x).max(1));
         let band = TexelRect { min: UVec2::new(0, row), max: UVec2::new(size.x, end) };
-        textures::paint_all(&self.base, None, &drawn.field, &drawn.look, &[band], self.rect.min, texels);
+        let slices = texels.each_mut().map(Option::as_deref_mut);
+        textures::paint(&self.base, None, &drawn.field, &drawn.look, &[band], self.rect.min, slices);
+        textures::update_mips(texels, self.base.size, &[band], self.rect.min);
         end
     }
 }

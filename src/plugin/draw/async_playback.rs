@@ -2,30 +2,29 @@
 
 use super::frame_job::{Back, FrameJob, Stage, TimelineSnapshot, gather};
 use super::report::report_painted;
+use super::running::{News, Running};
 use crate::growth::CrackGrowth;
 use crate::pattern::Moment;
 use crate::plugin::api::textures::MAPS;
 use crate::plugin::api::{CrackBudget, CrackState};
 use crate::plugin::gpu::buffer::Stager;
 use crate::plugin::gpu::uploads::Uploads;
-use crate::plugin::jobs::background::{BackgroundJob, drop_in_background, guarded};
-use crate::plugin::jobs::frame_time::{FrameClock, Timer};
+use crate::plugin::jobs::background::drop_in_background;
+use crate::plugin::jobs::frame_time::FrameClock;
 use crate::plugin::jobs::threads::Threads;
 use crate::plugin::surface::active::Active;
 use crate::plugin::surface::cracked::{Cracked, active_mut};
+use crate::plugin::surface::drawing::Frozen;
+use crate::plugin::surface::playhead::Playback;
 use crate::plugin::surface::queues::Queues;
-use crate::plugin::surface::tile_set::Touched;
+use crate::plugin::surface::stamp::stamp_anew;
 use crate::raster::{DepthField, DirtyTiles, Replay, ReplayChanges, TexelRect};
 use bevy::{
     ecs::{entity_disabling::Disabled, query::Allow},
-    platform::time::Instant,
     prelude::*,
     render::renderer::RenderDevice,
 };
-use std::{sync::Arc, time::Duration};
-
-/// How long a task may wait for a thread before its work is done in slices of frames.
-const PATIENCE: Duration = Duration::from_millis(50);
+use std::sync::Arc;
 
 /// The most nodes, and texels, of a surface that is drawn again in a frame.
 const MAX_NODES: usize = 1024;
@@ -34,8 +33,8 @@ const MAX_TEXELS: u64 = 512 * 512;
 /// Frames after which memory is given back if time stands still.
 const IDLE: u32 = 60;
 
-/// What shows the times of a surface with baked cracks, and draws other surfaces again of which much is to be drawn. Removed when that is done,
-/// or the end is shown and nothing can turn time back.
+/// What shows the times of a surface with baked cracks, and makes other surfaces again of which much is to be drawn or painted. Removed when
+/// that is done, or the end is shown and nothing can turn time back.
 ///
 /// While a job runs, the field, the touched tiles and the replay of the surface are with it, and the surface counts as dirty without being in
 /// the queue.
@@ -46,66 +45,10 @@ pub(crate) struct AsyncPlayback {
     back: Option<Back>,
     job: Option<Running>,
     stager: Option<Stager>,
+    /// Whether all of the surface is to be made again, whatever it shows.
+    is_asked: bool,
     /// Frames since anything was to be shown.
     idle: u32,
-}
-
-/// A moment that is being made.
-enum Running {
-    /// By a task, since then.
-    Task(BackgroundJob<Box<FrameJob>, Option<Box<FrameJob>>>, Instant),
-    Slices(Box<FrameJob>),
-}
-
-/// What has become of it.
-enum News {
-    Running(Running),
-    Made(Box<FrameJob>),
-    /// The task has failed.
-    Lost,
-}
-
-impl Running {
-    fn start(job: Box<FrameJob>, has_threads: bool) -> Self {
-        if has_threads {
-            Self::Task(BackgroundJob::start(job, |job| guarded(|| Ok(job.finish())).ok()), Instant::now())
-        } else {
-            Self::Slices(job)
-        }
-    }
-
-    /// Looks after it; makes slices until the time is over.
-    fn look(self, timer: &Timer) -> News {
-        match self {
-            Self::Task(task, _) if task.is_done() => task.finish().flatten().map_or(News::Lost, News::Made),
-            Self::Task(task, since) if since.elapsed() < PATIENCE => News::Running(Self::Task(task, since)),
-            Self::Task(task, since) => match task.take_back() {
-                Some(job) => Self::Slices(job).look(timer),
-                None => News::Running(Self::Task(task, since)),
-            },
-            Self::Slices(mut job) => loop {
-                if job.step() {
-                    return News::Made(job);
-                }
-                if timer.is_over() {
-                    return News::Running(Self::Slices(job));
-                }
-            },
-        }
-    }
-
-    /// What there is of it; waits for a task that is at work.
-    fn recall(self) -> Option<Box<FrameJob>> {
-        match self {
-            Self::Task(task, _) => task.take_back().or_else(|| task.finish().flatten()),
-            Self::Slices(mut job) => {
-                while matches!(job.stage, Stage::Draw | Stage::Crush) {
-                    job.step();
-                }
-                Some(job)
-            }
-        }
-    }
 }
 
 impl AsyncPlayback {
@@ -123,8 +66,9 @@ impl AsyncPlayback {
     /// Begins to make what the surface is to show.
     fn begin(&mut self, active: &mut Active, has_threads: bool) {
         let moment = active.moment();
+        let hair = active.hair();
         let Active { cracks, drawing, canvas, playhead, .. } = &mut *active;
-        let (Some(playback), Some(view)) = (&mut playhead.playback, canvas.views.get_mut(canvas.view)) else { return };
+        let Some(view) = canvas.views.get_mut(canvas.view) else { return };
         let (growth, field, profile) = (&cracks.growth, &mut drawing.field, drawing.profile);
         let timeline = self
             .timeline
@@ -144,9 +88,17 @@ impl AsyncPlayback {
             rect: view.rect,
             stager: self.stager.clone(),
             field: field.take(),
-            replay: core::mem::replace(&mut playback.replay, Replay::stale(UVec2::ZERO, profile)),
+            ground: None,
+            replay: playhead
+                .playback
+                .as_mut()
+                .map(|playback| core::mem::replace(&mut playback.replay, Replay::stale(UVec2::ZERO, profile))),
             touched: core::mem::take(&mut drawing.touched),
             profile,
+            is_anew: core::mem::take(&mut drawing.is_stale),
+            frozen: drawing.frozen.clone(),
+            carried: (drawing.carried.clone(), hair),
+            holes: drawing.cutouts.clone(),
             motion: cracks.motion_at(moment),
             back: self.back.take(),
             dirty: core::mem::replace(&mut view.dirty, DirtyTiles::new(size)),
@@ -156,18 +108,26 @@ impl AsyncPlayback {
             staged: [const { None }; MAPS],
         });
         (active.turn.is_dirty, active.turn.is_late) = (true, false);
+        self.is_asked = false;
         self.job = Some(Running::start(job, has_threads));
     }
 
     /// Shows what was made, and keeps what was shown.
     fn apply(&mut self, active: &mut Active, job: FrameJob, images: &mut Assets<Image>, uploads: &mut Uploads) {
         let rects = job.in_image(&gather(&job.changed, job.field.frame.size()));
-        let FrameJob { field, replay, touched, moment, back, changed, staged, .. } = job;
+        let FrameJob { field, replay, touched, moment, frozen, back, changed, staged, rect, .. } = job;
         (active.drawing.field, active.drawing.touched) = (field, touched);
-        if let Some(playback) = &mut active.playhead.playback {
+        if let (Some(playback), Some(replay)) = (&mut active.playhead.playback, replay) {
             (playback.replay, playback.shown) = (replay, moment);
         }
+        if has_thawed(active, frozen.as_ref()) {
+            (self.is_asked, active.drawing.is_stale) = (true, true);
+        }
         let Some(mut back) = back else { return };
+        let whole = TexelRect::whole(active.drawing.field.frame.size());
+        // The other texels have no cracks any more that show other parts of the picture.
+        let others = active.canvas.views.iter_mut().filter(|view| view.rect != rect);
+        others.for_each(|view| view.dirty.mark(whole));
         if !changed.is_empty() {
             active.canvas.note_depths(&changed);
             let pictures = active.canvas.textures.all().into_iter().zip(&mut back.texels).zip(staged);
@@ -193,19 +153,23 @@ impl AsyncPlayback {
     }
 }
 
-/// Whether a task can make the times of a surface: nothing else is to paint its textures.
+/// Whether tasks can make the times of a surface, one after the other: nothing else is to paint its textures.
 fn can_be_async(active: &Active) -> bool {
-    active.playhead.playback.is_some() && has_one_view(active)
-}
-
-fn has_one_view(active: &Active) -> bool {
-    active.drawing.cutouts.is_none() && active.canvas.views.len() == 1
+    let has_one_view = active.drawing.cutouts.is_none() && active.canvas.views.len() == 1;
+    AsyncPlayback::is_for(active) && has_one_view && !active.turn.is_to_shatter
 }
 
 /// Whether the field has to be drawn again. That of cracks that move is drawn for each moment.
 fn shows_stale(active: &Active) -> bool {
     let playback = active.playhead.playback.as_ref();
-    playback.is_some_and(|playback| playback.replay.is_stale() && active.cracks.motion_at(playback.shown).is_none())
+    let is_stale =
+        |playback: &Playback| playback.replay.is_stale() && active.cracks.motion_at(playback.shown).is_none();
+    active.drawing.is_stale || playback.is_some_and(is_stale)
+}
+
+/// Whether what a job has drawn below the cracks is not to be shown any more: time can be turned back since.
+const fn has_thawed(active: &Active, frozen: Option<&Frozen>) -> bool {
+    frozen.is_some() && active.drawing.frozen.is_none()
 }
 
 /// Draws all of a surface again: what was drawn is lost.
@@ -214,26 +178,38 @@ fn start_over(active: &mut Active) {
     active.drawing.field = DepthField::new(frame);
     active.drawing.field.set_forbidden(active.cracks.growth.mask());
     active.drawing.field.set_layers(active.preset.look.layer(active.surface.seed));
-    active.drawing.touched = Touched::new(frame.size());
+    active.drawing.is_stale = true;
     if let Some(playback) = &mut active.playhead.playback {
-        playback.start_over(frame, active.drawing.profile);
         playback.shown = Moment::START;
     }
     active.mark_all();
 }
 
-/// Ends what a task makes of a surface: it is as if it had been drawn and not painted yet. Waits for a task that is at work.
+/// Ends what a task makes of a surface, for a change of it: it is as if it had been drawn and not painted yet. Waits for a task that is at
+/// work. What is to be painted then is much.
 pub(crate) fn recall(world: &mut World, entity: Entity, active: &mut Active) {
-    let Some(mut playback) = world.get_mut::<AsyncPlayback>(entity) else { return };
+    if take_back(world, entity, active)
+        && let Some(mut playback) = world.get_mut::<AsyncPlayback>(entity)
+    {
+        playback.is_asked = true;
+    }
+}
+
+/// The same for a surface that will show something else. Returns whether anything was to be made.
+pub(crate) fn take_back(world: &mut World, entity: Entity, active: &mut Active) -> bool {
+    let Some(mut playback) = world.get_mut::<AsyncPlayback>(entity) else { return false };
     playback.timeline = None;
     playback.rest();
-    let Some(job) = playback.job.take() else { return };
+    let was_asked = core::mem::take(&mut playback.is_asked);
+    let Some(job) = playback.job.take() else { return was_asked };
     active.turn.is_dirty = false;
     match job.recall() {
         Some(job) => {
-            let FrameJob { field, replay, touched, moment, mut dirty, mut changed, stage, .. } = *job;
+            let FrameJob { field, replay, touched, moment, is_anew, frozen, mut dirty, mut changed, stage, .. } = *job;
             (active.drawing.field, active.drawing.touched) = (field, touched);
-            if let Some(playback) = &mut active.playhead.playback {
+            let is_stale = (is_anew && matches!(stage, Stage::Begin)) || has_thawed(active, frozen.as_ref());
+            active.drawing.is_stale |= is_stale;
+            if let (Some(playback), Some(replay)) = (&mut active.playhead.playback, replay) {
                 playback.replay = replay;
                 if !matches!(stage, Stage::Begin) {
                     playback.shown = moment;
@@ -244,6 +220,7 @@ pub(crate) fn recall(world: &mut World, entity: Entity, active: &mut Active) {
         }
         None => start_over(active),
     }
+    true
 }
 
 /// Drops what tasks make of a surface.
@@ -267,25 +244,51 @@ pub(crate) fn start(world: &mut World, entity: Entity, playback: Option<AsyncPla
 }
 
 /// Whether all texels of a surface are more than a frame paints.
-pub(crate) fn is_large(active: &Active) -> bool {
-    TexelRect::whole(active.drawing.field.frame.size()).area() > MAX_TEXELS
+fn is_large(active: &Active) -> bool {
+    is_much(0, active.drawing.field.frame.size())
 }
 
-/// Has all of a surface drawn again that shows something else in the same places: by a task, until which it shows what it showed, if it
-/// takes longer than a frame has. `false` if that cannot be.
-pub(crate) fn redraw(world: &mut World, entity: Entity, active: &mut Active) -> bool {
-    let budget = world.resource::<CrackBudget>();
-    let is_little = active.cracks.growth.network().nodes().len() <= MAX_NODES && !is_large(active);
-    let is_whole = active.drawing.frozen.is_none() && active.drawing.carried.is_empty();
-    if is_little || budget.is_unlimited() || !is_whole || !has_one_view(active) {
+/// Whether so many nodes on so many texels are more than a frame draws.
+pub(super) fn is_much(nodes: usize, size: UVec2) -> bool {
+    nodes > MAX_NODES || TexelRect::whole(size).area() > MAX_TEXELS
+}
+
+/// Has all of a surface drawn anew that shows something else in the same places: by a task, until which it shows what it showed, if it
+/// takes longer than a frame has.
+pub(crate) fn redraw(world: &mut World, entity: Entity, active: &mut Active) {
+    let (nodes, size) = (active.cracks.growth.network().nodes().len(), active.drawing.field.frame.size());
+    if !is_much(nodes, size) || !ask(world, entity) {
+        return stamp_anew(active);
+    }
+    active.drawing.is_stale = true;
+    active.drawing.redrawn += 1;
+}
+
+/// Has all of a surface painted by a task, if it takes longer than a frame has.
+pub(crate) fn repaint(world: &mut World, entity: Entity, active: &mut Active) {
+    if is_large(active) && ask(world, entity) {
+        active.drawing.redrawn += 1;
+    }
+}
+
+/// Has a task make what a surface shows. `false` if that is not needed.
+fn ask(world: &mut World, entity: Entity) -> bool {
+    let is_unlimited = world.resource::<CrackBudget>().is_unlimited();
+    let Ok(mut entity) = world.get_entity_mut(entity) else { return false };
+    if is_unlimited {
         return false;
     }
-    let Ok(mut entity) = world.get_entity_mut(entity) else { return false };
-    active.draw_later();
-    if !entity.contains::<AsyncPlayback>() {
-        entity.insert(AsyncPlayback::default());
+    if let Some(mut playback) = entity.get_mut::<AsyncPlayback>() {
+        playback.is_asked = true;
+    } else {
+        entity.insert(AsyncPlayback { is_asked: true, ..AsyncPlayback::default() });
     }
     true
+}
+
+/// Whether a task makes what a surface shows, or slices of frames do.
+pub(crate) fn is_at_work(world: &World, entity: Entity) -> bool {
+    world.get::<AsyncPlayback>(entity).is_some_and(|playback| playback.job.is_some())
 }
 
 /// Shows what tasks have made of surfaces with baked cracks, and has made what they are to show now.
@@ -306,7 +309,7 @@ pub(crate) fn play_async(
     let has_threads = threads.pool().is_some();
     for (entity, mut playback, mut cracked) in &mut playing {
         let Some(active) = cracked.get_mut() else { continue };
-        let (mut is_new, mut is_over) = (true, false);
+        let (mut is_new, mut is_over, mut has_made) = (true, false, false);
         loop {
             if let Some(job) = playback.job.take() {
                 let before = active.playhead.playback.as_ref().map(|playback| playback.shown);
@@ -318,6 +321,7 @@ pub(crate) fn play_async(
                     News::Made(job) => playback.apply(active, *job, &mut images, &mut uploads),
                     News::Lost => start_over(active),
                 }
+                has_made = true;
                 report_painted(active, entity, before, &mut states, &mut commands);
                 if active.has_normals_to_blend() {
                     queues.mark_blending(entity, &mut active.turn);
@@ -326,25 +330,20 @@ pub(crate) fn play_async(
             let is_stale = active.canvas.views.get(active.canvas.view).is_some_and(|view| !view.dirty.is_empty());
             let is_stale = is_stale || shows_stale(active);
             let is_wanted = active.is_behind() || is_stale;
-            let is_due = !budget.is_unlimited() && !active.turn.is_to_shatter;
-            // Cracks that were not baked are shown by the frames, unless all of them are to be drawn.
-            let is_baked = active.cracks.added.is_some();
-            if !is_baked && !shows_stale(active) {
-                if is_wanted {
-                    queues.mark_dirty(entity, &mut active.turn);
-                }
-                is_over = true;
-                break;
-            }
-            if !(is_due && can_be_async(active)) {
+            // Frames show cracks that were not baked, unless all of them are to be made again.
+            playback.is_asked &= is_wanted;
+            if budget.is_unlimited() || !(playback.is_asked || can_be_async(active)) {
                 playback.rest();
+                playback.is_asked = false;
+                is_over = active.cracks.added.is_none();
                 if !budget.is_unlimited()
                     && let Some(added) = &mut active.cracks.added
                 {
                     // It takes longer than a frame has.
                     added.motion = None;
                 }
-                if is_wanted {
+                // It may have grown meanwhile.
+                if is_wanted || (has_made && active.playhead.playback.is_none()) {
                     queues.mark_dirty(entity, &mut active.turn);
                 }
                 break;
@@ -367,7 +366,8 @@ pub(crate) fn play_async(
                 break;
             }
         }
-        if is_over || active.playhead.playback.is_none() {
+        let is_needed = playback.job.is_some() || playback.is_asked;
+        if !is_needed && (is_over || active.playhead.playback.is_none()) {
             drop_in_background(core::mem::take(&mut *playback));
             commands.entity(entity).try_remove::<AsyncPlayback>();
         }

@@ -1,16 +1,19 @@
-//! One moment of a surface, drawn and painted by a background task.
+//! One moment of a surface, or all of it again, drawn and painted by a background task.
 
 use crate::growth::CrackGrowth;
 use crate::paint::LookTable;
-use crate::pattern::{Moment, Network, Timeline};
+use crate::pattern::{CrackMask, Moment, Network, Timeline};
 use crate::plugin::api::textures::MAPS;
 use crate::plugin::gpu::buffer::{Staged, Stager};
 use crate::plugin::gpu::textures;
 use crate::plugin::source::analogy::AnalogyPicture;
 use crate::plugin::source::picture::BasePicture;
+use crate::plugin::surface::cutouts::Holes;
+use crate::plugin::surface::drawing::Frozen;
 use crate::plugin::surface::motion::MotionFrame;
+use crate::plugin::surface::stamp::stamp_hairlines;
 use crate::plugin::surface::tile_set::Touched;
-use crate::raster::{DepthField, DirtyTiles, Profile, Replay, ReplayChanges, TexelRect};
+use crate::raster::{DepthField, DirtyTiles, LayerPlan, Profile, Replay, ReplayChanges, TexelRect};
 use bevy::prelude::*;
 use std::sync::Arc;
 
@@ -18,6 +21,9 @@ use std::sync::Arc;
 pub(crate) const SLICE: u64 = 1 << 14;
 
 const SEGMENTS: usize = 256;
+
+/// Lines of cracks that were carried on which are drawn in a slice.
+const LINES: usize = 16;
 
 /// Parts of a side, each with one rectangle to upload at the most.
 const PARTS: u32 = 8;
@@ -59,8 +65,18 @@ pub(crate) struct FrameJob {
     pub(crate) rect: TexelRect,
     pub(crate) stager: Option<Stager>,
     pub(crate) field: DepthField,
-    pub(crate) replay: Replay,
+    /// What a field is made for, if there is none yet.
+    pub(crate) ground: Option<(Arc<CrackMask>, LayerPlan)>,
+    /// `None` if the field is as it is to be, and only painted.
+    pub(crate) replay: Option<Replay>,
     pub(crate) profile: Profile,
+    /// Whether all is drawn anew, as for another profile.
+    pub(crate) is_anew: bool,
+    /// What lies below the cracks, and above them: lines of this width.
+    pub(crate) frozen: Option<Frozen>,
+    pub(crate) carried: (Vec<Arc<[Vec<Vec2>]>>, f32),
+    /// The texels that have left with shards.
+    pub(crate) holes: Option<Holes>,
     /// If the cracks are on their way to where they stay.
     pub(crate) motion: Option<MotionFrame>,
     pub(crate) touched: Touched,
@@ -77,9 +93,13 @@ pub(crate) struct FrameJob {
 pub(crate) enum Stage {
     /// As it was.
     Begin,
+    /// There is nothing in the field.
+    Cleared,
     Draw,
     /// What hits have crushed is being drawn.
     Crush,
+    /// So many lines of those that were carried on are drawn.
+    Carry(usize),
     /// What is left to paint.
     Paint(Vec<TexelRect>),
     Made,
@@ -96,22 +116,39 @@ impl FrameJob {
         let snapshot = self.timeline.clone();
         let TimelineSnapshot { network, timeline } = &*snapshot;
         match &mut self.stage {
-            Stage::Begin => {
+            Stage::Begin if self.is_anew => {
+                self.clear();
+                self.stage = Stage::Cleared;
+            }
+            Stage::Begin | Stage::Cleared => {
                 self.stage = if self.draw_motion() {
                     Stage::Crush
-                } else {
-                    self.replay.begin(&mut self.field, network, timeline, self.moment, &mut self.redrawn);
+                } else if let Some(replay) = &mut self.replay {
+                    replay.begin(&mut self.field, network, timeline, self.moment, &mut self.redrawn);
+                    if let Some(frozen) = &self.frozen {
+                        frozen.draw(&mut self.field);
+                    }
                     Stage::Draw
+                } else {
+                    Stage::Paint(self.plan())
                 };
             }
             Stage::Draw => {
-                if self.replay.draw(&mut self.field, network, timeline, SEGMENTS, &mut self.redrawn) {
-                    self.replay.end(&mut self.field, network, timeline, &mut self.redrawn);
+                if let Some(replay) = &mut self.replay
+                    && replay.draw(&mut self.field, network, timeline, SEGMENTS, &mut self.redrawn)
+                {
+                    replay.end(&mut self.field, network, timeline, &mut self.redrawn);
                     self.stage = Stage::Crush;
                 }
             }
             Stage::Crush => {
                 if !self.field.crush(1, &mut self.redrawn.changed) {
+                    self.stage = Stage::Carry(0);
+                }
+            }
+            Stage::Carry(drawn) => {
+                let first = core::mem::replace(drawn, *drawn + LINES);
+                if !self.carry(first) {
                     self.stage = Stage::Paint(self.plan());
                 }
             }
@@ -133,6 +170,32 @@ impl FrameJob {
         matches!(self.stage, Stage::Made)
     }
 
+    /// Makes the field what it was before there was anything to draw.
+    fn clear(&mut self) {
+        let (frame, size) = (self.field.frame, self.field.frame.size());
+        match self.ground.take() {
+            Some((mask, layers)) => {
+                self.field = DepthField::new(frame);
+                self.field.set_forbidden(&mask);
+                self.field.set_layers(layers);
+            }
+            None => self.field.clear(),
+        }
+        self.touched = Touched::new(size);
+        self.replay = Some(Replay::new(size, self.profile));
+    }
+
+    /// Draws some of the lines that were carried on, from this one on; returns whether there were any.
+    fn carry(&mut self, first: usize) -> bool {
+        let Self { carried: (carried, width), field, profile, redrawn, .. } = self;
+        let mut lines = carried.iter().flat_map(|lines| lines.iter()).skip(first).take(LINES).peekable();
+        let is_any = lines.peek().is_some();
+        for line in lines {
+            stamp_hairlines(field, profile, *width, core::slice::from_ref(line), |rect| redrawn.changed.push(rect));
+        }
+        is_any
+    }
+
     /// Draws cracks that are on their way; returns whether they are.
     fn draw_motion(&mut self) -> bool {
         let Self { motion, profile, field, touched, replay, redrawn, .. } = self;
@@ -140,7 +203,7 @@ impl FrameJob {
             return false;
         }
         let size = field.frame.size();
-        *replay = Replay::stale(size, *profile);
+        *replay = Some(Replay::stale(size, *profile));
         *redrawn = ReplayChanges { changed: vec![TexelRect::whole(size)], ..ReplayChanges::default() };
         true
     }
@@ -175,8 +238,13 @@ impl FrameJob {
 
     fn paint(&mut self, rects: &[TexelRect]) {
         let Some(back) = &mut self.back else { return };
-        let (analogy, texels) = (self.analogy.as_deref(), &mut back.texels);
-        textures::paint_all(&self.base, analogy, &self.field, &self.look, rects, self.rect.min, texels);
+        let texels = back.texels.each_mut().map(Option::as_deref_mut);
+        let (size, origin) = (self.base.size, self.rect.min);
+        textures::paint(&self.base, self.analogy.as_deref(), &self.field, &self.look, rects, origin, texels);
+        if let (Some(holes), [Some(diffuse), ..]) = (&self.holes, &mut back.texels) {
+            rects.iter().for_each(|rect| holes.cut_out(diffuse, size, origin, *rect));
+        }
+        textures::update_mips(&mut back.texels, size, rects, origin);
     }
 
     /// Brings what has changed to where the renderer can read it.

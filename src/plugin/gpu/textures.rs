@@ -138,6 +138,69 @@ pub(crate) fn levels(image: &Image) -> Option<MipLevels> {
     Some(kind.levels(image.size()))
 }
 
+/// Brings mip levels up to date, of textures that have some, where rectangles of the field are painted, whose top left is at `origin`.
+pub(crate) fn update_mips(texels: &mut [Option<Vec<u8>>; MAPS], size: UVec2, rects: &[TexelRect], origin: UVec2) {
+    let in_image = |rect: &TexelRect| TexelRect { min: rect.min + origin, max: rect.max + origin };
+    let rects: Vec<_> = rects.iter().map(in_image).collect();
+    for (kind, texels) in KINDS.iter().zip(texels) {
+        texels.as_mut().map(|texels| kind.levels(size).update(texels, &rects));
+    }
+}
+
+impl TextureKind {
+    /// Bytes of a texel.
+    pub(crate) const fn texel(&self) -> usize {
+        self.texel.bytes()
+    }
+
+    /// The mip levels that a texture may have.
+    pub(crate) const fn levels(&self, size: UVec2) -> MipLevels {
+        MipLevels::new(size, self.texel)
+    }
+
+    /// The texels of an uncracked surface, with those of the mip levels if there are to be any.
+    pub(crate) fn texels(&self, base: &BasePicture, has_mips: bool) -> Vec<u8> {
+        let mut texels = (self.uncracked)(base);
+        if has_mips {
+            let levels = self.levels(base.size);
+            texels.resize(levels.bytes(), 0);
+            levels.update(&mut texels, &[TexelRect::whole(base.size)]);
+        }
+        texels
+    }
+
+    /// The only place where textures are made, with mip levels if the data has them. `None` if the data has not the length that size and format
+    /// need, or there is no texel: the renderer ends the app over such an image.
+    pub(crate) fn image(&self, size: UVec2, data: Vec<u8>, sampler: &ImageSampler) -> Option<Image> {
+        let levels = self.levels(size);
+        let has_mips = data.len() == levels.bytes();
+        let mut image =
+            self.empty(size, sampler, has_mips).filter(|_| has_mips || data.len() == levels.range(0).end)?;
+        image.data = Some(data);
+        Some(image)
+    }
+
+    /// The same without texels yet; the renderer makes room for them.
+    pub(crate) fn empty(&self, size: UVec2, sampler: &ImageSampler, has_mips: bool) -> Option<Image> {
+        let extent = Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 };
+        let mut image = Image::new_uninit(extent, TextureDimension::D2, self.format, RenderAssetUsages::default());
+        image.texture_descriptor.mip_level_count = if has_mips { self.levels(size).count() } else { 1 };
+        image.sampler = sampler.clone();
+        (size.min_element() > 0).then_some(image)
+    }
+}
+
+/// The texels of the uncracked textures that are wanted, in the order of [`KINDS`].
+pub(crate) fn texels(maps: Maps, base: &BasePicture) -> [Option<Vec<u8>>; MAPS] {
+    KINDS.each_ref().map(|kind| (kind.is_wanted)(maps).then(|| kind.texels(base, maps.mips)))
+}
+
+/// The mip levels that one of the textures may have; `None` of other images.
+pub(crate) fn levels(image: &Image) -> Option<MipLevels> {
+    let kind = KINDS.iter().find(|kind| kind.format == image.texture_descriptor.format)?;
+    Some(kind.levels(image.size()))
+}
+
 /// [`paint`] into texels that may have mip levels, which follow.
 pub(crate) fn paint_all(
     base: &BasePicture,

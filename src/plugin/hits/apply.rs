@@ -5,7 +5,7 @@ use crate::plugin::api::error::EntityLabel;
 use crate::plugin::api::{CrackBudget, CrackChips, CrackClock, CrackState, CrackStatus, HitPoint};
 use crate::plugin::carrier::kind::{CarrierKind, Found};
 use crate::plugin::carrier::kinds;
-use crate::plugin::draw::freeze::freeze_if_full;
+use crate::plugin::draw::freeze::{freeze_if_full, has_to_wait};
 use crate::plugin::jobs::frame_time::{FrameClock, Timer};
 use crate::plugin::source::picture;
 use crate::plugin::surface::cracked::{active, active_mut, has_cracked, with_queues};
@@ -70,6 +70,7 @@ pub(crate) fn apply_hits(world: &mut World) {
         match ready {
             // Observers may have healed it.
             _ if world.resource::<HitQueue>().next() != Some(entity) => {}
+            Ok(true) if has_to_wait(world, entity) => world.resource_mut::<HitQueue>().park(),
             Ok(true) => apply_next(world, entity, &timer),
             Ok(false) => {
                 set_status(world, entity, CrackStatus::Waiting);

@@ -8,6 +8,7 @@ use crate::plugin::carrier::kind::Found;
 use crate::plugin::carrier::kinds;
 use crate::plugin::draw::async_playback::{self, AsyncPlayback};
 use crate::plugin::draw::grow::CracksClosed;
+use crate::plugin::draw::next_picture::NextPicture;
 use crate::plugin::jobs::deferred::when_free;
 use crate::plugin::shards::broken::drop_shards;
 use crate::plugin::shards::request::cancel_requests;
@@ -81,7 +82,7 @@ fn forget(world: &mut World, entity: Entity) {
     }
     active.carrier.kind.detach(world, entity, &active.carrier);
     if let Ok(mut entity) = world.get_entity_mut(entity) {
-        entity.remove::<(CrackTextures, AsyncPlayback)>();
+        entity.remove::<(CrackTextures, AsyncPlayback, NextPicture)>();
     }
 }
 

@@ -9,7 +9,6 @@ use crate::plugin::carrier::kind::Carrier;
 use crate::plugin::carrier::plane::Plane;
 use crate::plugin::gpu::memory::TextureBytes;
 use crate::plugin::surface::active::Active;
-use crate::plugin::surface::stamp::stamp_anew;
 use crate::shatter::{BreakAgain, Flight, RimLook, Shards, Shell, Support};
 use bevy::{asset::UntypedHandle, prelude::*};
 use std::{collections::VecDeque, sync::Arc};
@@ -282,9 +281,7 @@ pub(crate) fn drop_shards(world: &mut World, entity: Entity, active: &mut Active
     }
     active.carrier.kind.open(world, entity, &active.carrier, false);
     active.drawing.cutouts = None;
-    if !core::mem::take(&mut active.drawing.carried).is_empty() {
-        stamp_anew(active);
-    }
+    active.drawing.is_stale |= !core::mem::take(&mut active.drawing.carried).is_empty();
     if let Ok(mut entity) = world.get_entity_mut(entity) {
         entity.remove::<(CrackShards, Pieces)>();
     }

@@ -10,6 +10,7 @@ use super::spans::{add_fringe, bounds, spans_of};
 use crate::math::mix;
 use crate::plugin::api::{CrackBudget, Reassembled, ShatterCracks};
 use crate::plugin::carrier::kind::Carrier;
+use crate::plugin::draw::async_playback::is_at_work;
 use crate::plugin::jobs::deferred::hold;
 use crate::plugin::surface::active::Active;
 use crate::plugin::surface::cracked::with_queues;
@@ -134,7 +135,8 @@ fn fly(
     let run = if run.is_finite() { run } else { 0.0 };
     let time = seek.map_or(before + run, f64::from);
     broken.time = if time.is_nan() { 0.0 } else { time.clamp(0.0, MAX_TIME) };
-    if run < 0.0 && time <= 0.0 {
+    // What a task makes of it still has the holes.
+    if run < 0.0 && time <= 0.0 && !is_at_work(world, surface) {
         broken::put_back(world, surface, broken);
         return (Fate::Whole, Vec::new());
     }

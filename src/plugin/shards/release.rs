@@ -8,6 +8,7 @@ use super::request::{FRAMES, Request, ShardQueue, frames};
 use super::show::ShownPiece;
 use crate::plugin::api::error::EntityLabel;
 use crate::plugin::api::{CrackBudget, Shard, ShardsError, ShatterCracks, ShatterFailed, Shattered};
+use crate::plugin::draw::async_playback::is_at_work;
 use crate::plugin::draw::paint::paint_now;
 use crate::plugin::gpu::memory::{TextureBytes, TextureMemory};
 use crate::plugin::gpu::textures;
@@ -232,6 +233,10 @@ fn release(world: &mut World, entity: Entity, active: &mut Active, made: CutSurf
 
 /// Lets the pieces go that leave a surface in this frame, if there is room for any.
 fn let_go(world: &mut World, entity: Entity, active: &mut Active, queue: &mut ShardQueue) -> Option<Shattered> {
+    if is_at_work(world, entity) {
+        // What a task makes of it would not have the holes.
+        return None;
+    }
     let budget = world.resource::<CrackBudget>();
     let (most, is_unlimited) = (budget.max_shards, budget.is_unlimited());
     let batch = broken::broken(world, entity)?.waiting.front()?;

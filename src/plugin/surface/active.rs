@@ -55,6 +55,8 @@ pub(crate) struct Turn {
     pub(crate) is_laying_out: bool,
     /// Whether it is in the dirty queue.
     pub(crate) is_dirty: bool,
+    /// Whether its growth waits for what it is to show next.
+    pub(crate) is_held: bool,
     /// Whether a frame had no time to paint it: its growth waits for that.
     pub(crate) is_late: bool,
     /// Whether its end has not been reported yet.

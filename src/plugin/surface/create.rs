@@ -7,6 +7,7 @@ use super::picture_plan::ReadPictures;
 use super::plan::{Plan, resolve_mask};
 use super::queue::with_queue;
 use crate::plugin::api::error::EntityLabel;
+use crate::plugin::api::textures::MAPS;
 use crate::plugin::api::{CrackClock, CrackError, CrackFailed, CrackState, CrackStatus, CrackTextures};
 use crate::plugin::gpu::textures::{self, TextureKind};
 use crate::plugin::gpu::uploads::Uploads;
@@ -52,7 +53,7 @@ pub(crate) fn make_now(world: &mut World, entity: Entity, plan: Plan) -> Result<
     let read = BaseAndMask { base: draft.base.clone(), mask };
     let BlankSurface { growth, field, look } =
         BlankSurface::new(&plan.surface, &plan.preset, &read, plan.pictures.rect)?;
-    let textures = make_textures(world, &draft, None)?;
+    let textures = make_textures(world, &draft, None, Default::default())?;
     let ground = plan.ground(world, read, look, textures);
     install(world, entity, Box::new(Active::new(ground, growth, field)));
     Ok(true)
@@ -81,21 +82,24 @@ pub(crate) fn report_textures(world: &mut World, entity: Entity) {
     }
 }
 
-/// Makes the textures of a surface, into the images of `reuse` if given.
+/// Makes the textures of a surface, into the images of `reuse` if given: of the texels that were `made`, or without cracks.
 pub(crate) fn make_textures(
     world: &mut World,
     draft: &ReadPictures,
     reuse: Option<&CrackTextures>,
+    made: [Option<Vec<u8>>; MAPS],
 ) -> Result<CrackTextures, CrackError> {
     world.resource_mut::<Uploads>().expect_whole();
     let mut images = world.get_resource_mut::<Assets<Image>>().ok_or(CrackError::NoImages)?;
     let ReadPictures { base, plan } = draft;
+    let mut made = made.into_iter();
     let mut add = |kind: &TextureKind, old: Option<&Option<Handle<Image>>>| -> Result<_, CrackError> {
+        let made = made.next().flatten();
         if !(kind.is_wanted)(plan.maps) {
             return Ok(None);
         }
         let UVec2 { x: width, y: height } = base.size;
-        let texels = kind.texels(base, plan.maps.mips);
+        let texels = made.unwrap_or_else(|| kind.texels(base, plan.maps.mips));
         let image = kind.image(base.size, texels, &plan.sampler).ok_or(CrackError::Size { width, height })?;
         if let Some(Some(old)) = old
             && let Some(mut place) = images.get_mut(old)

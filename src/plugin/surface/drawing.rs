@@ -21,6 +21,8 @@ pub(crate) struct Drawing {
     pub(crate) carried: Vec<Arc<[Vec<Vec2>]>>,
     /// The texels that have left it with shards; `None` = it is whole.
     pub(crate) cutouts: Option<Holes>,
+    /// Whether all of it is to be drawn anew: the field is not what is to be shown.
+    pub(crate) is_stale: bool,
     /// How often it has been painted.
     pub(crate) painted: u64,
     /// How often all of its cracks have been drawn anew.
@@ -30,14 +32,25 @@ pub(crate) struct Drawing {
 impl Drawing {
     pub(crate) fn new(field: DepthField, profile: Profile) -> Self {
         let touched = Touched::new(field.frame.size());
-        Self { field, profile, touched, frozen: None, carried: Vec::new(), cutouts: None, painted: 0, redrawn: 0 }
+        Self {
+            field,
+            profile,
+            touched,
+            frozen: None,
+            carried: Vec::new(),
+            cutouts: None,
+            is_stale: false,
+            painted: 0,
+            redrawn: 0,
+        }
     }
 }
 
 /// What a surface has forgotten of its cracks, and still shows.
+#[derive(Clone)]
 pub(crate) struct Frozen {
     /// All of the picture when they were frozen.
-    pub(crate) depth: Grid<u16>,
+    pub(crate) depth: Arc<Grid<u16>>,
     pub(crate) nodes: u32,
     /// Cells that they closed.
     pub(crate) cells: u32,
@@ -61,12 +74,17 @@ impl Frozen {
         *cells = CellTracker::new(field.frame.extent());
         cells.update(growth.network());
         let frozen = closed.saturating_sub(cells.closed());
-        (Self { depth: field.depth.clone(), nodes: nodes.saturating_add(gone), cells: frozen }, gone)
+        let depth = Arc::new(field.depth.clone());
+        (Self { depth, nodes: nodes.saturating_add(gone), cells: frozen }, gone)
     }
 
     /// Draws it into a field of any size.
     pub(crate) fn draw(&self, field: &mut DepthField) {
         let (from, to) = (self.depth.size(), field.depth.size());
+        if from == to {
+            let depths = field.depth.as_mut_slice().iter_mut().zip(self.depth.as_slice());
+            return depths.for_each(|(depth, frozen)| *depth = (*depth).max(*frozen));
+        }
         for y in 0..to.y {
             let row = self.depth.row((u64::from(y) * u64::from(from.y) / u64::from(to.y)) as usize);
             for (x, depth) in (0u64..).zip(field.depth.row_mut(y as usize)) {

@@ -116,7 +116,7 @@ pub(crate) struct Regrown {
 }
 
 impl Regrowth {
-    fn is_like(&self, other: &Self) -> bool {
+    pub(crate) fn is_like(&self, other: &Self) -> bool {
         let Self { preset, frame, seed, is_nearest, mask, density } = self;
         let is_same_mask = Arc::ptr_eq(mask, &other.mask) || *mask == other.mask;
         is_same_mask

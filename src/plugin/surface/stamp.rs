@@ -20,6 +20,9 @@ pub(crate) struct Scratch {
 
 /// Stamps what has grown since the last time into the field, or whatever is to be shown, but for what hits have crushed.
 pub(crate) fn stamp(active: &mut Active, scratch: &mut Scratch) {
+    if active.drawing.is_stale {
+        stamp_anew(active);
+    }
     let moment = active.moment();
     if stamp_motion(active, moment) {
         return;
@@ -83,6 +86,7 @@ impl Active {
 pub(crate) fn stamp_anew(active: &mut Active) {
     let frame = active.drawing.field.frame;
     active.drawing.redrawn += 1;
+    active.drawing.is_stale = false;
     active.drawing.field.clear();
     active.drawing.touched = Touched::new(frame.size());
     if let Some(frozen) = &active.drawing.frozen {

@@ -117,7 +117,7 @@ impl Active {
             (Ruler::Closing(_), _) => false,
             _ => self.playhead.due >= 1.0,
         };
-        is_due && self.cracks.growth.is_growing() && !self.turn.is_laying_out
+        is_due && self.cracks.growth.is_growing() && !self.turn.is_laying_out && !self.turn.is_held
     }
 
     /// Makes a step of growth if one is due and its preparations are done, which may need more than one turn: markers of the last hits are
@@ -164,18 +164,6 @@ impl Active {
             want: f64::from(end),
             shown: Moment::after(end),
         })
-    }
-
-    /// Has all that it shows drawn again, when it is next drawn.
-    pub(crate) fn draw_later(&mut self) {
-        let (due, had_playback) = (self.playhead.due, self.playhead.playback.is_some());
-        let (size, profile) = (self.drawing.field.frame.size(), self.drawing.profile);
-        let playback = self.open_playback();
-        playback.replay = Replay::stale(size, profile);
-        if !had_playback {
-            playback.want += due;
-        }
-        self.drawing.redrawn += 1;
     }
 
     /// Goes by `clock` from now on, jumping if it says so.
