@@ -85,7 +85,7 @@ impl TextureKind {
         self.format.block_copy_size(None).map_or(0, |size| size as usize)
     }
 
-    /// The only place where textures are made. `None` if the data has not the length that size and format need, or there
+    /// The only place where textures of surfaces are made. `None` if the data has not the length that size and format need, or there
     /// is no texel: the renderer ends the app over such an image.
     pub(crate) fn image(&self, size: UVec2, data: Vec<u8>, sampler: &ImageSampler) -> Option<Image> {
         let length = (size.x as usize).checked_mul(size.y as usize)?.checked_mul(self.texel())?;
