@@ -1,5 +1,5 @@
 //! A stone pedestal with a clay jar on it, and a ball of plaster beside it, to shoot at: cracks run over the edges of the box and around the
-//! curves of the others. At last the ball falls to pieces, as a hollow shell, and time runs backwards.
+//! curves of the others. At last the ball falls to pieces, as a hollow shell, in crumbs and dust, and time runs backwards.
 //!
 //! Click to shoot; B breaks the ball; R lets time run backwards, and forwards again; H heals everything. The camera goes around them.
 //!
@@ -10,12 +10,14 @@ use bevy::{
     asset::RenderAssetUsages,
     camera::Hdr,
     core_pipeline::tonemapping::Tonemapping,
-    light::CascadeShadowConfigBuilder,
+    light::{CascadeShadowConfigBuilder, NotShadowCaster},
     math::ops,
     mesh::{Indices, PrimitiveTopology},
     prelude::*,
+    render::render_resource::{Extent3d, TextureDimension, TextureFormat},
 };
 use bevy_crack::{
+    math::Rng,
     prelude::*,
     shatter::{BreakAgain, BurstParams, ShatterParams, SizeClasses},
 };
@@ -61,10 +63,28 @@ const BALL: usize = 2;
 #[derive(Component)]
 struct Target(usize);
 
+/// What clouds of dust are made of.
+#[derive(Resource)]
+struct Dust {
+    mesh: Handle<Mesh>,
+    picture: Handle<Image>,
+}
+
+/// A part of a cloud.
+#[derive(Component)]
+struct Puff {
+    velocity: Vec3,
+    /// Seconds.
+    age: f32,
+}
+
+/// How long a cloud of dust hangs in the air, seconds.
+const DUST_LASTS: f32 = 1.6;
+
 fn main() -> AppExit {
     let arguments = DemoArguments::given("A pedestal, a jar and a ball whose cracks run all around them");
     let mut app = demo_app("bevy_crack: statue", &arguments);
-    app.add_systems(Startup, setup).add_systems(Update, go_around);
+    app.add_systems(Startup, setup).add_systems(Update, (go_around, let_dust_settle).chain());
     play(app, (heal_on_h, break_on_b, turn_time_on_r), play_script)
 }
 
@@ -73,7 +93,9 @@ fn setup(
     assets: Res<AssetServer>,
     mut meshes: ResMut<Assets<Mesh>>,
     mut materials: ResMut<Assets<StandardMaterial>>,
+    mut images: ResMut<Assets<Image>>,
 ) {
+    commands.insert_resource(Dust { mesh: meshes.add(Rectangle::default()), picture: images.add(soft_disc(32)) });
     commands.spawn((
         Camera3d::default(),
         Camera { clear_color: ClearColorConfig::Custom(Color::srgb(0.46, 0.5, 0.54)), ..default() },
@@ -127,21 +149,22 @@ fn setup(
         (turned_on_a_lathe(&JAR, AROUND), clay, Transform::from_xyz(-0.3, PEDESTAL, 0.0), jar),
         (Sphere::new(0.42).mesh().uv(96, 64), plaster, Transform::from_xyz(0.75, 0.42, -0.35), ball),
     ];
-    let inside = materials.add(plain(Color::srgb(0.82, 0.79, 0.73), 1.0));
     for (i, (mesh, material, place, surface)) in targets.into_iter().enumerate() {
         let pieces = ShatterCracks {
             thickness: 0.11,
             // No piece is narrower than it is thick.
             cut: ShatterParams { min_area: 0.012, ..ShatterParams::DEFAULT },
-            inside: Some(inside.clone()),
             floor: Some(0.0),
             burst: BurstParams { fade_after: 30.0, ..BurstParams::DEFAULT },
             again: Some(BreakAgain { classes: SizeClasses { largest: [0.25, 0.6, 1.5] }, after: 0.15, apart: 0.1 }),
             ..default()
         };
+        // What hits knock out, and crumbs off the edges of the pieces.
+        let chips = CrackChips { floor: Some(0.0), ..default() };
         commands
-            .spawn((Target(i), Mesh3d(meshes.add(mesh)), MeshMaterial3d(material), place, surface, pieces))
-            .observe(hit_on_press);
+            .spawn((Target(i), Mesh3d(meshes.add(mesh)), MeshMaterial3d(material), place, surface, pieces, chips))
+            .observe(hit_on_press)
+            .observe(raise_dust);
     }
 }
 
@@ -179,6 +202,74 @@ fn turned_on_a_lathe(outline: &[Vec2], around: u32) -> Mesh {
         .with_inserted_attribute(Mesh::ATTRIBUTE_NORMAL, normals)
         .with_inserted_attribute(Mesh::ATTRIBUTE_UV_0, uvs)
         .with_inserted_indices(Indices::U32(indices))
+}
+
+/// White, and the more transparent the further from the middle.
+fn soft_disc(size: u32) -> Image {
+    let extent = Extent3d { width: size, height: size, depth_or_array_layers: 1 };
+    let texels = (0..size * size).flat_map(|i| {
+        let at = (Vec2::new((i % size) as f32, (i / size) as f32) + 0.5) / (0.5 * size as f32) - 1.0;
+        let there = (1.0 - at.length_squared()).max(0.0);
+        [255, 255, 255, (255.0 * there * there) as u8]
+    });
+    let (format, usage) = (TextureFormat::Rgba8UnormSrgb, RenderAssetUsages::RENDER_WORLD);
+    Image::new(extent, TextureDimension::D2, texels.collect(), format, usage)
+}
+
+/// What a game can hang on pieces that leave: a cloud of dust where they were.
+fn raise_dust(
+    shattered: On<Shattered>,
+    shards: Query<&Transform, With<Shard>>,
+    surfaces: Query<&GlobalTransform>,
+    dust: Res<Dust>,
+    mut materials: ResMut<Assets<StandardMaterial>>,
+    mut commands: Commands,
+) {
+    let Ok(surface) = surfaces.get(shattered.entity) else { return };
+    let material = materials.add(StandardMaterial {
+        base_color_texture: Some(dust.picture.clone()),
+        alpha_mode: AlphaMode::Blend,
+        unlit: true,
+        ..default()
+    });
+    let mut chance = Rng::new(1);
+    for shard in shattered.shards.iter().filter_map(|shard| shards.get(*shard).ok()).take(30) {
+        for _ in 0..4 {
+            let mut any = || Vec3::new(chance.signed(), chance.signed(), chance.signed());
+            let at = surface.transform_point(shard.translation) + 0.12 * any();
+            let velocity = 0.3 * any() + 0.5 * (at - surface.translation()).normalize_or_zero();
+            let look = (Mesh3d(dust.mesh.clone()), MeshMaterial3d(material.clone()), NotShadowCaster);
+            commands.spawn((Puff { velocity, age: 0.0 }, look, Transform::from_translation(at)));
+        }
+    }
+}
+
+/// Dust spreads, slows down and thins out.
+fn let_dust_settle(
+    time: Res<Time>,
+    camera: Single<&Transform, With<Camera3d>>,
+    mut puffs: Query<(Entity, &mut Puff, &mut Transform, &MeshMaterial3d<StandardMaterial>), Without<Camera3d>>,
+    mut materials: ResMut<Assets<StandardMaterial>>,
+    mut commands: Commands,
+) {
+    for (entity, mut puff, mut place, material) in &mut puffs {
+        puff.age += time.delta_secs();
+        let (share, velocity) = (puff.age / DUST_LASTS, puff.velocity * ops::exp(-3.0 * puff.age));
+        if share >= 1.0 {
+            commands.entity(entity).despawn();
+            continue;
+        }
+        let size = 0.12 + 0.45 * ops::sqrt(share);
+        place.translation += velocity * time.delta_secs();
+        // The floor does not cut it.
+        place.translation.y = place.translation.y.max(0.45 * size);
+        (place.rotation, place.scale) = (camera.rotation, Vec3::splat(size));
+        if let Some(mut material) = materials.get_mut(&material.0) {
+            // It is not there before the pieces move.
+            let there = (5.0 * share - 0.7).clamp(0.0, 1.0) * (1.0 - share);
+            material.base_color = Color::srgba(0.78, 0.75, 0.7, 0.2 * there);
+        }
+    }
 }
 
 fn go_around(time: Res<Time>, mut camera: Query<&mut Transform, With<Camera3d>>) {

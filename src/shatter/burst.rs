@@ -322,8 +322,11 @@ impl Flight {
 
     /// Computes where the piece comes to rest if there is a floor. `must` is set for parts of a piece that lands.
     fn land(&mut self, shard: &ShardShape, must: bool) {
-        let start = middle(shard) + self.offset;
-        let size = shard.area.max(0.0).sqrt();
+        self.land_from(middle(shard) + self.offset, shard.area.max(0.0).sqrt(), must);
+    }
+
+    /// The same for a piece of this size that starts at `start`.
+    fn land_from(&mut self, start: Vec3, size: f32, must: bool) {
         self.landing = self.floor.and_then(|floor| {
             floor.landing(start, (size, must), self.gravity, |time| {
                 let Moving { offset, velocity, .. } = self.in_air(time);
@@ -394,6 +397,34 @@ impl Flight {
             ..*self
         };
         flight.land(fragment, self.landing.is_some());
+        flight
+    }
+
+    /// The flight of a crumb that comes off this piece `late` seconds after the piece has left its place. Before, it lies at `at`, `arm` away from
+    /// the piece's middle, and it is `size` long; pattern units, y up. It fades when the piece does.
+    #[cfg(feature = "bevy")]
+    #[must_use]
+    pub(crate) fn crumb(&self, (at, arm, size): (Vec3, Vec3, f32), late: f32, seed: u64) -> Self {
+        let Moving { offset, velocity, rotation, spin } = self.moving(late);
+        let mut rng = Rng::new(seed).stream("crumb");
+        let mut noise = || Vec3::new(rng.signed(), rng.signed(), rng.signed());
+        let turned = rotation * arm;
+        let apart = noise() + 0.5 * turned.normalize_or_zero();
+        let velocity = velocity + (self.axis * spin).cross(turned);
+        let axis = if self.axis == Vec3::Z { Vec3::Z } else { noise().normalize_or(self.axis) };
+        let mut flight = Self {
+            delay: self.delay + late,
+            velocity: velocity * rng.range(0.6, 1.6) + apart * (0.3 + 0.5 * velocity.length()),
+            axis,
+            spin: self.spin + 12.0 * rng.signed(),
+            fade_after: self.fade_after - late,
+            offset: offset + turned - arm,
+            rotation,
+            floor: self.floor.map(|floor| Floor { clearance: 0.4 * size, depth: 0.0, ..floor }),
+            landing: None,
+            ..*self
+        };
+        flight.land_from(at + flight.offset, size, self.landing.is_some());
         flight
     }
 

@@ -34,6 +34,7 @@ mod mesh;
 mod rim;
 mod shards;
 mod shell;
+mod sides;
 mod support;
 #[cfg(test)]
 pub(crate) mod tests;

@@ -1,7 +1,7 @@
 //! Shards of a surface that is not flat: it is cut where it is laid out in a plane, and its pieces are curved.
 
+use super::sides::{Side, SideEnd, facing, unevenness};
 use super::{MeshFrame, RimLook, Shards};
-use crate::math::mix;
 use glam::{Affine3A, DVec2, UVec2, Vec2, Vec3};
 use std::collections::HashMap;
 
@@ -135,8 +135,8 @@ pub struct ShellPart {
 pub struct ShellMesh {
     /// Its outside, which shows the picture.
     pub picture: ShellPart,
-    /// Its inside, whose texture coordinates are places in the plane, and its sides, where u is the length along the edge, both in pattern units,
-    /// and v goes from 0 outside to 1 inside.
+    /// Its inside, whose texture coordinates are places in the plane, and its sides, where u runs along the edge and v from 0 outside to the
+    /// inside: all in pattern units.
     pub inside: ShellPart,
 }
 
@@ -316,7 +316,7 @@ impl ShellTriangle {
 }
 
 impl ShellPart {
-    fn push(&mut self, at: Vec3, normal: Vec3, tangent: [f32; 4], uv: [f32; 2]) -> u32 {
+    pub(super) fn push(&mut self, at: Vec3, normal: Vec3, tangent: [f32; 4], uv: [f32; 2]) -> u32 {
         let index = self.positions.len() as u32;
         self.positions.push(at.to_array());
         self.normals.push(normal.to_array());
@@ -326,7 +326,7 @@ impl ShellPart {
     }
 
     /// Adds the triangles of a convex polygon.
-    fn fill(&mut self, corners: &[u32], is_turned: bool) {
+    pub(super) fn fill(&mut self, corners: &[u32], is_turned: bool) {
         for i in 1..corners.len().saturating_sub(1) {
             let [a, b, c] = [corners[0], corners[i], corners[i + 1]];
             self.indices.extend(if is_turned { [a, c, b] } else { [a, b, c] });
@@ -340,6 +340,8 @@ struct Vertex {
     normal: Vec3,
     uv: [f32; 2],
     flat: Vec2,
+    /// The way out of the piece along the surface, on the whole; zero but for its edges.
+    out: Vec3,
 }
 
 impl Shards {
@@ -355,6 +357,11 @@ impl Shards {
         let flat = self.flat_mesh(shard, &plane);
         let place = |i: usize| Vec2::new(flat.positions[i][0] + 0.5 * extent.x, 0.5 * extent.y - flat.positions[i][1]);
         let next = self.next_corners(shard);
+        let outward = if frame.roughness > 0.0 {
+            self.outward(shard, SMOOTHED * frame.thickness / shell.unit)
+        } else {
+            Vec::new()
+        };
         let (mut polygon, mut spare) = (Vec::new(), Vec::new());
         for triangle in flat.indices.as_chunks::<3>().0 {
             // Turning from x to y.
@@ -380,7 +387,11 @@ impl Shards {
                 };
                 let uv = |weights| [0, 1].map(|axis| mix(weights, &|i| flat.uvs[i][axis]));
                 let color = |weights| [0, 1, 2, 3].map(|axis| mix(weights, &|i| flat.colors[i][axis]));
-                made.add(of, (&polygon, has_area), (frame, shell.unit), uv);
+                let out = |weights: [f64; 3]| {
+                    let out = |i: usize| outward.get(corners[i]).copied().unwrap_or_default();
+                    (0..3).map(|i| weights[i] as f32 * out(i)).sum::<Vec2>()
+                };
+                made.add(of, (&polygon, has_area), (frame, shell.unit), (uv, out));
                 if has_area && !flat.colors.is_empty() {
                     made.picture.colors.extend(polygon.iter().map(|corner| color(corner.weights)));
                 }
@@ -400,6 +411,9 @@ impl Shards {
     }
 }
 
+/// Over how much of their outline the sides of pieces are lit as if they were smooth, thicknesses: kinks of cracks reach less deep.
+const SMOOTHED: f32 = 0.35;
+
 /// Twice the area, of a polygon that turns from x to y.
 fn area(polygon: &[Corner]) -> f64 {
     let Some(first) = polygon.first() else { return 0.0 };
@@ -413,17 +427,17 @@ impl ShellMesh {
         of: &ShellTriangle,
         (polygon, has_area): (&[Corner], bool),
         (frame, unit): (&ShellFrame, f32),
-        uv: impl Fn([f64; 3]) -> [f32; 2],
+        (uv, out): (impl Fn([f64; 3]) -> [f32; 2], impl Fn([f64; 3]) -> Vec2),
     ) {
         let turn = (of.flat[1] - of.flat[0]).perp_dot(of.flat[2] - of.flat[0]);
         // A polygon turns from x to y, the triangle counter-clockwise as seen from outside.
         let is_turned = turn < 0.0;
-        let ShellPlace { right, .. } = of.place([1.0, 0.0, 0.0]);
+        let ShellPlace { right, down, .. } = of.place([1.0, 0.0, 0.0]);
         let turned = |way: Vec3| frame.to_mesh.transform_vector3(way).normalize_or_zero();
         let vertices: Vec<Vertex> = polygon
             .iter()
             .map(|corner| {
-                let flat = corner.at.as_vec2();
+                let (flat, out) = (corner.at.as_vec2(), out(corner.weights));
                 let weights = of.weights(flat);
                 let normal = (0..3).map(|i| of.normals[i] * weights[i]).sum::<Vec3>();
                 Vertex {
@@ -431,21 +445,22 @@ impl ShellMesh {
                     normal: turned(normal.try_normalize().unwrap_or(of.normals[0])),
                     uv: uv(corner.weights),
                     flat,
+                    out: turned(right * out.x + down * out.y),
                 }
             })
             .collect();
         // u runs to the right, v downward: laid out as it is seen from outside, the green of a normal map points up.
-        let side = if is_turned { 1.0 } else { -1.0 };
+        let handedness = if is_turned { 1.0 } else { -1.0 };
         let tangent = |normal: Vec3, way: Vec3| {
             let along = (way - normal * way.dot(normal)).normalize_or(normal.any_orthonormal_vector());
-            along.extend(side).to_array()
+            along.extend(handedness).to_array()
         };
         let along = turned(right);
         // What is uneven is lit face by face.
         let is_rough = frame.roughness > 0.0;
         let below = |vertex: &Vertex| {
-            let [x, y, z] = unevenness(vertex.flat, frame.thickness / unit);
-            let (aside, rough) = (Vec3::new(x, y, z), frame.roughness * frame.thickness);
+            let (aside, rough) = (unevenness(vertex.flat, frame.thickness / unit), frame.roughness * frame.thickness);
+            let aside = frame.to_mesh.transform_vector3(aside);
             let along = aside.reject_from_normalized(vertex.normal);
             vertex.at - vertex.normal * (frame.thickness + 0.35 * rough * aside.dot(vertex.normal)) + along * rough
         };
@@ -467,61 +482,19 @@ impl ShellMesh {
                 .collect();
             self.inside.fill(&inside, !is_turned);
         }
-        for (i, corner) in polygon.iter().enumerate().filter(|(_, corner)| corner.is_edge) {
+        let side = Side { is_turned, roughness: frame.roughness, thickness: frame.thickness, unit };
+        for (i, _) in polygon.iter().enumerate().filter(|(_, corner)| corner.is_edge) {
             let k = (i + 1) % vertices.len();
-            let (a, b) = (&vertices[i], &vertices[k]);
-            let way = b.at - a.at;
-            let smooth = if is_turned { a.normal.cross(way) } else { way.cross(a.normal) };
-            let Some(smooth) = smooth.try_normalize() else { continue };
-            let rough =
-                facing(&[a.at, b.at, under[k], under[i]]).map(|facing| if is_turned { facing } else { -facing });
-            let out = rough.filter(|_| is_rough).unwrap_or(smooth);
-            let length = corner.at.distance(polygon[k].at) as f32;
-            let tangent = way.normalize_or_zero().extend(1.0).to_array();
-            let mut corner = |at: Vec3, uv: [f32; 2]| self.inside.push(at, out, tangent, uv);
-            let corners = [
-                corner(a.at, [0.0, 0.0]),
-                corner(b.at, [length, 0.0]),
-                corner(under[k], [length, 1.0]),
-                corner(under[i], [0.0, 1.0]),
-            ];
-            self.inside.fill(&corners, !is_turned);
-        }
-    }
-}
-
-/// The unit normal of a polygon on the side from which it runs counter-clockwise: the mean of its triangles'. `None` if it has no area.
-fn facing(corners: &[Vec3]) -> Option<Vec3> {
-    let first = *corners.first()?;
-    corners.windows(2).map(|pair| (pair[0] - first).cross(pair[1] - first)).sum::<Vec3>().try_normalize()
-}
-
-/// Lengths of the waves of uneven faces, thicknesses; and how high each is. Together they are nowhere steeper than 0.7, or faces would fold: a wave
-/// rises by three times its height over its length at the most.
-const WAVES: [(f32, f32); 2] = [(3.0, 0.4), (1.5, 0.13)];
-
-/// How far a place of the inside is moved, thicknesses: the same for all pieces that meet there. The thickness is in pattern units.
-fn unevenness(at: Vec2, thickness: f32) -> [f32; 3] {
-    let mut sum = [0.0; 3];
-    for ((length, height), wave) in WAVES.into_iter().zip(0u64..) {
-        let at = at / (length * thickness).max(1e-6);
-        let (cell, share) = (at.floor(), at - at.floor());
-        let share = share * share * (3.0 - 2.0 * share);
-        for (axis, sum) in (0u64..).zip(&mut sum) {
-            let corner = |x: f32, y: f32| {
-                let [x, y] = [cell.x + x, cell.y + y].map(|value| u64::from(value.to_bits()));
-                let bits = mix(mix(x ^ (axis << 40) ^ (wave << 44)) ^ y);
-                (bits >> 40) as f32 / (1u32 << 23) as f32 - 1.0
+            let end = |i: usize| SideEnd {
+                at: vertices[i].at,
+                normal: vertices[i].normal,
+                under: under[i],
+                flat: vertices[i].flat,
+                out: vertices[i].out,
             };
-            let blend = |a: f32, b: f32, share: f32| a + (b - a) * share;
-            let (top, bottom) = (
-                blend(corner(0.0, 0.0), corner(1.0, 0.0), share.x),
-                blend(corner(0.0, 1.0), corner(1.0, 1.0), share.x),
-            );
-            *sum += height * blend(top, bottom, share.y);
+            side.add([end(i), end(k)], &frame.to_mesh, &mut self.inside);
         }
     }
-    sum
 }
 
 /// Which triangles lie in which cells of a plane.

@@ -19,6 +19,8 @@ mod cells;
 mod chips;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod clock;
+#[cfg(all(feature = "2d", feature = "3d"))]
+mod crumbs;
 mod docs;
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod films;

@@ -151,7 +151,9 @@ fn rims_befit_the_preset() {
                 let Some(children) = app.world().get::<Children>(shard) else { continue };
                 let sides = get::<MeshMaterial3d<StandardMaterial>>(&app, children[0]).0;
                 let sides = app.world().resource::<Assets<StandardMaterial>>().get(&sides).expect("a material");
-                inside = sides.base_color.to_srgba().red / (180.0 / 255.0);
+                // The picture of the grain is darker than white.
+                let grain = if sides.base_color_texture.is_some() { 0.8 } else { 1.0 };
+                inside = grain * sides.base_color.to_srgba().red / (180.0 / 255.0);
             }
             app.world_mut().despawn(entity);
             step(&mut app);

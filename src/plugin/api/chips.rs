@@ -1,10 +1,13 @@
-//! [`CrackChips`]: what hits knock out of a surface flies off.
+//! [`CrackChips`]: what hits knock out of a surface flies off, and crumbs off its shards.
 
 use super::shatter::GravitySpace;
 use crate::shatter::BurstParams;
 use bevy::prelude::*;
 
-/// Has the pieces of craters fly off a surface, beside a [`CrackSurface`](crate::plugin::CrackSurface).
+/// Has the pieces of craters fly off a surface, and crumbs off the edges of its shards, beside a
+/// [`CrackSurface`](crate::plugin::CrackSurface).
+///
+/// # Chips
 ///
 /// Each hit that cracks the surface breaks the crater that it leaves into chips: the same
 /// [`Crater`](crate::relief::Crater) that is painted, cut along its terraces and a few rays. Where a hit falls into an older crater, only
@@ -15,6 +18,14 @@ use bevy::prelude::*;
 /// Looks need a [crushed zone](crate::paint::Look::crushed) with
 /// [terraces](crate::raster::CrushedZone::terraces): those of concrete, asphalt, plaster and brick have one. Of a box or a curved mesh, chips come
 /// off where it is hit, not over an edge; they show its texture as it is then. None come off a body that is not laid out.
+///
+/// # Crumbs
+///
+/// Where shards leave the surface, and where they break again in the air, crumbs come off along their outlines: few large ones and many small ones,
+/// some of them on the way. They are as the inside of the shards is, in 2D as the picture; where rims are bright, as those of glass, they are
+/// splinters. Every look has them. They are entities as chips are, but go with the shards: they fall and fade as
+/// [`ShatterCracks::burst`](super::ShatterCracks::burst) and [`gravity`](super::ShatterCracks::gravity) say, rest on its
+/// [`floor`](super::ShatterCracks::floor), and in time that runs backwards they return to the edges and are gone.
 ///
 /// ```
 /// use bevy::prelude::*;
@@ -49,11 +60,20 @@ pub struct CrackChips {
     /// Where they come to rest: the height of a level floor in the world; see
     /// [`ShatterCracks::floor`](super::ShatterCracks::floor). `None` (default) or not finite = there is no floor.
     pub floor: Option<f32>,
+    /// About how many crumbs come off for each pattern unit of the outline of a shard, 64 of a shard and 256 in a frame at the most; 0 = none.
+    /// 0..=1000; default 40.
+    pub crumbs: u32,
+    /// How large the largest crumbs are, pattern units; most are much smaller. 0..=0.1; default 0.05.
+    pub crumb_size: f32,
 }
 
 impl CrackChips {
     /// The most chips of one hit.
     pub(crate) const MOST: u32 = 64;
+
+    /// The most crumbs of a pattern unit, and the size of the largest, pattern units.
+    pub(crate) const MOST_CRUMBS: u32 = 1000;
+    pub(crate) const LARGEST_CRUMB: f32 = 0.1;
 }
 
 impl Default for CrackChips {
@@ -70,11 +90,11 @@ impl Default for CrackChips {
             fade: 0.4,
             ..BurstParams::DEFAULT
         };
-        Self { count: 12, burst, gravity: GravitySpace::World, floor: None }
+        Self { count: 12, burst, gravity: GravitySpace::World, floor: None, crumbs: 40, crumb_size: 0.05 }
     }
 }
 
-/// A chip in the air, see [`CrackChips`].
+/// A chip or a crumb in the air, see [`CrackChips`].
 #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
 #[type_path = "bevy_crack"]
 #[reflect(Component, Default)]

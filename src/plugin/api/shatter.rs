@@ -82,8 +82,9 @@ pub struct ShatterCracks {
     /// How their rims look; `None` (default) = by the preset: [`RimLook::GLASS`] where cracks are frosted,
     /// [`RimLook::PLAIN`] where they are drawn as in a cartoon, else [`RimLook::STONE`].
     pub rim: Option<RimLook>,
-    /// What the sides of 3D shards look like; `None` (default) = the mean colour of the picture, darker, or like the edge of a pane where the rim
-    /// is bright.
+    /// What the sides of 3D shards look like; `None` (default) = the mean colour of the picture, darker and with the grain of broken stone; plain where the
+    /// rim is not darker than the picture, and like the edge of a pane where it is bright. Texture coordinates of the sides run along the edge and
+    /// from the outside to the inside: in pattern units on bodies, in the entity's units on what is flat.
     #[cfg(feature = "3d")]
     pub inside: Option<Handle<StandardMaterial>>,
 }

@@ -1,6 +1,6 @@
 //! `ColorMaterial` shows cracks.
 
-use super::slot::{CrackMaterial, MaterialSlot};
+use super::slot::{CrackMaterial, MaterialSlot, SideLook};
 use crate::plugin::api::textures::{CrackTextures, Maps};
 use bevy::{asset::Handle, image::Image, math::Affine2};
 use bevy::{
@@ -38,7 +38,7 @@ impl CrackMaterial for ColorMaterial {
         self.color = self.color.with_alpha(self.color.alpha() * opacity);
     }
 
-    fn for_sides(&self, _mean: [f32; 3], _bright: f32) -> Option<Self> {
+    fn for_sides(&self, _look: &SideLook, _grain: Option<Handle<Image>>) -> Option<Self> {
         None
     }
 

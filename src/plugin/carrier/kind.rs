@@ -2,6 +2,7 @@
 
 use super::plane::Plane;
 use super::shard_visual::ShardVisuals;
+use super::slot::SideLook;
 use crate::plugin::api::error::CrackError;
 use crate::plugin::api::hit::HitPoint;
 use crate::plugin::api::textures::{CrackTextures, Maps};
@@ -164,14 +165,8 @@ pub(crate) trait CarrierKind: Send + Sync {
         opacity: f32,
     ) -> Option<UntypedHandle>;
 
-    /// The material of the sides of its shards, if they have any. `mean` is the mean colour of the picture, sRGB.
-    fn side_material(
-        &self,
-        _world: &mut World,
-        _carrier: &Carrier,
-        _mean: [f32; 3],
-        _bright: f32,
-    ) -> Option<UntypedHandle> {
+    /// The material of the sides of its shards, if they have any.
+    fn side_material(&self, _world: &mut World, _carrier: &Carrier, _look: &SideLook) -> Option<UntypedHandle> {
         None
     }
 

@@ -2,7 +2,7 @@
 
 use crate::plugin::api::textures::Maps;
 use crate::plugin::api::{CrackSystems, CrackTextures};
-use crate::plugin::carrier::slot::{CrackMaterial, MaterialSlot};
+use crate::plugin::carrier::slot::{CrackMaterial, MaterialSlot, SideLook};
 use bevy::{
     asset::{AssetServer, embedded_asset},
     prelude::*,
@@ -129,7 +129,7 @@ impl CrackMaterial for CrackLitMaterial {
         self.lit.tint.w *= opacity;
     }
 
-    fn for_sides(&self, _mean: [f32; 3], _bright: f32) -> Option<Self> {
+    fn for_sides(&self, _look: &SideLook, _grain: Option<Handle<Image>>) -> Option<Self> {
         None
     }
 

@@ -7,7 +7,7 @@ use super::mesh::{aspect_of, check_for_tangents, closest, is_flat, lacks_tangent
 use super::pipelines::{self, Shape};
 use super::plane::Plane;
 use super::shard_visual::{MaterialVisuals, ShardVisuals};
-use super::slot::{CrackMaterial, MaterialSlot, mesh_of, to_picture, typed};
+use super::slot::{CrackMaterial, MaterialSlot, SideLook, mesh_of, to_picture, typed};
 #[cfg(feature = "3d")]
 use super::{split, unfold};
 use crate::plugin::api::error::CrackError;
@@ -15,9 +15,11 @@ use crate::plugin::api::error::CrackError;
 use crate::plugin::api::error::EntityLabel;
 use crate::plugin::api::hit::HitPoint;
 use crate::plugin::api::textures::{CrackTextures, Maps};
+use crate::plugin::gpu::grain;
 #[cfg(feature = "3d")]
 use crate::plugin::source::unfolding::Unfolding;
 use crate::raster::TexelRect;
+use crate::shatter::RimLook;
 #[cfg(feature = "3d")]
 use crate::shatter::ShellTriangle;
 use bevy::{
@@ -136,7 +138,9 @@ impl<S: MaterialSlot> CarrierKind for MaterialKind<S> {
                 let read = |material: &UntypedHandle| materials.get(&material.clone().try_typed().ok()?);
                 let sides = match inside {
                     Some(inside) => read(inside).cloned(),
-                    None => read(original).and_then(|before| before.for_sides([0.0; 3], 0.0)),
+                    None => read(original).and_then(|before| {
+                        before.for_sides(&SideLook { mean: [0.0; 3], rim: RimLook::PLAIN, unit: 1.0 }, None)
+                    }),
                 };
                 cracked.open();
                 if self.unfolding(world, entity).is_some() {
@@ -295,15 +299,15 @@ impl<S: MaterialSlot> CarrierKind for MaterialKind<S> {
         Some(materials.add(material).untyped())
     }
 
-    fn side_material(
-        &self,
-        world: &mut World,
-        carrier: &Carrier,
-        mean: [f32; 3],
-        bright: f32,
-    ) -> Option<UntypedHandle> {
+    fn side_material(&self, world: &mut World, carrier: &Carrier, look: &SideLook) -> Option<UntypedHandle> {
+        if !S::Material::MAPS.depth {
+            return None;
+        }
+        // What is drawn is flat, and glass clear.
+        let has_grain = look.rim.bright < 0.0;
+        let grain = if has_grain { grain::picture(world) } else { None };
         let mut materials = world.get_resource_mut::<Assets<S::Material>>()?;
-        let inside = materials.get(&typed(&carrier.shown.asset)?)?.for_sides(mean, bright)?;
+        let inside = materials.get(&typed(&carrier.shown.asset)?)?.for_sides(look, grain)?;
         Some(materials.add(inside).untyped())
     }
 

@@ -1,6 +1,7 @@
 //! Materials that can show cracks, and the components that hold them.
 
 use crate::plugin::api::textures::{CrackTextures, Maps};
+use crate::shatter::RimLook;
 use bevy::{
     asset::{UntypedAssetId, UntypedHandle},
     ecs::component::Mutable,
@@ -30,11 +31,22 @@ pub(crate) trait CrackMaterial: Asset + Clone {
     fn show_inside(&mut self) {}
     /// The same for shards: with this picture, the mesh's texture coordinates being the picture's, and so much of it there (0..=1).
     fn for_shards(&mut self, picture: &Handle<Image>, opacity: f32);
-    /// The same for the sides of shards of a picture of this mean colour (sRGB), if they have any; see
-    /// [`RimLook::bright`](crate::shatter::RimLook::bright).
-    fn for_sides(&self, mean: [f32; 3], bright: f32) -> Option<Self>;
+    /// The same for the sides of shards, if they have any, with the picture of a [`grain`](crate::plugin::gpu::grain) or without.
+    fn for_sides(&self, look: &SideLook, grain: Option<Handle<Image>>) -> Option<Self>;
     /// What the renderer's pipelines for it depend on.
     fn pipeline_key(&self) -> u64;
+}
+
+/// What the sides of shards are to look like.
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(not(feature = "3d"), expect(dead_code, reason = "only 3D shards have sides"))]
+pub(crate) struct SideLook {
+    /// The mean colour of the picture, sRGB.
+    pub(crate) mean: [f32; 3],
+    /// How the rims of the shards look.
+    pub(crate) rim: RimLook,
+    /// How far texture coordinates of the sides go on for each pattern unit.
+    pub(crate) unit: f32,
 }
 
 /// The component that holds a material.

@@ -1,7 +1,8 @@
 //! `StandardMaterial` shows cracks.
 
-use super::slot::{CrackMaterial, MaterialSlot};
+use super::slot::{CrackMaterial, MaterialSlot, SideLook};
 use crate::plugin::api::textures::{CrackTextures, Maps};
+use crate::plugin::gpu::grain::LIGHTER;
 use bevy::{asset::Handle, image::Image, math::Affine2};
 use bevy::{
     pbr::{ParallaxMappingMethod, StandardMaterialKey},
@@ -68,16 +69,19 @@ impl CrackMaterial for StandardMaterial {
         self.uv_transform = Affine2::IDENTITY;
     }
 
-    fn for_sides(&self, mean: [f32; 3], bright: f32) -> Option<Self> {
-        let share = bright.clamp(0.0, 1.0);
+    fn for_sides(&self, look: &SideLook, grain: Option<Handle<Image>>) -> Option<Self> {
+        let share = look.rim.bright.clamp(0.0, 1.0);
+        let lighter = if grain.is_some() { LIGHTER } else { 1.0 };
+        let fresh = [0, 1, 2].map(|i| FRESH[i] * lighter * look.mean[i]);
         let [red, green, blue] =
-            [0, 1, 2].map(|i| DARKER * mean[i] * (1.0 - share) + (0.4 * mean[i] + 0.6 * EDGE[i]) * share);
+            [0, 1, 2].map(|i| fresh[i] * (1.0 - share) + (0.4 * look.mean[i] + 0.6 * EDGE[i]) * share);
         let color = Color::srgb(red, green, blue);
         Some(Self {
             base_color: color,
             // Light that has entered elsewhere leaves through the edges of glass.
             emissive: color.to_linear() * (GLOW * share),
-            base_color_texture: None,
+            base_color_texture: grain,
+            uv_transform: Affine2::from_scale(Vec2::splat(1.0 / (GRAIN * look.unit).max(f32::MIN_POSITIVE))),
             normal_map_texture: None,
             emissive_texture: None,
             depth_map: None,
@@ -94,8 +98,11 @@ impl CrackMaterial for StandardMaterial {
     }
 }
 
-/// How much darker than its picture a wall is inside, sRGB.
-const DARKER: f32 = 0.55;
+/// A wall where it is freshly broken, as a share of its picture's mean colour, sRGB: darker, and a little warmer.
+const FRESH: [f32; 3] = [0.69, 0.68, 0.665];
+
+/// How far the picture of the grain reaches, pattern units.
+const GRAIN: f32 = 0.35;
 
 /// The edge of a pane of glass, sRGB, and how much it glows.
 const EDGE: [f32; 3] = [0.72, 0.94, 0.88];

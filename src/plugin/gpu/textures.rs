@@ -106,7 +106,7 @@ impl TextureKind {
         texels
     }
 
-    /// The only place where textures are made, with mip levels if the data has them. `None` if the data has not the length that size and format
+    /// The only place where textures of surfaces are made, with mip levels if the data has them. `None` if the data has not the length that size and format
     /// need, or there is no texel: the renderer ends the app over such an image.
     pub(crate) fn image(&self, size: UVec2, data: Vec<u8>, sampler: &ImageSampler) -> Option<Image> {
         let levels = self.levels(size);

@@ -1,5 +1,6 @@
 //! [`Batch`]: pieces that leave a surface.
 
+use super::crumbs::Crumb;
 use super::form::Form;
 use crate::plugin::carrier::plane::Plane;
 use crate::plugin::surface::cutouts::Span;
@@ -10,6 +11,8 @@ use bevy::prelude::*;
 /// Pieces that leave in one frame.
 pub(super) struct Batch {
     pub(super) leaving: Vec<Leaving>,
+    /// What comes off their edges.
+    pub(super) crumbs: Vec<Crumb>,
     /// Their texels, row by row.
     pub(super) spans: Vec<Span>,
     /// Rectangles that cover them, texels of the field.

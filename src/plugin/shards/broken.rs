@@ -2,6 +2,7 @@
 
 use super::batch::Batch;
 use super::body::{Body, LEVELS};
+use super::crumbs::{Crumb, CrumbParams};
 use super::form::Shape;
 use crate::Grid;
 use crate::plugin::api::{CrackShards, ShatterCracks};
@@ -55,6 +56,9 @@ pub(crate) struct Broken {
     pub(super) wear: [Option<UntypedHandle>; LEVELS + 1],
     /// Material of their sides.
     pub(super) inside: Option<UntypedHandle>,
+    /// Which crumbs come off its pieces, and those that have in this frame.
+    pub(super) crumb_params: Option<CrumbParams>,
+    pub(super) crumbs: Vec<Crumb>,
     /// Bytes of the picture.
     pub(super) _bytes: TextureBytes,
 }
@@ -140,6 +144,8 @@ impl Broken {
             end: 0.0,
             wear: Default::default(),
             inside: None,
+            crumb_params: None,
+            crumbs: Vec::new(),
             _bytes: bytes,
         }
     }
@@ -235,6 +241,18 @@ impl Broken {
             }
         }
     }
+}
+
+/// Seconds of the shards since a surface broke, if it has.
+pub(super) fn time_of(world: &World, surface: Entity) -> Option<f64> {
+    broken(world, surface).map(|broken| broken.time)
+}
+
+/// Takes the crumbs that have come off in this frame, and what they are made of.
+pub(super) fn take_crumbs(world: &mut World, surface: Entity) -> Option<(Vec<Crumb>, Option<UntypedHandle>, RimLook)> {
+    let broken = world.get_mut::<Pieces>(surface)?.into_inner().0.as_mut()?;
+    let crumbs = core::mem::take(&mut broken.crumbs);
+    (!crumbs.is_empty()).then(|| (crumbs, broken.inside.clone(), broken.rim))
 }
 
 /// The pieces of a surface that has shattered. They are taken out while shards come and go.

@@ -1,5 +1,7 @@
-//! Chips: the pieces of craters, in the air.
+//! Chips: the pieces of craters, in the air, and the crumbs of shards.
 
+use super::broken;
+use super::crumbs::{self, Crumb, MOST_IN_FRAME};
 use super::form::Style;
 use super::release::with_active;
 use super::throw::{Throw, in_plane};
@@ -11,14 +13,19 @@ use crate::plugin::api::{CrackBudget, CrackChip, CrackChips, ShatterCracks};
 use crate::plugin::carrier::kind::Carrier;
 use crate::plugin::carrier::plane::Plane;
 use crate::plugin::carrier::shard_visual::ShardVisual;
+use crate::plugin::carrier::slot::SideLook;
 use crate::plugin::jobs::deferred::hold;
 use crate::plugin::surface::active::Active;
 use crate::plugin::surface::cracked::{Cracked, has_cracked};
 use crate::relief::Crater;
-use crate::shatter::{Burst, Cuts, Flight, Shards, ShatterError, ShatterParams, shatter};
+use crate::shatter::{Burst, Cuts, Flight, Pose, RimLook, Shards, ShatterError, ShatterParams, shatter};
 use bevy::{
     asset::UntypedHandle,
-    ecs::{entity::EntityHashMap, entity_disabling::Disabled, query::Allow},
+    ecs::{
+        entity::{EntityHashMap, EntityHashSet},
+        entity_disabling::Disabled,
+        query::Allow,
+    },
     prelude::*,
 };
 use std::collections::VecDeque;
@@ -29,18 +36,25 @@ const MOST_HITS: usize = 4;
 /// How thick chips are, as a share of the size of their crater.
 const THICKNESS: f32 = 0.18;
 
+/// How much of the picture a crumb shows in 2D, pattern units.
+const PATCH: f32 = 0.004;
+
 /// How far 2D chips lie in front of their surface, in the entity's units.
 const IN_FRONT: f32 = 2e-3;
 
 /// The cosine of the most that the surface may turn from where it is hit to where a chip comes off.
 const SAME_PLANE: f32 = 0.8;
 
-/// All chips that are in the air.
+/// How long a crumb takes to be seen when it comes off, seconds.
+const GROWING: f32 = 0.05;
+
+/// All chips and crumbs that are in the air.
 #[derive(Resource, Default)]
 pub(crate) struct Chips {
     /// The oldest first.
     flying: VecDeque<Flying>,
     materials: EntityHashMap<Materials>,
+    crumbs: EntityHashMap<CrumbLook>,
 }
 
 /// What the chips of a surface look like.
@@ -51,47 +65,73 @@ struct Materials {
     sides: Option<UntypedHandle>,
 }
 
-/// A chip in the air.
+/// What the crumbs of a surface look like.
+struct CrumbLook {
+    meshes: Vec<Handle<Mesh>>,
+    material: UntypedHandle,
+}
+
+/// A chip or a crumb in the air.
 struct Flying {
     entity: Entity,
     surface: Entity,
-    place: Place,
+    home: Home,
     flight: Flight,
+    /// When the shard of a crumb began its flight, seconds since the surface broke; `None` = it is a chip.
+    start: Option<f64>,
     /// Seconds since the hit.
     time: f32,
 }
 
-/// Where a chip was when it was part of its surface.
+/// Where a chip or a crumb was when it was part of its surface.
 #[derive(Clone, Copy)]
-struct Place {
-    plane: Plane,
-    /// Of the surface, and the middle of the chip in it; pattern units.
-    extent: Vec2,
-    centroid: Vec2,
-    /// Half of its thickness if it has any, in the entity's units.
-    half: Option<f32>,
+struct Home {
+    /// There it lies as it is turned in its flight; and how large it is.
+    place: Transform,
+    /// How it lies besides.
+    turn: Quat,
+    /// Units of the entity for a pattern unit.
+    unit: Vec3,
+    is_flat: bool,
 }
 
 impl Flying {
     /// Where it is; `None` = nowhere any more.
     fn transform(&self) -> Option<Transform> {
-        let Place { plane, extent, centroid, half } = self.place;
+        let Home { place, turn, unit, is_flat } = self.home;
         let mut pose = self.flight.pose(self.time);
-        if half.is_none() {
+        if is_flat {
             // In 2D, z is only for the order of drawing.
             pose.offset.z = 0.0;
         }
-        let place = plane.place(centroid, extent, pose, half.unwrap_or(-IN_FRONT));
-        (pose.opacity > 0.0).then_some(place.with_scale(Vec3::splat(pose.opacity)))
+        let since = if self.start.is_some() { (self.time - self.flight.delay) / GROWING } else { 1.0 };
+        Some(Transform {
+            translation: place.translation + place.rotation * (pose.offset * unit),
+            rotation: place.rotation * pose.rotation * turn,
+            scale: place.scale * (pose.opacity * since.clamp(0.01, 1.0)),
+        })
+        .filter(|_| pose.opacity > 0.0)
+    }
+
+    /// Lets time pass: of a crumb, that of the shards. Returns whether it is still there.
+    fn pass(&mut self, world: &World, seconds: f32) -> bool {
+        let Some(start) = self.start else {
+            self.time += seconds;
+            return true;
+        };
+        let Some(now) = broken::time_of(world, self.surface) else { return false };
+        let before = core::mem::replace(&mut self.time, (now - start) as f32);
+        // Back at its edge it is part of the shard again.
+        self.time >= before || self.time > self.flight.delay
     }
 }
 
-/// Whether there are chips, or may be.
+/// Whether there are chips or crumbs, or may be.
 pub(crate) fn any_chips(chips: Res<Chips>, surfaces: Query<(), With<CrackChips>>) -> bool {
     !chips.flying.is_empty() || !surfaces.is_empty()
 }
 
-/// Moves all chips, and makes those of the hits of the frame before.
+/// Moves all chips and crumbs, and makes those of the hits of the frame before, and of the shards of this one.
 pub(crate) fn fly_chips(
     world: &mut World,
     surfaces: &mut QueryState<(Entity, &CrackChips, &mut Cracked), Allow<Disabled>>,
@@ -101,7 +141,8 @@ pub(crate) fn fly_chips(
         let hits = core::mem::take(&mut cracked.bypass_change_detection().get_mut()?.cracks.unchipped);
         (hits > 0).then(|| (entity, settings.clone(), hits as usize))
     };
-    let fresh: Vec<_> = surfaces.iter_mut(world).filter_map(fresh).collect();
+    let mut shed = Vec::new();
+    let fresh: Vec<_> = surfaces.iter_mut(world).inspect(|(entity, ..)| shed.push(*entity)).filter_map(fresh).collect();
     hold(world, |world| {
         world.resource_scope(|world, mut chips: Mut<Chips>| {
             chips.fly(world, seconds);
@@ -113,8 +154,17 @@ pub(crate) fn fly_chips(
                     warn_once!("{} has no chips: {error}", EntityLabel::of(world, entity));
                 }
             }
-            let Chips { flying, materials } = &mut *chips;
-            materials.retain(|surface, _| flying.iter().any(|chip| chip.surface == *surface));
+            let mut room = MOST_IN_FRAME;
+            for entity in shed {
+                let Some((crumbs, inside, rim)) = broken::take_crumbs(world, entity) else { continue };
+                let crumbs = crumbs.into_iter().take(room).collect::<Vec<Crumb>>();
+                room -= crumbs.len();
+                with_active(world, entity, |world, active| chips.scatter(world, entity, active, crumbs, (inside, rim)));
+            }
+            let Chips { flying, materials, crumbs } = &mut *chips;
+            let known: EntityHashSet = flying.iter().map(|chip| chip.surface).collect();
+            materials.retain(|surface, _| known.contains(surface));
+            crumbs.retain(|surface, _| known.contains(surface));
         });
     });
 }
@@ -127,9 +177,9 @@ impl Chips {
             world.try_despawn(chip.entity).ok();
         }
         self.flying.retain_mut(|chip| {
-            chip.time += seconds;
             // A surface that was healed is whole.
-            let place = chip.transform().filter(|_| has_cracked(world, chip.surface));
+            let is_there = chip.pass(world, seconds) && has_cracked(world, chip.surface);
+            let place = chip.transform().filter(|_| is_there);
             match (place, world.get_mut::<Transform>(chip.entity)) {
                 (Some(place), Some(mut transform)) => {
                     transform.set_if_neq(place);
@@ -181,8 +231,8 @@ impl Chips {
         (pieces, burst): (&Pieces, &Burst),
         seed: u64,
     ) {
-        let Some((picture, sides)) = self.materials_of(world, entity, active) else { return };
         let scale = surface.plane.size / surface.extent;
+        let Some((picture, sides)) = self.materials_of(world, entity, active, scale.y.abs()) else { return };
         let thickness = active.carrier.is_solid.then(|| THICKNESS * pieces.shards.extent().y * scale.y.abs());
         let plane = Plane { size: pieces.shards.extent() * scale, ..surface.plane };
         let rim = rim_for(&ShatterCracks::default(), &active.preset.look);
@@ -191,13 +241,15 @@ impl Chips {
         for &number in &pieces.numbers {
             let Some(mut shape) = pieces.shards.get(number).cloned() else { continue };
             shape.centroid += pieces.corner;
-            let place = Place {
-                plane: surface.plane,
-                extent: surface.extent,
-                centroid: shape.centroid,
-                half: thickness.map(|thickness| 0.5 * thickness),
+            let forward = thickness.map_or(-IN_FRONT, |thickness| 0.5 * thickness);
+            let home = Home {
+                place: surface.plane.place(shape.centroid, surface.extent, Pose::AT_REST, forward),
+                turn: Quat::IDENTITY,
+                unit: scale.extend(scale.y.abs()),
+                is_flat: thickness.is_none(),
             };
-            let chip = Flying { entity, surface: entity, place, flight: burst.flight(number, &shape), time: 0.0 };
+            let flight = burst.flight(number, &shape);
+            let chip = Flying { entity, surface: entity, home, flight, start: None, time: 0.0 };
             let Some(place) = chip.transform() else { continue };
             let form = style.form(&pieces.shards, number, &plane, uv, seed ^ u64::from(number));
             let Some(mut meshes) = world.get_resource_mut::<Assets<Mesh>>() else { return };
@@ -216,12 +268,76 @@ impl Chips {
         }
     }
 
-    /// The materials of the chips of a surface: their pictures, and their sides.
+    /// Makes entities of crumbs. `inside` is what the sides of their shards are made of.
+    fn scatter(
+        &mut self,
+        world: &mut World,
+        entity: Entity,
+        active: &Active,
+        crumbs: Vec<Crumb>,
+        (inside, rim): (Option<UntypedHandle>, RimLook),
+    ) {
+        let Some(now) = broken::time_of(world, entity) else { return };
+        let Some((meshes, material)) = self.crumb_look(world, entity, active, &crumbs, (inside, rim)) else { return };
+        let is_flat = !active.carrier.is_solid;
+        let (mut made, mut visuals) = (Vec::new(), Vec::new());
+        for Crumb { mut home, turn, unit, flight, start, shape, .. } in crumbs {
+            if is_flat {
+                home.translation += home.rotation * Vec3::Z * IN_FRONT;
+            }
+            let home = Home { place: home, turn, unit, is_flat };
+            let time = (now - start) as f32;
+            let crumb = Flying { entity, surface: entity, home, flight, start: Some(start), time };
+            let (Some(place), Some(mesh)) = (crumb.transform(), meshes.get(shape)) else { continue };
+            visuals.push(ShardVisual { parent: entity, place, mesh: mesh.clone(), material: material.clone() });
+            made.push(crumb);
+        }
+        let entities = active.carrier.kind.shards().spawn_sides(world, visuals);
+        for (crumb, entity) in made.into_iter().zip(entities) {
+            let Some(entity) = entity else { continue };
+            if let Ok(mut made) = world.get_entity_mut(entity) {
+                made.insert(CrackChip { surface: crumb.surface });
+            }
+            self.flying.push_back(Flying { entity, ..crumb });
+        }
+    }
+
+    /// The meshes of the crumbs of a surface, and their material: that of the sides of shards, in 2D their picture.
+    fn crumb_look(
+        &mut self,
+        world: &mut World,
+        entity: Entity,
+        active: &Active,
+        crumbs: &[Crumb],
+        (inside, rim): (Option<UntypedHandle>, RimLook),
+    ) -> Option<(Vec<Handle<Mesh>>, UntypedHandle)> {
+        if let Some(known) = self.crumbs.get(&entity) {
+            return Some((known.meshes.clone(), known.material.clone()));
+        }
+        let seed = active.surface.seed;
+        let (shapes, material) = match inside {
+            Some(inside) => (crumbs::solid_shapes(seed), inside),
+            None => {
+                let surface = Surface::of(world, entity, active, crumbs.first()?.at)?;
+                let places: Vec<Vec2> = crumbs.iter().map(|crumb| surface.uv(crumb.at)).collect();
+                let reach = (surface.uv(Vec2::splat(PATCH)) - surface.uv(Vec2::ZERO)).abs();
+                let (picture, _) = self.materials_of(world, entity, active, 1.0)?;
+                (crumbs::flat_shapes(seed, rim, &places, reach), picture)
+            }
+        };
+        let mut meshes = world.get_resource_mut::<Assets<Mesh>>()?;
+        let meshes: Vec<Handle<Mesh>> = shapes.into_iter().map(|mesh| meshes.add(mesh)).collect();
+        self.crumbs.insert(entity, CrumbLook { meshes: meshes.clone(), material: material.clone() });
+        Some((meshes, material))
+    }
+
+    /// The materials of the chips of a surface: their pictures, and their sides. A pattern unit is `unit` long.
     fn materials_of(
         &mut self,
         world: &mut World,
         entity: Entity,
         active: &Active,
+        unit: f32,
     ) -> Option<(UntypedHandle, Option<UntypedHandle>)> {
         let Carrier { kind, own, shown, is_twofold, unfolding, .. } = &active.carrier;
         let of = own.as_ref().unwrap_or(&shown.asset);
@@ -233,12 +349,10 @@ impl Chips {
         let plain = shown.diffuse.as_ref().filter(|_| shown.layout.is_none() && !is_twofold && is_its_own);
         let image = plain.or(active.canvas.textures.diffuse.as_ref())?.clone();
         let picture = kind.shard_material(world, entity, &active.carrier, &image, 1.0)?;
-        let bright = rim_for(&ShatterCracks::default(), &active.preset.look).bright;
-        let sides = active
-            .carrier
-            .is_solid
-            .then(|| kind.side_material(world, &active.carrier, active.canvas.base.mean(), bright));
-        let known = Materials { of: of.clone(), picture, sides: sides.flatten() };
+        let rim = rim_for(&ShatterCracks::default(), &active.preset.look);
+        let look = SideLook { mean: active.canvas.base.mean(), rim, unit };
+        let sides = if active.carrier.is_solid { kind.side_material(world, &active.carrier, &look) } else { None };
+        let known = Materials { of: of.clone(), picture, sides };
         let materials = (known.picture.clone(), known.sides.clone());
         self.materials.insert(entity, known);
         Some(materials)

@@ -2,6 +2,7 @@
 
 use super::body::Spares;
 use super::broken::{self, Broken, Piece, drop_shards};
+use super::crumbs::{Crumb, Loose, MOST_IN_FRAME};
 use super::order::MOST_NEW;
 use super::release::{count_shown, evict_oldest, with_active};
 use super::request::ShardQueue;
@@ -130,6 +131,8 @@ fn fly(
         Some(mut settings) => (settings.speed, settings.bypass_change_detection().seek.take(), settings.fly),
         None => (1.0, None, true),
     };
+    // Nobody wanted what is left of them.
+    broken.crumbs.clear();
     let before = broken.time;
     let run = f64::from(speed) * f64::from(seconds);
     let run = if run.is_finite() { run } else { 0.0 };
@@ -187,7 +190,7 @@ fn fly(
         while index < broken.pieces.len() {
             // Parts that have come off in this frame were counted then.
             let is_counted = broken.pieces[index].id >= first;
-            broken.break_if_due(index, is_counted, room);
+            broken.break_if_due(&active.carrier, index, is_counted, room);
             if let Some(pose) = broken.show(world, surface, &active.carrier, index) {
                 if is_counted || room.new > 0 {
                     fresh.push(ShownPiece { index, pose, form: None });
@@ -223,7 +226,7 @@ impl Broken {
 
     /// Lets fragments take the place of a piece if its time has come. They are always the same. It stays whole if there is no room for
     /// them when it has come, and waits for a frame that has.
-    fn break_if_due(&mut self, index: usize, is_counted: bool, room: &mut Room) {
+    fn break_if_due(&mut self, carrier: &Carrier, index: usize, is_counted: bool, room: &mut Room) {
         let piece = &mut self.pieces[index];
         let Some((again, due)) = piece.again.filter(|_| !piece.is_broken && !piece.is_spent) else { return };
         let born = piece.start + f64::from(due);
@@ -275,8 +278,20 @@ impl Broken {
                 level: 0,
             });
         }
+        self.shed_crumbs(carrier, &parts);
         self.next += parts.len() as u32;
         self.pieces[index].is_broken = true;
         self.pieces.append(&mut parts);
+    }
+
+    /// Crumbs come off the edges of fragments.
+    fn shed_crumbs(&mut self, carrier: &Carrier, parts: &[Piece]) {
+        let Some(params) = self.crumb_params else { return };
+        let style = self.style(carrier);
+        let most = MOST_IN_FRAME.saturating_sub(self.crumbs.len()) / parts.len().max(1);
+        for Piece { cut, number, plane, flight, seed, start, .. } in parts {
+            let loose = Loose { cut, number: *number, plane, flight, seed: *seed, style: &style };
+            self.crumbs.extend(loose.crumbs(params, most).into_iter().map(|crumb| Crumb { start: *start, ..crumb }));
+        }
     }
 }

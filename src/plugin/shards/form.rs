@@ -118,8 +118,8 @@ impl Style {
         };
         let on_sides = |[x, y, _]: [f32; 3]| [side * y, -side * x, 0.0, 1.0];
         Form {
-            picture: with_tangents(picture, &form.normals[..split], on_picture),
-            sides: Some(with_tangents(sides, &form.normals[split..], on_sides)),
+            picture: with_tangents(picture, form.normals[..split].iter().copied().map(on_picture).collect()),
+            sides: Some(with_tangents(sides, form.normals[split..].iter().copied().map(on_sides).collect())),
         }
     }
 
@@ -134,12 +134,13 @@ impl Style {
         let centroid = shards.get(number).map_or(Vec2::ZERO, |shard| shard.centroid);
         let at_rest = plane.place(centroid, shards.extent(), Pose::AT_REST, 0.5 * thickness);
         let to_mesh = at_rest.compute_affine().inverse();
-        let frame = ShellFrame { to_mesh, uv, rim: self.rim, seed, thickness, roughness: ROUGHNESS };
+        // Glass breaks smoothly.
+        let roughness = ROUGHNESS * (1.0 - self.rim.bright.clamp(0.0, 1.0));
+        let frame = ShellFrame { to_mesh, uv, rim: self.rim, seed, thickness, roughness };
         let ShellMesh { picture, inside } = shards.shell_mesh(number, shell, &frame);
         let part = |part: ShellPart| {
             let ShellPart { positions, normals, tangents, uvs, colors, indices } = part;
-            mesh(positions, normals, uvs, colors, indices, false)
-                .with_inserted_attribute(Mesh::ATTRIBUTE_TANGENT, tangents)
+            with_tangents(mesh(positions, normals, uvs, colors, indices, false), tangents)
         };
         Form { picture: part(picture), sides: Some(part(inside)) }
     }
@@ -159,7 +160,7 @@ impl Style {
 }
 
 /// A mesh of the engine.
-fn mesh(
+pub(super) fn mesh(
     positions: Vec<[f32; 3]>,
     mut normals: Vec<[f32; 3]>,
     uvs: Vec<[f32; 2]>,
@@ -180,7 +181,6 @@ fn mesh(
     if colors.is_empty() { mesh } else { mesh.with_inserted_attribute(Mesh::ATTRIBUTE_COLOR, colors) }
 }
 
-fn with_tangents(mesh: Mesh, normals: &[[f32; 3]], tangent: impl Fn([f32; 3]) -> [f32; 4]) -> Mesh {
-    let tangents: Vec<[f32; 4]> = normals.iter().map(|normal| tangent(*normal)).collect();
+pub(super) fn with_tangents(mesh: Mesh, tangents: Vec<[f32; 4]>) -> Mesh {
     mesh.with_inserted_attribute(Mesh::ATTRIBUTE_TANGENT, tangents)
 }

@@ -10,6 +10,7 @@ mod batch;
 pub(crate) mod body;
 pub(crate) mod broken;
 pub(crate) mod chips;
+mod crumbs;
 mod drawn;
 pub(crate) mod fly;
 mod form;

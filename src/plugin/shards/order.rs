@@ -2,6 +2,7 @@
 
 use super::batch::{Batch, Leaving};
 use super::broken::{Broken, BrokenShell, broken};
+use super::crumbs::{Crumb, CrumbParams, Loose, MOST_IN_FRAME};
 use super::drawn::{Drawn, Sketch};
 use super::form::Style;
 use super::shell::{MOST_REACH, ShellOrder};
@@ -11,7 +12,7 @@ use crate::Grid;
 use crate::math::mix;
 use crate::pattern::{Network, SurfaceFrame};
 use crate::plugin::api::shatter::rim_for;
-use crate::plugin::api::{CrackBudget, ShardsError, ShatterCracks, ShatterRequest};
+use crate::plugin::api::{CrackBudget, CrackChips, ShardsError, ShatterCracks, ShatterRequest};
 use crate::plugin::carrier::plane::Plane;
 use crate::plugin::jobs::background::guarded_as;
 use crate::plugin::source::mask;
@@ -47,6 +48,8 @@ pub(super) struct ShatterJob {
     /// Nodes and links of the network.
     grown: (usize, usize),
     pieces: CutFrom,
+    /// Which crumbs come off its shards.
+    crumbs: Option<CrumbParams>,
     /// Whether it is whole.
     is_first: bool,
     sketch: Option<Sketch>,
@@ -85,6 +88,7 @@ pub(super) struct CutSurface {
     pub(super) support: Support,
     /// What leaves, frame by frame.
     pub(super) batches: VecDeque<Batch>,
+    pub(super) crumbs: Option<CrumbParams>,
     /// The cracks that were carried on.
     pub(super) drawn: Option<Drawn>,
     /// Where cracks may go when all have left.
@@ -216,6 +220,7 @@ impl ShatterJob {
             seed,
             grown,
             pieces,
+            crumbs: world.get::<CrackChips>(entity).and_then(CrumbParams::of),
             is_first: broken.is_none(),
             sketch: if is_sketched { Sketch::new(active) } else { None },
             released,
@@ -328,7 +333,8 @@ impl ShatterJob {
             }
             let mut rects = Vec::new();
             dirty.take_rects(&mut rects);
-            batches.push_back(Batch { leaving, spans, rects, uv });
+            let crumbs = self.crumbs.map_or_else(Vec::new, |params| crumbs_of(&cut, &leaving, &style, params));
+            batches.push_back(Batch { leaving, crumbs, spans, rects, uv });
         }
         let density = holes.density(self.view, self.alpha_mask.then_some(&*self.base));
         let room = if self.is_first && !batches.is_empty() { vec![1; self.base.diffuse.len()] } else { Vec::new() };
@@ -349,9 +355,21 @@ impl ShatterJob {
             is_new,
             support,
             batches,
+            crumbs: self.crumbs,
             drawn,
             density,
             room,
         })
     }
+}
+
+/// The crumbs of pieces that leave in one frame.
+fn crumbs_of(cut: &Shards, leaving: &[Leaving], style: &Style, params: CrumbParams) -> Vec<Crumb> {
+    let seen: Vec<&Leaving> = leaving.iter().filter(|leaving| leaving.form.is_some()).collect();
+    let most = (MOST_IN_FRAME / seen.len().max(1)).max(1);
+    let crumbs = |leaving: &Leaving| {
+        let Leaving { number, ref plane, ref flight, seed, .. } = *leaving;
+        Loose { cut, number, plane, flight, seed, style }.crumbs(params, most)
+    };
+    seen.into_iter().flat_map(crumbs).take(MOST_IN_FRAME).collect()
 }

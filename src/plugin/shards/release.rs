@@ -3,11 +3,14 @@
 use super::batch::{Batch, Leaving};
 use super::body::Spares;
 use super::broken::{self, Broken, Piece, Pieces};
+use super::crumbs::Crumb;
 use super::order::{CutSurface, MOST_NEW, ShatterJob};
 use super::request::{FRAMES, Request, ShardQueue, frames};
 use super::show::ShownPiece;
 use crate::plugin::api::error::EntityLabel;
 use crate::plugin::api::{CrackBudget, Shard, ShardsError, ShatterCracks, ShatterFailed, Shattered};
+use crate::plugin::carrier::plane::Plane;
+use crate::plugin::carrier::slot::SideLook;
 use crate::plugin::draw::async_playback::is_at_work;
 use crate::plugin::draw::paint::paint_now;
 use crate::plugin::gpu::memory::{TextureBytes, TextureMemory};
@@ -19,6 +22,7 @@ use crate::plugin::surface::active::Active;
 use crate::plugin::surface::cutouts::{Holes, Span, cut_span};
 use crate::plugin::surface::{cracked, warm};
 use crate::raster::TexelRect;
+use crate::shatter::RimLook;
 use bevy::{asset::UntypedHandle, platform::time::Instant, prelude::*};
 
 /// Shatters the surfaces that are to, one request after the other.
@@ -194,8 +198,22 @@ fn release(world: &mut World, entity: Entity, active: &mut Active, made: CutSurf
     }
     let before = broken::take(world, entity);
     let is_first = before.is_none();
-    let CutSurface { settings, rim, plane, shell, grown, cut, is_new, support, batches, drawn, density, room, .. } =
-        made;
+    let CutSurface {
+        settings,
+        rim,
+        plane,
+        shell,
+        grown,
+        cut,
+        is_new,
+        support,
+        batches,
+        crumbs,
+        drawn,
+        density,
+        room,
+        ..
+    } = made;
     if is_first {
         can_copy_picture(world, active)?;
     }
@@ -220,10 +238,10 @@ fn release(world: &mut World, entity: Entity, active: &mut Active, made: CutSurf
     if is_new && !cut.extended_lines().is_empty() {
         active.drawing.carried.push(cut.shared_carried());
     }
-    broken.inside = inside(world, active, &settings, rim.bright, broken.inside.take());
+    broken.inside = inside(world, active, (&settings, rim, &plane), shell.is_some(), broken.inside.take());
     (broken.cut, broken.support, broken.grown) = (cut, support, grown);
     (broken.settings, broken.plane, broken.shell, broken.rim) = (settings, plane, shell, rim);
-    broken.is_fresh = is_first;
+    (broken.is_fresh, broken.crumb_params) = (is_first, crumbs);
     (broken.waiting, broken.since, broken.has_begun) = (batches, broken.time, false);
     broken.report(world, entity);
     broken::put_back(world, entity, broken);
@@ -271,7 +289,7 @@ fn depart(
     entity: Entity,
     active: &mut Active,
     broken: &mut Broken,
-    Batch { leaving, spans, rects, uv }: Batch,
+    Batch { leaving, crumbs, spans, rects, uv }: Batch,
     most: usize,
 ) -> Vec<(Entity, [u32; 2])> {
     if !core::mem::take(&mut broken.is_fresh) {
@@ -281,6 +299,8 @@ fn depart(
         holes.set(&spans, true);
     }
     punch(world, active, &spans, &rects);
+    let start = broken.since;
+    broken.crumbs.extend(crumbs.into_iter().map(|crumb| Crumb { start, ..crumb }));
     broken.pieces.reserve(leaving.len());
     let mut shown = Vec::with_capacity(leaving.len());
     for Leaving { number, plane, flight, seed, again, form, .. } in leaving {
@@ -407,8 +427,8 @@ fn punch(world: &mut World, active: &mut Active, spans: &[Span], rects: &[TexelR
 fn inside(
     world: &mut World,
     active: &Active,
-    settings: &ShatterCracks,
-    bright: f32,
+    (settings, rim, plane): (&ShatterCracks, RimLook, &Plane),
+    is_shell: bool,
     before: Option<UntypedHandle>,
 ) -> Option<UntypedHandle> {
     #[cfg(feature = "3d")]
@@ -419,7 +439,9 @@ fn inside(
     if before.is_some() || !carrier.is_solid {
         return before;
     }
-    carrier.kind.side_material(world, carrier, active.canvas.base.mean(), bright)
+    // Texture coordinates of shells are pattern units, those of all others the entity's units.
+    let unit = if is_shell { 1.0 } else { plane.size.y.abs() / active.cracks.growth.network().extent().y };
+    carrier.kind.side_material(world, carrier, &SideLook { mean: active.canvas.base.mean(), rim, unit })
 }
 
 #[cfg(all(test, feature = "2d"))]
