@@ -481,10 +481,9 @@ mod tests {
         let same = |app: &mut App, entity| change_picture(app, entity, UVec2::new(600, 500));
         let larger = |app: &mut App, entity| change_picture(app, entity, UVec2::new(720, 600));
         let wider = |app: &mut App, entity| change_picture(app, entity, UVec2::new(800, 400));
-        for crack in [cracked, forgetful, broken] {
-            for change in [same, larger, wider] {
-                changes_beside_the_frames(crack, change);
-            }
+        let cases: [(Crack, Change); 4] = [(cracked, larger), (cracked, wider), (forgetful, same), (broken, larger)];
+        for (crack, change) in cases {
+            changes_beside_the_frames(crack, change);
         }
     }
 
@@ -619,7 +618,7 @@ mod tests {
         let canvas = active(app.world(), entity).map(|active| (active.canvas.seen(), active.canvas.base.size.x));
         let Some((Some(rect), width)) = canvas else { return texels };
         let row = |y: u32| 4 * (y * width + rect.min.x) as usize..4 * (y * width + rect.max.x) as usize;
-        (rect.min.y..rect.max.y).flat_map(|y| texels[row(y)].iter().copied()).collect()
+        (rect.min.y..rect.max.y).map(|y| &texels[row(y)]).collect::<Vec<_>>().concat()
     }
 
     /// All that is shown while a surface changes, and what it shows after another hit, of all frames.
@@ -637,13 +636,18 @@ mod tests {
         app.world_mut().resource_mut::<Threads>().are_missing = no_threads;
         change(&mut app, entity);
         let mut pictures = vec![seen(&app, entity)];
-        for frame in 0..400 {
+        let mut last = 0;
+        for frame in 0..2000 {
             app.update();
             let now = seen(&app, entity);
             if pictures.last() != Some(&now) {
                 pictures.push(now);
+                last = frame;
             }
             assert!(frame > 0 || (pictures.len() == 1) == is_limited, "the frame of the change");
+            if pictures.len() > 1 && frame - last > 50 {
+                break;
+            }
             std::thread::sleep(Duration::from_millis(1));
         }
         let state = app.world().get::<CrackState>(entity);
