@@ -1,6 +1,8 @@
 //! The grain of broken stone: one small picture that repeats, for the sides of all shards.
 
 use crate::math::hash_unit;
+use crate::paint::{MipLevels, TexelKind};
+use crate::raster::TexelRect;
 use bevy::{
     asset::RenderAssetUsages,
     image::{ImageAddressMode, ImageSampler, ImageSamplerDescriptor},
@@ -16,10 +18,10 @@ const SIDE: u32 = 128;
 pub(crate) const LIGHTER: f32 = 1.0 / 0.8;
 
 /// Cells along each side of patches, and how much lighter or darker they are.
-const PATCHES: [(u32, f32); 3] = [(5, 0.12), (14, 0.12), (40, 0.1)];
+const PATCHES: [(u32, f32); 3] = [(5, 0.07), (16, 0.07), (48, 0.1)];
 
 /// Cells along each side with a stone or a pore each, and the share of cells that has one.
-const STONES: [(u32, f32); 2] = [(11, 0.4), (26, 0.35)];
+const STONES: [(u32, f32); 2] = [(17, 0.25), (40, 0.4)];
 
 /// Texels of all sizes, the largest first.
 static TEXELS: LazyLock<Vec<u8>> = LazyLock::new(texels);
@@ -56,28 +58,20 @@ fn image() -> Image {
 }
 
 fn texels() -> Vec<u8> {
-    let mut level: Vec<[f32; 4]> = (0..SIDE * SIDE).map(|i| texel(UVec2::new(i % SIDE, i / SIDE))).collect();
-    let mut texels = Vec::new();
-    let mut side = SIDE as usize;
-    loop {
-        texels.extend(level.iter().flatten().map(|value| (255.0 * value.clamp(0.0, 1.0)).round() as u8));
-        if side == 1 {
-            return texels;
-        }
-        side /= 2;
-        let mean = |i: usize| {
-            let at = 2 * (2 * side * (i / side) + i % side);
-            let four = [at, at + 1, at + 2 * side, at + 2 * side + 1];
-            core::array::from_fn(|k| 0.25 * four.iter().map(|i| level[*i][k]).sum::<f32>())
-        };
-        level = (0..side * side).map(mean).collect();
-    }
+    let size = UVec2::splat(SIDE);
+    let bytes =
+        |i: u32| texel(UVec2::new(i % SIDE, i / SIDE)).map(|value| (255.0 * value.clamp(0.0, 1.0)).round() as u8);
+    let mut texels: Vec<u8> = (0..SIDE * SIDE).flat_map(bytes).collect();
+    let levels = MipLevels::new(size, TexelKind::Color);
+    texels.resize(levels.bytes(), 0);
+    levels.update(&mut texels, &[TexelRect::whole(size)]);
+    texels
 }
 
 /// How light a texel is, and how warm.
 fn texel(at: UVec2) -> [f32; 4] {
     let share = (at.as_vec2() + 0.5) / SIDE as f32;
-    let mut light = 1.0 / LIGHTER + 0.14 * (hash_unit(1, u64::from(at.y * SIDE + at.x)) - 0.5);
+    let mut light = 1.0 / LIGHTER + 0.18 * (hash_unit(1, u64::from(at.y * SIDE + at.x)) - 0.5);
     let mut warm = 0.0;
     for (seed, (cells, height)) in (2..).zip(PATCHES) {
         light += height * (2.0 * patch(seed, cells, share) - 1.0);
@@ -116,7 +110,7 @@ fn stone(seed: u64, cells: u32, many: f32, share: Vec2) -> (f32, f32) {
         let middle = cell.as_vec2() + Vec2::new(number(1), number(2));
         let away = (at - middle) * Vec2::new(1.0, 0.7 + 0.6 * number(3));
         let inside = ((0.2 + 0.3 * number(4) - away.length()) * 8.0).clamp(0.0, 1.0);
-        let tone = if number(5) < 0.3 { -0.32 } else { 0.3 * (number(6) - 0.4) };
+        let tone = if number(5) < 0.25 { -0.16 } else { 0.22 * (number(6) - 0.4) };
         (light, warm) = (light + inside * tone, warm + inside * 0.06 * (number(7) - 0.5));
     }
     (light, warm)
