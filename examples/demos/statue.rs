@@ -160,7 +160,7 @@ fn setup(
             ..default()
         };
         // What hits knock out, and crumbs off the edges of the pieces.
-        let chips = CrackChips { floor: Some(0.0), ..default() };
+        let chips = CrackChips { floor: Some(0.0), crumbs: 60, crumb_size: 0.1, ..default() };
         commands
             .spawn((Target(i), Mesh3d(meshes.add(mesh)), MeshMaterial3d(material), place, surface, pieces, chips))
             .observe(hit_on_press)

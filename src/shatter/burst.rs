@@ -401,15 +401,16 @@ impl Flight {
     }
 
     /// The flight of a crumb that comes off this piece `late` seconds after the piece has left its place. Before, it lies at `at`, `arm` away from
-    /// the piece's middle, and it is `size` long; pattern units, y up. It fades when the piece does.
+    /// the piece's middle, and it is `size` long; pattern units, y up. It flies `outward` besides, and fades
+    /// when the piece does.
     #[cfg(feature = "bevy")]
     #[must_use]
-    pub(crate) fn crumb(&self, (at, arm, size): (Vec3, Vec3, f32), late: f32, seed: u64) -> Self {
+    pub(crate) fn crumb(&self, (at, arm, size): (Vec3, Vec3, f32), outward: Vec3, late: f32, seed: u64) -> Self {
         let Moving { offset, velocity, rotation, spin } = self.moving(late);
         let mut rng = Rng::new(seed).stream("crumb");
         let mut noise = || Vec3::new(rng.signed(), rng.signed(), rng.signed());
         let turned = rotation * arm;
-        let apart = noise() + 0.5 * turned.normalize_or_zero();
+        let apart = noise() + rotation * outward + 0.5 * turned.normalize_or_zero();
         let velocity = velocity + (self.axis * spin).cross(turned);
         let axis = if self.axis == Vec3::Z { Vec3::Z } else { noise().normalize_or(self.axis) };
         let mut flight = Self {

@@ -12,7 +12,7 @@ use bevy_crack::{
 use std::collections::HashSet;
 
 /// The most of one frame.
-const FRAME: usize = 256;
+const FRAME: usize = 512;
 
 #[derive(Resource, Default)]
 struct Whole(usize);

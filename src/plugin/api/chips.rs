@@ -60,7 +60,7 @@ pub struct CrackChips {
     /// Where they come to rest: the height of a level floor in the world; see
     /// [`ShatterCracks::floor`](super::ShatterCracks::floor). `None` (default) or not finite = there is no floor.
     pub floor: Option<f32>,
-    /// About how many crumbs come off for each pattern unit of the outline of a shard, 64 of a shard and 256 in a frame at the most; 0 = none.
+    /// About how many crumbs come off for each pattern unit of the outline of a shard, 64 of a shard and 512 in a frame at the most; 0 = none.
     /// 0..=1000; default 40.
     pub crumbs: u32,
     /// How large the largest crumbs are, pattern units; most are much smaller. 0..=0.1; default 0.05.

@@ -9,7 +9,7 @@ use bevy::prelude::*;
 
 /// The most crumbs of a shard, and of a surface in a frame.
 pub(super) const MOST_OF_SHARD: usize = 64;
-pub(super) const MOST_IN_FRAME: usize = 256;
+pub(super) const MOST_IN_FRAME: usize = 512;
 
 /// How many different shapes the crumbs of a surface have.
 pub(super) const SHAPES: usize = 6;
@@ -66,7 +66,8 @@ pub(super) struct Crumb {
 impl Loose<'_> {
     /// The crumbs that come off along its outline, no more than `most`: always the same.
     pub(super) fn crumbs(&self, params: CrumbParams, most: usize) -> Vec<Crumb> {
-        let Some(shard) = self.cut.get(self.number) else { return Vec::new() };
+        let has_size = self.plane.size.abs().min_element() > 0.0;
+        let Some(shard) = self.cut.get(self.number).filter(|_| has_size) else { return Vec::new() };
         let edges = self.edges();
         let length = edges.last().map_or(0.0, |(until, _)| *until);
         let mut rng = Rng::new(self.seed).stream("crumbs");
@@ -110,12 +111,13 @@ impl Loose<'_> {
     /// A crumb at a place of the outline.
     fn crumb(&self, shard: &ShardShape, at: Vec2, largest: f32, rng: &mut Rng) -> Option<Crumb> {
         // Few are large.
-        let size = largest * (0.2 + 0.8 * rng.unit().powi(4));
+        let size = largest * (0.25 + 0.75 * rng.unit().powi(3));
         let extent = self.cut.extent();
         let unit = self.plane.size / extent;
         let unit = unit.extend(unit.y.abs());
         let thickness = self.style.thickness.unwrap_or_default();
-        let depth = thickness * rng.unit();
+        // More where it is seen.
+        let depth = thickness * rng.unit() * rng.unit();
         let place = match &self.style.shell {
             Some(shell) => {
                 let place = shell.place(at)?;
@@ -125,6 +127,8 @@ impl Loose<'_> {
         };
         let axes_at = self.plane.flight_axes(place, extent);
         let arm = axes_at - Vec3::new(shard.centroid.x, -shard.centroid.y, -0.5 * thickness / unit.z);
+        // Off a body they fly outward.
+        let outward = if self.style.shell.is_some() { Vec3::Z } else { Vec3::ZERO };
         // Some come off on the way.
         let late = LATEST * (rng.unit() * 1.6 - 0.6).max(0.0);
         let seed = mix(self.seed ^ u64::from(rng.next_u32()));
@@ -136,7 +140,7 @@ impl Loose<'_> {
             home: Transform { translation: place, rotation: self.plane.rotation, scale: axes * (0.5 * size * unit.z) },
             turn,
             unit,
-            flight: self.flight.crumb((axes_at, arm, size), late, seed),
+            flight: self.flight.crumb((axes_at, arm, size), outward, late, seed),
             start: 0.0,
             shape: rng.next_u32() as usize % SHAPES,
             at,
