@@ -49,6 +49,7 @@ fn take(images: &mut Assets<Image>, image: AssetId<Image>, rects: Vec<TexelRect>
 #[cfg(all(test, feature = "2d"))]
 mod tests {
     use super::*;
+    use crate::shatter::{Anchor, ShatterParams};
     use crate::{
         Grid,
         math::Rng,
@@ -94,7 +95,8 @@ mod tests {
             app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(50)));
             let image = app.world_mut().resource_mut::<Assets<Image>>().add(blank(UVec2::from(size)));
             let surface = CrackSurface::new(CrackPreset::GLASS).with_mips(CrackMips::Always);
-            let shatter = ShatterCracks::default();
+            let cut = ShatterParams { extend_cracks: true, ..ShatterParams::DEFAULT };
+            let shatter = ShatterCracks { cut, anchor: Anchor::Nothing, ..default() };
             let entity =
                 app.world_mut().spawn((Sprite::from_image(image), surface, shatter, CrackClock::default())).id();
             let mut rng = Rng::new(7);
