@@ -143,7 +143,8 @@ impl FrameJob {
             }
             Stage::Crush => {
                 if !self.field.crush(1, &mut self.redrawn.changed) {
-                    self.stage = Stage::Carry(0);
+                    let is_any = !self.carried.0.is_empty();
+                    self.stage = if is_any { Stage::Carry(0) } else { Stage::Paint(self.plan()) };
                 }
             }
             Stage::Carry(drawn) => {
