@@ -22,7 +22,7 @@ pub(crate) fn follow_up(mut uploads: ResMut<Uploads>, images: Option<ResMut<Asse
     let fresh = uploads.levelled;
     let Some(mut images) = images.filter(|_| uploads.rects.len() > fresh) else { return };
     let mut rects = HashMap::<AssetId<Image>, Vec<TexelRect>>::default();
-    for changed in &uploads.rects[fresh..] {
+    for changed in uploads.rects.get(fresh..).unwrap_or_default() {
         let has_mips = |image: &Image| image.texture_descriptor.mip_level_count > 1;
         if changed.level == 0 && images.get(changed.image).is_some_and(has_mips) {
             rects.entry(changed.image).or_default().push(changed.rect);

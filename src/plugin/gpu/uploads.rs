@@ -58,6 +58,14 @@ impl Uploads {
         }
     }
 
+    /// Notes for a copy of an image what has changed in that in this frame: its mip levels have not followed yet, and neither have those of
+    /// the copy.
+    pub(crate) fn push_copy(&mut self, image: AssetId<Image>, copy: AssetId<Image>) {
+        let fresh = self.rects.get(self.levelled..).unwrap_or_default().iter();
+        let fresh = fresh.filter(|changed| changed.image == image && changed.level == 0).map(|changed| changed.rect);
+        fresh.collect::<Vec<_>>().into_iter().for_each(|rect| self.push(copy, rect));
+    }
+
     /// The rectangles that nobody has fetched yet.
     #[cfg(feature = "editor")]
     pub(crate) fn changed(&self) -> impl Iterator<Item = (AssetId<Image>, TexelRect)> + '_ {

@@ -337,7 +337,8 @@ fn depart(
 
 /// Bytes of a copy of the surface's picture on the CPU and the GPU.
 fn copy_bytes(active: &Active) -> u64 {
-    8 * u64::from(active.canvas.base.size.x) * u64::from(active.canvas.base.size.y)
+    let bytes = 8 * u64::from(active.canvas.base.size.x) * u64::from(active.canvas.base.size.y);
+    if active.canvas.has_mips { (4 * bytes).div_ceil(3) } else { bytes }
 }
 
 /// Whether the surface's picture can be copied.
@@ -366,7 +367,9 @@ fn copy_picture(
     room.extend_from_slice(shown.data.as_deref().ok_or(ShardsError::NoDiffuse)?);
     let copy = textures::DIFFUSE.image(shown.size(), room, &shown.sampler).ok_or(ShardsError::NoDiffuse)?;
     let copy = images.add(copy);
-    world.resource_mut::<Uploads>().expect_whole();
+    let mut uploads = world.resource_mut::<Uploads>();
+    uploads.expect_whole();
+    uploads.push_copy(diffuse.id(), copy.id());
     Ok((copy, world.resource::<TextureMemory>().count(copy_bytes(active))))
 }
 
