@@ -236,7 +236,10 @@ impl Plugin for CrackPlugin {
         #[cfg(feature = "2d")]
         app.configure_sets(PostUpdate, (Hit, Grow).before(bevy::sprite_render::SpriteSystems::ComputeSlices));
         #[cfg(any(feature = "2d", feature = "3d"))]
-        app.register_type::<CrackMemberOf>().register_type::<CrackGroup>().add_observer(group::hide::show_leaving);
+        app.register_type::<CrackMemberOf>()
+            .register_type::<CrackGroup>()
+            .init_resource::<gpu::grain::Grain>()
+            .add_observer(group::hide::show_leaving);
         #[cfg(feature = "2d")]
         app.init_resource::<group::system::GroupChanges>().add_systems(
             PostUpdate,

@@ -28,11 +28,11 @@ static TEXELS: LazyLock<Vec<u8>> = LazyLock::new(texels);
 
 /// The picture, if it is there: it goes with the last material that shows it.
 #[derive(Resource, Default)]
-struct Grain(Option<AssetId<Image>>);
+pub(crate) struct Grain(Option<AssetId<Image>>);
 
 /// The picture of the grain. `None` where there are no images.
 pub(crate) fn picture(world: &mut World) -> Option<Handle<Image>> {
-    let known = world.get_resource_or_init::<Grain>().0;
+    let known = world.get_resource::<Grain>()?.0;
     let mut images = world.get_resource_mut::<Assets<Image>>()?;
     if let Some(handle) = known.and_then(|known| images.get_strong_handle(known)) {
         return Some(handle);
