@@ -251,6 +251,8 @@ mod tests {
             headless::{app, blank},
         },
     };
+    use bevy::time::TimeUpdateStrategy;
+    use core::time::Duration;
 
     /// Fault B5: a frame without time looks at one slice of places, however many markers hits make and however many hits there are, and
     /// the cracks are those of hits that take effect at once.
@@ -258,6 +260,8 @@ mod tests {
     fn b5_the_markers_of_hits_are_laid_out_within_the_budget() {
         let preset = CrackPreset::TEMPERED_GLASS.scaled(0.3);
         let mut app = app(CrackBudget { milliseconds: 0.0, ..default() });
+        // However long its frames take.
+        app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(1)));
         let places = [Vec2::splat(0.5), Vec2::new(0.2, 0.7)];
         let entities: Vec<Entity> = (0..3)
             .map(|seed| {
