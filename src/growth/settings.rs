@@ -16,6 +16,12 @@ impl CrackGrowth {
         self.density = density.filter(|grid| grid.size().min_element() > 0);
     }
 
+    /// Takes over the density of another growth.
+    #[cfg(feature = "bevy")]
+    pub(crate) fn take_density(&mut self, other: &mut Self) {
+        self.density = other.density.take();
+    }
+
     /// Sets where the cracks of later hits and steps prefer to run, avoid to run, and never run. An empty mask treats
     /// the whole surface alike.
     ///

@@ -49,7 +49,7 @@ pub use stamp::{stamp_dot, stamp_path, stamp_path_with};
 
 use crate::{
     Grid, OutOfMemory,
-    pattern::{CrackMask, Moment, Network, SurfaceFrame, Timeline},
+    pattern::{CellTracker, CrackMask, Moment, Network, SurfaceFrame, Timeline},
     relief::Crater,
 };
 use glam::{UVec2, Vec2};
@@ -216,10 +216,17 @@ impl DepthField {
         self.layer.is_behind()
     }
 
-    /// Continues with a network whose oldest part was removed: what is shown stays.
+    /// Whether closed cells are plates of their own.
     #[cfg_attr(not(feature = "bevy"), expect(dead_code, reason = "surfaces of the plugin forget"))]
-    pub(crate) fn freeze_layer(&mut self, network: &Network, timeline: &Timeline) {
-        self.layer.freeze(network, timeline);
+    pub(crate) const fn has_plates(&self) -> bool {
+        self.layer.has_plates()
+    }
+
+    /// Continues with a network whose oldest part was removed: the plates that are shown stay. `cells` are what is left, as
+    /// [recorded](CellTracker::recording).
+    #[cfg_attr(not(feature = "bevy"), expect(dead_code, reason = "surfaces of the plugin forget"))]
+    pub(crate) fn freeze_plates(&mut self, cells: CellTracker) {
+        self.layer.freeze(cells);
     }
 
     /// The crater that impact number `impact` at `pos` (pattern units) has at an energy, as it is drawn: its contours, and how deep it is.

@@ -6,6 +6,7 @@ use crate::plugin::api::{CrackBudget, CrackChips, CrackClock, CrackState, CrackS
 use crate::plugin::carrier::kind::{CarrierKind, Found};
 use crate::plugin::carrier::kinds;
 use crate::plugin::draw::freeze::{freeze_if_full, has_to_wait};
+use crate::plugin::jobs::background::drop_in_background;
 use crate::plugin::jobs::frame_time::{FrameClock, Timer};
 use crate::plugin::source::picture;
 use crate::plugin::surface::cracked::{active, active_mut, has_cracked, with_queues};
@@ -32,15 +33,18 @@ const SLICE: u32 = 1024;
 /// Shards fly no further after harder hits: the most that [`ShatterRequest::energy`](super::ShatterRequest::energy) may be.
 const HARDEST: f32 = 1000.0;
 
+const GONE: &str = "the surface is gone";
+
 /// Whether any hit waits, or has markers to lay out.
 pub(crate) fn any_hits(hits: Res<HitQueue>, queues: Res<Queues>) -> bool {
-    hits.has_any() || !queues.laying_out.is_empty()
+    hits.has_any() || !queues.laying_out.is_empty() || !queues.freezing.is_empty()
 }
 
 /// Applies the hits that wait, in turns, as many as the budget allows.
 pub(crate) fn apply_hits(world: &mut World) {
     let timer = world.resource::<FrameClock>().start(world.resource::<CrackBudget>(), SHARE);
     let (mut looks, mut has_worked) = (0, lay_out(world, &timer));
+    keep_room(world);
     world.resource_mut::<HitQueue>().unpark();
     while let Some(entity) = world.resource::<HitQueue>().next() {
         if has_worked && timer.is_over() {
@@ -70,7 +74,9 @@ pub(crate) fn apply_hits(world: &mut World) {
         match ready {
             // Observers may have healed it.
             _ if world.resource::<HitQueue>().next() != Some(entity) => {}
-            Ok(true) if has_to_wait(world, entity) => world.resource_mut::<HitQueue>().park(),
+            Ok(true) if has_to_wait(world, entity, |world| will_land(world, entity)) => {
+                world.resource_mut::<HitQueue>().park();
+            }
             Ok(true) => apply_next(world, entity, &timer),
             Ok(false) => {
                 set_status(world, entity, CrackStatus::Waiting);
@@ -99,6 +105,19 @@ fn prepare_some(world: &mut World, entity: Entity) -> Option<bool> {
         }
         has_places
     })
+}
+
+/// No room is made any more for hits that have gone.
+fn keep_room(world: &mut World) {
+    let surfaces: Vec<Entity> = world.resource::<Queues>().freezing.iter().copied().collect();
+    for entity in surfaces {
+        if world.resource::<HitQueue>().first(entity).is_none() {
+            world.resource_mut::<Queues>().freezing.remove(&entity);
+            if let Some(active) = active_mut(world, entity) {
+                drop_in_background(active.freezing.take());
+            }
+        }
+    }
 }
 
 /// Goes on with the markers of hits, the oldest first, one slice at least. Returns whether there was any.
@@ -190,15 +209,14 @@ fn locate(world: &World, entity: Entity, kind: &dyn CarrierKind, at: HitPoint) -
     is_within.then_some(uv).ok_or("it lies off the surface")
 }
 
-fn apply(world: &mut World, entity: Entity, hit: QueuedHit, timer: &Timer) -> Result<HitOutcome, &'static str> {
-    const GONE: &str = "the surface is gone";
+/// Texture coordinates at which a hit meets the surface; a reason if it does not.
+fn land(world: &mut World, entity: Entity, hit: &QueuedHit) -> Result<Vec2, &'static str> {
     let before = active(world, entity);
     let kind = before.map(|active| active.carrier.kind).or_else(|| kinds::inspect(world, entity).0).ok_or(GONE)?;
     let is_blank = before.is_some_and(|active| active.cracks.growth.network().nodes().is_empty());
     let at = kind.aim(world, entity, hit.at, hit.point, is_blank);
     let uv = locate(world, entity, kind, at)?;
-    let has_chips = world.get::<CrackChips>(entity).is_some();
-    let active = active_mut(world, entity).ok_or(GONE)?;
+    let active = active(world, entity).ok_or(GONE)?;
     let frame = active.drawing.field.frame;
     let texel = frame.to_texel(frame.uv_to_pos(uv)).max(Vec2::ZERO).as_uvec2();
     if active.drawing.cutouts.as_ref().is_some_and(|holes| holes.contains(texel)) {
@@ -210,6 +228,19 @@ fn apply(world: &mut World, entity: Entity, hit: QueuedHit, timer: &Timer) -> Re
     {
         return Err("the surface is transparent there");
     }
+    Ok(uv)
+}
+
+/// Whether the first hit of a surface that waits meets it.
+fn will_land(world: &mut World, entity: Entity) -> bool {
+    let hit = world.resource::<HitQueue>().first(entity).copied();
+    hit.is_some_and(|hit| land(world, entity, &hit).is_ok())
+}
+
+fn apply(world: &mut World, entity: Entity, hit: QueuedHit, timer: &Timer) -> Result<HitOutcome, &'static str> {
+    let uv = land(world, entity, &hit)?;
+    let has_chips = world.get::<CrackChips>(entity).is_some();
+    let active = active_mut(world, entity).ok_or(GONE)?;
     let pos = uv * active.cracks.growth.network().extent();
     freeze_if_full(active);
     let outcome = active.cracks.growth.begin_hit(pos, hit.energy);

@@ -6,6 +6,7 @@ use super::canvas::Canvas;
 use super::cracks::Cracks;
 use super::drawing::Drawing;
 use super::frame::profile;
+use super::freezing::Freezing;
 use super::playhead::Playhead;
 use super::regrow::Regrowing;
 use crate::growth::CrackGrowth;
@@ -38,6 +39,8 @@ pub(crate) struct Active {
     pub(crate) turn: Turn,
     /// Its cracks on another picture, until they are there.
     pub(crate) regrowing: Option<Box<Regrowing>>,
+    /// What is left of its cracks when it forgets the oldest, until that is there. It does not grow meanwhile.
+    pub(crate) freezing: Option<Box<Freezing>>,
     /// Bytes of its textures.
     pub(crate) bytes: TextureBytes,
     /// Nodes of the network and closed cells when shards last fell by themselves.
@@ -128,6 +131,7 @@ impl Active {
             turn: Turn::default(),
             bytes,
             regrowing: None,
+            freezing: None,
             fell_at: (0, 1),
             revision: Arc::default(),
             surface,

@@ -56,6 +56,35 @@ pub(crate) struct Frozen {
     pub(crate) cells: u32,
 }
 
+/// What a growth has forgotten.
+pub(crate) struct Forgotten {
+    /// Nodes that were removed.
+    gone: u32,
+    /// The cells of what is left.
+    cells: CellTracker,
+    /// The same for plates, if there are any.
+    plates: Option<CellTracker>,
+    /// A picture to write into, if there is none.
+    depth: Option<Grid<u16>>,
+}
+
+impl Forgotten {
+    /// Removes all but the newest nodes of a growth. `size` is that of a picture that is wanted.
+    pub(crate) fn of(growth: &mut CrackGrowth, keep: u32, has_plates: bool, size: Option<UVec2>) -> Self {
+        let gone = growth.remove_oldest(keep);
+        let mut cells = CellTracker::new(growth.network().extent());
+        cells.update(growth.network());
+        let plates = has_plates.then(|| {
+            let mut plates = CellTracker::recording(growth.network().extent());
+            plates.follow(growth.network(), growth.timeline());
+            plates
+        });
+        // Of ones: memory that was never written to comes slowly.
+        let depth = size.map(|size| Grid::new(size, 1));
+        Self { gone, cells, plates, depth }
+    }
+}
+
 impl Frozen {
     /// Removes all but the newest nodes of a growth that is drawn in `field`, and keeps the picture. `cells` are those of the growth
     /// and, then, of what is left of it. Returns how many nodes were removed, too.
@@ -67,15 +96,35 @@ impl Frozen {
         cells: &mut CellTracker,
     ) -> (Self, u32) {
         cells.update(growth.network());
-        let gone = growth.remove_oldest(keep);
-        field.freeze_layer(growth.network(), growth.timeline());
-        let (nodes, frozen_cells) = before.map_or((0, 0), |before| (before.nodes, before.cells));
+        let forgotten = Forgotten::of(growth, keep, field.has_plates(), None);
+        Self::of(before, forgotten, field, cells)
+    }
+
+    /// Keeps the picture of a growth that has forgotten some of its nodes. `cells` are those it had before, and then those it has.
+    pub(crate) fn of(
+        before: Option<Self>,
+        forgotten: Forgotten,
+        field: &mut DepthField,
+        cells: &mut CellTracker,
+    ) -> (Self, u32) {
+        let Forgotten { gone, cells: left, plates, depth } = forgotten;
+        if let Some(plates) = plates {
+            field.freeze_plates(plates);
+        }
+        let (nodes, frozen_cells, picture) =
+            before.map_or((0, 0, None), |before| (before.nodes, before.cells, Some(before.depth)));
         let closed = frozen_cells + cells.closed();
-        *cells = CellTracker::new(field.frame.extent());
-        cells.update(growth.network());
+        *cells = left;
         let frozen = closed.saturating_sub(cells.closed());
-        let depth = Arc::new(field.depth.clone());
-        (Self { depth, nodes: nodes.saturating_add(gone), cells: frozen }, gone)
+        let picture = picture.and_then(|picture| Arc::try_unwrap(picture).ok()).or(depth);
+        let depth = picture.filter(|picture| picture.size() == field.depth.size()).map_or_else(
+            || field.depth.clone(),
+            |mut picture| {
+                picture.as_mut_slice().copy_from_slice(field.depth.as_slice());
+                picture
+            },
+        );
+        (Self { depth: Arc::new(depth), nodes: nodes.saturating_add(gone), cells: frozen }, gone)
     }
 
     /// Draws it into a field of any size.

@@ -13,6 +13,7 @@ pub(crate) mod create;
 pub(crate) mod cutouts;
 pub(crate) mod drawing;
 pub(crate) mod frame;
+pub(crate) mod freezing;
 pub(crate) mod inputs;
 pub(crate) mod motion;
 pub(crate) mod owners;

@@ -17,6 +17,8 @@ pub(crate) struct Queues {
     pub(crate) dirty: VecDeque<Entity>,
     /// Surfaces whose normals are to be blended once they are at rest, each once, in turns.
     pub(crate) blending: VecDeque<Entity>,
+    /// Surfaces that forget their oldest cracks when a task has worked out what is left: to make room for hits that wait.
+    pub(crate) freezing: EntityHashSet,
     /// Surfaces whose components or pictures have changed.
     pub(crate) changed: Vec<Entity>,
     /// Those among them that there was no time for in the last frame. Hits on them come after the change.
@@ -60,6 +62,7 @@ impl Queues {
 
     /// Takes a surface out of the queues at once: if it comes back before its turn, it must not be in them twice.
     pub(super) fn remove(&mut self, entity: Entity, turn: &Turn) {
+        self.freezing.remove(&entity);
         if turn.is_growing {
             self.growing.retain(|other| *other != entity);
             self.held.retain(|other| *other != entity);

@@ -18,6 +18,9 @@ use std::sync::Arc;
 /// Nodes up to which cracks are grown again in the frame.
 const MAX_NODES: usize = 1024;
 
+/// Markers up to which they are, which are laid out again.
+const MAX_MARKERS: u32 = 4096;
+
 /// What has changed so often before it was grown, as films of other proportions do, is grown in the frame.
 const MAX_RESTARTS: u32 = 3;
 
@@ -76,7 +79,9 @@ pub(crate) fn regrow(active: &mut Active, inputs: Regrowth, at_once: bool) -> Re
         }
         known => known.map_or(0, |known| known.restarts + 1),
     };
-    if at_once || restarts > MAX_RESTARTS || active.cracks.growth.network().nodes().len() <= MAX_NODES {
+    let growth = &active.cracks.growth;
+    let is_little = growth.network().nodes().len() <= MAX_NODES && growth.marker_counts().total <= MAX_MARKERS;
+    if at_once || restarts > MAX_RESTARTS || is_little {
         return Ok(OnAnother::Grown(Box::new(inputs.grow(active.cracks.added.as_mut(), &past)?)));
     }
     let work = Work { inputs: inputs.clone(), past: past.clone(), added: active.cracks.added.clone() };

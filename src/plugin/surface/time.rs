@@ -117,7 +117,8 @@ impl Active {
             (Ruler::Closing(_), _) => false,
             _ => self.playhead.due >= 1.0,
         };
-        is_due && self.cracks.growth.is_growing() && !self.turn.is_laying_out && !self.turn.is_held
+        let is_free = !self.turn.is_laying_out && !self.turn.is_held && self.freezing.is_none();
+        is_due && is_free && self.cracks.growth.is_growing()
     }
 
     /// Makes a step of growth if one is due and its preparations are done, which may need more than one turn: markers of the last hits are

@@ -26,7 +26,7 @@ pub(crate) use zones::CrushedField;
 use super::TexelRect;
 use crate::{
     Grid,
-    pattern::{Moment, Network, SurfaceFrame, Timeline},
+    pattern::{CellTracker, Moment, Network, SurfaceFrame, Timeline},
     relief::Crater,
 };
 use glam::Vec2;
@@ -155,10 +155,14 @@ impl Layer {
     }
 
     /// Continues with a network whose oldest part was removed.
-    pub(super) fn freeze(&mut self, network: &Network, timeline: &Timeline) {
+    pub(super) fn freeze(&mut self, cells: CellTracker) {
         if let Some(plates) = &mut self.plates {
-            plates.freeze(network, timeline);
+            plates.freeze(cells);
         }
+    }
+
+    pub(super) const fn has_plates(&self) -> bool {
+        self.plates.is_some()
     }
 
     pub(super) const fn plan(&self) -> &LayerPlan {

@@ -164,10 +164,9 @@ impl PlateField {
         }
     }
 
-    /// Keeps what is shown and continues with the remaining network.
-    pub(super) fn freeze(&mut self, network: &Network, timeline: &Timeline) {
-        self.cells = CellTracker::recording(self.frame.extent());
-        self.cells.follow(network, timeline);
+    /// Keeps what is shown and continues with the cells of the remaining network.
+    pub(super) fn freeze(&mut self, cells: CellTracker) {
+        self.cells = cells;
         self.frozen = self.plates.len() - 1;
         self.skipped = self.cells.closings().map_or(0, |closings| closings.all().len());
     }
