@@ -198,6 +198,8 @@ pub(crate) struct Carrier {
     pub(crate) is_solid: bool,
     /// What it showed before.
     pub(crate) shown: Shown,
+    /// What somebody has given it since, until its cracks are on that.
+    pub(crate) next: Option<Box<Shown>>,
     /// The sprite's image or the material that it shows now; `None` = as before.
     pub(crate) own: Option<UntypedHandle>,
     /// The mesh before, and the mesh with tangents.
@@ -220,6 +222,7 @@ impl Carrier {
             kind,
             is_solid: kind.is_solid(),
             shown,
+            next: None,
             own: None,
             mesh: None,
             size: None,
@@ -243,6 +246,25 @@ impl Carrier {
     /// Ids of the assets made for it, unmeasured textures.
     pub(crate) fn owned(&self) -> impl Iterator<Item = UntypedAssetId> + '_ {
         self.own.iter().map(UntypedHandle::id).chain(self.mesh.iter().map(|(_, own)| own.id().untyped()))
+    }
+
+    /// Gives back what an entity showed before, or what it was to show next.
+    pub(crate) fn give_back(&mut self, world: &mut World, entity: Entity) {
+        if let Some(next) = self.next.take() {
+            let before = core::mem::replace(&mut self.shown, *next);
+            self.kind.detach(world, entity, self);
+            self.next = Some(Box::new(core::mem::replace(&mut self.shown, before)));
+        } else {
+            self.kind.detach(world, entity, self);
+        }
+    }
+
+    /// Whether it may go on showing what it does until its cracks are on other pictures that somebody has given it. A part of a picture, or
+    /// one that is laid out, does not fit what it shows.
+    pub(crate) fn may_wait_for(&self, other: &Shown) -> bool {
+        let is_plain = |shown: &Shown| shown.rect.is_none() && shown.layout.is_none();
+        let is_of_its_kind = self.shown.asset.type_id() == other.asset.type_id();
+        is_of_its_kind && is_plain(&self.shown) && is_plain(other) && !self.is_twofold && self.unfolding.is_none()
     }
 
     /// Whether `asset` is what the entity should show.

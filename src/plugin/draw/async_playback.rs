@@ -30,6 +30,9 @@ use std::sync::Arc;
 const MAX_NODES: usize = 1024;
 const MAX_TEXELS: u64 = 512 * 512;
 
+/// Drawing what a hit has crushed takes as long as drawing so many nodes, or longer.
+const NODES_OF_HIT: usize = 128;
+
 /// Frames after which memory is given back if time stands still.
 const IDLE: u32 = 60;
 
@@ -244,20 +247,19 @@ pub(crate) fn start(world: &mut World, entity: Entity, playback: Option<AsyncPla
 }
 
 /// Whether all texels of a surface are more than a frame paints.
-fn is_large(active: &Active) -> bool {
-    is_much(0, active.drawing.field.frame.size())
+fn is_large(size: UVec2) -> bool {
+    TexelRect::whole(size).area() > MAX_TEXELS
 }
 
-/// Whether so many nodes on so many texels are more than a frame draws.
-pub(super) fn is_much(nodes: usize, size: UVec2) -> bool {
-    nodes > MAX_NODES || TexelRect::whole(size).area() > MAX_TEXELS
+/// Whether so many cracks on so many texels are more than a frame draws.
+pub(super) fn is_much(growth: &CrackGrowth, size: UVec2) -> bool {
+    growth.network().nodes().len() + NODES_OF_HIT * growth.impacts().len() > MAX_NODES || is_large(size)
 }
 
 /// Has all of a surface drawn anew that shows something else in the same places: by a task, until which it shows what it showed, if it
 /// takes longer than a frame has.
 pub(crate) fn redraw(world: &mut World, entity: Entity, active: &mut Active) {
-    let (nodes, size) = (active.cracks.growth.network().nodes().len(), active.drawing.field.frame.size());
-    if !is_much(nodes, size) || !ask(world, entity) {
+    if !is_much(&active.cracks.growth, active.drawing.field.frame.size()) || !ask(world, entity) {
         return stamp_anew(active);
     }
     active.drawing.is_stale = true;
@@ -266,7 +268,7 @@ pub(crate) fn redraw(world: &mut World, entity: Entity, active: &mut Active) {
 
 /// Has all of a surface painted by a task, if it takes longer than a frame has.
 pub(crate) fn repaint(world: &mut World, entity: Entity, active: &mut Active) {
-    if is_large(active) && ask(world, entity) {
+    if is_large(active.drawing.field.frame.size()) && ask(world, entity) {
         active.drawing.redrawn += 1;
     }
 }

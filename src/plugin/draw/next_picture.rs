@@ -158,8 +158,7 @@ pub(crate) fn make(
         OnAnother::Wait => return Ok(None),
     };
     let growth = regrown.as_ref().map_or(&active.cracks.growth, |regrown| &regrown.growth);
-    let is_for_frame =
-        !may_wait || is_unlimited || !is_much(growth.network().nodes().len(), inputs.growth.frame.size());
+    let is_for_frame = !may_wait || is_unlimited || !is_much(growth, inputs.growth.frame.size());
     let next = next_of(world, entity).filter(|next| !is_for_frame && next.restarts <= MAX_RESTARTS);
     let Some(mut next) = next else { return Ok(Some(NextShown { inputs, regrown, drawn: None })) };
     active.turn.is_held = true;

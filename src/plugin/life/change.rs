@@ -126,6 +126,10 @@ fn update(world: &mut World, entity: Entity, active: &mut Active) -> Result<bool
         Found::Other => return Ok(true),
     };
     if active.carrier.is_showing(&shown.asset) {
+        if let (Some(kind), Some(next)) = (kind, active.carrier.next.take()) {
+            let (rect, layout) = (shown.rect, shown.layout);
+            return update_picture(world, entity, active, Some(kind), Shown { rect, layout, ..*next });
+        }
         // A part of the picture is shown as it is, not of textures of another size.
         let is_part = shown.rect.is_some()
             && active.canvas.unstretched.is_some_and(|size| active.canvas.base.size.cmpgt(size).any());
@@ -230,13 +234,35 @@ fn change_carrier(
 }
 
 /// Reads the pictures again and paints the cracks over them; `false` if they are not there yet. `other` is how to deal with them if somebody
-/// gave them to it. Until they are accepted it is dealt with as before: its shards are of the kind that it was.
+/// gave them to it. Until they are accepted it is dealt with as before: its shards are of the kind that it was, and it goes on showing what it
+/// did, if it can.
 fn update_picture(
     world: &mut World,
     entity: Entity,
     active: &mut Active,
     other: Option<&'static dyn CarrierKind>,
     shown: Shown,
+) -> Result<bool, CrackError> {
+    let next = other.filter(|_| active.carrier.may_wait_for(&shown)).map(|_| Box::new(shown.clone()));
+    let may_wait = other.is_none() || next.is_some();
+    let outcome = try_picture(world, entity, active, other, shown, may_wait);
+    let is_back = matches!(kinds::inspect(world, entity).1, Found::Shown(now) if active.carrier.is_showing(&now.asset));
+    // One that turns out to be broken is not shown.
+    active.carrier.next = next.filter(|_| matches!(outcome, Ok(false)) || (is_back && outcome.is_err()));
+    if active.carrier.next.is_some() && !is_back {
+        attach(world, entity, active);
+    }
+    outcome
+}
+
+/// Like [`update_picture`]; what it was before may be shown meanwhile if it `may_wait`.
+fn try_picture(
+    world: &mut World,
+    entity: Entity,
+    active: &mut Active,
+    other: Option<&'static dyn CarrierKind>,
+    shown: Shown,
+    may_wait: bool,
 ) -> Result<bool, CrackError> {
     active.canvas.is_outdated = true;
     active.canvas.offered = if other.is_some() { shown.pictures().map(Handle::id).collect() } else { Vec::new() };
@@ -251,8 +277,6 @@ fn update_picture(
         rect: draft.plan.rect,
         maps: draft.plan.maps,
     };
-    // What somebody has given it is shown at once.
-    let may_wait = other.is_none();
     let Some(next) = next_picture::make(world, entity, active, inputs, may_wait)? else {
         // Hits come after it.
         world.resource_mut::<Queues>().late.insert(entity);
@@ -481,7 +505,17 @@ mod tests {
         let same = |app: &mut App, entity| change_picture(app, entity, UVec2::new(600, 500));
         let larger = |app: &mut App, entity| change_picture(app, entity, UVec2::new(720, 600));
         let wider = |app: &mut App, entity| change_picture(app, entity, UVec2::new(800, 400));
-        let cases: [(Crack, Change); 4] = [(cracked, larger), (cracked, wider), (forgetful, same), (broken, larger)];
+        let another = |app: &mut App, entity| give_picture(app, entity, UVec2::new(600, 500));
+        let another_wider = |app: &mut App, entity| give_picture(app, entity, UVec2::new(800, 400));
+        let cases: [(Crack, Change); 7] = [
+            (cracked, larger),
+            (cracked, wider),
+            (forgetful, same),
+            (broken, larger),
+            (cracked, another),
+            (cracked, another_wider),
+            (broken, another),
+        ];
         for (crack, change) in cases {
             changes_beside_the_frames(crack, change);
         }
@@ -521,6 +555,16 @@ mod tests {
         }
         // The engine tells of it at the end of the frame.
         app.update();
+    }
+
+    /// Somebody gives it another picture.
+    fn give_picture(app: &mut App, entity: Entity, size: UVec2) {
+        let mut image = blank(size);
+        image.data.iter_mut().flatten().for_each(|value| *value = value.saturating_add(20));
+        let image = app.world_mut().resource_mut::<Assets<Image>>().add(image);
+        if let Some(mut sprite) = app.world_mut().get_mut::<Sprite>(entity) {
+            sprite.image = image;
+        }
     }
 
     fn settle(app: &mut App, entity: Entity) {
@@ -634,8 +678,8 @@ mod tests {
         let is_limited = !budget.is_unlimited();
         app.insert_resource(budget);
         app.world_mut().resource_mut::<Threads>().are_missing = no_threads;
-        change(&mut app, entity);
         let mut pictures = vec![seen(&app, entity)];
+        change(&mut app, entity);
         let mut last = 0;
         for frame in 0..2000 {
             app.update();
@@ -663,6 +707,42 @@ mod tests {
             seen(&app, entity)
         });
         (pictures, after)
+    }
+
+    /// Fault B5: a picture that somebody has given a large surface is shown when its cracks are, and not without them; a surface that is
+    /// healed before shows it whole.
+    #[test]
+    fn b5_another_picture_comes_with_its_cracks() {
+        let image = |app: &App, entity| app.world().get::<Sprite>(entity).map(|sprite| sprite.image.clone());
+        let original = |app: &App, entity| active(app.world(), entity).and_then(|a| a.carrier.shown.diffuse.clone());
+        let mut app = app(CrackBudget { milliseconds: 0.0, ..default() });
+        app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(20)));
+        let entity = cracked(&mut app);
+        let own = image(&app, entity);
+        for size in [UVec2::new(600, 500), UVec2::new(500, 800)] {
+            give_picture(&mut app, entity, size);
+            let given = image(&app, entity);
+            let mut frames = 0;
+            while original(&app, entity) != given {
+                app.update();
+                frames += 1;
+                assert_eq!(image(&app, entity), own, "frame {frames}");
+                assert!(frames < 10_000, "it never comes");
+                std::thread::sleep(Duration::from_millis(1));
+            }
+            assert!(frames > 1);
+        }
+        let [first, second] = [0, 1].map(|_| {
+            give_picture(&mut app, entity, UVec2::new(600, 500));
+            let given = image(&app, entity);
+            app.update();
+            assert_eq!(image(&app, entity), own);
+            given
+        });
+        assert_ne!(first, second);
+        app.world_mut().commands().entity(entity).heal_cracks();
+        app.update();
+        assert_eq!(image(&app, entity), second);
     }
 
     fn changes_beside_the_frames(crack: Crack, change: Change) {

@@ -80,7 +80,7 @@ fn forget(world: &mut World, entity: Entity) {
     if let Some(mut progress) = world.get_mut::<AnalogyProgress>(entity) {
         progress.set_if_neq(AnalogyProgress(0.0));
     }
-    active.carrier.kind.detach(world, entity, &active.carrier);
+    active.carrier.give_back(world, entity);
     if let Ok(mut entity) = world.get_entity_mut(entity) {
         entity.remove::<(CrackTextures, AsyncPlayback, NextPicture)>();
     }
@@ -110,8 +110,8 @@ fn disown(world: &mut World, entity: Entity) {
     let (_, Found::Shown(shown)) = kinds::inspect(world, entity) else { return };
     let owner = world.resource::<Owners>().owner(shown.asset.id()).filter(|owner| *owner != entity);
     let Some(owner) = owner else { return };
-    if let Some(active) = cracked::take(world, owner) {
-        active.carrier.kind.detach(world, entity, &active.carrier);
+    if let Some(mut active) = cracked::take(world, owner) {
+        active.carrier.give_back(world, entity);
         cracked::put_back(world, owner, active);
     }
 }
