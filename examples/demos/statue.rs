@@ -110,6 +110,8 @@ fn setup(
             illuminance: 7_000.0,
             color: Color::srgb(1.0, 0.95, 0.86),
             shadow_maps_enabled: true,
+            // Crumbs are small.
+            shadow_normal_bias: 0.5,
             ..default()
         },
         CascadeShadowConfigBuilder { num_cascades: 1, maximum_distance: 9.0, ..default() }.build(),
@@ -155,7 +157,8 @@ fn setup(
             // No piece is narrower than it is thick.
             cut: ShatterParams { min_area: 0.012, ..ShatterParams::DEFAULT },
             floor: Some(0.0),
-            burst: BurstParams { fade_after: 30.0, ..BurstParams::DEFAULT },
+            // Fast where it is hit, while the far side only falls.
+            burst: BurstParams { speed: 2.6, falloff: 0.16, fade_after: 30.0, ..BurstParams::DEFAULT },
             again: Some(BreakAgain { classes: SizeClasses { largest: [0.25, 0.6, 1.5] }, after: 0.15, apart: 0.1 }),
             ..default()
         };

@@ -5,7 +5,11 @@ use crate::{
     support::*,
 };
 use bevy::{mesh::Indices, prelude::*};
-use bevy_crack::{plugin::ShardsError, prelude::*, shatter::Anchor};
+use bevy_crack::{
+    plugin::ShardsError,
+    prelude::*,
+    shatter::{Anchor, BurstParams},
+};
 
 #[derive(Resource, Default)]
 struct Failed(Vec<ShardsError>);
@@ -211,6 +215,30 @@ fn s8_a_blow_reaches_through_space() {
 }
 
 /// By default what reaches to the cuts of the layout stays, unless it is hit itself.
+#[test]
+fn s8_a_blow_from_nowhere_comes_from_the_side_that_is_hit() {
+    let (mut app, material) = bodies();
+    let normals = [Vec3::Z, Vec3::X, Vec3::new(0.6, 0.0, 0.8), Vec3::Z];
+    for ((name, mesh, at), normal) in meshes().into_iter().zip(normals) {
+        let mesh = add(&mut app, mesh);
+        // No piece is thrown but by the blow itself.
+        let burst = BurstParams { along: 1.0, scatter: 0.0, ..loose().burst };
+        let entity = spawn(&mut app, &mesh, &material, ShatterCracks { burst, ..loose() });
+        hit(&mut app, CrackHit::local(entity, at).with_energy(3.0));
+        settle(&mut app, entity);
+        shatter(&mut app, entity, ShatterRequest::EVERYTHING);
+        settle_shards(&mut app, entity);
+        let pieces = shards(&mut app);
+        assert!(pieces.len() > 4, "{name}");
+        for shard in pieces {
+            let velocity = get::<Shard>(&app, shard).velocity;
+            assert!(velocity.normalize_or_zero().dot(-normal) > 0.98, "{name}: {velocity}");
+        }
+        app.world_mut().despawn(entity);
+        steps(&mut app, 2);
+    }
+}
+
 #[test]
 fn s8_bodies_are_held_where_their_layout_ends() {
     let (mut app, material) = bodies();
