@@ -37,7 +37,11 @@ pub(crate) fn has_to_wait(world: &mut World, entity: Entity, lands: impl FnOnce(
     if !has_threads || world.resource::<CrackBudget>().is_unlimited() || !lands(world) {
         return false;
     }
-    let has_room = active_mut(world, entity).is_none_or(|active| Freezing::go_on(active, kept(active)));
+    let has_room = active_mut(world, entity).is_none_or(|active| {
+        let known = active.freezing.take();
+        let freezing = Freezing::go_on(known, &active.cracks, &active.drawing, kept(active));
+        active.freezing.insert(Box::new(freezing)).is_done()
+    });
     if !has_room {
         world.resource_mut::<Queues>().freezing.insert(entity);
     }
@@ -50,7 +54,7 @@ pub(crate) fn freeze_if_full(active: &mut Active) {
         return;
     }
     let keep = kept(active);
-    let left = Freezing::take(active);
+    let left = active.freezing.take().and_then(|freezing| freezing.left(&active.cracks, &active.drawing));
     stamp(active, &mut Scratch::default());
     let Drawing { field, frozen, .. } = &mut active.drawing;
     let Cracks { growth, cells, .. } = &mut active.cracks;

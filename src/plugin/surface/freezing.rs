@@ -1,7 +1,7 @@
 //! [`Freezing`]: a task works out what a surface forgets of its cracks.
 
-use super::active::Active;
-use super::drawing::Forgotten;
+use super::cracks::Cracks;
+use super::drawing::{Drawing, Forgotten};
 use crate::growth::{CrackGrowth, GrowthParams};
 use crate::pattern::CrackMask;
 use crate::plugin::jobs::background::{BackgroundJob, PATIENCE, guarded};
@@ -48,13 +48,13 @@ struct Seen {
 }
 
 impl Seen {
-    fn of(active: &Active) -> Self {
-        let growth = &active.cracks.growth;
+    fn of(cracks: &Cracks, drawing: &Drawing) -> Self {
+        let growth = &cracks.growth;
         Self {
             steps: growth.steps_made(),
             nodes: growth.network().nodes().len(),
             hits: growth.impacts().len(),
-            redrawn: active.drawing.redrawn,
+            redrawn: drawing.redrawn,
             extent: growth.network().extent(),
             params: growth.params().clone(),
             mask: growth.mask().clone(),
@@ -63,17 +63,17 @@ impl Seen {
 }
 
 impl Freezing {
-    /// Begins or goes on; returns whether it is done.
-    pub(crate) fn go_on(active: &mut Active, keep: u32) -> bool {
-        let seen = Seen::of(active);
-        let known = active.freezing.take().filter(|freezing| freezing.seen == seen);
+    /// Goes on, or begins (again) if nothing is `known` of these cracks.
+    pub(crate) fn go_on(known: Option<Box<Self>>, cracks: &Cracks, drawing: &Drawing, keep: u32) -> Self {
+        let seen = Seen::of(cracks, drawing);
+        let known = known.filter(|freezing| freezing.seen == seen);
         let stage = known.map_or_else(
             || {
                 let work = Work {
-                    growth: active.cracks.growth.clone(),
+                    growth: cracks.growth.clone(),
                     keep,
-                    has_plates: active.drawing.field.has_plates(),
-                    size: active.drawing.frozen.is_none().then(|| active.drawing.field.frame.size()),
+                    has_plates: drawing.field.has_plates(),
+                    size: drawing.frozen.is_none().then(|| drawing.field.frame.size()),
                 };
                 Stage::Running(BackgroundJob::start(work, Work::forget), Instant::now())
             },
@@ -86,16 +86,18 @@ impl Freezing {
             },
             done @ Stage::Done(_) => done,
         };
-        let is_done = matches!(stage, Stage::Done(_));
-        active.freezing = Some(Box::new(Self { seen, stage }));
-        is_done
+        Self { seen, stage }
     }
 
-    /// What is left of the cracks of a surface, if it was worked out from what it has now.
-    pub(crate) fn take(active: &mut Active) -> Option<Box<Left>> {
-        let Self { seen, stage } = *active.freezing.take()?;
-        match stage {
-            Stage::Done(left) if seen == Seen::of(active) => left,
+    /// Whether the task is done.
+    pub(crate) const fn is_done(&self) -> bool {
+        matches!(self.stage, Stage::Done(_))
+    }
+
+    /// What is left of these cracks, if it was worked out from what they are now.
+    pub(crate) fn left(self, cracks: &Cracks, drawing: &Drawing) -> Option<Box<Left>> {
+        match self.stage {
+            Stage::Done(left) if self.seen == Seen::of(cracks, drawing) => left,
             _ => None,
         }
     }
