@@ -218,8 +218,9 @@ fn s8_a_blow_reaches_through_space() {
 #[test]
 fn s8_a_blow_from_nowhere_comes_from_the_side_that_is_hit() {
     let (mut app, material) = bodies();
-    let normals = [Vec3::Z, Vec3::X, Vec3::new(0.6, 0.0, 0.8), Vec3::Z];
-    for ((name, mesh, at), normal) in meshes().into_iter().zip(normals) {
+    // A layout of a curved mesh is stretched, so that a piece is thrown a little to the side.
+    let blows = [(Vec3::Z, 0.999), (Vec3::X, 0.999), (Vec3::new(0.6, 0.0, 0.8), 0.9), (Vec3::Z, 0.9)];
+    for ((name, mesh, at), (normal, least)) in meshes().into_iter().zip(blows) {
         let mesh = add(&mut app, mesh);
         // No piece is thrown but by the blow itself.
         let burst = BurstParams { along: 1.0, scatter: 0.0, ..loose().burst };
@@ -232,7 +233,7 @@ fn s8_a_blow_from_nowhere_comes_from_the_side_that_is_hit() {
         assert!(pieces.len() > 4, "{name}");
         for shard in pieces {
             let velocity = get::<Shard>(&app, shard).velocity;
-            assert!(velocity.normalize_or_zero().dot(-normal) > 0.98, "{name}: {velocity}");
+            assert!(velocity.normalize_or_zero().dot(-normal) > least, "{name}: {velocity}");
         }
         app.world_mut().despawn(entity);
         steps(&mut app, 2);
