@@ -125,9 +125,12 @@ fn target(bytes: &[u8]) {
     let (area, share) = (shards.get(number).map_or(1.0, |shard| shard.area), input.mostly(least, 0.5, 16));
     let largest = if (0.0..4e-3).contains(&share) { 4e-3 * area } else { share * area };
     if let Ok(pieces) = shards.break_again(number, largest, u64::from(input.word())) {
-        let whole = shards.get(number).unwrap().area;
+        let whole = shards.get(number).unwrap();
         let sum: f32 = pieces.iter().map(|piece| piece.area).sum();
-        assert!((sum - whole).abs() < 1e-3 * whole, "{sum} of {whole}");
+        // Where its outline is cut it moves by up to half a unit of the lattice.
+        let around = whole.border.iter().chain(shards.neighbours(number).iter().map(|next| &next.length)).sum::<f32>();
+        let moved = around * 0.5 * extent.max_element() / 16_777_216.0;
+        assert!((sum - whole.area).abs() < 1e-3 * whole.area + moved, "{sum} of {}", whole.area);
     }
 }
 

@@ -51,6 +51,9 @@ const NEAR_HIT: f32 = 0.7;
 /// Share of the nodes along a brick at which a hairline splits it.
 const SPLIT: f32 = 0.06;
 
+/// A crack that could only go this far to the border is on it, pattern units.
+const ON_BORDER: f32 = 1e-5;
+
 const FIXED: f32 = 16_777_216.0;
 
 impl CrackGrowth {
@@ -233,6 +236,12 @@ impl CrackGrowth {
                 let distance = pull.closest_sq.sqrt();
                 pull.child = if distance <= length { to } else { from + (to - from) * (length / distance) };
                 pull.serves = true;
+                // Markers of rays may lie beyond the border: the ray ends on it.
+                let is_on = pull.child.cmpge(Vec2::ZERO).all() && pull.child.cmple(extent).all();
+                if !is_on && self.arrest.is_none() {
+                    pull.child = up_to_border(from, pull.child - from, 1.0, 0.0, extent);
+                    pull.serves = from.distance(pull.child) > ON_BORDER;
+                }
             }
         }
     }

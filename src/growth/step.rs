@@ -76,12 +76,15 @@ impl CrackGrowth {
         } else {
             for i in 0..self.order.len() {
                 let (node, slot) = self.order[i];
-                self.pull_of[node as usize] = NO_PULL;
-                if i < room {
+                if !self.pulls[slot as usize].serves {
+                    self.pulls[slot as usize].stopped = Some(self.to_closest(node, slot));
+                    any_stopped = true;
+                } else if i < room {
                     let (parent, child) = (self.network.nodes[node as usize], self.pulls[slot as usize].child);
                     self.add_thin_node(child, node, parent.generation.saturating_add(1), parent.impact, 1.0);
                 }
             }
+            self.end_pulls(any_stopped);
             self.widen_with(|widths, nodes, widened| widths.push(nodes, first, widened));
         }
         self.pulls.clear();
@@ -118,8 +121,7 @@ impl CrackGrowth {
             let stopped = if is_sealed {
                 Some(Vec2::ZERO)
             } else if !self.pulls[slot as usize].serves {
-                let closest = self.field.marker(self.pulls[slot as usize].closest).pos;
-                Some((closest - self.network.nodes[node as usize].pos).normalize_or_zero())
+                Some(self.to_closest(node, slot))
             } else {
                 let born = self.network.nodes.len();
                 let Pull { child, course, side, .. } = self.pulls[slot as usize];
@@ -149,6 +151,19 @@ impl CrackGrowth {
             self.pulls[slot as usize].stopped = stopped;
             any_stopped |= stopped.is_some();
         }
+        self.end_pulls(any_stopped);
+        self.advance_runners();
+        any_stopped
+    }
+
+    /// The direction from a node to the closest marker that pulls it.
+    fn to_closest(&self, node: u32, slot: u32) -> Vec2 {
+        let closest = self.field.marker(self.pulls[slot as usize].closest).pos;
+        (closest - self.network.nodes[node as usize].pos).normalize_or_zero()
+    }
+
+    /// Gives up the markers of nodes that have stopped, and ends all pulls.
+    fn end_pulls(&mut self, any_stopped: bool) {
         if any_stopped {
             let Self { field, network, pulls, pull_of, .. } = self;
             let mut given_up = Vec::new();
@@ -169,8 +184,6 @@ impl CrackGrowth {
         for &(node, _) in &self.order {
             self.pull_of[node as usize] = NO_PULL;
         }
-        self.advance_runners();
-        any_stopped
     }
 
     /// Starts new cracks where markers are out of reach of all others.

@@ -265,3 +265,59 @@ fn four_bytes_per_texel(size: UVec2, rgba: &[u8]) -> Result<(), MaskError> {
 fn grid(size: UVec2, values: Vec<f32>, texels: &[u8]) -> Result<Grid<f32>, MaskError> {
     Grid::from_vec(size, values).ok_or(MaskError { width: size.x, height: size.y, length: texels.len() })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Rng;
+
+    /// Whether a line has a part within a rectangle, by cutting it at the sides.
+    fn meets(from: Vec2, to: Vec2, min: Vec2, max: Vec2) -> bool {
+        let (mut first, mut last) = (0.0f32, 1.0f32);
+        for k in 0..2 {
+            let way = to[k] - from[k];
+            if way == 0.0 {
+                if from[k] < min[k] || from[k] > max[k] {
+                    return false;
+                }
+                continue;
+            }
+            let [a, b] = [(min[k] - from[k]) / way, (max[k] - from[k]) / way];
+            (first, last) = (first.max(a.min(b)), last.min(a.max(b)));
+        }
+        first <= last
+    }
+
+    #[test]
+    fn lines_are_blocked_by_the_texels_that_they_cross() {
+        let mut rng = Rng::new(5);
+        let mut found = [0; 2];
+        for _ in 0..4000 {
+            let size = UVec2::new(1 + rng.next_u32() % 9, 1 + rng.next_u32() % 9);
+            let values: Vec<f32> = (0..size.x * size.y).map(|_| f32::from(u8::from(rng.unit() < 0.15))).collect();
+            let layer = Grid::from_vec(size, values).unwrap();
+            // Some lines run along the axes, some end beyond the border, where they do not count.
+            let mut place = || Vec2::new(rng.range(-0.1, 1.1), rng.range(-0.1, 1.1)).clamp(Vec2::ZERO, Vec2::ONE);
+            let (from, mut to) = (place(), place());
+            if to.x > 0.8 {
+                to.x = from.x;
+            } else if to.y > 0.8 {
+                to.y = from.y;
+            }
+            // What a line is blocked by if texels are larger or smaller by this much.
+            let blocks = |by: f32| {
+                let texels = (0..size.y).flat_map(|y| (0..size.x).map(move |x| UVec2::new(x, y)));
+                texels.filter(|texel| layer.get(texel.x, texel.y).is_some_and(|value| value > 0.5)).any(|texel| {
+                    let min = texel.as_vec2();
+                    meets(from * size.as_vec2(), to * size.as_vec2(), min - by, min + 1.0 + by)
+                })
+            };
+            let mask = CrackMask { forbidden: Some(layer.clone()), ..CrackMask::default() };
+            let is_blocked = mask.blocks(from, to);
+            assert!(is_blocked || !blocks(-1e-3), "{from} {to} crosses {layer:?}");
+            assert!(!is_blocked || blocks(1e-3), "{from} {to} crosses nothing of {layer:?}");
+            found[usize::from(is_blocked)] += 1;
+        }
+        assert!(found.iter().all(|&times| times > 800), "{found:?}");
+    }
+}

@@ -404,3 +404,23 @@ impl Timeline {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn dots_grow_in_their_step() {
+        let mut timeline = Timeline::default();
+        timeline.begin(3);
+        let dot = Dot { pos: Vec2::new(0.25, 0.5), radius: 0.5 };
+        timeline.add_dot(dot);
+        let radius = |steps| timeline.dot_at(0, Moment::nearest(steps)).map(|dot| dot.radius);
+        assert_eq!(
+            [1.5, 2.0, 2.25, 2.5, 3.0, 9.0].map(radius),
+            [None, None, Some(0.125), Some(0.25), Some(0.5), Some(0.5)]
+        );
+        assert_eq!(timeline.dot_at(0, Moment::nearest(2.25)).map(|dot| dot.pos), Some(dot.pos));
+        assert_eq!(timeline.dot_at(1, Moment::after(9)), None);
+    }
+}

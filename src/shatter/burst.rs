@@ -1,6 +1,11 @@
 //! [`Burst`]: the flight of pieces as a function of time.
 
-use super::{Floor, ShardShape, ShatterError, cuts::in_range, floor::Landing};
+use super::{
+    Floor, ShardShape, ShatterError,
+    cuts::in_range,
+    floor::Landing,
+    turns::{after, turned},
+};
 use crate::math::{Rng, ops};
 use glam::{Quat, Vec2, Vec3};
 
@@ -353,7 +358,7 @@ impl Flight {
         Moving {
             offset: self.offset + self.velocity * run + self.gravity * fallen,
             velocity: self.velocity * decay + self.gravity * run,
-            rotation: Quat::from_vec4(rotation) * self.rotation,
+            rotation: after(Quat::from_vec4(rotation), self.rotation),
             spin: self.spin * decay,
         }
     }
@@ -380,7 +385,7 @@ impl Flight {
         let turning = self.axis * spin;
         let way = fragment.centroid - piece.centroid;
         let at_rest = Vec3::new(way.x, -way.y, 0.0);
-        let arm = rotation * at_rest;
+        let arm = turned(rotation, at_rest);
         let mut rng = Rng::new(seed).stream("fragment");
         let mut noise = || Vec3::new(rng.signed(), rng.signed(), rng.signed());
         let own = turning * 1.3 + noise() * (0.5 * spin);
@@ -409,9 +414,9 @@ impl Flight {
         let Moving { offset, velocity, rotation, spin } = self.moving(late);
         let mut rng = Rng::new(seed).stream("crumb");
         let mut noise = || Vec3::new(rng.signed(), rng.signed(), rng.signed());
-        let turned = rotation * arm;
-        let apart = noise() + rotation * outward + 0.5 * turned.normalize_or_zero();
-        let velocity = velocity + (self.axis * spin).cross(turned);
+        let arm_now = turned(rotation, arm);
+        let apart = noise() + turned(rotation, outward) + 0.5 * arm_now.normalize_or_zero();
+        let velocity = velocity + (self.axis * spin).cross(arm_now);
         let axis = if self.axis == Vec3::Z { Vec3::Z } else { noise().normalize_or(self.axis) };
         let mut flight = Self {
             delay: self.delay + late,
@@ -419,7 +424,7 @@ impl Flight {
             axis,
             spin: self.spin + 12.0 * rng.signed(),
             fade_after: self.fade_after - late,
-            offset: offset + turned - arm,
+            offset: offset + arm_now - arm,
             rotation,
             floor: self.floor.map(|floor| Floor { clearance: 0.4 * size, depth: 0.0, ..floor }),
             landing: None,

@@ -1,6 +1,10 @@
 //! [`Floor`]: a plane on which flying pieces come to rest.
 
-use super::{ShatterError, cuts::in_range};
+use super::{
+    ShatterError,
+    cuts::in_range,
+    turns::{after, between, from_to, turned},
+};
 use crate::math::ops;
 use glam::{Quat, Vec3};
 
@@ -131,7 +135,7 @@ impl Landing {
 
     /// How far it is lifted `seconds` after it has landed with the rotation `landed`: as far as what reaches behind it needs.
     pub(super) fn lift(&self, landed: Quat, seconds: f32) -> Vec3 {
-        let is_face_up = (landed * Vec3::Z).dot(self.up) >= 0.0;
+        let is_face_up = turned(landed, Vec3::Z).dot(self.up) >= 0.0;
         if is_face_up && self.depth > 0.0 {
             self.up * (self.depth * (1.0 - ops::exp(-SETTLING * seconds)))
         } else {
@@ -141,10 +145,10 @@ impl Landing {
 
     /// Its rotation `seconds` after it has landed with the rotation `landed`.
     pub(super) fn rotation(&self, landed: Quat, seconds: f32) -> Quat {
-        let face = landed * Vec3::Z;
+        let face = turned(landed, Vec3::Z);
         let lie = if self.lies_flat { self.up } else { Vec3::Z };
         let lie = if face.dot(lie) < 0.0 { -lie } else { lie };
-        let rest = Quat::from_rotation_arc(face, lie) * landed;
-        landed.slerp(rest, 1.0 - ops::exp(-SETTLING * seconds))
+        let rest = after(from_to(face, lie), landed);
+        between(landed, rest, 1.0 - ops::exp(-SETTLING * seconds))
     }
 }

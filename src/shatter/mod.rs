@@ -39,6 +39,7 @@ mod support;
 #[cfg(test)]
 pub(crate) mod tests;
 mod triangulate;
+mod turns;
 
 pub use again::{BreakAgain, SizeClasses};
 pub use burst::{Burst, BurstParams, Flight, Pose};

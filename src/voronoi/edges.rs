@@ -42,3 +42,37 @@ pub fn edges(picture: &Grid<f32>) -> Grid<f32> {
     slopes.as_mut_slice().iter_mut().for_each(|slope| *slope = (*slope * scale).min(1.0));
     slopes
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Rng;
+    use glam::UVec2;
+
+    #[test]
+    fn slopes_are_those_of_the_kernel() {
+        const KERNEL: [[f32; 3]; 3] = [[-1.0, 0.0, 1.0], [-2.0, 0.0, 2.0], [-1.0, 0.0, 1.0]];
+        let mut rng = Rng::new(2);
+        for size in [UVec2::new(7, 5), UVec2::new(1, 6), UVec2::new(9, 2)] {
+            let values = (0..size.x * size.y).map(|_| rng.unit()).collect();
+            let picture = Grid::from_vec(size, values).unwrap();
+            let slope = |x: u32, y: u32| {
+                let mut sums = [0.0f32; 2];
+                for (i, j) in (0..3u32).flat_map(|j| (0..3u32).map(move |i| (i, j))) {
+                    let [x, y] = [(x + i).saturating_sub(1).min(size.x - 1), (y + j).saturating_sub(1).min(size.y - 1)];
+                    let value = picture.row(y as usize)[x as usize];
+                    sums[0] += KERNEL[j as usize][i as usize] * value;
+                    sums[1] += KERNEL[i as usize][j as usize] * value;
+                }
+                sums[0].hypot(sums[1])
+            };
+            let places = || (0..size.y).flat_map(|y| (0..size.x).map(move |x| (x, y)));
+            let strongest = places().map(|(x, y)| slope(x, y)).fold(0.0, f32::max);
+            let guide = edges(&picture);
+            for (x, y) in places() {
+                let (is, expected) = (guide.row(y as usize)[x as usize], (slope(x, y) / (FULL * strongest)).min(1.0));
+                assert!((is - expected).abs() < 1e-5, "{x} {y} of {size}: {is} {expected}");
+            }
+        }
+    }
+}

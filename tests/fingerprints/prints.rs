@@ -1,5 +1,8 @@
 //! The fingerprints: one for each thing that the crate makes, over all of its bits.
 
+#[path = "settings.rs"]
+mod settings;
+
 use bevy_crack::{
     CrackPreset, Grid,
     growth::CrackGrowth,
@@ -96,10 +99,16 @@ fn painted(print: &mut Print, preset: &CrackPreset, growth: &CrackGrowth, seed: 
     field.show_layers(growth.network(), timeline, Moment::after(timeline.end()), &mut Vec::new());
     print.words(field.depth.as_slice().iter().map(|&depth| u32::from(depth)));
 
+    painted_field(print, &preset.look, field, seed)
+}
+
+/// What a look makes of a field: diffuse, normals that are blended into others, depth and light.
+fn painted_field(print: &mut Print, look: &Look, mut field: DepthField, seed: u64) -> Made<()> {
+    let size = field.frame.size();
     let n = (size.x * size.y) as usize;
     let [picture, normals, depths] = [0, 1, 2].map(|k| texels(size, seed + k));
     let base = BaseTexels { size, diffuse: &picture, normal: Some(&normals), depth: Some(&depths[..n]) };
-    let table = LookTable::new(&preset.look, field.frame.texels_per_unit())?;
+    let table = LookTable::new(look, field.frame.texels_per_unit())?;
     correct_normals(base, &mut field, UVec2::ZERO)?;
     let [mut diffuse, mut normal, mut depth] = [vec![0; 4 * n], vec![0; 4 * n], vec![0; n]];
     let mut targets = PaintTargets { diffuse: Some(&mut diffuse), normal: Some(&mut normal), depth: Some(&mut depth) };
@@ -340,5 +349,6 @@ pub(crate) fn prints(begin: &str) -> Made<Vec<String>> {
     add("mask lines_of_a_picture", &lines_of_a_picture)?;
     add("analogy darkness", &analogy)?;
     add("mesh laid_out", &laid_out)?;
+    settings::each(add)?;
     Ok(out)
 }

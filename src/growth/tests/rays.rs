@@ -365,3 +365,36 @@ fn a_hit_begins_with_no_more_nodes_than_there_may_be() {
         }
     }
 }
+
+/// Their markers may lie beyond the border, also where nothing stops them.
+#[test]
+fn rays_stay_on_the_surface() {
+    let mut rng = Rng::new(8);
+    let mut ends = 0;
+    for seed in 0..60 {
+        let params = GrowthParams {
+            markers: MarkerLayout::Rays { sectors: 3 + rng.next_u32() % 14, jitter: rng.unit(), through: rng.unit() },
+            wander: 0.3 * rng.unit(),
+            arrest: 0.0,
+            ..GrowthParams::DEFAULT
+        };
+        let extent = random_extent(&mut rng);
+        let mut growth = CrackGrowth::new(params, extent, seed).unwrap();
+        for _ in 0..2 {
+            growth.hit(Vec2::new(rng.unit(), rng.unit()) * extent, rng.range(0.05, 3.0));
+            while growth.step().grew() {}
+        }
+        for (index, node) in growth.network().nodes().iter().enumerate() {
+            assert!(
+                node.pos.cmpge(Vec2::ZERO).all() && node.pos.cmple(extent).all(),
+                "{seed}: {node:?} is off {extent}"
+            );
+            ends += u32::from(on_border(&growth, index));
+        }
+        // No node lies on the one that it has grown from.
+        let nodes = growth.network().nodes();
+        let lengths = nodes.iter().filter_map(|node| Some(nodes.get(node.parent as usize)?.pos.distance(node.pos)));
+        assert!(lengths.fold(f32::INFINITY, f32::min) > 0.0, "{seed}");
+    }
+    assert!(ends > 60, "{ends} ends on the border");
+}

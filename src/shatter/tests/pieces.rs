@@ -397,3 +397,28 @@ fn floors_that_are_none_are_refused() {
     let flight = floats.flight(0, shards.get(0).unwrap());
     assert!(flight.pose(100.0).offset.y > -2.0);
 }
+
+#[test]
+fn pictures_on_sides_are_as_long_as_the_sides() {
+    let shards =
+        shatter(Cuts::from_network(&grown(&CrackPreset::CLAY, 2, 5)).unwrap(), &ShatterParams::DEFAULT).unwrap();
+    let thickness = 9.0;
+    for rim in [RimLook::PLAIN, RimLook::GLASS] {
+        let frame = MeshFrame { rim, ..MeshFrame::new(200.0 * shards.extent()) };
+        let mut depth = 0.0f32;
+        for number in 0..shards.len() as u32 {
+            let mesh = shards.solid_mesh(number, &frame, thickness);
+            let place = |vertex: u32| Vec3::from_array(mesh.positions[vertex as usize]);
+            let uv = |vertex: u32| Vec2::from_array(mesh.uvs[vertex as usize]);
+            for triangle in mesh.indices[mesh.sides..].as_chunks::<3>().0 {
+                for (&a, &b) in triangle.iter().zip(triangle.iter().cycle().skip(1)) {
+                    let (length, far) = (uv(a).distance(uv(b)), place(a).distance(place(b)));
+                    assert!((length - far).abs() < 1e-2, "shard {number}: {length} for {far}");
+                    depth = depth.max(uv(a).y);
+                    assert!((uv(a).y == 0.0) == (place(a).z > 0.0), "shard {number}: v runs from the front");
+                }
+            }
+        }
+        assert!(depth <= thickness && (depth == thickness) == (rim == RimLook::PLAIN), "{depth}");
+    }
+}
