@@ -89,6 +89,9 @@ fn b2_without_memory_there_is_an_error() {
         });
     }
 
+    #[cfg(feature = "2d")]
+    game::a_surface_without_memory_fails_and_cracks_later();
+
     // The largest surface that there is, with half a gigabyte.
     let (size, limit) = (UVec2::splat(MAX_SIDE), 500_000_000);
     assert!(!with_no_more_than(limit, || draws(size)));
@@ -99,4 +102,57 @@ fn b2_without_memory_there_is_an_error() {
     assert_eq!(Grid::try_new(UVec2::MAX, 0u8), Err(OutOfMemory { bytes }));
     assert_eq!(Grid::try_new(UVec2::MAX, 0u64), Err(OutOfMemory { bytes: u64::MAX }));
     assert_eq!(Grid::try_new(UVec2::new(2, 1), 7u8).map(|grid| grid.as_slice().to_vec()), Ok(vec![7, 7]));
+}
+
+#[cfg(feature = "2d")]
+mod game {
+    use super::with_no_more_than;
+    use bevy::{
+        asset::RenderAssetUsages,
+        prelude::*,
+        render::render_resource::{Extent3d, TextureDimension, TextureFormat},
+    };
+    use bevy_crack::prelude::*;
+
+    #[derive(Resource, Default)]
+    struct Failed(Vec<CrackError>);
+
+    /// A picture of 16 MiB: what is made of it needs several times as much.
+    pub(super) fn a_surface_without_memory_fails_and_cracks_later() {
+        let mut app = App::new();
+        app.add_plugins((
+            MinimalPlugins,
+            TransformPlugin,
+            AssetPlugin::default(),
+            ImagePlugin::default(),
+            CrackPlugins,
+        ))
+        .init_asset::<TextureAtlasLayout>()
+        .init_asset::<Mesh>()
+        .init_asset::<ColorMaterial>()
+        .init_asset::<StandardMaterial>()
+        .insert_resource(CrackBudget { milliseconds: 1e6, ..default() })
+        .init_resource::<Failed>()
+        .add_observer(|event: On<CrackFailed>, mut failed: ResMut<Failed>| failed.0.push(event.error.clone()));
+        app.finish();
+        app.cleanup();
+        let extent = Extent3d { width: 2048, height: 2048, depth_or_array_layers: 1 };
+        let (format, usage) = (TextureFormat::Rgba8UnormSrgb, RenderAssetUsages::default());
+        let image = Image::new_fill(extent, TextureDimension::D2, &[90, 120, 150, 255], format, usage);
+        let image = app.world_mut().resource_mut::<Assets<Image>>().add(image);
+        let surface = CrackSurface::new(CrackPreset::CONCRETE);
+        let wall = app.world_mut().spawn((Sprite::from_image(image), surface)).id();
+        (0..5).for_each(|_| app.update());
+        for (limit, cracks) in [(6_000_000, false), (24_000_000, false), (1_000_000_000, true)] {
+            with_no_more_than(limit, || {
+                app.world_mut().trigger(CrackHit::uv(wall, Vec2::splat(0.5)));
+                (0..5).for_each(|_| app.update());
+            });
+            let is_cracked = app.world().get::<CrackTextures>(wall).is_some();
+            assert_eq!(is_cracked, cracks, "{limit} bytes");
+        }
+        let failed = &app.world().resource::<Failed>().0;
+        assert!(failed.iter().all(|error| error.to_string().contains("no memory")), "{failed:?}");
+        assert!(!failed.is_empty());
+    }
 }

@@ -3,6 +3,7 @@
 use super::frame::{frame, look};
 use super::picture_plan::PicturePlan;
 use crate::CrackPreset;
+use crate::OutOfMemory;
 use crate::growth::CrackGrowth;
 use crate::paint::LookTable;
 use crate::pattern::CrackMask;
@@ -103,7 +104,8 @@ impl BlankSurface {
             growth.set_density(base.density(rect));
         }
         growth.set_mask(mask.clone());
-        let mut field = DepthField::new(frame);
+        let out_of_memory = |error: OutOfMemory| CrackError::Textures { reason: error.to_string() };
+        let mut field = DepthField::try_new(frame).map_err(out_of_memory)?;
         field.set_forbidden(mask);
         field.set_layers(preset.look.layer(surface.seed));
         Ok(Self { growth, field, look })

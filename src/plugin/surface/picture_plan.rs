@@ -1,5 +1,6 @@
 //! [`PicturePlan`]: what the pictures of a surface will be.
 
+use crate::grid::ask_for;
 use crate::plugin::api::textures::Maps;
 use crate::plugin::api::{CrackBudget, CrackError, CrackMips, CrackResolution, CrackSurface};
 use crate::plugin::carrier::kind::Shown;
@@ -11,6 +12,9 @@ use crate::plugin::source::unfolding::Unfolding;
 use crate::raster::TexelRect;
 use bevy::{image::ImageSampler, prelude::*, render::renderer::RenderDevice};
 use std::sync::Arc;
+
+/// Bytes that a texel of a surface takes where pictures are read, beside those of its textures: colors, normals, depths, and on the way.
+const READ_BYTES: u64 = 16;
 
 /// Longer side of the textures of a surface without a picture, texels.
 const DEFAULT_SIDE: f32 = 512.0;
@@ -79,6 +83,8 @@ impl PicturePlan {
 
     /// The pictures, read.
     pub(super) fn read(&self, [diffuse, normal, depth]: [Option<&Image>; 3]) -> Result<BasePicture, CrackError> {
+        let bytes = self.bytes.saturating_add(READ_BYTES * self.size.as_u64vec2().element_product());
+        ask_for(bytes).map_err(|error| CrackError::Textures { reason: error.to_string() })?;
         if let Some(unfolding) = &self.unfolding {
             return self.read_unfolded(unfolding, [diffuse, normal, depth]);
         }
