@@ -406,11 +406,17 @@ impl Flight {
     }
 
     /// The flight of a crumb that comes off this piece `late` seconds after the piece has left its place. Before, it lies at `at`, `arm` away from
-    /// the piece's middle, and it is `size` long; pattern units, y up. It flies `outward` besides, and fades
-    /// when the piece does.
+    /// the piece's middle, and it is `size` long; on a floor its middle lies `half` of its height above it; pattern units, y up. It
+    /// flies `outward` besides, and fades when the piece does.
     #[cfg(feature = "bevy")]
     #[must_use]
-    pub(crate) fn crumb(&self, (at, arm, size): (Vec3, Vec3, f32), outward: Vec3, late: f32, seed: u64) -> Self {
+    pub(crate) fn crumb(
+        &self,
+        (at, arm, [size, half]): (Vec3, Vec3, [f32; 2]),
+        outward: Vec3,
+        late: f32,
+        seed: u64,
+    ) -> Self {
         let Moving { offset, velocity, rotation, spin } = self.moving(late);
         let mut rng = Rng::new(seed).stream("crumb");
         let mut noise = || Vec3::new(rng.signed(), rng.signed(), rng.signed());
@@ -426,7 +432,7 @@ impl Flight {
             fade_after: self.fade_after - late,
             offset: offset + arm_now - arm,
             rotation,
-            floor: self.floor.map(|floor| Floor { clearance: 0.4 * size, depth: 0.0, ..floor }),
+            floor: self.floor.map(|floor| Floor { clearance: half, depth: 0.0, ..floor }),
             landing: None,
             ..*self
         };

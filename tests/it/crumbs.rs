@@ -1,7 +1,7 @@
 //! Crumbs: they come off the edges of shards, rest as these do, and nothing is left of them.
 
 use crate::{
-    shards::{loose, shards, shatter, stock, surface},
+    shards::{loose, shards, shatter, stock, surface, vertices},
     support::*,
 };
 use bevy::prelude::*;
@@ -108,6 +108,15 @@ fn crumbs_come_off_edges_and_nothing_is_left_of_them() {
         let lowest = places(&mut app).iter().map(|place| place.translation.y + 3.0).fold(f32::MAX, f32::min);
         let highest = places(&mut app).iter().map(|place| place.translation.y + 3.0).fold(f32::MIN, f32::max);
         assert!(lowest > -0.01 && highest < 0.15, "{kind}: {lowest} {highest}");
+        if kind == 1 {
+            // None hangs in the air: its lowest corner is at the floor.
+            for crumb in &all {
+                let (place, mesh) = (get::<Transform>(&app, *crumb), get::<Mesh3d>(&app, *crumb).0);
+                let corners = vertices(&app, &mesh).into_iter().map(|(at, _)| place.transform_point(at).y + 3.0);
+                let (low, size) = (corners.fold(f32::MAX, f32::min), place.scale.max_element());
+                assert!((-0.6 * size..0.25 * size).contains(&low), "{kind}: {low} of {size}");
+            }
+        }
         assert_eq!(crumbs(&mut app).len(), all.len());
         match kind {
             0 => _ = app.world_mut().commands().entity(body).heal_cracks(),

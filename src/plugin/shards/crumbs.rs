@@ -14,6 +14,9 @@ pub(super) const MOST_IN_FRAME: usize = 512;
 /// How many different shapes the crumbs of a surface have.
 pub(super) const SHAPES: usize = 6;
 
+/// How far the corners of a stone are from its middle, as a share of the most: less than on average.
+const ROUND: f32 = 0.68;
+
 /// How long after its shard has left its place a crumb comes off at the latest, seconds.
 const LATEST: f32 = 0.45;
 
@@ -136,11 +139,13 @@ impl Loose<'_> {
         // Glass breaks into splinters.
         let axes = Vec3::new(1.0, rng.range(0.6, 0.95) - 0.5 * bright, rng.range(0.45, 0.8) - 0.35 * bright);
         let turn = if self.style.thickness.is_some() { any_rotation(rng) } else { about_z(rng) };
+        // Of an ellipsoid of these axes, a little smaller: what lies on a floor is sunk rather than in the air.
+        let half = 0.5 * size * ROUND * (axes * (turn.inverse() * Vec3::Z)).length();
         Some(Crumb {
             home: Transform { translation: place, rotation: self.plane.rotation, scale: axes * (0.5 * size * unit.z) },
             turn,
             unit,
-            flight: self.flight.crumb((axes_at, arm, size), outward, late, seed),
+            flight: self.flight.crumb((axes_at, arm, [size, half]), outward, late, seed),
             start: 0.0,
             shape: rng.next_u32() as usize % SHAPES,
             at,
