@@ -84,6 +84,37 @@ fn darkness(app: &App, entity: Entity) -> f32 {
     lost as f32 / (180 * texels.len() / 4) as f32
 }
 
+/// Fault G4: what was inserted before a surface was healed, in the same frame, is not baked; what comes after that is.
+#[test]
+fn g4_a_surface_that_is_healed_forgets_what_was_to_be_baked() {
+    type Give = fn(&mut EntityCommands);
+    let ends: [Give; 2] = [|of| _ = of.heal_cracks(), |of| _ = of.close_cracks(0.5)];
+    let gives: [Give; 3] = [
+        |of| _ = of.insert(guided()),
+        |of| _ = of.insert(CrackStrands::new([HitPoint::Uv(Vec2::new(0.0, 0.5))], StrandField::Linear(Vec2::X))),
+        |of| _ = of.insert((CrackSurface::new(CrackPreset::GLASS), guided())),
+    ];
+    let both = ends.into_iter().flat_map(|end| gives.map(|give| (end, give)));
+    for (i, (end, give)) in both.enumerate() {
+        let mut app = guided_app();
+        let image = add(&mut app, solid(UVec2::splat(128), [180, 180, 180, 255]));
+        let entity = app.world_mut().spawn((Sprite::from_image(image), CrackSurface::new(CrackPreset::CONCRETE))).id();
+        step(&mut app);
+        give(&mut app.world_mut().commands().entity(entity));
+        end(&mut app.world_mut().commands().entity(entity));
+        for _ in 0..60 {
+            step(&mut app);
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        assert!(app.world().get::<CrackTextures>(entity).is_none(), "{i}");
+        assert!(told(&app).baked.is_empty() && progress(&app, entity) == 0.0, "{i}");
+        end(&mut app.world_mut().commands().entity(entity));
+        give(&mut app.world_mut().commands().entity(entity));
+        bake(&mut app, entity);
+        assert!(app.world().get::<CrackTextures>(entity).is_some(), "{i}");
+    }
+}
+
 #[test]
 fn a_word_is_baked_and_shown() {
     let mut app = guided_app();

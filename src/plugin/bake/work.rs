@@ -6,7 +6,14 @@ use crate::plugin::api::{BakeProgress, CrackError, CrackRecord, CrackStrands, Cr
 use crate::plugin::jobs::copy::PictureCopies;
 use crate::plugin::jobs::stepped::{RunningTask, Step, Stepped};
 use crate::plugin::surface::plan::Plan;
-use bevy::{ecs::entity::EntityHashSet, prelude::*};
+use bevy::{
+    ecs::{
+        change_detection::Tick,
+        entity::{EntityHashMap, EntityHashSet},
+        system::SystemChangeTick,
+    },
+    prelude::*,
+};
 
 /// The bakes that go on, in order.
 #[derive(Resource, Default)]
@@ -14,6 +21,8 @@ pub(crate) struct Bakes {
     pub(super) list: Vec<(Entity, Bake)>,
     /// While the list is worked on: the bakes that were cancelled meanwhile.
     pub(super) cancelled: Option<EntityHashSet>,
+    /// Surfaces that were healed since the last look at what is to be baked, and when: what they were given before is not baked any more.
+    healed: EntityHashMap<Tick>,
 }
 
 /// The component whose cracks are baked.
@@ -94,7 +103,17 @@ fn reset(progress: &mut Mut<BakeProgress>) {
     progress.set_if_neq(BakeProgress(0.0));
 }
 
-/// Ends the bake of a surface that is healed.
+/// Ends the bake of a surface that is healed, also one that has not begun.
+pub(crate) fn give_up(world: &mut World, entity: Entity) {
+    cancel(world, entity);
+    // What it is given from now on is newer.
+    let now = world.increment_change_tick();
+    if let Some(mut bakes) = world.get_resource_mut::<Bakes>() {
+        bakes.healed.insert(entity, now);
+    }
+}
+
+/// Ends the bake of a surface.
 pub(crate) fn cancel(world: &mut World, entity: Entity) {
     if let Some(mut bakes) = world.get_resource_mut::<Bakes>() {
         bakes.cancel(entity);
@@ -140,15 +159,30 @@ impl Stepped for BakeJob {
 }
 
 /// Surfaces on which a component is new, or that are new.
-type Fresh<'w, 's, T> = Query<'w, 's, Entity, (With<T>, With<CrackSurface>, Or<(Changed<T>, Added<CrackSurface>)>)>;
+type Fresh<'w, 's, T> =
+    Query<'w, 's, (Entity, Ref<'static, T>, Ref<'static, CrackSurface>), Or<(Changed<T>, Added<CrackSurface>)>>;
 
 /// Notes what is to be baked.
-pub(crate) fn watch_baked(guided: Fresh<GuidedCracks>, strands: Fresh<CrackStrands>, mut bakes: ResMut<Bakes>) {
-    for entity in &guided {
-        bakes.want(entity, Baked::Guided);
+pub(crate) fn watch_baked(
+    guided: Fresh<GuidedCracks>,
+    strands: Fresh<CrackStrands>,
+    mut bakes: ResMut<Bakes>,
+    tick: SystemChangeTick,
+) {
+    let healed = if bakes.healed.is_empty() { default() } else { core::mem::take(&mut bakes.healed) };
+    let is_wanted = |entity: Entity, given: [Tick; 2]| {
+        let is_newer = |healed: &Tick| given.iter().any(|given| given.is_newer_than(*healed, tick.this_run()));
+        healed.get(&entity).is_none_or(is_newer)
+    };
+    for (entity, guided, surface) in &guided {
+        if is_wanted(entity, [guided.last_changed(), surface.added()]) {
+            bakes.want(entity, Baked::Guided);
+        }
     }
-    for entity in &strands {
-        bakes.want(entity, Baked::Strands);
+    for (entity, strands, surface) in &strands {
+        if is_wanted(entity, [strands.last_changed(), surface.added()]) {
+            bakes.want(entity, Baked::Strands);
+        }
     }
 }
 

@@ -22,7 +22,7 @@ use bevy::prelude::*;
 
 pub(super) fn close(world: &mut World, entity: Entity, seconds: f32) {
     give_up_record(world, entity);
-    work::cancel(world, entity);
+    work::give_up(world, entity);
     let is_closing = active_mut(world, entity).is_some_and(|active| active.close(seconds));
     if is_closing {
         with_queues(world, entity, |queues, turn| queues.wake(entity, turn));
@@ -35,7 +35,7 @@ pub(super) fn close(world: &mut World, entity: Entity, seconds: f32) {
 pub(super) fn heal(world: &mut World, entity: Entity) {
     // At once, wherever the list of bakes is; hits that come after this stay.
     give_up_record(world, entity);
-    work::cancel(world, entity);
+    work::give_up(world, entity);
     purge(world, entity);
     when_free(world, move |world| heal_now(world, entity));
 }
