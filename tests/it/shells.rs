@@ -216,7 +216,7 @@ fn s8_a_blow_reaches_through_space() {
 
 /// By default what reaches to the cuts of the layout stays, unless it is hit itself.
 #[test]
-fn s8_a_blow_from_nowhere_comes_from_the_side_that_is_hit() {
+fn s8_a_hit_without_a_direction_comes_from_its_side() {
     let (mut app, material) = bodies();
     // A layout of a curved mesh is stretched, so that a piece is thrown a little to the side.
     let blows = [(Vec3::Z, 0.999), (Vec3::X, 0.999), (Vec3::new(0.6, 0.0, 0.8), 0.9), (Vec3::Z, 0.9)];

@@ -62,7 +62,7 @@ impl ShellOrder {
         let hit = shell.shape.place(from);
         let at = hit.map_or(Vec3::ZERO, |hit| hit.position);
         let unit = hit.map_or(1.0, |hit| (hit.right.length() * hit.down.length()).sqrt());
-        // A blow from nowhere is one straight at the place that is hit, for all pieces, wherever they face.
+        // A hit without a direction is straight at its place, for all pieces, wherever they face.
         let direction = direction.try_normalize().or(hit.map(|hit| -hit.normal)).unwrap_or(Vec3::ZERO);
         CutShell { shell, throw, place, direction, energy, extent, from, at, unit }
     }
