@@ -127,9 +127,9 @@ fn target(bytes: &[u8]) {
     if let Ok(pieces) = shards.break_again(number, largest, u64::from(input.word())) {
         let whole = shards.get(number).unwrap();
         let sum: f32 = pieces.iter().map(|piece| piece.area).sum();
-        // Where its outline is cut it moves by up to half a unit of the lattice.
+        // Where its outline is cut it moves to the lattice, by up to 0.71 units each time.
         let around = whole.border.iter().chain(shards.neighbours(number).iter().map(|next| &next.length)).sum::<f32>();
-        let moved = around * 0.5 * extent.max_element() / 16_777_216.0;
+        let moved = around * extent.max_element() / 16_777_216.0;
         assert!((sum - whole.area).abs() < 1e-3 * whole.area + moved, "{sum} of {}", whole.area);
     }
 }

@@ -14,6 +14,9 @@ use crate::{
 };
 use glam::Vec2;
 
+/// The width that is left at the rim at least, as a share.
+const THINNEST: f32 = 0.02;
+
 impl CrackGrowth {
     /// Adds a node and widens the nodes behind it; the caller shows it to the markers.
     pub(super) fn add_node(&mut self, pos: Vec2, parent: u32, generation: u32, impact: u32, bend: f32) {
@@ -78,7 +81,7 @@ impl CrackGrowth {
         let (Some((_, reach)), Some(hit)) = (begun, self.impacts.get(impact as usize)) else { return 1.0 };
         let way = pos - hit.pos;
         let rim = rim_towards(way, *reach, self.seed ^ u64::from(impact));
-        1.0 - self.params.thinning * towards_rim(way.length(), rim)
+        (1.0 - self.params.thinning * towards_rim(way.length(), rim)).max(THINNEST)
     }
 
     /// Puts a node on the ray of its parent.

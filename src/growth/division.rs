@@ -163,6 +163,11 @@ pub(super) struct Patches {
 }
 
 impl Patches {
+    /// The largest factor of all.
+    pub(super) const fn most(&self) -> f32 {
+        1.0 + self.patchiness
+    }
+
     /// Factor of a distance at a place, at least 1.
     pub(super) fn at(&self, pos: Vec2) -> f32 {
         if self.patchiness <= 0.0 {

@@ -63,6 +63,7 @@ mod params;
 mod past;
 mod plan;
 mod pull;
+mod ray_lines;
 mod rays;
 mod region;
 mod settings;

@@ -3,6 +3,7 @@
 use super::{
     draws,
     params::{GrowthParams, MarkerLayout, StartLayout},
+    ray_lines::RayLines,
 };
 use crate::math::{Rng, hash_unit, mix, ops};
 use glam::Vec2;
@@ -14,8 +15,14 @@ const BY_ENERGY: f32 = 0.45;
 /// The same for the forks of each ray.
 const FORKS_BY_ENERGY: f32 = 0.6;
 
-/// The largest number of rays of one hit, forks included.
+/// The largest number of rays of one hit, forks included, if their runs are not very short.
 const MOST_RAYS: usize = 400;
+
+/// About the largest number of points of all rays of one hit: rays of very short runs are fewer.
+const MOST_POINTS: f32 = 131_072.0;
+
+/// How often one ray tries to fork, at the most.
+const MOST_TRIES: u32 = 256;
 
 /// The largest number of rings of one hit.
 pub(super) const MOST_RINGS: u32 = 24;
@@ -133,7 +140,8 @@ impl Plan {
         let mut rng = Rng::new(hit.seed).stream("rays");
         let PlannedHit { pos, energy, reach, .. } = hit;
         let radius = rim_radius(params, energy);
-        let angles = directions(hit, extent, sectors as f32 * ops::powf(energy, BY_ENERGY), jitter, &mut rng);
+        let count = (sectors as f32 * ops::powf(energy, BY_ENERGY), most_rays(params, extent));
+        let angles = directions(hit, extent, count, jitter, &mut rng);
         let mut plan = Self::default();
         let (n, phase) = (angles.len(), rng.unit());
         let runs_through =
@@ -173,19 +181,22 @@ impl Plan {
 
     /// Adds forks to the rays that run through.
     fn fork(&mut self, forks: f32, params: &GrowthParams, extent: Vec2, jitter: f32, rng: &mut Rng) {
+        let most = most_rays(params, extent);
+        let mut lines = RayLines::new(extent, ROOMY);
+        self.rays.iter().enumerate().for_each(|(i, ray)| lines.add(i, &ray.line));
         let mut next = 0;
         let mut share = forks;
         let angle = params.fork_angle.max(LEAST_FORK);
         let mut end = self.rays.len();
         // Forks can fork again, half as often.
         for _ in 0..3 {
-            while next < end && self.rays.len() < MOST_RAYS {
+            while next < end && self.rays.len() < most {
                 let Ray { line: main, last, from } = &self.rays[next];
                 let arc: f32 = main.windows(2).map(|pair| pair[0].distance(pair[1])).sum();
                 let base = from.map_or(0, |(_, generation)| generation);
                 let (main, last) = (main.clone(), *last);
                 let first_side = if rng.unit() < 0.5 { 1.0 } else { -1.0 };
-                let count = (share * FORKING * arc / params.step_length + rng.unit()) as u32;
+                let count = ((share * FORKING * arc / params.step_length + rng.unit()) as u32).min(MOST_TRIES);
                 for i in 0..count {
                     let from = (0.16 + FORKING * (i as f32 + rng.unit()) / count as f32) * arc;
                     let nodes = (from / params.step_length).round();
@@ -204,19 +215,17 @@ impl Plan {
                     // To the side with more room.
                     let heading = ops::atan2(way.y, way.x);
                     let is_roomy = |heading: &f32| {
-                        let clear = |far: f32| {
+                        [1.5, 3.0].into_iter().all(|far| {
                             let ahead = at + ops::unit(*heading) * (far * ROOMY / ops::sin(bend)).min(0.7 * room);
-                            let others = self.rays.iter().enumerate().filter(|(i, _)| *i != next);
-                            let mut pieces = others.flat_map(|(_, ray)| ray.line.windows(2));
-                            pieces.all(|pair| gap(ahead, (pair[0], pair[1])) > ROOMY)
-                        };
-                        clear(1.5) && clear(3.0)
+                            lines.is_clear(ahead, next)
+                        })
                     };
                     let Some(heading) = [heading + side * bend, heading - side * bend].into_iter().find(is_roomy)
                     else {
                         continue;
                     };
                     let line = line(params, (at, heading), u32::MAX, extent, jitter, rng);
+                    lines.add(self.rays.len(), &line);
                     self.rays.push(Ray { from: Some((next, generation)), line, last: u32::MAX });
                 }
                 next += 1;
@@ -337,7 +346,7 @@ fn corner(params: &GrowthParams, seed: u64, ray: usize, ring: u32, jitter: f32) 
 }
 
 /// The directions of the rays of a hit: irregular, but all around; fewer where the border is near.
-fn directions(hit: PlannedHit, extent: Vec2, count: f32, jitter: f32, rng: &mut Rng) -> Vec<f32> {
+fn directions(hit: PlannedHit, extent: Vec2, (count, most): (f32, usize), jitter: f32, rng: &mut Rng) -> Vec<f32> {
     const BINS: usize = 96;
     let mut sums = [0.0; BINS + 1];
     for bin in 0..BINS {
@@ -349,7 +358,7 @@ fn directions(hit: PlannedHit, extent: Vec2, count: f32, jitter: f32, rng: &mut 
     if all <= 0.0 {
         return Vec::new();
     }
-    let count = (count * ops::powf(all / BINS as f32, FEWER)).round().clamp(2.0, 360.0) as usize;
+    let count = (count * ops::powf(all / BINS as f32, FEWER)).round().clamp(2.0, most.min(360) as f32) as usize;
     let turn = rng.unit();
     let mut angles: Vec<f32> = (0..count)
         .map(|i| {
@@ -364,6 +373,17 @@ fn directions(hit: PlannedHit, extent: Vec2, count: f32, jitter: f32, rng: &mut 
     angles
 }
 
+/// The longest straight run of a ray: no marker may be out of reach of the one before.
+const fn longest_run(params: &GrowthParams) -> f32 {
+    0.6 * params.crack_radius
+}
+
+/// The largest number of rays of one hit, forks included.
+fn most_rays(params: &GrowthParams, extent: Vec2) -> usize {
+    let points = extent.length() / longest_run(params);
+    MOST_RAYS.min((MOST_POINTS / points.max(1.0)) as usize).max(2)
+}
+
 /// A line of straight runs with slight kinks, up to a generation or to the border.
 fn line(
     params: &GrowthParams,
@@ -373,7 +393,7 @@ fn line(
     jitter: f32,
     rng: &mut Rng,
 ) -> Vec<Vec2> {
-    let longest = 0.6 * params.crack_radius;
+    let longest = longest_run(params);
     let mut line = vec![start];
     let (mut pos, mut run, mut stray) = (start, FIRST_RUN.min(longest), 0.0);
     // Beyond the last node, which is sealed (nothing grows from it).
@@ -402,7 +422,7 @@ fn line(
 }
 
 /// Distance from a place to a segment.
-fn gap(pos: Vec2, (a, b): (Vec2, Vec2)) -> f32 {
+pub(super) fn gap(pos: Vec2, (a, b): (Vec2, Vec2)) -> f32 {
     let way = b - a;
     let share = ((pos - a).dot(way) / way.length_squared().max(1e-12)).clamp(0.0, 1.0);
     pos.distance(a + way * share)

@@ -71,6 +71,16 @@ pub(super) fn double_area(points: &[Point]) -> i128 {
     points.windows(2).map(|pair| i128::from(cross(first.to(pair[0]), first.to(pair[1])))).sum()
 }
 
+/// The longer side of the rectangle around a loop.
+pub(super) fn size(points: &[Point]) -> f64 {
+    let Some(&first) = points.first() else { return 0.0 };
+    let (low, high) = points.iter().fold((first, first), |(low, high), point| {
+        (Point::new(low.x.min(point.x), low.y.min(point.y)), Point::new(high.x.max(point.x), high.y.max(point.y)))
+    });
+    let [x, y] = low.to(high);
+    x.max(y) as f64
+}
+
 /// Length of the loop.
 pub(super) fn perimeter(points: &[Point]) -> f64 {
     edges(points).map(|(a, b)| a.distance(b)).sum()

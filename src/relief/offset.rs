@@ -1,7 +1,7 @@
 //! Shrinks and grows regions by a distance (section 2 of the paper).
 
 use super::{
-    lattice::{Loop, Point, edges},
+    lattice::{Loop, Point, edges, size},
     pace::Pace,
     params::{Join, MITER_LIMIT},
     simplify::working_copy,
@@ -13,6 +13,9 @@ use super::{
 /// Larger is faster and makes rounder valleys; smaller keeps corners that make no difference one can see. A hundredth is
 /// what other libraries take. The second and the third are for lines so rough that their moved edges cross very often.
 const TOLERANCES: [f64; 3] = [0.005, 0.02, 0.04];
+
+/// The same as a share of the size of a ring: of one much smaller than the distance nothing would be left but a tangle.
+const FINEST: f64 = 0.03;
 
 /// Most crossings of moved edges at the first two tolerances.
 const MAX_CROSSINGS: usize = 1 << 18;
@@ -108,7 +111,7 @@ fn moved_together(moves: &[Move<'_>], way: Way, tolerance: f64, most: usize) -> 
     let fill = Fill::AtLeast(if way == Way::Inward { moves.len() as i32 } else { 1 });
     let one = |Move { rings, join, pace, tolerance: own }: &Move<'_>| {
         let one = |ring: &Loop| {
-            let copy = working_copy(ring, own.max(tolerance * finest));
+            let copy = working_copy(ring, own.max(tolerance * finest).min(FINEST * size(ring)));
             let copy = if pace.is_even() { copy } else { divided(&copy, 2.0 * pace.least()) };
             moved(&copy, way, *join, pace)
         };

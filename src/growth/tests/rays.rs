@@ -5,6 +5,7 @@ use crate::{
     CrackPreset,
     growth::{
         CrackGrowth, GrowthParams, MarkerLayout, StartLayout,
+        plan::{MOST_RINGS, Plan, PlannedHit},
         rays::{NO_RAY, RAY},
     },
     math::Rng,
@@ -397,4 +398,24 @@ fn rays_stay_on_the_surface() {
         assert!(lengths.fold(f32::INFINITY, f32::min) > 0.0, "{seed}");
     }
     assert!(ends > 60, "{ends} ends on the border");
+}
+
+/// However short the runs and however many the forks, the plan of a hit stays of a size that a frame has time for.
+#[test]
+fn b5_the_plan_of_a_hit_is_bounded() {
+    let params = GrowthParams {
+        markers: MarkerLayout::Rays { sectors: 360, jitter: 1.0, through: 1.0 },
+        step_length: 0.001,
+        crack_radius: 0.001,
+        kill_distance: 0.0005,
+        forks: 1.0,
+        ..CrackPreset::GLASS.growth
+    };
+    for extent in [Vec2::ONE, Vec2::new(4.0, 0.5)] {
+        let hit = PlannedHit { pos: 0.5 * extent, energy: 20.0, reach: 4.0, seed: 5 };
+        let plan = Plan::new(&params, hit, extent).expect("rays");
+        let points: usize = plan.rays.iter().map(|ray| ray.line.len()).sum();
+        assert!((15_000..200_000).contains(&points), "{points} points of {} rays", plan.rays.len());
+        assert!(plan.chords.len() <= plan.rays.len() * MOST_RINGS as usize);
+    }
 }
