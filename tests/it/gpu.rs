@@ -51,6 +51,13 @@ fn e10_a_renderer_that_starts_again_shows_the_same() {
     let Some((_one, mut app)) = gpu_app() else { return };
     let surfaces: Vec<_> = (0..8).map(|_| spawn_picture(&mut app, UVec2::splat(128))).collect();
     steps(&mut app, 2);
+    // When the memory was made or used last from which textures are filled.
+    let used = |app: &App| {
+        let world = app.get_sub_app(RenderApp).expect("there is a renderer").world();
+        let mut all = world.components().iter_registered();
+        let id = all.find(|info| info.name().to_string().ends_with("gpu::fetch::Staging")).expect("the resource").id();
+        world.get_resource_change_ticks_by_id(id).expect("it is there").changed
+    };
     let mut rng = Rng::new(4);
     let mut most = 0;
     for round in 0..40 {
@@ -67,7 +74,9 @@ fn e10_a_renderer_that_starts_again_shows_the_same() {
             if round % 8 == 3 {
                 app.world_mut().run_schedule(Main);
             }
+            let before = used(&app);
             start_again(&mut app);
+            assert_ne!(used(&app), before, "its buffers are of the device before");
         }
         step(&mut app);
         most = most.max(app.world().resource::<CrackUploadStats>().rects);

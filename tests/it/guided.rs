@@ -7,7 +7,7 @@ use bevy_crack::{
     math::Rng,
     plugin::CrackUploadStats,
     prelude::*,
-    voronoi::{FONT, MAX_SITES, SiteLayout, VoronoiParams, draw_text},
+    voronoi::{FONT, MAX_SITES, SiteLayout, VoronoiBake, VoronoiParams, draw_text},
 };
 use std::{
     sync::Arc,
@@ -191,7 +191,9 @@ fn g1_g2_any_guide_makes_cracks() {
 
 #[test]
 fn g3_any_number_of_sites() {
+    assert_eq!(MAX_SITES, 65_536, "as the documentation says");
     let mut app = guided_app();
+    let mut made = Vec::new();
     for sites in [0, 1, 2, MAX_SITES, 1_000_000] {
         let mut guided = guided();
         guided.params.sites = sites;
@@ -200,20 +202,28 @@ fn g3_any_number_of_sites() {
         bake(&mut app, entity);
         wait_for(&mut app, "the end", |app| state(app, entity).status == CrackStatus::Done);
         assert_eq!(state(&app, entity).nodes > 0, sites > 1, "{sites} sites");
+        let params = VoronoiParams { sites, layout: SiteLayout::Uniform, ..default() };
+        let map = VoronoiBake::new(params, Vec::new(), UVec2::splat(16), 0).unwrap().finish().0;
+        assert_eq!(map.sites().len(), sites.min(MAX_SITES) as usize);
+        made.push((state(&app, entity).nodes, state(&app, entity).cells, shown(&app, entity)));
         if sites < 3 {
             assert_cracks(&mut app, entity);
         }
     }
-    for places in [
-        vec![Vec2::splat(0.5); 20],
-        vec![Vec2::NAN, Vec2::splat(9.0)],
-        (0..9).map(|i| Vec2::new(0.5, i as f32 / 9.0)).collect(),
+    assert!(made[3] == made[4], "what is beyond the most makes no difference: {:?} {:?}", &made[3].0, &made[4].0);
+    assert!(made[2] != made[3]);
+    for (places, cracks) in [
+        // The first has it all; what is no number is no site.
+        (vec![Vec2::splat(0.5); 20], false),
+        (vec![Vec2::NAN, Vec2::splat(9.0)], false),
+        ((0..9).map(|i| Vec2::new(0.5, i as f32 / 9.0)).collect(), true),
     ] {
         let mut guided = guided();
         guided.params.layout = SiteLayout::Given(places);
         let entity = spawn(&mut app, guided);
         bake(&mut app, entity);
         wait_for(&mut app, "the end", |app| state(app, entity).status == CrackStatus::Done);
+        assert_eq!(state(&app, entity).nodes > 0, cracks, "{:?}", get::<GuidedCracks>(&app, entity).params.layout);
     }
     assert_eq!(told(&app).failed, []);
 }

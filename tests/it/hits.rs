@@ -51,22 +51,44 @@ fn i1_numbers_that_are_not_finite_are_refused() {
 #[test]
 fn i1_any_bits_at_all() {
     let mut app = app();
+    // None is merged with another before it is looked at.
+    app.world_mut().resource_mut::<CrackBudget>().max_queued_per_surface = 10_000;
     let entity = spawn_picture(&mut app, UVec2::splat(32));
     let mut rng = Rng::new(1);
     let mut any = || f32::from_bits(rng.next_u32());
+    // What is no number, below zero, off the surface; what does nothing; what lands.
+    let (mut refused, mut ignored, mut landing) = ([0u64; 3], 0, 0);
     for _ in 0..100 {
         for _ in 0..100 {
             let point = Vec3::new(any(), any(), any());
-            let bad_hit = match any().to_bits() % 3 {
-                0 => CrackHit::uv(entity, point.truncate()),
-                1 => CrackHit::local(entity, point),
-                _ => CrackHit::world(entity, point),
+            // The sprite stands at the origin, a texel for each unit. Its picture has no depth.
+            let on_sprite = point.truncate().abs().max_element() <= 16.0;
+            let (any_hit, is_number, is_on) = match any().to_bits() % 3 {
+                0 => {
+                    let (uv, on) = (point.truncate(), 0.0..=1.0);
+                    (CrackHit::uv(entity, uv), uv.is_finite(), on.contains(&uv.x) && on.contains(&uv.y))
+                }
+                1 => (CrackHit::local(entity, point), point.is_finite(), on_sprite),
+                _ => (CrackHit::world(entity, point), point.is_finite(), on_sprite),
             };
-            hit(&mut app, bad_hit.with_energy(any()).with_direction(Vec3::new(any(), any(), any())));
+            let (energy, direction) = (any(), Vec3::new(any(), any(), any()));
+            match (is_number && energy.is_finite() && direction.is_finite(), energy) {
+                (false, _) => refused[0] += 1,
+                (true, energy) if energy < 0.0 => refused[1] += 1,
+                (true, 0.0) => ignored += 1,
+                (true, _) if !is_on => refused[2] += 1,
+                (true, _) => landing += 1,
+            }
+            hit(&mut app, any_hit.with_energy(energy).with_direction(direction));
         }
         step(&mut app);
     }
-    assert_eq!(counts(&app).sent, 10_000);
+    wait_for(&mut app, "all hits", |app| counts(app).queued == 0);
+    let stats = counts(&app);
+    println!("{refused:?} refused, {landing} land");
+    assert!(landing > 100 && refused.iter().all(|n| *n > 100), "{landing} {refused:?}");
+    let seen = (stats.sent, stats.rejected, stats.ignored, stats.applied + stats.merged);
+    assert_eq!(seen, (10_000, refused.iter().sum::<u64>(), ignored, landing), "{refused:?}");
     hit(&mut app, center(entity));
     settle(&mut app, entity);
 }
@@ -348,6 +370,38 @@ fn i8_a_thousand_surfaces_grow_at_once_and_in_turns() {
     for entity in surfaces {
         settle(&mut app, entity);
     }
+}
+
+/// How many cracks get longer in one frame: never more than may, and others begin when some have ended.
+#[test]
+fn i8_no_more_grow_at_once_than_may() {
+    const MOST: usize = 10;
+    let mut app = app();
+    app.world_mut().resource_mut::<CrackBudget>().max_growing = MOST;
+    let image = add(&mut app, picture(UVec2::splat(32)));
+    let surfaces: Vec<_> = (0..100).map(|seed| spawn_small(&mut app, &image, seed)).collect();
+    for entity in &surfaces {
+        hit(&mut app, center(*entity));
+    }
+    let nodes = |app: &App| surfaces.iter().map(|entity| state(app, *entity).nodes).collect::<Vec<_>>();
+    // All show where they begin in the frame of the hit, also those that wait.
+    step(&mut app);
+    let first = nodes(&app);
+    assert!(first.iter().all(|nodes| *nodes > 0), "{first:?}");
+    let (mut before, mut most, mut n_frames) = (first.clone(), 0, 0);
+    while surfaces.iter().any(|entity| state(&app, *entity).status != CrackStatus::Done) {
+        step(&mut app);
+        let now = nodes(&app);
+        most = most.max(now.iter().zip(&before).filter(|(now, before)| now != before).count());
+        before = now;
+        n_frames += 1;
+        assert!(n_frames < 10_000, "they do not all end");
+    }
+    assert!((2..=MOST).contains(&most), "{most} grow in one frame, {MOST} may");
+    let grown = before.iter().zip(&first).filter(|(now, first)| now > first).count();
+    assert!(grown > surfaces.len() / 2, "{grown} have grown");
+    // With that of the hits.
+    assert!(n_frames + 1 >= surfaces.len() / MOST, "{n_frames} frames for all of them");
 }
 
 /// Counted, not timed: a surface that is not hit is a sprite with one component more, which no system writes to, and has no texture.

@@ -100,12 +100,34 @@ const ODD_SIZES: [UVec2; 7] = [
     UVec2::new(257, 13),
 ];
 
+/// The cracks of a hit near a corner lie around it and nowhere else: columns and rows are not mixed up, and none is turned round.
+fn assert_lies_around(app: &App, entity: Entity, before: &[u8], size: UVec2, uv: Vec2) {
+    // Texels of a unit of patterns; cracks of one hit are shorter.
+    let unit = size.min_element().max(size.max_element() / 64) as f32;
+    let aim = uv * size.as_vec2();
+    let now = shown(app, entity);
+    let texels = now.chunks(4).zip(before.chunks(4)).zip(0u32..).filter(|((now, before), _)| now != before);
+    let places: Vec<Vec2> = texels.map(|(_, i)| UVec2::new(i % size.x, i / size.x).as_vec2() + 0.5).collect();
+    if places.is_empty() {
+        assert!(unit < 8.0, "{size}: no crack shows: {:?}", state(app, entity));
+        return;
+    }
+    let farthest = places.iter().map(|place| place.distance(aim)).fold(0.0, f32::max);
+    assert!(farthest < 1.5 * unit + 3.0, "{size}: {farthest} texels from {aim}");
+    let middle = places.iter().sum::<Vec2>() / places.len() as f32;
+    assert!(middle.distance(aim) < 0.5 * unit + 2.0, "{size}: around {middle} instead of {aim}");
+}
+
 #[test]
 fn t2_odd_sizes() {
     let mut app = app();
     for size in ODD_SIZES {
         let entity = spawn_picture(&mut app, size);
         let before = shown(&app, entity);
+        let corner = Vec2::new(0.2, 0.1);
+        hit(&mut app, CrackHit::uv(entity, corner));
+        settle(&mut app, entity);
+        assert_lies_around(&app, entity, &before, size, corner);
         for at in [0.0, 0.2, 0.5, 1.0] {
             hit(&mut app, CrackHit::uv(entity, Vec2::splat(at)).with_energy(2.0));
         }

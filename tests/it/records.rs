@@ -251,6 +251,20 @@ fn f4_records_that_cannot_be_are_refused() {
     assert_eq!(state(&app, other).hits, 1);
 }
 
+/// Moves the fourth hit.
+fn hit_at(record: &mut CrackRecord, at: Vec2) {
+    if let PastEvent::Hit { pos, .. } = &mut record.past.events[3] {
+        *pos = at;
+    }
+}
+
+/// Has the fourth hit come after this many steps.
+fn hit_after(record: &mut CrackRecord, steps: u32) {
+    if let PastEvent::Hit { after, .. } = &mut record.past.events[3] {
+        *after = steps;
+    }
+}
+
 /// Files that were cut off or edited are refused, or are the past of some surface: none ends the game.
 #[test]
 fn f4_files_that_were_edited() {
@@ -261,7 +275,66 @@ fn f4_files_that_were_edited() {
         hit(&mut app, CrackHit::uv(entity, Vec2::new(rng.unit(), rng.unit())));
         steps(&mut app, 3);
     }
-    let text = serde_json::to_string(&saved(&mut app, entity)).expect("it can be written");
+    let good = saved(&mut app, entity);
+    assert!(good.validate().is_ok() && good.past.events.len() == 6, "{good:?}");
+    // One number is wrong, the rest is as it was: each is refused before anything is made of it.
+    let ([wide, high], last) = (good.past.extent.to_array(), good.past.events[5].after());
+    let hit_with = |change: fn(&mut Vec2, &mut f32)| {
+        move |record: &mut CrackRecord| match &mut record.past.events[3] {
+            PastEvent::Hit { pos, energy, .. } => change(pos, energy),
+            PastEvent::Removal { .. } => panic!("it is a hit"),
+        }
+    };
+    let edits: [(&str, Box<dyn Fn(&mut CrackRecord)>); 29] = [
+        ("version", Box::new(|record| record.version += 1)),
+        ("version", Box::new(|record| record.version = 0)),
+        ("time", Box::new(|record| record.time = f64::NAN)),
+        ("time", Box::new(|record| record.time = f64::INFINITY)),
+        ("time", Box::new(|record| record.time = -1e-9)),
+        ("finite", Box::new(|record| record.around = Some(Vec3::new(0.0, f32::NAN, 0.0)))),
+        ("finite", Box::new(|record| record.around = Some(Vec3::new(0.0, 0.0, f32::NEG_INFINITY)))),
+        ("extent", Box::new(|record| record.past.extent.x = 0.0)),
+        ("extent", Box::new(|record| record.past.extent.y = -1.0)),
+        ("extent", Box::new(|record| record.past.extent.x = f32::NAN)),
+        ("extent", Box::new(|record| record.past.extent.y = 65.0)),
+        ("event 3 is", Box::new(hit_with(|pos, _| pos.x = f32::NAN))),
+        ("event 3 is", Box::new(hit_with(|pos, _| pos.y = f32::NAN))),
+        ("event 3 is", Box::new(hit_with(|pos, _| pos.x = -1e-6))),
+        ("event 3 is", Box::new(hit_with(|pos, _| pos.y = -1e-6))),
+        ("event 3 is", Box::new(move |record| hit_at(record, Vec2::new(1.001 * wide, 0.5)))),
+        ("event 3 is", Box::new(move |record| hit_at(record, Vec2::new(0.5, 1.001 * high)))),
+        ("event 3 is", Box::new(hit_with(|_, energy| *energy = 0.0))),
+        ("event 3 is", Box::new(hit_with(|_, energy| *energy = -1.0))),
+        ("event 3 is", Box::new(hit_with(|_, energy| *energy = f32::NAN))),
+        ("event 3 is", Box::new(hit_with(|_, energy| *energy = f32::INFINITY))),
+        ("event 4 comes", Box::new(|record| record.past.events.swap(3, 4))),
+        ("event 4 comes", Box::new(move |record| hit_after(record, last))),
+        ("event 3 comes", Box::new(|record| hit_after(record, 0))),
+        ("event 3 comes", Box::new(|record| hit_after(record, u32::MAX))),
+        ("event 5 comes", Box::new(|record| record.past.steps = record.past.events[5].after() - 1)),
+        ("event 1 comes", Box::new(|record| record.past.steps = 0)),
+        ("event 6 comes", Box::new(|record| record.past.events.push(PastEvent::Removal { after: 0, keep: 5 }))),
+        (
+            "more than 16384",
+            Box::new(|record| {
+                let last = record.past.events[5];
+                record.past.events.resize(Past::MAX_EVENTS + 1, last);
+            }),
+        ),
+    ];
+    for (i, (named, edit)) in edits.iter().enumerate() {
+        let mut record = good.clone();
+        edit(&mut record);
+        let refused = record.validate().expect_err("it is wrong").to_string();
+        assert!(refused.contains(named), "edit {i}: {refused}");
+    }
+    // As many events as there may be, and a hit on the very corner, are no fault.
+    let mut most = good.clone();
+    hit_at(&mut most, good.past.extent);
+    most.past.events.resize(Past::MAX_EVENTS, good.past.events[5]);
+    assert_eq!(most.validate(), Ok(()));
+
+    let text = serde_json::to_string(&good).expect("it can be written");
     let (mut n_read, mut n_valid) = (0, 0);
     for _ in 0..20_000 {
         let mut bytes = text.clone().into_bytes();

@@ -10,7 +10,11 @@ mod ocr;
 #[path = "../../examples/bake/pictures.rs"]
 mod pictures;
 
-use bevy_crack::voronoi::{FONT, Guide, SiteLayout, VoronoiBake, VoronoiParams, draw_text};
+use bevy_crack::{
+    Grid,
+    pattern::CrackMask,
+    voronoi::{FONT, Guide, SiteLayout, VoronoiBake, VoronoiParams, draw_text, ink as ink_of, lightness},
+};
 use glam::UVec2;
 use image::{Rgba, RgbaImage};
 use std::{env, fs, io::Write, path::PathBuf};
@@ -150,6 +154,13 @@ fn f2_bombs_are_refused() {
         let refused = pictures::read_picture(&path).unwrap_err().to_string();
         assert!(refused.contains("bomb.png"), "{refused}");
         assert!(side == u32::MAX || refused.to_lowercase().contains("limit"), "{side}: {refused}");
+        // What makes pictures of texels that are there already takes no more memory than they do. Files: `src/plugin/source/png.rs`.
+        let (size, few) = (UVec2::splat(side), [0; 44]);
+        assert!(ink_of(size, &few).is_none() && lightness(size, &few).is_none());
+        assert!(CrackMask::from_picture(size, &few).is_err());
+        assert!(Grid::from_vec(size, vec![0.0f32; 11]).is_none());
+        let params = VoronoiParams::DEFAULT;
+        assert!(side == 8_193 || VoronoiBake::new(params, Vec::new(), size, 1).is_err(), "{side}");
     }
     fs::remove_dir_all(folder).unwrap();
 }
@@ -178,6 +189,24 @@ fn f1_broken_pictures_are_errors() {
     assert!(refused > n / 2, "{refused} of {n}");
     assert!(pictures::read_picture(&folder.join("nothing.png")).is_err());
     fs::remove_dir_all(folder).unwrap();
+    // Texels that do not fit their size, for all that reads pictures. Files: `src/plugin/source/png.rs`.
+    let size = UVec2::new(9, 7);
+    for n in [0, 1, 4 * 62, 4 * 63, 4 * 64, 8 * 63] {
+        let (texels, fits) = (vec![200; n], n == 4 * 63);
+        assert_eq!(ink_of(size, &texels).is_some(), fits, "{n} bytes");
+        assert_eq!(lightness(size, &texels).is_some(), fits, "{n} bytes");
+        assert_eq!(CrackMask::from_picture(size, &texels).is_ok(), fits, "{n} bytes");
+        assert_eq!(CrackMask::weak_from_picture(size, &texels).is_ok(), fits, "{n} bytes");
+        assert_eq!(CrackMask::forbidden_from_alpha(size, &texels).is_ok(), fits, "{n} bytes");
+        assert!(Grid::from_vec(size, texels).is_none(), "{n} values");
+    }
+    assert!(Grid::from_vec(size, vec![0u8; 63]).is_some());
+    for size in [UVec2::ZERO, UVec2::new(0, 7), UVec2::new(9, 0)] {
+        assert!(
+            CrackMask::from_picture(size, &[]).is_err()
+                && VoronoiBake::new(VoronoiParams::DEFAULT, Vec::new(), size, 1).is_err()
+        );
+    }
 }
 
 /// G1: guides of any channel count; the drawing is found whichever way round it is drawn.

@@ -202,3 +202,159 @@ fn lines(seams: &Seams, appearance: GuidedAppearance) -> (Network, u32) {
     };
     (network, opening)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bevy::{
+        asset::RenderAssetUsages,
+        render::render_resource::{Extent3d, TextureDimension, TextureFormat},
+    };
+    use image::{DynamicImage, ImageFormat, RgbaImage};
+
+    const SIZE: UVec2 = UVec2::new(20, 12);
+
+    /// The light of red, green and blue and the cover of a column of a drawing: paper, a broad stroke, a grey one, a red one, a blue one, and
+    /// one of glass.
+    fn column(x: u32, is_inverted: bool) -> [f64; 4] {
+        let (paper, pen) = if is_inverted { (0.0, 1.0) } else { (1.0, 0.0) };
+        match x {
+            5..8 => [pen, pen, pen, 1.0],
+            10 => [0.25, 0.25, 0.25, 1.0],
+            12 => [1.0, 0.0, 0.0, 1.0],
+            14 => [0.0, 0.0, 1.0, 1.0],
+            16 => [pen, pen, pen, 0.0],
+            _ => [paper, paper, paper, 1.0],
+        }
+    }
+
+    /// The level that stands for a light in a picture for the eye.
+    fn level(light: f64) -> f64 {
+        if light <= 0.003_130_8 { 12.92 * light } else { 1.055 * light.powf(1.0 / 2.4) - 0.055 }
+    }
+
+    /// A share of the most, in so many bytes; as a float the share itself.
+    fn stored(share: f64, bytes: usize, is_float: bool) -> Vec<u8> {
+        match (bytes, is_float) {
+            (4, true) => (share as f32).to_le_bytes().to_vec(),
+            // Sign, exponent and fraction of the three shares that there are.
+            (_, true) => (if share > 0.5 {
+                0x3C00u16
+            } else if share > 0.0 {
+                0x3400
+            } else {
+                0
+            })
+            .to_le_bytes()
+            .to_vec(),
+            (4, false) => ((share * f64::from(u32::MAX)).round() as u32).to_le_bytes().to_vec(),
+            (2, false) => ((share * f64::from(u16::MAX)).round() as u16).to_le_bytes().to_vec(),
+            _ => vec![(share * 255.0).round() as u8],
+        }
+    }
+
+    fn read(copies: Vec<Image>, source: Source) -> Result<Grid<f32>, String> {
+        let base = Arc::new(BasePicture::new(UVec2::ONE, vec![255; 4], None, None));
+        let surface = BakeSurface::Known(base, TexelRect::whole(UVec2::ONE));
+        let mut job = MapJob::new(CracksOrder::Record(Box::default()), SIZE, surface, Vec::new());
+        job.copies = copies;
+        job.read(source)
+    }
+
+    /// Fault G1: the same drawing in each format that can be read, dark on light and light on dark. What is expected is worked out from the light
+    /// of its columns, by other numbers than those that are read.
+    #[test]
+    fn g1_guide_pictures_of_every_format() {
+        use TextureFormat::*;
+        let formats = [
+            R8Unorm,
+            R8Uint,
+            R16Unorm,
+            R16Uint,
+            R16Float,
+            R32Uint,
+            R32Float,
+            Rg8Unorm,
+            Rg8Uint,
+            Rg16Unorm,
+            Rg16Uint,
+            Rg16Float,
+            Rg32Uint,
+            Rg32Float,
+            Rgba8Unorm,
+            Rgba8UnormSrgb,
+            Rgba8Uint,
+            Bgra8Unorm,
+            Bgra8UnormSrgb,
+            Rgba16Unorm,
+            Rgba16Uint,
+            Rgba16Float,
+            Rgba32Uint,
+            Rgba32Float,
+        ];
+        for (format, is_inverted) in formats.into_iter().flat_map(|format| [(format, false), (format, true)]) {
+            let name = format!("{format:?}");
+            let channels = usize::from(format.components());
+            let bytes = format.block_copy_size(None).expect("a plain format") as usize / channels;
+            let (is_float, is_srgb) = (name.contains("Float"), name.contains("Srgb"));
+            let texel = |x: u32| {
+                let [red, green, blue, cover] = column(x, is_inverted);
+                let [red, green, blue] = [red, green, blue].map(|light| if is_srgb { level(light) } else { light });
+                let all = if name.starts_with("Bgra") { [blue, green, red, cover] } else { [red, green, blue, cover] };
+                all[..channels].iter().flat_map(|share| stored(*share, bytes, is_float)).collect::<Vec<u8>>()
+            };
+            let data = (0..SIZE.y).flat_map(|_| (0..SIZE.x).flat_map(texel)).collect();
+            let extent = Extent3d { width: SIZE.x, height: SIZE.y, depth_or_array_layers: 1 };
+            let usage = RenderAssetUsages::MAIN_WORLD;
+            let mut image = Image::new_uninit(extent, TextureDimension::D2, format, usage);
+            image.data = Some(data);
+            let ink = read(vec![image], Source::Image(0)).expect("it can be read");
+            assert_eq!(ink.size(), SIZE, "{name}");
+            for x in 0..SIZE.x {
+                let [red, green, blue, cover] = column(x, is_inverted);
+                // One channel is grey; of two there is no blue; all is opaque without a fourth.
+                let (shown, cover) = match channels {
+                    1 => ([red; 3], 1.0),
+                    2 => ([red, green, 0.0], 1.0),
+                    _ => ([red, green, blue], cover),
+                };
+                let light: f64 =
+                    shown.into_iter().zip([0.299, 0.587, 0.114]).map(|(light, of)| of * level(light)).sum();
+                let want = cover * if is_inverted { light } else { 1.0 - light };
+                for y in [0, 7, SIZE.y - 1] {
+                    let got = ink.get(x, y).map_or(f64::NAN, f64::from);
+                    assert!((got - want).abs() < 0.01, "{name} {is_inverted}: {got}, not {want} at {x}");
+                }
+            }
+        }
+    }
+
+    /// Fault G1: and in each kind of PNG file.
+    #[test]
+    fn g1_guide_files_of_every_kind() {
+        let of = |x: u32| column(x, false).map(|share| if share > 0.5 { 255 } else { 0 });
+        // Without grey and colours, of which files say other things.
+        let has_no_color = |x: u32| !matches!(x, 10..=14);
+        let drawing = RgbaImage::from_fn(SIZE.x, SIZE.y, |x, _| image::Rgba(of(if has_no_color(x) { x } else { 0 })));
+        let drawing = DynamicImage::ImageRgba8(drawing);
+        let kinds: [DynamicImage; 6] = [
+            drawing.to_luma8().into(),
+            drawing.to_rgb8().into(),
+            drawing.to_luma_alpha8().into(),
+            drawing.to_rgba8().into(),
+            drawing.to_luma16().into(),
+            drawing.to_rgba16().into(),
+        ];
+        for (i, kind) in kinds.into_iter().enumerate() {
+            let mut file = std::io::Cursor::new(Vec::new());
+            let is_transparent = kind.color().has_alpha();
+            kind.write_to(&mut file, ImageFormat::Png).expect("it can be written");
+            let ink = read(Vec::new(), Source::Png(file.into_inner().into())).expect("it can be read");
+            for x in 0..SIZE.x {
+                let is_ink = (5..8).contains(&x) || (x == 16 && !is_transparent);
+                let got = ink.get(x, 3).unwrap_or(f32::NAN);
+                assert!((got - f32::from(u8::from(is_ink))).abs() < 0.01, "kind {i} at {x}: {got}");
+            }
+        }
+    }
+}

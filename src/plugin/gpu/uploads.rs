@@ -212,4 +212,78 @@ mod tests {
             assert_eq!(left, if is_fetched { MAX_UNFETCHED + 1 } else { 1 });
         }
     }
+
+    /// Faults E4 and E5: without a renderer, and with one that has no adapter, nothing waits for one, however much is painted.
+    #[cfg(all(feature = "2d", feature = "3d"))]
+    #[test]
+    fn e5_nothing_waits_for_a_renderer_that_is_not_there() {
+        use crate::plugin::{
+            CrackPlugins,
+            headless::{self, blank, shown},
+            prelude::*,
+        };
+        use bevy::{
+            camera::CameraPlugin,
+            core_pipeline::CorePipelinePlugin,
+            image::TextureAtlasLayout,
+            mesh::MeshPlugin,
+            render::{RenderPlugin, settings::WgpuSettings},
+            sprite_render::SpriteRenderPlugin,
+            time::TimeUpdateStrategy,
+            window::ExitCondition,
+        };
+        use core::time::Duration;
+
+        let budget = CrackBudget { milliseconds: 1e6, ..default() };
+        let without_adapter = || {
+            let render_creation = WgpuSettings { backends: None, ..default() }.into();
+            let windows = WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() };
+            let mut app = App::new();
+            app.add_plugins((
+                MinimalPlugins,
+                TransformPlugin,
+                windows,
+                AssetPlugin::default(),
+                RenderPlugin { render_creation, ..default() },
+                ImagePlugin::default(),
+                MeshPlugin,
+                CameraPlugin,
+                CorePipelinePlugin,
+                SpriteRenderPlugin,
+                CrackPlugins,
+            ))
+            .init_asset::<TextureAtlasLayout>()
+            .init_asset::<ColorMaterial>()
+            .init_asset::<StandardMaterial>()
+            .insert_resource(budget.clone());
+            while app.plugins_state() == bevy::app::PluginsState::Adding {
+                bevy::tasks::tick_global_task_pools_on_main_thread();
+            }
+            app.finish();
+            app.cleanup();
+            app
+        };
+        for mut app in [headless::app(budget.clone()), without_adapter()] {
+            app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(20)));
+            let image = app.world_mut().resource_mut::<Assets<Image>>().add(blank(UVec2::splat(64)));
+            let entity = app.world_mut().spawn((Sprite::from_image(image), CrackSurface::default())).id();
+            app.update();
+            let (mut changes, mut before) = (0, shown(&app, entity));
+            for i in 0..60u8 {
+                if i % 10 == 0 {
+                    let at = Vec2::new(0.1 + f32::from(i) / 70.0, 0.5);
+                    app.world_mut().trigger(CrackHit::uv(entity, at));
+                }
+                app.update();
+                let now = shown(&app, entity);
+                changes += usize::from(now != before);
+                before = now;
+                let uploads = app.world().resource::<Uploads>();
+                assert!(uploads.rects.is_empty() && uploads.staged.is_empty() && uploads.packed.is_none());
+                assert!(uploads.packers.iter().all(|packer| packer.rects.is_empty()));
+                assert!(!uploads.has_whole && !uploads.is_wanted && uploads.stager(None).is_none());
+            }
+            assert!(changes > 5, "{changes} frames have painted something");
+        }
+    }
 }

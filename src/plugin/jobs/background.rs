@@ -23,8 +23,10 @@ impl<W: Send + 'static, T: Send + 'static> BackgroundJob<W, T> {
     /// Begins some work.
     pub(crate) fn start(work: W, run: fn(W) -> T) -> Self {
         let work = Arc::new(Mutex::new(Some(work)));
-        let begin = work.clone();
-        let task = AsyncComputeTaskPool::try_get().map(|pool| pool.spawn(async move { take(&begin).map(run) }));
+        let (begin, there) = (work.clone(), run);
+        #[cfg(test)]
+        let there = tests::panicking_alike(there);
+        let task = AsyncComputeTaskPool::try_get().map(|pool| pool.spawn(async move { take(&begin).map(there) }));
         Self { work, run, task }
     }
 
@@ -75,6 +77,8 @@ pub(crate) fn guarded<T>(run: impl FnOnce() -> Result<T, CrackError>) -> Result<
 
 /// The same, of another kind.
 pub(crate) fn guarded_as<T, E>(error: impl FnOnce(String) -> E, run: impl FnOnce() -> Result<T, E>) -> Result<T, E> {
+    #[cfg(test)]
+    let run = tests::panicking_if_asked(run);
     catch_unwind(AssertUnwindSafe(run)).unwrap_or_else(|panic| {
         let text = panic.downcast_ref::<&str>().copied().or(panic.downcast_ref::<String>().map(String::as_str));
         Err(error(format!("it panicked: {}", text.unwrap_or("unknown"))))
@@ -82,10 +86,32 @@ pub(crate) fn guarded_as<T, E>(error: impl FnOnce(String) -> E, run: impl FnOnce
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use bevy::tasks::TaskPool;
-    use std::{sync::mpsc, thread};
+    use std::{cell::Cell, sync::mpsc, thread};
+
+    thread_local! {
+        /// Whether guarded work panics, on this thread and in tasks that are begun on it.
+        static PANICS: Cell<bool> = const { Cell::new(false) };
+    }
+
+    /// Guarded work, which panics if the thread on which it is done says so.
+    pub(super) fn panicking_if_asked<T>(run: impl FnOnce() -> T) -> impl FnOnce() -> T {
+        || {
+            assert!(!PANICS.get(), "as a test has asked");
+            run()
+        }
+    }
+
+    /// What a task is to do, with panics as on the thread on which it is begun.
+    pub(crate) fn panicking_alike<W, T>(run: impl FnOnce(W) -> T) -> impl FnOnce(W) -> T {
+        let panics = PANICS.get();
+        move |work| {
+            PANICS.set(panics);
+            run(work)
+        }
+    }
 
     #[test]
     fn work_is_done_once_whoever_does_it() {
@@ -136,5 +162,165 @@ mod tests {
         assert_eq!(job.take_if_done(false), None);
         assert_eq!(job.take_if_done(true), Some(8));
         assert_eq!(job.take_if_done(true), None);
+    }
+
+    /// Fault E11: a panic in whatever a task does, or slices of frames where there are no threads, is told of once, and the game goes on.
+    #[cfg(feature = "2d")]
+    mod panics {
+        use super::PANICS;
+        use crate::{
+            Grid,
+            growth::PastEvent,
+            paint::analogy::{AnalogyPair, AnalogyParams},
+            plugin::{
+                headless::{app, blank},
+                jobs::threads::Threads,
+                prelude::*,
+            },
+        };
+        use bevy::{ecs::schedule::SingleThreadedExecutor, prelude::*, time::TimeUpdateStrategy};
+        use std::{thread, time::Duration};
+
+        /// What was told of failures.
+        #[derive(Resource, Default)]
+        struct Told(Vec<(Entity, String)>);
+
+        fn told(app: &App) -> &[(Entity, String)] {
+            &app.world().resource::<Told>().0
+        }
+
+        fn frames_until(app: &mut App, what: &str, mut is_so: impl FnMut(&App) -> bool) {
+            for _ in 0..30_000 {
+                if is_so(app) {
+                    return;
+                }
+                app.update();
+                thread::sleep(Duration::from_millis(1));
+            }
+            panic!("{what}: it never comes");
+        }
+
+        fn state(app: &App, entity: Entity) -> CrackState {
+            app.world().get::<CrackState>(entity).cloned().unwrap_or_default()
+        }
+
+        fn hit(app: &mut App, entity: Entity) {
+            app.world_mut().trigger(CrackHit::uv(entity, Vec2::splat(0.5)));
+        }
+
+        /// Has work begun that panics, on a sprite of this size; `is_cracked` before, or not.
+        fn check(
+            what: &str,
+            has_threads: bool,
+            side: u32,
+            is_cracked: bool,
+            begin: fn(&mut App, Entity, &Handle<Image>),
+        ) {
+            let what = format!("{what}, threads: {has_threads}");
+            let mut app = app(CrackBudget { milliseconds: 1e6, ..default() });
+            // What begins is begun on this thread.
+            app.edit_schedule(PostUpdate, |schedule| {
+                schedule.set_executor(SingleThreadedExecutor::new());
+            });
+            app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(20)))
+                .init_resource::<Told>()
+                .add_observer(|failed: On<CrackFailed>, mut told: ResMut<Told>| {
+                    told.0.push((failed.entity, format!("{:?}", failed.error)));
+                })
+                .add_observer(|failed: On<ShatterFailed>, mut told: ResMut<Told>| {
+                    told.0.push((failed.entity, format!("{:?}", failed.error)));
+                })
+                .add_observer(|failed: On<ReliefFailed>, mut told: ResMut<Told>| {
+                    told.0.push((failed.entity, format!("{:?}", failed.error)));
+                })
+                .add_observer(|failed: On<AnalogyFailed>, mut told: ResMut<Told>| {
+                    told.0.push((failed.entity, format!("{:?}", failed.error)));
+                });
+            app.world_mut().resource_mut::<Threads>().are_missing = !has_threads;
+            let spawn = |app: &mut App, side: u32| {
+                let image = app.world_mut().resource_mut::<Assets<Image>>().add(blank(UVec2::splat(side)));
+                let sprite = (Sprite::from_image(image.clone()), CrackSurface::new(CrackPreset::GLASS));
+                (app.world_mut().spawn(sprite).id(), image)
+            };
+            let (entity, image) = spawn(&mut app, side);
+            app.update();
+            if is_cracked {
+                hit(&mut app, entity);
+                frames_until(&mut app, &what, |app| state(app, entity).status == CrackStatus::Done);
+            }
+            app.world_mut().resource_mut::<CrackBudget>().milliseconds = 0.0;
+            PANICS.set(true);
+            begin(&mut app, entity, &image);
+            frames_until(&mut app, &what, |app| !told(app).is_empty());
+            (0..20).for_each(|_| app.update());
+            PANICS.set(false);
+            let [(failed, error)] = told(&app) else { panic!("{what}: {:?}", told(&app)) };
+            assert_eq!(*failed, entity, "{what}");
+            assert!(error.contains("as a test has asked"), "{what}: {error}");
+            assert_eq!(app.world().resource::<CrackStats>().queued, 0, "{what}: hits that wait are refused");
+            // Others crack.
+            let (other, _) = spawn(&mut app, 64);
+            hit(&mut app, other);
+            frames_until(&mut app, &what, |app| state(app, other).nodes > 0);
+            assert_eq!(told(&app).len(), 1, "{what}: {:?}", told(&app));
+        }
+
+        #[test]
+        fn e11_in_bakes() {
+            for has_threads in [true, false] {
+                check("guided cracks", has_threads, 64, false, |app, entity, _| {
+                    let guide = CrackGuide::new(Grid::new(UVec2::new(3, 1), 0.5));
+                    app.world_mut().entity_mut(entity).insert(GuidedCracks::new(guide));
+                });
+                check("strands", has_threads, 64, false, |app, entity, _| {
+                    let start = HitPoint::Uv(Vec2::new(0.0, 0.5));
+                    app.world_mut().entity_mut(entity).insert(CrackStrands::new([start], StrandField::Linear(Vec2::X)));
+                });
+                check("a record", has_threads, 64, false, |app, entity, _| {
+                    let mut record = CrackRecord::default();
+                    record.past.events.push(PastEvent::Hit { after: 0, pos: Vec2::splat(0.5), energy: 1.0 });
+                    app.world_mut().entity_mut(entity).insert(record);
+                });
+            }
+        }
+
+        #[test]
+        fn e11_in_reliefs_and_analogies() {
+            for has_threads in [true, false] {
+                check("a relief", has_threads, 64, false, |app, entity, _| {
+                    let relief = CrackRelief::island().with_size(UVec2::splat(64));
+                    app.world_mut().entity_mut(entity).insert(relief);
+                });
+                check("an analogy", has_threads, 64, true, |app, entity, _| {
+                    let texel = |i: usize| if i / 4 % 16 == 5 { [9, 9, 9, 255] } else { [200, 190, 180, 255] };
+                    let rgba: Vec<u8> = (0..64 * 64).flat_map(texel).collect();
+                    let photo = AnalogyPair::from_darkness(UVec2::splat(64), &rgba, 0.3).expect("it has cracks");
+                    let examples = AnalogyExamples::new(vec![photo], &AnalogyParams::DEFAULT).expect("it is whole");
+                    let examples = app.world_mut().resource_mut::<Assets<AnalogyExamples>>().add(examples);
+                    app.world_mut().entity_mut(entity).insert(CrackAnalogy::new(examples));
+                });
+            }
+        }
+
+        #[test]
+        fn e11_in_what_makes_a_large_surface() {
+            check("its first hit", true, 600, false, |app, entity, _| {
+                (0..3).for_each(|_| hit(app, entity));
+            });
+            check("another picture", true, 600, true, |app, _, image| {
+                if let Some(mut image) = app.world_mut().resource_mut::<Assets<Image>>().get_mut(image) {
+                    image.data.iter_mut().flatten().for_each(|value| *value ^= 8);
+                }
+            });
+        }
+
+        #[test]
+        fn e11_in_what_cuts_shards() {
+            check("shards", true, 64, true, |app, entity, _| {
+                let mut commands = app.world_mut().commands();
+                commands.entity(entity).insert(ShatterCracks::default()).shatter_cracks(ShatterRequest::EVERYTHING);
+                app.world_mut().flush();
+            });
+        }
     }
 }

@@ -61,7 +61,10 @@ impl<J: Stepped> RunningTask<J> {
         let progress = AtomicU32::new(job.progress().to_bits());
         let link = Arc::new(TaskLink { cancelled: AtomicBool::new(false), progress });
         let (linked, home) = (link.clone(), thread::current().id());
-        Self { task: pool.spawn(async move { run(job, &linked, home) }), link }
+        let work = move |job: J| run(job, &linked, home);
+        #[cfg(test)]
+        let work = super::background::tests::panicking_alike(work);
+        Self { task: pool.spawn(async move { work(job) }), link }
     }
 
     /// What comes back, once it is there.
