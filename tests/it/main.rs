@@ -3,6 +3,13 @@
 
 #![cfg(test)]
 
+use cap::Cap;
+use std::alloc::System;
+
+/// Counts the bytes that this process has in use.
+#[global_allocator]
+static MEMORY: Cap<System> = Cap::new(System, usize::MAX);
+
 #[cfg(all(feature = "2d", feature = "3d"))]
 mod analogies;
 mod analogy;

@@ -1,6 +1,7 @@
 //! How shards look, break again, serve again, and that nothing is left of them however often that is.
 
 use crate::{
+    MEMORY,
     shards::{crack, cracked, loose, shards, shatter, stock, vertices},
     support::*,
 };
@@ -207,12 +208,6 @@ fn every_edge_lies_on_a_drawn_crack() {
     assert!(checked > 200 && missing == 0, "{missing} of {checked}");
 }
 
-/// Memory of this process that is in use, bytes; 0 where the system does not tell.
-pub(crate) fn resident() -> u64 {
-    let pages = std::fs::read_to_string("/proc/self/statm").unwrap_or_default();
-    4096 * pages.split(' ').nth(1).and_then(|pages| pages.parse::<u64>().ok()).unwrap_or(0)
-}
-
 /// In a process of its own: other tests use memory as well.
 #[test]
 fn two_thousand_times_leave_nothing_behind() {
@@ -249,10 +244,10 @@ fn two_thousand_times() {
         assert_eq!(stock(&app), before, "after {i}");
         assert!(shown(&app, entity) == picture);
         if i == 400 {
-            used = resident();
+            used = MEMORY.allocated();
         }
     }
-    let more = resident().saturating_sub(used);
+    let more = MEMORY.allocated().saturating_sub(used);
     assert!(more < 4 << 20, "{more} bytes more after 1600 times");
     // Nothing of the budget is lost either.
     let tight = CrackBudget { milliseconds: 1e6, max_texture_bytes: 48 * 48 * (22 + 8 + 2), ..default() };
