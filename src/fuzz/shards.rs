@@ -129,7 +129,7 @@ fn target(bytes: &[u8]) {
         let sum: f32 = pieces.iter().map(|piece| piece.area).sum();
         // Where its outline is cut it moves to the lattice, by up to 0.71 units each time.
         let around = whole.border.iter().chain(shards.neighbours(number).iter().map(|next| &next.length)).sum::<f32>();
-        let moved = around * extent.max_element() / 16_777_216.0;
+        let moved = around * 0.7072 * extent.max_element() / 16_777_216.0;
         assert!((sum - whole.area).abs() < 1e-3 * whole.area + moved, "{sum} of {}", whole.area);
     }
 }

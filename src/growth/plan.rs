@@ -421,13 +421,6 @@ fn line(
     line
 }
 
-/// Distance from a place to a segment.
-pub(super) fn gap(pos: Vec2, (a, b): (Vec2, Vec2)) -> f32 {
-    let way = b - a;
-    let share = ((pos - a).dot(way) / way.length_squared().max(1e-12)).clamp(0.0, 1.0);
-    pos.distance(a + way * share)
-}
-
 /// The point at arc length `arc` of a line, and the direction there; extrapolated beyond its end.
 fn along(line: &[Vec2], mut arc: f32) -> (Vec2, Vec2) {
     let mut way = Vec2::X;

@@ -1,6 +1,5 @@
 //! An index of the lines of planned rays, so that forks find out quickly whether they have room.
 
-use super::plan::gap;
 use glam::{UVec2, Vec2};
 
 const NONE: u32 = u32::MAX;
@@ -79,6 +78,13 @@ impl RayLines {
             true
         })
     }
+}
+
+/// Distance from a place to a segment.
+fn gap(pos: Vec2, (a, b): (Vec2, Vec2)) -> f32 {
+    let way = b - a;
+    let share = ((pos - a).dot(way) / way.length_squared().max(1e-12)).clamp(0.0, 1.0);
+    pos.distance(a + way * share)
 }
 
 #[cfg(test)]
