@@ -102,6 +102,9 @@ fn check(growth: &CrackGrowth, most_nodes: usize, widest: f32) {
             "{i} is of no hit: {node:?}"
         );
     }
+    for segment in network.segments() {
+        assert!(growth.timeline().step_of(segment).is_some(), "{segment:?} was added at no time");
+    }
     for link in network.links() {
         assert!(link.a.max(link.b) < nodes.len() as u32 && link.width > 0.0 && link.width.is_finite(), "{link:?}");
     }

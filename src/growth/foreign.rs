@@ -36,9 +36,6 @@ impl CrackGrowth {
         // Keeps border points exactly on the border.
         let place = |pos: Vec2| Vec2::select(pos.cmpeq(from), extent, (pos / from * extent).min(extent));
         let (before, first) = (self.steps, self.network.nodes.len() as u32);
-        // Links that a hit has added since the last step belong to the next one.
-        self.timeline.begin(before.saturating_add(1));
-        (self.links_reported..self.network.links.len() as u32).for_each(|_| self.timeline.add_link());
         // Number of nodes and links added so far.
         let (mut node, mut link) = (0, 0);
         for step in 0..=last {

@@ -251,6 +251,8 @@ impl CrackGrowth {
                     break;
                 }
             }
+            // Where there is no room even for that it is joined to what is in the way.
+            self.report_links();
             self.new_nodes = born as u32..self.network.nodes.len() as u32;
         }
     }

@@ -40,6 +40,12 @@ impl CrackGrowth {
                 }
             }
         }
+        self.report_links();
+    }
+
+    /// Enters the links that were added since the last call in the timeline and in the list of changes. To be called before a step or a
+    /// hit ends: what is not listed is not drawn.
+    pub(super) fn report_links(&mut self) {
         let all = self.network.links.len() as u32;
         (self.links_reported..all).for_each(|_| self.timeline.add_link());
         self.changes.list.extend((self.links_reported..all).map(SegmentId::Link));

@@ -263,6 +263,26 @@ fn added_cracks_come_as_their_network_says() {
     }
 }
 
+/// Every segment is told of and has its time, also the link of a hit where there is room for nothing else.
+#[test]
+fn crowded_hits_are_told_of() {
+    for case in 0..400u64 {
+        let mut rng = Rng::new(case).stream("crowded");
+        let params = GrowthParams { reach: 0.1, crack_radius: 0.2, arrest: 0.1, ..random_arrest(&mut rng) };
+        let mut growth = CrackGrowth::new(params, Vec2::ONE, case).unwrap();
+        let (mut changed, mut told) = (Vec::new(), std::collections::BTreeSet::new());
+        for hit in 0..12 {
+            growth.hit(Vec2::new(rng.range(0.35, 0.65), rng.range(0.35, 0.65)), 0.02);
+            while growth.step().grew() {}
+            growth.take_changed(&mut changed);
+            told.extend(changed.drain(..));
+            let (network, timeline) = (growth.network(), growth.timeline());
+            let is_whole = |&segment: &SegmentId| told.contains(&segment) && timeline.step_of(segment).is_some();
+            assert_eq!(network.segments().find(|segment| !is_whole(segment)), None, "case {case}, hit {hit}");
+        }
+    }
+}
+
 /// Forbidden texels hold no line, and, with the field that keeps them, no depth.
 #[test]
 fn forbidden_texels_hold_no_crack() {
