@@ -15,6 +15,7 @@ use crate::{
     pattern::SurfaceFrame,
 };
 use std::{
+    iter::successors,
     sync::{Mutex, PoisonError},
     thread,
 };
@@ -129,6 +130,30 @@ fn check(contours: &Contours) -> Result<(), ReliefError> {
     Ok(())
 }
 
+/// Heights of the levels from the lowest to the highest. Each is above the one below it, as slopes need.
+fn level_heights(params: &HeightParams, lowest: i32, highest: i32, seed: u64) -> Vec<f32> {
+    // Steps up to a level, added one by one: the formula of the sum has no digits left where they hardly taper.
+    let left = 1.0 - f64::from(params.taper);
+    let sums: Vec<f64> =
+        successors(Some(0.0), |sum| Some(1.0 + left * sum)).take(highest.max(0) as usize + 1).collect();
+    let height = |level: i32| {
+        let deviation = params.variation * (hash_unit(seed, u64::from(level as u32)) - 0.5);
+        let step = if level > 0 { ops::powf(1.0 - params.taper, level as f32) } else { 1.0 };
+        let rise = if level > 0 && params.taper > 0.0 {
+            sums[level as usize] as f32 + LEAST_STEP * level as f32
+        } else {
+            level as f32
+        };
+        params.step * (rise + if level == 0 { 0.0 } else { step * deviation })
+    };
+    let mut heights: Vec<f32> = (lowest..=highest).map(height).collect();
+    for i in 1..heights.len() {
+        // Rounding may have made them equal.
+        heights[i] = heights[i].max(heights[i - 1].next_up());
+    }
+    heights
+}
+
 impl HeightMap {
     /// Rows of a stripe; the last one may have less.
     pub const STRIPE: usize = 128;
@@ -160,23 +185,13 @@ impl HeightMap {
                 last = next;
             }
         }
-        let height = |level: i32| {
-            let deviation = params.variation * (hash_unit(seed, u64::from(level as u32)) - 0.5);
-            let step = if level > 0 { ops::powf(1.0 - params.taper, level as f32) } else { 1.0 };
-            let rise = if level > 0 && params.taper > 0.0 {
-                (1.0 - step) / params.taper + LEAST_STEP * level as f32
-            } else {
-                level as f32
-            };
-            params.step * (rise + if level == 0 { 0.0 } else { step * deviation })
-        };
         Ok(Self {
             frame,
             params: *params,
             bands: Bands::new(contours, frame.texels_per_unit()),
             levels,
             lowest,
-            heights: (lowest - 2..=highest + 3).map(height).collect(),
+            heights: level_heights(params, lowest - 2, highest + 3, seed),
             distance: contours.distance * frame.texels_per_unit(),
             seed,
         })

@@ -74,6 +74,33 @@ fn steps_that_taper_to_nothing_still_rise() {
     }
 }
 
+/// However little steps taper and however many there are, levels are as high as their steps together, and each is above the one below
+/// it.
+#[test]
+fn levels_are_as_high_as_their_steps() {
+    let contours =
+        Contours { rings: vec![circle(Vec2::splat(0.5), 0.4, -2), circle(Vec2::splat(0.5), 0.2, 1000)], distance: 0.1 };
+    for taper in [0.0, f32::from_bits(1), 3e-43, 1e-20, 1e-9, 3e-8, 1e-7, 1e-5, 0.00175, 0.1, 0.95] {
+        for variation in [0.0, 0.9] {
+            let params = HeightParams { step: 0.01, taper, variation, ..HeightParams::DEFAULT };
+            let map = HeightMap::new(&contours, &params, frame(9), 1).unwrap();
+            let (mut steps, mut step) = (0.0, 1.0);
+            for level in 0..1000 {
+                let height = f64::from(map.level_height(level)) / 0.01;
+                let least = 1e-4 * f64::from(level);
+                let off = 0.5 * f64::from(variation) * step + 1e-6 * steps;
+                assert!((height - steps - least).abs() <= least + off, "{taper}, {level}: {height} of {steps}");
+                assert!(map.level_height(level + 1) > map.level_height(level), "{taper}, {level}");
+                steps += step;
+                step *= 1.0 - f64::from(taper);
+            }
+            let summits = map.heights(1);
+            let most = map.level_height(1000) + 2.0 * params.step;
+            assert!(summits.as_slice().iter().all(|height| (-0.05..=most).contains(height)), "{taper}");
+        }
+    }
+}
+
 #[test]
 fn every_texel_lies_between_the_levels_around_it() {
     for seed in 0..12 {
