@@ -26,15 +26,16 @@ mod tests {
     #[cfg(target_arch = "x86_64")]
     use super::Level;
     use crate::{
-        Grid,
+        CrackPreset, Grid,
         blend::{NormalBlending, solve_poisson},
+        growth::CrackGrowth,
         math::{Rng, ops},
         paint::{
             BaseTexels, Look, LookTable, PaintTargets,
             analogy::{Analogy, AnalogyPair, AnalogyParams, Examples},
             paint_into,
         },
-        pattern::{CrackMask, PathPoint, SegmentPath, SurfaceFrame},
+        pattern::{CrackMask, Moment, PathPoint, SegmentPath, SurfaceFrame},
         raster::{DepthField, Profile, TexelRect, stamp_path},
         relief::{Contours, HeightParams, Ring, TerrainColors, Weathering, colors, heights, normals, weathered},
         voronoi::{VoronoiParams, voronoi_map},
@@ -102,6 +103,27 @@ mod tests {
             });
             assert!(wide.0.depth.as_slice().iter().any(|&depth| depth > 0), "something is stamped");
             assert!(wide == plain, "seed {seed}");
+        }
+    }
+
+    #[test]
+    fn crushed_zones_are_the_same_without_wide_vectors() {
+        for (seed, name) in (0..).zip(["concrete", "plaster", "brick", "ice", "glass", "toon"]) {
+            let [wide, plain] = both(seed, |rng| {
+                let preset = CrackPreset::named(name).unwrap();
+                let frame = SurfaceFrame::new(UVec2::new(150, 97)).unwrap();
+                let mut growth = CrackGrowth::new(preset.growth, frame.extent(), seed).unwrap();
+                for _ in 0..3 {
+                    growth.hit(Vec2::new(1.5 * rng.unit(), rng.unit()), 3.0 * rng.unit());
+                }
+                let mut field = DepthField::new(frame);
+                field.set_layers(preset.look.layer(seed));
+                let mut changed = Vec::new();
+                field.show_layers(growth.network(), growth.timeline(), Moment::after(1), &mut changed);
+                assert!(!changed.is_empty(), "{name} is crushed");
+                field
+            });
+            assert!(wide == plain, "{name}");
         }
     }
 

@@ -244,7 +244,7 @@ impl DepthField {
     /// ```
     #[must_use]
     pub fn crater(&self, impact: u32, pos: Vec2, energy: f32) -> Option<Crater> {
-        self.layer.crater(impact, pos, energy)
+        self.plan().crater(impact, pos, energy)
     }
 
     pub(crate) const fn layer(&self) -> &Layer {

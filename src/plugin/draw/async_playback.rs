@@ -50,6 +50,8 @@ pub(crate) struct AsyncPlayback {
     stager: Option<Stager>,
     /// Whether all of the surface is to be made again, whatever it shows.
     is_asked: bool,
+    /// Whether a change of the surface waits for the job: no other one is begun before it.
+    is_awaited: bool,
     /// Frames since anything was to be shown.
     idle: u32,
 }
@@ -188,8 +190,17 @@ fn start_over(active: &mut Active) {
     active.mark_all();
 }
 
+/// Whether a surface can be changed without waiting for a task, and without ending the slices of one. If not, it can as soon as what is being
+/// made is there.
+pub(crate) fn may_change(world: &mut World, entity: Entity) -> bool {
+    let Some(mut playback) = world.get_mut::<AsyncPlayback>(entity) else { return true };
+    let is_at_rest = playback.job.as_ref().is_none_or(Running::is_at_rest);
+    playback.is_awaited = !is_at_rest;
+    is_at_rest
+}
+
 /// Ends what a task makes of a surface, for a change of it: it is as if it had been drawn and not painted yet. Waits for a task that is at
-/// work. What is to be painted then is much.
+/// work, unless the surface [may change](may_change). What is to be painted then is much.
 pub(crate) fn recall(world: &mut World, entity: Entity, active: &mut Active) {
     if take_back(world, entity, active)
         && let Some(mut playback) = world.get_mut::<AsyncPlayback>(entity)
@@ -311,7 +322,8 @@ pub(crate) fn play_async(
     let has_threads = threads.pool().is_some();
     for (entity, mut playback, mut cracked) in &mut playing {
         let Some(active) = cracked.get_mut() else { continue };
-        let (mut is_new, mut is_over, mut has_made) = (true, false, false);
+        let is_awaited = core::mem::take(&mut playback.is_awaited);
+        let (mut is_new, mut is_over, mut has_made) = (!is_awaited, false, false);
         loop {
             if let Some(job) = playback.job.take() {
                 let before = active.playhead.playback.as_ref().map(|playback| playback.shown);
@@ -385,9 +397,13 @@ mod tests {
         plugin::{
             draw::frame_job::SLICE,
             headless::{app, blank, shown},
+            jobs::background::BackgroundJob,
             prelude::*,
+            surface::cracked::active,
         },
     };
+    use bevy::platform::time::Instant;
+    use std::{sync::Mutex, thread, time::Duration};
 
     /// Where tasks run in place, moments are made in slices of frames, one a frame if there is no time, and the end is the same.
     #[test]
@@ -421,5 +437,100 @@ mod tests {
         let (made, _) = end(false);
         assert!(slices > 8, "{slices}");
         assert!(sliced == made && made.iter().any(|&value| value < 100), "the same cracks");
+    }
+
+    fn frames_until(app: &mut App, mut is_so: impl FnMut(&mut App) -> bool) {
+        for _ in 0..10_000 {
+            if is_so(app) {
+                return;
+            }
+            app.update();
+            thread::sleep(Duration::from_millis(1));
+        }
+        panic!("it never comes");
+    }
+
+    /// A large sprite with cracks that have grown.
+    fn cracked(budget: CrackBudget) -> (App, Entity) {
+        let mut app = app(budget);
+        let image = app.world_mut().resource_mut::<Assets<Image>>().add(blank(UVec2::new(600, 500)));
+        let surface = CrackSurface::new(CrackPreset::CONCRETE).with_seed(4);
+        let entity = app.world_mut().spawn((Sprite::from_image(image), surface)).id();
+        for x in [0.2, 0.4, 0.6, 0.8] {
+            app.world_mut().trigger(CrackHit::uv(entity, Vec2::new(x, 0.5)).with_energy(3.0));
+        }
+        let is_done = |app: &mut App| {
+            app.world().get::<CrackState>(entity).is_some_and(|state| state.status == CrackStatus::Done)
+        };
+        app.update();
+        frames_until(&mut app, is_done);
+        (app, entity)
+    }
+
+    fn give_preset(app: &mut App, entity: Entity, preset: CrackPreset) {
+        let mut surface = app.world_mut().get_mut::<CrackSurface>(entity).expect("it cracks");
+        surface.preset = preset.into();
+    }
+
+    fn give_picture(app: &mut App, entity: Entity) {
+        let image = app.world_mut().resource_mut::<Assets<Image>>().add(blank(UVec2::new(600, 480)));
+        app.world_mut().get_mut::<Sprite>(entity).expect("it is a sprite").image = image;
+    }
+
+    /// Fault B5: another preset, and another picture, do not wait in the frame for a task that draws. They come after it, and what is shown
+    /// then is what frames would have drawn.
+    #[test]
+    fn b5_changes_come_after_the_task_that_draws() {
+        static GATE: Mutex<()> = Mutex::new(());
+        let redraw = |app: &mut App, entity| {
+            give_preset(app, entity, CrackPreset { profile: CrackPreset::CLAY.profile, ..CrackPreset::CONCRETE });
+        };
+        let other = |app: &mut App, entity| give_preset(app, entity, CrackPreset::MUD);
+        let changes: [fn(&mut App, Entity); 2] = [other, give_picture];
+        for change in changes {
+            let (mut app, entity) = cracked(CrackBudget { milliseconds: 500.0, ..default() });
+            let seen = |app: &App| {
+                let active = active(app.world(), entity).expect("it is cracked");
+                (active.preset.clone(), active.canvas.base.size)
+            };
+            redraw(&mut app, entity);
+            app.update();
+            // The task that draws it again stops at a lock.
+            let gate = GATE.lock().expect("nothing has failed");
+            let mut playback = app.world_mut().get_mut::<AsyncPlayback>(entity).expect("a task draws it");
+            let job = playback.job.take().and_then(Running::recall).expect("it is drawn");
+            let job = BackgroundJob::start(job, |job| {
+                // Not for ever, so that a frame that waits for it fails.
+                for _ in 0..10_000 {
+                    if GATE.try_lock().is_ok() {
+                        break;
+                    }
+                    thread::sleep(Duration::from_millis(1));
+                }
+                Some(job.finish())
+            });
+            while !job.is_begun() {
+                thread::yield_now();
+            }
+            playback.job = Some(Running::Task(job, Instant::now()));
+            let before = seen(&app);
+            change(&mut app, entity);
+            for _ in 0..3 {
+                app.update();
+                assert!(seen(&app) == before && is_at_work(app.world(), entity), "it waits for what is drawn");
+            }
+            drop(gate);
+            frames_until(&mut app, |app| seen(app) != before);
+            let is_over = |app: &mut App| app.world().get::<AsyncPlayback>(entity).is_none();
+            frames_until(&mut app, is_over);
+
+            let (mut frames, same) = cracked(CrackBudget { milliseconds: f32::INFINITY, ..default() });
+            let both: [fn(&mut App, Entity); 2] = [redraw, change];
+            for change in both {
+                change(&mut frames, same);
+                (0..3).for_each(|_| frames.update());
+            }
+            assert!(shown(&app, entity) == shown(&frames, same), "other cracks");
+        }
     }
 }

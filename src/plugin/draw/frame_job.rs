@@ -111,6 +111,11 @@ impl FrameJob {
         self
     }
 
+    /// Whether the field is neither as it was nor as it will be.
+    pub(crate) const fn is_half_drawn(&self) -> bool {
+        matches!(self.stage, Stage::Cleared | Stage::Draw | Stage::Crush | Stage::Carry(_))
+    }
+
     /// A slice of the work; says whether it was the last one.
     pub(crate) fn step(&mut self) -> bool {
         let snapshot = self.timeline.clone();

@@ -1,6 +1,6 @@
 //! A moment that is being made: by a task, or in slices of frames.
 
-use super::frame_job::{FrameJob, Stage};
+use super::frame_job::FrameJob;
 use crate::plugin::jobs::background::{BackgroundJob, guarded};
 use crate::plugin::jobs::frame_time::Timer;
 use bevy::platform::time::Instant;
@@ -53,12 +53,20 @@ impl Running {
         }
     }
 
+    /// Whether [`Self::recall`] gives back what there is without work and without waiting. Until it is looked after, this stays so.
+    pub(super) fn is_at_rest(&self) -> bool {
+        match self {
+            Self::Task(task, _) => task.is_done(),
+            Self::Slices(job) => !job.is_half_drawn(),
+        }
+    }
+
     /// What there is of it; waits for a task that is at work.
     pub(super) fn recall(self) -> Option<Box<FrameJob>> {
         match self {
             Self::Task(task, _) => task.take_back().or_else(|| task.finish().flatten()),
             Self::Slices(mut job) => {
-                while matches!(job.stage, Stage::Cleared | Stage::Draw | Stage::Crush | Stage::Carry(_)) {
+                while job.is_half_drawn() {
                     job.step();
                 }
                 Some(job)

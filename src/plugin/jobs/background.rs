@@ -53,6 +53,12 @@ impl<W: Send + 'static, T: Send + 'static> BackgroundJob<W, T> {
         self.task.as_ref().is_some_and(Task::is_finished)
     }
 
+    /// Whether a thread has begun it.
+    #[cfg(test)]
+    pub(crate) fn is_begun(&self) -> bool {
+        self.work.lock().is_ok_and(|work| work.is_none())
+    }
+
     /// The work, if no thread has begun it.
     pub(crate) fn take_back(&self) -> Option<W> {
         take(&self.work)

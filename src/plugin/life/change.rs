@@ -153,7 +153,7 @@ fn update(world: &mut World, entity: Entity, active: &mut Active) -> Result<bool
 }
 
 /// Applies other settings; a preset that is invalid is refused and the old one stays. `false` if it is not there yet, or if markers of the
-/// last hit are to be laid out before it, which may need more than one frame.
+/// last hit are to be laid out before it, which may need more than one frame, or if a task draws what it shows.
 fn update_settings(world: &mut World, entity: Entity, active: &mut Active) -> bool {
     if let Some(surface) = world.get::<CrackSurface>(entity)
         && *surface != active.surface
@@ -171,6 +171,11 @@ fn update_settings(world: &mut World, entity: Entity, active: &mut Active) -> bo
     }
     let grows_otherwise = matches!(&preset, Ok(Some(preset)) if preset.growth != active.preset.growth && preset.growth.validate().is_ok());
     if grows_otherwise && active.cracks.growth.is_preparing() && !active.cracks.growth.prepare_step(SLICE) {
+        world.resource_mut::<Queues>().late.insert(entity);
+        return false;
+    }
+    let is_other = matches!(&preset, Ok(Some(preset)) if *preset != active.preset);
+    if is_other && !async_playback::may_change(world, entity) {
         world.resource_mut::<Queues>().late.insert(entity);
         return false;
     }
@@ -277,7 +282,13 @@ fn try_picture(
         rect: draft.plan.rect,
         maps: draft.plan.maps,
     };
-    let Some(next) = next_picture::make(world, entity, active, inputs, may_wait)? else {
+    let next = if may_wait && !async_playback::may_change(world, entity) {
+        active.turn.is_held = true;
+        None
+    } else {
+        next_picture::make(world, entity, active, inputs, may_wait)?
+    };
+    let Some(next) = next else {
         // Hits come after it.
         world.resource_mut::<Queues>().late.insert(entity);
         return Ok(false);

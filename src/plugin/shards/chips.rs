@@ -203,8 +203,9 @@ impl Chips {
         hits: usize,
     ) -> Result<(), ShatterError> {
         let strikes = active.cracks.growth.timeline().strikes();
+        // Not from what is drawn, which may be with a task.
+        let layer = active.preset.look.layer(active.surface.seed);
         for strike in &strikes[strikes.len().saturating_sub(hits)..] {
-            let layer = active.drawing.field.layer();
             let crater = layer.crater(strike.impact, strike.pos, strike.energy);
             let Some(crater) = crater else { continue };
             let before = layer.crater(strike.impact, strike.pos, strike.before);
@@ -492,7 +493,18 @@ impl Pieces {
 #[cfg(test)]
 mod tests {
     use super::*;
+    #[cfg(feature = "2d")]
+    use crate::plugin::{
+        draw::async_playback::is_at_work,
+        headless::{app, blank},
+        jobs::threads::Threads,
+        prelude::*,
+    };
     use crate::relief::CraterParams;
+    #[cfg(feature = "2d")]
+    use bevy::time::TimeUpdateStrategy;
+    #[cfg(feature = "2d")]
+    use std::time::Duration;
 
     /// Pieces tile what is new of a crater, and lie on the surface.
     #[test]
@@ -535,5 +547,35 @@ mod tests {
         let areas: Vec<f32> = some.numbers.iter().map(|number| some.shards.get(*number).unwrap().area).collect();
         assert!(areas.len() == 5 && areas.is_sorted_by(|a, b| a >= b));
         assert!((30..=64).contains(&of(64).numbers.len()), "{}", of(64).numbers.len());
+    }
+
+    /// A hit on a surface that is being drawn again has its chips.
+    #[cfg(feature = "2d")]
+    #[test]
+    fn surfaces_that_are_drawn_again_have_chips() {
+        // One slice in a frame.
+        let mut app = app(CrackBudget { milliseconds: 0.0, ..default() });
+        app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(16)));
+        app.world_mut().resource_mut::<Threads>().are_missing = true;
+        let image = app.world_mut().resource_mut::<Assets<Image>>().add(blank(UVec2::new(600, 500)));
+        let surface = CrackSurface::new(CrackPreset::CONCRETE).with_seed(4);
+        let entity = app.world_mut().spawn((Sprite::from_image(image), surface, CrackChips::default())).id();
+        let hit =
+            |app: &mut App, x: f32| app.world_mut().trigger(CrackHit::uv(entity, Vec2::new(x, 0.5)).with_energy(2.0));
+        hit(&mut app, 0.3);
+        let mut chips = app.world_mut().query_filtered::<(), With<CrackChip>>();
+        for _ in 0..3000 {
+            app.update();
+        }
+        assert_eq!(chips.iter(app.world()).count(), 0, "the first ones have come to rest and gone");
+        let mut surface = app.world_mut().get_mut::<CrackSurface>(entity).expect("it cracks");
+        surface.preset = CrackPreset { profile: CrackPreset::CLAY.profile, ..CrackPreset::CONCRETE }.into();
+        app.update();
+        hit(&mut app, 0.7);
+        for _ in 0..4 {
+            app.update();
+        }
+        assert!(is_at_work(app.world(), entity), "it is being drawn");
+        assert!(chips.iter(app.world()).count() > 5, "{} chips", chips.iter(app.world()).count());
     }
 }

@@ -1,16 +1,19 @@
 //! Material that breaks off along chords: outlines, facets, chips and their shadows.
 
 use super::{
-    broken::{Broken, Chip, LONG_SHADOW, SHADOW},
+    broken::{Broken, Chip, LONG_SHADOW, NearBroken, SHADOW},
     crushed::CrushedZone,
     draws,
-    ledges::{BRIGHTEST, LEDGE_LIT, LEDGE_SHADE, SAG},
+    ledges::{BRIGHTEST, LEDGE_LIT, LEDGE_SHADE, SAG, ledge_light},
     noise::{draw, lattice, noise},
     outline::FAR_OUT,
+    row::{FLAT, Line, Row},
     shape::{Place, Shape, TO_LIGHT},
     spot::PIT_STEPS,
     stone::{Cell, Stone, facets},
 };
+use crate::math::vectorized;
+use core::ops::Range;
 use glam::Vec2;
 
 /// Share of the depth that lies outside the basin.
@@ -63,49 +66,261 @@ impl ChipLight {
 /// Texels over which a hard shadow ends.
 const HARD: f32 = 1.0 / 0.6;
 
+/// Noise along a row of what has broken off.
+struct Crumbling {
+    /// Bumps of the edge, wide and fine: where a place is, where its shadow falls from, and where its light comes from.
+    edge: [[Row; 2]; 3],
+    /// Deviation of the edges of steps.
+    basin: Row,
+    /// How much of a slope walls are.
+    slope: Row,
+    plates: Row,
+    small: Row,
+    coarse: Row,
+    broad: Row,
+    pits: Row,
+    lumps: [Row; 2],
+    powder: Row,
+    patches: Row,
+    /// Dust around it: fine, in streaks, and in heaps of three sizes.
+    dust: Row,
+    streaks: Row,
+    heaps: [Row; 3],
+}
+
+impl Crumbling {
+    const FLAT: Self = Self {
+        edge: [[FLAT; 2]; 3],
+        basin: FLAT,
+        slope: FLAT,
+        plates: FLAT,
+        small: FLAT,
+        coarse: FLAT,
+        broad: FLAT,
+        pits: FLAT,
+        lumps: [FLAT; 2],
+        powder: FLAT,
+        patches: FLAT,
+        dust: FLAT,
+        streaks: FLAT,
+        heaps: [FLAT; 3],
+    };
+}
+
+/// How light falls on a floor: the share of the depth that lies at the edge, the length of shadows in units of the height of the caster and how
+/// dark they are, and the distances of what casts them and of what lights a wall, texels.
+struct Light {
+    share: f32,
+    long: f32,
+    shade: f32,
+    length: f32,
+    facing: f32,
+}
+
+/// The texels from the first to the last one for which something holds.
+fn span(all: Range<usize>, holds: impl Fn(usize) -> bool) -> Range<usize> {
+    let first = all.clone().find(|&k| holds(k));
+    let last = all.rev().find(|&k| holds(k));
+    first.zip(last).map_or(0..0, |(first, last)| first..last + 1)
+}
+
 impl Shape<'_> {
-    /// Distance of a place from the edge of the broken-off area, crumbling included; positive inside.
-    fn within(&self, broken: &Broken, off: Vec2, at: Vec2, seed: u32) -> f32 {
-        let within = broken.within(off);
+    /// Distance of a place from the edge of the broken-off area, crumbling included; positive inside. `bumps` are those at that place.
+    fn crumbled(&self, within: f32, bumps: [f32; 2]) -> f32 {
         if self.jag <= 0.0 || within < -1.0 {
             return within;
         }
-        let (wide, fine) = ((3.5 * self.jag).max(3.0), (1.2 * self.jag).max(1.3));
-        let noise = |k: u32, size: f32| 0.5 + 0.5 * noise(seed ^ k, at.x / size, at.y / size);
-        within - self.jag * (1.3 * noise(draws::JAG_WIDE, wide) + 0.7 * noise(draws::JAG_FINE, fine))
+        let [wide, fine] = bumps.map(|bump| 0.5 + 0.5 * bump);
+        within - self.jag * (1.3 * wide + 0.7 * fine)
     }
 
-    /// Adds what is at a place in material that breaks along chords.
-    pub(super) fn break_off(&self, place: &mut Place, broken: &Broken, off: Vec2, at: Vec2, seed: u32) {
-        let CrushedZone { dust, chips, reach, fall, .. } = *self.crushed;
-        let within = self.within(broken, off, at, seed);
-        let inside = (within + 0.5).clamp(0.0, 1.0);
-        if inside > 0.0 {
-            self.add_floor(place, broken, (within, inside), off, at, seed);
+    /// Adds what is along a row in material that breaks along chords, where the zone `is_within`.
+    pub(super) fn break_off(
+        &self,
+        places: &mut [Place],
+        broken: &NearBroken,
+        line: Line,
+        is_within: impl Fn(usize) -> bool,
+        seed: u32,
+    ) {
+        let texels = span(0..places.len(), &is_within);
+        if texels.is_empty() {
+            return;
         }
-        if inside < 1.0 {
-            let sunk = 0.8 * fall;
-            let radii = (off - Vec2::new(0.0, sunk * self.radius)).length() / self.radius.max(0.5);
-            let left = 1.0 - ((radii - 0.7) / (reach - 0.7 - sunk).max(0.2)).clamp(0.0, 1.0);
-            if dust > 0.0 {
-                let mut cloud = 0.6 + 0.4 * noise(seed ^ 6, 0.7 * at.x, 0.7 * at.y);
-                if self.jag > 0.0 && fall > 0.0 {
-                    // Dust runs down in streaks.
-                    let wide = 1.5 * self.grain;
-                    cloud *= 1.0 - fall * (0.4 - 0.4 * noise(seed ^ 8, at.x / wide, at.y / (7.0 * wide)));
-                }
-                place.pale = place.pale.max(dust * left * left * cloud * (1.0 - inside));
-                if broken.has_ledges() {
-                    self.add_dust(place, at, left, 1.0 - inside, seed);
-                }
+        let mut noise = Crumbling::FLAT;
+        vectorized(
+            #[inline(always)]
+            || self.fill_edge(&mut noise.edge[0], line, &texels, Vec2::ZERO, seed),
+        );
+        let mut within = FLAT;
+        for k in texels.clone() {
+            within[k] =
+                self.crumbled(broken.within_at_most(line.off(k), f32::INFINITY), noise.edge[0].map(|bumps| bumps[k]));
+        }
+        let inside = within.map(|within| (within + 0.5).clamp(0.0, 1.0));
+        let floor = span(texels.clone(), |k| inside[k] > 0.0 && is_within(k));
+        let mut left = FLAT;
+        for k in texels.clone().filter(|&k| inside[k] < 1.0 && is_within(k)) {
+            left[k] = self.left_around(line.off(k));
+        }
+        // Where nothing is left there is neither dust nor a crumb.
+        let around = span(texels.clone(), |k| left[k] > 0.0);
+        vectorized(
+            #[inline(always)]
+            || {
+                self.fill_floor(&mut noise, broken.whole, line, &floor, seed);
+                self.fill_around(&mut noise, broken.whole, line, &around, seed);
+            },
+        );
+        let is_beside = |chip: &&&Chip| {
+            let outline = &chip.outline;
+            (line.off(0).y - outline.centre.y).abs() <= 2.0 * outline.reach + 3.0
+        };
+        let chips: Vec<&Chip> = broken.chips.iter().filter(is_beside).copied().collect();
+        for k in texels.filter(|&k| is_within(k)) {
+            let (at, off) = (line.at(k), line.off(k));
+            let place = &mut places[k];
+            if inside[k] > 0.0 {
+                self.add_floor(place, broken, &noise, (k, within[k], inside[k]), (off, at), seed);
             }
-            if self.jag > 0.0 {
-                let many = if broken.has_ledges() { 2.0 } else { 1.0 };
-                self.add_crumbs(place, at, (many * (1.2 * chips * left).min(0.6) * left).min(0.9), inside, seed);
-            } else if self.crushed.outline <= 0.0 {
-                self.add_grit(place, at, (chips * left).min(0.5) * left, seed);
+            if left[k] > 0.0 {
+                self.add_around(place, broken.whole, &noise, (k, inside[k], left[k]), at, seed);
+            }
+            self.add_pieces(place, broken.whole, &chips, off, at, seed);
+        }
+    }
+
+    /// The bumps of an edge beside each texel.
+    #[inline(always)]
+    fn fill_edge(&self, [wide, fine]: &mut [Row; 2], line: Line, texels: &Range<usize>, by: Vec2, seed: u32) {
+        if self.jag > 0.0 {
+            let sides = [(3.5 * self.jag).max(3.0), (1.2 * self.jag).max(1.3)];
+            let bump = |k: u32, at: Vec2, size: f32| noise(seed ^ k, at.x / size, at.y / size);
+            line.fill(wide, texels, |at| bump(draws::JAG_WIDE, at + by, sides[0]));
+            line.fill(fine, texels, |at| bump(draws::JAG_FINE, at + by, sides[1]));
+        }
+    }
+
+    /// Noise around what has broken off.
+    #[inline(always)]
+    fn fill_around(&self, found: &mut Crumbling, broken: &Broken, line: Line, texels: &Range<usize>, seed: u32) {
+        let CrushedZone { dust, fall, .. } = *self.crushed;
+        if dust > 0.0 {
+            line.fill(&mut found.dust, texels, |at| noise(seed ^ 6, 0.7 * at.x, 0.7 * at.y));
+            if self.jag > 0.0 && fall > 0.0 {
+                let wide = 1.5 * self.grain;
+                line.fill(&mut found.streaks, texels, |at| noise(seed ^ 8, at.x / wide, at.y / (7.0 * wide)));
+            }
+            if broken.has_ledges() {
+                self.fill_heaps(&mut found.heaps, line, texels, seed);
             }
         }
+    }
+
+    /// Noise on a floor.
+    #[inline(always)]
+    fn fill_floor(&self, found: &mut Crumbling, broken: &Broken, line: Line, texels: &Range<usize>, seed: u32) {
+        let bump = |at: Vec2, k: u32, size: f32| noise(seed ^ k, at.x / size, at.y / size);
+        let Light { length, facing, .. } = self.light(broken);
+        let crumbles = self.jag > 0.0;
+        let [_, dark, lit] = &mut found.edge;
+        self.fill_edge(dark, line, texels, TO_LIGHT * length, seed);
+        self.fill_edge(lit, line, texels, -(TO_LIGHT * facing), seed);
+        if crumbles {
+            let wide = (0.35 * self.radius).max(4.0);
+            line.fill(&mut found.slope, texels, |at| bump(at, draws::WALL_SLOPE, wide));
+        }
+        if !broken.steps.is_empty() {
+            let side = (3.0 * self.jag).max(2.0);
+            line.fill(&mut found.basin, texels, |at| bump(at, draws::BASIN_EDGE, side));
+        }
+        let fold = |at: Vec2, k: u32, size: f32| {
+            let warp =
+                Vec2::new(noise(seed ^ k, at.x / size, at.y / size), noise(seed ^ k ^ 9, at.y / size, at.x / size));
+            facets(seed ^ k, at / size + 0.45 * warp)
+        };
+        let (large, small) = ((0.42 * self.radius).max(2.0 * self.grain), 1.7 * self.grain);
+        line.fill(&mut found.plates, texels, |at| fold(at, draws::PLATES, large));
+        line.fill(&mut found.small, texels, |at| fold(at, draws::SMALL_PLATES, small));
+        if broken.has_ledges() {
+            line.fill(&mut found.patches, texels, |at| self.edge_patches(at, seed));
+        }
+        if !crumbles {
+            return;
+        }
+        let (coarse, broad) = (2.2 * self.grain, 0.3 * self.radius + 6.0 * self.grain);
+        line.fill(&mut found.coarse, texels, |at| bump(at, draws::COARSE_TONE, coarse));
+        line.fill(&mut found.broad, texels, |at| bump(at, draws::BROAD_TONE, broad));
+        line.fill(&mut found.pits, texels, |at| {
+            // Rotated, so that the lattice of the noise does not show.
+            let turned = Vec2::new(0.8 * at.x - 0.6 * at.y, 0.6 * at.x + 0.8 * at.y);
+            noise(seed ^ draws::SAND_PITS, 0.42 * turned.x, 0.42 * turned.y)
+        });
+        // Lumps of several sizes, each turned against the others.
+        let lump = |at: Vec2, k: u32, size: f32, [x, y]: [f32; 2]| {
+            noise(seed ^ k, (x * at.x - y * at.y) / size, (y * at.x + x * at.y) / size)
+        };
+        let [wide, fine] = &mut found.lumps;
+        line.fill(wide, texels, |at| lump(at, draws::LUMPS, 3.1 * self.grain, [0.92, 0.39]));
+        line.fill(fine, texels, |at| lump(at, draws::LUMPS + 1, 1.3 * self.grain, [0.6, 0.8]));
+        if broken.has_ledges() {
+            line.fill(&mut found.powder, texels, |at| self.powder(at, seed));
+        }
+    }
+
+    /// How light falls on a floor.
+    fn light(&self, broken: &Broken) -> Light {
+        let share = match broken.steps.len() {
+            0 => 1.0,
+            1 => SHELF,
+            // A shallow edge, and deeper and deeper steps.
+            _ => EDGE,
+        };
+        let (long, shade) = if self.jag > 0.0 { (LONG_SHADOW, DEEP_SHADE) } else { (SHADOW, SHADE) };
+        let (length, facing) = (long * share * self.depth, (1.5 * WALL * share * self.depth).max(1.0));
+        Light { share, long, shade, length, facing }
+    }
+
+    /// How much of the dust and the crumbs around a hit is left at a place, 0..=1.
+    fn left_around(&self, off: Vec2) -> f32 {
+        let CrushedZone { reach, fall, .. } = *self.crushed;
+        let sunk = 0.8 * fall;
+        let radii = (off - Vec2::new(0.0, sunk * self.radius)).length() / self.radius.max(0.5);
+        1.0 - ((radii - 0.7) / (reach - 0.7 - sunk).max(0.2)).clamp(0.0, 1.0)
+    }
+
+    /// Adds dust and crumbs where nothing has broken off; so much of them is `left` there.
+    fn add_around(
+        &self,
+        place: &mut Place,
+        broken: &Broken,
+        found: &Crumbling,
+        (k, inside, left): (usize, f32, f32),
+        at: Vec2,
+        seed: u32,
+    ) {
+        let CrushedZone { dust, chips, fall, .. } = *self.crushed;
+        if dust > 0.0 {
+            let mut cloud = 0.6 + 0.4 * found.dust[k];
+            if self.jag > 0.0 && fall > 0.0 {
+                // Dust runs down in streaks.
+                cloud *= 1.0 - fall * (0.4 - 0.4 * found.streaks[k]);
+            }
+            place.pale = place.pale.max(dust * left * left * cloud * (1.0 - inside));
+            if broken.has_ledges() {
+                self.add_dust(place, found.heaps.each_ref().map(|heaps| heaps[k]), left, 1.0 - inside);
+            }
+        }
+        if self.jag > 0.0 {
+            let many = if broken.has_ledges() { 2.0 } else { 1.0 };
+            self.add_crumbs(place, at, (many * (1.2 * chips * left).min(0.6) * left).min(0.9), inside, seed);
+        } else if self.crushed.outline <= 0.0 {
+            self.add_grit(place, at, (chips * left).min(0.5) * left, seed);
+        }
+    }
+
+    /// Adds strokes, chips and a pit.
+    fn add_pieces(&self, place: &mut Place, broken: &Broken, chips: &[&Chip], off: Vec2, at: Vec2, seed: u32) {
         for [from, to] in &broken.ticks {
             // The stroke begins blunt and ends in a point.
             let (along, off) = (*to - *from, off - *from);
@@ -113,7 +328,7 @@ impl Shape<'_> {
             let inside = broken.thick * (1.0 - t * t) + 0.5 - (off - along * t).length();
             place.dark = place.dark.max(inside.clamp(0.0, 1.0));
         }
-        for chip in &broken.chips {
+        for chip in chips {
             self.add_chip(place, chip, off, at, seed);
         }
         if let Some(pit) = &broken.pit {
@@ -135,44 +350,38 @@ impl Shape<'_> {
     fn add_floor(
         &self,
         place: &mut Place,
-        broken: &Broken,
-        (within, inside): (f32, f32),
-        off: Vec2,
-        at: Vec2,
+        near: &NearBroken,
+        found: &Crumbling,
+        (k, within, inside): (usize, f32, f32),
+        (off, at): (Vec2, Vec2),
         seed: u32,
     ) {
         let CrushedZone { pale, speckle, stones, .. } = *self.crushed;
-        let crumbles = self.jag > 0.0;
-        let bump = |k: u32, size: f32| noise(seed ^ k, at.x / size, at.y / size);
-        let share = match broken.steps.len() {
-            0 => 1.0,
-            1 => SHELF,
-            // A shallow edge, and deeper and deeper steps.
-            _ => EDGE,
-        };
+        let (broken, crumbles) = (near.whole, self.jag > 0.0);
+        let Light { share, long, shade, length, facing } = self.light(broken);
         let has_ledges = broken.has_ledges();
         // In some places a wall is a slope.
-        let slope = bump(draws::WALL_SLOPE, (0.35 * self.radius).max(4.0));
-        let run = if crumbles { 0.8 + 1.4 * slope.max(0.0) } else { 1.0 };
+        let run = if crumbles { 0.8 + 1.4 * found.slope[k].max(0.0) } else { 1.0 };
         let wall = (within / (run * WALL * share * self.depth).max(1.0)).clamp(0.0, 1.0);
         let bowl = (within / (0.8 * self.radius).max(1.0)).clamp(0.0, 1.0);
         let hollow = if has_ledges { self.hollow(off) * wall } else { 0.0 };
         let sag = if has_ledges { SAG } else { 0.0 };
         let mut down = share * (wall + BOWL * (bowl - wall)) + (1.0 - share) * sag * hollow;
-        let (long, shade) = if crumbles { (LONG_SHADOW, DEEP_SHADE) } else { (SHADOW, SHADE) };
-        let length = long * share * self.depth;
         // A shadow is soft where the edge that casts it is far away.
         let soft = if crumbles { (0.7 * length).max(HARD) } else { HARD };
-        let mut shadow = sink(self.within(broken, off + TO_LIGHT * length, at + TO_LIGHT * length, seed), soft);
+        let [_, dark, lit] = found.edge.each_ref().map(|bumps| bumps.each_ref().map(|bumps| bumps[k]));
+        // Farther inside there is neither shadow nor light of the edge, however far it crumbles.
+        let most = |soft: f32| 0.6 * soft + 2.1 * self.jag;
+        let mut shadow = sink(self.crumbled(near.within_at_most(off + TO_LIGHT * length, most(soft)), dark), soft);
         // The wall on the far side faces the light.
-        let facing = (1.5 * WALL * share * self.depth).max(1.0);
-        let lit = sink(self.within(broken, off - TO_LIGHT * facing, at - TO_LIGHT * facing, seed), HARD);
+        let lit = sink(self.crumbled(near.within_at_most(off - TO_LIGHT * facing, most(HARD)), lit), HARD);
         let (mut sunk, mut bright) = (0.0, 0.0f32);
         let one = 1.0 / broken.steps.len().max(1) as f32;
         for step in &broken.steps {
-            let within =
-                step.within(off) - 2.0 * self.jag * (0.5 + 0.5 * bump(draws::BASIN_EDGE, (3.0 * self.jag).max(2.0)));
-            let fall = (within / (2.5 * WALL * one * self.depth).max(2.0)).clamp(0.0, 1.0);
+            let long_fall = (2.5 * WALL * one * self.depth).max(2.0);
+            let within = step.within_at_most(off, 1.1 * long_fall + 2.1 * self.jag)
+                - 2.0 * self.jag * (0.5 + 0.5 * found.basin[k]);
+            let fall = (within / long_fall).clamp(0.0, 1.0);
             let gone = one * fall * fall * (3.0 - 2.0 * fall);
             sunk += gone;
             down += (1.0 - share) * (1.0 - sag) * gone;
@@ -180,36 +389,23 @@ impl Shape<'_> {
                 let length = long * (1.0 - share) * one * self.depth;
                 // The step is lower and rounder than the edge.
                 let strength = if has_ledges { LEDGE_SHADE } else { STEP_SHADE };
-                shadow = shadow.max(strength * sink(step.within(off + TO_LIGHT * length), 1.5 * soft));
+                shadow = shadow.max(strength * sink(step.within_at_most(off + TO_LIGHT * length, soft), 1.5 * soft));
                 if has_ledges {
                     let facing = (2.0 * WALL * one * self.depth).max(1.5);
-                    bright = bright.max(LEDGE_LIT * sink(step.within(off - TO_LIGHT * facing), 2.0 * HARD));
+                    bright = bright
+                        .max(LEDGE_LIT * sink(step.within_at_most(off - TO_LIGHT * facing, 1.5 * HARD), 2.0 * HARD));
                 }
             }
         }
-        let fold = |k: u32, size: f32| {
-            let warp =
-                Vec2::new(noise(seed ^ k, at.x / size, at.y / size), noise(seed ^ k ^ 9, at.y / size, at.x / size));
-            facets(seed ^ k, at / size + 0.45 * warp)
-        };
-        let plate = fold(draws::PLATES, (0.42 * self.radius).max(2.0 * self.grain));
-        let small = fold(draws::SMALL_PLATES, 1.7 * self.grain);
+        let (plate, small) = (found.plates[k], found.small[k]);
         let fade = (0.5 * within).clamp(0.0, 1.0);
         let mut bumps = self.rough * (plate + if crumbles { 0.2 } else { 0.4 } * small) * fade;
         let tone = if crumbles {
-            let coarse = bump(draws::COARSE_TONE, 2.2 * self.grain)
-                + 0.7 * bump(draws::BROAD_TONE, 0.3 * self.radius + 6.0 * self.grain);
+            let coarse = found.coarse[k] + 0.7 * found.broad[k];
             let sand = lattice(seed ^ draws::SAND, at.x.floor() as i32, at.y.floor() as i32);
-            // Rotated, so that the lattice of the noise does not show.
-            let turned = Vec2::new(0.8 * at.x - 0.6 * at.y, 0.6 * at.x + 0.8 * at.y);
-            let pit = noise(seed ^ draws::SAND_PITS, 0.42 * turned.x, 0.42 * turned.y);
+            let pit = found.pits[k];
             let sand = 0.3 * sand + 0.5 * pit - 0.9 * (-pit - 0.55).max(0.0);
-            // Lumps of several sizes, each turned against the others.
-            let lump = |k: u32, size: f32, [x, y]: [f32; 2]| {
-                noise(seed ^ k, (x * at.x - y * at.y) / size, (y * at.x + x * at.y) / size)
-            };
-            let lumps = 0.9 * lump(draws::LUMPS, 3.1 * self.grain, [0.92, 0.39])
-                + 0.45 * lump(draws::LUMPS + 1, 1.3 * self.grain, [0.6, 0.8]);
+            let lumps = 0.9 * found.lumps[0][k] + 0.45 * found.lumps[1][k];
             bumps += self.rough * (lumps + 0.16 * pit) * fade;
             // Less of the sky lights the floor next to the wall.
             let corner = (1.0 - within / (1.3 * self.depth).max(1.0)).clamp(0.0, 1.0);
@@ -218,7 +414,7 @@ impl Shape<'_> {
                 - 0.6 * corner * wall
                 - if has_ledges { 0.0 } else { 0.4 * sunk };
             if has_ledges {
-                let powder = self.powder(at, seed) * fade;
+                let powder = found.powder[k] * fade;
                 tone += (0.3 + 0.12 * sand - tone) * 0.8 * powder;
                 bumps *= 1.0 - 0.5 * powder;
             }
@@ -243,7 +439,7 @@ impl Shape<'_> {
         let (mut light, mut lit) = (speckle * tone, lit);
         if has_ledges {
             light -= (1.0 + light) * self.darkness(off, sunk, hollow, wall);
-            lit = self.ledge_light(lit, bright, at, seed);
+            lit = ledge_light(lit, bright, found.patches[k]);
         }
         let light = light + LIT * lit * (1.0 - shadow);
         place.shade = if has_ledges { light.min(BRIGHTEST) } else { light } * inside;

@@ -20,6 +20,7 @@ pub(super) const SHADOW: f32 = 0.75;
 pub(super) const LONG_SHADOW: f32 = 1.1;
 
 /// A chip that lies beside the zone.
+#[derive(Debug)]
 pub(super) struct Chip {
     pub(super) outline: Outline,
     /// Its difference in brightness.
@@ -29,6 +30,7 @@ pub(super) struct Chip {
 }
 
 /// A part of a brick's face.
+#[derive(Debug)]
 pub(super) struct Face {
     outline: Outline,
     /// Opposite corners of the brick.
@@ -56,21 +58,22 @@ impl Face {
         (0..bricks.len()).map(face).collect()
     }
 
-    fn within(&self, at: Vec2) -> f32 {
+    fn within_at_most(&self, at: Vec2, most: f32) -> f32 {
         let beside = (at - self.min).min(self.max - at);
-        self.outline.within(at).min(beside.min_element())
+        self.outline.within_at_most(at, most).min(beside.min_element())
     }
 }
 
 /// Broken-off pieces and where they lie; positions relative to the hit, texels.
+#[derive(Debug)]
 pub(super) struct Broken {
     /// The crater and the flakes around it.
-    pub(super) off: Vec<Outline>,
+    off: Vec<Outline>,
     /// Faces of bricks that have come off, in place of those: each is the part of an outline that lies in its brick.
-    pub(super) faces: Vec<Face>,
+    faces: Vec<Face>,
     /// Where it goes down further, step by step.
     pub(super) steps: Vec<Outline>,
-    pub(super) chips: Vec<Chip>,
+    chips: Vec<Chip>,
     /// Strokes between two places; the first end is the wide one.
     pub(super) ticks: Vec<[Vec2; 2]>,
     pub(super) thick: f32,
@@ -165,21 +168,35 @@ impl Broken {
         Self { off, faces, steps, chips, ticks, thick: 0.8 * crushed.outline * unit, pit }
     }
 
-    /// Drops the pieces that do not reach into a rectangle, texels from the hit.
-    pub(super) fn keep_near(&mut self, min: Vec2, max: Vec2, depth: f32) {
+    /// What of it reaches into a rectangle, texels from the hit.
+    pub(super) fn near(&self, min: Vec2, max: Vec2, depth: f32) -> NearBroken<'_> {
         let is_near = |outline: &Outline, beyond: f32| {
             let nearest = outline.centre.clamp(min - 1.0, max + 1.0);
             nearest.distance_squared(outline.centre) <= (outline.reach + beyond) * (outline.reach + beyond)
         };
-        self.off.retain(|outline| is_near(outline, 3.0 + LONG_SHADOW.max(SHADOW) * depth));
-        self.faces.retain(|face| is_near(&face.outline, 3.0 + LONG_SHADOW.max(SHADOW) * depth));
-        self.chips.retain(|chip| is_near(&chip.outline, 2.0 + chip.outline.reach));
+        let shadow = 3.0 + LONG_SHADOW.max(SHADOW) * depth;
+        NearBroken {
+            whole: self,
+            off: self.off.iter().filter(|outline| is_near(outline, shadow)).collect(),
+            faces: self.faces.iter().filter(|face| is_near(&face.outline, shadow)).collect(),
+            chips: self.chips.iter().filter(|chip| is_near(&chip.outline, 2.0 + chip.outline.reach)).collect(),
+        }
     }
+}
 
-    /// Distance of a place from the edge of the broken-off area; positive inside.
-    pub(super) fn within(&self, at: Vec2) -> f32 {
-        let off = self.off.iter().map(|outline| outline.within(at));
-        off.chain(self.faces.iter().map(|face| face.within(at))).fold(-FAR_OUT, f32::max)
+/// What of it is near some texels.
+pub(super) struct NearBroken<'a> {
+    pub(super) whole: &'a Broken,
+    off: Vec<&'a Outline>,
+    faces: Vec<&'a Face>,
+    pub(super) chips: Vec<&'a Chip>,
+}
+
+impl NearBroken<'_> {
+    /// Distance of a place from the edge of the broken-off area; positive inside, and `most` where it is so much or more.
+    pub(super) fn within_at_most(&self, at: Vec2, most: f32) -> f32 {
+        let off = self.off.iter().map(|outline| outline.within_at_most(at, most));
+        off.chain(self.faces.iter().map(|face| face.within_at_most(at, most))).fold(-FAR_OUT, f32::max)
     }
 }
 

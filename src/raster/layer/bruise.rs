@@ -1,7 +1,10 @@
 //! Bruises: crushed zones of short radial and ring cracks with angular flakes between them.
 
-use super::{draws, noise::hash};
-use crate::math::ops;
+use super::{
+    draws,
+    noise::{floor, hash},
+};
+use crate::math::{ops, vectorized};
 use glam::Vec2;
 use std::f32::consts::TAU;
 
@@ -61,52 +64,140 @@ pub(super) fn bruise(off: Vec2, q: f32, dense: f32, fine: f32, seed: u32) -> Bru
     found
 }
 
-/// A cloud of short cracks that cross each other, each with a sheet to one side that fades. `off` is the offset from
-/// the hit in texels, `left` how much of the cloud is left there, 0..=1.
-pub(super) fn crazed(off: Vec2, radius: f32, left: f32, seed: u32) -> Bruise {
-    let mut found = Bruise::default();
-    let out = off.normalize_or_zero();
-    for (sheet, size) in [0.54f32, 0.38, 0.25, 0.15].into_iter().enumerate() {
-        let side = (size * radius).max(3.0);
-        let seed = seed ^ draws::SHEETS ^ (sheet as u32).wrapping_mul(0x51ED_270B);
-        let corner = (off / side).floor();
-        for (dx, dy) in [(-1, -1), (0, -1), (1, -1), (-1, 0), (0, 0), (1, 0), (-1, 1), (0, 1), (1, 1)] {
-            let (x, y) = ((corner.x as i32).wrapping_add(dx), (corner.y as i32).wrapping_add(dy));
-            let draw = |k: u32| (hash(seed ^ k, x, y) >> 8) as i32 as f32 * (1.0 / 16_777_216.0);
-            let middle = Vec2::new(x as f32 + draw(1), y as f32 + draw(2)) * side;
-            // Fewer outward, by the position of the middle.
-            let near = 1.2 - (0.46 + 0.16 * draw(11)) * middle.length() / radius;
-            let near = near.clamp(0.0, 1.0) * (0.35 + 0.65 * left);
-            if draw(3) >= 0.9 * near {
-                continue;
-            }
-            // Most of them run away from the hit, or across.
-            let any = ops::unit(TAU * draw(4));
-            let way = match () {
-                () if draw(5) < 0.4 => (middle.normalize_or(out) + 0.5 * any).normalize_or(Vec2::X),
-                () if draw(5) < 0.6 => (middle.normalize_or(out).perp() + 0.5 * any).normalize_or(Vec2::X),
-                () => any,
-            };
-            let half = side * (0.3 + 0.55 * draw(6));
-            let (along, across) = ((off - middle).dot(way) / half, (off - middle).perp_dot(way));
-            if along.abs() >= 1.0 {
-                continue;
-            }
-            let taper = 1.0 - along * along;
-            let strength = (0.2 + 0.8 * draw(7)) * (0.3 + 0.7 * near);
-            found.crack =
-                found.crack.max(strength * taper.sqrt() * (0.75 - 0.9 * (across.abs() - 0.35).max(0.0)).max(0.0));
-            // The sheet to one side, with a slanting end.
-            let deep = side * (0.12 + 0.5 * draw(8)) * (1.0 - along * (0.8 * draw(9) - 0.4)) * taper.sqrt();
-            let inside = (across + 0.5).clamp(0.0, 1.0) * (deep - across + 0.5).clamp(0.0, 1.0);
-            if inside > 0.0 {
-                let fall = (1.0 - across / deep.max(1.0)).clamp(0.0, 1.0);
-                found.flake = found.flake + (1.0 - found.flake) * inside * draw(10) * near * (0.25 + 0.7 * fall * fall);
+/// A short crack of a cloud of them, with a sheet to one side that fades.
+struct Crazing {
+    /// From the hit, texels.
+    middle: Vec2,
+    way: Vec2,
+    half: f32,
+    /// Width of the sheet in its middle, and how much its end slants.
+    deep: f32,
+    slant: f32,
+    /// Its share of what is there at its distance from the hit, and from which share on it is.
+    near: f32,
+    from: f32,
+    strong: f32,
+    bright: f32,
+}
+
+impl Crazing {
+    /// The crack in a square of a lattice with this side, texels.
+    fn new(seed: u32, [x, y]: [i32; 2], side: f32, radius: f32) -> Self {
+        let draw = |k: u32| (hash(seed ^ k, x, y) >> 8) as i32 as f32 * (1.0 / 16_777_216.0);
+        let middle = Vec2::new(x as f32 + draw(1), y as f32 + draw(2)) * side;
+        // Fewer outward, by the position of the middle.
+        let near = 1.2 - (0.46 + 0.16 * draw(11)) * middle.length() / radius;
+        // Most of them run away from the hit, or across.
+        let any = ops::unit(TAU * draw(4));
+        let out = middle.normalize_or(Vec2::X);
+        let way = match () {
+            () if draw(5) < 0.4 => (out + 0.5 * any).normalize_or(Vec2::X),
+            () if draw(5) < 0.6 => (out.perp() + 0.5 * any).normalize_or(Vec2::X),
+            () => any,
+        };
+        Self {
+            middle,
+            way,
+            half: side * (0.3 + 0.55 * draw(6)),
+            deep: side * (0.12 + 0.5 * draw(8)),
+            slant: 0.8 * draw(9) - 0.4,
+            near: near.clamp(0.0, 1.0),
+            from: draw(3),
+            strong: 0.2 + 0.8 * draw(7),
+            bright: draw(10),
+        }
+    }
+
+    /// The least rectangle around all that it changes: the corners with the least and the largest coordinates, texels from the hit.
+    fn bounds(&self) -> [Vec2; 2] {
+        let deep = self.deep * (1.0 + self.slant.abs()) + 0.5;
+        let across = -self.way.perp();
+        let (low, high) = (across * -1.2, across * deep.max(1.2));
+        let along = self.way.abs() * self.half;
+        [self.middle + low.min(high) - along - 1.0, self.middle + low.max(high) + along + 1.0]
+    }
+
+    /// The crack and the flake at a place, with this one; so much of the cloud is left there, 0..=1.
+    #[inline(always)]
+    fn over(&self, [crack, flake]: [f32; 2], off: Vec2, left: f32) -> [f32; 2] {
+        let near = self.near * (0.35 + 0.65 * left);
+        let (along, across) = ((off - self.middle).dot(self.way) / self.half, (off - self.middle).perp_dot(self.way));
+        let taper = 1.0 - along * along;
+        let strength = self.strong * (0.3 + 0.7 * near);
+        let line = strength * taper.sqrt() * (0.75 - 0.9 * (across.abs() - 0.35).max(0.0)).max(0.0);
+        // The sheet to one side, with a slanting end.
+        let deep = self.deep * (1.0 - along * self.slant) * taper.sqrt();
+        let inside = (across + 0.5).clamp(0.0, 1.0) * (deep - across + 0.5).clamp(0.0, 1.0);
+        let fall = (1.0 - across / deep.max(1.0)).clamp(0.0, 1.0);
+        let more = (1.0 - flake) * inside * self.bright * near * (0.25 + 0.7 * fall * fall);
+        // Without a branch, so that many places are done at a time.
+        let is_there = (self.from < 0.9 * near) & (along.abs() < 1.0);
+        [if is_there { crack.max(line) } else { crack }, if is_there { flake + more } else { flake }]
+    }
+}
+
+/// Sides of the squares that hold a crack each, in radii: one layer for each.
+const SHEET_SIDES: [f32; 4] = [0.54, 0.38, 0.25, 0.15];
+
+/// The most texels in a row.
+const WIDEST: usize = 64;
+
+/// A cloud of short cracks that cross each other around a hit: what there is of cracks and of flakes, each 0..=1, at texels in rows of `wide`
+/// that begin at `corner`. `left` says how much of the cloud is left at each, 0..=1. Rows have no more than [`WIDEST`] texels.
+pub(super) fn craze(
+    [cracks, flakes]: [&mut [f32]; 2],
+    left: &[f32],
+    wide: usize,
+    (corner, hit): (Vec2, Vec2),
+    radius: f32,
+    seed: u32,
+) {
+    let (size, first) = (Vec2::new(wide as f32, (left.len() / wide.max(1)) as f32), corner - hit);
+    let place = |column: usize, row: usize| corner + Vec2::new(column as i32 as f32, row as i32 as f32) - hit;
+    for (sheet, side) in (0u32..).zip(SHEET_SIDES) {
+        let side = (side * radius).max(3.0);
+        let seed = seed ^ draws::SHEETS ^ sheet.wrapping_mul(0x51ED_270B);
+        let square = |at: f32| floor(at / side).1;
+        let mut columns = [0; WIDEST];
+        (0..).zip(&mut columns).for_each(|(k, column)| *column = square(place(k, 0).x));
+        let (low, high) = ((first / side).floor().as_ivec2() - 1, ((first + size - 1.0) / side).floor().as_ivec2() + 1);
+        for y in low.y..=high.y {
+            for x in low.x..=high.x {
+                let crack = Crazing::new(seed, [x, y], side, radius);
+                let [min, max] = crack.bounds().map(|corner| corner - first);
+                let (from, to) =
+                    (min.max(Vec2::ZERO).as_usizevec2(), (max + 1.0).clamp(Vec2::ZERO, size).as_usizevec2());
+                for row in from.y..to.y {
+                    // A crack is seen in its own square and those around it.
+                    if (square(place(0, row).y) - y).abs() > 1 || from.x >= to.x {
+                        continue;
+                    }
+                    let texels = row * wide + from.x..row * wide + to.x;
+                    let (Some(cracks), Some(flakes), Some(left), Some(columns)) = (
+                        cracks.get_mut(texels.clone()),
+                        flakes.get_mut(texels.clone()),
+                        left.get(texels),
+                        columns.get(from.x..to.x),
+                    ) else {
+                        continue;
+                    };
+                    vectorized(
+                        #[inline(always)]
+                        || {
+                            let texels = cracks.iter_mut().zip(flakes).zip(left).zip(columns).enumerate();
+                            for (k, (((crack_here, flake_here), left), column)) in texels {
+                                let before = [*crack_here, *flake_here];
+                                let is_near = (column - x).abs() <= 1;
+                                let after = crack.over(before, place(from.x + k, row), *left);
+                                [*crack_here, *flake_here] = if is_near { after } else { before };
+                            }
+                        },
+                    );
+                }
             }
         }
     }
-    found.crack = found.crack.min(1.0);
-    found
+    cracks.iter_mut().for_each(|crack| *crack = crack.min(1.0));
 }
 
 /// `count` bubbles around a hit of this radius, in strings and clusters: positions relative to the hit, and radii.
@@ -163,10 +254,44 @@ mod tests {
     /// The cloud of short cracks ends.
     #[test]
     fn the_cloud_thins_out() {
-        let covered = |distance: f32| {
-            let at = |i: u32| ops::unit(i as f32 * 0.1) * distance;
-            (0..63).map(|i| crazed(at(i), 30.0, (1.0 - distance / 75.0).max(0.0), 5).flake).sum::<f32>()
+        let (side, radius) = (WIDEST, 12.0);
+        let first = Vec2::splat(-31.7);
+        let off = |k: usize| first + Vec2::new((k % side) as f32, (k / side) as f32);
+        let left: Vec<f32> = (0..side * side).map(|k| (1.0 - off(k).length() / 30.0).max(0.0)).collect();
+        let (mut cracks, mut flakes) = (vec![0.0; side * side], vec![0.0; side * side]);
+        craze([&mut cracks, &mut flakes], &left, side, (first, Vec2::ZERO), radius, 5);
+        let covered = |far: f32| {
+            let ring = (0..side * side).filter(|&k| (off(k).length() - far).abs() < 2.0);
+            let flakes: Vec<f32> = ring.map(|k| flakes[k]).collect();
+            flakes.iter().sum::<f32>() / flakes.len() as f32
         };
-        assert!(covered(8.0) > 3.0 * covered(55.0), "{} {}", covered(8.0), covered(55.0));
+        assert!(covered(3.2) > 3.0 * covered(22.0), "{} {}", covered(3.2), covered(22.0));
+    }
+
+    /// What is drawn crack by crack is what each place finds in the squares around it.
+    #[test]
+    fn cracks_are_where_each_place_finds_them() {
+        let mut rng = crate::math::Rng::new(4);
+        for seed in 0..30 {
+            let radius = rng.range(2.0, 90.0);
+            let first = Vec2::new(rng.range(-120.0, 60.0), rng.range(-120.0, 60.0));
+            let left: Vec<f32> = (0..34 * 34).map(|_| rng.unit()).collect();
+            let (mut cracks, mut flakes) = ([0.0; 34 * 34], [0.0; 34 * 34]);
+            craze([&mut cracks, &mut flakes], &left, 34, (first, Vec2::ZERO), radius, seed);
+            for (k, left) in left.iter().enumerate() {
+                let off = first + Vec2::new((k % 34) as f32, (k / 34) as f32);
+                let [mut crack, mut flake] = [0.0; 2];
+                for (sheet, side) in (0u32..).zip(SHEET_SIDES) {
+                    let side = (side * radius).max(3.0);
+                    let seed = seed ^ draws::SHEETS ^ sheet.wrapping_mul(0x51ED_270B);
+                    let square = (off / side).floor();
+                    for (dx, dy) in [(-1, -1), (0, -1), (1, -1), (-1, 0), (0, 0), (1, 0), (-1, 1), (0, 1), (1, 1)] {
+                        let place = [square.x as i32 + dx, square.y as i32 + dy];
+                        [crack, flake] = Crazing::new(seed, place, side, radius).over([crack, flake], off, *left);
+                    }
+                }
+                assert_eq!((cracks[k], flakes[k]), (crack.min(1.0), flake), "seed {seed}, {off}");
+            }
+        }
     }
 }

@@ -3,8 +3,10 @@
 use super::{
     draws,
     noise::noise,
+    row::{Line, Row},
     shape::{Place, Shape, TO_LIGHT},
 };
+use core::ops::Range;
 use glam::Vec2;
 
 /// Share of the depth inside of the edge that is an even hollow; the ledges have the rest.
@@ -53,25 +55,38 @@ impl Shape<'_> {
         (BELOW_LEDGES * sunk + IN_HOLLOW * hollow + AWAY * away).clamp(DARKENS[0], DARKENS[1])
     }
 
-    /// The light on walls: on that of the edge in patches, and on those of ledges.
-    pub(super) fn ledge_light(&self, edge: f32, ledges: f32, at: Vec2, seed: u32) -> f32 {
+    /// Patches of light on the edge.
+    #[inline(always)]
+    pub(super) fn edge_patches(&self, at: Vec2, seed: u32) -> f32 {
         let wide = (0.3 * self.radius).max(4.0);
-        let patch = 0.5 + 0.9 * noise(seed ^ draws::EDGE_PATCHES, at.x / wide, at.y / wide);
-        (edge * (1.0 - PATCHES + PATCHES * patch)).clamp(0.0, 1.0) * EDGE_LIT + ledges * (1.0 - edge)
+        0.5 + 0.9 * noise(seed ^ draws::EDGE_PATCHES, at.x / wide, at.y / wide)
     }
 
     /// How much powder lies at a place of the floor, 0..=1.
+    #[inline(always)]
     pub(super) fn powder(&self, at: Vec2, seed: u32) -> f32 {
         let cloud = |k: u32, size: f32| noise(seed ^ (draws::POWDER + k), at.x / size, at.y / size);
         (1.3 * (cloud(0, 3.0 * self.grain) + 0.4 * cloud(1, 1.1 * self.grain) - 0.1)).clamp(0.0, 1.0)
     }
 
+    /// Noise of the heaps of dust around a crater, from the largest on.
+    #[inline(always)]
+    pub(super) fn fill_heaps(&self, heaps: &mut [Row; 3], line: Line, texels: &Range<usize>, seed: u32) {
+        for ((k, row), size) in (0u32..).zip(heaps).zip([4.0 * self.grain, 2.1, 1.0]) {
+            line.fill(row, texels, |at| noise(seed ^ (draws::HEAPS + k), at.x / size, at.y / size));
+        }
+    }
+
     /// Adds the dust that lies around a crater, in heaps; `left` is 1 at its edge and falls to 0 outward.
-    pub(super) fn add_dust(&self, place: &mut Place, at: Vec2, left: f32, open: f32, seed: u32) {
-        let heap = |k: u32, size: f32| noise(seed ^ (draws::HEAPS + k), at.x / size, at.y / size);
-        let heaps = 0.55 + 0.8 * heap(0, 4.0 * self.grain) + 0.3 * heap(1, 2.1);
+    pub(super) fn add_dust(&self, place: &mut Place, [large, small, fine]: [f32; 3], left: f32, open: f32) {
+        let heaps = 0.55 + 0.8 * large + 0.3 * small;
         let dust = (3.0 * self.crushed.dust * left * left * heaps).clamp(0.0, MOST_DUST) * open;
         place.pale = place.pale.max(dust);
-        place.shade += (DUST_TONE + 0.1 * heap(2, 1.0)) * open * dust;
+        place.shade += (DUST_TONE + 0.1 * fine) * open * dust;
     }
+}
+
+/// The light on walls: on that of the edge in patches, and on those of ledges.
+pub(super) fn ledge_light(edge: f32, ledges: f32, patch: f32) -> f32 {
+    (edge * (1.0 - PATCHES + PATCHES * patch)).clamp(0.0, 1.0) * EDGE_LIT + ledges * (1.0 - edge)
 }

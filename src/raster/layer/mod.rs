@@ -9,6 +9,7 @@ mod ledges;
 mod noise;
 mod outline;
 mod plates;
+mod row;
 mod shape;
 mod spot;
 mod stone;
@@ -22,6 +23,7 @@ pub(crate) use spot::{PIT_STEPS, SLOPE_UNIT, Spot};
 pub use veil::Veil;
 pub(super) use veil::VeilField;
 pub(crate) use zones::CrushedField;
+use zones::crater_of;
 
 use super::TexelRect;
 use crate::{
@@ -90,6 +92,11 @@ impl LayerPlan {
     #[must_use]
     pub const fn bytes_per_texel(&self) -> u64 {
         (if self.plates { 2 } else { 0 }) + (if self.veil.is_some() || self.floor[0] > 0.0 { 1 } else { 0 })
+    }
+
+    /// The crater that an impact at `pos` (pattern units) has at an energy, if zones have terraces.
+    pub(crate) fn crater(&self, impact: u32, pos: Vec2, energy: f32) -> Option<Crater> {
+        crater_of(self.crushed.as_ref()?, self.seed, impact, pos, energy)
     }
 }
 
@@ -175,11 +182,6 @@ impl Layer {
 
     pub(crate) fn plates(&self) -> Option<&PlateField> {
         self.plates.as_deref().filter(|plates| !plates.is_empty())
-    }
-
-    /// The crater that an impact at `pos` (pattern units) has at an energy, if zones have terraces.
-    pub(crate) fn crater(&self, impact: u32, pos: Vec2, energy: f32) -> Option<Crater> {
-        self.crushed.as_deref()?.crater(impact, pos, energy)
     }
 
     pub(crate) fn crushed(&self) -> Option<&CrushedField> {

@@ -18,8 +18,7 @@ pub(super) fn hash(seed: u32, x: i32, y: i32) -> u32 {
 /// Smooth noise in `-1..=1` with bumps about one unit wide.
 #[inline(always)]
 pub(crate) fn noise(seed: u32, x: f32, y: f32) -> f32 {
-    let (fx, fy) = (x.floor(), y.floor());
-    let (ix, iy) = (fx as i32, fy as i32);
+    let ((fx, ix), (fy, iy)) = (floor(x), floor(y));
     let ease = |t: f32| t * t * (3.0 - 2.0 * t);
     let (tx, ty) = (ease(x - fx), ease(y - fy));
     let at = |dx: i32, dy: i32| lattice(seed, ix.wrapping_add(dx), iy.wrapping_add(dy));
@@ -28,7 +27,16 @@ pub(crate) fn noise(seed: u32, x: f32, y: f32) -> f32 {
     top + (low - top) * ty
 }
 
+/// The whole number below, as both. Without a call, which [`f32::floor`] is on machines that may be old.
+#[inline(always)]
+pub(super) fn floor(x: f32) -> (f32, i32) {
+    let whole = x as i32;
+    let below = whole.wrapping_sub(i32::from(whole as f32 > x));
+    (below as f32, below)
+}
+
 /// A random number in 0..1 for a pair of integers.
+#[inline(always)]
 pub(super) fn draw(seed: u32, x: i32, y: i32) -> f32 {
     (hash(seed, x, y) >> 8) as i32 as f32 * (1.0 / 16_777_216.0)
 }

@@ -8,14 +8,97 @@ use glam::Vec2;
 pub(super) const WIDEST: f32 = 1.1;
 
 /// A polygon around a place, texels.
+#[derive(Debug)]
 pub(super) struct Outline {
     pub(super) centre: Vec2,
     /// Largest distance of its corners.
     pub(super) reach: f32,
+    /// Least distance of its sides from its centre.
+    inner: f32,
     /// Corners relative to the centre, sorted by their [`turn`].
-    pub(super) corners: Vec<(f32, Vec2)>,
+    corners: Vec<(f32, Vec2)>,
+    /// The side that ends at each corner, in the same order; before and after them the last and the first ones again.
+    sides: Vec<Side>,
+    ends: SideEnds,
+    /// How many corners there are up to each of some directions, from 0 on in equal steps.
+    counts: Vec<usize>,
     /// Whether the distance to the edge accounts for both sides of narrow tips.
-    pub(super) is_worn: bool,
+    is_worn: bool,
+}
+
+/// A side of an outline, relative to its centre.
+#[derive(Debug)]
+struct Side {
+    from: Vec2,
+    along: Vec2,
+    length: f32,
+    length_sq: f32,
+    inward: Vec2,
+}
+
+impl Side {
+    fn new(from: Vec2, to: Vec2) -> Self {
+        let along = to - from;
+        let (length, length_sq) = (along.length().max(0.1), along.length_squared().max(0.01));
+        Self { from, along, length, length_sq, inward: along.perp().normalize_or_zero() }
+    }
+
+    /// Distance from the line along it; positive inside.
+    fn within(&self, off: Vec2) -> f32 {
+        self.along.perp_dot(off - self.from) / self.length
+    }
+
+    fn distance_squared(&self, off: Vec2) -> f32 {
+        let share = ((off - self.from).dot(self.along) / self.length_sq).clamp(0.0, 1.0);
+        off.distance_squared(self.from + self.along * share)
+    }
+}
+
+/// Directions in each quarter of which it is known how many corners lie before them.
+const DIRECTIONS: f32 = 8.0;
+
+/// Sides that are looked at at a time: the one of a sector, and those beside it; one more than that makes whole vectors.
+const NEAR: usize = 2 * BESIDE + 2;
+
+/// What distances from sides are worked out from, each value of all sides by itself.
+#[derive(Debug)]
+struct SideEnds {
+    from: [Vec<f32>; 2],
+    along: [Vec<f32>; 2],
+    length_sq: Vec<f32>,
+}
+
+impl SideEnds {
+    fn of(sides: &[Side]) -> Self {
+        let all = |value: fn(&Side) -> f32| sides.iter().chain(sides.last()).map(value).collect();
+        Self {
+            from: [all(|side| side.from.x), all(|side| side.from.y)],
+            along: [all(|side| side.along.x), all(|side| side.along.y)],
+            length_sq: all(|side| side.length_sq),
+        }
+    }
+
+    /// The least squared distance from the sides of a sector and those beside it, from `first` on.
+    fn nearest_squared(&self, first: usize, off: Vec2) -> Option<f32> {
+        let [from_x, from_y] = self.from.each_ref().map(|all| near(all, first));
+        let [along_x, along_y] = self.along.each_ref().map(|all| near(all, first));
+        let (from_x, from_y, along_x, along_y) = (from_x?, from_y?, along_x?, along_y?);
+        let length_sq = near(&self.length_sq, first)?;
+        let mut distances = [f32::MAX; NEAR];
+        for (k, distance) in distances.iter_mut().enumerate() {
+            let (x, y) = (off.x - from_x[k], off.y - from_y[k]);
+            let share = ((x * along_x[k] + y * along_y[k]) / length_sq[k]).clamp(0.0, 1.0);
+            let (x, y) = (off.x - (from_x[k] + along_x[k] * share), off.y - (from_y[k] + along_y[k] * share));
+            *distance = x * x + y * y;
+        }
+        // The last one is not beside it.
+        distances.into_iter().take(NEAR - 1).reduce(f32::min)
+    }
+}
+
+/// The values of some sides from the first on.
+fn near(all: &[f32], first: usize) -> Option<&[f32; NEAR]> {
+    all.get(first..)?.first_chunk()
 }
 
 /// A direction as a number in 0..4 that increases with its angle.
@@ -59,21 +142,41 @@ impl Outline {
             .map(|corner| (turn(corner), corner))
             .collect();
         corners.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let reach = corners.iter().map(|(_, corner)| corner.length()).fold(0.0, f32::max);
-        Self { centre, reach, corners, is_worn: false }
+        Self::of(centre, corners, false)
     }
 
     /// The polygon around the origin with these corners.
     pub(super) fn through(corners: impl Iterator<Item = Vec2>) -> Self {
         let mut corners: Vec<(f32, Vec2)> = corners.map(|corner| (turn(corner), corner)).collect();
         corners.sort_by(|a, b| a.0.total_cmp(&b.0));
+        Self::of(Vec2::ZERO, corners, true)
+    }
+
+    /// Of sorted corners.
+    fn of(centre: Vec2, corners: Vec<(f32, Vec2)>, is_worn: bool) -> Self {
         let reach = corners.iter().map(|(_, corner)| corner.length()).fold(0.0, f32::max);
-        Self { centre: Vec2::ZERO, reach, corners, is_worn: true }
+        let n = corners.len();
+        let side = |k: usize| {
+            // One end is the corner before.
+            let (before, k) = ((k + (BESIDE + 1) * n - BESIDE - 1) % n, (k + BESIDE * n - BESIDE) % n);
+            Some(Side::new(corners.get(before)?.1, corners.get(k)?.1))
+        };
+        let sides = if n > 0 { (0..n + 1 + 2 * BESIDE).filter_map(side).collect() } else { Vec::new() };
+        let ends = SideEnds::of(&sides);
+        let up_to = |step: usize| corners.partition_point(|corner| corner.0 <= step as f32 / DIRECTIONS);
+        let counts = (0..=4 * DIRECTIONS as usize).map(up_to).collect();
+        // The centre is inside, or nothing is known.
+        let is_around = sides.iter().all(|side| side.within(Vec2::ZERO) > 0.0);
+        let distance = |side: &Side| match is_worn {
+            true => side.distance_squared(Vec2::ZERO).sqrt(),
+            false => side.within(Vec2::ZERO),
+        };
+        let inner = if is_around { sides.iter().map(distance).fold(f32::MAX, f32::min) } else { 0.0 };
+        Self { centre, reach, inner, corners, sides, ends, counts, is_worn }
     }
 
     /// The same polygon, longer in one direction and shorter across it.
     pub(super) fn stretched(mut self, seed: u32) -> Self {
-        self.is_worn = true;
         let way = ops::unit(std::f32::consts::PI * draw(seed, -2, 0));
         let (by, most) = (1.0 + 0.5 * draw(seed, -2, 1), self.reach);
         for (at, corner) in &mut self.corners {
@@ -82,44 +185,53 @@ impl Outline {
             *at = turn(*corner);
         }
         self.corners.sort_by(|a, b| a.0.total_cmp(&b.0));
-        self
+        Self { reach: self.reach, ..Self::of(self.centre, self.corners, true) }
+    }
+
+    /// How many corners there are up to a direction, see [`turn`].
+    fn corners_up_to(&self, turn: f32) -> usize {
+        let known = self.counts.get((turn * DIRECTIONS) as usize).copied().unwrap_or_default();
+        let rest = self.corners.get(known..).unwrap_or_default();
+        known + rest.iter().take_while(|corner| corner.0 <= turn).count()
     }
 
     /// Distance of a place from the edge, texels: positive inside, negative outside.
     pub(super) fn within(&self, at: Vec2) -> f32 {
-        self.side(at).0
+        self.nearest(at).map_or(-FAR_OUT, |(within, _)| within)
     }
 
-    /// The same, and the direction inward from the nearest side.
+    /// The same, or `most` where the distance is so much or more.
+    pub(super) fn within_at_most(&self, at: Vec2, most: f32) -> f32 {
+        let rest = self.inner - most;
+        // No side is nearer to the centre. A little less, for rounding.
+        if rest > 0.0 && at.distance_squared(self.centre) < 0.999 * rest * rest {
+            return most;
+        }
+        self.within(at).min(most)
+    }
+
+    /// The same as [`Self::within`], and the direction inward from the nearest side.
     pub(super) fn side(&self, at: Vec2) -> (f32, Vec2) {
+        self.nearest(at).map_or((-FAR_OUT, Vec2::ZERO), |(within, side)| (within, side.inward))
+    }
+
+    /// The same, and the side of the sector of a place. `None` if it is far away.
+    #[inline]
+    fn nearest(&self, at: Vec2) -> Option<(f32, &Side)> {
         let off = at - self.centre;
         if off.length_squared() > (self.reach + 1.0) * (self.reach + 1.0) {
-            return (-FAR_OUT, Vec2::ZERO);
+            return None;
         }
         let turn = turn(off);
-        let n = self.corners.len();
-        let next = self.corners.partition_point(|corner| corner.0 <= turn) + n;
-        let corner = |k: usize| self.corners.get(k % n.max(1)).map(|corner| corner.1);
-        let (Some(a), Some(b)) = (corner(next - 1), corner(next)) else {
-            return (-FAR_OUT, Vec2::ZERO);
-        };
-        let side = b - a;
-        let within = side.perp_dot(off - a) / side.length().max(0.1);
-        let inward = side.perp().normalize_or_zero();
+        let next = self.corners_up_to(turn);
+        let side = self.sides.get(next + BESIDE)?;
+        let within = side.within(off);
         if !self.is_worn {
-            return (within, inward);
+            return Some((within, side));
         }
         // The sides of its sector and of the neighbouring ones.
-        let mut nearest = f32::MAX;
-        for k in 0..=2 * BESIDE {
-            let (Some(from), Some(to)) = (corner(next + n + k - BESIDE - 1), corner(next + n + k - BESIDE)) else {
-                continue;
-            };
-            let side = to - from;
-            let share = ((off - from).dot(side) / side.length_squared().max(0.01)).clamp(0.0, 1.0);
-            nearest = nearest.min(off.distance_squared(from + side * share));
-        }
-        (if within > 0.0 { nearest.sqrt() } else { -nearest.sqrt() }, inward)
+        let nearest = self.ends.nearest_squared(next, off)?.sqrt();
+        Some((if within > 0.0 { nearest } else { -nearest }, side))
     }
 }
 
@@ -157,13 +269,30 @@ mod tests {
         }
     }
 
+    /// What is far enough inside is found without looking for the nearest side.
+    #[test]
+    fn distances_end_where_they_are_to() {
+        let mut rng = Rng::new(11);
+        for seed in 0..100 {
+            let mut outline = Outline::new(Vec2::splat(3.0), 30.0, 4 + seed % 20, seed % 3, 0.6 * rng.unit(), seed);
+            if seed % 2 == 0 {
+                outline = outline.stretched(seed);
+            }
+            for _ in 0..200 {
+                let at = Vec2::new(rng.range(-40.0, 40.0), rng.range(-40.0, 40.0));
+                let most = rng.range(0.5, 30.0);
+                assert_eq!(outline.within_at_most(at, most), outline.within(at).min(most), "seed {seed} at {at}");
+            }
+        }
+    }
+
     /// What is worn has its edge where it was.
     #[test]
     fn worn_outlines_have_the_same_edge() {
         let mut rng = Rng::new(10);
         for seed in 0..60 {
             let worn = Outline::new(Vec2::ZERO, 30.0, 4 + seed % 6, seed % 3, 0.6, seed).stretched(seed);
-            let clean = Outline { is_worn: false, corners: worn.corners.clone(), ..worn };
+            let clean = Outline::of(worn.centre, worn.corners.clone(), false);
             for _ in 0..200 {
                 let at = Vec2::new(rng.range(-40.0, 40.0), rng.range(-40.0, 40.0));
                 assert_eq!(worn.within(at) > 0.0, clean.within(at) > 0.0, "seed {seed} at {at}");

@@ -1,7 +1,7 @@
 //! The content of a crushed zone at a place, in texels.
 
 use super::{
-    broken::Broken,
+    broken::{Broken, NearBroken},
     bruise::{self, Bruise},
     crushed::CrushedZone,
     draws,
@@ -14,7 +14,17 @@ use glam::Vec2;
 /// Direction to the light: the upper left.
 pub(super) const TO_LIGHT: Vec2 = Vec2::new(-std::f32::consts::FRAC_1_SQRT_2, -std::f32::consts::FRAC_1_SQRT_2);
 
-/// A crushed zone in texels.
+/// The pieces of a crushed zone, wherever they are drawn.
+#[derive(Debug)]
+pub(super) struct Pieces {
+    broken: Option<Broken>,
+    /// A hole with a broken edge, and the outer outline of that edge.
+    hole: Option<[Outline; 2]>,
+    /// Positions relative to the hit, and radii, texels.
+    bubbles: Vec<(Vec2, f32)>,
+}
+
+/// A crushed zone in texels, with what of it is near the texels that are drawn.
 pub(super) struct Shape<'a> {
     pub(super) crushed: &'a CrushedZone,
     pub(super) radius: f32,
@@ -22,11 +32,17 @@ pub(super) struct Shape<'a> {
     pub(super) rough: f32,
     pub(super) grain: f32,
     pub(super) jag: f32,
-    pub(super) broken: Option<Broken>,
-    /// A hole with a broken edge, and the outer outline of that edge.
-    pub(super) hole: Option<[Outline; 2]>,
-    /// Positions relative to the hit, and radii, texels.
+    pub(super) broken: Option<NearBroken<'a>>,
+    pub(super) hole: Option<&'a [Outline; 2]>,
     pub(super) bubbles: Vec<(Vec2, f32)>,
+}
+
+/// How a bruise spreads: the distance of a place in its radii, what is left of it there, 0..=1, and noise, -1..=1.
+#[derive(Clone, Copy, Default)]
+pub(super) struct BruiseSpread {
+    pub(super) q: f32,
+    pub(super) left: f32,
+    pub(super) cloud: f32,
 }
 
 /// The content of a place.
@@ -43,16 +59,10 @@ impl Place {
     pub(super) const NONE: Self = Self { height: 0.0, pale: 0.0, shade: 0.0, dark: 0.0, pit: [0; 3] };
 }
 
-impl<'a> Shape<'a> {
-    pub(super) fn new(crushed: &'a CrushedZone, unit: f32, radius: f32, seed: u32, bricks: &Bricks) -> Self {
-        let grain = (crushed.grain * unit).max(1.0);
+impl Pieces {
+    pub(super) fn new(crushed: &CrushedZone, unit: f32, radius: f32, seed: u32, bricks: &Bricks) -> Self {
+        let grain = grain(crushed, unit);
         Self {
-            crushed,
-            radius,
-            depth: crushed.depth * unit,
-            rough: crushed.rough * unit,
-            grain,
-            jag: crushed.jag * unit,
             broken: crushed.broken.then(|| Broken::new(crushed, unit, radius, grain, seed, bricks)),
             hole: (crushed.hole > 0.0 && crushed.edge > 0.0).then(|| {
                 let hole = crushed.hole * radius;
@@ -68,27 +78,69 @@ impl<'a> Shape<'a> {
             bubbles: bruise::bubbles(crushed.bubbles, radius, crushed.reach, grain, seed),
         }
     }
+}
 
-    /// Short cracks and flakes that thin out outward.
-    pub(super) fn add_bruise(&self, place: &mut Place, off: Vec2, radii: f32, at: Vec2, seed: u32) {
-        let CrushedZone { ragged, pale, speckle, reach, needles, .. } = self.crushed;
+/// Size of a grain, texels.
+const fn grain(crushed: &CrushedZone, unit: f32) -> f32 {
+    (crushed.grain * unit).max(1.0)
+}
+
+impl<'a> Shape<'a> {
+    /// What of a zone with these pieces reaches into a rectangle, texels from the hit.
+    pub(super) fn near(
+        crushed: &'a CrushedZone,
+        unit: f32,
+        radius: f32,
+        pieces: &'a Pieces,
+        [min, max]: [Vec2; 2],
+    ) -> Self {
+        let depth = crushed.depth * unit;
+        let is_near = |&&(middle, radius): &&(Vec2, f32)| {
+            let far = middle.clamp(min - 2.0, max + 2.0).distance_squared(middle);
+            far <= (radius + 1.0) * (radius + 1.0)
+        };
+        Self {
+            crushed,
+            radius,
+            depth,
+            rough: crushed.rough * unit,
+            grain: grain(crushed, unit),
+            jag: crushed.jag * unit,
+            broken: pieces.broken.as_ref().map(|broken| broken.near(min, max, depth)),
+            hole: pieces.hole.as_ref(),
+            bubbles: pieces.bubbles.iter().filter(is_near).copied().collect(),
+        }
+    }
+
+    /// How far a place lies in a bruise, and how much of the bruise is left there, 0..=1; `cloud` is noise.
+    pub(super) fn left_of_bruise(&self, off: Vec2, radii: f32, cloud: f32, seed: u32) -> (f32, f32) {
+        let CrushedZone { ragged, reach, .. } = self.crushed;
         let way = off.normalize_or_zero();
         let round = |k: u32, times: f32| noise(seed ^ k, way.x * times + 17.0, way.y * times + 31.0);
-        let cloud = noise(seed ^ 10, at.x / (3.0 * self.grain), at.y / (3.0 * self.grain));
         // No outline: the cracks are dense near the hit, and further out there are more and more gaps.
         let stray = 1.0 + ragged * (0.45 * round(2, 1.3) + 0.4 * round(3, 3.7)) + 0.25 * ragged * cloud;
         let q = radii / stray.max(0.3);
-        let left = (1.0 - q / reach).min(2.0 * (1.0 - radii / reach)).clamp(0.0, 1.0);
+        (q, (1.0 - q / reach).min(2.0 * (1.0 - radii / reach)).clamp(0.0, 1.0))
+    }
+
+    /// Noise along a bruise.
+    #[inline(always)]
+    pub(super) fn cloud(&self, at: Vec2, seed: u32) -> f32 {
+        noise(seed ^ 10, at.x / (3.0 * self.grain), at.y / (3.0 * self.grain))
+    }
+
+    /// Short cracks and flakes that thin out outward. `crazed` is what there is of crossing ones.
+    pub(super) fn add_bruise(&self, place: &mut Place, off: Vec2, spread: BruiseSpread, crazed: Bruise, seed: u32) {
+        let CrushedZone { pale, speckle, needles, crazing, .. } = *self.crushed;
+        let BruiseSpread { q, left, cloud } = spread;
         if left <= 0.0 {
             return;
         }
         let dense = (1.5 * left * left).min(1.0);
         let fine = (self.radius / (8.0 * self.grain)).sqrt().clamp(0.6, 3.0);
-        let crazing = self.crushed.crazing;
         let mut bruise = if crazing < 1.0 { bruise::bruise(off, q, dense, fine, seed) } else { Bruise::default() };
         let mut haze = (1.08 - 0.8 * q).clamp(0.0, 1.0);
         if crazing > 0.0 {
-            let crazed = bruise::crazed(off, self.radius, left, seed);
             bruise.crack = bruise.crack * (1.0 - crazing) + crazed.crack * crazing;
             bruise.flake = bruise.flake * (1.0 - crazing) + crazed.flake * crazing;
             // The haze is not uniform.

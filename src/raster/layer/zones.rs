@@ -2,21 +2,23 @@
 
 use super::{
     broken::crater,
+    bruise::{Bruise, craze},
     crushed::CrushedZone,
     noise::noise,
     outline::WIDEST,
-    shape::{Place, Shape},
+    row::{FLAT, Line, WIDE},
+    shape::{BruiseSpread, Pieces, Place, Shape},
     spot::{SLOPE_UNIT, Spot, TILE, Tile},
 };
 use crate::{
     Grid,
-    math::mix,
+    math::{mix, vectorized},
     pattern::{Bricks, Strike, SurfaceFrame},
     raster::TexelRect,
     relief::Crater,
 };
 use glam::{UVec2, Vec2};
-use std::collections::VecDeque;
+use std::{collections::VecDeque, sync::Arc};
 
 /// Salt of the random draws of crushed zones. Frozen: a seed must give the same result in every version.
 const OF_ZONES: u64 = 0xC4;
@@ -38,6 +40,22 @@ const MOST: usize = 8;
 /// Energies at which a zone is enlarged, from 1 to 2 and repeated for each doubling, so that a thousand small hits on
 /// one place do not redraw it a thousand times.
 const LEVELS: [f32; 4] = [1.0, 1.189_207_1, std::f32::consts::SQRT_2, 1.681_792_8];
+
+/// Seed of all zones of a layer.
+fn own_seed(seed: u64) -> u32 {
+    mix(seed ^ OF_ZONES) as u32
+}
+
+/// Seed of the zone of an impact.
+const fn seed_of(own: u32, impact: u32) -> u32 {
+    own ^ impact.wrapping_mul(0x9E37_79B1)
+}
+
+/// The crater that an impact at `pos` (pattern units) has at an energy, in a layer with this seed; `None` if zones have no terraces.
+pub(super) fn crater_of(crushed: &CrushedZone, seed: u64, impact: u32, pos: Vec2, energy: f32) -> Option<Crater> {
+    let radius = crushed.radius * level(energy).sqrt();
+    crater(crushed, pos, radius, seed_of(own_seed(seed), impact))
+}
 
 /// The highest level that is not above an energy.
 fn level(energy: f32) -> f32 {
@@ -77,6 +95,16 @@ pub(crate) struct CrushedField {
     is_anew: Vec<bool>,
     /// Distance beside a plate at which its side is visible, texels.
     beyond: u32,
+    /// What was drawn last, until nothing waits.
+    known: Vec<KnownPieces>,
+}
+
+/// The pieces of the zone of an impact.
+#[derive(Clone, Debug)]
+struct KnownPieces {
+    index: u32,
+    zone: Zone,
+    pieces: Arc<Pieces>,
 }
 
 /// A tile that is not drawn yet.
@@ -100,7 +128,7 @@ impl CrushedField {
         Self {
             crushed: *crushed,
             frame,
-            seed: mix(seed ^ OF_ZONES) as u32,
+            seed: own_seed(seed),
             zones: Vec::new(),
             shown: 0,
             columns: count.x,
@@ -109,6 +137,7 @@ impl CrushedField {
             waiting: VecDeque::new(),
             is_anew: vec![false; count.element_product() as usize],
             beyond: 0,
+            known: Vec::new(),
         }
     }
 
@@ -202,6 +231,9 @@ impl CrushedField {
                 self.draw(impact, tile, forbidden);
             }
         }
+        if !self.is_behind() {
+            self.known = Vec::new();
+        }
         self.is_behind()
     }
 
@@ -246,15 +278,9 @@ impl CrushedField {
         }
     }
 
-    /// The crater that an impact at `pos` (pattern units) has at an energy; `None` if zones have no terraces.
-    pub(crate) fn crater(&self, impact: u32, pos: Vec2, energy: f32) -> Option<Crater> {
-        let radius = self.crushed.radius * level(energy).sqrt();
-        crater(&self.crushed, pos, radius, self.seed_of(impact))
-    }
-
     /// Seed of what is random about the zone of an impact.
     const fn seed_of(&self, impact: u32) -> u32 {
-        self.seed ^ impact.wrapping_mul(0x9E37_79B1)
+        seed_of(self.seed, impact)
     }
 
     fn radius(&self, energy: f32) -> f32 {
@@ -269,19 +295,13 @@ impl CrushedField {
         if rect.is_empty() {
             return;
         }
-        let (radius, seed) = (self.radius(zone.energy), self.seed_of(index));
+        let (radius, seed, unit) = (self.radius(zone.energy), self.seed_of(index), self.frame.texels_per_unit());
+        let pieces = self.pieces_of(index, &zone);
         let slot = &mut self.tiles[(tile.y * self.columns + tile.x) as usize];
         self.used += usize::from(slot.is_none());
         let texels = slot.get_or_insert_with(|| Box::new([Spot::NONE; (TILE * TILE) as usize]));
-        let mut shape = Shape::new(&self.crushed, self.frame.texels_per_unit(), radius, seed, &zone.bricks);
-        if let Some(broken) = &mut shape.broken {
-            broken.keep_near(rect.min.as_vec2() - zone.pos, rect.max.as_vec2() - zone.pos, shape.depth);
-        }
-        let (min, max) = (rect.min.as_vec2() - zone.pos - 2.0, rect.max.as_vec2() - zone.pos + 2.0);
-        shape.bubbles.retain(|&(middle, radius)| {
-            let far = middle.clamp(min, max).distance_squared(middle);
-            far <= (radius + 1.0) * (radius + 1.0)
-        });
+        let near = [rect.min, rect.max].map(|corner| corner.as_vec2() - zone.pos);
+        let shape = Shape::near(&self.crushed, unit, radius, &pieces, near);
         shape.draw(texels, zone.pos, seed, rect, corner);
         let Some(forbidden) = forbidden else { return };
         for y in rect.min.y..rect.max.y {
@@ -291,6 +311,19 @@ impl CrushedField {
                 }
             }
         }
+    }
+
+    /// The pieces of the zone of an impact, which are kept until all of it is drawn.
+    fn pieces_of(&mut self, index: u32, zone: &Zone) -> Arc<Pieces> {
+        let is_it = |known: &&KnownPieces| known.index == index && known.zone == *zone;
+        if let Some(known) = self.known.iter().find(is_it) {
+            return known.pieces.clone();
+        }
+        let (radius, unit) = (self.radius(zone.energy), self.frame.texels_per_unit());
+        let pieces = Arc::new(Pieces::new(&self.crushed, unit, radius, self.seed_of(index), &zone.bricks));
+        self.known.truncate(MOST - 1);
+        self.known.insert(0, KnownPieces { index, zone: *zone, pieces: pieces.clone() });
+        pieces
     }
 
     /// Whether a plate with its middle at `at` and its outline within `extent` of it is missing in a hole (`true`) or
@@ -339,14 +372,25 @@ impl CrushedField {
 impl Shape<'_> {
     /// Draws it over the texels `rect` of a tile whose first texel is at `corner`.
     fn draw(&self, texels: &mut Tile, centre: Vec2, seed: u32, rect: TexelRect, corner: UVec2) {
-        const WIDE: usize = TILE as usize + 2;
         // Heights around each texel are needed for its slope.
         let mut places = [Place::NONE; WIDE * WIDE];
         let (size, first) = (rect.size().as_usizevec2(), rect.min.as_vec2() - 0.5);
-        for y in 0..size.y + 2 {
-            for x in 0..size.x + 2 {
-                let at = first + Vec2::new(x as f32, y as f32);
-                places[y * WIDE + x] = self.place(at - centre, at, seed);
+        let line = |y: usize| Line { first: first + Vec2::new(0.0, y as f32), centre };
+        match &self.broken {
+            Some(broken) => {
+                for (y, places) in places.chunks_exact_mut(WIDE).enumerate().take(size.y + 2) {
+                    let is_within = |k: usize| !self.is_beyond(line(y).off(k).length());
+                    self.break_off(&mut places[..size.x + 2], broken, line(y), is_within, seed);
+                }
+            }
+            None => {
+                let bruised = self.bruised(size.y + 2, line, seed);
+                for y in 0..size.y + 2 {
+                    for x in 0..size.x + 2 {
+                        let (at, k) = (line(y).at(x), y * WIDE + x);
+                        places[k] = self.place(line(y).off(x), at, bruised.as_ref().map(|all| all[k]), seed);
+                    }
+                }
             }
         }
         let corner = (rect.min - corner).as_usizevec2();
@@ -374,27 +418,67 @@ impl Shape<'_> {
         }
     }
 
-    /// The content of a place; `off` is the offset from the centre, `at` the position in the field.
-    fn place(&self, off: Vec2, at: Vec2, seed: u32) -> Place {
+    /// Whether a zone ends nearer to the hit than this; no outline extends further.
+    fn is_beyond(&self, distance: f32) -> bool {
+        let CrushedZone { ragged, flake, reach, .. } = *self.crushed;
+        distance / self.radius.max(0.5) > reach.max(flake).max(1.0 + WIDEST * ragged) + 0.1
+    }
+
+    /// How a bruise spreads over some rows, and its crossing cracks. `None` if there is none.
+    fn bruised(
+        &self,
+        rows: usize,
+        line: impl Fn(usize) -> Line,
+        seed: u32,
+    ) -> Option<Box<[(BruiseSpread, Bruise); WIDE * WIDE]>> {
+        if self.crushed.needles <= 0.0 {
+            return None;
+        }
+        let mut all = Box::new([(BruiseSpread::default(), Bruise::default()); WIDE * WIDE]);
+        let mut left = [0.0; WIDE * WIDE];
+        for y in 0..rows {
+            let mut clouds = FLAT;
+            vectorized(
+                #[inline(always)]
+                || line(y).fill(&mut clouds, &(0..WIDE), |at| self.cloud(at, seed)),
+            );
+            for (x, cloud) in clouds.into_iter().enumerate() {
+                let off = line(y).off(x);
+                if !self.is_beyond(off.length()) {
+                    let radii = off.length() / self.radius.max(0.5);
+                    let (q, left_here) = self.left_of_bruise(off, radii, cloud, seed);
+                    all[y * WIDE + x].0 = BruiseSpread { q, left: left_here, cloud };
+                    left[y * WIDE + x] = left_here;
+                }
+            }
+        }
+        if self.crushed.crazing > 0.0 {
+            let (mut cracks, mut flakes) = ([0.0; WIDE * WIDE], [0.0; WIDE * WIDE]);
+            let Line { first, centre } = line(0);
+            craze([&mut cracks, &mut flakes], &left[..rows * WIDE], WIDE, (first, centre), self.radius, seed);
+            for ((all, crack), flake) in all.iter_mut().zip(cracks).zip(flakes) {
+                all.1 = Bruise { crack, flake };
+            }
+        }
+        Some(all)
+    }
+
+    /// The content of a place that does not break off; `off` is the offset from the centre, `at` the position in the field.
+    fn place(&self, off: Vec2, at: Vec2, bruised: Option<(BruiseSpread, Bruise)>, seed: u32) -> Place {
         let CrushedZone { ragged, soft, hole, pale, speckle, flake, dust, chips, reach, .. } = *self.crushed;
         let mut place = Place::NONE;
         let distance = off.length();
         let radii = distance / self.radius.max(0.5);
-        // No outline extends further.
         let widest = 1.0 + WIDEST * ragged;
-        if radii > reach.max(flake).max(widest) + 0.1 {
-            return place;
-        }
-        if let Some(broken) = &self.broken {
-            self.break_off(&mut place, broken, off, at, seed);
+        if self.is_beyond(distance) {
             return place;
         }
         let way = off / distance.max(1.0e-3);
         let grain = |k: u32, size: f32| noise(seed ^ k, at.x / size, at.y / size);
         let round = |k: u32, times: f32| noise(seed ^ k, way.x * times + 17.0, way.y * times + 31.0);
         let mut inside = 0.0;
-        if self.crushed.needles > 0.0 {
-            self.add_bruise(&mut place, off, radii, at, seed);
+        if let Some((spread, crazed)) = bruised {
+            self.add_bruise(&mut place, off, spread, crazed, seed);
         }
         if radii <= widest {
             let fine = grain(1, self.grain);
@@ -439,7 +523,7 @@ impl Shape<'_> {
                 place.shade += (0.3 * white - 0.25 * (1.0 - white) - place.shade) * inside;
             }
         }
-        if let Some(hole) = &self.hole {
+        if let Some(hole) = self.hole {
             self.add_hole(&mut place, hole, off);
         } else if hole > 0.0 && radii <= hole * (1.0 + WIDEST * ragged) + 1.0 {
             let radius = self.radius * hole * (1.0 + 0.6 * ragged * (round(7, 1.9) + 0.5 * round(8, 4.3)));
