@@ -318,7 +318,8 @@ pub struct Profile {
     /// [drawn](crate::paint::Cel) cracks; default false.
     pub even_walls: bool,
     /// How far the edges of a crack deviate from its smooth outline, each on its own: chips, crumbling material.
-    /// Narrow cracks deviate less, by up to 60 % of their half width. Pattern units, 0..=0.05; default 0.
+    /// Narrow cracks deviate less, by up to 60 % of their half width, and 33 % if all of it is [`wall`](Self::wall).
+    /// Pattern units, 0..=0.05; default 0.
     pub ragged: f32,
 }
 

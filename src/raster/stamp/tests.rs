@@ -53,7 +53,9 @@ fn reference(field: &DepthField, profile: &Profile, path: &SegmentPath, x: u32, 
     let most = f64::from(profile.ragged) * unit;
     let uneven =
         if most > 0.0 { f64::from(ragged::at(ragged::tile(most as f32), x as usize, y as usize)[0]) } else { 0.0 };
-    let d = texel.distance(a + (b - a) * t) + uneven / 127.0 * most.min(0.6 * (r - 0.5).max(0.0));
+    let slope = 0.5 * if profile.even_walls { 1.0 } else { f64::from(profile.wall) };
+    let deviates = f64::min(0.6, (1.0 - slope) / (1.0 + slope));
+    let d = texel.distance(a + (b - a) * t) + uneven / 127.0 * most.min(deviates * (r - 0.5).max(0.0));
     let full = f64::from(profile.full_width);
     let share =
         if profile.even_walls { (1.0 + r) * 2.0 / (full * unit) } else { (0.4 + 0.6 * width / full).clamp(0.4, 1.0) };
