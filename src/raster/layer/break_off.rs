@@ -7,7 +7,7 @@ use super::{
     ledges::{BRIGHTEST, LEDGE_LIT, LEDGE_SHADE, SAG, ledge_light},
     noise::{draw, lattice, noise},
     outline::FAR_OUT,
-    row::{FLAT, Line, Row},
+    row::{Row, TexelRow, WIDE, ZEROS},
     shape::{Place, Shape, TO_LIGHT},
     spot::PIT_STEPS,
     stone::{Cell, Stone, facets},
@@ -89,21 +89,21 @@ struct Crumbling {
 }
 
 impl Crumbling {
-    const FLAT: Self = Self {
-        edge: [[FLAT; 2]; 3],
-        basin: FLAT,
-        slope: FLAT,
-        plates: FLAT,
-        small: FLAT,
-        coarse: FLAT,
-        broad: FLAT,
-        pits: FLAT,
-        lumps: [FLAT; 2],
-        powder: FLAT,
-        patches: FLAT,
-        dust: FLAT,
-        streaks: FLAT,
-        heaps: [FLAT; 3],
+    const NONE: Self = Self {
+        edge: [[ZEROS; 2]; 3],
+        basin: ZEROS,
+        slope: ZEROS,
+        plates: ZEROS,
+        small: ZEROS,
+        coarse: ZEROS,
+        broad: ZEROS,
+        pits: ZEROS,
+        lumps: [ZEROS; 2],
+        powder: ZEROS,
+        patches: ZEROS,
+        dust: ZEROS,
+        streaks: ZEROS,
+        heaps: [ZEROS; 3],
     };
 }
 
@@ -134,51 +134,48 @@ impl Shape<'_> {
         within - self.jag * (1.3 * wide + 0.7 * fine)
     }
 
-    /// Adds what is along a row in material that breaks along chords, where the zone `is_within`.
-    pub(super) fn break_off(
-        &self,
-        places: &mut [Place],
-        broken: &NearBroken,
-        line: Line,
-        is_within: impl Fn(usize) -> bool,
-        seed: u32,
-    ) {
-        let texels = span(0..places.len(), &is_within);
+    /// Adds what is along a row in material that breaks along chords.
+    pub(super) fn break_off(&self, places: &mut [Place], broken: &NearBroken, row: TexelRow, seed: u32) {
+        let mut is_within = [false; WIDE];
+        for (k, is_within) in is_within.iter_mut().enumerate().take(places.len()) {
+            *is_within = !self.is_beyond(row.off(k).length());
+        }
+        let texels = span(0..places.len(), |k| is_within[k]);
         if texels.is_empty() {
             return;
         }
-        let mut noise = Crumbling::FLAT;
+        let mut noise = Crumbling::NONE;
         vectorized(
             #[inline(always)]
-            || self.fill_edge(&mut noise.edge[0], line, &texels, Vec2::ZERO, seed),
+            || self.fill_edge(&mut noise.edge[0], row, &texels, Vec2::ZERO, seed),
         );
-        let mut within = FLAT;
+        let mut within = ZEROS;
         for k in texels.clone() {
             within[k] =
-                self.crumbled(broken.within_at_most(line.off(k), f32::INFINITY), noise.edge[0].map(|bumps| bumps[k]));
+                self.crumbled(broken.within_at_most(row.off(k), f32::INFINITY), noise.edge[0].map(|bumps| bumps[k]));
         }
         let inside = within.map(|within| (within + 0.5).clamp(0.0, 1.0));
-        let floor = span(texels.clone(), |k| inside[k] > 0.0 && is_within(k));
-        let mut left = FLAT;
-        for k in texels.clone().filter(|&k| inside[k] < 1.0 && is_within(k)) {
-            left[k] = self.left_around(line.off(k));
+        let floor = span(texels.clone(), |k| inside[k] > 0.0 && is_within[k]);
+        let mut left = ZEROS;
+        for k in texels.clone().filter(|&k| inside[k] < 1.0 && is_within[k]) {
+            left[k] = self.left_around(row.off(k));
         }
         // Where nothing is left there is neither dust nor a crumb.
         let around = span(texels.clone(), |k| left[k] > 0.0);
         vectorized(
             #[inline(always)]
             || {
-                self.fill_floor(&mut noise, broken.whole, line, &floor, seed);
-                self.fill_around(&mut noise, broken.whole, line, &around, seed);
+                self.fill_floor(&mut noise, broken.whole, row, &floor, seed);
+                self.fill_around(&mut noise, broken.whole, row, &around, seed);
             },
         );
         let is_beside = |chip: &&&Chip| {
             let outline = &chip.outline;
-            (line.off(0).y - outline.centre.y).abs() <= 2.0 * outline.reach + 3.0
+            (row.off(0).y - outline.centre.y).abs() <= 2.0 * outline.reach + 3.0
         };
         let chips: Vec<&Chip> = broken.chips.iter().filter(is_beside).copied().collect();
-        for k in texels.filter(|&k| is_within(k)) {
-            let (at, off) = (line.at(k), line.off(k));
+        for k in texels.filter(|&k| is_within[k]) {
+            let (at, off) = (row.at(k), row.off(k));
             let place = &mut places[k];
             if inside[k] > 0.0 {
                 self.add_floor(place, broken, &noise, (k, within[k], inside[k]), (off, at), seed);
@@ -192,47 +189,47 @@ impl Shape<'_> {
 
     /// The bumps of an edge beside each texel.
     #[inline(always)]
-    fn fill_edge(&self, [wide, fine]: &mut [Row; 2], line: Line, texels: &Range<usize>, by: Vec2, seed: u32) {
+    fn fill_edge(&self, [wide, fine]: &mut [Row; 2], row: TexelRow, texels: &Range<usize>, by: Vec2, seed: u32) {
         if self.jag > 0.0 {
             let sides = [(3.5 * self.jag).max(3.0), (1.2 * self.jag).max(1.3)];
             let bump = |k: u32, at: Vec2, size: f32| noise(seed ^ k, at.x / size, at.y / size);
-            line.fill(wide, texels, |at| bump(draws::JAG_WIDE, at + by, sides[0]));
-            line.fill(fine, texels, |at| bump(draws::JAG_FINE, at + by, sides[1]));
+            row.fill(wide, texels, |at| bump(draws::JAG_WIDE, at + by, sides[0]));
+            row.fill(fine, texels, |at| bump(draws::JAG_FINE, at + by, sides[1]));
         }
     }
 
     /// Noise around what has broken off.
     #[inline(always)]
-    fn fill_around(&self, found: &mut Crumbling, broken: &Broken, line: Line, texels: &Range<usize>, seed: u32) {
+    fn fill_around(&self, found: &mut Crumbling, broken: &Broken, row: TexelRow, texels: &Range<usize>, seed: u32) {
         let CrushedZone { dust, fall, .. } = *self.crushed;
         if dust > 0.0 {
-            line.fill(&mut found.dust, texels, |at| noise(seed ^ 6, 0.7 * at.x, 0.7 * at.y));
+            row.fill(&mut found.dust, texels, |at| noise(seed ^ 6, 0.7 * at.x, 0.7 * at.y));
             if self.jag > 0.0 && fall > 0.0 {
                 let wide = 1.5 * self.grain;
-                line.fill(&mut found.streaks, texels, |at| noise(seed ^ 8, at.x / wide, at.y / (7.0 * wide)));
+                row.fill(&mut found.streaks, texels, |at| noise(seed ^ 8, at.x / wide, at.y / (7.0 * wide)));
             }
             if broken.has_ledges() {
-                self.fill_heaps(&mut found.heaps, line, texels, seed);
+                self.fill_heaps(&mut found.heaps, row, texels, seed);
             }
         }
     }
 
     /// Noise on a floor.
     #[inline(always)]
-    fn fill_floor(&self, found: &mut Crumbling, broken: &Broken, line: Line, texels: &Range<usize>, seed: u32) {
+    fn fill_floor(&self, found: &mut Crumbling, broken: &Broken, row: TexelRow, texels: &Range<usize>, seed: u32) {
         let bump = |at: Vec2, k: u32, size: f32| noise(seed ^ k, at.x / size, at.y / size);
         let Light { length, facing, .. } = self.light(broken);
         let crumbles = self.jag > 0.0;
         let [_, dark, lit] = &mut found.edge;
-        self.fill_edge(dark, line, texels, TO_LIGHT * length, seed);
-        self.fill_edge(lit, line, texels, -(TO_LIGHT * facing), seed);
+        self.fill_edge(dark, row, texels, TO_LIGHT * length, seed);
+        self.fill_edge(lit, row, texels, -(TO_LIGHT * facing), seed);
         if crumbles {
             let wide = (0.35 * self.radius).max(4.0);
-            line.fill(&mut found.slope, texels, |at| bump(at, draws::WALL_SLOPE, wide));
+            row.fill(&mut found.slope, texels, |at| bump(at, draws::WALL_SLOPE, wide));
         }
         if !broken.steps.is_empty() {
             let side = (3.0 * self.jag).max(2.0);
-            line.fill(&mut found.basin, texels, |at| bump(at, draws::BASIN_EDGE, side));
+            row.fill(&mut found.basin, texels, |at| bump(at, draws::BASIN_EDGE, side));
         }
         let fold = |at: Vec2, k: u32, size: f32| {
             let warp =
@@ -240,18 +237,18 @@ impl Shape<'_> {
             facets(seed ^ k, at / size + 0.45 * warp)
         };
         let (large, small) = ((0.42 * self.radius).max(2.0 * self.grain), 1.7 * self.grain);
-        line.fill(&mut found.plates, texels, |at| fold(at, draws::PLATES, large));
-        line.fill(&mut found.small, texels, |at| fold(at, draws::SMALL_PLATES, small));
+        row.fill(&mut found.plates, texels, |at| fold(at, draws::PLATES, large));
+        row.fill(&mut found.small, texels, |at| fold(at, draws::SMALL_PLATES, small));
         if broken.has_ledges() {
-            line.fill(&mut found.patches, texels, |at| self.edge_patches(at, seed));
+            row.fill(&mut found.patches, texels, |at| self.edge_patches(at, seed));
         }
         if !crumbles {
             return;
         }
         let (coarse, broad) = (2.2 * self.grain, 0.3 * self.radius + 6.0 * self.grain);
-        line.fill(&mut found.coarse, texels, |at| bump(at, draws::COARSE_TONE, coarse));
-        line.fill(&mut found.broad, texels, |at| bump(at, draws::BROAD_TONE, broad));
-        line.fill(&mut found.pits, texels, |at| {
+        row.fill(&mut found.coarse, texels, |at| bump(at, draws::COARSE_TONE, coarse));
+        row.fill(&mut found.broad, texels, |at| bump(at, draws::BROAD_TONE, broad));
+        row.fill(&mut found.pits, texels, |at| {
             // Rotated, so that the lattice of the noise does not show.
             let turned = Vec2::new(0.8 * at.x - 0.6 * at.y, 0.6 * at.x + 0.8 * at.y);
             noise(seed ^ draws::SAND_PITS, 0.42 * turned.x, 0.42 * turned.y)
@@ -261,10 +258,10 @@ impl Shape<'_> {
             noise(seed ^ k, (x * at.x - y * at.y) / size, (y * at.x + x * at.y) / size)
         };
         let [wide, fine] = &mut found.lumps;
-        line.fill(wide, texels, |at| lump(at, draws::LUMPS, 3.1 * self.grain, [0.92, 0.39]));
-        line.fill(fine, texels, |at| lump(at, draws::LUMPS + 1, 1.3 * self.grain, [0.6, 0.8]));
+        row.fill(wide, texels, |at| lump(at, draws::LUMPS, 3.1 * self.grain, [0.92, 0.39]));
+        row.fill(fine, texels, |at| lump(at, draws::LUMPS + 1, 1.3 * self.grain, [0.6, 0.8]));
         if broken.has_ledges() {
-            line.fill(&mut found.powder, texels, |at| self.powder(at, seed));
+            row.fill(&mut found.powder, texels, |at| self.powder(at, seed));
         }
     }
 

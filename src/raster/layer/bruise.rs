@@ -3,6 +3,7 @@
 use super::{
     draws,
     noise::{floor, hash},
+    row::WIDE,
 };
 use crate::math::{ops, vectorized};
 use glam::Vec2;
@@ -139,26 +140,22 @@ impl Crazing {
 /// Sides of the squares that hold a crack each, in radii: one layer for each.
 const SHEET_SIDES: [f32; 4] = [0.54, 0.38, 0.25, 0.15];
 
-/// The most texels in a row.
-const WIDEST: usize = 64;
-
-/// A cloud of short cracks that cross each other around a hit: what there is of cracks and of flakes, each 0..=1, at texels in rows of `wide`
-/// that begin at `corner`. `left` says how much of the cloud is left at each, 0..=1. Rows have no more than [`WIDEST`] texels.
+/// A cloud of short cracks that cross each other around a hit: what there is of cracks and of flakes, each 0..=1, at texels in rows of [`WIDE`]
+/// that begin at `corner`. `left` says how much of the cloud is left at each, 0..=1.
 pub(super) fn craze(
     [cracks, flakes]: [&mut [f32]; 2],
     left: &[f32],
-    wide: usize,
     (corner, hit): (Vec2, Vec2),
     radius: f32,
     seed: u32,
 ) {
-    let (size, first) = (Vec2::new(wide as f32, (left.len() / wide.max(1)) as f32), corner - hit);
+    let (size, first) = (Vec2::new(WIDE as f32, (left.len() / WIDE) as f32), corner - hit);
     let place = |column: usize, row: usize| corner + Vec2::new(column as i32 as f32, row as i32 as f32) - hit;
     for (sheet, side) in (0u32..).zip(SHEET_SIDES) {
         let side = (side * radius).max(3.0);
         let seed = seed ^ draws::SHEETS ^ sheet.wrapping_mul(0x51ED_270B);
         let square = |at: f32| floor(at / side).1;
-        let mut columns = [0; WIDEST];
+        let mut columns = [0; WIDE];
         (0..).zip(&mut columns).for_each(|(k, column)| *column = square(place(k, 0).x));
         let (low, high) = ((first / side).floor().as_ivec2() - 1, ((first + size - 1.0) / side).floor().as_ivec2() + 1);
         for y in low.y..=high.y {
@@ -172,7 +169,7 @@ pub(super) fn craze(
                     if (square(place(0, row).y) - y).abs() > 1 || from.x >= to.x {
                         continue;
                     }
-                    let texels = row * wide + from.x..row * wide + to.x;
+                    let texels = row * WIDE + from.x..row * WIDE + to.x;
                     let (Some(cracks), Some(flakes), Some(left), Some(columns)) = (
                         cracks.get_mut(texels.clone()),
                         flakes.get_mut(texels.clone()),
@@ -254,14 +251,13 @@ mod tests {
     /// The cloud of short cracks ends.
     #[test]
     fn the_cloud_thins_out() {
-        let (side, radius) = (WIDEST, 12.0);
-        let first = Vec2::splat(-31.7);
-        let off = |k: usize| first + Vec2::new((k % side) as f32, (k / side) as f32);
-        let left: Vec<f32> = (0..side * side).map(|k| (1.0 - off(k).length() / 30.0).max(0.0)).collect();
-        let (mut cracks, mut flakes) = (vec![0.0; side * side], vec![0.0; side * side]);
-        craze([&mut cracks, &mut flakes], &left, side, (first, Vec2::ZERO), radius, 5);
+        let first = Vec2::splat(0.3);
+        let off = |k: usize| first + Vec2::new((k % WIDE) as f32, (k / WIDE) as f32);
+        let left: Vec<f32> = (0..WIDE * WIDE).map(|k| (1.0 - off(k).length() / 30.0).max(0.0)).collect();
+        let (mut cracks, mut flakes) = (vec![0.0; WIDE * WIDE], vec![0.0; WIDE * WIDE]);
+        craze([&mut cracks, &mut flakes], &left, (first, Vec2::ZERO), 12.0, 5);
         let covered = |far: f32| {
-            let ring = (0..side * side).filter(|&k| (off(k).length() - far).abs() < 2.0);
+            let ring = (0..WIDE * WIDE).filter(|&k| (off(k).length() - far).abs() < 2.0);
             let flakes: Vec<f32> = ring.map(|k| flakes[k]).collect();
             flakes.iter().sum::<f32>() / flakes.len() as f32
         };
@@ -275,11 +271,11 @@ mod tests {
         for seed in 0..30 {
             let radius = rng.range(2.0, 90.0);
             let first = Vec2::new(rng.range(-120.0, 60.0), rng.range(-120.0, 60.0));
-            let left: Vec<f32> = (0..34 * 34).map(|_| rng.unit()).collect();
-            let (mut cracks, mut flakes) = ([0.0; 34 * 34], [0.0; 34 * 34]);
-            craze([&mut cracks, &mut flakes], &left, 34, (first, Vec2::ZERO), radius, seed);
+            let left: Vec<f32> = (0..WIDE * WIDE).map(|_| rng.unit()).collect();
+            let (mut cracks, mut flakes) = ([0.0; WIDE * WIDE], [0.0; WIDE * WIDE]);
+            craze([&mut cracks, &mut flakes], &left, (first, Vec2::ZERO), radius, seed);
             for (k, left) in left.iter().enumerate() {
-                let off = first + Vec2::new((k % 34) as f32, (k / 34) as f32);
+                let off = first + Vec2::new((k % WIDE) as f32, (k / WIDE) as f32);
                 let [mut crack, mut flake] = [0.0; 2];
                 for (sheet, side) in (0u32..).zip(SHEET_SIDES) {
                     let side = (side * radius).max(3.0);

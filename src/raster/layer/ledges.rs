@@ -3,7 +3,7 @@
 use super::{
     draws,
     noise::noise,
-    row::{Line, Row},
+    row::{Row, TexelRow},
     shape::{Place, Shape, TO_LIGHT},
 };
 use core::ops::Range;
@@ -71,9 +71,9 @@ impl Shape<'_> {
 
     /// Noise of the heaps of dust around a crater, from the largest on.
     #[inline(always)]
-    pub(super) fn fill_heaps(&self, heaps: &mut [Row; 3], line: Line, texels: &Range<usize>, seed: u32) {
-        for ((k, row), size) in (0u32..).zip(heaps).zip([4.0 * self.grain, 2.1, 1.0]) {
-            line.fill(row, texels, |at| noise(seed ^ (draws::HEAPS + k), at.x / size, at.y / size));
+    pub(super) fn fill_heaps(&self, heaps: &mut [Row; 3], row: TexelRow, texels: &Range<usize>, seed: u32) {
+        for ((k, heap), size) in (0u32..).zip(heaps).zip([4.0 * self.grain, 2.1, 1.0]) {
+            row.fill(heap, texels, |at| noise(seed ^ (draws::HEAPS + k), at.x / size, at.y / size));
         }
     }
 

@@ -13,6 +13,7 @@ mod row;
 mod shape;
 mod spot;
 mod stone;
+mod texels;
 mod veil;
 mod zones;
 

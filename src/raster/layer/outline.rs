@@ -19,9 +19,6 @@ pub(super) struct Outline {
     corners: Vec<(f32, Vec2)>,
     /// The side that ends at each corner, in the same order; before and after them the last and the first ones again.
     sides: Vec<Side>,
-    ends: SideEnds,
-    /// How many corners there are up to each of some directions, from 0 on in equal steps.
-    counts: Vec<usize>,
     /// Whether the distance to the edge accounts for both sides of narrow tips.
     is_worn: bool,
 }
@@ -52,53 +49,6 @@ impl Side {
         let share = ((off - self.from).dot(self.along) / self.length_sq).clamp(0.0, 1.0);
         off.distance_squared(self.from + self.along * share)
     }
-}
-
-/// Directions in each quarter of which it is known how many corners lie before them.
-const DIRECTIONS: f32 = 8.0;
-
-/// Sides that are looked at at a time: the one of a sector, and those beside it; one more than that makes whole vectors.
-const NEAR: usize = 2 * BESIDE + 2;
-
-/// What distances from sides are worked out from, each value of all sides by itself.
-#[derive(Debug)]
-struct SideEnds {
-    from: [Vec<f32>; 2],
-    along: [Vec<f32>; 2],
-    length_sq: Vec<f32>,
-}
-
-impl SideEnds {
-    fn of(sides: &[Side]) -> Self {
-        let all = |value: fn(&Side) -> f32| sides.iter().chain(sides.last()).map(value).collect();
-        Self {
-            from: [all(|side| side.from.x), all(|side| side.from.y)],
-            along: [all(|side| side.along.x), all(|side| side.along.y)],
-            length_sq: all(|side| side.length_sq),
-        }
-    }
-
-    /// The least squared distance from the sides of a sector and those beside it, from `first` on.
-    fn nearest_squared(&self, first: usize, off: Vec2) -> Option<f32> {
-        let [from_x, from_y] = self.from.each_ref().map(|all| near(all, first));
-        let [along_x, along_y] = self.along.each_ref().map(|all| near(all, first));
-        let (from_x, from_y, along_x, along_y) = (from_x?, from_y?, along_x?, along_y?);
-        let length_sq = near(&self.length_sq, first)?;
-        let mut distances = [f32::MAX; NEAR];
-        for (k, distance) in distances.iter_mut().enumerate() {
-            let (x, y) = (off.x - from_x[k], off.y - from_y[k]);
-            let share = ((x * along_x[k] + y * along_y[k]) / length_sq[k]).clamp(0.0, 1.0);
-            let (x, y) = (off.x - (from_x[k] + along_x[k] * share), off.y - (from_y[k] + along_y[k] * share));
-            *distance = x * x + y * y;
-        }
-        // The last one is not beside it.
-        distances.into_iter().take(NEAR - 1).reduce(f32::min)
-    }
-}
-
-/// The values of some sides from the first on.
-fn near(all: &[f32], first: usize) -> Option<&[f32; NEAR]> {
-    all.get(first..)?.first_chunk()
 }
 
 /// A direction as a number in 0..4 that increases with its angle.
@@ -162,9 +112,6 @@ impl Outline {
             Some(Side::new(corners.get(before)?.1, corners.get(k)?.1))
         };
         let sides = if n > 0 { (0..n + 1 + 2 * BESIDE).filter_map(side).collect() } else { Vec::new() };
-        let ends = SideEnds::of(&sides);
-        let up_to = |step: usize| corners.partition_point(|corner| corner.0 <= step as f32 / DIRECTIONS);
-        let counts = (0..=4 * DIRECTIONS as usize).map(up_to).collect();
         // The centre is inside, or nothing is known.
         let is_around = sides.iter().all(|side| side.within(Vec2::ZERO) > 0.0);
         let distance = |side: &Side| match is_worn {
@@ -172,7 +119,7 @@ impl Outline {
             false => side.within(Vec2::ZERO),
         };
         let inner = if is_around { sides.iter().map(distance).fold(f32::MAX, f32::min) } else { 0.0 };
-        Self { centre, reach, inner, corners, sides, ends, counts, is_worn }
+        Self { centre, reach, inner, corners, sides, is_worn }
     }
 
     /// The same polygon, longer in one direction and shorter across it.
@@ -186,13 +133,6 @@ impl Outline {
         }
         self.corners.sort_by(|a, b| a.0.total_cmp(&b.0));
         Self { reach: self.reach, ..Self::of(self.centre, self.corners, true) }
-    }
-
-    /// How many corners there are up to a direction, see [`turn`].
-    fn corners_up_to(&self, turn: f32) -> usize {
-        let known = self.counts.get((turn * DIRECTIONS) as usize).copied().unwrap_or_default();
-        let rest = self.corners.get(known..).unwrap_or_default();
-        known + rest.iter().take_while(|corner| corner.0 <= turn).count()
     }
 
     /// Distance of a place from the edge, texels: positive inside, negative outside.
@@ -223,14 +163,15 @@ impl Outline {
             return None;
         }
         let turn = turn(off);
-        let next = self.corners_up_to(turn);
+        let next = self.corners.partition_point(|corner| corner.0 <= turn);
         let side = self.sides.get(next + BESIDE)?;
         let within = side.within(off);
         if !self.is_worn {
             return Some((within, side));
         }
         // The sides of its sector and of the neighbouring ones.
-        let nearest = self.ends.nearest_squared(next, off)?.sqrt();
+        let near = self.sides.get(next..=next + 2 * BESIDE)?;
+        let nearest = near.iter().map(|side| side.distance_squared(off)).fold(f32::MAX, f32::min).sqrt();
         Some((if within > 0.0 { nearest } else { -nearest }, side))
     }
 }

@@ -10,19 +10,19 @@ pub(super) const WIDE: usize = TILE as usize + 2;
 /// A value for each texel of a row.
 pub(super) type Row = [f32; WIDE];
 
-/// No value.
-pub(super) const FLAT: Row = [0.0; WIDE];
+/// 0 for each.
+pub(super) const ZEROS: Row = [0.0; WIDE];
 
 /// A row of texels.
 #[derive(Clone, Copy)]
-pub(super) struct Line {
+pub(super) struct TexelRow {
     /// The place of its first texel, in the field.
     pub(super) first: Vec2,
-    /// What offsets are from, as the middle of a zone.
+    /// The place that offsets are from, as the middle of a zone.
     pub(super) centre: Vec2,
 }
 
-impl Line {
+impl TexelRow {
     #[inline(always)]
     pub(super) fn at(self, k: usize) -> Vec2 {
         Vec2::new(self.first.x + k as i32 as f32, self.first.y)

@@ -2,17 +2,14 @@
 
 use super::{
     broken::crater,
-    bruise::{Bruise, craze},
     crushed::CrushedZone,
-    noise::noise,
     outline::WIDEST,
-    row::{FLAT, Line, WIDE},
-    shape::{BruiseSpread, Pieces, Place, Shape},
-    spot::{SLOPE_UNIT, Spot, TILE, Tile},
+    shape::{Pieces, Shape},
+    spot::{Spot, TILE, Tile},
 };
 use crate::{
     Grid,
-    math::{mix, vectorized},
+    math::mix,
     pattern::{Bricks, Strike, SurfaceFrame},
     raster::TexelRect,
     relief::Crater,
@@ -366,170 +363,6 @@ impl CrushedField {
             x += now.len() as u32;
             rest = later;
         }
-    }
-}
-
-impl Shape<'_> {
-    /// Draws it over the texels `rect` of a tile whose first texel is at `corner`.
-    fn draw(&self, texels: &mut Tile, centre: Vec2, seed: u32, rect: TexelRect, corner: UVec2) {
-        // Heights around each texel are needed for its slope.
-        let mut places = [Place::NONE; WIDE * WIDE];
-        let (size, first) = (rect.size().as_usizevec2(), rect.min.as_vec2() - 0.5);
-        let line = |y: usize| Line { first: first + Vec2::new(0.0, y as f32), centre };
-        match &self.broken {
-            Some(broken) => {
-                for (y, places) in places.chunks_exact_mut(WIDE).enumerate().take(size.y + 2) {
-                    let is_within = |k: usize| !self.is_beyond(line(y).off(k).length());
-                    self.break_off(&mut places[..size.x + 2], broken, line(y), is_within, seed);
-                }
-            }
-            None => {
-                let bruised = self.bruised(size.y + 2, line, seed);
-                for y in 0..size.y + 2 {
-                    for x in 0..size.x + 2 {
-                        let (at, k) = (line(y).at(x), y * WIDE + x);
-                        places[k] = self.place(line(y).off(x), at, bruised.as_ref().map(|all| all[k]), seed);
-                    }
-                }
-            }
-        }
-        let corner = (rect.min - corner).as_usizevec2();
-        for y in 0..size.y {
-            for x in 0..size.x {
-                let at = (y + 1) * WIDE + x + 1;
-                let slope = |step: usize| {
-                    let slope = 0.5 * (places[at - step].height - places[at + step].height);
-                    (slope * SLOPE_UNIT).clamp(-32_000.0, 32_000.0) as i16
-                };
-                let Place { height, pale, shade, dark, pit } = places[at];
-                let deep = if self.depth > 0.0 { -height / self.depth } else { 0.0 };
-                let spot = Spot {
-                    // Nothing is lit in a hole.
-                    slope: if dark > 0.5 { [0; 2] } else { [slope(1), slope(WIDE)] },
-                    pale: (pale.clamp(0.0, 1.0) * 255.0 + 0.5) as u8,
-                    shade: (shade * 128.0).clamp(-127.0, 127.0) as i8,
-                    dark: (dark.clamp(0.0, 1.0) * 255.0 + 0.5) as u8,
-                    deep: (deep.clamp(0.0, 1.0) * 255.0 + 0.5) as u8,
-                    pit,
-                };
-                let texel = &mut texels[(y + corner.y) * TILE as usize + x + corner.x];
-                *texel = texel.with(spot);
-            }
-        }
-    }
-
-    /// Whether a zone ends nearer to the hit than this; no outline extends further.
-    fn is_beyond(&self, distance: f32) -> bool {
-        let CrushedZone { ragged, flake, reach, .. } = *self.crushed;
-        distance / self.radius.max(0.5) > reach.max(flake).max(1.0 + WIDEST * ragged) + 0.1
-    }
-
-    /// How a bruise spreads over some rows, and its crossing cracks. `None` if there is none.
-    fn bruised(
-        &self,
-        rows: usize,
-        line: impl Fn(usize) -> Line,
-        seed: u32,
-    ) -> Option<Box<[(BruiseSpread, Bruise); WIDE * WIDE]>> {
-        if self.crushed.needles <= 0.0 {
-            return None;
-        }
-        let mut all = Box::new([(BruiseSpread::default(), Bruise::default()); WIDE * WIDE]);
-        let mut left = [0.0; WIDE * WIDE];
-        for y in 0..rows {
-            let mut clouds = FLAT;
-            vectorized(
-                #[inline(always)]
-                || line(y).fill(&mut clouds, &(0..WIDE), |at| self.cloud(at, seed)),
-            );
-            for (x, cloud) in clouds.into_iter().enumerate() {
-                let off = line(y).off(x);
-                if !self.is_beyond(off.length()) {
-                    let radii = off.length() / self.radius.max(0.5);
-                    let (q, left_here) = self.left_of_bruise(off, radii, cloud, seed);
-                    all[y * WIDE + x].0 = BruiseSpread { q, left: left_here, cloud };
-                    left[y * WIDE + x] = left_here;
-                }
-            }
-        }
-        if self.crushed.crazing > 0.0 {
-            let (mut cracks, mut flakes) = ([0.0; WIDE * WIDE], [0.0; WIDE * WIDE]);
-            let Line { first, centre } = line(0);
-            craze([&mut cracks, &mut flakes], &left[..rows * WIDE], WIDE, (first, centre), self.radius, seed);
-            for ((all, crack), flake) in all.iter_mut().zip(cracks).zip(flakes) {
-                all.1 = Bruise { crack, flake };
-            }
-        }
-        Some(all)
-    }
-
-    /// The content of a place that does not break off; `off` is the offset from the centre, `at` the position in the field.
-    fn place(&self, off: Vec2, at: Vec2, bruised: Option<(BruiseSpread, Bruise)>, seed: u32) -> Place {
-        let CrushedZone { ragged, soft, hole, pale, speckle, flake, dust, chips, reach, .. } = *self.crushed;
-        let mut place = Place::NONE;
-        let distance = off.length();
-        let radii = distance / self.radius.max(0.5);
-        let widest = 1.0 + WIDEST * ragged;
-        if self.is_beyond(distance) {
-            return place;
-        }
-        let way = off / distance.max(1.0e-3);
-        let grain = |k: u32, size: f32| noise(seed ^ k, at.x / size, at.y / size);
-        let round = |k: u32, times: f32| noise(seed ^ k, way.x * times + 17.0, way.y * times + 31.0);
-        let mut inside = 0.0;
-        if let Some((spread, crazed)) = bruised {
-            self.add_bruise(&mut place, off, spread, crazed, seed);
-        }
-        if radii <= widest {
-            let fine = grain(1, self.grain);
-            let edge = 1.0 + ragged * (0.55 * round(2, 1.3) + 0.35 * round(3, 3.7) + 0.2 * fine);
-            let outline = (self.radius * edge).max(0.5);
-            // An edge one texel wide.
-            inside = (outline - distance + 0.5).clamp(0.0, 1.0);
-            if inside > 0.0 {
-                let coarse = grain(4, 2.3 * self.grain);
-                let rest = (1.0 - distance / outline).clamp(0.0, 1.0);
-                let fade = inside + soft * ((1.5 * rest).min(1.0) - inside);
-                // A broken edge is steep; a soft one has no wall.
-                let bowl = rest.sqrt() + soft * (rest * rest - rest.sqrt());
-                place.height += -self.depth * bowl + fade * self.rough * (0.6 * coarse + 0.4 * fine);
-                let grains = 1.0 - speckle * (0.5 + 0.5 * grain(5, 0.6 * self.grain)).clamp(0.0, 1.0);
-                place.pale = place.pale.max(pale * fade * grains * (1.0 - self.crushed.needles));
-                place.shade += speckle * (0.6 * coarse + 0.3 * fine) * inside * (1.0 - self.crushed.needles);
-            }
-        }
-        if flake > 1.0 {
-            self.add_flake(&mut place, way, radii, seed);
-        }
-        if (inside < 1.0 || self.crushed.needles > 0.0) && radii < reach {
-            let left = 1.0 - ((radii - 0.8) / (reach - 0.8)).clamp(0.0, 1.0);
-            if dust > 0.0 {
-                let cloud = 0.65 + 0.35 * grain(6, 5.0 * self.grain);
-                let powder = inside * (1.0 - self.crushed.needles);
-                place.pale = place.pale.max(dust * left * left * cloud * (1.0 - powder));
-            }
-            self.add_crumb(&mut place, at, chips * left * left, seed);
-        }
-        for &(middle, radius) in &self.bubbles {
-            let (off, out) = (off - middle, off.distance(middle));
-            let inside = (radius + 0.5 - out).clamp(0.0, 1.0);
-            if inside > 0.0 {
-                // A bright ring, brighter where the light leaves it, and a highlight.
-                let ring = (1.0 - (radius - 0.7 - out).abs() / 1.2).clamp(0.0, 1.0);
-                let leaves = 0.5 + 0.35 * (off.x + off.y) / out.max(0.5);
-                let light = (0.34 * radius + 0.5 - (off + 0.38 * radius).length()).clamp(0.0, 1.0);
-                let white = (ring * leaves).max(light);
-                place.pale += (white.max(0.10) - place.pale) * (0.8 * inside);
-                place.shade += (0.3 * white - 0.25 * (1.0 - white) - place.shade) * inside;
-            }
-        }
-        if let Some(hole) = self.hole {
-            self.add_hole(&mut place, hole, off);
-        } else if hole > 0.0 && radii <= hole * (1.0 + WIDEST * ragged) + 1.0 {
-            let radius = self.radius * hole * (1.0 + 0.6 * ragged * (round(7, 1.9) + 0.5 * round(8, 4.3)));
-            place.dark = (radius - distance + 0.5).clamp(0.0, 1.0);
-        }
-        place
     }
 }
 
