@@ -11,4 +11,4 @@ mod play;
 pub use film::OnCanvas;
 pub use label::Label;
 pub use machine::{DemoArguments, Output, demo_app};
-pub use play::{Cursor, Script, caption, heal_on_h, hit_on_press, play, with_normals};
+pub use play::{Cursor, Script, caption, heal_on_h, hit_on_press, play, repeated, with_normals};

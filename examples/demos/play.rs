@@ -10,7 +10,7 @@ use bevy::{
         schedule::IntoScheduleConfigs,
         system::{ScheduleSystem, SystemParam},
     },
-    image::ImageLoaderSettings,
+    image::{ImageAddressMode, ImageLoaderSettings, ImageSampler, ImageSamplerDescriptor},
     prelude::*,
     window::PrimaryWindow,
 };
@@ -119,4 +119,17 @@ pub fn with_normals(assets: &AssetServer, name: &str) -> (Handle<Image>, Handle<
         .with_settings(|settings: &mut ImageLoaderSettings| settings.is_srgb = false)
         .load(format!("textures/{name}_normal.png"));
     (assets.load(format!("textures/{name}.png")), normals)
+}
+
+/// A picture that ships with the crate and repeats.
+#[must_use]
+pub fn repeated(assets: &AssetServer, name: &str) -> Handle<Image> {
+    let settings = |settings: &mut ImageLoaderSettings| {
+        settings.sampler = ImageSampler::Descriptor(ImageSamplerDescriptor {
+            address_mode_u: ImageAddressMode::Repeat,
+            address_mode_v: ImageAddressMode::Repeat,
+            ..ImageSamplerDescriptor::linear()
+        });
+    };
+    assets.load_builder().with_settings(settings).load(format!("textures/{name}.png"))
 }

@@ -8,7 +8,6 @@
 use bevy::{
     camera::Hdr,
     core_pipeline::tonemapping::Tonemapping,
-    image::{ImageAddressMode, ImageLoaderSettings, ImageSampler, ImageSamplerDescriptor},
     light::{CascadeShadowConfigBuilder, NotShadowCaster},
     math::Affine2,
     prelude::*,
@@ -17,7 +16,7 @@ use bevy_crack::{
     prelude::*,
     shatter::{Anchor, BurstParams, ShatterParams},
 };
-use bevy_crack_demos::{Cursor, DemoArguments, OnCanvas, Script, demo_app, heal_on_h, play};
+use bevy_crack_demos::{Cursor, DemoArguments, OnCanvas, Script, demo_app, heal_on_h, play, repeated};
 
 /// Width and height of the pane, metres, and the height of its middle above the pavement.
 const PANE: Vec2 = Vec2::new(2.5, 1.7);
@@ -60,18 +59,6 @@ fn main() -> AppExit {
         .add_systems(Update, fly)
         .add_observer(mend);
     play(app, (play_by_hand, heal_on_h).before(fly), play_script.before(fly))
-}
-
-/// A picture that repeats.
-fn repeated(assets: &AssetServer, name: &str) -> Handle<Image> {
-    let settings = |settings: &mut ImageLoaderSettings| {
-        settings.sampler = ImageSampler::Descriptor(ImageSamplerDescriptor {
-            address_mode_u: ImageAddressMode::Repeat,
-            address_mode_v: ImageAddressMode::Repeat,
-            ..ImageSamplerDescriptor::linear()
-        });
-    };
-    assets.load_builder().with_settings(settings).load(format!("textures/{name}.png"))
 }
 
 /// The light, the camera, the pavement and the front of the house.

@@ -11,7 +11,7 @@ use bevy::{
     camera::Hdr,
     core_pipeline::tonemapping::Tonemapping,
     light::{CascadeShadowConfigBuilder, NotShadowCaster},
-    math::ops,
+    math::{Affine2, ops},
     mesh::{Indices, PrimitiveTopology},
     prelude::*,
     render::render_resource::{Extent3d, TextureDimension, TextureFormat},
@@ -21,7 +21,7 @@ use bevy_crack::{
     prelude::*,
     shatter::{BreakAgain, BurstParams, ShatterParams, SizeClasses},
 };
-use bevy_crack_demos::{DemoArguments, Script, demo_app, heal_on_h, hit_on_press, play, with_normals};
+use bevy_crack_demos::{DemoArguments, Script, demo_app, heal_on_h, hit_on_press, play, repeated, with_normals};
 use std::f32::consts::TAU;
 
 /// Height of the pedestal, metres.
@@ -129,13 +129,30 @@ fn setup(
         perceptual_roughness: roughness,
         ..default()
     };
-    let floor = materials.add(plain(Color::srgb(0.36, 0.34, 0.33), 0.95));
+    let mut tiled = |name, times: Vec2, tint| {
+        materials.add(StandardMaterial {
+            base_color_texture: Some(repeated(&assets, name)),
+            uv_transform: Affine2::from_scale(times),
+            ..plain(tint, 0.95)
+        })
+    };
+    let floor = tiled("paving", Vec2::splat(8.0), Color::srgb(0.62, 0.6, 0.58));
+    let wall = tiled("plaster", Vec2::new(6.0, 2.0), Color::srgb(0.5, 0.6, 0.62));
     let clay = materials.add(plain(Color::srgb(0.72, 0.42, 0.28), 0.6));
     let plaster = materials.add(StandardMaterial {
         base_color_texture: Some(assets.load("textures/plaster.png")),
         ..plain(Color::WHITE, 0.95)
     });
     commands.spawn((Mesh3d(meshes.add(Plane3d::new(Vec3::Y, Vec2::splat(8.0)))), MeshMaterial3d(floor)));
+    // Behind all of it, whichever way the camera looks.
+    for (x, z) in [(-0.35, -1.0), (-1.0, -0.35)] {
+        let facing = Vec3::new(-x, 0.0, -z).normalize();
+        commands.spawn((
+            Mesh3d(meshes.add(Rectangle::new(16.0, 5.0))),
+            MeshMaterial3d(wall.clone()),
+            Transform::from_translation(Vec3::Y * 2.5 - 2.2 * facing).looking_to(-facing, Vec3::Y),
+        ));
+    }
     // It has a picture of its own, which is laid out with it.
     let pedestal = CrackSurface::new(CrackPreset::CONCRETE).with_unwrap(CrackUnwrap::Always);
     let jar = CrackSurface::new(CrackPreset::CLAY).with_seed(1);
@@ -278,8 +295,8 @@ fn let_dust_settle(
 fn go_around(time: Res<Time>, mut camera: Query<&mut Transform, With<Camera3d>>) {
     for mut transform in &mut camera {
         let angle = 0.75 + 0.4 * ops::sin(0.5 * time.elapsed_secs());
-        let eye = Vec3::new(3.7 * ops::sin(angle), 2.35, 3.7 * ops::cos(angle));
-        *transform = Transform::from_translation(eye).looking_at(Vec3::new(0.0, 1.08, 0.0), Vec3::Y);
+        let eye = Vec3::new(3.2 * ops::sin(angle), 1.95, 3.2 * ops::cos(angle));
+        *transform = Transform::from_translation(eye).looking_at(Vec3::new(0.1, 1.05, 0.0), Vec3::Y);
     }
 }
 

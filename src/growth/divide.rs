@@ -22,6 +22,7 @@ use crate::{
     pattern::{LinkKind, NO_PARENT, Node},
 };
 use glam::Vec2;
+use std::{cmp::Ordering, collections::BinaryHeap};
 
 /// Largest number of steps that a tip runs straight without markers.
 pub(super) const STRAIGHT: u16 = 400;
@@ -67,7 +68,7 @@ const ROUND: f32 = 1.7;
 const WITHIN_GRAIN: f32 = 0.3;
 
 /// A marker at which a crack may start.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Candidate {
     pub(super) marker: u32,
     pub(super) id: u32,
@@ -79,6 +80,28 @@ pub(super) struct Candidate {
     from_hit: f32,
 }
 
+/// The farthest from all cracks is the greatest; ties go to the one nearest to the hit.
+impl Ord for Candidate {
+    fn cmp(&self, other: &Self) -> Ordering {
+        let nearer = other.from_hit.total_cmp(&self.from_hit).then(other.id.cmp(&self.id));
+        self.near_sq.total_cmp(&other.near_sq).then(nearer)
+    }
+}
+
+impl PartialOrd for Candidate {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Candidate {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl Eq for Candidate {}
+
 impl CrackGrowth {
     /// One step of a growth that divides domains.
     pub(super) fn divide(&mut self) {
@@ -89,7 +112,9 @@ impl CrackGrowth {
         let fresh = std::mem::take(&mut division.fresh);
         let is_running = self.arrest.as_ref().is_some_and(Arrest::is_running);
         let is_idle = tips.is_empty() && fresh.is_empty() && !is_running;
-        let mut candidates = self.candidates(is_idle);
+        let due = self.params.nucleation * self.steps.saturating_add(1) as f32;
+        let is_due = (self.nucleated as f32) < due;
+        let candidates = if is_idle || is_due { self.candidates(is_idle) } else { Vec::new() };
         self.timeline.begin(self.steps.saturating_add(1));
         self.new_nodes = first..first;
         if is_idle && candidates.is_empty() && self.room() > 0 {
@@ -118,15 +143,11 @@ impl CrackGrowth {
         }
         self.advance_runners();
         self.show_markers();
-        // The farthest from all cracks first; ties go to the one nearest to the hit.
-        candidates.sort_unstable_by(|a, b| {
-            b.near_sq.total_cmp(&a.near_sq).then(a.from_hit.total_cmp(&b.from_hit)).then(a.id.cmp(&b.id))
-        });
-        let due = self.params.nucleation * self.steps as f32;
-        for candidate in candidates {
-            if self.nucleated as f32 >= due {
-                break;
-            }
+        // Few of them are needed, so they are not sorted.
+        let mut candidates = BinaryHeap::from(candidates);
+        while (self.nucleated as f32) < due
+            && let Some(candidate) = candidates.pop()
+        {
             self.begin_crack(candidate);
         }
         self.nucleated = self.nucleated.max(due as u32);

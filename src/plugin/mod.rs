@@ -52,6 +52,10 @@ pub use carrier::lit::{CrackLight2d, CrackLitMaterial, CrackLitUniform, MAX_LIGH
 pub use carrier::place::{CrackPlace, CrackPlaces};
 pub use life::{commands::CrackCommandsExt, record::CrackRecords};
 
+use draw::{async_playback::AsyncPlayback, next_picture::NextPicture};
+use shards::broken::Pieces;
+use surface::cracked::Cracked;
+
 use bevy::{
     app::{PluginGroup, PluginGroupBuilder, PostUpdate},
     asset::AssetEventSystems,
@@ -138,6 +142,9 @@ impl Plugin for CrackPlugin {
             .register_type::<CrackBudget>()
             .register_type::<CrackStats>()
             .register_type::<CrackUploadStats>()
+            .register_required_components::<Cracked, AsyncPlayback>()
+            .register_required_components::<Cracked, NextPicture>()
+            .register_required_components::<CrackShards, Pieces>()
             .init_resource::<CrackBudget>()
             .init_resource::<CrackStats>()
             .init_resource::<CrackUploadStats>()

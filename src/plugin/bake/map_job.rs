@@ -300,7 +300,11 @@ mod tests {
             let texel = |x: u32| {
                 let [red, green, blue, cover] = column(x, is_inverted);
                 let [red, green, blue] = [red, green, blue].map(|light| if is_srgb { level(light) } else { light });
-                let all = if name.starts_with("Bgra") { [blue, green, red, cover] } else { [red, green, blue, cover] };
+                let all = match format {
+                    Bgra8Unorm | Bgra8UnormSrgb => [blue, green, red, cover],
+                    Rg16Uint => [red, cover, 0.0, 0.0],
+                    _ => [red, green, blue, cover],
+                };
                 all[..channels].iter().flat_map(|share| stored(*share, bytes, is_float)).collect::<Vec<u8>>()
             };
             let data = (0..SIZE.y).flat_map(|_| (0..SIZE.x).flat_map(texel)).collect();
@@ -312,9 +316,10 @@ mod tests {
             assert_eq!(ink.size(), SIZE, "{name}");
             for x in 0..SIZE.x {
                 let [red, green, blue, cover] = column(x, is_inverted);
-                // One channel is grey; of two there is no blue; all is opaque without a fourth.
+                // One channel is grey; of two there is no blue; all is opaque without a fourth. Files with grey and alpha become one format.
                 let (shown, cover) = match channels {
                     1 => ([red; 3], 1.0),
+                    2 if format == Rg16Uint => ([red; 3], cover),
                     2 => ([red, green, 0.0], 1.0),
                     _ => ([red, green, blue], cover),
                 };
@@ -332,17 +337,21 @@ mod tests {
     /// Fault G1: and in each kind of PNG file.
     #[test]
     fn g1_guide_files_of_every_kind() {
-        let of = |x: u32| column(x, false).map(|share| if share > 0.5 { 255 } else { 0 });
-        // Without grey and colours, of which files say other things.
-        let has_no_color = |x: u32| !matches!(x, 10..=14);
+        let of = |x: u32| match x {
+            10 => [100, 100, 100, 255],
+            _ => column(x, false).map(|share| if share > 0.5 { 255 } else { 0 }),
+        };
+        // Without colours, of which files say other things.
+        let has_no_color = |x: u32| !matches!(x, 12..=14);
         let drawing = RgbaImage::from_fn(SIZE.x, SIZE.y, |x, _| image::Rgba(of(if has_no_color(x) { x } else { 0 })));
         let drawing = DynamicImage::ImageRgba8(drawing);
-        let kinds: [DynamicImage; 6] = [
+        let kinds: [DynamicImage; 7] = [
             drawing.to_luma8().into(),
             drawing.to_rgb8().into(),
             drawing.to_luma_alpha8().into(),
             drawing.to_rgba8().into(),
             drawing.to_luma16().into(),
+            drawing.to_luma_alpha16().into(),
             drawing.to_rgba16().into(),
         ];
         for (i, kind) in kinds.into_iter().enumerate() {
@@ -351,9 +360,14 @@ mod tests {
             kind.write_to(&mut file, ImageFormat::Png).expect("it can be written");
             let ink = read(Vec::new(), Source::Png(file.into_inner().into())).expect("it can be read");
             for x in 0..SIZE.x {
-                let is_ink = (5..8).contains(&x) || (x == 16 && !is_transparent);
+                let want = match x {
+                    5..8 => 1.0,
+                    10 => 155.0 / 255.0,
+                    16 if !is_transparent => 1.0,
+                    _ => 0.0,
+                };
                 let got = ink.get(x, 3).unwrap_or(f32::NAN);
-                assert!((got - f32::from(u8::from(is_ink))).abs() < 0.01, "kind {i} at {x}: {got}");
+                assert!((got - want).abs() < 0.01, "kind {i} at {x}: {got}, not {want}");
             }
         }
     }

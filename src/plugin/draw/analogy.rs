@@ -70,7 +70,7 @@ type WithAnalogies<'w, 's> = Query<
         Ref<'static, CrackAnalogy>,
         &'static mut AnalogyProgress,
         &'static mut Cracked,
-        Has<AsyncPlayback>,
+        &'static AsyncPlayback,
     ),
     (With<CrackSurface>, Allow<Disabled>),
 >;
@@ -94,7 +94,7 @@ pub(crate) fn make_analogies(
     let count = surfaces.iter().count();
     // In turns: who was first is the last in the next frame in which there is no time for all.
     let mut seen = 0;
-    for (number, (entity, name, analogy, mut progress, mut cracked, is_async)) in surfaces.iter_mut().enumerate() {
+    for (number, (entity, name, analogy, mut progress, mut cracked, playback)) in surfaces.iter_mut().enumerate() {
         if number < *first % count {
             continue;
         }
@@ -132,7 +132,7 @@ pub(crate) fn make_analogies(
         }
         let is_dirty = active.canvas.views.iter().any(|view| !view.dirty.is_empty());
         // Tasks that play baked cracks see for themselves what is to be painted.
-        if is_dirty && !is_async {
+        if is_dirty && !playback.is_on() {
             queues.mark_dirty(entity, &mut active.turn);
         }
         if timer.is_over() {

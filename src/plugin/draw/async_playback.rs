@@ -36,14 +36,18 @@ const NODES_OF_HIT: usize = 128;
 /// Frames after which memory is given back if time stands still.
 const IDLE: u32 = 60;
 
-/// What shows the times of a surface with baked cracks, and makes other surfaces again of which much is to be drawn or painted. Removed when
-/// that is done, or the end is shown and nothing can turn time back.
+/// What shows the times of a surface with baked cracks, and makes other surfaces again of which much is to be drawn or painted. Nothing as
+/// soon as that is done, or the end is shown and nothing can turn time back.
 ///
 /// While a job runs, the field, the touched tiles and the replay of the surface are with it, and the surface counts as dirty without being in
 /// the queue.
 #[derive(Component, Default)]
-#[component(storage = "SparseSet", clone_behavior = Ignore)]
-pub(crate) struct AsyncPlayback {
+#[component(clone_behavior = Ignore)]
+pub(crate) struct AsyncPlayback(Option<Box<AsyncWork>>);
+
+/// What tasks make of one surface.
+#[derive(Default)]
+struct AsyncWork {
     timeline: Option<Arc<TimelineSnapshot>>,
     back: Option<Back>,
     job: Option<Running>,
@@ -60,14 +64,27 @@ impl AsyncPlayback {
     /// Of a growth all of whose times are to be shown, and of the texels that are shown first: in the background, as both are copied.
     pub(crate) fn new(growth: &CrackGrowth, texels: &[Option<Vec<u8>>; MAPS]) -> Self {
         let back = Back { texels: texels.clone(), behind: Vec::new() };
-        Self { timeline: Some(TimelineSnapshot::of(growth)), back: Some(back), ..Self::default() }
+        let work = AsyncWork { timeline: Some(TimelineSnapshot::of(growth)), back: Some(back), ..AsyncWork::default() };
+        Self(Some(Box::new(work)))
+    }
+
+    /// Whether tasks make what the surface shows, or will as soon as that changes.
+    pub(crate) const fn is_on(&self) -> bool {
+        self.0.is_some()
+    }
+
+    /// Has tasks make what the surface shows from now on.
+    pub(super) fn turn_on(&mut self) {
+        self.0.get_or_insert_default();
     }
 
     /// Whether a surface has baked cracks and shows any but the end.
     pub(crate) const fn is_for(active: &Active) -> bool {
         active.cracks.added.is_some() && active.playhead.playback.is_some()
     }
+}
 
+impl AsyncWork {
     /// Begins to make what the surface is to show.
     fn begin(&mut self, active: &mut Active, has_threads: bool) {
         let moment = active.moment();
@@ -158,6 +175,11 @@ impl AsyncPlayback {
     }
 }
 
+/// What tasks make of a surface, if they make anything.
+fn work_of(world: &mut World, entity: Entity) -> Option<&mut AsyncWork> {
+    world.get_mut::<AsyncPlayback>(entity)?.into_inner().0.as_deref_mut()
+}
+
 /// Whether tasks can make the times of a surface, one after the other: nothing else is to paint its textures.
 fn can_be_async(active: &Active) -> bool {
     let has_one_view = active.drawing.cutouts.is_none() && active.canvas.views.len() == 1;
@@ -193,9 +215,9 @@ fn start_over(active: &mut Active) {
 /// Whether a surface can be changed without waiting for a task, and without ending the slices of one. If not, it can as soon as what is being
 /// made is there.
 pub(crate) fn may_change(world: &mut World, entity: Entity) -> bool {
-    let Some(mut playback) = world.get_mut::<AsyncPlayback>(entity) else { return true };
-    let is_at_rest = playback.job.as_ref().is_none_or(Running::is_at_rest);
-    playback.is_awaited = !is_at_rest;
+    let Some(work) = work_of(world, entity) else { return true };
+    let is_at_rest = work.job.as_ref().is_none_or(Running::is_at_rest);
+    work.is_awaited = !is_at_rest;
     is_at_rest
 }
 
@@ -203,19 +225,19 @@ pub(crate) fn may_change(world: &mut World, entity: Entity) -> bool {
 /// work, unless the surface [may change](may_change). What is to be painted then is much.
 pub(crate) fn recall(world: &mut World, entity: Entity, active: &mut Active) {
     if take_back(world, entity, active)
-        && let Some(mut playback) = world.get_mut::<AsyncPlayback>(entity)
+        && let Some(work) = work_of(world, entity)
     {
-        playback.is_asked = true;
+        work.is_asked = true;
     }
 }
 
 /// The same for a surface that will show something else. Returns whether anything was to be made.
 pub(crate) fn take_back(world: &mut World, entity: Entity, active: &mut Active) -> bool {
-    let Some(mut playback) = world.get_mut::<AsyncPlayback>(entity) else { return false };
-    playback.timeline = None;
-    playback.rest();
-    let was_asked = core::mem::take(&mut playback.is_asked);
-    let Some(job) = playback.job.take() else { return was_asked };
+    let Some(work) = work_of(world, entity) else { return false };
+    work.timeline = None;
+    work.rest();
+    let was_asked = core::mem::take(&mut work.is_asked);
+    let Some(job) = work.job.take() else { return was_asked };
     active.turn.is_dirty = false;
     match job.recall() {
         Some(job) => {
@@ -239,21 +261,18 @@ pub(crate) fn take_back(world: &mut World, entity: Entity, active: &mut Active) 
 
 /// Drops what tasks make of a surface.
 pub(crate) fn stop(world: &mut World, entity: Entity, active: &mut Active) {
-    let playback = world.get_entity_mut(entity).ok().and_then(|mut entity| entity.take::<AsyncPlayback>());
-    if let Some(playback) = playback {
-        active.turn.is_dirty = active.turn.is_dirty && playback.job.is_none();
-        drop_in_background(playback);
+    if let Some(work) = world.get_mut::<AsyncPlayback>(entity).and_then(|mut playback| playback.0.take()) {
+        active.turn.is_dirty = active.turn.is_dirty && work.job.is_none();
+        drop_in_background(work);
     }
 }
 
 /// Has tasks make the times of a surface with baked cracks, if it shows any but the end.
 pub(crate) fn start(world: &mut World, entity: Entity, playback: Option<AsyncPlayback>) {
     let is_for = active_mut(world, entity).is_some_and(|active| AsyncPlayback::is_for(active));
-    if is_for
-        && let Ok(mut entity) = world.get_entity_mut(entity)
-        && !entity.contains::<AsyncPlayback>()
-    {
-        entity.insert(playback.unwrap_or_default());
+    if is_for && let Some(mut to) = world.get_mut::<AsyncPlayback>(entity).filter(|playback| !playback.is_on()) {
+        *to = playback.unwrap_or_default();
+        to.turn_on();
     }
 }
 
@@ -286,22 +305,18 @@ pub(crate) fn repaint(world: &mut World, entity: Entity, active: &mut Active) {
 
 /// Has a task make what a surface shows. `false` if that is not needed.
 fn ask(world: &mut World, entity: Entity) -> bool {
-    let is_unlimited = world.resource::<CrackBudget>().is_unlimited();
-    let Ok(mut entity) = world.get_entity_mut(entity) else { return false };
-    if is_unlimited {
+    if world.resource::<CrackBudget>().is_unlimited() {
         return false;
     }
-    if let Some(mut playback) = entity.get_mut::<AsyncPlayback>() {
-        playback.is_asked = true;
-    } else {
-        entity.insert(AsyncPlayback { is_asked: true, ..AsyncPlayback::default() });
-    }
+    let Some(mut playback) = world.get_mut::<AsyncPlayback>(entity) else { return false };
+    playback.0.get_or_insert_default().is_asked = true;
     true
 }
 
 /// Whether a task makes what a surface shows, or slices of frames do.
 pub(crate) fn is_at_work(world: &World, entity: Entity) -> bool {
-    world.get::<AsyncPlayback>(entity).is_some_and(|playback| playback.job.is_some())
+    let work = world.get::<AsyncPlayback>(entity).and_then(|playback| playback.0.as_deref());
+    work.is_some_and(|work| work.job.is_some())
 }
 
 /// Shows what tasks have made of surfaces with baked cracks, and has made what they are to show now.
@@ -317,22 +332,23 @@ pub(crate) fn play_async(
     images: Option<ResMut<Assets<Image>>>,
     mut states: Query<&mut CrackState>,
 ) {
-    let Some(mut images) = images.filter(|_| !playing.is_empty()) else { return };
+    let is_any = playing.iter().any(|(_, playback, _)| playback.is_on());
+    let Some(mut images) = images.filter(|_| is_any) else { return };
     let timer = clock.start(&budget, 1.0);
     let has_threads = threads.pool().is_some();
     for (entity, mut playback, mut cracked) in &mut playing {
-        let Some(active) = cracked.get_mut() else { continue };
-        let is_awaited = core::mem::take(&mut playback.is_awaited);
+        let (Some(work), Some(active)) = (&mut playback.0, cracked.get_mut()) else { continue };
+        let is_awaited = core::mem::take(&mut work.is_awaited);
         let (mut is_new, mut is_over, mut has_made) = (!is_awaited, false, false);
         loop {
-            if let Some(job) = playback.job.take() {
+            if let Some(job) = work.job.take() {
                 let before = active.playhead.playback.as_ref().map(|playback| playback.shown);
                 match job.look(&timer) {
                     News::Running(job) => {
-                        playback.job = Some(job);
+                        work.job = Some(job);
                         break;
                     }
-                    News::Made(job) => playback.apply(active, *job, &mut images, &mut uploads),
+                    News::Made(job) => work.apply(active, *job, &mut images, &mut uploads),
                     News::Lost => start_over(active),
                 }
                 has_made = true;
@@ -345,10 +361,10 @@ pub(crate) fn play_async(
             let is_stale = is_stale || shows_stale(active);
             let is_wanted = active.is_behind() || is_stale;
             // Frames show cracks that were not baked, unless all of them are to be made again.
-            playback.is_asked &= is_wanted;
-            if budget.is_unlimited() || !(playback.is_asked || can_be_async(active)) {
-                playback.rest();
-                playback.is_asked = false;
+            work.is_asked &= is_wanted;
+            if budget.is_unlimited() || !(work.is_asked || can_be_async(active)) {
+                work.rest();
+                work.is_asked = false;
                 is_over = active.cracks.added.is_none();
                 if !budget.is_unlimited()
                     && let Some(added) = &mut active.cracks.added
@@ -362,9 +378,9 @@ pub(crate) fn play_async(
                 }
                 break;
             }
-            playback.idle = if is_wanted { 0 } else { playback.idle + 1 };
-            if playback.idle == IDLE {
-                playback.rest();
+            work.idle = if is_wanted { 0 } else { work.idle + 1 };
+            if work.idle == IDLE {
+                work.rest();
             }
             if !(is_wanted && core::mem::take(&mut is_new)) {
                 break;
@@ -372,18 +388,17 @@ pub(crate) fn play_async(
             if active.turn.is_dirty {
                 queues.dirty.retain(|other| *other != entity);
             }
-            let stager = playback.stager.take();
+            let stager = work.stager.take();
             let stager = stager.filter(|stager| device.as_ref().is_some_and(|device| stager.is_of(device)));
-            playback.stager = stager.or_else(|| uploads.stager(device.as_deref()));
-            playback.begin(active, has_threads);
+            work.stager = stager.or_else(|| uploads.stager(device.as_deref()));
+            work.begin(active, has_threads);
             if has_threads {
                 break;
             }
         }
-        let is_needed = playback.job.is_some() || playback.is_asked;
+        let is_needed = work.job.is_some() || work.is_asked;
         if !is_needed && (is_over || active.playhead.playback.is_none()) {
-            drop_in_background(core::mem::take(&mut *playback));
-            commands.entity(entity).try_remove::<AsyncPlayback>();
+            drop_in_background(playback.0.take());
         }
     }
     clock.stop(&timer);
@@ -418,7 +433,7 @@ mod tests {
             let mut slices = 0;
             while app.world().get::<CrackState>(entity).is_none_or(|state| state.status != CrackStatus::Done) {
                 let left_to_paint = |app: &App| {
-                    let Some(Running::Slices(job)) = &app.world().get::<AsyncPlayback>(entity)?.job else {
+                    let Some(Running::Slices(job)) = &app.world().get::<AsyncPlayback>(entity)?.0.as_ref()?.job else {
                         return None;
                     };
                     let Stage::Paint(rects) = &job.stage else { return None };
@@ -500,8 +515,8 @@ mod tests {
             app.update();
             // The task that draws it again stops at a lock.
             let gate = GATE.lock().expect("nothing has failed");
-            let mut playback = app.world_mut().get_mut::<AsyncPlayback>(entity).expect("a task draws it");
-            let job = playback.job.take().and_then(Running::recall).expect("it is drawn");
+            let work = work_of(app.world_mut(), entity).expect("a task draws it");
+            let job = work.job.take().and_then(Running::recall).expect("it is drawn");
             let job = BackgroundJob::start(job, |job| {
                 // Not for ever, so that a frame that waits for it fails.
                 for _ in 0..10_000 {
@@ -515,7 +530,7 @@ mod tests {
             while !job.is_begun() {
                 thread::yield_now();
             }
-            playback.job = Some(Running::Task(job, Instant::now()));
+            work.job = Some(Running::Task(job, Instant::now()));
             let before = seen(&app);
             change(&mut app, entity);
             for _ in 0..3 {
@@ -524,7 +539,7 @@ mod tests {
             }
             drop(gate);
             frames_until(&mut app, |app| seen(app) != before);
-            let is_over = |app: &mut App| app.world().get::<AsyncPlayback>(entity).is_none();
+            let is_over = |app: &mut App| work_of(app.world_mut(), entity).is_none();
             frames_until(&mut app, is_over);
 
             let (mut frames, same) = cracked(CrackBudget { milliseconds: f32::INFINITY, ..default() });

@@ -15,7 +15,7 @@ pub(crate) fn blend_normals(
     budget: Res<CrackBudget>,
     mut clock: ResMut<FrameClock>,
     mut queues: ResMut<Queues>,
-    mut surfaces: Query<(&mut Cracked, Has<AsyncPlayback>), Allow<Disabled>>,
+    mut surfaces: Query<(&mut Cracked, &AsyncPlayback), Allow<Disabled>>,
 ) {
     if queues.blending.is_empty() {
         return;
@@ -23,7 +23,7 @@ pub(crate) fn blend_normals(
     let timer = clock.start(&budget, 1.0);
     for _ in 0..queues.blending.len() {
         let Some(entity) = queues.blending.pop_front() else { break };
-        let Ok((mut cracked, is_async)) = surfaces.get_mut(entity) else { continue };
+        let Ok((mut cracked, playback)) = surfaces.get_mut(entity) else { continue };
         let Some(active) = cracked.get_mut() else { continue };
         let turn = &active.turn;
         let is_at_rest = !(turn.is_growing || turn.is_dirty || turn.is_to_shatter);
@@ -31,7 +31,7 @@ pub(crate) fn blend_normals(
             active.blend_normals(budget.is_unlimited());
             let is_dirty = active.canvas.views.iter().any(|view| !view.dirty.is_empty());
             // Tasks that play baked cracks see for themselves what is to be painted.
-            if is_dirty && !is_async {
+            if is_dirty && !playback.is_on() {
                 queues.mark_dirty(entity, &mut active.turn);
             }
         }

@@ -11,10 +11,9 @@ use bevy::{
 
 /// Applies clocks that were set, changed or removed.
 pub(crate) fn follow_clocks(
-    mut commands: Commands,
     mut changed: Query<(Entity, &mut CrackClock), (Changed<CrackClock>, With<CrackTextures>)>,
     mut removed: RemovedComponents<CrackClock>,
-    mut surfaces: Query<(&mut Cracked, Has<AsyncPlayback>), Allow<Disabled>>,
+    mut surfaces: Query<(&mut Cracked, &mut AsyncPlayback), Allow<Disabled>>,
     mut queues: ResMut<Queues>,
 ) {
     for entity in removed.read() {
@@ -26,14 +25,14 @@ pub(crate) fn follow_clocks(
         }
     }
     for (entity, mut clock) in &mut changed {
-        if let Ok((mut cracked, is_async)) = surfaces.get_mut(entity)
+        if let Ok((mut cracked, mut playback)) = surfaces.get_mut(entity)
             && let Some(active) = cracked.get_mut()
         {
             let is_first = active.playhead.playback.is_none();
             active.follow(clock.bypass_change_detection());
             queues.wake(entity, &mut active.turn);
-            if !is_async && AsyncPlayback::is_for(active) {
-                commands.entity(entity).try_insert(AsyncPlayback::default());
+            if AsyncPlayback::is_for(active) {
+                playback.turn_on();
             }
             if is_first {
                 // What has grown frame by frame is drawn once more, at a stroke.

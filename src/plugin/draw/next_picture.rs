@@ -29,7 +29,7 @@ const KEPT: Duration = Duration::from_secs(5);
 
 /// What a surface is to show, until it is there. What it showed before is shown until then.
 #[derive(Component, Default)]
-#[component(storage = "SparseSet", clone_behavior = Ignore)]
+#[component(clone_behavior = Ignore)]
 pub(crate) struct NextPicture {
     making: Option<Box<Making>>,
     restarts: u32,
@@ -178,11 +178,7 @@ pub(crate) fn make(
 }
 
 fn next_of(world: &mut World, entity: Entity) -> Option<Mut<'_, NextPicture>> {
-    let mut entity = world.get_entity_mut(entity).ok()?;
-    if !entity.contains::<NextPicture>() {
-        entity.insert(NextPicture::default());
-    }
-    let mut next = entity.into_mut::<NextPicture>()?;
+    let mut next = world.get_mut::<NextPicture>(entity)?;
     if next.restarted.is_some_and(|at| at.elapsed() >= KEPT) {
         next.restarts = 0;
     }

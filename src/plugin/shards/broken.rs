@@ -256,8 +256,8 @@ pub(super) fn take_crumbs(world: &mut World, surface: Entity) -> Option<(Vec<Cru
 }
 
 /// The pieces of a surface that has shattered. They are taken out while shards come and go.
-#[derive(Component)]
-#[component(storage = "SparseSet", clone_behavior = Ignore)]
+#[derive(Component, Default)]
+#[component(clone_behavior = Ignore)]
 pub(crate) struct Pieces(Option<Box<Broken>>);
 
 impl Pieces {

@@ -258,9 +258,14 @@ pub(crate) fn read(image: &Image, space: Space, size: UVec2) -> Result<Vec<u8>, 
             let mut texels = Vec::with_capacity(n * 4);
             for y in 0..own_size.y {
                 for x in 0..own_size.x {
-                    let color = image
+                    let mut color = image
                         .get_color_at(x, y)
                         .map_err(|_| CrackError::UnsupportedFormat { format: format!("{format:?}") })?;
+                    if format == TextureFormat::Rg16Uint {
+                        // What the engine makes of a file with grey and alpha.
+                        let LinearRgba { red, green, .. } = color.to_linear();
+                        color = LinearRgba::new(red, red, red, green).into();
+                    }
                     let rgba = match space {
                         Space::Srgb => color.to_srgba().to_f32_array(),
                         Space::Linear => color.to_linear().to_f32_array(),

@@ -4,6 +4,7 @@ use bevy::{
     asset::RenderAssetUsages,
     image::{CompressedImageFormats, ImageSampler, ImageType},
     prelude::*,
+    render::render_resource::{TextureDimension, TextureFormat},
 };
 
 /// Longest side, texels.
@@ -24,8 +25,33 @@ pub(crate) fn decode(file: &[u8]) -> Result<Image, String> {
     }
     let (kind, sampler) = (ImageType::MimeType("image/png"), ImageSampler::Default);
     let usage = RenderAssetUsages::MAIN_WORLD;
-    Image::from_buffer(file, kind, CompressedImageFormats::NONE, true, sampler, usage)
-        .map_err(|error| error.to_string().lines().next().unwrap_or_default().to_owned())
+    let image = Image::from_buffer(file, kind, CompressedImageFormats::NONE, true, sampler, usage)
+        .map_err(|error| error.to_string().lines().next().unwrap_or_default().to_owned())?;
+    Ok(with_levels(image))
+}
+
+/// 16 bits of a channel are a level for the eye, as 8 are; the engine takes them for light.
+fn with_levels(image: Image) -> Image {
+    use TextureFormat::{R16Uint, Rg16Uint, Rgba8UnormSrgb, Rgba16Unorm};
+    let channels = match image.texture_descriptor.format {
+        R16Uint => 1,
+        Rg16Uint => 2,
+        Rgba16Unorm => 4,
+        _ => return image,
+    };
+    let level = |bytes: &[u8; 2]| u8::try_from((u32::from(u16::from_ne_bytes(*bytes)) * 255 + 32_767) / 65_535);
+    let texel = |texel: &[u8]| {
+        let levels: Vec<u8> = texel.as_chunks().0.iter().map(|bytes| level(bytes).unwrap_or(u8::MAX)).collect();
+        match levels[..] {
+            [grey] => [grey, grey, grey, u8::MAX],
+            [grey, cover] => [grey, grey, grey, cover],
+            [red, green, blue, cover] => [red, green, blue, cover],
+            _ => [0; 4],
+        }
+    };
+    let data = image.data.iter().flat_map(|data| data.chunks_exact(2 * channels)).flat_map(texel).collect();
+    let (size, usage) = (image.texture_descriptor.size, image.asset_usage);
+    Image::new(size, TextureDimension::D2, data, Rgba8UnormSrgb, usage)
 }
 
 #[cfg(test)]

@@ -21,6 +21,9 @@ const MAX_NODES: usize = 1024;
 /// Markers up to which they are, which are laid out again.
 const MAX_MARKERS: u32 = 4096;
 
+/// Hits and changes up to which they are. Of old cracks there may be many more than nodes are left.
+const MAX_EVENTS: usize = 16;
+
 /// What has changed so often before it was grown, as films of other proportions do, is grown in the frame.
 const MAX_RESTARTS: u32 = 3;
 
@@ -80,7 +83,9 @@ pub(crate) fn regrow(active: &mut Active, inputs: Regrowth, at_once: bool) -> Re
         known => known.map_or(0, |known| known.restarts + 1),
     };
     let growth = &active.cracks.growth;
-    let is_little = growth.network().nodes().len() <= MAX_NODES && growth.marker_counts().total <= MAX_MARKERS;
+    let is_little = growth.network().nodes().len() <= MAX_NODES
+        && growth.marker_counts().total <= MAX_MARKERS
+        && past.events.len() <= MAX_EVENTS;
     if at_once || restarts > MAX_RESTARTS || is_little {
         return Ok(OnAnother::Grown(Box::new(inputs.grow(active.cracks.added.as_mut(), &past)?)));
     }
