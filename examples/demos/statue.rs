@@ -107,7 +107,7 @@ fn setup(
     ));
     commands.spawn((
         DirectionalLight {
-            illuminance: 7_000.0,
+            illuminance: 8_500.0,
             color: Color::srgb(1.0, 0.95, 0.86),
             shadow_maps_enabled: true,
             // Crumbs are small.
@@ -136,8 +136,8 @@ fn setup(
             ..plain(tint, 0.95)
         })
     };
-    let floor = tiled("paving", Vec2::splat(8.0), Color::srgb(0.62, 0.6, 0.58));
-    let wall = tiled("plaster", Vec2::new(6.0, 2.0), Color::srgb(0.5, 0.6, 0.62));
+    let floor = tiled("paving", Vec2::splat(8.0), Color::srgb(0.9, 0.9, 0.92));
+    let wall = tiled("plaster", Vec2::new(6.0, 2.0), Color::srgb(0.62, 0.68, 0.72));
     let clay = materials.add(plain(Color::srgb(0.72, 0.42, 0.28), 0.6));
     let plaster = materials.add(StandardMaterial {
         base_color_texture: Some(assets.load("textures/plaster.png")),
@@ -295,8 +295,8 @@ fn let_dust_settle(
 fn go_around(time: Res<Time>, mut camera: Query<&mut Transform, With<Camera3d>>) {
     for mut transform in &mut camera {
         let angle = 0.75 + 0.4 * ops::sin(0.5 * time.elapsed_secs());
-        let eye = Vec3::new(3.2 * ops::sin(angle), 1.95, 3.2 * ops::cos(angle));
-        *transform = Transform::from_translation(eye).looking_at(Vec3::new(0.1, 1.05, 0.0), Vec3::Y);
+        let eye = Vec3::new(3.6 * ops::sin(angle), 2.1, 3.6 * ops::cos(angle));
+        *transform = Transform::from_translation(eye).looking_at(Vec3::new(0.12, 1.13, 0.0), Vec3::Y);
     }
 }
 
