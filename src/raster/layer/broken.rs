@@ -119,7 +119,8 @@ impl Broken {
             let far = far.min(radius * reach - 1.8 * size);
             let centre = ops::unit(std::f32::consts::TAU * pick(k, 3)) * far.max(0.0);
             let seed = mix_in(seed, 0x100 + k);
-            off.push(shape(Outline::new(centre, size, 5, levels, 0.6, seed), 0x340 + k));
+            let (count, levels, ragged) = if crumbles { (7, 2, 0.8) } else { (5, levels, 0.6) };
+            off.push(shape(Outline::new(centre, size, count, levels, ragged, seed), 0x340 + k));
         }
         let faces = Face::all(bricks, crushed, radius, seed ^ draws::FACES);
         if !faces.is_empty() {
@@ -147,8 +148,10 @@ impl Broken {
                 let far = near * radius;
                 let far = if crumbles { far.min(radius * reach - 2.2 * size) } else { far };
                 let centre = way.normalize_or(Vec2::Y) * far;
-                let outline =
-                    Outline::new(centre, size, 4 + (2.0 * pick(k, 12)) as u32, 0, 0.6, mix_in(seed, 0x200 + k));
+                // Four corners alone are now and then a square.
+                let (count, levels) = if crumbles { (5, 1) } else { (4, 0) };
+                let count = count + (2.0 * pick(k, 12)) as u32;
+                let outline = Outline::new(centre, size, count, levels, 0.6, mix_in(seed, 0x200 + k));
                 Chip { outline, tone: 0.34 * pick(k, 13) - 0.08, ink: crushed.outline * unit }
             })
             .collect();
