@@ -36,7 +36,7 @@ const NODES_OF_HIT: usize = 128;
 /// Frames after which memory is given back if time stands still.
 const IDLE: u32 = 60;
 
-/// What shows the times of a surface with baked cracks, and makes other surfaces again of which much is to be drawn or painted. Nothing as
+/// What shows the times of a surface with baked cracks, and makes other surfaces again of which much is to be drawn or painted. Empty as
 /// soon as that is done, or the end is shown and nothing can turn time back.
 ///
 /// While a job runs, the field, the touched tiles and the replay of the surface are with it, and the surface counts as dirty without being in

@@ -39,15 +39,13 @@ fn with_levels(image: Image) -> Image {
         Rgba16Unorm => 4,
         _ => return image,
     };
-    let level = |bytes: &[u8; 2]| u8::try_from((u32::from(u16::from_ne_bytes(*bytes)) * 255 + 32_767) / 65_535);
-    let texel = |texel: &[u8]| {
-        let levels: Vec<u8> = texel.as_chunks().0.iter().map(|bytes| level(bytes).unwrap_or(u8::MAX)).collect();
-        match levels[..] {
-            [grey] => [grey, grey, grey, u8::MAX],
-            [grey, cover] => [grey, grey, grey, cover],
-            [red, green, blue, cover] => [red, green, blue, cover],
-            _ => [0; 4],
-        }
+    let share = |bytes: [u8; 2]| (u32::from(u16::from_ne_bytes(bytes)) * 255 + 32_767) / 65_535;
+    let level = |bytes: [u8; 2]| u8::try_from(share(bytes)).unwrap_or(u8::MAX);
+    let texel = |texel: &[u8]| match *texel.as_chunks().0 {
+        [grey] => [level(grey), level(grey), level(grey), u8::MAX],
+        [grey, cover] => [level(grey), level(grey), level(grey), level(cover)],
+        [red, green, blue, cover] => [red, green, blue, cover].map(level),
+        _ => [0; 4],
     };
     let data = image.data.iter().flat_map(|data| data.chunks_exact(2 * channels)).flat_map(texel).collect();
     let (size, usage) = (image.texture_descriptor.size, image.asset_usage);
