@@ -346,6 +346,7 @@ impl CrackGrowth {
             if let Some(link) = self.network.links.last_mut() {
                 link.width = width;
             }
+            self.go_on_beyond(node, tip);
         }
         joined
     }

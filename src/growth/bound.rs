@@ -16,8 +16,8 @@ impl GrowthParams {
     /// Each new node either reaches a marker or brings one closer by at least `D²/4` of squared distance, and no
     /// marker is further than [`crack_radius`](Self::crack_radius) from the node that it attracts. With closed
     /// venation a marker attracts at most six nodes at once, for at most twice as many steps. With arrest a marker
-    /// counts for each time that it can be given up, and every node can be a tip that runs on. With nucleation every
-    /// marker can be a start. Each node can fork. Strands have a largest number of points.
+    /// counts for each time that it can be given up, and every node can be a tip that runs on and breaks through the
+    /// crack at which it ends. With nucleation every marker can be a start. Each node can fork. Strands have a largest number of points.
     ///
     /// ```
     /// use bevy_crack::growth::GrowthParams;
@@ -48,7 +48,7 @@ impl GrowthParams {
         if !self.keeps_apart() {
             return starts + births;
         }
-        let run = u64::from(arrest::steps_for(self.arrest.max(self.island_distance), self.step_length)) + 2;
+        let run = u64::from(arrest::steps_for(self.arrest.max(self.island_distance), self.step_length)) + 3;
         let each = if self.forks > 0.0 { 2 } else { 1 };
         each * (starts + births * u64::from(field::MOST_GIVEN_UP)) * (1 + run)
     }

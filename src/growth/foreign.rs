@@ -7,7 +7,7 @@ use glam::Vec2;
 impl CrackGrowth {
     /// Adds cracks that have not grown here, such as those of [`Seams::network`](crate::voronoi::Seams::network).
     /// Later hits and steps treat them as cracks of another hit: with [`arrest`](super::GrowthParams::arrest) new
-    /// cracks stop at them, and a hit on one starts from it.
+    /// cracks stop at them unless their hit is near, and a hit on one starts from it.
     ///
     /// They are added in the steps after the current one, in the order of their [`birth`](Node::birth), and each
     /// opens to its width within `opening` further steps. Returns how many steps this takes in total. Lines are

@@ -129,7 +129,7 @@ impl CrackGrowth {
             self.new_nodes = first..self.network.nodes.len() as u32;
             self.lay_out_strands(index, 0.0, energy);
         } else if first == self.network.nodes.len() as u32 {
-            self.sprout(pos, index);
+            self.sprout((pos, energy), index, seed);
         } else if plan.is_some() {
             // The rim is joined below.
         } else if matches!(self.params.starts, StartLayout::Crushed { .. }) {
@@ -313,13 +313,28 @@ impl CrackGrowth {
 
     /// Handles a hit on a crack: new cracks start from it to both sides, or from the nearest place where there is
     /// room.
-    fn sprout(&mut self, pos: Vec2, impact: u32) {
+    fn sprout(&mut self, (pos, energy): (Vec2, f32), impact: u32, seed: u64) {
+        if self.sprout_in_joints((pos, energy), impact) {
+            return;
+        }
         let length = self.params.step_length;
+        let arms = match self.params.starts {
+            StartLayout::Arms { count } if self.breaks_through() => {
+                starts::arms(count, (pos, energy), self.params.reach, self.network.extent(), seed)
+            }
+            _ => Vec::new(),
+        };
         let mut near = Vec::new();
         self.nodes.within(pos, WIDE.max(3.0 * length), |node, distance_sq| near.push((distance_sq, node)));
         near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let first = self.network.nodes.len();
         for (_, index) in near.into_iter().take(12) {
+            for arm in &arms {
+                self.grow_beyond(impact, index, *arm);
+            }
+            if self.network.nodes.len() > first + 1 {
+                break;
+            }
             let nodes = &self.network.nodes;
             let node = nodes[index as usize];
             let beside = nodes.get(node.parent as usize).or_else(|| nodes.get(self.child_of(index) as usize));

@@ -36,6 +36,7 @@
 mod advance;
 mod aim;
 mod arrest;
+mod beyond;
 mod birth;
 mod bound;
 mod changes;

@@ -217,7 +217,9 @@ pub struct GrowthParams {
     pub island_distance: f32,
     /// Distance at which a tip reacts to an older crack or the border ahead of it, pattern units, 0..=1; default 0. The tip
     /// turns to meet it at a steep angle and stops there. The distance used is at least 2.5 segment lengths, which
-    /// the turn needs. No two cracks cross then. 0 = off: cracks ignore each other, as in the papers.
+    /// the turn needs. No two cracks cross then. Cracks that branch break through those of older hits within 0.6 of the
+    /// reach of their hit: they go on beside the place where they met them. 0 = off: cracks ignore each other, as in
+    /// the papers.
     pub arrest: f32,
     /// Share of tips that stop before they reach the crack that they would have met, 0..=1; default 0.
     pub open_ends: f32,

@@ -1,10 +1,11 @@
 //! What energy does, and what the seed: the presets as they ship, hit once.
 
+use super::arrest::assert_planar;
 use crate::{
     CrackPreset,
-    growth::CrackGrowth,
+    growth::{CrackGrowth, GrowthParams, HitOutcome},
     math::Rng,
-    pattern::{Moment, NO_PARENT, SegmentId, SurfaceFrame},
+    pattern::{Moment, NO_PARENT, Network, Node, SegmentId, SurfaceFrame},
     raster::{DepthField, Spot},
 };
 use glam::{UVec2, Vec2};
@@ -173,6 +174,75 @@ fn no_hit_is_a_dud() {
         }
         assert!(duds.is_empty(), "{name}: usual {usual}, but {duds:?}");
     }
+}
+
+/// Length of the branches of an impact.
+fn length_of(growth: &CrackGrowth, impact: u32) -> f32 {
+    let network = growth.network();
+    let is_of = |node: &u32| {
+        let node = network.nodes()[*node as usize];
+        node.impact == impact && node.parent != NO_PARENT
+    };
+    let length = |node: u32| {
+        let node = network.nodes()[node as usize];
+        node.pos.distance(network.nodes()[node.parent as usize].pos)
+    };
+    (0..network.nodes().len() as u32).filter(is_of).map(length).sum()
+}
+
+/// Hit after hit on one wall: those on cracked ground have arms too.
+#[test]
+fn later_hits_break_through_older_cracks() {
+    for name in ["concrete", "brick", "toon"] {
+        let usual = median(of_seeds(name, 1.0).0);
+        let preset = CrackPreset::named(name).unwrap();
+        let (mut lengths, mut duds) = (Vec::new(), 0);
+        for seed in 0..24 {
+            let mut rng = Rng::new(seed).stream("later");
+            let mut growth = CrackGrowth::new(preset.growth.clone(), Vec2::ONE, seed).unwrap();
+            for _ in 0..8 {
+                let outcome = growth.hit(Vec2::new(rng.range(0.1, 0.9), rng.range(0.1, 0.9)), 1.0);
+                while growth.step().grew() {}
+                if let HitOutcome::Started(impact @ 1..) = outcome {
+                    let length = length_of(&growth, impact);
+                    duds += u32::from(length < 0.1 * usual);
+                    lengths.push(length);
+                }
+            }
+            assert_planar(&growth, seed);
+        }
+        println!("{name}: {duds} of {} later hits have hardly a crack", lengths.len());
+        assert!(lengths.len() > 100 && 20 * duds <= lengths.len() as u32, "{name}: {duds} of {}", lengths.len());
+        assert!(median(lengths) > 0.3 * usual, "{name}");
+    }
+}
+
+/// A hit beside a long crack: its arms go on beyond that, but not far from the hit.
+#[test]
+fn cracks_go_on_beyond_older_ones_near_the_hit_only() {
+    let params = GrowthParams { wander: 0.0, roughness: 0.0, ..CrackPreset::CONCRETE.growth };
+    let (mut through, mut stopped) = (0, 0);
+    for seed in 0..40 {
+        for (x, is_near) in [(0.56, true), (0.72, false)] {
+            let mut older = Network::new(Vec2::ONE, 0.0, 0);
+            for k in 0..=60u32 {
+                let (pos, parent) = (Vec2::new(x, k as f32 / 60.0), k.checked_sub(1).unwrap_or(NO_PARENT));
+                older.nodes.push(Node { pos, width: 0.002, parent, generation: k, birth: 0, impact: 0, bend: 0.0 });
+            }
+            let mut growth = CrackGrowth::new(params.clone(), Vec2::ONE, seed).unwrap();
+            growth.add_cracks(&older, 0);
+            growth.hit(Vec2::splat(0.5), 1.0);
+            while growth.step().grew() {}
+            let is_beyond = |node: &&Node| node.impact == 0 && node.pos.x > x + 0.02;
+            let beyond = growth.network().nodes().iter().filter(is_beyond).count();
+            if is_near {
+                through += u32::from(beyond > 5);
+            } else {
+                stopped += u32::from(beyond == 0);
+            }
+        }
+    }
+    assert!(through >= 36 && stopped == 40, "{through} went on, {stopped} stopped");
 }
 
 /// Arms from the hit, and how sharply cracks turn.
