@@ -103,8 +103,8 @@ impl PartialEq for Candidate {
 impl Eq for Candidate {}
 
 impl CrackGrowth {
-    /// One step of a growth that divides domains.
-    pub(super) fn divide(&mut self) {
+    /// One step of a growth that divides domains. `found` is for the next steps in which nothing happens either.
+    pub(super) fn divide(&mut self, found: &mut Vec<Candidate>) {
         let first = self.network.nodes.len() as u32;
         let Some(division) = &mut self.division else { return };
         division.seen = first;
@@ -114,7 +114,11 @@ impl CrackGrowth {
         let is_idle = tips.is_empty() && fresh.is_empty() && !is_running;
         let due = self.params.nucleation * self.steps.saturating_add(1) as f32;
         let is_due = (self.nucleated as f32) < due;
-        let candidates = if is_idle || is_due { self.candidates(is_idle) } else { Vec::new() };
+        let candidates = match () {
+            () if is_idle => self.idle_candidates(found),
+            () if is_due => self.candidates(false),
+            () => Vec::new(),
+        };
         self.timeline.begin(self.steps.saturating_add(1));
         self.new_nodes = first..first;
         if is_idle && candidates.is_empty() && self.room() > 0 {
@@ -155,58 +159,65 @@ impl CrackGrowth {
         self.join_newborn();
     }
 
-    /// The markers at which cracks may start in this step. If nothing else happens there are some as long as domains
-    /// are too large.
-    fn candidates(&mut self, is_idle: bool) -> Vec<Candidate> {
-        let mut found = Vec::new();
-        loop {
-            let Some(division) = &self.division else { return found };
-            let (params, impacts, generation) = (&self.params, &self.impacts, division.generation);
-            let is_last = u32::from(generation) + 1 >= params.generations;
-            let narrow = if is_last { NARROW } else { 1.0 };
-            let finest = narrow * params.loaded(generation, 0.0, f32::INFINITY);
-            let fronts: Vec<f32> = (0..impacts.len() as u32).map(|impact| self.front(impact)).collect();
-            let patches = params.patches(self.seed);
-            let mut nearest = f32::INFINITY;
-            self.field.each_beyond(finest * finest, |marker, id, pos, near_sq, impact| {
-                let (Some(hit), Some(&front)) = (impacts.get(impact as usize), fronts.get(impact as usize)) else {
-                    return;
-                };
-                let from_hit_sq = hit.pos.distance_squared(pos);
-                if !is_idle && from_hit_sq > front * front {
-                    return;
-                }
-                let from_hit = from_hit_sq.sqrt();
-                let reach = division.begun.get(impact as usize).map_or(f32::INFINITY, |begun| begun.1);
-                // A patch is a factor of 1 or more: most markers are too near even without it.
-                let least = params.loaded(generation, from_hit, reach);
-                if near_sq <= (narrow * least) * (narrow * least) {
-                    return;
-                }
-                // Far from all cracks it is far enough whatever the patch; cosines take most of the time of this search.
-                let most = NO_CLOSER * narrow * least * patches.most();
-                let is_far = near_sq > most * most || {
-                    let loaded = narrow * (least * patches.at(pos));
-                    near_sq > loaded * loaded
-                };
-                if is_far {
-                    nearest = nearest.min(from_hit - front);
-                    found.push(Candidate { marker, id, impact, pos, near_sq, from_hit });
-                }
-            });
-            if is_idle && nearest > 0.0 {
-                // Nothing is left behind the front: it jumps ahead.
-                let leap = nearest + self.params.front;
-                found.retain(|candidate: &Candidate| candidate.from_hit - self.front(candidate.impact) <= leap);
+    /// The markers at which cracks may start when nothing else happens: there are some as long as domains are too large.
+    /// `found` has them from the step before if nothing has grown since; only those that were taken are missing now.
+    fn idle_candidates(&mut self, found: &mut Vec<Candidate>) -> Vec<Candidate> {
+        found.retain(|candidate| self.field.near_sq(candidate.marker) == candidate.near_sq);
+        while found.is_empty() {
+            *found = self.candidates(true);
+            let Some(division) = &mut self.division else { break };
+            if u32::from(division.generation) + 1 >= self.params.generations {
+                break;
             }
             // The next generation starts when this one no longer grows.
-            if !is_idle || !found.is_empty() || is_last {
-                return found;
-            }
-            if let Some(division) = &mut self.division {
+            if found.is_empty() {
                 division.generation += 1;
             }
         }
+        let ahead = |candidate: &Candidate| candidate.from_hit - self.front(candidate.impact);
+        let nearest = found.iter().map(ahead).fold(f32::INFINITY, f32::min);
+        // If nothing is left behind the front it jumps ahead.
+        let leap = if nearest > 0.0 { nearest + self.params.front } else { f32::INFINITY };
+        found.iter().filter(|candidate| ahead(candidate) <= leap).copied().collect()
+    }
+
+    /// The markers at which cracks may start, as far from all cracks as the generation allows; those beyond the front only
+    /// if nothing else happens.
+    fn candidates(&self, is_idle: bool) -> Vec<Candidate> {
+        let mut found = Vec::new();
+        let Some(division) = &self.division else { return found };
+        let (params, impacts, generation) = (&self.params, &self.impacts, division.generation);
+        let is_last = u32::from(generation) + 1 >= params.generations;
+        let narrow = if is_last { NARROW } else { 1.0 };
+        let finest = narrow * params.loaded(generation, 0.0, f32::INFINITY);
+        let fronts: Vec<f32> = (0..impacts.len() as u32).map(|impact| self.front(impact)).collect();
+        let patches = params.patches(self.seed);
+        self.field.each_beyond(finest * finest, |marker, id, pos, near_sq, impact| {
+            let (Some(hit), Some(&front)) = (impacts.get(impact as usize), fronts.get(impact as usize)) else {
+                return;
+            };
+            let from_hit_sq = hit.pos.distance_squared(pos);
+            if !is_idle && from_hit_sq > front * front {
+                return;
+            }
+            let from_hit = from_hit_sq.sqrt();
+            let reach = division.begun.get(impact as usize).map_or(f32::INFINITY, |begun| begun.1);
+            // A patch is a factor of 1 or more: most markers are too near even without it.
+            let least = params.loaded(generation, from_hit, reach);
+            if near_sq <= (narrow * least) * (narrow * least) {
+                return;
+            }
+            // Far from all cracks it is far enough whatever the patch; cosines take most of the time of this search.
+            let most = NO_CLOSER * narrow * least * patches.most();
+            let is_far = near_sq > most * most || {
+                let loaded = narrow * (least * patches.at(pos));
+                near_sq > loaded * loaded
+            };
+            if is_far {
+                found.push(Candidate { marker, id, impact, pos, near_sq, from_hit });
+            }
+        });
+        found
     }
 
     /// Largest distance from its hit at which cracks of an impact may start.

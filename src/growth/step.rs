@@ -2,6 +2,7 @@
 
 use super::{
     arrest::{Advance, Arrest},
+    divide::Candidate,
     draws,
     params::StartLayout,
     pull::{NO_PULL, Pull},
@@ -41,8 +42,9 @@ impl CrackGrowth {
             self.record.step();
         }
         // A tip that has just turned to meet a crack may be all that moves, and it has no new node yet.
+        let mut found = Vec::new();
         while self.steps_left > 0 && self.new_nodes.is_empty() {
-            self.make_step();
+            self.make_step(&mut found);
         }
         if self.steps_left == 0 && self.arrest.is_some() {
             self.show_hits();
@@ -50,11 +52,11 @@ impl CrackGrowth {
         StepReport { born: self.new_nodes.len() as u32 }
     }
 
-    fn make_step(&mut self) {
+    fn make_step(&mut self, found: &mut Vec<Candidate>) {
         self.steps_left -= 1;
         self.field.settle(&self.network.nodes, &self.nodes);
         if self.divides() {
-            self.divide();
+            self.divide(found);
             return;
         }
         if self.params.strands().is_some() {

@@ -68,6 +68,9 @@ fn apply_changes(world: &mut World, timer: &Timer) {
                 queues.start_growing(entity, turn);
             }
         });
+        if is_growing && world.get::<CrackState>(entity).is_some_and(|state| state.status == CrackStatus::Done) {
+            set_status(world, entity, CrackStatus::Growing);
+        }
         if has_new_textures {
             report_textures(world, entity);
         }
