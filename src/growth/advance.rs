@@ -3,11 +3,12 @@
 use super::{
     arrest::{AHEAD, Advance, Arrest, Goal, Runner, steps_for},
     division::{Division, MUCH_WIDER},
+    params::StartLayout,
     state::CrackGrowth,
     steer::turned_at_most,
     walls::crosses_itself,
 };
-use crate::pattern::{Link, LinkKind, NO_PARENT, PathPoint, SegmentId, SegmentPath};
+use crate::pattern::{Link, LinkKind, NO_PARENT, Node, PathPoint, SegmentId, SegmentPath};
 use glam::Vec2;
 
 /// Shares of the roughness that are tried for a line, until it touches no other.
@@ -25,6 +26,9 @@ const HOOK: f32 = 4.0;
 
 /// How much a straight crack avoids a place where a third crack meets another, segment lengths.
 const TAKEN: f32 = 2.0;
+
+/// Cosine of the angle to the direction from its hit beyond which an arm does not turn to meet a crack: 75 degrees.
+const TURNS_BACK: f32 = 0.26;
 
 /// Segment lengths that a tip needs to turn.
 const TURN: f32 = 2.5;
@@ -60,9 +64,11 @@ impl CrackGrowth {
             if self.are_rays() || self.masonry.is_some() { None } else { self.goal_ahead(from, heading, reach, AHEAD) };
         // A crack that has turned already does not turn further.
         let last = self.heading_of(from);
+        let out = self.away_from_hit(from);
         let is_ahead = |goal: Goal| {
             let way = self.place_of(goal) - pos;
-            last == Vec2::ZERO || way.dot(last) >= AHEAD * way.length()
+            let is_along = |kept: Vec2, least: f32| kept == Vec2::ZERO || way.dot(kept) >= least * way.length();
+            is_along(last, AHEAD) && is_along(out, TURNS_BACK)
         };
         match goal.filter(|&(_, goal)| is_ahead(goal)) {
             None => {}
@@ -94,6 +100,14 @@ impl CrackGrowth {
             self.seal(node);
         }
         Advance::Grown
+    }
+
+    /// The direction from its hit to a node of an arm; zero for other cracks.
+    fn away_from_hit(&self, node: u32) -> Vec2 {
+        let Node { pos, impact, .. } = self.network.nodes[node as usize];
+        let hit = self.impacts.get(impact as usize).filter(|_| self.breaks_through());
+        hit.filter(|_| matches!(self.params.starts, StartLayout::Arms { .. }))
+            .map_or(Vec2::ZERO, |hit| (pos - hit.pos).normalize_or_zero())
     }
 
     /// Joins the tip of a ray to a crack that it would meet within the next two segments; returns whether there is

@@ -61,7 +61,9 @@ impl CrackGrowth {
     /// them.
     pub(super) fn is_same_crack(&self, one: u32, other: u32) -> bool {
         let (a, b) = (&self.network.nodes[one as usize], &self.network.nodes[other as usize]);
-        if a.impact != b.impact {
+        let are_of_one = a.impact == b.impact;
+        // One that has gone on beyond another does not turn back to it.
+        if !are_of_one && !self.breaks_through() {
             return false;
         }
         if self.has_rays() {
@@ -78,7 +80,8 @@ impl CrackGrowth {
             if parent == NO_PARENT {
                 // The starts of a compact hit belong to one crack.
                 let to_start = |node: u32| self.network.nodes[node as usize].generation;
-                return !self.divides()
+                return are_of_one
+                    && !self.divides()
                     && !matches!(self.params.starts, StartLayout::Points { .. })
                     && to_start(one).saturating_add(to_start(other)) <= apart;
             }
