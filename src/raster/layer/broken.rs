@@ -41,6 +41,9 @@ pub(super) struct Face {
 /// Sizes of the parts that come off the bricks around a hit, in radii.
 const FACES: [f32; 4] = [1.9, 1.1, 0.75, 0.45];
 
+/// Radius within which a hit breaks out the mortar too, in radii.
+const CORE: f32 = 0.85;
+
 impl Face {
     /// Those of the bricks around a hit, each larger than the next.
     fn all(bricks: &Bricks, crushed: &CrushedZone, radius: f32, seed: u32) -> Vec<Self> {
@@ -124,7 +127,10 @@ impl Broken {
         }
         let faces = Face::all(bricks, crushed, radius, seed ^ draws::FACES);
         if !faces.is_empty() {
+            // The mortar breaks out where the hit is, and the flakes beside it stay in their bricks.
+            let core = Outline::new(Vec2::ZERO, radius * CORE, 8, 2, 0.8 * ragged, mix_in(seed, 0x500));
             off.clear();
+            off.push(core.stretched(mix_in(seed, 0x501)));
         }
         // Craters from contours have more chips around them, and slightly larger ones.
         let (many, large) = if crushed.terraces > 0 { (58.0, 1.05) } else { (24.0, 1.0) };
@@ -220,4 +226,39 @@ fn terraces(crushed: &CrushedZone, unit: f32, radius: f32, seed: u32) -> Option<
 /// A different seed for each `k`.
 fn mix_in(seed: u32, k: u32) -> u32 {
     mix(u64::from(seed) << 32 | u64::from(k)) as u32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::CrackPreset;
+
+    /// Bricks lose their faces up to the joints, and the mortar breaks out where the hit is, but not further out.
+    #[test]
+    fn mortar_breaks_out_at_the_hit() {
+        let crushed = CrackPreset::BRICK.look.crushed.unwrap();
+        let (unit, joint) = (512.0, 2.0);
+        let radius = crushed.radius * unit;
+        // A head joint above the bed joint in which the hit is.
+        let brick = |min: [f32; 2], max: [f32; 2]| [Vec2::from(min), Vec2::from(max)];
+        let bricks = [
+            brick([-90.0, -32.0], [-joint, -joint]),
+            brick([joint, -32.0], [90.0, -joint]),
+            brick([-45.0, joint], [45.0, 32.0]),
+            [Vec2::ZERO; 2],
+        ];
+        let mut faces = 0;
+        for seed in 0..200 {
+            let broken = Broken::new(&crushed, unit, radius, 2.0, seed, &bricks);
+            let all = broken.near(Vec2::splat(-200.0), Vec2::splat(200.0), 10.0);
+            let is_off = |x: f32, y: f32| all.within_at_most(Vec2::new(x, y), 1.0) > 0.0;
+            assert!(is_off(0.0, 0.0), "{seed}: the mortar at the hit");
+            for x in [-89.0, -70.0, 70.0, 89.0] {
+                assert!(!is_off(x, 0.0), "{seed}: the mortar at {x}");
+            }
+            let beside = 1.2 * radius;
+            faces += [[-beside, -10.0], [beside, -10.0]].iter().filter(|[x, y]| is_off(*x, *y)).count();
+        }
+        assert!(faces > 100, "{faces} faces are off further out than the mortar");
+    }
 }
