@@ -64,11 +64,10 @@ impl CrackGrowth {
             if self.are_rays() || self.masonry.is_some() { None } else { self.goal_ahead(from, heading, reach, AHEAD) };
         // A crack that has turned already does not turn further.
         let last = self.heading_of(from);
-        let out = self.away_from_hit(from);
         let is_ahead = |goal: Goal| {
             let way = self.place_of(goal) - pos;
             let is_along = |kept: Vec2, least: f32| kept == Vec2::ZERO || way.dot(kept) >= least * way.length();
-            is_along(last, AHEAD) && is_along(out, TURNS_BACK)
+            is_along(last, AHEAD) && is_along(self.away_from_hit(from), TURNS_BACK)
         };
         match goal.filter(|&(_, goal)| is_ahead(goal)) {
             None => {}
@@ -104,10 +103,10 @@ impl CrackGrowth {
 
     /// The direction from its hit to a node of an arm; zero for other cracks.
     fn away_from_hit(&self, node: u32) -> Vec2 {
+        let are_arms = self.breaks_through() && matches!(self.params.starts, StartLayout::Arms { .. });
         let Node { pos, impact, .. } = self.network.nodes[node as usize];
-        let hit = self.impacts.get(impact as usize).filter(|_| self.breaks_through());
-        hit.filter(|_| matches!(self.params.starts, StartLayout::Arms { .. }))
-            .map_or(Vec2::ZERO, |hit| (pos - hit.pos).normalize_or_zero())
+        let hit = self.impacts.get(impact as usize).filter(|_| are_arms);
+        hit.map_or(Vec2::ZERO, |hit| (pos - hit.pos).normalize_or_zero())
     }
 
     /// Joins the tip of a ray to a crack that it would meet within the next two segments; returns whether there is

@@ -1,7 +1,7 @@
 //! Cracks that go on beyond older ones: what a hit does where the surface is cracked already.
 
 use super::state::CrackGrowth;
-use crate::pattern::{NO_PARENT, SegmentId};
+use crate::pattern::{NO_PARENT, Node, SegmentId};
 use glam::Vec2;
 
 /// Share of its reach within which a hit breaks through older cracks.
@@ -16,9 +16,12 @@ impl CrackGrowth {
     pub(super) fn go_on_beyond(&mut self, node: u32, tip: u32) {
         let nodes = &self.network.nodes;
         let (met, end) = (nodes[node as usize], nodes[tip as usize]);
-        let Some(hit) = self.impacts.get(end.impact as usize).filter(|_| self.breaks_through()) else { return };
+        if met.impact == end.impact || !self.breaks_through() {
+            return;
+        }
+        let Some(hit) = self.impacts.get(end.impact as usize) else { return };
         let far = STRONG * self.reach(hit.pos, hit.energy);
-        if met.impact == end.impact || met.pos.distance_squared(hit.pos) > far * far {
+        if met.pos.distance_squared(hit.pos) > far * far {
             return;
         }
         let heading = match self.heading_of(tip) {
@@ -71,21 +74,28 @@ impl CrackGrowth {
 
     /// Grows a segment of a hit from a node of an older crack, away from it; returns whether there was room.
     pub(super) fn grow_beyond(&mut self, impact: u32, from: u32, heading: Vec2) -> bool {
-        let nodes = &self.network.nodes;
-        let node = nodes[from as usize];
-        let along = nodes
-            .get(node.parent as usize)
-            .or_else(|| nodes.get(self.child_of(from) as usize))
-            .map_or(heading.perp(), |beside| node.pos - beside.pos);
-        let across = along.perp().normalize_or(heading);
+        let pos = self.network.nodes[from as usize].pos;
+        let across = self.across_crack(from).unwrap_or(heading);
         let across = if across.dot(heading) < 0.0 { -across } else { across };
-        let length = self.params.step_length;
-        // Far enough to leave the older crack, however wide it is.
-        let to = node.pos + (heading + across).normalize_or(across) * length.max(0.5 * (node.width + length));
+        let to = pos + (heading + across).normalize_or(across) * self.way_out(from);
         let is_inside = to.cmpgt(Vec2::ZERO).all() && to.cmplt(self.network.extent()).all();
         let segment = SegmentId::Branch(self.network.nodes.len() as u32);
         is_inside
-            && self.free_line(segment, (from, u32::MAX), (node.pos, to)).is_ok()
+            && self.free_line(segment, (from, u32::MAX), (pos, to)).is_ok()
             && self.extend_of(impact, from, to, false).is_some()
+    }
+
+    /// A direction across the crack of a node; `None` if that is a single node.
+    pub(super) fn across_crack(&self, node: u32) -> Option<Vec2> {
+        let nodes = &self.network.nodes;
+        let Node { pos, parent, .. } = nodes[node as usize];
+        let beside = nodes.get(parent as usize).or_else(|| nodes.get(self.child_of(node) as usize))?;
+        (pos - beside.pos).perp().try_normalize()
+    }
+
+    /// Length of a segment that leaves the crack of a node, however wide that is.
+    pub(super) fn way_out(&self, node: u32) -> f32 {
+        let length = self.params.step_length;
+        length.max(0.5 * (self.network.nodes[node as usize].width + length))
     }
 }

@@ -17,7 +17,8 @@ impl GrowthParams {
     /// marker is further than [`crack_radius`](Self::crack_radius) from the node that it attracts. With closed
     /// venation a marker attracts at most six nodes at once, for at most twice as many steps. With arrest a marker
     /// counts for each time that it can be given up, and every node can be a tip that runs on and breaks through the
-    /// crack at which it ends. With nucleation every marker can be a start. Each node can fork. Strands have a largest number of points.
+    /// crack at which it ends. With nucleation every marker can be a start. Each node can fork. Strands have a largest
+    /// number of points.
     ///
     /// ```
     /// use bevy_crack::growth::GrowthParams;

@@ -114,10 +114,12 @@ impl CrackGrowth {
         let is_idle = tips.is_empty() && fresh.is_empty() && !is_running;
         let due = self.params.nucleation * self.steps.saturating_add(1) as f32;
         let is_due = (self.nucleated as f32) < due;
-        let candidates = match () {
-            () if is_idle => self.idle_candidates(found),
-            () if is_due => self.candidates(false),
-            () => Vec::new(),
+        let candidates = if is_idle {
+            self.idle_candidates(found)
+        } else if is_due {
+            self.candidates(false)
+        } else {
+            Vec::new()
         };
         self.timeline.begin(self.steps.saturating_add(1));
         self.new_nodes = first..first;

@@ -335,14 +335,10 @@ impl CrackGrowth {
             if self.network.nodes.len() > first + 1 {
                 break;
             }
-            let nodes = &self.network.nodes;
-            let node = nodes[index as usize];
-            let beside = nodes.get(node.parent as usize).or_else(|| nodes.get(self.child_of(index) as usize));
-            let across = beside.map_or(Vec2::X, |other| (node.pos - other.pos).perp().normalize_or(Vec2::X));
-            // Far enough to leave the crack, however wide it is.
-            let way_out = length.max(0.5 * (node.width + length));
+            let pos = self.network.nodes[index as usize].pos;
+            let across = self.across_crack(index).unwrap_or(Vec2::X) * self.way_out(index);
             for way in [across, -across] {
-                self.extend_of(impact, index, node.pos + way * way_out, false);
+                self.extend_of(impact, index, pos + way, false);
             }
             if self.network.nodes.len() > first {
                 break;

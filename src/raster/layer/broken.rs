@@ -127,10 +127,9 @@ impl Broken {
         }
         let faces = Face::all(bricks, crushed, radius, seed ^ draws::FACES);
         if !faces.is_empty() {
-            // The mortar breaks out where the hit is, and the flakes beside it stay in their bricks.
+            // In place of crater and flakes. Mortar breaks out only where the hit is.
             let core = Outline::new(Vec2::ZERO, radius * CORE, 8, 2, 0.8 * ragged, mix_in(seed, 0x500));
-            off.clear();
-            off.push(core.stretched(mix_in(seed, 0x501)));
+            off = vec![shape(core, 0x501)];
         }
         // Craters from contours have more chips around them, and slightly larger ones.
         let (many, large) = if crushed.terraces > 0 { (58.0, 1.05) } else { (24.0, 1.0) };
