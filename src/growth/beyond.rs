@@ -7,6 +7,9 @@ use glam::Vec2;
 /// Share of its reach within which a hit breaks through older cracks.
 const STRONG: f32 = 0.6;
 
+/// How wide a crack is beyond an older one, as a share: less is left of its energy.
+pub(super) const THINNER: f32 = 0.5;
+
 /// Cosine of the least angle, seen from the hit, between two new cracks in joints: 45 degrees.
 const APART: f32 = 0.707;
 
@@ -29,7 +32,10 @@ impl CrackGrowth {
             heading => heading,
         };
         for from in [self.child_of(node), met.parent, node] {
-            if from != NO_PARENT && self.grow_beyond(end.impact, from, heading) {
+            if from != NO_PARENT
+                && let Some(child) = self.grow_beyond(end.impact, from, heading)
+            {
+                self.widths.thin_beyond(tip, child, THINNER);
                 return;
             }
         }
@@ -72,17 +78,16 @@ impl CrackGrowth {
         !begun.is_empty()
     }
 
-    /// Grows a segment of a hit from a node of an older crack, away from it; returns whether there was room.
-    pub(super) fn grow_beyond(&mut self, impact: u32, from: u32, heading: Vec2) -> bool {
+    /// Grows a segment of a hit from a node of an older crack, away from it; `None` if there is no room.
+    pub(super) fn grow_beyond(&mut self, impact: u32, from: u32, heading: Vec2) -> Option<u32> {
         let pos = self.network.nodes[from as usize].pos;
         let across = self.across_crack(from).unwrap_or(heading);
         let across = if across.dot(heading) < 0.0 { -across } else { across };
         let to = pos + (heading + across).normalize_or(across) * self.way_out(from);
         let is_inside = to.cmpgt(Vec2::ZERO).all() && to.cmplt(self.network.extent()).all();
         let segment = SegmentId::Branch(self.network.nodes.len() as u32);
-        is_inside
-            && self.free_line(segment, (from, u32::MAX), (pos, to)).is_ok()
-            && self.extend_of(impact, from, to, false).is_some()
+        let is_free = is_inside && self.free_line(segment, (from, u32::MAX), (pos, to)).is_ok();
+        is_free.then(|| self.extend_of(impact, from, to, false)).flatten()
     }
 
     /// A direction across the crack of a node; `None` if that is a single node.

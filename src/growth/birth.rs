@@ -32,7 +32,8 @@ impl CrackGrowth {
         let (mixed, draw) = (self.params.width_variation, hash_unit(self.seed ^ draws::MIXED_WIDTH, node));
         let share = |division: &mut Division| division.add_node(node as u32, parent, 1.0 - mixed * draw);
         let wider = self.division.as_mut().map_or(1.0, share) * wider * self.thinned(pos, impact);
-        let width = self.widths.tip(parent, || hash_unit(self.seed ^ draws::UNEVEN_WIDTH, node), wider);
+        let is_own = self.network.nodes.get(parent as usize).is_some_and(|parent| parent.impact == impact);
+        let width = self.widths.tip((parent, is_own), || hash_unit(self.seed ^ draws::UNEVEN_WIDTH, node), wider);
         if let Some(arrest) = &mut self.arrest {
             arrest.push_node(false);
         }

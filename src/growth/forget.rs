@@ -56,7 +56,7 @@ impl CrackGrowth {
         for node in &self.network.nodes {
             self.nodes.push(node.pos);
         }
-        self.widths.forget(&self.network.nodes);
+        self.widths.forget(self.network.nodes.len());
         self.linker.forget(forgotten);
         self.rays.forget(forgotten);
         self.strands.iter_mut().for_each(|strands| strands.forget(forgotten));

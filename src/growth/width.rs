@@ -31,6 +31,8 @@ const WAITING: usize = 12;
 /// ancestor is known only after reading the one before, and the memory accesses of several chains overlap. Else the
 /// counts are collected and added in one pass from the youngest node to the oldest, when a twelfth as many as there
 /// are nodes have gathered, or growth has ended; the ancestors just behind the tips are updated at once.
+///
+/// Every hit is counted for itself: cracks that begin at one of an older hit do not make that wider.
 #[derive(Clone, Debug)]
 pub(super) struct Widths {
     /// Number of nodes behind from which each notch applies, with its width; then an entry that is never reached.
@@ -61,6 +63,7 @@ struct Pipe {
     waiting: u32,
     /// The count at which it reaches the next notch.
     due: u32,
+    /// The node for which it counts too.
     parent: u32,
 }
 
@@ -71,6 +74,8 @@ struct Form {
     factor: f32,
     /// Factor for the energy of its impact.
     wider: f32,
+    /// Factor for the crack that it belongs to: smaller beyond an older crack, 0..=1.
+    share: f32,
     /// Its own count: one, plus the length of a taper if the crack continues beyond it.
     counts: u32,
 }
@@ -167,8 +172,9 @@ impl Widths {
         self.notches.partition_point(|notch| notch.0 <= behind).saturating_sub(1)
     }
 
-    /// Adds the entry of a node that grows from `parent`, with one random draw; returns its width.
-    pub(super) fn tip(&mut self, parent: u32, draw: impl FnOnce() -> f32, wider: f32) -> f32 {
+    /// Adds the entry of a node that grows from `parent`, with one random draw; returns its width. It counts for its
+    /// parent too, if that `is_own`.
+    pub(super) fn tip(&mut self, (parent, is_own): (u32, bool), draw: impl FnOnce() -> f32, wider: f32) -> f32 {
         let mut factor = 1.0;
         if self.unevenness > 0.0 {
             // Each node is similar to the one before.
@@ -177,13 +183,14 @@ impl Widths {
             factor = middle + 0.75 * (before - middle) + self.unevenness * (draw() - 0.5);
             factor = factor.clamp(1.0 - self.unevenness, 1.0);
         }
-        self.place(parent, Form { factor, wider, counts: 1 });
-        self.at_most(self.notches[0].1 * factor * wider)
+        let share = self.forms.get(parent as usize).filter(|_| is_own).map_or(1.0, |form| form.share);
+        self.place(if is_own { parent } else { NO_PARENT }, Form { factor, wider, share, counts: 1 });
+        self.at_most(self.notches[0].1 * factor * wider * share)
     }
 
     /// Adds the entry of a node that has its own width and is not counted.
     pub(super) fn admit(&mut self, parent: u32) {
-        self.place(parent, Form { factor: 1.0, wider: 1.0, counts: 0 });
+        self.place(parent, Form { factor: 1.0, wider: 1.0, share: 1.0, counts: 0 });
     }
 
     fn place(&mut self, parent: u32, form: Form) {
@@ -191,12 +198,14 @@ impl Widths {
         self.forms.push(form);
     }
 
-    /// Removes all nodes except the last ones, which are `left`.
-    pub(super) fn forget(&mut self, left: &[Node]) {
-        let first = self.pipes.len().saturating_sub(left.len());
+    /// Removes all nodes except the last `left`.
+    pub(super) fn forget(&mut self, left: usize) {
+        let first = self.pipes.len().saturating_sub(left);
         self.pipes.drain(..first);
         self.forms.drain(..first);
-        self.pipes.iter_mut().zip(left).for_each(|(pipe, node)| pipe.parent = node.parent);
+        for pipe in self.pipes.iter_mut().filter(|pipe| pipe.parent != NO_PARENT) {
+            pipe.parent = pipe.parent.checked_sub(first as u32).unwrap_or(NO_PARENT);
+        }
     }
 
     /// Makes a node permanently wider.
@@ -206,9 +215,14 @@ impl Widths {
 
     /// Counts the nodes from `first` on and widens their ancestors; calls `widened` with each node that became wider.
     pub(super) fn push(&mut self, nodes: &mut [Node], first: u32, widened: impl FnMut(u32)) {
-        let born = nodes[first as usize..].iter().filter(|node| node.parent != NO_PARENT);
-        self.pending.extend(born.map(|node| (node.parent, 1)));
+        let born = self.pipes[first as usize..].iter().filter(|pipe| pipe.parent != NO_PARENT);
+        self.pending.extend(born.map(|pipe| (pipe.parent, 1)));
         self.spread(nodes, widened);
+    }
+
+    /// Makes all that grows from `node` thinner, by a factor, than the crack of `end`: it goes on beyond an older one.
+    pub(super) fn thin_beyond(&mut self, end: u32, node: u32, by: f32) {
+        self.forms[node as usize].share = by * self.forms[end as usize].share;
     }
 
     /// Handles an end that is no longer free: it gets the width of a crack that continues.
@@ -295,7 +309,8 @@ impl Widths {
         let notch = self.notch(self.pipes[node as usize].behind);
         self.pipes[node as usize].due = self.notches[notch + 1].0;
         let form = self.forms[node as usize];
-        let (this, width) = (&mut nodes[node as usize], self.at_most(self.notches[notch].1 * form.factor * form.wider));
+        let width = self.at_most(self.notches[notch].1 * form.factor * form.wider * form.share);
+        let this = &mut nodes[node as usize];
         if width > this.width {
             this.width = width;
             widened(node);
@@ -307,7 +322,12 @@ impl Widths {
 impl Widths {
     /// The own count of a node, and its width as a share of the even width.
     pub(super) fn form(&self, node: u32) -> (u32, f32) {
-        let Form { factor, wider, counts } = self.forms[node as usize];
-        (counts, factor * wider)
+        let Form { factor, wider, share, counts } = self.forms[node as usize];
+        (counts, factor * wider * share)
+    }
+
+    /// Its factor for the crack that it belongs to.
+    pub(super) fn share(&self, node: u32) -> f32 {
+        self.forms[node as usize].share
     }
 }

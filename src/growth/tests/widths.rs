@@ -12,11 +12,11 @@ use crate::{
 };
 use glam::Vec2;
 
-/// Nodes that hang on each, itself included; each counts for `own`.
-fn recount(nodes: &[Node], own: impl Fn(u32) -> u32) -> Vec<u32> {
+/// Nodes that hang on each, itself included; each counts for `own`, and for the node that `before` names.
+fn recount(nodes: &[Node], own: impl Fn(u32) -> u32, before: impl Fn(u32) -> u32) -> Vec<u32> {
     let mut behind: Vec<u32> = (0..nodes.len() as u32).map(own).collect();
-    for node in (0..nodes.len()).rev().filter(|&node| nodes[node].parent != NO_PARENT) {
-        behind[nodes[node].parent as usize] += behind[node];
+    for node in (0..nodes.len() as u32).rev().filter(|&node| before(node) != NO_PARENT) {
+        behind[before(node) as usize] += behind[node as usize];
     }
     behind
 }
@@ -50,7 +50,7 @@ fn widths_are_those_of_a_recount_on_random_trees() {
                 let from_end = (youth * rng.unit() * first as f32) as u32;
                 let parent =
                     if first == 0 || rng.unit() < 0.01 { NO_PARENT } else { first - 1 - from_end.min(first - 1) };
-                let width = widths.tip(parent, || 0.5, 1.0);
+                let width = widths.tip((parent, true), || 0.5, 1.0);
                 nodes.push(node(parent, width));
             }
             let before: Vec<f32> = nodes.iter().map(|node| node.width).collect();
@@ -70,7 +70,7 @@ fn widths_are_those_of_a_recount_on_random_trees() {
             } else if size > 1000 && rng.unit() < 0.9 {
                 continue;
             }
-            let behind = recount(&nodes, |node| widths.form(node).0);
+            let behind = recount(&nodes, |node| widths.form(node).0, |node| nodes[node as usize].parent);
             // In a small network each at once; in a large one no more than a twelfth of all are told later.
             let late = if is_last || nodes.len() <= 192 { 0 } else { nodes.len() as u32 / 12 };
             // What is as wide as can be has stopped telling.
@@ -104,7 +104,7 @@ fn widths_are_those_of_a_recount_on_random_trees() {
 /// Growths of all kinds: widths at rest are what the documents promise, free ends are needles, and those that meet something are not.
 #[test]
 fn widths_of_growths_are_those_of_a_recount() {
-    let (mut free, mut met) = (0, 0);
+    let (mut free, mut met, mut gone_on) = (0, 0, 0);
     for case in 0..400u64 {
         let mut rng = Rng::new(case).stream("recount");
         let params = if case % 2 == 0 { random_params(&mut rng, true) } else { random_arrest(&mut rng) };
@@ -142,13 +142,30 @@ fn widths_of_growths_are_those_of_a_recount() {
             node if is_thinned[node] => 1 + thinly(beyond),
             _ => 1,
         };
-        let behind = recount(nodes, |node| counts(node as usize));
-        let at_most = recount(nodes, |node| if may_be[node as usize] { 1 + beyond } else { counts(node as usize) });
+        // Each hit is counted for itself.
+        let before = |node: u32| {
+            let Node { parent, impact, .. } = nodes[node as usize];
+            if nodes.get(parent as usize).is_some_and(|parent| parent.impact == impact) { parent } else { NO_PARENT }
+        };
+        let behind = recount(nodes, |node| counts(node as usize), before);
+        let own = |node: u32| if may_be[node as usize] { 1 + beyond } else { counts(node as usize) };
+        let at_most = recount(nodes, own, before);
         for (index, ((node, &behind), &at_most)) in nodes.iter().zip(&behind).zip(&at_most).enumerate() {
             // Hits that have merged make wider ones.
             let generation = growth.division.as_ref().map_or(0, |division| division.generation_of(index as u32));
             let share = 0.5f32.powi(i32::from(generation)) * growth.impacts()[node.impact as usize].widening;
-            let (least, most) = (promised(&params, behind) * share, promised(&params, at_most) * share);
+            // Beyond an older crack they are thinner; only the first node begins as wide as any tip.
+            let thinner = growth.widths.share(index as u32);
+            let (parent, begins) =
+                (before(index as u32), node.parent != NO_PARENT && before(index as u32) == NO_PARENT);
+            gone_on += usize::from(begins && thinner < 1.0);
+            assert!(
+                if parent == NO_PARENT { begins || thinner == 1.0 } else { thinner == growth.widths.share(parent) },
+                "case {case}, node {index}: {thinner}"
+            );
+            let first = if begins { promised(&params, 1) * share } else { 0.0 };
+            let share = share * thinner;
+            let (least, most) = (promised(&params, behind) * share, (promised(&params, at_most) * share).max(first));
             let is_right = (least / NOTCH * 0.9999..=most * 1.0001).contains(&node.width);
             assert!(is_right, "case {case}, node {index}: {behind} behind, {} is not {least}: {params:?}", node.width);
             if params.tip_taper >= 2.0 && at_most == 1 {
@@ -162,6 +179,7 @@ fn widths_of_growths_are_those_of_a_recount() {
         }
     }
     assert!(free > 1000 && met > 1000, "{free} free ends, {met} that met something");
+    assert!(gone_on > 100, "{gone_on} went on beyond an older crack");
 }
 
 /// Along every branch of every preset the width never rises towards the tip by more than `unevenness` lets it, at any time.
