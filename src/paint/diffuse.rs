@@ -261,6 +261,18 @@ impl Block<'_> {
                 facing[i] *= 1.0 - dark[i];
             }
         }
+        if look.uneven_glint > 0.0 {
+            for (i, facing) in facing.iter_mut().enumerate() {
+                if *facing > 0.0 {
+                    let mut share = lit_share(look, at + UVec2::new(i as u32, 0));
+                    // Crushed stone is lit as it lies.
+                    if RICH && let Some((extras, place)) = extras {
+                        share += (1.0 - share) * f32::from(extras.spot(place + i).pale) * (1.0 / 255.0);
+                    }
+                    *facing *= share;
+                }
+            }
+        }
         for c in 0..3 {
             let (under, over) = (&under[c], &over[c]);
             for i in 0..BLOCK {
@@ -410,6 +422,14 @@ impl Block<'_> {
         }
         sheen
     }
+}
+
+/// How much of the light on walls there is at a texel.
+#[inline(always)]
+fn lit_share(look: &LookTable, at: UVec2) -> f32 {
+    let bump = 0.5 + 0.9 * smooth_noise(0x61E7, at.x as f32 * look.glint_scale, at.y as f32 * look.glint_scale);
+    let bump = bump.clamp(0.0, 1.0);
+    1.0 - look.uneven_glint * (1.0 - bump * bump)
 }
 
 /// Puts reflections and crushed material under the cracks, and holes over them; returns how dark the holes are.

@@ -63,6 +63,9 @@ pub struct Look {
     /// How much walls that face the light (from the upper left) brighten and walls that face away darken, by their
     /// slope. 0..=4; default 0.9.
     pub glint: f32,
+    /// How much the light of [`glint`](Self::glint) comes and goes along a crack: up to this share of it is removed, so
+    /// that walls are lit in places. 0..=1; default 0.
+    pub uneven_glint: f32,
     /// How much of the light on walls is an added highlight instead of a share of the colour below it (glass). 0..=4;
     /// default 0.
     pub gloss: f32,
@@ -174,6 +177,7 @@ impl Look {
         ]),
         tint: 1.0,
         glint: 0.9,
+        uneven_glint: 0.0,
         gloss: 0.0,
         shadow: 0.0,
         grain: 0.12,
@@ -281,6 +285,7 @@ impl Look {
         }
         within("tint", self.tint, 0.0..=1.0, unit)?;
         within("glint", self.glint, 0.0..=4.0, "0..=4")?;
+        within("uneven_glint", self.uneven_glint, 0.0..=1.0, unit)?;
         within("gloss", self.gloss, 0.0..=4.0, "0..=4")?;
         within("shadow", self.shadow, 0.0..=1.0, unit)?;
         within("sparkle", self.sparkle, 0.0..=1.0, unit)?;

@@ -15,6 +15,9 @@ use std::sync::{Arc, Mutex, PoisonError, Weak};
 /// Bumps per pattern unit of the noise that varies the cover along cracks.
 const SPARKLES: f32 = 28.0;
 
+/// Bumps of the light on walls per pattern unit.
+const GLINTS: f32 = 40.0;
+
 /// Steps of the precomputed ramp: one for each value of the high byte of a depth.
 const STEPS: usize = 256;
 
@@ -39,6 +42,9 @@ pub struct LookTable {
     glow: Option<Arc<Ramp>>,
     pub(super) tint: f32,
     pub(super) glint: f32,
+    pub(super) uneven_glint: f32,
+    /// Bumps of its noise per texel.
+    pub(super) glint_scale: f32,
     pub(super) gloss: f32,
     pub(super) shadow: f32,
     pub(super) sparkle: f32,
@@ -137,12 +143,15 @@ impl LookTable {
         let glow = (!look.glow.is_empty()).then(|| shared_ramp(&look.glow));
         // Sobel's kernel weighs a slope of one depth step per texel with 8.
         let slope = look.relief * texels_per_unit / (8.0 * 65535.0);
-        let Look { tint, glint, gloss, shadow, sparkle, grain, shift, normals, opaque, facets, .. } = *look;
+        let Look { tint, glint, uneven_glint, gloss, shadow, sparkle, grain, shift, normals, opaque, facets, .. } =
+            *look;
         Ok(Self {
             ramp,
             glow,
             tint,
             glint,
+            uneven_glint,
+            glint_scale: GLINTS / texels_per_unit,
             gloss,
             shadow,
             sparkle,
@@ -228,6 +237,7 @@ mod tests {
     fn numbers_out_of_range_are_named() {
         for bad in [-0.1, 17.0, f32::NAN, f32::INFINITY] {
             assert_eq!(refused(&Look { glint: bad, ..Look::GROOVE }), Some("glint"));
+            assert_eq!(refused(&Look { uneven_glint: bad, ..Look::GROOVE }), Some("uneven_glint"));
             assert_eq!(refused(&Look { grain: bad, ..Look::GROOVE }), Some("grain"));
             assert_eq!(refused(&Look { shift: bad, ..Look::GROOVE }), Some("shift"));
             assert_eq!(refused(&Look { relief: bad, ..Look::GROOVE }), Some("relief"));
