@@ -6,7 +6,7 @@ use bevy::{
     ecs::system::RunSystemOnce,
     image::TextureAtlasLayout,
     prelude::*,
-    render::render_resource::Extent3d,
+    render::render_resource::{Extent3d, TextureFormat},
     sprite_render::{
         TileData, TileOrientation, TilemapChunk, TilemapChunkMaterial, TilemapChunkMeshCache, TilemapChunkTileData,
     },
@@ -362,6 +362,46 @@ fn members_are_shown_as_before() {
     steps(&mut app, 3);
     assert_eq!(app.world().get::<RenderLayers>(members[0]), Some(&layers));
     assert!(members.iter().all(|member| !is_hidden(&app, *member)));
+    assert!(app.world().get::<RenderLayers>(group).is_none(), "those of its members go");
+}
+
+/// However many members a group has, all of them are shown again, also if its picture has just been made again.
+#[test]
+fn all_members_are_shown_again() {
+    let mut app = app();
+    let image = add(&mut app, solid(UVec2::splat(2), [120, 110, 100, 255]));
+    let group = app.world_mut().spawn(CrackSurface::new(preset()).with_seed(5)).id();
+    let spawn = |app: &mut App, i: u32| {
+        let place = Transform::from_xyz(2.0 * (i % 40) as f32, 2.0 * (i / 40) as f32, 0.0);
+        app.world_mut().spawn((Sprite::from_image(image.clone()), place, CrackMemberOf(group))).id()
+    };
+    let members: Vec<Entity> = (0..1600).map(|i| spawn(&mut app, i)).collect();
+    step(&mut app);
+    hit(&mut app, CrackHit::uv(group, Vec2::splat(0.5)));
+    wait_for(&mut app, "all", |app| members.iter().all(|member| is_hidden(app, *member)));
+    app.world_mut().get_mut::<Transform>(members[7]).unwrap().translation.x += 500.0;
+    wait_for(&mut app, "the one that moves", |app| !is_hidden(app, members[7]));
+    app.world_mut().commands().entity(group).heal_cracks();
+    steps(&mut app, 10);
+    let hidden = members.iter().filter(|member| is_hidden(&app, **member)).count();
+    assert_eq!(hidden, 0, "of {}", members.len());
+}
+
+/// Pictures of one channel are red on their members, and so they are on the group.
+#[test]
+fn groups_of_pictures_with_one_channel_are_red() {
+    let mut app = app();
+    let image = add(&mut app, picture_of(UVec2::splat(16), TextureFormat::R8Unorm));
+    let group = app.world_mut().spawn(CrackSurface::new(preset())).id();
+    for x in [0.0, 16.0] {
+        let sprite = Sprite::from_image(image.clone());
+        app.world_mut().spawn((sprite, Transform::from_xyz(x, 0.0, 0.0), CrackMemberOf(group)));
+    }
+    step(&mut app);
+    prepare(&mut app, group);
+    let shown = texels(&app, &image_of(&app, group));
+    let all = shown.as_chunks::<4>().0;
+    assert!(all.iter().all(|[_, green, blue, _]| (*green, *blue) == (0, 0)) && all.iter().any(|[red, ..]| *red > 0));
 }
 
 /// Whatever happens to groups and their members, counts add up and nothing is left.

@@ -1023,6 +1023,51 @@ fn t10_a_changed_picture_of_another_size_is_cracked_anew_in_the_same_places() {
     }
 }
 
+/// A picture whose right half is transparent, 100 texels high.
+fn half_transparent(width: u32) -> Image {
+    let mut image = solid(UVec2::new(width, 100), [120, 110, 100, 255]);
+    let row = 4 * width as usize;
+    image.data.as_mut().unwrap().iter_mut().enumerate().for_each(|(i, byte)| {
+        if i % 4 == 3 && i % row >= row / 2 {
+            *byte = 0;
+        }
+    });
+    image
+}
+
+/// Cracks that are grown again on a picture of other proportions avoid what is transparent there, as if they had been hit on it at once; what
+/// is asked for is so from the next picture on.
+#[test]
+fn t10_cracks_on_another_picture_avoid_what_is_transparent() {
+    let mut app = app();
+    for alpha_mask in [true, false] {
+        let surface = CrackSurface { alpha_mask, ..CrackSurface::new(CrackPreset::CONCRETE).with_seed(3) };
+        let first = if alpha_mask { solid(UVec2::splat(100), [120, 110, 100, 255]) } else { half_transparent(100) };
+        let image = add(&mut app, first);
+        let entity = app.world_mut().spawn((Sprite::from_image(image.clone()), surface.clone())).id();
+        // What was avoided on the first picture is not any more.
+        app.world_mut().get_mut::<CrackSurface>(entity).unwrap().alpha_mask = true;
+        let at = Vec2::new(0.3, 0.5);
+        hit(&mut app, CrackHit::uv(entity, at).with_energy(2.0));
+        settle(&mut app, entity);
+        app.world_mut().get_mut::<CrackSurface>(entity).unwrap().alpha_mask = alpha_mask;
+        replace(&mut app, &image, half_transparent(140));
+        steps(&mut app, 60);
+        settle(&mut app, entity);
+        let direct = add(&mut app, half_transparent(140));
+        let direct = app.world_mut().spawn((Sprite::from_image(direct), surface)).id();
+        hit(&mut app, CrackHit::uv(direct, at).with_energy(2.0));
+        settle(&mut app, direct);
+        assert_eq!(state(&app, entity).nodes, state(&app, direct).nodes, "{alpha_mask}");
+        assert!(shown(&app, entity) == shown(&app, direct), "{alpha_mask}");
+        for entity in [entity, direct] {
+            hit(&mut app, CrackHit::uv(entity, Vec2::new(0.2, 0.8)).with_energy(2.0));
+            settle(&mut app, entity);
+        }
+        assert!(shown(&app, entity) == shown(&app, direct), "{alpha_mask}, hit again");
+    }
+}
+
 #[test]
 fn t9_t10_reloaded_pictures_are_drawn() {
     let Some((_one, mut app)) = gpu_app() else { return };

@@ -7,6 +7,7 @@ use crate::{
 use bevy::{
     asset::RenderAssetUsages,
     camera::visibility::RenderLayers,
+    light::{NotShadowCaster, NotShadowReceiver},
     math::Affine2,
     mesh::{PrimitiveTopology, VertexAttributeValues},
     prelude::*,
@@ -94,6 +95,43 @@ fn areas(app: &App, entity: Entity) -> [f32; 6] {
         };
         all.as_chunks::<3>().0.iter().map(area).sum()
     })
+}
+
+/// A group is drawn where its members are, with the shadows that they have, and has nothing of them once it is healed.
+#[test]
+fn a_healed_group_has_nothing_of_its_members() {
+    let mut app = app();
+    let picture = add(&mut app, speckled(UVec2::splat(32), 1));
+    let material = add(&mut app, StandardMaterial { base_color_texture: Some(picture), ..default() });
+    let (group, members) = spawn_room(&mut app, &material, Transform::default());
+    let layers = [RenderLayers::layer(2), RenderLayers::layer(3)];
+    for (layers, has_shadows) in layers.iter().zip([false, true]) {
+        for member in &members {
+            let mut member = app.world_mut().entity_mut(*member);
+            member.insert(layers.clone());
+            if has_shadows {
+                member.remove::<(NotShadowCaster, NotShadowReceiver)>();
+            } else {
+                member.insert((NotShadowCaster, NotShadowReceiver));
+            }
+        }
+        step(&mut app);
+        hit(&mut app, CrackHit::world(members[0], Vec3::new(0.3, -0.9, -1.0)));
+        settle(&mut app, group);
+        steps(&mut app, 8);
+        let given = app.world().entity(group);
+        assert_eq!(given.get::<RenderLayers>(), Some(layers));
+        assert_eq!(
+            (given.contains::<NotShadowCaster>(), given.contains::<NotShadowReceiver>()),
+            (!has_shadows, !has_shadows)
+        );
+        app.world_mut().commands().entity(group).heal_cracks();
+        steps(&mut app, 8);
+        let healed = app.world().entity(group);
+        assert!(!healed.contains::<Mesh3d>() && !healed.contains::<RenderLayers>());
+        assert!(!healed.contains::<NotShadowCaster>() && !healed.contains::<NotShadowReceiver>());
+        assert!(members.iter().all(|member| app.world().get::<RenderLayers>(*member) == Some(layers)));
+    }
 }
 
 /// Six rectangles show in every frame what one mesh of them shows, bit for bit, with the same cracks; what goes leaves the others as they are.

@@ -203,9 +203,15 @@ impl Finish {
 impl FinishInputs {
     fn grow(&self, added: Option<&mut Added>) -> Result<Stage, CrackError> {
         let frame = frame(self.rect, &self.base)?;
-        let density = if self.surface.alpha_mask || self.base.has_gaps() { self.base.density(self.rect) } else { None };
-        let (mask, seed, is_nearest) = (self.mask.clone(), self.surface.seed, self.base.is_nearest);
-        let regrowth = Regrowth { preset: self.preset.clone(), frame, seed, is_nearest, mask, density };
+        let regrowth = Regrowth {
+            preset: self.preset.clone(),
+            base: self.base.clone(),
+            rect: self.rect,
+            frame,
+            seed: self.surface.seed,
+            alpha_mask: self.surface.alpha_mask,
+            mask: self.mask.clone(),
+        };
         let mut grown = regrowth.grow(added, &self.past)?;
         // All of it is drawn.
         grown.growth.take_changed(&mut Vec::new());

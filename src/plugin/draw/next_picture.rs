@@ -11,15 +11,14 @@ use crate::plugin::gpu::textures;
 use crate::plugin::jobs::background::drop_in_background;
 use crate::plugin::jobs::frame_time::FrameClock;
 use crate::plugin::jobs::threads::Threads;
-use crate::plugin::source::picture::BasePicture;
 use crate::plugin::surface::active::Active;
 use crate::plugin::surface::frame::profile;
 use crate::plugin::surface::regrow::{OnAnother, Regrown, Regrowth, regrow};
 use crate::plugin::surface::tile_set::Touched;
-use crate::raster::{DepthField, DirtyTiles, ReplayChanges, TexelRect};
+use crate::raster::{DepthField, DirtyTiles, ReplayChanges};
 use bevy::{platform::time::Instant, prelude::*};
 use core::ops::ControlFlow;
-use std::{sync::Arc, time::Duration};
+use std::time::Duration;
 
 /// A picture that has changed so often before it was drawn, as those of a film do, is drawn in the frame.
 const MAX_RESTARTS: u32 = 3;
@@ -46,8 +45,6 @@ struct Making {
 /// What cracks are drawn and painted on.
 pub(crate) struct NextInputs {
     pub(crate) growth: Regrowth,
-    pub(crate) base: Arc<BasePicture>,
-    pub(crate) rect: TexelRect,
     pub(crate) maps: Maps,
     pub(crate) look: LookTable,
 }
@@ -70,8 +67,7 @@ pub(crate) struct Drawn(Box<FrameJob>);
 
 impl NextInputs {
     fn is_like(&self, other: &Self) -> bool {
-        let is_same = Arc::ptr_eq(&self.base, &other.base) && (self.rect, self.maps) == (other.rect, other.maps);
-        is_same && self.growth.is_like(&other.growth)
+        self.maps == other.maps && self.growth.is_like(&other.growth)
     }
 
     /// Whether cracks with a past that is only known as a picture are where they were: they are not drawn again.
@@ -83,15 +79,15 @@ impl NextInputs {
 
     /// Whether the cracks are elsewhere on it, or drawn in another way. What the mask forbids may be elsewhere.
     pub(crate) fn changes_field(&self, active: &Active) -> bool {
-        let Regrowth { preset, frame, is_nearest, mask, .. } = &self.growth;
+        let Regrowth { preset, base, frame, mask, .. } = &self.growth;
         *frame != active.drawing.field.frame
             || !active.cracks.growth.mask().is_empty()
             || !mask.is_empty()
-            || profile(preset, *is_nearest) != active.drawing.profile
+            || profile(preset, base.is_nearest) != active.drawing.profile
     }
 
     fn job(&self, active: &Active, regrown: Option<&Regrown>) -> Box<FrameJob> {
-        let Regrowth { preset, frame, seed, is_nearest, mask, .. } = &self.growth;
+        let Regrowth { preset, base, rect, frame, seed, mask, .. } = &self.growth;
         let growth = regrown.map_or(&active.cracks.growth, |regrown| &regrown.growth);
         let is_played = active.playhead.playback.is_some();
         let moment = if is_played { active.moment() } else { Moment::after(growth.timeline().end()) };
@@ -101,17 +97,17 @@ impl NextInputs {
         Box::new(FrameJob {
             timeline: TimelineSnapshot::of(growth),
             moment,
-            base: self.base.clone(),
+            base: base.clone(),
             analogy: None,
             look: self.look.clone(),
             maps: [(); MAPS].map(|()| kinds.next().unwrap_or(false)),
             has_mips: self.maps.mips,
-            rect: self.rect,
+            rect: *rect,
             stager: None,
             field,
             ground: is_anew.then(|| (mask.clone(), preset.look.layer(*seed))),
             replay: None,
-            profile: profile(preset, *is_nearest),
+            profile: profile(preset, base.is_nearest),
             is_anew,
             frozen: regrown.map_or(&active.drawing.frozen, |regrown| &regrown.frozen).clone(),
             carried: (Vec::new(), 0.0),

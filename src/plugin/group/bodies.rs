@@ -2,7 +2,7 @@
 
 use super::body::{BodyWork, MadeBody};
 use super::common::{self, GroupFrame, Whole, warn_left_out};
-use super::hide::Replaced;
+use super::hide::{GivenLayers, Replaced};
 use super::solids::{Solids, place_in};
 use crate::plugin::api::{CrackError, CrackGroup, CrackMemberOf, CrackTextures};
 use crate::plugin::carrier::unfold;
@@ -40,6 +40,9 @@ pub(crate) struct Body {
     mesh: Handle<Mesh>,
     members: Vec<Member>,
     replaced: Replaced,
+    layers: GivenLayers,
+    /// Whether it casts no shadows, and receives none, as its members.
+    is_unshadowed: (bool, bool),
     has_warned: bool,
 }
 
@@ -182,18 +185,17 @@ impl Body {
         let material = materials.add(material);
         let Some(mut meshes) = world.get_resource_mut::<Assets<Mesh>>() else { return };
         self.mesh = meshes.add(made.before);
-        let (casts, receives) =
-            (world.get::<NotShadowCaster>(first.0).is_none(), world.get::<NotShadowReceiver>(first.0).is_none());
+        let lacks = (has::<NotShadowCaster>(world, first.0), has::<NotShadowReceiver>(world, first.0));
+        let had = (has::<NotShadowCaster>(world, group), has::<NotShadowReceiver>(world, group));
+        self.is_unshadowed = (lacks.0 && !had.0, lacks.1 && !had.1);
         unfold::give(world, group, self.mesh.clone(), made.mesh, made.unfolding);
         if let Ok(mut group) = world.get_entity_mut(group) {
             group.insert(MeshMaterial3d(material));
-            if let Some(layers) = of.layers.filter(|_| !group.contains::<RenderLayers>()) {
-                group.insert(layers);
-            }
-            if !casts {
+            self.layers.give(&mut group, of.layers);
+            if self.is_unshadowed.0 {
                 group.insert(NotShadowCaster);
             }
-            if !receives {
+            if self.is_unshadowed.1 {
                 group.insert(NotShadowReceiver);
             }
         }
@@ -234,6 +236,13 @@ impl Body {
             && group.get::<Mesh3d>().is_some_and(|mesh| mesh.0 == self.mesh)
         {
             group.remove::<(Mesh3d, MeshMaterial3d<StandardMaterial>)>();
+            self.layers.take_back(&mut group);
+            if self.is_unshadowed.0 {
+                group.remove::<NotShadowCaster>();
+            }
+            if self.is_unshadowed.1 {
+                group.remove::<NotShadowReceiver>();
+            }
         }
         is_over
     }
@@ -273,6 +282,10 @@ fn copy(
             Stage::Making { work: Running::start(world.resource::<Threads>(), work), made_of }
         }
     })
+}
+
+fn has<C: Component>(world: &World, entity: Entity) -> bool {
+    world.get::<C>(entity).is_some()
 }
 
 /// Whether a member is where it was, but for rounding.

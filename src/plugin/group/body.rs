@@ -50,11 +50,7 @@ impl Source {
         image.sampler = of.sampler.clone();
         let size = picture::readable_size(&image)?;
         let sampling = Sampling::of(&image, of.space);
-        let mut texels = picture::read(&image, of.space, size)?;
-        if of.space == picture::Space::Srgb && image.texture_descriptor.format.components() == 1 {
-            // The renderer shows one channel as red.
-            texels.as_chunks_mut::<4>().0.iter_mut().for_each(|texel| (texel[1], texel[2]) = (0, 0));
-        }
+        let texels = picture::read_colors(&image, of.space, size)?;
         Ok(Self { size, texels, sampling, is_nearest: of.is_nearest })
     }
 

@@ -45,7 +45,33 @@ impl Replaced {
         for member in self.members.iter().filter(|member| !stay.contains(*member)) {
             show(world, *member);
         }
-        (self.members, self.hidden) = (members, 0);
+        // Those that are hidden come first, so that all of them are shown again.
+        let is_hidden = |member: &Entity| world.get::<HiddenMember>(*member).is_some();
+        let (mut all, more): (Vec<_>, Vec<_>) = members.into_iter().partition(is_hidden);
+        self.hidden = all.len();
+        all.extend(more);
+        self.members = all;
+    }
+}
+
+/// The layers that a group is drawn in, if its members' and not its own.
+#[derive(Default)]
+pub(super) struct GivenLayers(Option<RenderLayers>);
+
+impl GivenLayers {
+    /// Gives a group the layers of its members, if it has none.
+    pub(super) fn give(&mut self, group: &mut EntityWorldMut, layers: Option<RenderLayers>) {
+        if let Some(layers) = layers.filter(|_| !group.contains::<RenderLayers>()) {
+            group.insert(layers.clone());
+            self.0 = Some(layers);
+        }
+    }
+
+    /// Takes them away again, unless somebody has given it others meanwhile.
+    pub(super) fn take_back(&mut self, group: &mut EntityWorldMut) {
+        if self.0.take().is_some_and(|given| group.get::<RenderLayers>() == Some(&given)) {
+            group.remove::<RenderLayers>();
+        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! When the picture of a group is made, and shown in place of its members.
 
 use super::common::{self, GroupFrame, Whole, warn_left_out};
-use super::hide::Replaced;
+use super::hide::{GivenLayers, Replaced};
 use super::members::Members;
 use super::wall::{WallFrame, WallWork};
 use crate::plugin::api::{CrackError, CrackGroup, CrackMemberOf, CrackTextures};
@@ -11,7 +11,6 @@ use crate::plugin::jobs::stepped::{News, Running};
 use crate::plugin::jobs::threads::Threads;
 use bevy::{
     asset::RenderAssetUsages,
-    camera::visibility::RenderLayers,
     ecs::entity::EntityHashSet,
     platform::time::Instant,
     prelude::*,
@@ -40,6 +39,7 @@ pub(crate) struct Wall {
     gone: EntityHashSet,
     /// Members that lie within it.
     within: Replaced,
+    layers: GivenLayers,
     /// Whether members have changed since it was made.
     is_stale: bool,
     /// For how many frames it is not made again.
@@ -228,9 +228,7 @@ impl Wall {
             let sprite = Sprite { image: self.picture.clone(), custom_size: Some(extent), ..Sprite::default() };
             if let Ok(mut group) = world.get_entity_mut(group) {
                 group.insert((sprite, Anchor(-frame.center() / extent)));
-                if let Some(layers) = members.layers.clone().filter(|_| !group.contains::<RenderLayers>()) {
-                    group.insert(layers);
-                }
+                self.layers.give(&mut group, members.layers.clone());
             }
         }
         self.within.become_of(world, within);
@@ -246,6 +244,7 @@ impl Wall {
             && group.get::<Sprite>().is_some_and(|sprite| sprite.image == self.picture)
         {
             group.remove::<(Sprite, Anchor)>();
+            self.layers.take_back(&mut group);
         }
         is_over
     }

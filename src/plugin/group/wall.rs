@@ -125,7 +125,7 @@ impl Source {
         let Extent3d { width, height, depth_or_array_layers: layers } = image.texture_descriptor.size;
         let rows = height.saturating_mul(layers);
         image.texture_descriptor.size = Extent3d { width, height: rows, depth_or_array_layers: 1 };
-        let texels = picture::read(&image, Space::Srgb, UVec2::new(width, rows))?;
+        let texels = picture::read_colors(&image, Space::Srgb, UVec2::new(width, rows))?;
         Ok(Self { size: UVec2::new(width, height), texels })
     }
 

@@ -222,11 +222,11 @@ fn land(world: &mut World, entity: Entity, hit: &QueuedHit) -> Result<Vec2, &'st
     if active.drawing.cutouts.as_ref().is_some_and(|holes| holes.contains(texel)) {
         return Err("a shard has left the surface there");
     }
-    if (active.surface.alpha_mask || active.canvas.base.has_gaps())
-        && let Some(rect) = active.canvas.seen()
-        && active.canvas.base.is_hole(rect.min + (uv * frame.size().as_vec2()).as_uvec2().min(rect.size() - 1))
-    {
-        return Err("the surface is transparent there");
+    if let Some(rect) = active.canvas.seen() {
+        let texel = rect.min + (uv * frame.size().as_vec2()).as_uvec2().min(rect.size() - 1);
+        if active.canvas.base.is_closed(texel, active.surface.alpha_mask) {
+            return Err("the surface is transparent there");
+        }
     }
     Ok(uv)
 }

@@ -276,13 +276,18 @@ fn try_picture(
     active.canvas.offered = if other.is_some() { shown.pictures().map(Handle::id).collect() } else { Vec::new() };
     let Some(draft) = draft(world, entity, active, other, &shown)? else { return Ok(false) };
     let Some(mask) = resolve_mask(world, &active.surface, &active.preset, &shown, &draft)? else { return Ok(false) };
-    let (frame, is_nearest) = (frame(draft.plan.rect, &draft.base)?, draft.base.is_nearest);
-    let (preset, seed) = (active.preset.clone(), active.surface.seed);
+    let frame = frame(draft.plan.rect, &draft.base)?;
     let inputs = NextInputs {
-        look: look(&preset, frame, is_nearest)?,
-        growth: Regrowth { preset, frame, seed, is_nearest, mask, density: None },
-        base: draft.base.clone(),
-        rect: draft.plan.rect,
+        look: look(&active.preset, frame, draft.base.is_nearest)?,
+        growth: Regrowth {
+            preset: active.preset.clone(),
+            base: draft.base.clone(),
+            rect: draft.plan.rect,
+            frame,
+            seed: active.surface.seed,
+            alpha_mask: active.surface.alpha_mask,
+            mask,
+        },
         maps: draft.plan.maps,
     };
     let next = if may_wait && !async_playback::may_change(world, entity) {
@@ -328,9 +333,8 @@ fn show_picture(
         active.cracks.cells_reported = active.cracks.cells.cells().len();
         active.cracks.growth = growth;
     }
-    if active.surface.alpha_mask || draft.base.has_gaps() {
-        active.cracks.growth.set_density(draft.base.density(draft.plan.rect));
-    }
+    let density = draft.base.density(draft.plan.rect, active.surface.alpha_mask);
+    active.cracks.growth.set_density(density);
     active.cracks.growth.set_mask(mask.clone());
     active.bytes = world.resource::<TextureMemory>().count(draft.plan.bytes);
     active.canvas.unstretched = draft.plan.unstretched;

@@ -336,7 +336,7 @@ impl ShatterJob {
             let crumbs = self.crumbs.map_or_else(Vec::new, |params| crumbs_of(&cut, &leaving, &style, params));
             batches.push_back(Batch { leaving, crumbs, spans, rects, uv });
         }
-        let density = holes.density(self.view, self.alpha_mask.then_some(&*self.base));
+        let density = holes.density(self.view, &self.base, self.alpha_mask);
         let room = if self.is_first && !batches.is_empty() { vec![1; self.base.diffuse.len()] } else { Vec::new() };
         let drawn = match self.sketch {
             Some(sketch) if !batches.is_empty() && !cut.extended_lines().is_empty() => {

@@ -51,16 +51,19 @@ impl BasePicture {
         self.unfolding.as_ref().map(|unfolding| unfolding.unit)
     }
 
-    /// Whether there is something beside what cracks, whatever is transparent.
-    pub(crate) const fn has_gaps(&self) -> bool {
-        self.unfolding.is_some()
+    /// Whether the texel is a hole: a gap, or transparent.
+    pub(crate) fn is_hole(&self, texel: UVec2) -> bool {
+        self.is_closed(texel, true)
     }
 
-    /// Whether the texel is a hole.
-    pub(crate) fn is_hole(&self, texel: UVec2) -> bool {
+    /// Whether cracks may not go over the texel: a gap, or transparent if that is to be kept free (`alpha_mask`).
+    pub(crate) fn is_closed(&self, texel: UVec2, alpha_mask: bool) -> bool {
         let texel = texel.min(self.size.saturating_sub(UVec2::ONE));
         if self.unfolding.as_ref().is_some_and(|unfolding| unfolding.is_gap(texel)) {
             return true;
+        }
+        if !alpha_mask {
+            return false;
         }
         let i = (texel.y as usize * self.size.x as usize + texel.x as usize) * 4 + 3;
         self.diffuse.get(i).is_some_and(|alpha| *alpha < OPAQUE)
@@ -77,9 +80,10 @@ impl BasePicture {
         self.size.x as usize * self.size.y as usize
     }
 
-    /// Where cracks may go in `rect`: not over holes. `None` if there are none.
-    pub(crate) fn density(&self, rect: TexelRect) -> Option<Grid<f32>> {
-        self.has_holes.then(|| density(rect.size(), |texel| self.is_hole(rect.min + texel)))?
+    /// Where cracks may go in `rect`. `None` = everywhere.
+    pub(crate) fn density(&self, rect: TexelRect, alpha_mask: bool) -> Option<Grid<f32>> {
+        let has_any = if alpha_mask { self.has_holes } else { self.unfolding.is_some() };
+        has_any.then(|| density(rect.size(), |texel| self.is_closed(rect.min + texel, alpha_mask)))?
     }
 }
 
@@ -279,33 +283,33 @@ pub(crate) fn read(image: &Image, space: Space, size: UVec2) -> Result<Vec<u8>, 
     Ok(if size == own_size { texels } else { Sampling::of(image, space).resample(&texels, own_size, size) })
 }
 
-/// As [`read`] in sRGB, as the renderer shows the picture: one channel is red, not grey, and it is laid out, its texels as squares if
-/// `is_nearest`.
+/// As [`read`], but as the renderer shows a picture in sRGB: one channel is red, not grey.
+pub(crate) fn read_colors(image: &Image, space: Space, size: UVec2) -> Result<Vec<u8>, CrackError> {
+    let mut texels = read(image, space, size)?;
+    if space == Space::Srgb && image.texture_descriptor.format.components() == 1 {
+        texels.as_chunks_mut::<4>().0.iter_mut().for_each(|texel| (texel[1], texel[2]) = (0, 0));
+    }
+    Ok(texels)
+}
+
+/// As [`read_colors`] in sRGB, laid out as the renderer shows the picture, its texels as squares if `is_nearest`.
 pub(crate) fn read_shown(
     image: &Image,
     size: UVec2,
     layout: Option<&Layout>,
     is_nearest: bool,
 ) -> Result<Vec<u8>, CrackError> {
-    let mut texels = match layout {
-        None => read(image, Space::Srgb, size)?,
-        Some(layout) => {
-            let own_size = readable_size(image)?;
-            let texels = read(image, Space::Srgb, own_size)?;
-            let places = layout.places(own_size, size);
-            Sampling::of(image, Space::Srgb).sample(&texels, own_size, size, |x, y| {
-                let place = places(x, y);
-                if is_nearest { place.floor() + 0.5 } else { place }
-            })
-        }
-    };
-    if image.texture_descriptor.format.components() == 1 {
-        texels.as_chunks_mut::<4>().0.iter_mut().for_each(|texel| (texel[1], texel[2]) = (0, 0));
-    }
-    Ok(texels)
+    let Some(layout) = layout else { return read_colors(image, Space::Srgb, size) };
+    let own_size = readable_size(image)?;
+    let texels = read_colors(image, Space::Srgb, own_size)?;
+    let places = layout.places(own_size, size);
+    Ok(Sampling::of(image, Space::Srgb).sample(&texels, own_size, size, |x, y| {
+        let place = places(x, y);
+        if is_nearest { place.floor() + 0.5 } else { place }
+    }))
 }
 
-/// The texels of a picture where a mesh shows them that is laid out, RGBA8 in `space`.
+/// As [`read_colors`], where a mesh shows them that is laid out.
 pub(crate) fn read_unfolded(
     image: &Image,
     space: Space,
@@ -313,16 +317,12 @@ pub(crate) fn read_unfolded(
     is_nearest: bool,
 ) -> Result<Vec<u8>, CrackError> {
     let own_size = readable_size(image)?;
-    let texels = read(image, space, own_size)?;
+    let texels = read_colors(image, space, own_size)?;
     let place = |x, y| {
         let place = unfolding.place(UVec2::new(x, y), own_size);
         if is_nearest { place.floor() + 0.5 } else { place }
     };
-    let mut texels = Sampling::of(image, space).sample(&texels, own_size, unfolding.layout.size, place);
-    if space == Space::Srgb && image.texture_descriptor.format.components() == 1 {
-        texels.as_chunks_mut::<4>().0.iter_mut().for_each(|texel| (texel[1], texel[2]) = (0, 0));
-    }
-    Ok(texels)
+    Ok(Sampling::of(image, space).sample(&texels, own_size, unfolding.layout.size, place))
 }
 
 /// The red channel alone.

@@ -168,10 +168,10 @@ impl Active {
     /// Where cracks may go: not over holes.
     fn density(&self) -> Option<Grid<f32>> {
         let rect = self.canvas.seen()?;
-        let base = self.surface.alpha_mask.then_some(&*self.canvas.base);
+        let (base, alpha_mask) = (&self.canvas.base, self.surface.alpha_mask);
         match &self.drawing.cutouts {
-            Some(holes) => holes.density(rect, base),
-            None => base?.density(rect),
+            Some(holes) => holes.density(rect, base, alpha_mask),
+            None => base.density(rect, alpha_mask),
         }
     }
 

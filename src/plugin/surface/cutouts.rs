@@ -63,9 +63,9 @@ impl Holes {
         });
     }
 
-    /// Where cracks may go on a surface that shows `view` of a picture, if its holes matter: not over any hole. `None` = everywhere.
-    pub(crate) fn density(&self, view: TexelRect, base: Option<&BasePicture>) -> Option<Grid<f32>> {
-        let is_hole = |texel| self.contains(texel) || base.is_some_and(|base| base.is_hole(view.min + texel));
+    /// Where cracks may go on a surface that shows `view` of a picture. `None` = everywhere.
+    pub(crate) fn density(&self, view: TexelRect, base: &BasePicture, alpha_mask: bool) -> Option<Grid<f32>> {
+        let is_hole = |texel| self.contains(texel) || base.is_closed(view.min + texel, alpha_mask);
         density(view.size(), is_hole)
     }
 

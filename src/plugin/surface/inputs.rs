@@ -100,9 +100,7 @@ impl BlankSurface {
         let look = look(preset, frame, base.is_nearest)?;
         let mut growth = CrackGrowth::new(preset.growth.clone(), frame.extent(), surface.seed)
             .map_err(|error| CrackError::Preset { reason: error.to_string() })?;
-        if surface.alpha_mask || base.has_gaps() {
-            growth.set_density(base.density(rect));
-        }
+        growth.set_density(base.density(rect, surface.alpha_mask));
         growth.set_mask(mask.clone());
         let out_of_memory = |error: OutOfMemory| CrackError::Textures { reason: error.to_string() };
         let mut field = DepthField::try_new(frame).map_err(out_of_memory)?;

@@ -6,12 +6,13 @@ use super::drawing::Frozen;
 use super::frame::profile;
 use super::stamp_network::stamp_all;
 use super::tile_set::Touched;
+use crate::CrackPreset;
 use crate::growth::{CrackGrowth, Past, PastEvent};
 use crate::pattern::{CellTracker, CrackMask, SurfaceFrame};
 use crate::plugin::api::CrackError;
 use crate::plugin::jobs::background::{BackgroundJob, PATIENCE, guarded};
-use crate::raster::DepthField;
-use crate::{CrackPreset, Grid};
+use crate::plugin::source::picture::BasePicture;
+use crate::raster::{DepthField, TexelRect};
 use bevy::platform::time::Instant;
 use std::sync::Arc;
 
@@ -110,12 +111,14 @@ pub(crate) fn past(active: &Active) -> Past {
 #[derive(Clone)]
 pub(crate) struct Regrowth {
     pub(crate) preset: CrackPreset,
+    pub(crate) base: Arc<BasePicture>,
+    /// What is shown of the picture.
+    pub(crate) rect: TexelRect,
     pub(crate) frame: SurfaceFrame,
     pub(crate) seed: u64,
-    /// Whether the picture is shown in whole texels.
-    pub(crate) is_nearest: bool,
+    /// Whether there are no cracks on what is transparent.
+    pub(crate) alpha_mask: bool,
     pub(crate) mask: Arc<CrackMask>,
-    pub(crate) density: Option<Grid<f32>>,
 }
 
 /// Cracks that were grown again.
@@ -127,20 +130,21 @@ pub(crate) struct Regrown {
 
 impl Regrowth {
     pub(crate) fn is_like(&self, other: &Self) -> bool {
-        let Self { preset, frame, seed, is_nearest, mask, density } = self;
+        let Self { preset, base, rect, frame, seed, alpha_mask, mask } = self;
         let is_same_mask = Arc::ptr_eq(mask, &other.mask) || *mask == other.mask;
         is_same_mask
-            && (frame, seed, is_nearest) == (&other.frame, &other.seed, &other.is_nearest)
-            && (preset, density) == (&other.preset, &other.density)
+            && Arc::ptr_eq(base, &other.base)
+            && (rect, frame, seed) == (&other.rect, &other.frame, &other.seed)
+            && (preset, alpha_mask) == (&other.preset, &other.alpha_mask)
     }
 
     /// The same happens again around what is added.
     pub(crate) fn grow(self, added: Option<&mut Added>, past: &Past) -> Result<Regrown, CrackError> {
-        let Self { preset, frame, seed, is_nearest, mask, density } = self;
+        let Self { preset, base, rect, frame, seed, alpha_mask, mask } = self;
         let mut growth = CrackGrowth::new(preset.growth.clone(), frame.extent(), seed)
             .map_err(|error| CrackError::Preset { reason: error.to_string() })?;
         growth.set_mask(mask.clone());
-        growth.set_density(density);
+        growth.set_density(base.density(rect, alpha_mask));
         if let Some(added) = added {
             added.steps = growth.add_cracks(&added.network, added.opening);
         }
@@ -156,7 +160,7 @@ impl Regrowth {
                 },
                 |(field, frozen)| (field, Some(frozen)),
             );
-            stamp_all(growth, &profile(&preset, is_nearest), &mut field, &mut Touched::new(frame.size()));
+            stamp_all(growth, &profile(&preset, base.is_nearest), &mut field, &mut Touched::new(frame.size()));
             let mut cells = CellTracker::new(frame.extent());
             let (frozen, _) = Frozen::after(before, growth, keep, &mut field, &mut cells);
             picture = Some((field, frozen));
