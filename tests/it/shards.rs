@@ -205,6 +205,47 @@ fn every_corner_of_every_shard_stands_where_the_surface_shows_it() {
     }
 }
 
+/// A material that shows no holes does so while there are some, whatever other material it is given, and not a frame longer.
+#[test]
+fn materials_are_open_as_long_as_there_are_holes() {
+    let mut app = app();
+    let mut material = |size| {
+        let image = add(&mut app, picture(UVec2::splat(size)));
+        add(&mut app, StandardMaterial { base_color_texture: Some(image), ..default() })
+    };
+    let [before, other] = [96, 64].map(&mut material);
+    let unread = add(&mut app, StandardMaterial { base_color_texture: Some(Handle::default()), ..default() });
+    let quad = add(&mut app, Mesh::from(Rectangle::new(2.0, 2.0)));
+    let entity = app.world_mut().spawn((Mesh3d(quad), MeshMaterial3d(before), surface(), loose())).id();
+    let mode = |app: &App| {
+        let own = get::<MeshMaterial3d<StandardMaterial>>(app, entity).0;
+        app.world().resource::<Assets<StandardMaterial>>().get(&own).expect("a material").alpha_mode
+    };
+    crack(&mut app, entity);
+    assert_eq!(mode(&app), AlphaMode::Opaque);
+    shatter(&mut app, entity, ShatterRequest::ALL);
+    assert_eq!(mode(&app), AlphaMode::Mask(0.5));
+    // Its picture is not there yet: the surface goes on showing its holes.
+    app.world_mut().get_mut::<MeshMaterial3d<StandardMaterial>>(entity).unwrap().0 = unread;
+    for _ in 0..5 {
+        step(&mut app);
+        let is_open = mode(&app) == AlphaMode::Mask(0.5);
+        assert_eq!(is_open, app.world().get::<CrackShards>(entity).is_some());
+    }
+    // Whole again on another picture, it is as that one is.
+    app.world_mut().get_mut::<MeshMaterial3d<StandardMaterial>>(entity).unwrap().0 = other;
+    steps(&mut app, 20);
+    assert!(app.world().get::<CrackShards>(entity).is_none());
+    assert_eq!(mode(&app), AlphaMode::Opaque);
+    // All shards come back.
+    shatter(&mut app, entity, ShatterRequest::ALL);
+    assert_eq!(mode(&app), AlphaMode::Mask(0.5));
+    app.world_mut().get_mut::<ShatterCracks>(entity).unwrap().speed = -1.0;
+    steps(&mut app, 10);
+    assert!(app.world().get::<CrackShards>(entity).is_none(), "it is whole");
+    assert_eq!(mode(&app), AlphaMode::Opaque);
+}
+
 #[test]
 fn shards_of_3d_surfaces_are_closed() {
     let mut app = app();

@@ -136,6 +136,49 @@ fn s11_a_box_cracks_over_its_edges() {
     }
 }
 
+/// A box is laid out around the hit that cracks it, not around one before that was healed away, and as it is asked for by then.
+#[test]
+fn a_hit_that_is_healed_away_lays_out_nothing() {
+    for unwrap in [CrackUnwrap::Auto, CrackUnwrap::Never] {
+        let (mut app, material) = bodies(Some(solid(UVec2::new(64, 64), PLAIN)));
+        app.insert_resource(CrackBudget::default());
+        let cube = add(&mut app, Mesh::from(Cuboid::new(2.0, 2.0, 2.0)));
+        let [entity, fresh] = [(); 2].map(|()| spawn(&mut app, &cube, &material, Transform::IDENTITY));
+        let (first, second) = (Vec3::new(0.95, 0.9, 1.0), Vec3::new(-0.2, -0.9, -1.0));
+        hit(&mut app, CrackHit::local(entity, first).with_energy(2.0));
+        step(&mut app);
+        assert!(app.world().get::<CrackTextures>(entity).is_none(), "it is on its way");
+        app.world_mut().commands().entity(entity).heal_cracks();
+        step(&mut app);
+        for entity in [entity, fresh] {
+            app.world_mut().get_mut::<CrackSurface>(entity).expect("it").unwrap = unwrap;
+            hit(&mut app, CrackHit::local(entity, second).with_energy(2.0));
+            settle(&mut app, entity);
+        }
+        assert_eq!(triangles(&app, entity), triangles(&app, fresh));
+        assert_eq!(get::<Mesh3d>(&app, entity).0 == cube, unwrap == CrackUnwrap::Never);
+    }
+}
+
+/// Where transparent texels do not matter, bodies crack there too, and can be hit there.
+#[test]
+fn transparent_bodies_crack_if_they_are_to() {
+    let (mut app, material) = bodies(Some(solid(UVec2::new(64, 64), [180, 170, 160, 0])));
+    let cube = add(&mut app, Mesh::from(Cuboid::new(2.0, 2.0, 2.0)));
+    for alpha_mask in [false, true] {
+        let entity = spawn(&mut app, &cube, &material, Transform::IDENTITY);
+        app.world_mut().get_mut::<CrackSurface>(entity).expect("it").alpha_mask = alpha_mask;
+        let before = counts(&app);
+        hit(&mut app, CrackHit::local(entity, Vec3::new(0.1, 0.2, 1.0)).with_energy(2.0));
+        steps(&mut app, 200);
+        let nodes = state(&app, entity).nodes;
+        assert_eq!(
+            (counts(&app).rejected - before.rejected, nodes > 0),
+            if alpha_mask { (1, false) } else { (0, true) }
+        );
+    }
+}
+
 /// What a picture shows is where it was before, on all sides, at the same size, and texels on both sides of an edge are neighbours.
 #[test]
 fn s11_a_box_that_is_laid_out_shows_its_picture_as_before() {

@@ -31,6 +31,10 @@ impl CrackMaterial for ColorMaterial {
         }
     }
 
+    fn close(&mut self, before: &Self) {
+        self.alpha_mode = before.alpha_mode;
+    }
+
     fn for_shards(&mut self, picture: &Handle<Image>, opacity: f32) {
         self.texture = Some(picture.clone());
         self.uv_transform = Affine2::IDENTITY;

@@ -102,6 +102,9 @@ pub(crate) trait CarrierKind: Send + Sync {
         true
     }
 
+    /// Gives up the layout of a mesh that has not cracked.
+    fn forget_layout(&self, _world: &mut World, _entity: Entity) {}
+
     /// How its mesh is laid out, if it is.
     fn unfolding(&self, _world: &World, _entity: Entity) -> Option<Arc<Unfolding>> {
         None

@@ -124,6 +124,8 @@ impl CrackMaterial for CrackLitMaterial {
     /// It blends anyway.
     fn open(&mut self) {}
 
+    fn close(&mut self, _before: &Self) {}
+
     fn for_shards(&mut self, picture: &Handle<Image>, opacity: f32) {
         self.diffuse = Some(picture.clone());
         self.lit.tint.w *= opacity;

@@ -187,6 +187,13 @@ impl<S: MaterialSlot> CarrierKind for MaterialKind<S> {
     }
 
     #[cfg(feature = "3d")]
+    fn forget_layout(&self, world: &mut World, entity: Entity) {
+        if S::Material::MAPS.depth {
+            unfold::forget_own(world, entity);
+        }
+    }
+
+    #[cfg(feature = "3d")]
     fn unfolding(&self, world: &World, entity: Entity) -> Option<Arc<Unfolding>> {
         unfold::unfolding(world, entity).filter(|_| S::Material::MAPS.depth)
     }
@@ -270,13 +277,16 @@ impl<S: MaterialSlot> CarrierKind for MaterialKind<S> {
     fn open(&self, world: &mut World, entity: Entity, carrier: &Carrier, has_holes: bool) {
         #[cfg(feature = "3d")]
         split::open(world, entity, has_holes);
-        if !has_holes {
-            return;
-        }
         let (Some(own), Some(mut materials)) = (&carrier.own, world.get_resource_mut::<Assets<S::Material>>()) else {
             return;
         };
-        if let Some(mut material) = typed(own).and_then(|own| materials.get_mut(&own)) {
+        let before = typed(&carrier.shown.asset).and_then(|before| materials.get(&before)).cloned();
+        let Some(mut material) = typed(own).and_then(|own| materials.get_mut(&own)) else { return };
+        if !has_holes {
+            if let Some(before) = before {
+                material.close(&before);
+            }
+        } else {
             material.open();
             if carrier.unfolding.is_some() {
                 material.show_inside();

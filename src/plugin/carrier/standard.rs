@@ -59,6 +59,11 @@ impl CrackMaterial for StandardMaterial {
         }
     }
 
+    fn close(&mut self, before: &Self) {
+        self.alpha_mode = before.alpha_mode;
+        (self.double_sided, self.cull_mode) = (before.double_sided, before.cull_mode);
+    }
+
     fn show_inside(&mut self) {
         (self.double_sided, self.cull_mode) = (true, None);
     }

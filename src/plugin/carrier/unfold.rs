@@ -5,6 +5,7 @@ use super::kind::{Carrier, UnfoldOrder};
 use super::mesh::{Triangles, closest, is_flat, place_of};
 use super::plane::Plane;
 use super::slot::{CrackMaterial, MaterialSlot, to_picture};
+use crate::plugin::api::CrackGroup;
 use crate::plugin::api::hit::HitPoint;
 use crate::plugin::jobs::background::{BackgroundJob, PATIENCE, guarded};
 use crate::plugin::source::unfolding::Unfolding;
@@ -321,6 +322,13 @@ pub(super) fn show(world: &mut World, entity: Entity, carrier: &mut Carrier) {
     if let Some(mut mesh) = world.get_mut::<Mesh3d>(entity) {
         mesh.0 = own.clone();
         carrier.mesh = Some((before, own));
+    }
+}
+
+/// Nothing is known any more of a mesh that has not cracked, unless it is that of a group, which comes with its layout.
+pub(super) fn forget_own(world: &mut World, entity: Entity) {
+    if world.get::<CrackGroup>(entity).is_none() {
+        forget(world, entity);
     }
 }
 

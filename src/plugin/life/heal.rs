@@ -75,7 +75,13 @@ fn forget(world: &mut World, entity: Entity) {
     work::cancel(world, entity);
     prepare::cancel(world, entity);
     cancel_requests(world, entity);
-    let Some(mut active) = cracked::remove(world, entity) else { return };
+    let Some(mut active) = cracked::remove(world, entity) else {
+        // A mesh that is being laid out is so around a hit that is gone.
+        if let Some(kind) = kinds::inspect(world, entity).0 {
+            kind.forget_layout(world, entity);
+        }
+        return;
+    };
     drop_shards(world, entity, &mut active);
     if let Some(mut progress) = world.get_mut::<AnalogyProgress>(entity) {
         progress.set_if_neq(AnalogyProgress(0.0));

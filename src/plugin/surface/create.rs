@@ -71,7 +71,11 @@ pub(crate) fn install(world: &mut World, entity: Entity, mut active: Box<Active>
 /// Makes the entity show the surface's textures.
 pub(crate) fn attach(world: &mut World, entity: Entity, active: &mut Active) {
     let relief = (active.preset.look.relief / active.drawing.field.frame.extent().max_element()).min(MAX_PARALLAX);
-    active.carrier.kind.attach(world, entity, &mut active.carrier, &active.canvas.textures, relief);
+    let kind = active.carrier.kind;
+    kind.attach(world, entity, &mut active.carrier, &active.canvas.textures, relief);
+    if active.drawing.cutouts.is_some() {
+        kind.open(world, entity, &active.carrier, true);
+    }
 }
 
 /// Gives the entity the component that names its textures. Observers and commands that wait run then, and may heal the surface.
