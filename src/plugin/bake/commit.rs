@@ -8,7 +8,7 @@ use crate::plugin::api::{CrackClock, CrackError, CrackStatus, CrackStrands, Crac
 use crate::plugin::draw::async_playback::{self, AsyncPlayback};
 use crate::plugin::draw::next_picture;
 use crate::plugin::gpu::uploads::Uploads;
-use crate::plugin::jobs::background::drop_in_background;
+use crate::plugin::jobs::background::{drop_in_background, guarded};
 use crate::plugin::shards::broken::drop_shards;
 use crate::plugin::surface::active::Active;
 use crate::plugin::surface::cracked::{self, active, has_cracked, with_queues};
@@ -141,7 +141,7 @@ fn again(world: &mut World, entity: Entity, bake: &mut Bake, finished: Finished)
     }
     match core::mem::replace(&mut bake.work, Work::Wanted) {
         Work::Ready(BakeJob::Finish(mut finish)) => loop {
-            match finish.step()? {
+            match guarded(|| finish.step())? {
                 FinishStep::More(more) => finish = more,
                 FinishStep::Done(finished) => {
                     bake.work = Work::Uploading(finished, 0);

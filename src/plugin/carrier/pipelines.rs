@@ -56,6 +56,8 @@ pub(crate) struct PipelineRequests {
     pub(crate) views: u64,
     /// By all that makes a look another one for the renderer.
     pub(crate) looks: BTreeMap<u64, Look>,
+    /// Since when those are waited for that were not there when the cameras became others.
+    pub(crate) waited: BTreeMap<u64, Instant>,
     /// Surfaces that are to be looked at.
     pub(crate) fresh: VecDeque<Entity>,
 }
@@ -202,7 +204,8 @@ pub(crate) fn can_draw<S: MaterialSlot>(
     }
     let stand_in = Some(stand_in.id());
     let warmth = &mut *world.resource_mut::<PipelineRequests>();
-    warmth.looks.insert(key, Look { of: entity, stand_in, frame: warmth.frame, since: Instant::now() });
+    let since = warmth.waited.remove(&key).unwrap_or_else(Instant::now);
+    warmth.looks.insert(key, Look { of: entity, stand_in, frame: warmth.frame, since });
     false
 }
 

@@ -83,7 +83,7 @@ impl Drawn {
         for (_, view) in active.canvas.views.iter_mut().enumerate().filter(|(index, _)| *index != shown) {
             rects.iter().for_each(|rect| view.dirty.mark(*rect));
         }
-        rects.iter().for_each(|rect| active.canvas.new_depths.mark(*rect));
+        active.canvas.note_depths(&rects);
         world.resource_scope(|world, mut images: Mut<Assets<Image>>| {
             let mut uploads = world.resource_mut::<Uploads>();
             for ((texture, map), kind) in active.canvas.textures.all().into_iter().zip(&maps).zip(&textures::KINDS) {
@@ -116,5 +116,42 @@ fn copy(from: &[u8], to: &mut [u8], size: UVec2, origin: UVec2, rect: TexelRect,
         if let (Some(from), Some(to)) = (from.get(start..start + length), to.get_mut(start..start + length)) {
             to.copy_from_slice(from);
         }
+    }
+}
+
+#[cfg(all(test, feature = "2d"))]
+mod tests {
+    use crate::plugin::{
+        headless::{app, blank},
+        prelude::*,
+        surface::cracked::active,
+    };
+    use crate::shatter::{Anchor, ShatterParams};
+    use bevy::prelude::*;
+
+    /// Lines that shards carry on have depths too: whoever blends normals from depths hears of them.
+    #[test]
+    fn lines_that_are_carried_on_are_new_depths() {
+        let mut app = app(CrackBudget { milliseconds: f32::INFINITY, ..default() });
+        let image = app.world_mut().resource_mut::<Assets<Image>>().add(blank(UVec2::splat(128)));
+        let cut = ShatterParams { extend_cracks: true, ..ShatterParams::DEFAULT };
+        let settings = ShatterCracks { cut, anchor: Anchor::Nothing, speed: 0.0, ..default() };
+        let surface = CrackSurface::new(CrackPreset::GLASS);
+        let entity = app.world_mut().spawn((Sprite::from_image(image), surface, settings)).id();
+        app.world_mut().trigger(CrackHit::uv(entity, Vec2::splat(0.4)).with_energy(2.0));
+        let revision = |app: &App| active(app.world(), entity).map(|active| active.canvas.revision);
+        while app.world().get::<CrackState>(entity).is_none_or(|state| state.status != CrackStatus::Done) {
+            app.update();
+        }
+        app.update();
+        let before = revision(&app);
+        app.update();
+        assert_eq!(revision(&app), before, "at rest");
+        app.world_mut().commands().entity(entity).shatter_cracks(ShatterRequest::ALL);
+        while app.world().get::<CrackShards>(entity).is_none() {
+            app.update();
+        }
+        assert!(active(app.world(), entity).is_some_and(|active| !active.drawing.carried.is_empty()), "lines go on");
+        assert!(revision(&app) > before);
     }
 }

@@ -20,7 +20,12 @@ use crate::plugin::jobs::frame_time::{FrameClock, Timer};
 use crate::plugin::jobs::threads::Threads;
 use crate::plugin::source::picture::{BaseKey, BasePictures};
 use crate::raster::TexelRect;
-use bevy::{ecs::entity::EntityHashMap, platform::time::Instant, prelude::*, render::renderer::RenderDevice};
+use bevy::{
+    ecs::entity::{EntityHashMap, EntityHashSet},
+    platform::time::Instant,
+    prelude::*,
+    render::renderer::RenderDevice,
+};
 use std::collections::VecDeque;
 
 /// Texels up to which the frame of the first hit makes a surface itself.
@@ -51,24 +56,51 @@ pub(crate) const MAX_UPLOAD_FRAMES: u32 = 16;
 #[derive(Resource, Default)]
 pub(crate) struct Preparations {
     list: Vec<(Entity, Preparation)>,
-    /// Those that are to be made without a hit, in order.
-    wanted: VecDeque<Entity>,
+    /// Those that are to be made without a hit, in order, each once.
+    wanted: Wanted,
     /// When a task was last done.
     moved: Option<Instant>,
     /// How often a surface had to begin again.
     rounds: EntityHashMap<u32>,
 }
 
+/// Entities in a queue, each once.
+#[derive(Default)]
+struct Wanted {
+    queue: VecDeque<Entity>,
+    all: EntityHashSet,
+}
+
+impl Wanted {
+    fn push(&mut self, entity: Entity) {
+        if self.all.insert(entity) {
+            self.queue.push_back(entity);
+        }
+    }
+
+    fn pop(&mut self) -> Option<Entity> {
+        let next = self.queue.pop_front()?;
+        self.all.remove(&next);
+        Some(next)
+    }
+
+    fn remove(&mut self, entity: Entity) {
+        if self.all.remove(&entity) {
+            self.queue.retain(|wanted| *wanted != entity);
+        }
+    }
+}
+
 impl Preparations {
     /// Has a surface made, though nothing hits it.
     pub(crate) fn want(&mut self, entity: Entity) {
-        self.wanted.push_back(entity);
+        self.wanted.push(entity);
     }
 
     /// Surfaces that are to be made, though nothing hits them.
     #[cfg(any(feature = "2d", feature = "3d"))]
     pub(crate) fn wanted(&self) -> impl Iterator<Item = Entity> + '_ {
-        self.wanted.iter().copied()
+        self.wanted.queue.iter().copied()
     }
 
     /// What was read of the picture before this frame has changed.
@@ -120,13 +152,13 @@ impl Preparations {
 
 /// Whether any surface is to be made.
 pub(crate) fn any_preparing(preparations: Res<Preparations>) -> bool {
-    !preparations.list.is_empty() || !preparations.wanted.is_empty()
+    !preparations.list.is_empty() || !preparations.wanted.queue.is_empty()
 }
 
 /// Makes nothing of a surface any more.
 pub(crate) fn cancel(world: &mut World, entity: Entity) {
     if let Some(mut preparations) = world.get_resource_mut::<Preparations>() {
-        preparations.wanted.retain(|wanted| *wanted != entity);
+        preparations.wanted.remove(entity);
         preparations.rounds.remove(&entity);
         if let Some(preparation) = preparations.take(entity) {
             drop_in_background(preparation);
@@ -302,17 +334,17 @@ pub(crate) fn prepare_surfaces(world: &mut World) {
             Err(error) => fail(world, entity, error),
         }
     }
-    for _ in 0..world.resource::<Preparations>().wanted.len().min(MAX_WANTED) {
+    for _ in 0..world.resource::<Preparations>().wanted.queue.len().min(MAX_WANTED) {
         if timer.is_over() {
             break;
         }
-        let Some(entity) = world.resource_mut::<Preparations>().wanted.pop_front() else { break };
+        let Some(entity) = world.resource_mut::<Preparations>().wanted.pop() else { break };
         if world.get::<CrackSurface>(entity).is_none() {
             continue;
         }
         match ready(world, entity, true) {
             Ok(true) => {}
-            Ok(false) => world.resource_mut::<Preparations>().wanted.push_back(entity),
+            Ok(false) => world.resource_mut::<Preparations>().wanted.push(entity),
             Err(error) => fail(world, entity, error),
         }
     }
@@ -451,6 +483,28 @@ mod tests {
         surface::cracked::Cracked,
     };
     use std::sync::Arc;
+
+    /// Surfaces that are asked for in every frame, and whose pictures are not there, wait once each.
+    #[test]
+    fn what_is_wanted_again_and_again_waits_once() {
+        let mut app = app(CrackBudget::default());
+        let image = app.world().resource::<Assets<Image>>().reserve_handle();
+        let sprite = || (Sprite::from_image(image.clone()), CrackSurface::default());
+        let entities: Vec<Entity> = (0..40).map(|_| app.world_mut().spawn(sprite()).id()).collect();
+        for _ in 0..30 {
+            for entity in &entities {
+                app.world_mut().commands().entity(*entity).prepare_cracks();
+            }
+            app.update();
+        }
+        assert_eq!(app.world().resource::<Preparations>().wanted.queue.len(), entities.len());
+        for entity in &entities {
+            app.world_mut().commands().entity(*entity).heal_cracks();
+        }
+        app.update();
+        let wanted = &app.world().resource::<Preparations>().wanted;
+        assert!(wanted.queue.is_empty() && wanted.all.is_empty());
+    }
 
     /// Surfaces that show the same are read once, however many of them are hit at once.
     #[test]

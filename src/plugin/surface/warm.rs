@@ -43,10 +43,13 @@ pub(crate) fn watch_views(
     if core::mem::replace(&mut warmth.views, views) == views {
         return;
     }
-    for look in core::mem::take(&mut warmth.looks).into_values() {
+    warmth.waited.retain(|_, since| since.elapsed() < PATIENCE);
+    for (key, look) in core::mem::take(&mut warmth.looks) {
         warmth.fresh.push_back(look.of);
         if let Some(stand_in) = look.stand_in {
             commands.entity(stand_in).try_despawn();
+            // However often they change, nothing waits for longer.
+            warmth.waited.insert(key, look.since);
         }
     }
 }
@@ -131,4 +134,29 @@ pub(crate) fn can_break(world: &mut World, entity: Entity, active: &Active) -> b
     let original = &active.carrier.shown.asset;
     let asked = NextLook::Broken { maps, original, has_rims, inside: inside(&settings) };
     active.carrier.kind.can_draw(world, entity, &asked)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plugin::carrier::pipelines::Look;
+    use bevy::{ecs::system::RunSystemOnce, platform::time::Instant};
+
+    /// However often cameras change, what was not there is waited for since it was first asked for.
+    #[test]
+    fn cameras_that_change_do_not_prolong_a_wait() {
+        let mut world = World::new();
+        world.init_resource::<PipelineRequests>();
+        let camera = world.spawn(Camera::default()).id();
+        let (of, stand_in) = (world.spawn_empty().id(), world.spawn_empty().id());
+        world.run_system_once(watch_views).ok();
+        let since = Instant::now();
+        let look = |stand_in| Look { of, stand_in, frame: 0, since };
+        world.resource_mut::<PipelineRequests>().looks.extend([(1, look(Some(stand_in))), (2, look(None))]);
+        world.entity_mut(camera).insert(Name::new("other"));
+        world.run_system_once(watch_views).ok();
+        let requests = world.resource::<PipelineRequests>();
+        assert!(requests.looks.is_empty() && requests.fresh == [of, of]);
+        assert!(requests.waited.iter().eq([(&1, &since)]), "{:?}", requests.waited);
+    }
 }
