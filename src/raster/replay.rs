@@ -482,8 +482,9 @@ impl Replay {
                 (dot.pos, dot.pos, dot.radius)
             }
         };
-        // The edge of a stamp is one texel wide; one more for rounding.
-        let reach = (radius + self.profile.rim_width.max(0.0)) * field.frame.texels_per_unit() + 2.5;
+        // An uneven edge deviates by less than the half width. The edge of a stamp is one texel wide; one more for rounding.
+        let ragged = self.profile.ragged.max(0.0).min(radius);
+        let reach = (radius + self.profile.rim_width.max(0.0) + ragged) * field.frame.texels_per_unit() + 2.5;
         let hang = match (part.what, &field.layer.veil) {
             (What::Segment(_), Some(veil)) => veil.hang(),
             _ => (Vec2::ZERO, Vec2::ZERO),
@@ -531,4 +532,39 @@ fn tiles_of(rect: TexelRect, side: u32) -> TexelRect {
         return TexelRect::default();
     }
     TexelRect { min: rect.min / side, max: (rect.max - 1) / side + 1 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        growth::{CrackGrowth, GrowthParams},
+        pattern::SurfaceFrame,
+    };
+
+    /// Edges that deviate by many texels are taken back with their cracks.
+    #[test]
+    fn ragged_edges_are_taken_back() {
+        for (seed, unit) in [(1, 1500.0), (2, 2048.0), (3, 2048.0)] {
+            let frame = SurfaceFrame::with_unit(UVec2::new(420, 300), unit).unwrap();
+            let params = GrowthParams { line_width: 0.03, max_width: 0.04, reach: 0.15, ..GrowthParams::DEFAULT };
+            let profile = Profile { ragged: 0.012, ..Profile::DEFAULT };
+            let mut growth = CrackGrowth::new(params, frame.extent(), seed).unwrap();
+            growth.hit(0.5 * frame.extent(), 1.0);
+            while growth.step().grew() {}
+            let (network, timeline) = (growth.network(), growth.timeline());
+            let (mut field, mut changes) = (DepthField::new(frame), ReplayChanges::default());
+            let mut replay = Replay::new(frame.size(), profile);
+            for step in (0..=timeline.end()).rev() {
+                let at = Moment::after(step);
+                replay.show(&mut field, network, timeline, at, &mut changes);
+                let mut fresh = DepthField::new(frame);
+                for path in network.segments().filter_map(|segment| timeline.path_at(network, segment, at)) {
+                    stamp_path(&mut fresh, &profile, &path);
+                }
+                assert!(field.depth == fresh.depth, "seed {seed}, after {step} steps");
+            }
+            assert!(timeline.end() > 2 && field.depth.as_slice().iter().all(|&depth| depth == 0));
+        }
+    }
 }
