@@ -113,6 +113,16 @@ impl Default for ShellFrame {
     }
 }
 
+/// The least thickness of pieces that are uneven, pattern units: how uneven they are is in proportion to it.
+const LEAST_THICKNESS: f32 = 1e-6;
+
+impl ShellFrame {
+    /// How uneven the pieces are of a shell whose pattern unit is so long: those without thickness are smooth.
+    fn roughness_of(&self, unit: f32) -> f32 {
+        if self.thickness > LEAST_THICKNESS * unit { self.roughness } else { 0.0 }
+    }
+}
+
 /// A part of a [`ShellMesh`]: a triangle list, counter-clockwise as seen from outside.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ShellPart {
@@ -357,7 +367,7 @@ impl Shards {
         let flat = self.flat_mesh(shard, &plane);
         let place = |i: usize| Vec2::new(flat.positions[i][0] + 0.5 * extent.x, 0.5 * extent.y - flat.positions[i][1]);
         let next = self.next_corners(shard);
-        let outward = if frame.roughness > 0.0 {
+        let outward = if frame.roughness_of(shell.unit) > 0.0 {
             self.outward(shard, SMOOTHED * frame.thickness / shell.unit)
         } else {
             Vec::new()
@@ -457,9 +467,10 @@ impl ShellMesh {
         };
         let along = turned(right);
         // What is uneven is lit face by face.
-        let is_rough = frame.roughness > 0.0;
+        let roughness = frame.roughness_of(unit);
+        let is_rough = roughness > 0.0;
         let below = |vertex: &Vertex| {
-            let (aside, rough) = (unevenness(vertex.flat, frame.thickness / unit), frame.roughness * frame.thickness);
+            let (aside, rough) = (unevenness(vertex.flat, frame.thickness / unit), roughness * frame.thickness);
             let aside = frame.to_mesh.transform_vector3(aside);
             let along = aside.reject_from_normalized(vertex.normal);
             vertex.at - vertex.normal * (frame.thickness + 0.35 * rough * aside.dot(vertex.normal)) + along * rough
@@ -482,7 +493,7 @@ impl ShellMesh {
                 .collect();
             self.inside.fill(&inside, !is_turned);
         }
-        let side = Side { is_turned, roughness: frame.roughness, thickness: frame.thickness, unit };
+        let side = Side { is_turned, roughness, thickness: frame.thickness, unit };
         for (i, _) in polygon.iter().enumerate().filter(|(_, corner)| corner.is_edge) {
             let k = (i + 1) % vertices.len();
             let end = |i: usize| SideEnd {

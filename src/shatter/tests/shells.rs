@@ -189,6 +189,28 @@ fn pieces_of_what_is_smooth_are_closed() {
     closed_pieces(RimLook::STONE, 1.0, (0.1, 0.0));
 }
 
+/// Pieces without thickness are smooth, whatever their roughness: they are those without it.
+#[test]
+fn pieces_without_thickness_are_smooth() {
+    let (shell, extent) = shell(&ball(8), 0, |at, _| at);
+    let shards = cut(&shell, extent, 6, &mut Rng::new(5));
+    for thickness in [0.0, 1e-40, 1e-8] {
+        let mut pieces = 0;
+        for number in 0..shards.len() as u32 {
+            let [smooth, rough] = [0.0, 1.0].map(|roughness| {
+                shards.shell_mesh(number, &shell, &ShellFrame { thickness, roughness, ..ShellFrame::default() })
+            });
+            for part in [&rough.picture, &rough.inside] {
+                let numbers = part.positions.iter().chain(&part.normals).flatten().chain(part.uvs.iter().flatten());
+                assert!(numbers.chain(part.tangents.iter().flatten()).all(|number| number.is_finite()));
+            }
+            assert!(smooth == rough, "shard {number}, {thickness} thick");
+            pieces += usize::from(!rough.inside.positions.is_empty());
+        }
+        assert!(pieces > 5, "{pieces}");
+    }
+}
+
 #[test]
 fn what_is_no_shell_has_no_pieces() {
     let flat = [Vec2::ZERO, Vec2::X, Vec2::Y];
