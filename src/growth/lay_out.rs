@@ -38,7 +38,7 @@ impl CrackGrowth {
     }
 
     /// Continues to lay out the markers of a hit that was [begun](Self::begin_hit), at up to about `places` places.
-    /// Returns whether some are left. [Strands](super::MarkerLayout::Strands) are laid out one try at a time.
+    /// Returns whether some are left. [Strands](super::MarkerLayout::Strands) are laid out one try at a time. 0 counts as 1.
     ///
     /// The positions of markers do not depend on the slices. All other methods complete the layout first.
     pub fn continue_hit(&mut self, places: u32) -> bool {
@@ -46,7 +46,7 @@ impl CrackGrowth {
             return true;
         }
         let Some(mut layout) = self.layout.take() else { return false };
-        layout.cursor.left = places;
+        layout.cursor.left = places.max(1);
         if layout.room.is_none() && self.lay_out_markers(&mut layout) {
             layout.room = Some(0);
         }
@@ -111,7 +111,7 @@ impl CrackGrowth {
     }
 
     /// Processes the markers of hits, up to about `markers` of them, before the next [`step`](Self::step), which
-    /// processes all that are left. Returns whether none are left.
+    /// processes all that are left. Returns whether none are left. 0 counts as 1.
     ///
     /// The result of the growth does not depend on the slices.
     ///

@@ -166,3 +166,21 @@ fn darts_are_those_of_all_pairs() {
     }
     assert!(kept > 5_000, "{kept}");
 }
+
+/// Slices of nothing do a little: who waits for the last one does not wait for ever.
+#[test]
+fn slices_of_nothing_end() {
+    for markers in [GrowthParams::DEFAULT.markers, MarkerLayout::DartThrowing { spacing: 0.04 }] {
+        let mut at_once = CrackGrowth::new(GrowthParams { markers, ..GrowthParams::DEFAULT }, Vec2::ONE, 2).unwrap();
+        let mut in_slices = at_once.clone();
+        for pos in [Vec2::splat(0.4), Vec2::splat(0.7)] {
+            at_once.hit(pos, 1.0);
+            in_slices.begin_hit(pos, 1.0);
+            assert!((0..100_000).any(|_| !in_slices.continue_hit(0)));
+            assert!((0..100_000).any(|_| in_slices.prepare_step(0)));
+            at_once.step();
+            in_slices.step();
+            assert_eq!(fingerprint(&at_once), fingerprint(&in_slices));
+        }
+    }
+}

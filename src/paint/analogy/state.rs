@@ -189,7 +189,7 @@ impl Analogy {
         Ok(())
     }
 
-    /// Does some of the work that is queued: parts of up to a row, until at least `texels` texels have been visited.
+    /// Does some of the work that is queued: parts of up to a row, until at least `texels` texels have been visited; 0 counts as 1.
     /// One part of each change, which takes its guide to the smaller levels, is as large as the change.
     ///
     /// Returns whether any is left.
@@ -198,7 +198,7 @@ impl Analogy {
     /// result stops calling this and drops the surface; who wants it later goes on later.
     pub fn step(&mut self, texels: u64) -> bool {
         let mut visited = 0;
-        while visited < texels {
+        while visited < texels.max(1) {
             if self.work.is_none() {
                 let Some(change) = self.queue.pop_front() else { return false };
                 let guide = GuideWork::new(&change, &mut self.is_crack, self.levels[0].size, &self.examples);

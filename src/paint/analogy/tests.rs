@@ -492,3 +492,13 @@ fn ground_far_from_cracks_is_made_of_many_texels() {
         wall.sources().as_slice().iter().map(|from| from.texel[1] % 12).collect();
     assert!(rows.len() >= 3, "{rows:?}");
 }
+
+/// A step of nothing does a little: who waits for the end does not wait for ever.
+#[test]
+fn steps_of_nothing_end() {
+    let (size, mut rng) = (UVec2::splat(24), Rng::new(3));
+    let examples = Arc::new(Examples::new(&[pair(&mut rng, size)], &AnalogyParams::DEFAULT).unwrap());
+    let mut wall = Analogy::new(examples, &depths(&cracks(&mut rng, size, 2)), &[], 1).unwrap();
+    assert!((0..1_000_000).any(|_| !wall.step(0)));
+    assert!(!wall.is_busy() && !wall.take_changed().is_empty());
+}
