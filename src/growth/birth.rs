@@ -1,7 +1,7 @@
 //! Adds nodes, and widens the nodes behind them.
 
 use super::{
-    division::{Division, rim_towards, towards_rim},
+    division::{Division, towards_rim},
     draws,
     pull::NO_PULL,
     rays::NO_RAY,
@@ -78,11 +78,9 @@ impl CrackGrowth {
         if self.params.thinning <= 0.0 {
             return 1.0;
         }
-        let begun = self.division.as_ref().and_then(|division| division.begun.get(impact as usize));
-        let (Some((_, reach)), Some(hit)) = (begun, self.impacts.get(impact as usize)) else { return 1.0 };
+        let (Some(_), Some(hit)) = (&self.division, self.impacts.get(impact as usize)) else { return 1.0 };
         let way = pos - hit.pos;
-        let rim = rim_towards(way, *reach, self.seed ^ u64::from(impact));
-        (1.0 - self.params.thinning * towards_rim(way.length(), rim)).max(THINNEST)
+        (1.0 - self.params.thinning * towards_rim(way.length(), self.rim_of(impact, way))).max(THINNEST)
     }
 
     /// Puts a node on the ray of its parent.

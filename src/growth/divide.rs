@@ -203,7 +203,7 @@ impl CrackGrowth {
                 return;
             }
             let from_hit = from_hit_sq.sqrt();
-            let reach = division.begun.get(impact as usize).map_or(f32::INFINITY, |begun| begun.1);
+            let reach = division.reach_of(impact);
             // A patch is a factor of 1 or more: most markers are too near even without it.
             let least = params.loaded(generation, from_hit, reach);
             if near_sq <= (narrow * least) * (narrow * least) {
@@ -224,10 +224,10 @@ impl CrackGrowth {
 
     /// Largest distance from its hit at which cracks of an impact may start.
     fn front(&self, impact: u32) -> f32 {
-        let begun = self.division.as_ref().and_then(|division| division.begun.get(impact as usize));
+        let begun = self.division.as_ref().and_then(|division| division.step_of(impact));
         match begun {
-            Some((step, _)) if self.params.front > 0.0 => {
-                self.params.front * self.steps.saturating_sub(*step).saturating_add(1) as f32
+            Some(step) if self.params.front > 0.0 => {
+                self.params.front * self.steps.saturating_sub(step).saturating_add(1) as f32
             }
             _ => f32::INFINITY,
         }
@@ -237,7 +237,7 @@ impl CrackGrowth {
     fn begin_crack(&mut self, candidate: Candidate) {
         let near_sq = self.field.near_sq(candidate.marker);
         let Some(division) = &self.division else { return };
-        let reach = division.begun.get(candidate.impact as usize).map_or(f32::INFINITY, |begun| begun.1);
+        let reach = division.reach_of(candidate.impact);
         let patch = self.params.patches(self.seed).at(candidate.pos);
         let loaded = self.params.loaded(division.generation, candidate.from_hit, reach) * patch;
         if near_sq < STILL * STILL * candidate.near_sq || self.room() < 3 {

@@ -47,8 +47,8 @@ pub(super) struct Division {
     pub(super) generation: u8,
     /// Per node, of its crack; empty = the first generation, at full width.
     pub(super) kinds: Vec<Kind>,
-    /// Steps of the impacts, and radii of the areas that they have loaded.
-    pub(super) begun: Vec<(u32, f32)>,
+    /// Per impact: its step, and the radius of the area that it has loaded; nothing for those before cracks divided.
+    begun: Vec<Option<(u32, f32)>>,
     /// Tips that have left the area that their hit has loaded, and wait for a crack that meets them.
     pub(super) resting: Vec<Tip>,
     /// Number of nodes that were shown to the markers.
@@ -116,15 +116,24 @@ impl Division {
         self.kind(node).generation
     }
 
-    /// How far an impact has loaded the surface.
-    #[cfg(test)]
-    pub(super) fn reach_of(&self, impact: u32) -> Option<f32> {
-        self.begun.get(impact as usize).map(|begun| begun.1)
+    /// The step at which an impact has loaded the surface, if cracks divided then.
+    pub(super) fn step_of(&self, impact: u32) -> Option<u32> {
+        self.loaded_by(impact).map(|begun| begun.0)
+    }
+
+    /// How far an impact has loaded the surface; all of it if cracks did not divide then.
+    pub(super) fn reach_of(&self, impact: u32) -> f32 {
+        self.loaded_by(impact).map_or(f32::INFINITY, |begun| begun.1)
+    }
+
+    fn loaded_by(&self, impact: u32) -> Option<(u32, f32)> {
+        self.begun.get(impact as usize).copied().flatten()
     }
 
     /// Registers the nodes of a hit.
-    pub(super) fn begin(&mut self, born: Range<u32>, step: u32, reach: f32) {
-        self.begun.push((step, reach));
+    pub(super) fn begin(&mut self, impact: u32, born: Range<u32>, step: u32, reach: f32) {
+        self.begun.resize(impact as usize, None);
+        self.begun.push(Some((step, reach)));
         let first = if self.fresh.is_empty() { born.start } else { self.fresh.start };
         self.fresh = first..born.end;
         self.generation = 0;
@@ -132,7 +141,7 @@ impl Division {
 
     /// Sets the reach of an impact that has gained energy.
     pub(super) fn extend_reach(&mut self, impact: u32, reach: f32) {
-        if let Some((_, rim)) = self.begun.get_mut(impact as usize) {
+        if let Some(Some((_, rim))) = self.begun.get_mut(impact as usize) {
             *rim = reach;
         }
         self.tips.append(&mut self.resting);

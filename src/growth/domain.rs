@@ -70,6 +70,17 @@ impl CrackGrowth {
         sight
     }
 
+    /// How far an impact has loaded the surface in the direction `way` from its hit.
+    pub(super) fn rim_of(&self, impact: u32, way: Vec2) -> f32 {
+        let reach = self.division.as_ref().map_or(f32::INFINITY, |division| division.reach_of(impact));
+        rim_towards(way, reach, self.seed ^ u64::from(impact))
+    }
+
+    /// Whether a place, `way` from the hit of an impact, is outside the area that it has loaded.
+    pub(super) fn is_beyond_rim(&self, impact: u32, way: Vec2) -> bool {
+        way.length() > self.rim_of(impact, way)
+    }
+
     /// How a crack would divide the domain around a place; `None` if it could not end at other cracks.
     pub(super) fn across(&self, pos: Vec2, impact: u32, name: u32, clearance: f32) -> Option<Across> {
         let across = self.across_from(pos, impact, name, clearance)?;
@@ -89,8 +100,6 @@ impl CrackGrowth {
         let far = FAR * clearance;
         let sight = self.look_around(pos, &axes, far);
         let (extent, hit) = (self.network.extent(), self.impacts.get(impact as usize).map_or(pos, |impact| impact.pos));
-        let begun = self.division.as_ref().and_then(|division| division.begun.get(impact as usize));
-        let reach = begun.map_or(f32::INFINITY, |begun| begun.1);
         let mut is_closed = [true; AXES];
         let mut seen = [[(0.0, 0.0); 2]; AXES];
         for (i, seen) in seen.iter_mut().enumerate() {
@@ -100,8 +109,7 @@ impl CrackGrowth {
                 seen[side] = if border < crack { (border, slant) } else { (crack, sight[side].slant[i]) };
                 let distance = seen[side].0;
                 if distance > far {
-                    let there = pos + way * distance.min(BEYOND * far) - hit;
-                    let leaves = there.length() > rim_towards(there, reach, self.seed ^ u64::from(impact));
+                    let leaves = self.is_beyond_rim(impact, pos + way * distance.min(BEYOND * far) - hit);
                     is_closed[i] &= !leaves;
                     seen[side] = (if leaves { OPEN * far } else { far }, 0.5);
                 }
@@ -119,9 +127,7 @@ impl CrackGrowth {
         // In the middle of its length.
         let long = (best + AXES / 2) % AXES;
         let middle = pos + axes[long] * (0.4 * (seen[long][0].0 - seen[long][1].0));
-        let is_out =
-            |there: Vec2| (there - hit).length() > rim_towards(there - hit, reach, self.seed ^ u64::from(impact));
-        let middle = if is_out(middle) { pos } else { middle };
+        let middle = if self.is_beyond_rim(impact, middle - hit) { pos } else { middle };
         let stray =
             2.0 * self.params.wander * (1.0 - 0.7 * self.params.straightness) * (2.0 * draw(draws::DOMAIN_STRAY) - 1.0);
         let way = (axes[best] + axes[best].perp() * stray).normalize_or(Vec2::X);

@@ -151,7 +151,7 @@ impl CrackGrowth {
         }
         self.populate(index, pos, 0.0, reach);
         if let Some(division) = &mut self.division {
-            division.begin(self.new_nodes.clone(), self.steps, reach);
+            division.begin(index, self.new_nodes.clone(), self.steps, reach);
         }
         self.steps_left = self.params.num_iterations;
         HitOutcome::Started(index)

@@ -1,12 +1,6 @@
 //! A tip and the other cracks around it: which cracks are others, and what happens to those that it meets.
 
-use super::{
-    division::{MUCH_WIDER, rim_towards},
-    draws,
-    params::StartLayout,
-    rays::NO_RAY,
-    state::CrackGrowth,
-};
+use super::{division::MUCH_WIDER, draws, params::StartLayout, rays::NO_RAY, state::CrackGrowth};
 use crate::{
     math::hash_unit,
     pattern::{NO_PARENT, Node},
@@ -104,14 +98,7 @@ impl CrackGrowth {
     /// Whether a node is outside the area that its hit has loaded.
     pub(super) fn has_left(&self, node: u32) -> bool {
         let Node { pos, impact, .. } = self.network.nodes[node as usize];
-        let rim = self.division.as_ref().and_then(|division| division.begun.get(impact as usize));
-        match (rim, self.impacts.get(impact as usize)) {
-            (Some((_, reach)), Some(hit)) => {
-                let way = pos - hit.pos;
-                way.length() > rim_towards(way, *reach, self.seed ^ u64::from(impact))
-            }
-            _ => false,
-        }
+        self.impacts.get(impact as usize).is_some_and(|hit| self.is_beyond_rim(impact, pos - hit.pos))
     }
 
     /// The nearest waiting tip within reach and ahead of a node.

@@ -183,7 +183,7 @@ fn cracks_thin_out() {
         let (mut near, mut far) = (Vec::new(), Vec::new());
         for growth in of_seeds(&preset, 1.0) {
             let hit = growth.impacts()[0].pos;
-            let reach = growth.division.as_ref().unwrap().reach_of(0).unwrap();
+            let reach = growth.division.as_ref().unwrap().reach_of(0);
             for node in growth.network().nodes() {
                 match node.pos.distance(hit) / reach {
                     ..0.3 => near.push(node.width),
@@ -333,7 +333,7 @@ fn what_is_known_equals_brute_force() {
                     };
                     growth.field.each_beyond(-0.5, |_, _, pos, near_sq, impact| {
                         let hit = growth.impacts()[impact as usize];
-                        let reach = growth.division.as_ref().unwrap().reach_of(impact).unwrap();
+                        let reach = growth.division.as_ref().unwrap().reach_of(impact);
                         let rim = rim_towards(pos - hit.pos, reach, seed ^ u64::from(impact)) - pos.distance(hit.pos);
                         let free = pos.min(growth.network().extent() - pos).min_element().min(rim);
                         assert_eq!(near_sq, nearest(pos).min(free.max(0.0) * free), "{name} {seed}: {pos}");

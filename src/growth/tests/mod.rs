@@ -1,6 +1,7 @@
 //! Growth: its end, its hits, and its frozen patterns.
 
 mod arrest;
+mod changed;
 mod divide;
 mod energy;
 mod long;
