@@ -58,6 +58,9 @@ const STRAIGHT_ASIDE: f32 = 0.35;
 /// started in it.
 const STILL: f32 = 0.8;
 
+/// Nodes for which there must be room where a crack starts.
+const ROOM: usize = 3;
+
 /// A little more than 1, for rounding.
 const NO_CLOSER: f32 = 1.001;
 
@@ -114,7 +117,11 @@ impl CrackGrowth {
         let is_idle = tips.is_empty() && fresh.is_empty() && !is_running;
         let due = self.params.nucleation * self.steps.saturating_add(1) as f32;
         let is_due = (self.nucleated as f32) < due;
-        let candidates = if is_idle {
+        // Else what is left comes to rest.
+        let may_begin = self.params.nucleation > 0.0 && self.room() >= ROOM;
+        let candidates = if !may_begin {
+            Vec::new()
+        } else if is_idle {
             self.idle_candidates(found)
         } else if is_due {
             self.candidates(false)
@@ -211,10 +218,8 @@ impl CrackGrowth {
             }
             // Far from all cracks it is far enough whatever the patch; cosines take most of the time of this search.
             let most = NO_CLOSER * narrow * least * patches.most();
-            let is_far = near_sq > most * most || {
-                let loaded = narrow * (least * patches.at(pos));
-                near_sq > loaded * loaded
-            };
+            // As where a crack begins, or there would be markers at which none ever does.
+            let is_far = near_sq > most * most || near_sq.sqrt() > narrow * (least * patches.at(pos));
             if is_far {
                 found.push(Candidate { marker, id, impact, pos, near_sq, from_hit });
             }
@@ -240,7 +245,7 @@ impl CrackGrowth {
         let reach = division.reach_of(candidate.impact);
         let patch = self.params.patches(self.seed).at(candidate.pos);
         let loaded = self.params.loaded(division.generation, candidate.from_hit, reach) * patch;
-        if near_sq < STILL * STILL * candidate.near_sq || self.room() < 3 {
+        if near_sq < STILL * STILL * candidate.near_sq || self.room() < ROOM {
             return;
         }
         let (near, is_last) = (near_sq.sqrt(), u32::from(division.generation) + 1 >= self.params.generations);

@@ -307,6 +307,73 @@ fn generations_are_of_their_widths() {
     }
 }
 
+/// Where there are places for more cracks and none can start, growth ends and does not wait: where no crack starts by itself, and where there is
+/// room for a node or two.
+#[test]
+fn growth_ends_where_no_crack_can_start() {
+    let num_iterations = 20_000;
+    let mut nearly_full = 0;
+    for (name, preset) in PRESETS {
+        let params = GrowthParams { nucleation: 0.0, num_iterations, ..preset.growth.clone() };
+        let mut growth = CrackGrowth::new(params, Vec2::ONE, 3).unwrap();
+        growth.hit(Vec2::splat(0.5), 1.0);
+        while growth.step().grew() {}
+        assert!(growth.steps() < 2000 && growth.network().nodes().len() > 4, "{name}: {} steps", growth.steps());
+        // One crack after the other, until there is room for no other.
+        for (seed, max_nodes) in (0..4).flat_map(|seed| (40..140).map(move |max_nodes| (seed, max_nodes))) {
+            let params = GrowthParams { max_nodes, num_iterations, nucleation: 0.05, ..preset.growth.clone() };
+            let mut growth = CrackGrowth::new(params, Vec2::ONE, seed).unwrap();
+            growth.hit(Vec2::splat(0.5), 1.0);
+            while growth.step().grew() {}
+            nearly_full += u32::from((1..3).contains(&growth.room()));
+            assert!(growth.steps() < 2000, "{name}, {max_nodes} nodes: {} steps", growth.steps());
+        }
+    }
+    assert!(nearly_full > 5, "{nearly_full}");
+}
+
+/// A marker whose distance is what its generation allows, but for rounding of its square, does not keep the next generation from its turn.
+#[test]
+fn a_marker_at_the_limit_does_not_hold_up_growth() {
+    let mut params = GrowthParams {
+        generations: 2,
+        focus: 0.0,
+        thinning: 0.0,
+        patchiness: 0.0,
+        variety: 0.0,
+        num_iterations: 20_000,
+        ..CrackPreset::MUD.growth
+    };
+    let limit_of = |params: &GrowthParams| params.loaded(0, 0.0, f32::INFINITY);
+    while (limit_of(&params) * limit_of(&params)).next_up().sqrt() > limit_of(&params) {
+        params.kill_distance *= 1.001;
+    }
+    let limit = limit_of(&params);
+    let mut growth = CrackGrowth::new(params, Vec2::ONE, 3).unwrap();
+    growth.set_density(Some(Grid::new(UVec2::ONE, 0.0)));
+    growth.hit(Vec2::splat(0.5), 1.0);
+    while growth.step().grew() {}
+    let nearest_sq = |pos: Vec2| {
+        let nodes = growth.network().nodes().iter().map(|node| node.pos.distance_squared(pos));
+        nodes.fold(f32::INFINITY, f32::min)
+    };
+    let mut rng = Rng::new(8);
+    let nodes = growth.network().nodes();
+    let place = (0..1_000_000).find_map(|_| {
+        let way = Vec2::new(rng.signed(), rng.signed()).normalize_or(Vec2::X);
+        let pos = nodes[rng.next_u32() as usize % nodes.len()].pos + way * (limit * (1.0 + 1e-6 * rng.signed()));
+        let near_sq = nearest_sq(pos);
+        (near_sq > limit * limit && near_sq.sqrt() <= limit).then_some(pos)
+    });
+    growth.field.add(place.unwrap(), 0, f32::INFINITY);
+    growth.division.as_mut().unwrap().generation = 0;
+    let before = growth.steps();
+    growth.steps_left = 20_000;
+    while growth.step().grew() {}
+    assert!(growth.steps() - before < 1000, "{} steps", growth.steps() - before);
+    assert_eq!(growth.division.as_ref().unwrap().generation, 1);
+}
+
 /// What markers, cracks and tips know of each other, against all of them looked through, after every step.
 #[test]
 fn what_is_known_equals_brute_force() {
