@@ -56,6 +56,7 @@ impl CrackGrowth {
             }
         }
         self.steps = self.steps.saturating_add(opening);
+        self.skip_due_since(before);
         let reported = std::mem::replace(&mut self.links_reported, self.network.links.len() as u32);
         self.changes.list.extend((reported..self.links_reported).map(SegmentId::Link));
         self.new_nodes = first..self.network.nodes.len() as u32;

@@ -8,7 +8,18 @@ use super::{
 use crate::{Grid, pattern::CrackMask};
 use std::sync::Arc;
 
+/// How many cracks have started by themselves after so many steps, if all did that were due.
+fn due_after(nucleation: f32, steps: u32) -> u32 {
+    (nucleation * steps as f32) as u32
+}
+
 impl CrackGrowth {
+    /// Counts the cracks as started that were due in the steps since `before`, in which nothing grew here.
+    pub(super) fn skip_due_since(&mut self, before: u32) {
+        let due = |steps| due_after(self.params.nucleation, steps);
+        self.nucleated = self.nucleated.saturating_add(due(self.steps).saturating_sub(due(before)));
+    }
+
     /// Sets where the markers of later hits may be: a probability 0..=1 over the whole surface, at any resolution,
     /// sampled at the nearest cell. `None` = everywhere. Values that are not finite count as 0.
     pub fn set_density(&mut self, density: Option<Grid<f32>>) {
@@ -70,7 +81,12 @@ impl CrackGrowth {
         self.field.set_params(&params);
         self.widths.set_params(&params);
         let division = Division::new(&params).map(|new| self.division.take().unwrap_or(new));
+        let begins_alike = division.is_some() == self.divides();
         self.division = division;
+        // What was due before is neither made up for nor waited for.
+        if params.nucleation != self.params.nucleation || !begins_alike {
+            self.nucleated = due_after(params.nucleation, self.steps);
+        }
         self.params = params;
         self.update_arrest();
         self.update_masonry();
