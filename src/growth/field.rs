@@ -111,16 +111,23 @@ impl MarkerField {
 
     /// Sets other parameters; every marker searches for its nodes again when it [settles](Self::settle).
     pub(super) fn set_params(&mut self, params: &GrowthParams) {
+        // Distances to cracks are known only where cracks divided before.
+        let divides = params.venation == Venation::Subdivision;
+        self.divides &= divides;
+        let mut living = self.take_living();
         self.radius = params.crack_radius;
         self.kill_sq = kill_sq(params);
-        self.divides = params.venation == Venation::Subdivision;
+        self.divides = divides;
         self.relations = (params.venation == Venation::Closed).then(|| {
             let mut relations = Relations::new(params);
             (0..self.next).for_each(|_| relations.add());
             relations
         });
-        let mut living = self.take_living();
         living.append(&mut self.newborn);
+        if !divides {
+            // Other cracks may take a marker however near the border or the rim are.
+            living.iter_mut().for_each(|marker| marker.near_sq = f32::INFINITY);
+        }
         self.newborn = living;
     }
 
