@@ -18,7 +18,7 @@ impl GrowthParams {
     /// venation a marker attracts at most six nodes at once, for at most twice as many steps. With arrest a marker
     /// counts for each time that it can be given up, and every node can be a tip that runs on and breaks through the
     /// crack at which it ends. With nucleation every marker can be a start. Each node can fork. Strands have a largest
-    /// number of points.
+    /// number of points. The largest number there is stands for all above it.
     ///
     /// ```
     /// use bevy_crack::growth::GrowthParams;
@@ -29,28 +29,49 @@ impl GrowthParams {
     #[must_use]
     pub fn most_nodes(&self, markers: u64, starts: u64) -> u64 {
         let approaches = ((self.crack_radius / self.step_length).powi(2) / PROGRESS).ceil() as u64;
-        let mut births = markers * (2 + approaches);
+        let mut births = markers.saturating_mul(approaches.saturating_add(2));
         if self.strands().is_some() {
-            births += MOST_POINTS * starts;
+            births = births.saturating_add(starts.saturating_mul(MOST_POINTS));
         }
         if self.venation == Venation::Closed {
-            births = 6 * markers * u64::from(closed::patience(self));
+            births = markers.saturating_mul(6 * u64::from(closed::patience(self)));
         }
         if matches!(self.markers, MarkerLayout::Rays { .. }) {
             // A first node, and one line for each ring.
             let chord = u64::from(rays::chord_steps(plan::LONGEST_CHORD, self.step_length));
-            births += markers * (1 + u64::from(plan::MOST_RINGS) * chord);
+            births = births.saturating_add(markers.saturating_mul(1 + u64::from(plan::MOST_RINGS) * chord));
         }
-        let starts = starts + if self.nucleation > 0.0 || self.venation == Venation::Subdivision { markers } else { 0 };
+        let own_starts = if self.nucleation > 0.0 || self.venation == Venation::Subdivision { markers } else { 0 };
+        let starts = starts.saturating_add(own_starts);
         if self.venation == Venation::Subdivision {
             // Each start has two tips, which may run straight on.
-            births += 2 * starts * (1 + u64::from(divide::STRAIGHT));
+            births = births.saturating_add(starts.saturating_mul(2 * (1 + u64::from(divide::STRAIGHT))));
         }
         if !self.keeps_apart() {
-            return starts + births;
+            return starts.saturating_add(births);
         }
-        let run = u64::from(arrest::steps_for(self.arrest.max(self.island_distance), self.step_length)) + 3;
+        let run = u64::from(arrest::steps_for(self.arrest.max(self.island_distance), self.step_length)) + 4;
         let each = if self.forks > 0.0 { 2 } else { 1 };
-        each * (starts + births * u64::from(field::MOST_GIVEN_UP)) * (1 + run)
+        births.saturating_mul(field::MOST_GIVEN_UP.into()).saturating_add(starts).saturating_mul(each * run)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::CrackPreset;
+
+    #[test]
+    fn bounds_beyond_all_numbers_are_the_largest() {
+        for name in CrackPreset::NAMES {
+            let mut params = CrackPreset::named(name).unwrap().growth;
+            for venation in [params.venation, Venation::Closed, Venation::Subdivision] {
+                params.venation = venation;
+                for (markers, starts) in [(u64::MAX, u64::MAX), (u64::MAX, 0), (u64::MAX / 3, 7)] {
+                    assert_eq!(params.most_nodes(markers, starts), u64::MAX, "{name}");
+                }
+                assert!(params.most_nodes(0, u64::MAX) == u64::MAX && params.most_nodes(1000, 9) < 1 << 50, "{name}");
+            }
+        }
     }
 }

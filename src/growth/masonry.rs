@@ -68,7 +68,8 @@ impl Masonry {
         let size = weak.size();
         let scale = extent / size.as_vec2();
         let (columns, rows) = (size.x as usize, size.y as usize);
-        let of_rows: Vec<f32> = (0..rows).map(|y| mean(weak.row(y).iter().copied())).collect();
+        let known = |value: f32| if value.is_nan() { 0.0 } else { value };
+        let of_rows: Vec<f32> = (0..rows).map(|y| mean(weak.row(y).iter().copied().map(known))).collect();
         let beds = ridges(&of_rows);
         if beds.len() < 2 {
             return None;
@@ -84,7 +85,8 @@ impl Masonry {
                 if bottom < top + 2 {
                     return Vec::new();
                 }
-                let of_columns: Vec<f32> = (0..columns).map(|x| mean((top..bottom).map(|y| weak.row(y)[x]))).collect();
+                let of_columns: Vec<f32> =
+                    (0..columns).map(|x| mean((top..bottom).map(|y| known(weak.row(y)[x])))).collect();
                 ridges(&of_columns).iter().map(|&(x, _)| x * scale.x).collect()
             })
             .collect();

@@ -141,7 +141,7 @@ impl CrackMask {
         let Some(density) = &self.density else { return 1.0 };
         let size = density.size();
         let texel = (uv * size.as_vec2()).max(Vec2::ZERO).as_uvec2().min(size.saturating_sub(UVec2::ONE));
-        density.get(texel.x, texel.y).map_or(1.0, |value| value.clamp(0.0, 1.0))
+        density.get(texel.x, texel.y).map_or(1.0, |value| if value.is_nan() { 0.0 } else { value.clamp(0.0, 1.0) })
     }
 
     /// Whether the mask has no layer that says where cracks run. [`density`](Self::density) does not count.

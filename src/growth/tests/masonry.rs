@@ -1,8 +1,8 @@
 //! Cracks in masonry: as brick ships, on walls with a picture and without.
 
 use crate::{
-    CrackPreset,
-    growth::CrackGrowth,
+    CrackPreset, Grid,
+    growth::{CrackGrowth, masonry::Masonry},
     math::Rng,
     pattern::{CrackMask, NO_PARENT},
 };
@@ -118,4 +118,20 @@ fn bricks_lie_between_joints() {
         }
     }
     assert!(counts[0] == 0 && counts[3] > 20, "{counts:?}");
+}
+
+/// What is no number in a mask counts as not weak: courses are found all the same.
+#[test]
+fn courses_are_found_beside_what_is_no_number() {
+    let size = UVec2::new(96, 96);
+    let is_joint = |x: u32, y: u32| y % 16 < 2 || (x + 12 * (y / 16 % 2)) % 24 < 2;
+    let wall = |hole: f32| {
+        let values = (0..size.y).flat_map(|y| (0..size.x).map(move |x| (x, y)));
+        let value =
+            |(x, y)| if (x, y) == (40, 40) || x == 7 && y < 20 { hole } else { f32::from(u8::from(is_joint(x, y))) };
+        Grid::from_vec(size, values.map(value).collect()).unwrap()
+    };
+    let with = |hole| Masonry::find(&wall(hole), Vec2::ONE);
+    assert!(with(0.0).is_some());
+    assert_eq!(with(f32::NAN), with(0.0));
 }

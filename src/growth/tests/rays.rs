@@ -2,14 +2,14 @@
 
 use super::{arrest::assert_planar, random_extent, random_params};
 use crate::{
-    CrackPreset,
+    CrackPreset, Grid,
     growth::{
         CrackGrowth, GrowthParams, MarkerLayout, StartLayout,
         plan::{MOST_RINGS, Plan, PlannedHit},
         rays::{NO_RAY, RAY},
     },
     math::Rng,
-    pattern::{CellTracker, LinkKind, NO_PARENT, SurfaceFrame},
+    pattern::{CellTracker, CrackMask, LinkKind, NO_PARENT, SurfaceFrame},
     raster::{DepthField, stamp_path},
 };
 use glam::{UVec2, Vec2};
@@ -417,5 +417,17 @@ fn b5_the_plan_of_a_hit_is_bounded() {
         let points: usize = plan.rays.iter().map(|ray| ray.line.len()).sum();
         assert!((15_000..200_000).contains(&points), "{points} points of {} rays", plan.rays.len());
         assert!(plan.chords.len() <= plan.rays.len() * MOST_RINGS as usize);
+    }
+}
+
+/// A density that is no number counts as 0, for rays as for other layouts.
+#[test]
+fn there_are_no_rays_where_density_is_no_number() {
+    for preset in [CrackPreset::GLASS, CrackPreset::CONCRETE] {
+        let mut growth = CrackGrowth::new(preset.growth, Vec2::ONE, 1).unwrap();
+        let density = Some(Grid::new(UVec2::ONE, f32::NAN));
+        growth.set_mask(CrackMask { density, ..CrackMask::default() });
+        growth.hit(Vec2::splat(0.5), 1.0);
+        assert_eq!(growth.marker_counts().total, 0);
     }
 }
