@@ -8,6 +8,7 @@ pub mod ops;
 pub(crate) mod pools;
 mod rng;
 mod simd;
+pub(crate) mod turns;
 pub(crate) mod whole;
 
 pub use rng::Rng;

@@ -1,12 +1,10 @@
 //! [`Burst`]: the flight of pieces as a function of time.
 
-use super::{
-    Floor, ShardShape, ShatterError,
-    cuts::in_range,
-    floor::Landing,
+use super::{Floor, ShardShape, ShatterError, cuts::in_range, floor::Landing};
+use crate::math::{
+    Rng, ops,
     turns::{after, turned},
 };
-use crate::math::{Rng, ops};
 use glam::{Quat, Vec2, Vec3};
 
 /// How a burst looks. Lengths are pattern units, times are seconds.

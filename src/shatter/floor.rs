@@ -1,11 +1,10 @@
 //! [`Floor`]: a plane on which flying pieces come to rest.
 
-use super::{
-    ShatterError,
-    cuts::in_range,
+use super::{ShatterError, cuts::in_range};
+use crate::math::{
+    ops,
     turns::{after, between, from_to, turned},
 };
-use crate::math::ops;
 use glam::{Quat, Vec3};
 
 /// A plane on which pieces land, bounce a little, slide, and come to rest. Place and time of the landing are computed

@@ -39,7 +39,6 @@ mod support;
 #[cfg(test)]
 pub(crate) mod tests;
 mod triangulate;
-mod turns;
 
 pub use again::{BreakAgain, SizeClasses};
 pub use burst::{Burst, BurstParams, Flight, Pose};

@@ -2,7 +2,8 @@
 
 use super::chart::{Chart, Start, along, bounds, cells};
 use super::shape::MeshShape;
-use glam::{Quat, UVec2, Vec2, Vec3};
+use crate::math::turns::{from_to, turned};
+use glam::{UVec2, Vec2, Vec3};
 use std::{cmp::Reverse, collections::BinaryHeap};
 
 /// The most that a triangle may be stretched or shrunk in the plane, along any of its edges and in area.
@@ -74,9 +75,7 @@ impl Laid {
 
     /// The same direction elsewhere.
     fn turned(&self, from: Vec3, to: Vec3) -> Vec3 {
-        (Quat::from_rotation_arc(from, to) * self.right)
-            .reject_from_normalized(to)
-            .normalize_or(to.any_orthonormal_vector())
+        turned(from_to(from, to), self.right).reject_from_normalized(to).normalize_or(to.any_orthonormal_vector())
     }
 }
 

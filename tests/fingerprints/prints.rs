@@ -21,7 +21,11 @@ use bevy_crack::{
     voronoi::{BakeStatus, FONT, Front, Guide, SiteLayout, VoronoiBake, VoronoiParams, draw_text},
 };
 use glam::{UVec2, Vec2, Vec3};
-use std::{error::Error, f32::consts::FRAC_PI_2, sync::Arc};
+use std::{
+    error::Error,
+    f32::consts::{FRAC_PI_2, PI},
+    sync::Arc,
+};
 
 /// FNV-1a, a word at a time.
 struct Print(u64);
@@ -271,20 +275,44 @@ fn laid_out(print: &mut Print) -> Made<()> {
         (positions, triangles)
     };
     for (positions, triangles) in [bent(4, 1, FRAC_PI_2), bent(24, 12, 0.2)] {
-        let shape = MeshShape::new(&positions, &triangles)?;
-        let unwrap = Unwrap {
-            around: positions[0],
-            triangle: 0,
-            right: Vec3::Y,
-            texels: 40.0,
-            most_side: 1024,
-            most_texels: 1 << 20,
-        };
-        let laid_out = unwrap.apply(&shape)?;
-        print.words([laid_out.size.x, laid_out.size.y, laid_out.charts as u32]);
-        print.places(laid_out.corners.iter().flatten().flatten());
-        print.words(laid_out.owner);
+        lay_out(print, &positions, &triangles)?;
     }
+    Ok(())
+}
+
+/// A ball and one that is pressed flat, laid out.
+fn laid_out_balls(print: &mut Print) -> Made<()> {
+    let (rows, round) = (14, 28);
+    let corner = |row: u32, i: u32| row * round + i % round;
+    let cells = (0..rows).flat_map(|row| (0..round).map(move |i| (row, i)));
+    let triangles: Vec<[u32; 3]> = cells
+        .flat_map(|(row, i)| {
+            let [a, b, c, d] = [corner(row, i), corner(row, i + 1), corner(row + 1, i + 1), corner(row + 1, i)];
+            [[a, c, b], [a, d, c]]
+        })
+        .collect();
+    for height in [1.0, 0.3] {
+        let at = |row: u32, i: u32| {
+            let [up, around] =
+                [row as f32 / rows as f32, 2.0 * i as f32 / round as f32].map(|share| ops::unit(PI * share));
+            Vec3::new(up.y * around.x, height * up.x, -up.y * around.y)
+        };
+        let positions: Vec<Vec3> = (0..=rows).flat_map(|row| (0..round).map(move |i| at(row, i))).collect();
+        lay_out(print, &positions, &triangles)?;
+    }
+    Ok(())
+}
+
+/// A mesh, laid out around the first vertex of a triangle with area.
+fn lay_out(print: &mut Print, positions: &[Vec3], triangles: &[[u32; 3]]) -> Made<()> {
+    let shape = MeshShape::new(positions, triangles)?;
+    let triangle = (0..shape.len()).find(|&triangle| shape.has_area(triangle)).ok_or("no triangle")?;
+    let around = positions[triangles[triangle][0] as usize];
+    let unwrap = Unwrap { around, triangle, right: Vec3::Y, texels: 40.0, most_side: 1024, most_texels: 1 << 20 };
+    let laid_out = unwrap.apply(&shape)?;
+    print.words([laid_out.size.x, laid_out.size.y, laid_out.charts as u32]);
+    print.places(laid_out.corners.iter().flatten().flatten());
+    print.words(laid_out.owner);
     Ok(())
 }
 
@@ -349,6 +377,7 @@ pub(crate) fn prints(begin: &str) -> Made<Vec<String>> {
     add("mask lines_of_a_picture", &lines_of_a_picture)?;
     add("analogy darkness", &analogy)?;
     add("mesh laid_out", &laid_out)?;
+    add("mesh laid_out_balls", &laid_out_balls)?;
     settings::each(add)?;
     Ok(out)
 }

@@ -1,6 +1,6 @@
 //! Rotations in plain arithmetic: those of `glam` use other instructions on each kind of machine, which give other bits.
 
-use crate::math::ops;
+use super::ops;
 use glam::{Quat, Vec3};
 
 fn axis(rotation: Quat) -> Vec3 {
@@ -20,13 +20,13 @@ fn mix((a, of_a): (Quat, f32), (b, of_b): (Quat, f32)) -> Quat {
 }
 
 /// A place that is turned by a rotation.
-pub(super) fn turned(rotation: Quat, place: Vec3) -> Vec3 {
+pub(crate) fn turned(rotation: Quat, place: Vec3) -> Vec3 {
     let (axis, w) = (axis(rotation), rotation.w);
     place * (w * w - axis.dot(axis)) + axis * (2.0 * place.dot(axis)) + axis.cross(place) * (2.0 * w)
 }
 
 /// The rotation by `first` and then by `next`.
-pub(super) fn after(next: Quat, first: Quat) -> Quat {
+pub(crate) fn after(next: Quat, first: Quat) -> Quat {
     let (a, b) = (next, first);
     Quat::from_xyzw(
         a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,
@@ -36,14 +36,21 @@ pub(super) fn after(next: Quat, first: Quat) -> Quat {
     )
 }
 
-/// The shortest rotation from a direction to another, which is at most a right angle away.
-pub(super) fn from_to(from: Vec3, to: Vec3) -> Quat {
-    let across = from.cross(to);
-    mix((Quat::from_xyzw(across.x, across.y, across.z, 1.0 + from.dot(to)), 1.0), (Quat::IDENTITY, 0.0))
+/// One plus the cosine of an angle below which two directions are opposite: rounding would decide how to turn.
+const OPPOSITE: f32 = 2.0 * f32::EPSILON;
+
+/// The shortest rotation from a direction to another; to the opposite one it is about any axis across.
+pub(crate) fn from_to(from: Vec3, to: Vec3) -> Quat {
+    let (across, w) = (from.cross(to), 1.0 + from.dot(to));
+    if w < OPPOSITE {
+        let axis = from.any_orthonormal_vector();
+        return Quat::from_xyzw(axis.x, axis.y, axis.z, 0.0);
+    }
+    mix((Quat::from_xyzw(across.x, across.y, across.z, w), 1.0), (Quat::IDENTITY, 0.0))
 }
 
 /// The rotation that is this share of the way between two.
-pub(super) fn between(from: Quat, to: Quat, share: f32) -> Quat {
+pub(crate) fn between(from: Quat, to: Quat, share: f32) -> Quat {
     let cos = dot(from, to);
     // Of both signs of a rotation the nearer one.
     let (cos, sign) = if cos < 0.0 { (-cos, -1.0) } else { (cos, 1.0) };
@@ -76,8 +83,15 @@ mod tests {
             assert!(between.abs_diff_eq(expected, 1e-3) || between.abs_diff_eq(-expected, 1e-3), "{a} {b} {share}");
             let from = place.normalize_or(Vec3::X);
             let to = draw().normalize_or(Vec3::Y);
-            let to = if from.dot(to) < 0.0 { -to } else { to };
-            assert!(turned(from_to(from, to), from).abs_diff_eq(to, 1e-5), "{from} {to}");
+            for to in [to, -to, from, -from, (2e-4 * to - from).normalize_or(to)] {
+                let found = from_to(from, to);
+                assert!(turned(found, from).abs_diff_eq(to, 2e-3), "{from} {to}");
+                assert!((found.length() - 1.0).abs() < 1e-5, "{from} {to}");
+                if from.dot(to) > -0.99 {
+                    let expected = Quat::from_rotation_arc(from, to);
+                    assert!(turned(found, place).abs_diff_eq(expected * place, 1e-4), "{from} {to}");
+                }
+            }
         }
     }
 }
