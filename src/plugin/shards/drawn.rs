@@ -136,7 +136,7 @@ mod tests {
         let image = app.world_mut().resource_mut::<Assets<Image>>().add(blank(UVec2::splat(128)));
         let cut = ShatterParams { extend_cracks: true, ..ShatterParams::DEFAULT };
         let settings = ShatterCracks { cut, anchor: Anchor::Nothing, speed: 0.0, ..default() };
-        let surface = CrackSurface::new(CrackPreset::GLASS);
+        let surface = CrackSurface::new(CrackPreset::CONCRETE);
         let entity = app.world_mut().spawn((Sprite::from_image(image), surface, settings)).id();
         app.world_mut().trigger(CrackHit::uv(entity, Vec2::splat(0.4)).with_energy(2.0));
         let revision = |app: &App| active(app.world(), entity).map(|active| active.canvas.revision);
