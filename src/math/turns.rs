@@ -37,7 +37,7 @@ pub(crate) fn after(next: Quat, first: Quat) -> Quat {
 }
 
 /// One plus the cosine of an angle below which two directions are opposite: rounding would decide how to turn.
-const OPPOSITE: f32 = 2.0 * f32::EPSILON;
+const OPPOSITE: f32 = 8.0 * f32::EPSILON;
 
 /// The shortest rotation from a direction to another; to the opposite one it is about any axis across.
 pub(crate) fn from_to(from: Vec3, to: Vec3) -> Quat {
@@ -83,6 +83,9 @@ mod tests {
             assert!(between.abs_diff_eq(expected, 1e-3) || between.abs_diff_eq(-expected, 1e-3), "{a} {b} {share}");
             let from = place.normalize_or(Vec3::X);
             let to = draw().normalize_or(Vec3::Y);
+            let to = if from.dot(to) < 0.0 { -to } else { to };
+            assert!(turned(from_to(from, to), from).abs_diff_eq(to, 1e-5), "{from} {to}");
+            // Further away, up to the opposite direction.
             for to in [to, -to, from, -from, (2e-4 * to - from).normalize_or(to)] {
                 let found = from_to(from, to);
                 assert!(turned(found, from).abs_diff_eq(to, 2e-3), "{from} {to}");
