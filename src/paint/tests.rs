@@ -28,6 +28,7 @@ fn noise_bytes(rng: &mut Rng, n: usize) -> Vec<u8> {
 fn looks() -> [Look; 4] {
     let wild = Look {
         glint: 4.0,
+        uneven_glint: 1.0,
         gloss: 4.0,
         grain: 1.0,
         sparkle: 1.0,
@@ -297,6 +298,42 @@ fn a_slow_ramp_has_no_steps() {
         let want = f64::from(30_000 + x as u32) / 65536.0 * 255.0;
         assert!((f64::from(texel[0]) - want).abs() <= 0.51, "{x}: {texel:?} {want}");
     }
+}
+
+/// Uneven light is between none and all of it on walls that face it, and comes and goes along a groove; walls that face away are as before.
+#[test]
+fn uneven_light_comes_and_goes_along_a_groove() {
+    let size = UVec2::new(512, 64);
+    let mut field = field(size);
+    for (i, depth) in field.depth.as_mut_slice().iter_mut().enumerate() {
+        let away = (i as u32 / size.x).abs_diff(32);
+        *depth = 8000 * 6u32.saturating_sub(away) as u16;
+    }
+    let base = [120, 120, 120, 255].repeat(size.element_product() as usize);
+    let paint = |glint: f32, uneven_glint: f32| {
+        let mut out = base.clone();
+        let mut targets = PaintTargets { diffuse: Some(&mut out), normal: None, depth: None };
+        let texels = BaseTexels { size, diffuse: &base, normal: None, depth: None };
+        let look = Look { glint, uneven_glint, grain: 0.0, ..Look::GROOVE };
+        paint_into(texels, &field, &table(&look, &field), TexelRect::whole(size), UVec2::ZERO, &mut targets);
+        out.as_chunks::<4>().0.iter().map(|texel| texel[0]).collect::<Vec<u8>>()
+    };
+    let [none, even, uneven] = [(0.0, 0.0), (0.9, 0.0), (0.9, 1.0)].map(|(glint, gaps)| paint(glint, gaps));
+    let (mut lit, mut dark, mut bright) = (0, 0, 0);
+    for ((none, even), uneven) in none.into_iter().zip(even).zip(uneven) {
+        if even <= none {
+            assert_eq!(uneven, even, "a wall that faces away");
+            continue;
+        }
+        assert!((none..=even).contains(&uneven), "{none} {uneven} {even}");
+        lit += 1;
+        dark += u32::from(uneven - none <= (even - none) / 8);
+        bright += u32::from(even - uneven <= (even - none) / 8);
+    }
+    assert!(
+        lit > 2000 && dark * 10 > lit && bright * 10 > lit,
+        "of {lit} lit texels {dark} are dark and {bright} bright"
+    );
 }
 
 #[test]

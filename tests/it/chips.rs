@@ -149,7 +149,7 @@ fn craters_that_grow_lose_what_is_new() {
 fn s12_chips_go_with_their_surface() {
     let mut app = app();
     let image = add(&mut app, picture(SIZE));
-    for preset in [CrackPreset::GLASS, CrackPreset::CLAY] {
+    for preset in [CrackPreset::GLASS, CrackPreset::GLAZE] {
         let wall = app.world_mut().spawn((Sprite::from_image(image.clone()), surface(preset))).id();
         hit(&mut app, center(wall).with_energy(4.0));
         steps(&mut app, 3);
