@@ -31,8 +31,8 @@ impl CrackMaterial for ColorMaterial {
         }
     }
 
-    fn close(&mut self, before: &Self) {
-        self.alpha_mode = before.alpha_mode;
+    fn close(&mut self, original: &Self) {
+        self.alpha_mode = original.alpha_mode;
     }
 
     fn for_shards(&mut self, picture: &Handle<Image>, opacity: f32) {

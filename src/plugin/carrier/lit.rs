@@ -124,7 +124,7 @@ impl CrackMaterial for CrackLitMaterial {
     /// It blends anyway.
     fn open(&mut self) {}
 
-    fn close(&mut self, _before: &Self) {}
+    fn close(&mut self, _original: &Self) {}
 
     fn for_shards(&mut self, picture: &Handle<Image>, opacity: f32) {
         self.diffuse = Some(picture.clone());

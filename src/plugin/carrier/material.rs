@@ -280,13 +280,12 @@ impl<S: MaterialSlot> CarrierKind for MaterialKind<S> {
         let (Some(own), Some(mut materials)) = (&carrier.own, world.get_resource_mut::<Assets<S::Material>>()) else {
             return;
         };
-        let before = typed(&carrier.shown.asset).and_then(|before| materials.get(&before)).cloned();
+        let original = if has_holes { None } else { typed(&carrier.shown.asset) };
+        let original = original.and_then(|original| materials.get(&original)).cloned();
         let Some(mut material) = typed(own).and_then(|own| materials.get_mut(&own)) else { return };
-        if !has_holes {
-            if let Some(before) = before {
-                material.close(&before);
-            }
-        } else {
+        if let Some(original) = original {
+            material.close(&original);
+        } else if has_holes {
             material.open();
             if carrier.unfolding.is_some() {
                 material.show_inside();

@@ -27,8 +27,8 @@ pub(crate) trait CrackMaterial: Asset + Clone {
     fn show_all(&mut self) {}
     /// Becomes transparent where its picture is.
     fn open(&mut self);
-    /// Is as transparent, and seen from as many sides, as it was before.
-    fn close(&mut self, before: &Self);
+    /// Has no holes any more: transparent, and seen from behind, as the original is.
+    fn close(&mut self, original: &Self);
     /// Shows its faces from behind as well: through holes, the inside of a body is seen.
     fn show_inside(&mut self) {}
     /// The same for shards: with this picture, the mesh's texture coordinates being the picture's, and so much of it there (0..=1).

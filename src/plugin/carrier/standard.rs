@@ -59,9 +59,9 @@ impl CrackMaterial for StandardMaterial {
         }
     }
 
-    fn close(&mut self, before: &Self) {
-        self.alpha_mode = before.alpha_mode;
-        (self.double_sided, self.cull_mode) = (before.double_sided, before.cull_mode);
+    fn close(&mut self, original: &Self) {
+        self.alpha_mode = original.alpha_mode;
+        (self.double_sided, self.cull_mode) = (original.double_sided, original.cull_mode);
     }
 
     fn show_inside(&mut self) {
