@@ -102,6 +102,8 @@ fn paints(c: &mut Criterion) {
     let whole = TexelRect::whole(size);
     let square = |side: u32| TexelRect { min: UVec2::splat(1000), max: UVec2::splat(1000 + side) };
     let Ok(look) = LookTable::new(&Look::GROOVE, 2048.0) else { return };
+    let uneven = Look { uneven_glint: Look::CONCRETE.uneven_glint, ..Look::GROOVE };
+    let Ok(uneven) = LookTable::new(&uneven, 2048.0) else { return };
     let Ok(glass) = LookTable::new(&Look::FROSTED, 2048.0) else { return };
     for (area, rect) in [("2048^2", whole), ("64^2", square(64)), ("16^2", square(16))] {
         group.throughput(Throughput::Elements(rect.area()));
@@ -120,6 +122,8 @@ fn paints(c: &mut Criterion) {
         for (kind, field, look) in [
             ("diffuse groove, all touched", &relief, &look),
             ("diffuse groove, cracks", &cracks, &look),
+            ("diffuse unevenly lit groove, all touched", &relief, &uneven),
+            ("diffuse unevenly lit groove, cracks", &cracks, &uneven),
             ("diffuse frosted, cracks", &cracks, &glass),
         ] {
             group.bench_function(BenchmarkId::new(kind, area), |b| {

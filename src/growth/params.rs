@@ -164,7 +164,8 @@ pub struct GrowthParams {
     pub line_width: f32,
     /// How fast cracks widen with the number of nodes that have grown from them; 0 = not at all. A node with `n`
     /// nodes behind it, itself included, is `1 + line_growth (n^(1/murray) - 1)` times as wide as
-    /// [`line_width`](Self::line_width). 0..=16; default 0.4.
+    /// [`line_width`](Self::line_width). Nodes of other hits do not count, and beyond a crack of another hit a crack
+    /// is half as wide. 0..=16; default 0.4.
     pub line_growth: f32,
     /// Exponent of the pipe model: at a `line_growth` of 1 a node with `n` nodes behind it is `n^(1/murray)` times as
     /// wide as a tip. 1..=8; default 3.
