@@ -6,7 +6,7 @@ use super::{
     patch::{BLOCK, Patch},
     rows::{Rgba, channel, round},
 };
-use crate::raster::{TexelRect, noise as smooth_noise};
+use crate::raster::{TexelRect, noise_row};
 use glam::{Mat4, UVec2};
 
 /// Largest brightening of a wall that faces the light: the highlight for a gloss of 1, in sRGB levels, and a share of
@@ -261,16 +261,16 @@ impl Block<'_> {
                 facing[i] *= 1.0 - dark[i];
             }
         }
-        if look.uneven_glint > 0.0 {
-            for (i, facing) in facing.iter_mut().enumerate() {
-                if *facing > 0.0 {
-                    let mut share = lit_share(look, at + UVec2::new(i as u32, 0));
-                    // Crushed stone is lit as it lies.
-                    if RICH && let Some((extras, place)) = extras {
-                        share += (1.0 - share) * f32::from(extras.spot(place + i).pale) * (1.0 / 255.0);
-                    }
-                    *facing *= share;
+        if look.uneven_glint > 0.0 && facing.iter().any(|facing| *facing > 0.0) {
+            let mut share = lit_shares(look, at);
+            // Crushed stone is lit as it lies.
+            if RICH && let Some((extras, place)) = extras {
+                for (i, share) in share.iter_mut().enumerate() {
+                    *share += (1.0 - *share) * f32::from(extras.spot(place + i).pale) * (1.0 / 255.0);
                 }
+            }
+            for i in 0..BLOCK {
+                facing[i] *= if facing[i] > 0.0 { share[i] } else { 1.0 };
             }
         }
         for c in 0..3 {
@@ -311,9 +311,8 @@ impl Block<'_> {
             }
         }
         if look.sparkle > 0.0 && *self.depth != [0; BLOCK] {
-            for (i, share) in share.iter_mut().enumerate() {
-                let (x, y) = ((at.x + i as u32) as f32 * look.sparkle_scale, at.y as f32 * look.sparkle_scale);
-                *share *= 1.0 - look.sparkle * (0.5 + 0.5 * smooth_noise(0x5EED, x, y));
+            for (share, bump) in share.iter_mut().zip(bumps(0x5EED, look.sparkle_scale, at)) {
+                *share *= 1.0 - look.sparkle * (0.5 + 0.5 * bump);
             }
         }
         if RICH
@@ -424,12 +423,25 @@ impl Block<'_> {
     }
 }
 
-/// How much of the light on walls there is at a texel.
+/// Smooth noise in -1..=1 at each texel from `at` on, with `scale` bumps per texel.
 #[inline(always)]
-fn lit_share(look: &LookTable, at: UVec2) -> f32 {
-    let bump = 0.5 + 0.9 * smooth_noise(0x61E7, at.x as f32 * look.glint_scale, at.y as f32 * look.glint_scale);
-    let bump = bump.clamp(0.0, 1.0);
-    1.0 - look.uneven_glint * (1.0 - bump * bump)
+fn bumps(seed: u32, scale: f32, at: UVec2) -> [f32; BLOCK] {
+    let mut x = [0.0; BLOCK];
+    for (i, x) in x.iter_mut().enumerate() {
+        *x = (at.x + i as u32) as f32 * scale;
+    }
+    noise_row(seed, x, at.y as f32 * scale)
+}
+
+/// How much of the light on walls there is at each texel from `at` on.
+#[inline(always)]
+fn lit_shares(look: &LookTable, at: UVec2) -> [f32; BLOCK] {
+    let mut share = bumps(0x61E7, look.glint_scale, at);
+    for share in &mut share {
+        let bump = (0.5 + 0.9 * *share).clamp(0.0, 1.0);
+        *share = 1.0 - look.uneven_glint * (1.0 - bump * bump);
+    }
+    share
 }
 
 /// Puts reflections and crushed material under the cracks, and holes over them; returns how dark the holes are.

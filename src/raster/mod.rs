@@ -41,7 +41,7 @@ mod stamp;
 pub use correction::SlopeCorrection;
 pub use dirty::DirtyTiles;
 pub use distance::{MAX_DISTANCE, crack_distance};
-pub(crate) use layer::{CrushedField, Layer, PIT_STEPS, Plate, SLOPE_UNIT, Spot, noise};
+pub(crate) use layer::{CrushedField, Layer, PIT_STEPS, Plate, SLOPE_UNIT, Spot, noise, noise_row};
 pub use layer::{CrushedZone, LayerPlan, Veil};
 pub use rect::TexelRect;
 pub use replay::{DOT_DEPTH, Replay, ReplayChanges};

@@ -18,7 +18,7 @@ mod veil;
 mod zones;
 
 pub use crushed::CrushedZone;
-pub(crate) use noise::noise;
+pub(crate) use noise::{noise, noise_row};
 pub(crate) use plates::Plate;
 pub(crate) use spot::{PIT_STEPS, SLOPE_UNIT, Spot};
 pub use veil::Veil;
