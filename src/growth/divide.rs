@@ -181,6 +181,7 @@ impl CrackGrowth {
             // The next generation starts when this one no longer grows.
             if found.is_empty() {
                 division.generation += 1;
+                self.field.seek_again();
             }
         }
         let ahead = |candidate: &Candidate| candidate.from_hit - self.front(candidate.impact);
@@ -192,29 +193,31 @@ impl CrackGrowth {
 
     /// The markers at which cracks may start, as far from all cracks as the generation allows; those beyond the front only
     /// if nothing else happens.
-    fn candidates(&self, is_idle: bool) -> Vec<Candidate> {
+    ///
+    /// No crack ever starts at the others in this generation, because distances to cracks only become smaller.
+    pub(super) fn candidates(&mut self, is_idle: bool) -> Vec<Candidate> {
         let mut found = Vec::new();
-        let Some(division) = &self.division else { return found };
-        let (params, impacts, generation) = (&self.params, &self.impacts, division.generation);
+        let fronts: Vec<f32> = (0..self.impacts.len() as u32).map(|impact| self.front(impact)).collect();
+        let Self { division: Some(division), field, params, impacts, seed, .. } = self else { return found };
+        let generation = division.generation;
         let is_last = u32::from(generation) + 1 >= params.generations;
         let narrow = if is_last { NARROW } else { 1.0 };
         let finest = narrow * params.loaded(generation, 0.0, f32::INFINITY);
-        let fronts: Vec<f32> = (0..impacts.len() as u32).map(|impact| self.front(impact)).collect();
-        let patches = params.patches(self.seed);
-        self.field.each_beyond(finest * finest, |marker, id, pos, near_sq, impact| {
+        let patches = params.patches(*seed);
+        field.retain_beyond(finest * finest, |marker, id, pos, near_sq, impact| {
             let (Some(hit), Some(&front)) = (impacts.get(impact as usize), fronts.get(impact as usize)) else {
-                return;
+                return false;
             };
             let from_hit_sq = hit.pos.distance_squared(pos);
             if !is_idle && from_hit_sq > front * front {
-                return;
+                return true;
             }
             let from_hit = from_hit_sq.sqrt();
             let reach = division.reach_of(impact);
             // A patch is a factor of 1 or more: most markers are too near even without it.
             let least = params.loaded(generation, from_hit, reach);
             if near_sq <= (narrow * least) * (narrow * least) {
-                return;
+                return false;
             }
             // Far from all cracks it is far enough whatever the patch; cosines take most of the time of this search.
             let most = NO_CLOSER * narrow * least * patches.most();
@@ -223,6 +226,7 @@ impl CrackGrowth {
             if is_far {
                 found.push(Candidate { marker, id, impact, pos, near_sq, from_hit });
             }
+            is_far
         });
         found
     }

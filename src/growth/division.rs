@@ -235,3 +235,8 @@ pub(super) fn rim_towards(way: Vec2, reach: f32, seed: u64) -> f32 {
     }
     reach * (1.0 - UNEVEN * (0.5 + 0.25 * sum).clamp(0.0, 1.0))
 }
+
+/// The smallest and the largest radius that [`rim_towards`] gives.
+pub(super) fn rims(reach: f32) -> [f32; 2] {
+    [reach * (1.0 - UNEVEN), reach]
+}

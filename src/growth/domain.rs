@@ -1,8 +1,12 @@
 //! How a crack would divide the domain around a place.
 
-use super::{division::rim_towards, draws, state::CrackGrowth};
+use super::{
+    division::{rim_towards, rims},
+    draws,
+    state::CrackGrowth,
+};
 use crate::math::{hash_unit, ops};
-use glam::Vec2;
+use glam::{Vec2, Vec4};
 use std::f32::consts::PI;
 
 /// Axes along which the width of a domain is measured.
@@ -48,37 +52,55 @@ impl CrackGrowth {
     pub(super) fn look_around(&self, pos: Vec2, axes: &[Vec2; AXES], far: f32) -> [Sight; 2] {
         let mut sight = [Sight { distance: [f32::INFINITY; AXES], slant: [0.0; AXES] }; 2];
         let Some(arrest) = &self.arrest else { return sight };
+        // Four axes at once.
+        const LANES: usize = 4;
+        let fours = |number: fn(&Vec2) -> f32| -> [Vec4; AXES / LANES] {
+            std::array::from_fn(|k| Vec4::from_array(std::array::from_fn(|i| number(&axes[LANES * k + i]))))
+        };
+        let (x, y) = (fours(|axis| axis.x), fours(|axis| axis.y));
+        let mut nearest = [[(Vec4::INFINITY, Vec4::ZERO); AXES / LANES]; 2];
         arrest.walls.each_near(pos, far, |from, to| {
             let (from, way) = (from - pos, to - from);
             let length_sq = way.length_squared();
-            // The same for all axes, without a branch, so that the loop is vectorized.
-            for (i, axis) in axes.iter().enumerate() {
-                let (slope, across) = (axis.perp_dot(way), axis.perp_dot(from));
+            for (k, (&x, &y)) in x.iter().zip(&y).enumerate() {
+                let (slope, across) = (x * way.y - y * way.x, x * from.y - y * from.x);
                 let share = -across / slope;
-                let distance = axis.dot(from) + share * axis.dot(way);
-                let slant = 1.0 - slope * slope / length_sq;
-                let is_on = (0.0..=1.0).contains(&share);
-                for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
-                    let sight = &mut sight[side];
-                    let ahead = sign * distance;
-                    let is_nearer = is_on & (ahead >= 0.0) & (ahead < sight.distance[i]);
-                    sight.distance[i] = if is_nearer { ahead } else { sight.distance[i] };
-                    sight.slant[i] = if is_nearer { slant } else { sight.slant[i] };
+                let is_on = share.cmpge(Vec4::ZERO) & share.cmple(Vec4::ONE);
+                if !is_on.any() {
+                    continue;
+                }
+                let distance = x * from.x + y * from.y + share * (x * way.x + y * way.y);
+                let slant = Vec4::ONE - slope * slope / length_sq;
+                for (nearest, ahead) in nearest.iter_mut().zip([distance, -distance]) {
+                    let before = nearest[k];
+                    let is_nearer = is_on & ahead.cmpge(Vec4::ZERO) & ahead.cmplt(before.0);
+                    nearest[k] = (Vec4::select(is_nearer, ahead, before.0), Vec4::select(is_nearer, slant, before.1));
                 }
             }
         });
+        for (sight, nearest) in sight.iter_mut().zip(nearest) {
+            for (k, (distance, slant)) in nearest.into_iter().enumerate() {
+                sight.distance[LANES * k..LANES * (k + 1)].copy_from_slice(&distance.to_array());
+                sight.slant[LANES * k..LANES * (k + 1)].copy_from_slice(&slant.to_array());
+            }
+        }
         sight
     }
 
     /// How far an impact has loaded the surface in the direction `way` from its hit.
     pub(super) fn rim_of(&self, impact: u32, way: Vec2) -> f32 {
-        let reach = self.division.as_ref().map_or(f32::INFINITY, |division| division.reach_of(impact));
-        rim_towards(way, reach, self.seed ^ u64::from(impact))
+        rim_towards(way, self.reach_of_impact(impact), self.seed ^ u64::from(impact))
     }
 
     /// Whether a place, `way` from the hit of an impact, is outside the area that it has loaded.
     pub(super) fn is_beyond_rim(&self, impact: u32, way: Vec2) -> bool {
-        way.length() > self.rim_of(impact, way)
+        let (length, reach) = (way.length(), self.reach_of_impact(impact));
+        let [nearest, farthest] = rims(reach);
+        length > farthest || length > nearest && length > self.rim_of(impact, way)
+    }
+
+    fn reach_of_impact(&self, impact: u32) -> f32 {
+        self.division.as_ref().map_or(f32::INFINITY, |division| division.reach_of(impact))
     }
 
     /// How a crack would divide the domain around a place; `None` if it could not end at other cracks.

@@ -75,6 +75,8 @@ pub(super) struct MarkerField {
     first: Vec<u32>,
     /// Markers that attract a node; may contain dead ones until the next sweep.
     pub(super) active: Vec<u32>,
+    /// What [`retain_beyond`](Self::retain_beyond) has kept, if anything was sought since markers were last sorted.
+    beyond: Option<Vec<u32>>,
     pub(super) made: u32,
     /// Number for the next marker.
     next: u32,
@@ -103,6 +105,7 @@ impl MarkerField {
             per_unit: extent.recip(),
             first: vec![0, 0],
             active: Vec::new(),
+            beyond: None,
             made: 0,
             next: 0,
             killed: 0,
@@ -187,6 +190,7 @@ impl MarkerField {
         self.owner.clear();
         self.given_up.clear();
         self.active.clear();
+        self.beyond = None;
         self.first.fill(0);
     }
 
@@ -399,14 +403,22 @@ impl MarkerField {
         Some((Vec2::new(self.x[i], self.y[i]), self.owner[i]))
     }
 
-    /// Calls `visit` with each living marker that is further than this from all cracks: its index in the field,
-    /// number, position, squared distance to the nearest crack and impact.
-    pub(super) fn each_beyond(&self, least_sq: f32, mut visit: impl FnMut(u32, u32, Vec2, f32, u32)) {
-        for (i, &near_sq) in self.near_sq.iter().enumerate() {
-            if near_sq > least_sq {
-                visit(i as u32, self.id[i], Vec2::new(self.x[i], self.y[i]), near_sq, self.owner[i]);
-            }
-        }
+    /// Calls `keeps` with each living marker that is further than this from all cracks: its index in the field,
+    /// number, position, squared distance to the nearest crack and impact. Those for which it returns `false` are not
+    /// visited again until [`seek_again`](Self::seek_again).
+    pub(super) fn retain_beyond(&mut self, least_sq: f32, mut keeps: impl FnMut(u32, u32, Vec2, f32, u32) -> bool) {
+        let Self { near_sq, id, x, y, owner, beyond, .. } = self;
+        let is_beyond = |i: &u32| near_sq[*i as usize] > least_sq;
+        let beyond = beyond.get_or_insert_with(|| (0..near_sq.len() as u32).filter(is_beyond).collect());
+        beyond.retain(|index| {
+            let i = *index as usize;
+            is_beyond(index) && keeps(*index, id[i], Vec2::new(x[i], y[i]), near_sq[i], owner[i])
+        });
+    }
+
+    /// Lets [`retain_beyond`](Self::retain_beyond) visit all markers again.
+    pub(super) fn seek_again(&mut self) {
+        self.beyond = None;
     }
 
     /// Calls `visit` with the position and squared distance of each marker within the radius that is nearer to the
@@ -453,6 +465,14 @@ impl MarkerField {
             attracting += u32::from(*node != NO_NODE);
         }
         (living, attracting)
+    }
+
+    /// Calls `visit` with the position, squared distance to the nearest crack and impact of each living marker.
+    #[cfg(test)]
+    pub(super) fn each_living(&self, mut visit: impl FnMut(Vec2, f32, u32)) {
+        for i in (0..self.x.len()).filter(|&i| self.near_sq[i] > DEAD) {
+            visit(Vec2::new(self.x[i], self.y[i]), self.near_sq[i], self.owner[i]);
+        }
     }
 
     /// Positions and owners of the unsettled markers.

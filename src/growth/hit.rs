@@ -98,6 +98,7 @@ impl CrackGrowth {
                 self.populate(index, center, self.reach(center, before), reach);
                 if let Some(division) = &mut self.division {
                     division.extend_reach(index, reach);
+                    self.field.seek_again();
                 }
                 self.steps_left = self.params.num_iterations;
             }
@@ -152,6 +153,7 @@ impl CrackGrowth {
         self.populate(index, pos, 0.0, reach);
         if let Some(division) = &mut self.division {
             division.begin(index, self.new_nodes.clone(), self.steps, reach);
+            self.field.seek_again();
         }
         self.steps_left = self.params.num_iterations;
         HitOutcome::Started(index)

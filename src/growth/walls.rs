@@ -34,7 +34,17 @@ pub(super) struct Walls {
     /// Wall and next entry.
     entries: Vec<(u32, u32)>,
     walls: Vec<Wall>,
+    /// Per wall: its ends, and the first cell that it lies in.
+    chords: Vec<Chord>,
     points: Vec<Vec2>,
+}
+
+/// The straight line between the ends of a wall.
+#[derive(Clone, Copy, Debug)]
+struct Chord {
+    from: Vec2,
+    to: Vec2,
+    cell: UVec2,
 }
 
 impl Walls {
@@ -48,6 +58,7 @@ impl Walls {
             head: vec![NONE; cells.x as usize * cells.y as usize],
             entries: Vec::new(),
             walls: Vec::new(),
+            chords: Vec::new(),
             points: Vec::new(),
         }
     }
@@ -66,6 +77,7 @@ impl Walls {
     pub(super) fn reserve(&mut self, lines: usize) {
         self.entries.reserve(2 * lines);
         self.walls.reserve(lines);
+        self.chords.reserve(lines);
         self.points.reserve(3 * lines);
     }
 
@@ -77,8 +89,10 @@ impl Walls {
             self.entries.push((wall, self.head[slot]));
             self.head[slot] = self.entries.len() as u32 - 1;
         }
-        self.walls.push(Wall { ends, first: self.points.len() as u32, len: path.points().len() as u32, low, high });
-        self.points.extend(path.points().iter().map(|point| point.pos));
+        let points = path.points();
+        self.walls.push(Wall { ends, first: self.points.len() as u32, len: points.len() as u32, low, high });
+        self.chords.push(Chord { from: points[0].pos, to: points[points.len() - 1].pos, cell: self.cell_at(low) });
+        self.points.extend(points.iter().map(|point| point.pos));
     }
 
     /// Whether the line `path` between the nodes `ends` would touch another elsewhere than at a shared node, or run along
@@ -135,15 +149,22 @@ impl Walls {
         false
     }
 
-    /// Calls `visit` with the ends of each line that may pass within `distance` of `pos`, at least once.
+    /// Calls `visit` with the ends of each line that may pass within `distance` of `pos`, once.
     pub(super) fn each_near(&self, pos: Vec2, distance: f32, mut visit: impl FnMut(Vec2, Vec2)) {
-        for slot in self.slots(pos - distance, pos + distance) {
-            let mut entry = self.head[slot];
-            while entry != NONE {
-                let (wall, next) = self.entries[entry as usize];
-                let Wall { first, len, .. } = self.walls[wall as usize];
-                visit(self.points[first as usize], self.points[(first + len - 1) as usize]);
-                entry = next;
+        let (low, high) = (self.cell_at(pos - distance), self.cell_at(pos + distance));
+        for y in low.y..=high.y {
+            for x in low.x..=high.x {
+                let cell = UVec2::new(x, y);
+                let mut entry = self.head[y as usize * self.cells.x as usize + x as usize];
+                while entry != NONE {
+                    let (wall, next) = self.entries[entry as usize];
+                    let chord = &self.chords[wall as usize];
+                    // Of all the cells that it lies in, in the first one of these.
+                    if chord.cell.max(low) == cell {
+                        visit(chord.from, chord.to);
+                    }
+                    entry = next;
+                }
             }
         }
     }

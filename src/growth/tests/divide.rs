@@ -398,7 +398,7 @@ fn what_is_known_equals_brute_force() {
                             .map(|node| node.pos.distance_squared(pos))
                             .fold(p.crack_radius * p.crack_radius, f32::min)
                     };
-                    growth.field.each_beyond(-0.5, |_, _, pos, near_sq, impact| {
+                    growth.field.each_living(|pos, near_sq, impact| {
                         let hit = growth.impacts()[impact as usize];
                         let reach = growth.division.as_ref().unwrap().reach_of(impact);
                         let rim = rim_towards(pos - hit.pos, reach, seed ^ u64::from(impact)) - pos.distance(hit.pos);
@@ -410,7 +410,7 @@ fn what_is_known_equals_brute_force() {
                     let node = &nodes[nodes.len() - 1];
                     let (mut own, mut expected) = (Vec::new(), Vec::new());
                     growth.field.each_own(node.pos, |pos, _| own.push(pos.to_array().map(f32::to_bits)));
-                    growth.field.each_beyond(-0.5, |_, _, pos, near_sq, _| {
+                    growth.field.each_living(|pos, near_sq, _| {
                         let distance_sq = node.pos.distance_squared(pos);
                         if distance_sq == near_sq && distance_sq < p.crack_radius * p.crack_radius {
                             expected.push(pos.to_array().map(f32::to_bits));
@@ -419,6 +419,12 @@ fn what_is_known_equals_brute_force() {
                     own.sort_unstable();
                     expected.sort_unstable();
                     assert_eq!(own, expected, "{name} {seed}");
+                    // Where cracks may start: the same as without what the searches before have ruled out.
+                    for is_idle in [false, true] {
+                        let (mut known, mut fresh) = (growth.clone(), growth.clone());
+                        fresh.field.seek_again();
+                        assert_eq!(known.candidates(is_idle), fresh.candidates(is_idle), "{name} {seed}");
+                    }
                     // What a place sees along its axes: every straight line that each axis crosses.
                     let at = Vec2::new(1.2 * rng.unit(), rng.unit());
                     let turn = 3.0 * rng.unit();
