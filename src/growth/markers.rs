@@ -5,6 +5,7 @@ use super::{
     layout::Keeper,
     params::{GrowthParams, MarkerLayout},
     region::{Cells, Region, dart_cells, density_at, grid, spacing, span},
+    starts::room,
 };
 use crate::{
     Grid,
@@ -29,9 +30,11 @@ pub(super) fn lay_out(
 ) -> bool {
     let mut kept = cursor.kept;
     let apart = spacing(params, region.extent);
+    // A hit near the border has little room as it is.
+    let uneven = params.reach_variation * room(region.center, params.reach, region.extent);
     // Decides whether a marker is created at a place, and where it moves.
     let settle = |pos: Vec2, chance: f32, probability: f32| {
-        let share = region.share(pos, params.reach_variation, seed)?;
+        let share = region.share(pos, uneven, seed)?;
         let mut thinned = if params.focus > 0.0 { ops::powf(1.0 - share, params.focus) } else { 1.0 };
         let mut pos = pos;
         if !mask.is_empty() {

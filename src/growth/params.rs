@@ -155,7 +155,8 @@ pub struct GrowthParams {
     /// Radius around a hit of energy 1 that is filled with markers. It is proportional to the root of the energy.
     /// Pattern units, 0.01..=64; default 0.6.
     pub reach: f32,
-    /// How much the reach varies with direction: it is shorter by up to this share of it, for all layouts but rays.
+    /// How much the reach varies with direction: it is shorter by up to this share of it, for all layouts but rays, and
+    /// by less near the border.
     /// With [`Venation::Subdivision`] the reach is uneven even at 0. 0..=0.9; default 0.
     pub reach_variation: f32,
     /// The nodes from which the cracks of a hit start. Default: [`Point`](StartLayout::Point).

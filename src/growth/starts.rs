@@ -61,7 +61,7 @@ pub(super) fn arms(count: u32, (center, energy): (Vec2, f32), reach: f32, extent
         }
         0.0
     };
-    let mut places = (0..count).map(|i| (i as f32 + turn + 0.2 * rng.signed()) / count as f32).collect::<Vec<_>>();
+    let mut places = (0..count).map(|i| (i as f32 + turn + 0.35 * rng.signed()) / count as f32).collect::<Vec<_>>();
     places.iter_mut().map(|place| ops::unit(angle(*place))).collect()
 }
 

@@ -223,7 +223,8 @@ fn cracks_go_on_beyond_older_ones_near_the_hit_only() {
     let params = GrowthParams { wander: 0.0, roughness: 0.0, ..CrackPreset::CONCRETE.growth };
     let (mut through, mut stopped) = (0, 0);
     for seed in 0..40 {
-        for (x, is_near) in [(0.56, true), (0.72, false)] {
+        for (distance, is_near) in [(0.2, true), (0.73, false)] {
+            let x = 0.5 + distance * params.reach;
             let mut older = Network::new(Vec2::ONE, 0.0, 0);
             for k in 0..=60u32 {
                 let (pos, parent) = (Vec2::new(x, k as f32 / 60.0), k.checked_sub(1).unwrap_or(NO_PARENT));
