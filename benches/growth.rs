@@ -1,11 +1,14 @@
 //! Growth to exhaustion, beside the usual way: a k-d tree over the nodes, rebuilt at every step and asked by every marker.
 //!
 //! `cargo bench --no-default-features --bench growth`. The scene: random markers 11.76 px apart on average, reach 30 px,
-//! segments and kill distance 5 px, one start for 1500 markers.
+//! segments and kill distance 5 px, one start for 1500 markers. Then each preset with six hits, alone (`-- presets`).
 
 #![expect(clippy::print_stdout, clippy::expect_used, reason = "a benchmark")]
 
-use bevy_crack::growth::{CrackGrowth, GrowthParams, MarkerLayout, StartLayout};
+use bevy_crack::{
+    CrackPreset,
+    growth::{CrackGrowth, GrowthParams, MarkerLayout, StartLayout},
+};
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use std::{
@@ -34,14 +37,15 @@ fn params(markers: u32) -> GrowthParams {
     }
 }
 
-fn start(markers: u32) -> CrackGrowth {
-    let mut growth = CrackGrowth::new(params(markers), [1.0, 1.0].into(), 1).expect("the scene is valid");
-    growth.hit([0.5, 0.5].into(), 1.0);
-    growth
+const HIT: ([f32; 2], f32) = ([0.5, 0.5], 1.0);
+
+fn surface(markers: u32) -> CrackGrowth {
+    CrackGrowth::new(params(markers), [1.0, 1.0].into(), 1).expect("the scene is valid")
 }
 
 fn ours(markers: u32) -> usize {
-    let mut growth = start(markers);
+    let mut growth = surface(markers);
+    growth.hit(HIT.0.into(), HIT.1);
     while growth.step().grew() {}
     growth.network().nodes().len()
 }
@@ -102,29 +106,75 @@ fn rebuilt(markers: u32) -> usize {
     nodes.len()
 }
 
-fn growth(c: &mut Criterion) {
-    let mut group = c.benchmark_group("growth");
-    for markers in [400u32, 2_500, 10_000, 100_000] {
-        let nodes = ours(markers);
-        // Beside the total: the worst single step, each at its best of ten runs (the machine may pause one, never speed it up).
-        let mut steps = Vec::<Duration>::new();
-        for _ in 0..10 {
-            let mut growth = start(markers);
-            for step in 0.. {
-                let from = Instant::now();
-                let grew = growth.step().grew();
-                let time = from.elapsed();
+/// Steps until nothing grows, and calls `each` with every one.
+fn grow(growth: &mut CrackGrowth, mut each: impl FnMut(Duration)) {
+    loop {
+        let from = Instant::now();
+        let grew = growth.step().grew();
+        each(from.elapsed());
+        if !grew {
+            break;
+        }
+    }
+}
+
+/// The longest of all steps of a surface that gets these hits, in milliseconds; each step at its best of ten runs (the
+/// machine may pause one, never speed it up).
+fn worst_step(start: impl Fn() -> CrackGrowth, hits: &[([f32; 2], f32)]) -> f64 {
+    let mut steps = Vec::<Duration>::new();
+    for _ in 0..10 {
+        let (mut growth, mut step) = (start(), 0);
+        for &(pos, energy) in hits {
+            growth.hit(pos.into(), energy);
+            grow(&mut growth, |time| {
                 match steps.get_mut(step) {
                     Some(least) => *least = time.min(*least),
                     None => steps.push(time),
                 }
-                if !grew {
-                    break;
-                }
-            }
+                step += 1;
+            });
         }
-        let worst = steps.iter().max().map_or(0.0, Duration::as_secs_f64);
-        println!("{markers} markers: {nodes} nodes, worst step {:.3} ms", worst * 1e3);
+    }
+    steps.iter().max().map_or(0.0, Duration::as_secs_f64) * 1e3
+}
+
+/// Where the presets are hit, and how hard.
+const HITS: [([f32; 2], f32); 6] = [
+    ([0.3, 0.4], 1.0),
+    ([0.7, 0.55], 2.0),
+    ([0.45, 0.8], 0.5),
+    ([0.8, 0.2], 3.0),
+    ([0.15, 0.75], 1.0),
+    ([0.5, 0.5], 2.0),
+];
+
+/// Six hits on each preset, one after the other.
+fn presets(c: &mut Criterion) {
+    let mut group = c.benchmark_group("growth of presets");
+    group.sample_size(10);
+    for name in CrackPreset::NAMES {
+        let params = CrackPreset::named(name).expect("it is a preset").growth;
+        let start = || CrackGrowth::new(params.clone(), [1.0, 1.0].into(), 1).expect("presets are valid");
+        println!("{name}: worst step {:.3} ms", worst_step(start, &HITS));
+        group.bench_function(*name, |b| {
+            b.iter(|| {
+                let mut growth = start();
+                for (pos, energy) in HITS {
+                    growth.hit(pos.into(), energy);
+                    grow(&mut growth, |_| {});
+                }
+                growth.network().nodes().len()
+            });
+        });
+    }
+    group.finish();
+}
+
+fn growth(c: &mut Criterion) {
+    let mut group = c.benchmark_group("growth");
+    for markers in [400u32, 2_500, 10_000, 100_000] {
+        let nodes = ours(markers);
+        println!("{markers} markers: {nodes} nodes, worst step {:.3} ms", worst_step(|| surface(markers), &[HIT]));
         group.throughput(Throughput::Elements(nodes as u64));
         group.sample_size(10);
         group.bench_with_input(BenchmarkId::new("ours", markers), &markers, |b, &m| b.iter(|| ours(m)));
@@ -133,5 +183,5 @@ fn growth(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, growth);
+criterion_group!(benches, growth, presets);
 criterion_main!(benches);
