@@ -156,7 +156,7 @@ fn presets(c: &mut Criterion) {
         let params = CrackPreset::named(name).expect("it is a preset").growth;
         let start = || CrackGrowth::new(params.clone(), [1.0, 1.0].into(), 1).expect("presets are valid");
         println!("{name}: worst step {:.3} ms", worst_step(start, &HITS));
-        group.bench_function(*name, |b| {
+        group.bench_function(name, |b| {
             b.iter(|| {
                 let mut growth = start();
                 for (pos, energy) in HITS {
