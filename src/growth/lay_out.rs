@@ -38,11 +38,12 @@ impl CrackGrowth {
     }
 
     /// Continues to lay out the markers of a hit that was [begun](Self::begin_hit), at up to about `places` places.
-    /// Returns whether some are left. [Strands](super::MarkerLayout::Strands) are laid out one try at a time. 0 counts as 1.
+    /// Returns whether some are left. For [strands](super::MarkerLayout::Strands) about a quarter as many points are laid out. 0 counts
+    /// as 1.
     ///
     /// The positions of markers do not depend on the slices. All other methods complete the layout first.
     pub fn continue_hit(&mut self, places: u32) -> bool {
-        if self.try_strands() {
+        if self.try_strands(places) {
             return true;
         }
         let Some(mut layout) = self.layout.take() else { return false };

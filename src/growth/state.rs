@@ -66,7 +66,7 @@ pub struct MarkerCounts {
 ///
 /// // Each step adds nodes, and their segments are to be drawn.
 /// assert!(growth.is_growing() && !growth.is_laying_out());
-/// let StepReport { born } = growth.step();
+/// let StepReport { born, .. } = growth.step();
 /// assert_eq!(growth.new_nodes(), 1..1 + born);
 /// let mut changed = Vec::new();
 /// growth.take_changed(&mut changed);

@@ -16,13 +16,15 @@ use glam::Vec2;
 pub struct StepReport {
     /// Number of nodes that were added.
     pub born: u32,
+    /// Whether more strands are to be laid out, because all of a hit have been blocked.
+    lays_out_more: bool,
 }
 
 impl StepReport {
-    /// Whether anything grew; if not, the growth has ended until the next hit.
+    /// Whether anything grew, or may grow in the next step; if not, the growth has ended until the next hit.
     #[must_use]
     pub const fn grew(&self) -> bool {
-        self.born > 0
+        self.born > 0 || self.lays_out_more
     }
 }
 
@@ -43,13 +45,13 @@ impl CrackGrowth {
         }
         // A tip that has just turned to meet a crack may be all that moves, and it has no new node yet.
         let mut found = Vec::new();
-        while self.steps_left > 0 && self.new_nodes.is_empty() {
+        while self.steps_left > 0 && self.new_nodes.is_empty() && self.orders.is_empty() {
             self.make_step(&mut found);
         }
         if self.steps_left == 0 && self.arrest.is_some() {
             self.show_hits();
         }
-        StepReport { born: self.new_nodes.len() as u32 }
+        StepReport { born: self.new_nodes.len() as u32, lays_out_more: !self.orders.is_empty() }
     }
 
     fn make_step(&mut self, found: &mut Vec<Candidate>) {

@@ -3,7 +3,7 @@
 use crate::{
     math::mix,
     pattern::{NO_PARENT, Network},
-    strands::{Directions, Material, Primitive, StrandParams, StrandStart, Strands},
+    strands::{Directions, GrowingStrands, Material, Primitive, StrandParams, StrandStart},
 };
 use glam::Vec2;
 use std::sync::LazyLock;
@@ -30,6 +30,8 @@ pub(super) struct Order {
     pub(super) tries: u32,
     pub(super) points: usize,
     pub(super) best: Option<(f32, Network)>,
+    /// The strands of the try that is being made.
+    pub(super) growing: Option<GrowingStrands>,
 }
 
 /// Most tries to find strands that have room.
@@ -65,24 +67,23 @@ impl Order {
             tries: 0,
             points: 0,
             best: None,
+            growing: None,
         }
     }
 
-    /// Makes one try. Returns whether it was the last.
+    /// Goes on with a try, by up to about so many points. Returns whether the last try is done.
     ///
     /// Near the border strands may run off the surface at once. Then others are tried that noise turns less and that are longer,
     /// until they are as long as they should be.
-    pub(super) fn make_try(&mut self, extent: Vec2) -> bool {
-        let less = self.tries as f32 / TRIES as f32;
-        let length = (self.params.length * (1.0 + 1.5 * less)).min(64.0);
-        let params = StrandParams { rotation: self.params.rotation * (1.0 - less), length, ..self.params };
-        let most = MOST_POINTS.min(MOST_PRIMITIVES * params.tile_steps() as usize);
-        let library = &LIBRARIES[params.material as usize][usize::from(params.lanes > 1)];
-        let field = Directions::Radial { center: self.center };
-        let seed = mix(self.seed ^ u64::from(self.tries) << 32);
-        let strands = Strands::within(&params, field, &self.starts, extent, seed, most);
+    pub(super) fn go_on(&mut self, extent: Vec2, points: u32) -> bool {
+        let library = &LIBRARIES[self.params.material as usize][usize::from(self.params.lanes > 1)];
         // There is no error: the parameters have been checked, and the starts are on the surface.
-        let Ok(network) = strands.and_then(|strands| strands.network(library)) else { return true };
+        let Some(mut growing) = self.growing.take().or_else(|| self.begin_try(extent)) else { return true };
+        if !growing.grow(points) {
+            self.growing = Some(growing);
+            return false;
+        }
+        let Ok(network) = growing.finish().network(library) else { return true };
         let room = length_inside(&network);
         self.tries += 1;
         self.points += network.nodes.len();
@@ -90,6 +91,16 @@ impl Order {
             self.best = Some((room, network));
         }
         room >= self.least || self.tries >= TRIES || self.points >= MOST_POINTS
+    }
+
+    fn begin_try(&self, extent: Vec2) -> Option<GrowingStrands> {
+        let less = self.tries as f32 / TRIES as f32;
+        let length = (self.params.length * (1.0 + 1.5 * less)).min(64.0);
+        let params = StrandParams { rotation: self.params.rotation * (1.0 - less), length, ..self.params };
+        let most = MOST_POINTS.min(MOST_PRIMITIVES * params.tile_steps() as usize);
+        let field = Directions::Radial { center: self.center };
+        let seed = mix(self.seed ^ u64::from(self.tries) << 32);
+        GrowingStrands::new(&params, field, &self.starts, extent, seed, most).ok()
     }
 
     /// The best of its tries.

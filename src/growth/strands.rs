@@ -15,6 +15,9 @@ use crate::{
 };
 use glam::Vec2;
 
+/// A point of a strand that is laid out costs as much as this many places for markers.
+const POINT: u32 = 4;
+
 /// Points of a path closer than this to the last node are left out, segment lengths.
 const CLOSE: f32 = 0.4;
 
@@ -101,10 +104,10 @@ impl CrackGrowth {
         }
     }
 
-    /// Makes one try of the first strands that are to be laid out. Returns whether there are any left.
-    pub(super) fn try_strands(&mut self) -> bool {
+    /// Goes on to lay out strands; a point of a strand costs as much as some places for markers. Returns whether any are left.
+    pub(super) fn try_strands(&mut self, places: u32) -> bool {
         if let Some(order) = self.orders.front_mut()
-            && order.make_try(self.network.extent())
+            && order.go_on(self.network.extent(), (places / POINT).max(1))
         {
             self.strands.extend(self.orders.pop_front().and_then(Order::finish));
         }
@@ -198,7 +201,6 @@ impl CrackGrowth {
 
     /// One step of a growth whose hits lay out strands.
     pub(super) fn advance_strands(&mut self) {
-        while self.try_strands() {}
         let (first, links) = (self.network.nodes.len() as u32, self.network.links.len());
         self.timeline.begin(self.steps.saturating_add(1));
         self.steps = self.steps.saturating_add(1);

@@ -91,6 +91,7 @@ pub struct Strand {
 }
 
 /// A strand that still grows.
+#[derive(Clone, Debug)]
 struct Tip {
     strand: u32,
     walk: Walk,
@@ -111,10 +112,11 @@ enum Contact {
 }
 
 /// The paths of all strands.
+#[derive(Clone, Debug)]
 pub(super) struct Paths {
-    params: StrandParams,
-    extent: Vec2,
-    seed: u64,
+    pub(super) params: StrandParams,
+    pub(super) extent: Vec2,
+    pub(super) seed: u64,
     /// The field of each depth.
     fields: Vec<GuidanceField>,
     branching: Turbulence,
@@ -174,15 +176,20 @@ impl Paths {
         Ok(paths)
     }
 
-    /// Grows all strands to their ends.
-    pub(super) fn finish(&mut self) {
+    /// Grows all strands by up to about so many steps of their tips. Returns whether all have ended.
+    pub(super) fn grow(&mut self, mut steps: u32) -> bool {
         while !self.tips.is_empty() {
+            if steps == 0 {
+                return false;
+            }
+            steps = steps.saturating_sub(self.tips.len() as u32);
             let mut tips = std::mem::take(&mut self.tips);
             // Children that start in this round grow from the next one on.
             tips.retain_mut(|tip| self.advance(tip));
             tips.append(&mut self.tips);
             self.tips = tips;
         }
+        true
     }
 
     /// Starts a strand unless another one is too close.
@@ -314,18 +321,22 @@ impl Paths {
         let own = (4.0 * repulsion / step) as u32 + 8;
         let mut best: Option<(f32, Mark)> = None;
         near.within(pos, 2.0 * repulsion, |mark, distance_sq| {
-            // A strand that was taken back has left its marks.
-            let is_there = (mark.number as usize) < self.strands[mark.strand as usize].points.len();
+            let is_own = mark.strand == strand;
+            if is_own && number.abs_diff(mark.number) <= own {
+                return;
+            }
             let is_nearer =
                 best.is_none_or(|(least, at)| (distance_sq, mark.strand, mark.number) < (least, at.strand, at.number));
+            if !is_nearer {
+                return;
+            }
+            // A strand that was taken back has left its marks.
+            let is_there = (mark.number as usize) < self.strands[mark.strand as usize].points.len();
             let is_free = is_there
-                && is_nearer
-                && match mark.strand == strand {
-                    true => number.abs_diff(mark.number) > own,
-                    false => !self.joints[strand as usize].iter().any(|(other, at)| {
+                && (is_own
+                    || !self.joints[strand as usize].iter().any(|(other, at)| {
                         *other == mark.strand && at.distance(pos) <= joint && at.distance(mark.pos) <= joint
-                    }),
-                };
+                    }));
             if is_free {
                 best = Some((distance_sq, mark));
             }

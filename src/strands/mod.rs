@@ -48,4 +48,5 @@ pub use line::{PrimitiveLine, PrimitivePoint};
 pub use material::Material;
 pub use params::{Propagation, StrandParams};
 pub use primitive::{PRIMITIVE_SIDES, Primitive};
+pub(crate) use set::GrowingStrands;
 pub use set::Strands;

@@ -39,6 +39,40 @@ pub struct Strands {
     pub(super) courses: Vec<Course>,
 }
 
+/// Strands that grow in slices.
+#[derive(Clone, Debug)]
+pub(crate) struct GrowingStrands(Paths);
+
+impl GrowingStrands {
+    /// As [`Strands::new`], with at most about so many points: strands that would need more end there.
+    pub(crate) fn new(
+        params: &StrandParams,
+        directions: Directions,
+        starts: &[StrandStart],
+        extent: Vec2,
+        seed: u64,
+        most: usize,
+    ) -> Result<Self, StrandError> {
+        Paths::new(params, directions, starts, extent, seed, most).map(Self)
+    }
+
+    /// Grows them by up to about so many points. Returns whether all have ended.
+    pub(crate) fn grow(&mut self, points: u32) -> bool {
+        self.0.grow(points)
+    }
+
+    /// What has grown.
+    pub(crate) fn finish(self) -> Strands {
+        let Paths { params, extent, seed, strands, .. } = self.0;
+        let mut courses: Vec<Course> = Vec::with_capacity(strands.len());
+        for strand in &strands {
+            let start = strand.parent.map(|(parent, point)| courses[parent as usize].at(point as f32).0);
+            courses.push(Course::new(&params, &strand.points, start));
+        }
+        Strands { params, extent, seed, strands, courses }
+    }
+}
+
 impl Strands {
     /// Grows all strands over a surface of `extent` pattern units.
     ///
@@ -54,27 +88,9 @@ impl Strands {
         extent: Vec2,
         seed: u64,
     ) -> Result<Self, StrandError> {
-        Self::within(params, directions, starts, extent, seed, MAX_STRAND_POINTS)
-    }
-
-    /// The same with at most about so many points: strands that would need more end there.
-    pub(crate) fn within(
-        params: &StrandParams,
-        directions: Directions,
-        starts: &[StrandStart],
-        extent: Vec2,
-        seed: u64,
-        most: usize,
-    ) -> Result<Self, StrandError> {
-        let mut paths = Paths::new(params, directions, starts, extent, seed, most)?;
-        paths.finish();
-        let strands = paths.strands;
-        let mut courses: Vec<Course> = Vec::with_capacity(strands.len());
-        for strand in &strands {
-            let start = strand.parent.map(|(parent, point)| courses[parent as usize].at(point as f32).0);
-            courses.push(Course::new(params, &strand.points, start));
-        }
-        Ok(Self { params: *params, extent, seed, strands, courses })
+        let mut growing = GrowingStrands::new(params, directions, starts, extent, seed, MAX_STRAND_POINTS)?;
+        while !growing.grow(u32::MAX) {}
+        Ok(growing.finish())
     }
 
     /// The paths, parents before their children.

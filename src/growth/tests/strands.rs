@@ -163,11 +163,12 @@ fn wild_settings_of_strands_are_bounded() {
         let mut growth = CrackGrowth::new(params, Vec2::new(1.0, 1.0 + rng.unit()), case).unwrap();
         for _ in 0..2 {
             growth.begin_hit(Vec2::new(rng.unit(), rng.unit()), 16.0 * rng.unit());
-            let mut slices = 0;
-            while growth.continue_hit(1) {
-                slices += 1;
+            // Each has room for a whole try.
+            let mut tries = 0;
+            while growth.continue_hit(u32::MAX) {
+                tries += 1;
             }
-            assert!(slices < 40, "case {case}: {slices} slices");
+            assert!(tries < 40, "case {case}: {tries} tries");
             assert!(
                 growth.strands.iter().map(|paths| paths.network.nodes.len()).sum::<usize>() < 1 << 20,
                 "case {case}"
@@ -203,6 +204,34 @@ fn slices_do_not_change_the_strands() {
         };
         let ((sliced, slices), (at_once, _)) = (grow(true), grow(false));
         assert_eq!(sliced, at_once, "seed {seed}");
-        assert!(slices > 4, "{slices} slices");
+        assert!(slices > 100, "{slices} slices");
     }
+}
+
+/// Strands are laid out before a step, in slices, and never in it: a step after which more are to be laid out adds no node and says
+/// that growth goes on.
+#[test]
+fn steps_do_not_lay_out_strands() {
+    let mut without_nodes = 0;
+    for (preset, seed) in PRESETS.iter().flat_map(|preset| (0..3).map(move |seed| (preset, seed))) {
+        let mut rng = Rng::new(seed).stream("steps");
+        let mut growth = CrackGrowth::new(preset.growth.clone(), Vec2::ONE, seed).unwrap();
+        for _ in 0..8 {
+            growth.begin_hit(Vec2::new(rng.unit(), rng.unit()), rng.range(0.5, 3.0));
+            loop {
+                while !growth.prepare_step(256) {}
+                assert!(!growth.is_laying_out());
+                let report = growth.step();
+                if !report.grew() {
+                    break;
+                }
+                if report.born == 0 {
+                    assert!(growth.is_growing() && growth.is_laying_out(), "seed {seed}");
+                    without_nodes += 1;
+                }
+            }
+            assert!(!growth.is_growing() && !growth.is_laying_out(), "seed {seed}");
+        }
+    }
+    assert!(without_nodes > 0);
 }
