@@ -2,6 +2,8 @@
 
 use glam::{IVec2, UVec2, Vec2};
 
+const NONE: u32 = u32::MAX;
+
 /// Most cells along a side.
 const MOST_CELLS: f32 = 512.0;
 
@@ -18,39 +20,42 @@ pub(super) struct Mark {
 #[derive(Clone, Debug)]
 pub(super) struct Near {
     cell: f32,
-    count: UVec2,
-    cells: Vec<Vec<Mark>>,
+    cells: UVec2,
+    heads: Vec<u32>,
+    marks: Vec<(Mark, u32)>,
 }
 
 impl Near {
     /// An empty index for queries of up to `reach` over `extent`.
     pub(super) fn new(extent: Vec2, reach: f32) -> Self {
-        // Small cells, so that few points outside the circle are looked at.
-        let cell = (0.5 * reach).max(extent.max_element() / MOST_CELLS);
-        let count = (extent / cell).floor().as_uvec2() + 1;
-        Self { cell, count, cells: vec![Vec::new(); (count.x * count.y) as usize] }
+        let cell = reach.max(extent.max_element() / MOST_CELLS);
+        let cells = (extent / cell).floor().as_uvec2() + 1;
+        Self { cell, cells, heads: vec![NONE; (cells.x * cells.y) as usize], marks: Vec::new() }
     }
 
-    fn cell_of(&self, pos: Vec2) -> UVec2 {
-        (pos / self.cell).floor().as_ivec2().clamp(IVec2::ZERO, self.count.as_ivec2() - 1).as_uvec2()
+    fn cell_of(&self, pos: Vec2) -> IVec2 {
+        (pos / self.cell).floor().as_ivec2().clamp(IVec2::ZERO, self.cells.as_ivec2() - 1)
     }
 
     pub(super) fn add(&mut self, mark: Mark) {
-        let cell = self.cell_of(mark.pos);
-        self.cells[(cell.y * self.count.x + cell.x) as usize].push(mark);
+        let cell = self.cell_of(mark.pos).as_uvec2();
+        let head = &mut self.heads[(cell.y * self.cells.x + cell.x) as usize];
+        self.marks.push((mark, *head));
+        *head = self.marks.len() as u32 - 1;
     }
 
     /// Calls `visit` with all points within `reach` of `pos` and their squared distances, and with no others.
     pub(super) fn within(&self, pos: Vec2, reach: f32, mut visit: impl FnMut(Mark, f32)) {
         let (low, high) = (self.cell_of(pos - reach), self.cell_of(pos + reach));
         for y in low.y..=high.y {
-            let row = (y * self.count.x) as usize;
-            for marks in &self.cells[row + low.x as usize..=row + high.x as usize] {
-                for mark in marks {
+            for x in low.x..=high.x {
+                let mut next = self.heads[(y as u32 * self.cells.x + x as u32) as usize];
+                while let Some((mark, after)) = self.marks.get(next as usize) {
                     let distance_sq = mark.pos.distance_squared(pos);
                     if distance_sq <= reach * reach {
                         visit(*mark, distance_sq);
                     }
+                    next = *after;
                 }
             }
         }
