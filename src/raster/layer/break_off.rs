@@ -371,7 +371,7 @@ impl Shape<'_> {
         let most = |soft: f32| 0.6 * soft + 2.1 * self.jag;
         let mut shadow = sink(self.crumbled(near.within_at_most(off + TO_LIGHT * length, most(soft)), dark), soft);
         // The wall on the far side faces the light.
-        let lit = sink(self.crumbled(near.within_at_most(off - TO_LIGHT * facing, most(HARD)), lit), HARD);
+        let mut lit = sink(self.crumbled(near.within_at_most(off - TO_LIGHT * facing, most(HARD)), lit), HARD);
         let (mut sunk, mut bright) = (0.0, 0.0f32);
         let one = 1.0 / broken.steps.len().max(1) as f32;
         for step in &broken.steps {
@@ -430,10 +430,16 @@ impl Shape<'_> {
             let tone = if is_stone { 0.45 * stone.draw * (5.0 * stone.gap).min(1.0) } else { 0.10 * stone.draw };
             tone + 0.1 * plate + 0.16 * noise(seed ^ draws::GRAIN_TONE, 0.9 * at.x, 0.9 * at.y)
         };
+        let mut tone = tone;
+        if let Some([level, darker]) = near.masonry(off) {
+            down *= level;
+            tone -= darker * wall;
+            lit *= 0.5 + 0.8 * found.small[k];
+        }
         place.height = -self.depth * down + bumps;
         // The wall has the colour of the material that came off, not of what lay under it.
         place.pale = pale * inside * if crumbles { 0.15 + 0.85 * wall } else { 1.0 };
-        let (mut light, mut lit) = (speckle * tone, lit);
+        let mut light = speckle * tone;
         if has_ledges {
             light -= (1.0 + light) * self.darkness(off, sunk, hollow, wall);
             lit = ledge_light(lit, bright, found.patches[k]);

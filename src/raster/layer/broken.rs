@@ -3,7 +3,7 @@
 use super::{
     crushed::CrushedZone,
     draws,
-    noise::draw,
+    noise::{draw, noise},
     outline::{FAR_OUT, Outline, WIDEST},
 };
 use crate::{
@@ -29,26 +29,44 @@ pub(super) struct Chip {
     pub(super) ink: f32,
 }
 
-/// A part of a brick's face.
+/// A part of a brick's face that has come off, with some of the mortar beside it.
 #[derive(Debug)]
 pub(super) struct Face {
     outline: Outline,
     /// Opposite corners of the brick.
     min: Vec2,
     max: Vec2,
+    /// How far the mortar has come off beside the sides at `min` and at `max`, texels.
+    mortar: [Vec2; 2],
+    /// Size of the notches in that mortar, texels.
+    notch: f32,
+    seed: u32,
+    /// How deep its floor is in the middle, as a share of the depth, and how much deeper per texel.
+    level: f32,
+    lean: Vec2,
 }
 
 /// Sizes of the parts that come off the bricks around a hit, in radii.
 const FACES: [f32; 4] = [1.9, 1.1, 0.75, 0.45];
+
+/// Least and largest depth of the floor where a face has come off, as a share of the depth, and how much deeper it is
+/// at the side towards the hit.
+const LEVELS: [f32; 2] = [0.4, 0.8];
+const LEAN: f32 = 0.35;
+
+/// The same for the mortar, and how much darker it is between bricks.
+const MORTAR: f32 = 0.95;
+const IN_JOINT: f32 = 1.1;
 
 /// Radius within which a hit breaks out the mortar too, in radii.
 const CORE: f32 = 0.85;
 
 impl Face {
     /// Those of the bricks around a hit, each larger than the next.
-    fn all(bricks: &Bricks, crushed: &CrushedZone, radius: f32, seed: u32) -> Vec<Self> {
+    fn all(bricks: &Bricks, crushed: &CrushedZone, (unit, radius): (f32, f32), seed: u32) -> Vec<Self> {
         let bricks: Vec<[Vec2; 2]> = bricks.iter().copied().filter(|[min, max]| min != max).collect();
         let first = (draw(seed, -3, 1) * bricks.len() as f32) as usize;
+        let (joint, jag) = (joint_between(&bricks).min(0.5 * radius), crushed.jag * unit);
         let face = |k: usize| {
             let [min, max] = bricks[(first + k) % bricks.len()];
             let seed = mix_in(seed, 0x400 + k as u32);
@@ -56,15 +74,49 @@ impl Face {
             let size = (FACES[k] * radius * (0.85 + 0.3 * draw(seed, -3, 2))).min(0.75 * most);
             let near = Vec2::ZERO.clamp(min, max);
             let centre = near + (0.5 * (min + max) - near).clamp_length_max(0.3 * size);
-            Self { outline: Outline::new(centre, size, 6, 2, 0.8 * crushed.ragged, seed), min, max }
+            let pick = |what: i32| draw(seed, -3, what);
+            // Beside most sides nearly all of the mortar comes off, beside some none.
+            let gone = |what: i32| jag + joint * if pick(what) < 0.85 { 0.8 + 0.6 * pick(what + 1) } else { 0.2 };
+            let mortar = [Vec2::new(gone(3), gone(5)), Vec2::new(gone(7), gone(9))];
+            // Deeper towards the hit, and a little to one side.
+            let lean = (-centre.normalize_or_zero() + 0.9 * (Vec2::new(pick(11), pick(12)) - 0.5)) * (LEAN / size);
+            Self {
+                outline: Outline::new(centre, size, 6, 2, 0.8 * crushed.ragged, seed),
+                min,
+                max,
+                mortar,
+                notch: joint.max(2.0),
+                seed,
+                level: LEVELS[0] + (LEVELS[1] - LEVELS[0]) * pick(13),
+                lean,
+            }
         };
         (0..bricks.len()).map(face).collect()
     }
 
+    /// Distance of a place from the edge of what has come off, and from that of its brick; positive inside.
     fn within_at_most(&self, at: Vec2, most: f32) -> f32 {
-        let beside = (at - self.min).min(self.max - at);
-        self.outline.within_at_most(at, most).min(beside.min_element())
+        let within = self.outline.within_at_most(at, most);
+        let beside = self.beside(at);
+        if within <= beside.min_element() || within < 0.0 {
+            return within.min(beside.min_element());
+        }
+        let bump = noise(self.seed, at.x / self.notch, at.y / self.notch);
+        let notched = 0.85 + 0.3 * bump;
+        let beyond = (at - self.min + notched * self.mortar[0]).min(self.max - at + notched * self.mortar[1]);
+        within.min(beyond.min_element())
     }
+
+    /// Distances from the sides of its brick; positive inside.
+    fn beside(&self, at: Vec2) -> Vec2 {
+        (at - self.min).min(self.max - at)
+    }
+}
+
+/// Width of the joints between bricks, texels.
+fn joint_between(bricks: &[[Vec2; 2]]) -> f32 {
+    let gaps = bricks.iter().flat_map(|[_, max]| bricks.iter().map(move |[min, _]| *min - *max));
+    gaps.flat_map(|gap| [gap.x, gap.y]).filter(|gap| *gap > 0.0).fold(f32::MAX, f32::min)
 }
 
 /// Broken-off pieces and where they lie; positions relative to the hit, texels.
@@ -99,7 +151,7 @@ impl Broken {
         let levels = if crumbles && ragged < 0.65 { 1 } else { 2 };
         let shape = |outline: Outline, k: u32| if crumbles { outline.stretched(mix_in(seed, k)) } else { outline };
         let count = 6 + (3.0 * pick(0, 0)) as u32;
-        let (edge, steps) = terraces(crushed, unit, radius, seed).unwrap_or_else(|| {
+        let (edge, mut steps) = terraces(crushed, unit, radius, seed).unwrap_or_else(|| {
             let edge = shape(Outline::new(Vec2::ZERO, radius, count, levels, ragged, seed ^ draws::CRATER), 0x300);
             let basin = (crushed.basin > 0.0).then(|| {
                 let centre = Vec2::new(pick(0, 4) - 0.5, pick(0, 5) - 0.3) * (0.3 * radius);
@@ -125,11 +177,12 @@ impl Broken {
             let (count, levels, ragged) = if crumbles { (7, 2, 0.8) } else { (5, levels, 0.6) };
             off.push(shape(Outline::new(centre, size, count, levels, ragged, seed), 0x340 + k));
         }
-        let faces = Face::all(bricks, crushed, radius, seed ^ draws::FACES);
+        let faces = Face::all(bricks, crushed, (unit, radius), seed ^ draws::FACES);
         if !faces.is_empty() {
             // In place of crater and flakes. Mortar breaks out only where the hit is.
             let core = Outline::new(Vec2::ZERO, radius * CORE, 8, 2, 0.8 * ragged, mix_in(seed, 0x500));
             off = vec![shape(core, 0x501)];
+            steps.clear();
         }
         // Craters from contours have more chips around them, and slightly larger ones.
         let (many, large) = if crushed.terraces > 0 { (58.0, 1.05) } else { (24.0, 1.0) };
@@ -205,6 +258,18 @@ impl NearBroken<'_> {
     pub(super) fn within_at_most(&self, at: Vec2, most: f32) -> f32 {
         let off = self.off.iter().map(|outline| outline.within_at_most(at, most));
         off.chain(self.faces.iter().map(|face| face.within_at_most(at, most))).fold(-FAR_OUT, f32::max)
+    }
+
+    /// The floor where bricks are: its depth as a share of the depth, and how much darker it is. `None` if there are no bricks.
+    pub(super) fn masonry(&self, at: Vec2) -> Option<[f32; 2]> {
+        if self.whole.faces.is_empty() {
+            return None;
+        }
+        let inside = |face: &&&Face| face.beside(at).min_element() > 0.0;
+        Some(match self.faces.iter().find(inside) {
+            Some(face) => [(face.level + face.lean.dot(at - face.outline.centre)).clamp(0.25, 1.0), 0.0],
+            None => [MORTAR, IN_JOINT],
+        })
     }
 }
 
