@@ -36,7 +36,7 @@ const DEEP_SHADE: f32 = 0.72;
 const LIT: f32 = 0.45;
 
 /// Strength of the shadow of the step down to the basin, as a share of that of the edge.
-const STEP_SHADE: f32 = 0.6;
+const STEP_SHADE: f32 = 0.3;
 
 /// Strength of the shadow at this distance from the edge that casts it.
 fn sink(within: f32, soft: f32) -> f32 {
@@ -372,10 +372,14 @@ impl Shape<'_> {
         let mut shadow = sink(self.crumbled(near.within_at_most(off + TO_LIGHT * length, most(soft)), dark), soft);
         // The wall on the far side faces the light.
         let mut lit = sink(self.crumbled(near.within_at_most(off - TO_LIGHT * facing, most(HARD)), lit), HARD);
+        if crumbles {
+            // Its faces are turned this way and that.
+            lit *= (0.6 + 0.7 * found.small[k]).max(0.0);
+        }
         let (mut sunk, mut bright) = (0.0, 0.0f32);
         let one = 1.0 / broken.steps.len().max(1) as f32;
         for step in &broken.steps {
-            let long_fall = (2.5 * WALL * one * self.depth).max(2.0);
+            let long_fall = (if has_ledges { 7.0 } else { 4.0 } * WALL * one * self.depth).max(2.0);
             let within = step.within_at_most(off, 1.1 * long_fall + 2.1 * self.jag)
                 - 2.0 * self.jag * (0.5 + 0.5 * found.basin[k]);
             let fall = (within / long_fall).clamp(0.0, 1.0);
@@ -434,7 +438,6 @@ impl Shape<'_> {
         if let Some([level, darker]) = near.masonry(off) {
             down *= level;
             tone -= darker * wall;
-            lit *= 0.5 + 0.8 * found.small[k];
         }
         place.height = -self.depth * down + bumps;
         // The wall has the colour of the material that came off, not of what lay under it.

@@ -55,8 +55,8 @@ const LEVELS: [f32; 2] = [0.4, 0.8];
 const LEAN: f32 = 0.35;
 
 /// The same for the mortar, and how much darker it is between bricks.
-const MORTAR: f32 = 0.95;
-const IN_JOINT: f32 = 1.1;
+const MORTAR: f32 = 0.8;
+const IN_JOINT: f32 = 0.7;
 
 /// Radius within which a hit breaks out the mortar too, in radii.
 const CORE: f32 = 0.85;
@@ -265,7 +265,11 @@ impl NearBroken<'_> {
         if self.whole.faces.is_empty() {
             return None;
         }
-        let inside = |face: &&&Face| face.beside(at).min_element() > 0.0;
+        // Corners and edges of the bricks are chipped.
+        let inside = |face: &&&Face| {
+            let bump = noise(face.seed ^ draws::CHIPPED, 1.4 * at.x / face.notch, 1.4 * at.y / face.notch);
+            face.beside(at).min_element() > 0.45 * face.notch * bump
+        };
         Some(match self.faces.iter().find(inside) {
             Some(face) => [(face.level + face.lean.dot(at - face.outline.centre)).clamp(0.25, 1.0), 0.0],
             None => [MORTAR, IN_JOINT],

@@ -52,6 +52,9 @@ pub(super) const PIECES: u32 = 0x0B0E;
 /// Which bricks break off.
 pub(super) const FACES: u32 = 0x63;
 
+/// Chipped edges of bricks below the faces that have come off.
+pub(super) const CHIPPED: u32 = 0x64;
+
 /// Outlines: of the crater, its basin, a drawn pit, and a hole with its broken edge.
 pub(super) const CRATER: u32 = 0x60;
 pub(super) const BASIN: u32 = 0x61;

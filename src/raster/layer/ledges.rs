@@ -13,24 +13,24 @@ use glam::Vec2;
 pub(super) const SAG: f32 = 0.4;
 
 /// Strength of the shadows of ledges, as a share of that of the edge.
-pub(super) const LEDGE_SHADE: f32 = 0.95;
+pub(super) const LEDGE_SHADE: f32 = 0.35;
 
 /// How much brighter the wall of a ledge is that faces the light, as a share of that of the edge.
-pub(super) const LEDGE_LIT: f32 = 0.5;
+pub(super) const LEDGE_LIT: f32 = 0.25;
 
 /// How much of the light on the edge is in patches, and its strength.
-const PATCHES: f32 = 0.9;
-const EDGE_LIT: f32 = 0.7;
+const PATCHES: f32 = 0.75;
+const EDGE_LIT: f32 = 1.4;
 
 /// How much darker it is at the bottom: for the ledges above a place, and for its distance from the edge.
-const BELOW_LEDGES: f32 = 0.27;
+const BELOW_LEDGES: f32 = 0.36;
 const IN_HOLLOW: f32 = 0.28;
 
 /// How much darker the side of the hollow is that is turned away from the light.
-const AWAY: f32 = 0.3;
+const AWAY: f32 = 0.45;
 
 /// Limits of what these darken, as a share of the brightness.
-const DARKENS: [f32; 2] = [-0.15, 0.7];
+const DARKENS: [f32; 2] = [-0.25, 0.7];
 
 /// How much brighter than the surface a place is at most.
 pub(super) const BRIGHTEST: f32 = 0.4;
