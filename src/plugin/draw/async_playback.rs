@@ -417,7 +417,7 @@ mod tests {
             surface::cracked::active,
         },
     };
-    use bevy::platform::time::Instant;
+    use bevy::{platform::time::Instant, time::TimeUpdateStrategy};
     use std::{sync::Mutex, thread, time::Duration};
 
     /// Where tasks run in place, moments are made in slices of frames, one a frame if there is no time, and the end is the same.
@@ -425,6 +425,8 @@ mod tests {
     fn slices_make_what_tasks_make() {
         let end = |no_threads: bool| {
             let mut app = app(CrackBudget { milliseconds: 0.0, ..default() });
+            // However long a frame takes.
+            app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(2)));
             app.world_mut().resource_mut::<Threads>().are_missing = no_threads;
             let image = app.world_mut().resource_mut::<Assets<Image>>().add(blank(UVec2::new(300, 200)));
             let guided = GuidedCracks::new(CrackGuide::new(Grid::new(UVec2::new(3, 1), 0.5)))

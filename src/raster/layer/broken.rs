@@ -301,7 +301,8 @@ mod tests {
     use super::*;
     use crate::CrackPreset;
 
-    /// Bricks lose their faces up to the joints, and the mortar breaks out where the hit is, but not further out.
+    /// Bricks lose their faces, and the mortar breaks out where the hit is, and beside faces that are lost, but not further
+    /// out.
     #[test]
     fn mortar_breaks_out_at_the_hit() {
         let crushed = CrackPreset::BRICK.look.crushed.unwrap();
@@ -315,7 +316,7 @@ mod tests {
             brick([-45.0, joint], [45.0, 32.0]),
             [Vec2::ZERO; 2],
         ];
-        let mut faces = 0;
+        let (mut faces, mut mortar) = (0, 0);
         for seed in 0..200 {
             let broken = Broken::new(&crushed, unit, radius, 2.0, seed, &bricks);
             let all = broken.near(Vec2::splat(-200.0), Vec2::splat(200.0), 10.0);
@@ -326,7 +327,13 @@ mod tests {
             }
             let beside = 1.2 * radius;
             faces += [[-beside, -10.0], [beside, -10.0]].iter().filter(|[x, y]| is_off(*x, *y)).count();
+            for x in [-1.4 * radius, 1.4 * radius].into_iter().filter(|x| is_off(*x, 0.0)) {
+                let mut beside = (-8..=8).flat_map(|by| [-1.0, 1.0].map(|side| (x + by as f32, side * (joint + 0.5))));
+                assert!(beside.any(|(x, y)| is_off(x, y)), "{seed}: the mortar at {x} is off, and nothing beside it");
+                mortar += 1;
+            }
         }
-        assert!(faces > 100, "{faces} faces are off further out than the mortar");
+        assert!(faces > 100, "{faces} faces are off further out than the hit");
+        assert!(mortar > 60, "{mortar} places in the mortar further out than the hit are off");
     }
 }
