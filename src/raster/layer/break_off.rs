@@ -35,6 +35,10 @@ const DEEP_SHADE: f32 = 0.72;
 /// How much brighter a wall is that faces the light.
 const LIT: f32 = 0.45;
 
+/// Horizontal extent of the slopes inside it, in units of their height: so long that those of several ledges are one.
+const LEDGE_FALL: f32 = 7.0 * WALL;
+const STEP_FALL: f32 = 4.0 * WALL;
+
 /// Strength of the shadow of the step down to the basin, as a share of that of the edge.
 const STEP_SHADE: f32 = 0.3;
 
@@ -379,7 +383,7 @@ impl Shape<'_> {
         let (mut sunk, mut bright) = (0.0, 0.0f32);
         let one = 1.0 / broken.steps.len().max(1) as f32;
         for step in &broken.steps {
-            let long_fall = (if has_ledges { 7.0 } else { 4.0 } * WALL * one * self.depth).max(2.0);
+            let long_fall = (if has_ledges { LEDGE_FALL } else { STEP_FALL } * one * self.depth).max(2.0);
             let within = step.within_at_most(off, 1.1 * long_fall + 2.1 * self.jag)
                 - 2.0 * self.jag * (0.5 + 0.5 * found.basin[k]);
             let fall = (within / long_fall).clamp(0.0, 1.0);
@@ -434,11 +438,9 @@ impl Shape<'_> {
             let tone = if is_stone { 0.45 * stone.draw * (5.0 * stone.gap).min(1.0) } else { 0.10 * stone.draw };
             tone + 0.1 * plate + 0.16 * noise(seed ^ draws::GRAIN_TONE, 0.9 * at.x, 0.9 * at.y)
         };
-        let mut tone = tone;
-        if let Some([level, darker]) = near.masonry(off) {
-            down *= level;
-            tone -= darker * wall;
-        }
+        let [level, darker] = near.masonry(off).unwrap_or([1.0, 0.0]);
+        down *= level;
+        let tone = tone - darker * wall;
         place.height = -self.depth * down + bumps;
         // The wall has the colour of the material that came off, not of what lay under it.
         place.pale = pale * inside * if crumbles { 0.15 + 0.85 * wall } else { 1.0 };
