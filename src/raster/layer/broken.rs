@@ -266,11 +266,11 @@ impl NearBroken<'_> {
             return None;
         }
         // Corners and edges of the bricks are chipped.
-        let inside = |face: &&&Face| {
+        let inside = |face: &&Face| {
             let bump = noise(face.seed ^ draws::CHIPPED, 1.4 * at.x / face.notch, 1.4 * at.y / face.notch);
             face.beside(at).min_element() > 0.45 * face.notch * bump
         };
-        Some(match self.faces.iter().find(inside) {
+        Some(match self.whole.faces.iter().find(inside) {
             Some(face) => [(face.level + face.lean.dot(at - face.outline.centre)).clamp(0.25, 1.0), 0.0],
             None => [MORTAR, IN_JOINT],
         })
