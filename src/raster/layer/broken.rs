@@ -42,7 +42,7 @@ pub(super) struct Face {
     notch: f32,
     seed: u32,
     /// How deep its floor is in the middle, as a share of the depth, and how much deeper per texel.
-    level: f32,
+    floor: f32,
     lean: Vec2,
 }
 
@@ -51,7 +51,7 @@ const FACES: [f32; 4] = [1.9, 1.1, 0.75, 0.45];
 
 /// Least and largest depth of the floor where a face has come off, as a share of the depth, and how much deeper it is
 /// at the side towards the hit.
-const LEVELS: [f32; 2] = [0.4, 0.8];
+const FLOORS: [f32; 2] = [0.4, 0.8];
 const LEAN: f32 = 0.35;
 
 /// The same for the mortar, and how much darker it is between bricks.
@@ -75,7 +75,7 @@ impl Face {
             let near = Vec2::ZERO.clamp(min, max);
             let centre = near + (0.5 * (min + max) - near).clamp_length_max(0.3 * size);
             let pick = |what: i32| draw(seed, -3, what);
-            // Beside most sides nearly all of the mortar comes off, beside some none.
+            // Beside most sides nearly all of the mortar comes off, beside some hardly any; crumbling leaves less.
             let gone = |what: i32| jag + joint * if pick(what) < 0.85 { 0.8 + 0.6 * pick(what + 1) } else { 0.2 };
             let mortar = [Vec2::new(gone(3), gone(5)), Vec2::new(gone(7), gone(9))];
             // Deeper towards the hit, and a little to one side.
@@ -87,7 +87,7 @@ impl Face {
                 mortar,
                 notch: joint.max(2.0),
                 seed,
-                level: LEVELS[0] + (LEVELS[1] - LEVELS[0]) * pick(13),
+                floor: FLOORS[0] + (FLOORS[1] - FLOORS[0]) * pick(13),
                 lean,
             }
         };
@@ -143,47 +143,17 @@ impl Broken {
 
     pub(super) fn new(crushed: &CrushedZone, unit: f32, radius: f32, grain: f32, seed: u32, bricks: &Bricks) -> Self {
         let CrushedZone { ragged, reach, fall, .. } = *crushed;
-        // The root of the energy.
-        let more = radius / (crushed.radius * unit).max(1.0e-3);
+        let more = root_of_energy(crushed, unit, radius);
         let pick = |k: u32, what: i32| draw(seed ^ draws::PIECES, k as i32, what);
         let crumbles = crushed.jag > 0.0;
-        // Less ragged zones have longer chords.
-        let levels = if crumbles && ragged < 0.65 { 1 } else { 2 };
-        let shape = |outline: Outline, k: u32| if crumbles { outline.stretched(mix_in(seed, k)) } else { outline };
-        let count = 6 + (3.0 * pick(0, 0)) as u32;
-        let (edge, mut steps) = terraces(crushed, unit, radius, seed).unwrap_or_else(|| {
-            let edge = shape(Outline::new(Vec2::ZERO, radius, count, levels, ragged, seed ^ draws::CRATER), 0x300);
-            let basin = (crushed.basin > 0.0).then(|| {
-                let centre = Vec2::new(pick(0, 4) - 0.5, pick(0, 5) - 0.3) * (0.3 * radius);
-                shape(Outline::new(centre, radius * crushed.basin, 7, 2, 0.8 * ragged, seed ^ draws::BASIN), 0x301)
-            });
-            (edge, basin.into_iter().collect())
-        });
-        let mut off = vec![edge];
-        let flakes = (crushed.flakes as f32 * more).round().min(64.0) as u32;
-        let one = radius / more.max(1.0) * more.max(1.0).sqrt();
-        for k in 0..flakes {
-            // A few large flakes beside the hit, small ones further out.
-            let is_beside = k % 3 == 0;
-            let size = one * if is_beside { 0.5 + 0.3 * pick(k, 1) } else { 0.22 + 0.4 * pick(k, 1) * pick(k, 14) };
-            let far = if is_beside {
-                0.75 * radius + 0.5 * size
-            } else {
-                radius * (0.9 + pick(k, 2) * pick(k, 15) * (reach - 1.0))
-            };
-            let far = far.min(radius * reach - 1.8 * size);
-            let centre = ops::unit(std::f32::consts::TAU * pick(k, 3)) * far.max(0.0);
-            let seed = mix_in(seed, 0x100 + k);
-            let (count, levels, ragged) = if crumbles { (7, 2, 0.8) } else { (5, levels, 0.6) };
-            off.push(shape(Outline::new(centre, size, count, levels, ragged, seed), 0x340 + k));
-        }
         let faces = Face::all(bricks, crushed, (unit, radius), seed ^ draws::FACES);
-        if !faces.is_empty() {
-            // In place of crater and flakes. Mortar breaks out only where the hit is.
+        let (off, steps) = if faces.is_empty() {
+            crater_and_flakes(crushed, unit, radius, seed)
+        } else {
+            // Mortar breaks out only where the hit is, and beside the faces.
             let core = Outline::new(Vec2::ZERO, radius * CORE, 8, 2, 0.8 * ragged, mix_in(seed, 0x500));
-            off = vec![shape(core, 0x501)];
-            steps.clear();
-        }
+            (vec![shaped(core, crushed, mix_in(seed, 0x501))], Vec::new())
+        };
         // Craters from contours have more chips around them, and slightly larger ones.
         let (many, large) = if crushed.terraces > 0 { (58.0, 1.05) } else { (24.0, 1.0) };
         let chips = (many * crushed.chips * more).round().min(96.0) as u32;
@@ -267,11 +237,12 @@ impl NearBroken<'_> {
         }
         // Corners and edges of the bricks are chipped.
         let inside = |face: &&Face| {
-            let bump = noise(face.seed ^ draws::CHIPPED, 1.4 * at.x / face.notch, 1.4 * at.y / face.notch);
-            face.beside(at).min_element() > 0.45 * face.notch * bump
+            let (within, most) = (face.beside(at).min_element(), 0.45 * face.notch);
+            let bump = || noise(face.seed ^ draws::CHIPPED, 1.4 * at.x / face.notch, 1.4 * at.y / face.notch);
+            within > most || (within > -most && within > most * bump())
         };
         Some(match self.whole.faces.iter().find(inside) {
-            Some(face) => [(face.level + face.lean.dot(at - face.outline.centre)).clamp(0.25, 1.0), 0.0],
+            Some(face) => [(face.floor + face.lean.dot(at - face.outline.centre)).clamp(0.25, 1.0), 0.0],
             None => [MORTAR, IN_JOINT],
         })
     }
@@ -282,6 +253,55 @@ pub(super) fn crater(crushed: &CrushedZone, pos: Vec2, radius: f32, seed: u32) -
     let CrushedZone { terraces, ragged: roughness, .. } = *crushed;
     let params = CraterParams { radius, terraces, roughness, ..CraterParams::DEFAULT };
     Crater::new(pos, &params, u64::from(seed ^ draws::CRATER)).ok()
+}
+
+/// The edges of a crater and of the flakes around it, and its terraces or its basin.
+fn crater_and_flakes(crushed: &CrushedZone, unit: f32, radius: f32, seed: u32) -> (Vec<Outline>, Vec<Outline>) {
+    let CrushedZone { ragged, reach, .. } = *crushed;
+    let more = root_of_energy(crushed, unit, radius);
+    let pick = |k: u32, what: i32| draw(seed ^ draws::PIECES, k as i32, what);
+    let crumbles = crushed.jag > 0.0;
+    // Less ragged zones have longer chords.
+    let levels = if crumbles && ragged < 0.65 { 1 } else { 2 };
+    let shape = |outline: Outline, k: u32| shaped(outline, crushed, mix_in(seed, k));
+    let count = 6 + (3.0 * pick(0, 0)) as u32;
+    let (edge, steps) = terraces(crushed, unit, radius, seed).unwrap_or_else(|| {
+        let edge = shape(Outline::new(Vec2::ZERO, radius, count, levels, ragged, seed ^ draws::CRATER), 0x300);
+        let basin = (crushed.basin > 0.0).then(|| {
+            let centre = Vec2::new(pick(0, 4) - 0.5, pick(0, 5) - 0.3) * (0.3 * radius);
+            shape(Outline::new(centre, radius * crushed.basin, 7, 2, 0.8 * ragged, seed ^ draws::BASIN), 0x301)
+        });
+        (edge, basin.into_iter().collect())
+    });
+    let mut off = vec![edge];
+    let flakes = (crushed.flakes as f32 * more).round().min(64.0) as u32;
+    let one = radius / more.max(1.0) * more.max(1.0).sqrt();
+    for k in 0..flakes {
+        // A few large flakes beside the hit, small ones further out.
+        let is_beside = k % 3 == 0;
+        let size = one * if is_beside { 0.5 + 0.3 * pick(k, 1) } else { 0.22 + 0.4 * pick(k, 1) * pick(k, 14) };
+        let far = if is_beside {
+            0.75 * radius + 0.5 * size
+        } else {
+            radius * (0.9 + pick(k, 2) * pick(k, 15) * (reach - 1.0))
+        };
+        let far = far.min(radius * reach - 1.8 * size);
+        let centre = ops::unit(std::f32::consts::TAU * pick(k, 3)) * far.max(0.0);
+        let seed = mix_in(seed, 0x100 + k);
+        let (count, levels, ragged) = if crumbles { (7, 2, 0.8) } else { (5, levels, 0.6) };
+        off.push(shape(Outline::new(centre, size, count, levels, ragged, seed), 0x340 + k));
+    }
+    (off, steps)
+}
+
+/// The root of the energy of a hit whose zone has this radius, texels.
+fn root_of_energy(crushed: &CrushedZone, unit: f32, radius: f32) -> f32 {
+    radius / (crushed.radius * unit).max(1.0e-3)
+}
+
+/// An outline as it is in the material: pieces of what crumbles are longer one way.
+fn shaped(outline: Outline, crushed: &CrushedZone, seed: u32) -> Outline {
+    if crushed.jag > 0.0 { outline.stretched(seed) } else { outline }
 }
 
 /// The edge of a crater and its terraces, if it has any; texels.
