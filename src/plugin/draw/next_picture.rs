@@ -4,35 +4,54 @@ use super::async_playback::is_much;
 use super::frame_job::{FrameJob, Stage, TimelineSnapshot};
 use super::running::{News, Running};
 use crate::paint::LookTable;
-use crate::pattern::Moment;
+use crate::pattern::{CrackMask, Moment};
 use crate::plugin::api::textures::{MAPS, Maps};
 use crate::plugin::api::{CrackBudget, CrackError};
+use crate::plugin::carrier::kind::{CarrierKind, Shown};
 use crate::plugin::gpu::textures;
 use crate::plugin::jobs::background::drop_in_background;
 use crate::plugin::jobs::frame_time::FrameClock;
 use crate::plugin::jobs::threads::Threads;
 use crate::plugin::surface::active::Active;
 use crate::plugin::surface::frame::profile;
+use crate::plugin::surface::picture_plan::ReadPictures;
 use crate::plugin::surface::regrow::{OnAnother, Regrown, Regrowth, regrow};
 use crate::plugin::surface::tile_set::Touched;
 use crate::raster::{DepthField, DirtyTiles, ReplayChanges};
 use bevy::{platform::time::Instant, prelude::*};
 use core::ops::ControlFlow;
-use std::time::Duration;
+use std::{sync::Arc, time::Duration};
 
-/// A picture that has changed so often before it was drawn, as those of a film do, is drawn in the frame.
+/// How often another picture takes the place of one that is not drawn yet. In a film one that was begun is shown before the next begins.
+const MAX_CHANGES: u32 = 3;
+
+/// Cracks that have changed so often before they were drawn are drawn in the frame.
 const MAX_RESTARTS: u32 = 3;
 
-/// How long that is remembered.
+/// How long these are remembered.
 const KEPT: Duration = Duration::from_secs(5);
 
 /// What a surface is to show, until it is there. What it showed before is shown until then.
 #[derive(Component, Default)]
 #[component(clone_behavior = Ignore)]
 pub(crate) struct NextPicture {
+    request: Option<Box<Request>>,
     making: Option<Box<Making>>,
+    changes: u32,
+    changed: Option<Instant>,
     restarts: u32,
     restarted: Option<Instant>,
+}
+
+/// A picture that somebody gave to a surface.
+pub(crate) struct Request {
+    /// How to deal with it, if the surface was not made from it.
+    pub(crate) other: Option<&'static dyn CarrierKind>,
+    pub(crate) shown: Shown,
+    /// What was read of it, and where it keeps cracks off.
+    pub(crate) read: Option<(ReadPictures, Arc<CrackMask>)>,
+    /// Whether there is a newer one, which comes after it.
+    pub(crate) is_superseded: bool,
 }
 
 struct Making {
@@ -132,6 +151,37 @@ impl Seen {
     }
 }
 
+/// The picture that a surface is to show: the `latest`, or one that was begun before it and has given way to others often enough.
+/// `has_changed` if texels of the picture have.
+pub(crate) fn request(world: &mut World, entity: Entity, latest: Request, has_changed: bool) -> Request {
+    let Some(mut next) = next_of(world, entity) else { return latest };
+    let Some(request) = next.request.take() else { return latest };
+    let is_like = request.shown == latest.shown && request.other.is_some() == latest.other.is_some();
+    if is_like && !has_changed {
+        return *request;
+    }
+    next.changed = Some(Instant::now());
+    if next.changes >= MAX_CHANGES && request.shown.asset.type_id() == latest.shown.asset.type_id() {
+        return Request { is_superseded: true, ..*request };
+    }
+    next.changes += 1;
+    latest
+}
+
+/// It is not there yet.
+pub(crate) fn put_back(world: &mut World, entity: Entity, request: Request) {
+    if let Some(mut next) = world.get_mut::<NextPicture>(entity) {
+        next.request = Some(Box::new(request));
+    }
+}
+
+/// What was read may be read in another way from now on.
+pub(crate) fn read_again(world: &mut World, entity: Entity) {
+    if let Some(request) = world.get_mut::<NextPicture>(entity).as_mut().and_then(|next| next.request.as_mut()) {
+        request.read = None;
+    }
+}
+
 /// Goes on with the cracks on another picture: they are grown again if it has other proportions, and then drawn and painted, by a task if that
 /// takes longer than a frame has and what was shown before still is, so that it `may_wait`. They do not grow while they are drawn. `None` if
 /// it is not there yet.
@@ -175,8 +225,12 @@ pub(crate) fn make(
 
 fn next_of(world: &mut World, entity: Entity) -> Option<Mut<'_, NextPicture>> {
     let mut next = world.get_mut::<NextPicture>(entity)?;
-    if next.restarted.is_some_and(|at| at.elapsed() >= KEPT) {
+    let is_over = |at: Option<Instant>| at.is_some_and(|at| at.elapsed() >= KEPT);
+    if is_over(next.restarted) {
         next.restarts = 0;
+    }
+    if is_over(next.changed) {
+        next.changes = 0;
     }
     Some(next)
 }
@@ -213,7 +267,7 @@ fn go_on(
 /// Gives up what a surface was to show.
 pub(crate) fn give_up(world: &mut World, entity: Entity) {
     if let Some(mut next) = world.get_mut::<NextPicture>(entity) {
-        drop_in_background(next.making.take());
+        drop_in_background((next.making.take(), next.request.take()));
     }
 }
 

@@ -58,13 +58,18 @@ impl PictureCopies {
         }
     }
 
-    /// A picture has changed: half of the copy may be of before.
-    pub(crate) fn forget(&mut self, picture: AssetId<Image>) {
+    /// A picture has changed: half of the copy may be of before. `false` if it stays so: it has begun again often enough.
+    pub(crate) fn forget(&mut self, picture: AssetId<Image>) -> bool {
         let begun = |copy: &&mut PictureCopy| copy.picture.id() == picture && !copy.data.is_empty();
-        for copy in self.copies.iter_mut().filter(begun).filter(|copy| copy.restarts < MAX_RESTARTS) {
-            copy.data.clear();
-            copy.restarts += 1;
+        let mut begins_again = true;
+        for copy in self.copies.iter_mut().filter(begun) {
+            begins_again &= copy.restarts < MAX_RESTARTS;
+            if copy.restarts < MAX_RESTARTS {
+                copy.data.clear();
+                copy.restarts += 1;
+            }
         }
+        begins_again
     }
 
     /// Copies what there is to copy, no more bytes than are `left` of this frame. What takes several frames is done in the one after the

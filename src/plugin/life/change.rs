@@ -7,7 +7,7 @@ use crate::plugin::api::{CrackBudget, CrackError, CrackState, CrackStatus, Crack
 use crate::plugin::carrier::kind::{Carrier, CarrierKind, Found, Shown};
 use crate::plugin::carrier::kinds;
 use crate::plugin::draw::async_playback::{self, recall};
-use crate::plugin::draw::next_picture::{self, NextInputs, NextShown};
+use crate::plugin::draw::next_picture::{self, NextInputs, NextShown, Request};
 use crate::plugin::gpu::memory::TextureMemory;
 use crate::plugin::jobs::deferred::hold;
 use crate::plugin::jobs::frame_time::{FrameClock, Timer};
@@ -183,6 +183,7 @@ fn update_settings(world: &mut World, entity: Entity, active: &mut Active) -> bo
         return false;
     }
     active.has_new_settings = false;
+    next_picture::read_again(world, entity);
     match preset.and_then(|preset| preset.map_or(Ok(()), |preset| update_preset(world, entity, active, preset))) {
         Ok(()) => {}
         Err(error) => warn!("the changed preset of {} is not used: {error}", EntityLabel::of(world, entity)),
@@ -274,8 +275,42 @@ fn try_picture(
 ) -> Result<bool, CrackError> {
     active.canvas.is_outdated = true;
     active.canvas.offered = if other.is_some() { shown.pictures().map(Handle::id).collect() } else { Vec::new() };
-    let Some(draft) = draft(world, entity, active, other, &shown)? else { return Ok(false) };
-    let Some(mask) = resolve_mask(world, &active.surface, &active.preset, &shown, &draft)? else { return Ok(false) };
+    let has_changed = core::mem::take(&mut active.canvas.has_changed);
+    let latest = Request { other, shown, read: None, is_superseded: false };
+    let mut request = if may_wait { next_picture::request(world, entity, latest, has_changed) } else { latest };
+    let is_superseded = match show_request(world, entity, active, &mut request, may_wait) {
+        Ok(true) => request.is_superseded,
+        Err(error) if !request.is_superseded => return Err(error),
+        // The newer one may be whole.
+        Err(_) => true,
+        Ok(false) => {
+            if may_wait {
+                next_picture::put_back(world, entity, request);
+            }
+            return Ok(false);
+        }
+    };
+    active.canvas.is_outdated = is_superseded;
+    Ok(!is_superseded)
+}
+
+/// Reads a picture, draws the cracks on it and shows them; `false` if they are not there yet.
+fn show_request(
+    world: &mut World,
+    entity: Entity,
+    active: &mut Active,
+    request: &mut Request,
+    may_wait: bool,
+) -> Result<bool, CrackError> {
+    if request.read.is_none() {
+        let Some(reading) = draft(world, entity, active, request.other, &request.shown)? else { return Ok(false) };
+        request.is_superseded |= reading.has_changed;
+        let read = reading.pictures;
+        let mask = resolve_mask(world, &active.surface, &active.preset, &request.shown, &read)?;
+        let Some(mask) = mask else { return Ok(false) };
+        request.read = Some((read, mask));
+    }
+    let Some((draft, mask)) = &request.read else { return Ok(false) };
     let frame = frame(draft.plan.rect, &draft.base)?;
     let inputs = NextInputs {
         look: look(&active.preset, frame, draft.base.is_nearest)?,
@@ -286,7 +321,7 @@ fn try_picture(
             frame,
             seed: active.surface.seed,
             alpha_mask: active.surface.alpha_mask,
-            mask,
+            mask: mask.clone(),
         },
         maps: draft.plan.maps,
     };
@@ -301,7 +336,8 @@ fn try_picture(
         world.resource_mut::<Queues>().late.insert(entity);
         return Ok(false);
     };
-    show_picture(world, entity, active, (other, shown), draft, next)?;
+    let Some((draft, _)) = request.read.take() else { return Ok(false) };
+    show_picture(world, entity, active, (request.other, request.shown.clone()), draft, next)?;
     Ok(true)
 }
 
@@ -322,7 +358,6 @@ fn show_picture(
     if let Some(kind) = other {
         change_carrier(world, entity, active, kind, &shown);
     }
-    active.canvas.is_outdated = false;
     active.canvas.read_at = world.resource::<FrameCount>().0;
     let changes_field = inputs.changes_field(active);
     let (mask, frame) = (inputs.growth.mask, inputs.growth.frame);

@@ -63,12 +63,12 @@ pub(crate) fn watch_pictures(
         bases.forget(*id);
         bakes.forget_picture(*id, before);
         preparations.forget_picture(*id, before);
-        readings.forget(*id);
+        readings.forget(*id, before);
         for &entity in owners.users(*id) {
             if let Ok((_, mut cracked)) = surfaces.get_mut(entity)
                 && let Some(active) = cracked.get_mut().filter(|active| active.canvas.read_at < before)
             {
-                active.canvas.is_outdated = true;
+                (active.canvas.is_outdated, active.canvas.has_changed) = (true, true);
                 queues.changed.push(entity);
             }
         }

@@ -116,6 +116,7 @@ impl Active {
             revision: 0,
             read_at,
             is_outdated: false,
+            has_changed: false,
             offered: Vec::new(),
         };
         canvas.show(rect, field.frame.size());

@@ -33,6 +33,8 @@ pub(crate) struct Canvas {
     pub(crate) read_at: u64,
     /// Whether the pictures have changed since.
     pub(crate) is_outdated: bool,
+    /// Whether they have changed since this was last looked at.
+    pub(crate) has_changed: bool,
     /// Pictures that somebody has given the entity, until they are accepted.
     pub(crate) offered: Vec<AssetId<Image>>,
 }

@@ -9,7 +9,7 @@ use crate::plugin::jobs::background::{BackgroundJob, PATIENCE, guarded_as};
 use crate::plugin::jobs::copy::{CopyProgress, MAX_BYTES, PictureCopies};
 use crate::plugin::jobs::threads::Threads;
 use crate::plugin::source::picture::{BaseKey, BasePicture, BasePictures, FrameCount};
-use bevy::{ecs::entity::EntityHashMap, platform::time::Instant, prelude::*};
+use bevy::{platform::time::Instant, prelude::*};
 use std::{sync::Arc, time::Duration};
 
 /// Texels up to which a picture is read in the frame.
@@ -24,37 +24,34 @@ pub(crate) struct Rereadings {
     list: Vec<Rereading>,
     /// The frame in which something was last copied, and how many bytes may still be copied in it.
     copied: (u64, usize),
-    /// Surfaces whose pictures are not there yet.
-    asked: EntityHashMap<Asked>,
 }
 
-/// What a surface waits for.
-struct Asked {
-    key: BaseKey,
-    restarts: u32,
-    /// How often it has changed before it was there.
-    changes: u32,
-    at: Instant,
+/// What was read.
+pub(crate) struct Reread {
+    pub(crate) pictures: ReadPictures,
+    /// Whether a picture has changed meanwhile: what was read is shown until it is read again. A film would never be there otherwise.
+    pub(crate) has_changed: bool,
 }
-
-/// A picture that has changed so often before it was read, as those of a film do, is read in the frame.
-const MAX_CHANGES: u32 = 3;
 
 struct Rereading {
     key: BaseKey,
     stage: Stage,
     since: Instant,
     asked: Instant,
-    /// How often it had to begin again.
-    restarts: u32,
+    /// The frame in which it was last copied.
+    copied_at: u64,
+    /// Whether a picture has changed since.
+    has_changed: bool,
 }
 
 enum Stage {
     /// Pictures are copied; indices of the copies of diffuse, normal and depth.
     Copying(PictureCopies, [Option<usize>; 3]),
     Reading(BackgroundJob<Work, Result<BasePicture, CrackError>>),
-    /// A picture has changed since.
-    Stale,
+    /// It has changed while it was read. Surfaces that do not show it yet get it.
+    Read(Arc<BasePicture>),
+    /// Nothing is done.
+    Idle,
 }
 
 /// What a task reads.
@@ -73,11 +70,15 @@ impl Work {
 }
 
 impl Rereadings {
-    /// The picture has changed.
-    pub(crate) fn forget(&mut self, picture: AssetId<Image>) {
+    /// The picture has changed, `before` this frame.
+    pub(crate) fn forget(&mut self, picture: AssetId<Image>, before: u64) {
         for reading in self.list.iter_mut().filter(|reading| reading.key.pictures.contains(&Some(picture))) {
-            reading.stage = Stage::Stale;
-            reading.restarts += 1;
+            match &mut reading.stage {
+                Stage::Copying(copies, _) => reading.has_changed |= !copies.forget(picture),
+                Stage::Reading(_) => reading.has_changed |= reading.copied_at < before,
+                Stage::Read(_) => reading.stage = Stage::Idle,
+                Stage::Idle => {}
+            }
         }
     }
 }
@@ -90,7 +91,7 @@ pub(crate) fn draft(
     active: &Active,
     other: Option<&dyn CarrierKind>,
     shown: &Shown,
-) -> Result<Option<ReadPictures>, CrackError> {
+) -> Result<Option<Reread>, CrackError> {
     let kind = other.unwrap_or(active.carrier.kind);
     let aspect = |picture| kind.aspect(world, entity, picture, active.carrier.size);
     let same = active.canvas.unstretched.filter(|_| other.is_none());
@@ -106,62 +107,43 @@ pub(crate) fn draft(
     let wanted = Maps { emissive, ..Maps::wanted(active.surface.write, &active.preset.look) };
     let plan = plan_pictures(world, (&active.surface, wanted), shown, &stretch, layer, active.bytes.get())?;
     let Some(plan) = plan else { return Ok(None) };
-    Ok(base(world, entity, &plan, shown)?.map(|base| ReadPictures { base, plan }))
+    let read = base(world, &plan, shown, &active.canvas.base)?;
+    Ok(read.map(|(base, has_changed)| Reread { pictures: ReadPictures { base, plan }, has_changed }))
 }
 
-/// The pictures of a plan, read; `None` if that takes some frames more.
+/// The pictures of a plan, read, and whether they have changed meanwhile; `None` if that takes some frames more. What is shown `now` is not
+/// what is asked for.
 fn base(
     world: &mut World,
-    entity: Entity,
     plan: &PicturePlan,
     shown: &Shown,
-) -> Result<Option<Arc<BasePicture>>, CrackError> {
+    now: &Arc<BasePicture>,
+) -> Result<Option<(Arc<BasePicture>, bool)>, CrackError> {
     let key = plan.key(shown);
     let is_small = plan.size.as_usizevec2().element_product() <= MAX_AT_ONCE;
     let has_threads = world.resource::<Threads>().pool().is_some();
     if is_small || !has_threads || world.resource::<CrackBudget>().is_unlimited() {
-        return plan.clone().draft(world, shown).map(|draft| Some(draft.base));
+        return plan.clone().draft(world, shown).map(|draft| Some((draft.base, false)));
     }
     if let Some(base) = world.resource::<BasePictures>().find(key) {
-        return Ok(Some(base));
+        return Ok(Some((base, false)));
     }
-    if world.resource_mut::<Rereadings>().changes_often(entity, key) {
-        return plan.clone().draft(world, shown).map(|draft| Some(draft.base));
-    }
-    world.resource_scope(|world, mut readings: Mut<Rereadings>| {
-        let base = readings.step(world, plan, shown, key)?;
-        if base.is_some() {
-            readings.asked.remove(&entity);
-        }
-        Ok(base)
-    })
+    world.resource_scope(|world, mut readings: Mut<Rereadings>| readings.step(world, plan, shown, (key, now)))
 }
 
 impl Rereadings {
-    /// Whether what a surface waits for changes before it is there, time and again.
-    fn changes_often(&mut self, entity: Entity, key: BaseKey) -> bool {
-        let now = Instant::now();
-        self.asked.retain(|_, asked| now - asked.at < KEPT);
-        let restarts = self.list.iter().find(|reading| reading.key == key).map_or(0, |reading| reading.restarts);
-        let asked = self.asked.entry(entity).or_insert(Asked { key, restarts, changes: 0, at: now });
-        if (asked.key, asked.restarts) != (key, restarts) {
-            (asked.key, asked.restarts, asked.at) = (key, restarts, now);
-            asked.changes = (asked.changes + 1).min(MAX_CHANGES);
-        }
-        asked.changes == MAX_CHANGES
-    }
-
     fn step(
         &mut self,
         world: &mut World,
         plan: &PicturePlan,
         shown: &Shown,
-        key: BaseKey,
-    ) -> Result<Option<Arc<BasePicture>>, CrackError> {
+        (key, before): (BaseKey, &Arc<BasePicture>),
+    ) -> Result<Option<(Arc<BasePicture>, bool)>, CrackError> {
         let now = Instant::now();
         self.list.retain(|reading| reading.key == key || now - reading.asked < KEPT);
         let index = self.list.iter().position(|reading| reading.key == key).unwrap_or_else(|| {
-            self.list.push(Rereading { key, stage: Stage::Stale, since: now, asked: now, restarts: 0 });
+            let stage = Stage::Idle;
+            self.list.push(Rereading { key, stage, since: now, asked: now, copied_at: 0, has_changed: false });
             self.list.len() - 1
         });
         let frame = world.resource::<FrameCount>().0;
@@ -172,25 +154,28 @@ impl Rereadings {
         let images = world.get_resource::<Assets<Image>>().ok_or(CrackError::NoImages)?;
         let reading = &mut list[index];
         reading.asked = now;
-        if matches!(reading.stage, Stage::Stale) {
+        let is_known = matches!(&reading.stage, Stage::Read(base) if Arc::ptr_eq(base, before));
+        if is_known || matches!(reading.stage, Stage::Idle) {
             let needed = plan.needed(shown);
             let pictures: Vec<Handle<Image>> = needed.iter().copied().flatten().cloned().collect();
             let mut next = 0..;
             let indices = needed.map(|picture| picture.and_then(|_| next.next()));
             let Some(copies) = PictureCopies::new(pictures, images, true) else { return Ok(None) };
             (reading.stage, reading.since) = (Stage::Copying(copies, indices), now);
+            reading.has_changed = false;
         }
         match &mut reading.stage {
             Stage::Copying(copies, indices) => {
                 if now - reading.since >= PATIENCE {
                     copies.wait_no_more();
                 }
+                reading.copied_at = frame;
                 match copies.step(images, left) {
                     CopyProgress::More => {}
-                    CopyProgress::Changed => reading.stage = Stage::Stale,
+                    CopyProgress::Changed => reading.stage = Stage::Idle,
                     CopyProgress::Done => {
                         let indices = *indices;
-                        if let Stage::Copying(copies, _) = core::mem::replace(&mut reading.stage, Stage::Stale) {
+                        if let Stage::Copying(copies, _) = core::mem::replace(&mut reading.stage, Stage::Idle) {
                             let work = Work { plan: plan.clone(), copies: copies.finish(), indices };
                             let job = BackgroundJob::start(work, Work::read);
                             (reading.stage, reading.since) = (Stage::Reading(job), now);
@@ -201,12 +186,19 @@ impl Rereadings {
             }
             Stage::Reading(job) => {
                 let Some(read) = job.take_if_done(now - reading.since >= PATIENCE) else { return Ok(None) };
-                list.swap_remove(index);
+                let has_changed = reading.has_changed;
+                reading.stage = Stage::Idle;
                 let base = Arc::new(read?);
-                world.resource_mut::<BasePictures>().remember(key, &base);
-                Ok(Some(base))
+                if has_changed {
+                    reading.stage = Stage::Read(base.clone());
+                } else {
+                    list.swap_remove(index);
+                    world.resource_mut::<BasePictures>().remember(key, &base);
+                }
+                Ok(Some((base, has_changed)))
             }
-            Stage::Stale => Ok(None),
+            Stage::Read(base) => Ok(Some((base.clone(), true))),
+            Stage::Idle => Ok(None),
         }
     }
 }

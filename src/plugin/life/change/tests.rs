@@ -390,6 +390,73 @@ fn b5_another_picture_comes_with_its_cracks() {
     assert_eq!(image(&app, entity), second);
 }
 
+/// Fault B5: nor is a frame of a film drawn within a frame of the game: each is drawn beside the frames and shown before the next one, be it
+/// another picture or the same one with other texels. The last stays.
+#[test]
+fn b5_films_on_large_surfaces_are_drawn_beside_the_frames() {
+    let grey = |level: u8| {
+        let mut image = blank(UVec2::new(800, 400));
+        image.data.iter_mut().flat_map(|data| data.as_chunks_mut().0).for_each(|texel| *texel = [level, level, level, 255]);
+        image
+    };
+    let give = |app: &mut App, entity: Entity, level: u8, in_place: bool| {
+        let original = active(app.world(), entity).and_then(|active| active.carrier.shown.diffuse.clone());
+        let mut images = app.world_mut().resource_mut::<Assets<Image>>();
+        if in_place {
+            if let Some(mut image) = original.and_then(|original| images.get_mut(&original)) {
+                *image = grey(level);
+            }
+            return;
+        }
+        let image = images.add(grey(level));
+        if let Some(mut sprite) = app.world_mut().get_mut::<Sprite>(entity) {
+            sprite.image = image;
+        }
+    };
+    let level = |app: &App, entity| {
+        active(app.world(), entity).and_then(|active| active.canvas.base.diffuse.first().copied()).unwrap_or_default()
+    };
+    const FIRST: u8 = 60;
+    const LAST: u8 = 180;
+    for in_place in [false, true] {
+        let played = |film: core::ops::RangeInclusive<u8>, budget: CrackBudget| {
+            let mut app = app(CrackBudget { milliseconds: 1e6, ..default() });
+            app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(20)));
+            let entity = cracked(&mut app);
+            app.insert_resource(budget);
+            let mut levels = Vec::new();
+            for given in film {
+                give(&mut app, entity, given, in_place);
+                app.update();
+                let now = level(&app, entity);
+                if (FIRST..=LAST).contains(&now) {
+                    assert!(now < given, "{given} was drawn in a frame: {levels:?}");
+                    if levels.last() != Some(&now) {
+                        levels.push(now);
+                    }
+                }
+                std::thread::sleep(Duration::from_millis(10));
+            }
+            for _ in 0..10_000 {
+                app.update();
+                let is_waiting = !app.world().resource::<Queues>().changed.is_empty();
+                if level(&app, entity) == LAST && !is_waiting {
+                    break;
+                }
+                std::thread::sleep(Duration::from_millis(1));
+            }
+            assert_eq!(level(&app, entity), LAST, "the last one never comes");
+            (0..5).for_each(|_| app.update());
+            assert!(app.world().resource::<Queues>().changed.is_empty());
+            (levels, seen(&app, entity))
+        };
+        let (levels, last) = played(FIRST..=LAST, CrackBudget { milliseconds: 0.0, ..default() });
+        assert!(levels.len() >= 3 && levels.is_sorted(), "{in_place}: {levels:?}");
+        let (_, alone) = played(LAST..=LAST, CrackBudget { milliseconds: 500.0, ..default() });
+        assert!(last == alone, "{in_place}: another picture");
+    }
+}
+
 fn changes_beside_the_frames(crack: Crack, change: Change) {
     let (in_a_frame, after) = pictures_of(crack, change, CrackBudget { milliseconds: 1e6, ..default() }, false);
     assert_eq!(in_a_frame.len(), 2);
