@@ -44,6 +44,8 @@ pub(crate) fn watch_pictures(
 ) {
     let frame = &mut frame.0;
     *frame += 1;
+    readings.trim();
+    masks.trim();
     let Some(mut events) = events else { return };
     let mut removed = Vec::new();
     for event in events.read() {

@@ -122,6 +122,14 @@ impl PictureMasks {
         self.made.push((key, Arc::downgrade(mask)));
     }
 
+    /// Drops what nobody has come for.
+    pub(crate) fn trim(&mut self) {
+        if !self.in_work.is_empty() {
+            let now = Instant::now();
+            self.in_work.retain(|work| now - work.asked < KEPT);
+        }
+    }
+
     /// The picture has changed.
     pub(crate) fn forget(&mut self, picture: AssetId<Image>) {
         self.made.retain(|(key, _)| key.picture != picture);
@@ -146,7 +154,6 @@ impl PictureMasks {
             return Ok(Some(mask));
         }
         let now = Instant::now();
-        self.in_work.retain(|work| work.key == key || now - work.asked < KEPT);
         if has_time || AsyncComputeTaskPool::try_get().is_none() {
             let mask = key.make(&base.diffuse)?;
             self.remember(key, &mask);

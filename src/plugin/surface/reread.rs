@@ -70,6 +70,14 @@ impl Work {
 }
 
 impl Rereadings {
+    /// Drops what nobody has come for.
+    pub(crate) fn trim(&mut self) {
+        if !self.list.is_empty() {
+            let now = Instant::now();
+            self.list.retain(|reading| now - reading.asked < KEPT);
+        }
+    }
+
     /// The picture has changed, `before` this frame.
     pub(crate) fn forget(&mut self, picture: AssetId<Image>, before: u64) {
         for reading in self.list.iter_mut().filter(|reading| reading.key.pictures.contains(&Some(picture))) {
@@ -140,7 +148,6 @@ impl Rereadings {
         (key, before): (BaseKey, &Arc<BasePicture>),
     ) -> Result<Option<(Arc<BasePicture>, bool)>, CrackError> {
         let now = Instant::now();
-        self.list.retain(|reading| reading.key == key || now - reading.asked < KEPT);
         let index = self.list.iter().position(|reading| reading.key == key).unwrap_or_else(|| {
             let stage = Stage::Idle;
             self.list.push(Rereading { key, stage, since: now, asked: now, copied_at: 0, has_changed: false });

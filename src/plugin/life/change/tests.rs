@@ -457,6 +457,30 @@ fn b5_films_on_large_surfaces_are_drawn_beside_the_frames() {
     }
 }
 
+/// A picture that is read for a surface that goes meanwhile is not kept.
+#[test]
+fn pictures_that_nobody_waits_for_are_dropped() {
+    let mut app = app(CrackBudget { milliseconds: 1e6, ..default() });
+    app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(20)));
+    let entity = cracked(&mut app);
+    app.insert_resource(CrackBudget { milliseconds: 0.0, ..default() });
+    give_picture(&mut app, entity, UVec2::new(800, 400));
+    let picture = app.world().get::<Sprite>(entity).map(|sprite| sprite.image.id()).unwrap_or_default();
+    app.update();
+    let is_there = |app: &App| app.world().resource::<Assets<Image>>().contains(picture);
+    let is_read = |app: &App| active(app.world(), entity).is_none_or(|active| active.carrier.next.is_none());
+    assert!(is_there(&app) && !is_read(&app));
+    app.world_mut().despawn(entity);
+    for _ in 0..1000 {
+        app.update();
+        if !is_there(&app) {
+            break;
+        }
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    assert!(!is_there(&app));
+}
+
 fn changes_beside_the_frames(crack: Crack, change: Change) {
     let (in_a_frame, after) = pictures_of(crack, change, CrackBudget { milliseconds: 1e6, ..default() }, false);
     assert_eq!(in_a_frame.len(), 2);
