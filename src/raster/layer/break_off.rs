@@ -7,7 +7,7 @@ use super::{
     ledges::{BRIGHTEST, LEDGE_LIT, LEDGE_SHADE, SAG, ledge_light},
     noise::{draw, lattice, noise},
     outline::FAR_OUT,
-    row::{Row, TexelRow, WIDE, ZEROS},
+    row::{Row, TexelRow, WIDE, ZEROS, span},
     shape::{Place, Shape, TO_LIGHT},
     spot::PIT_STEPS,
     stone::{Cell, Stone, facets},
@@ -119,13 +119,6 @@ struct Light {
     shade: f32,
     length: f32,
     facing: f32,
-}
-
-/// The texels from the first to the last one for which something holds.
-fn span(all: Range<usize>, holds: impl Fn(usize) -> bool) -> Range<usize> {
-    let first = all.clone().find(|&k| holds(k));
-    let last = all.rev().find(|&k| holds(k));
-    first.zip(last).map_or(0..0, |(first, last)| first..last + 1)
 }
 
 impl Shape<'_> {

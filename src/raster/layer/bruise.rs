@@ -34,12 +34,16 @@ pub(super) fn bruise(off: Vec2, q: f32, dense: f32, fine: f32, seed: u32) -> Bru
     let turn = ops::atan2(off.y, off.x) * (1.0 / TAU) + 0.5;
     for sheet in 0..SHEETS {
         let along = RINGS * fine * q.sqrt() + 0.37 * sheet as f32;
-        let (ring, share) = (along.floor(), along - along.floor());
+        let (before, ring) = floor(along);
+        let share = along - before;
         let count = (INNER as f32 * fine) as u32 + MORE * ring as u32 + 2 * sheet;
         let seed = seed ^ sheet.wrapping_mul(0x51ED_270B);
-        let draw_of = |cell: i32, k: u32| (hash(seed ^ k, cell, ring as i32) >> 8) as i32 as f32 * (1.0 / 16_777_216.0);
+        let draw_of = |cell: i32, k: u32| (hash(seed ^ k, cell, ring) >> 8) as i32 as f32 * (1.0 / 16_777_216.0);
         let at = turn * count as f32 + draw_of(-1, 40);
-        let (cell, across) = ((at.floor() as i32).rem_euclid(count as i32), at - at.floor());
+        let (before, cell) = floor(at);
+        let across = at - before;
+        // A division takes time, and few of them are needed.
+        let cell = if (0..count as i32).contains(&cell) { cell } else { cell.rem_euclid(count as i32) };
         let draw = |k: u32| draw_of(cell, k);
         let chance = dense * (1.15 - 0.25 * sheet as f32);
         // Texels from side to side of a cell, and from ring to ring.

@@ -13,6 +13,13 @@ pub(super) type Row = [f32; WIDE];
 /// 0 for each.
 pub(super) const ZEROS: Row = [0.0; WIDE];
 
+/// The texels from the first to the last one for which something holds.
+pub(super) fn span(all: Range<usize>, holds: impl Fn(usize) -> bool) -> Range<usize> {
+    let first = all.clone().find(|&k| holds(k));
+    let last = all.rev().find(|&k| holds(k));
+    first.zip(last).map_or(0..0, |(first, last)| first..last + 1)
+}
+
 /// A row of texels.
 #[derive(Clone, Copy)]
 pub(super) struct TexelRow {

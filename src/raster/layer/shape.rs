@@ -5,7 +5,7 @@ use super::{
     bruise::{self, Bruise},
     crushed::CrushedZone,
     draws,
-    noise::{hash, lattice, noise},
+    noise::{floor, hash, lattice, noise},
     outline::{Outline, WIDEST},
 };
 use crate::pattern::Bricks;
@@ -112,15 +112,15 @@ impl<'a> Shape<'a> {
         }
     }
 
-    /// How far a place lies in a bruise, and how much of the bruise is left there, 0..=1; `cloud` is noise.
-    pub(super) fn left_of_bruise(&self, off: Vec2, radii: f32, cloud: f32, seed: u32) -> (f32, f32) {
+    /// How a bruise spreads to a place at a distance; `cloud` is noise, `bumps` is noise around it.
+    pub(super) fn spread_of_bruise(&self, distance: f32, cloud: f32, bumps: [f32; 2]) -> BruiseSpread {
         let CrushedZone { ragged, reach, .. } = self.crushed;
-        let way = off.normalize_or_zero();
-        let round = |k: u32, times: f32| noise(seed ^ k, way.x * times + 17.0, way.y * times + 31.0);
+        let radii = distance / self.radius.max(0.5);
         // No outline: the cracks are dense near the hit, and further out there are more and more gaps.
-        let stray = 1.0 + ragged * (0.45 * round(2, 1.3) + 0.4 * round(3, 3.7)) + 0.25 * ragged * cloud;
+        let stray = 1.0 + ragged * (0.45 * bumps[0] + 0.4 * bumps[1]) + 0.25 * ragged * cloud;
         let q = radii / stray.max(0.3);
-        (q, (1.0 - q / reach).min(2.0 * (1.0 - radii / reach)).clamp(0.0, 1.0))
+        let left = (1.0 - q / reach).min(2.0 * (1.0 - radii / reach)).clamp(0.0, 1.0);
+        BruiseSpread { q, left, cloud }
     }
 
     /// Noise along a bruise.
@@ -213,8 +213,8 @@ impl<'a> Shape<'a> {
     /// A crumb in some of the squares of a lattice.
     pub(super) fn add_crumb(&self, place: &mut Place, at: Vec2, chance: f32, seed: u32) {
         let side = 2.6 * self.grain;
-        let cell = (at / side).floor();
-        let (x, y) = (cell.x as i32, cell.y as i32);
+        let ((left, x), (top, y)) = (floor(at.x / side), floor(at.y / side));
+        let cell = Vec2::new(left, top);
         let draw = |k: u32| (hash(seed ^ k, x, y) >> 8) as i32 as f32 * (1.0 / 16_777_216.0);
         if draw(20) >= chance {
             return;

@@ -5,12 +5,39 @@ use super::{
     crushed::CrushedZone,
     noise::noise,
     outline::WIDEST,
-    row::{TexelRow, WIDE, ZEROS},
+    row::{Row, TexelRow, WIDE, ZEROS, span},
     shape::{BruiseSpread, Place, Shape},
     spot::{SLOPE_UNIT, Spot, TILE, Tile},
 };
 use crate::{math::vectorized, raster::TexelRect};
+use core::ops::Range;
 use glam::{UVec2, Vec2};
+
+/// Bumps around an outline: what they are drawn from, and how many there are.
+const WIDE_BUMPS: (u32, f32) = (2, 1.3);
+const FINE_BUMPS: (u32, f32) = (3, 3.7);
+
+/// Least distance at which a place has a direction, texels.
+const NEAREST: f32 = 1.0e-3;
+
+/// Noise around an outline.
+#[inline(always)]
+fn round(seed: u32, way: Vec2, (k, times): (u32, f32)) -> f32 {
+    noise(seed ^ k, way.x * times + 17.0, way.y * times + 31.0)
+}
+
+/// Noise along a row of a zone that does not break off: its floor, its edge, and the dust around it.
+struct Grains {
+    fine: Row,
+    coarse: Row,
+    specks: Row,
+    edge: [Row; 2],
+    dust: Row,
+}
+
+impl Grains {
+    const NONE: Self = Self { fine: ZEROS, coarse: ZEROS, specks: ZEROS, edge: [ZEROS; 2], dust: ZEROS };
+}
 
 impl Shape<'_> {
     /// Draws it over the texels `rect` of a tile whose first texel is at `corner`.
@@ -27,10 +54,13 @@ impl Shape<'_> {
             }
             None => {
                 let bruised = self.bruised(size.y + 2, row, seed);
-                for y in 0..size.y + 2 {
-                    for x in 0..size.x + 2 {
-                        let (at, k) = (row(y).at(x), y * WIDE + x);
-                        places[k] = self.place(row(y).off(x), at, bruised.as_ref().map(|all| all[k]), seed);
+                for (y, places) in places.chunks_exact_mut(WIDE).enumerate().take(size.y + 2) {
+                    let row = row(y);
+                    let texels = span(0..size.x + 2, |k| !self.is_beyond(row.off(k).length()));
+                    let grains = self.grains(row, &texels, seed);
+                    for k in texels {
+                        let bruised = bruised.as_ref().map(|all| all[y * WIDE + k]);
+                        places[k] = self.place(row.off(k), row.at(k), (&grains, k), bruised, seed);
                     }
                 }
             }
@@ -79,18 +109,23 @@ impl Shape<'_> {
         let mut all = Box::new([(BruiseSpread::default(), Bruise::default()); WIDE * WIDE]);
         let mut left = [0.0; WIDE * WIDE];
         for y in 0..rows {
-            let mut clouds = ZEROS;
+            let row = row(y);
+            let texels = span(0..WIDE, |k| !self.is_beyond(row.off(k).length()));
+            let (mut clouds, [mut wide, mut fine]) = (ZEROS, [ZEROS; 2]);
             vectorized(
                 #[inline(always)]
-                || row(y).fill(&mut clouds, &(0..WIDE), |at| self.cloud(at, seed)),
+                || {
+                    let way = |at: Vec2| (at - row.centre).normalize_or_zero();
+                    row.fill(&mut clouds, &texels, |at| self.cloud(at, seed));
+                    row.fill(&mut wide, &texels, |at| round(seed, way(at), WIDE_BUMPS));
+                    row.fill(&mut fine, &texels, |at| round(seed, way(at), FINE_BUMPS));
+                },
             );
-            for (x, cloud) in clouds.into_iter().enumerate() {
-                let off = row(y).off(x);
-                if !self.is_beyond(off.length()) {
-                    let radii = off.length() / self.radius.max(0.5);
-                    let (q, left_here) = self.left_of_bruise(off, radii, cloud, seed);
-                    all[y * WIDE + x].0 = BruiseSpread { q, left: left_here, cloud };
-                    left[y * WIDE + x] = left_here;
+            for k in texels {
+                let distance = row.off(k).length();
+                if !self.is_beyond(distance) {
+                    let spread = self.spread_of_bruise(distance, clouds[k], [wide[k], fine[k]]);
+                    (all[y * WIDE + k].0, left[y * WIDE + k]) = (spread, spread.left);
                 }
             }
         }
@@ -105,8 +140,43 @@ impl Shape<'_> {
         Some(all)
     }
 
-    /// The content of a place that does not break off; `off` is the offset from the centre, `at` the position in the field.
-    fn place(&self, off: Vec2, at: Vec2, bruised: Option<(BruiseSpread, Bruise)>, seed: u32) -> Place {
+    /// Noise along some texels of a row.
+    fn grains(&self, row: TexelRow, texels: &Range<usize>, seed: u32) -> Grains {
+        let CrushedZone { ragged, dust, .. } = *self.crushed;
+        let inside = span(texels.clone(), |k| row.off(k).length() / self.radius.max(0.5) <= 1.0 + WIDEST * ragged);
+        let mut found = Grains::NONE;
+        vectorized(
+            #[inline(always)]
+            || {
+                let grain = |at: Vec2, k: u32, size: f32| noise(seed ^ k, at.x / size, at.y / size);
+                let way = |at: Vec2| {
+                    let off = at - row.centre;
+                    off / off.length().max(NEAREST)
+                };
+                row.fill(&mut found.fine, &inside, |at| grain(at, 1, self.grain));
+                row.fill(&mut found.coarse, &inside, |at| grain(at, 4, 2.3 * self.grain));
+                row.fill(&mut found.specks, &inside, |at| grain(at, 5, 0.6 * self.grain));
+                let [wide, fine] = &mut found.edge;
+                row.fill(wide, &inside, |at| round(seed, way(at), WIDE_BUMPS));
+                row.fill(fine, &inside, |at| round(seed, way(at), FINE_BUMPS));
+                if dust > 0.0 {
+                    row.fill(&mut found.dust, texels, |at| grain(at, 6, 5.0 * self.grain));
+                }
+            },
+        );
+        found
+    }
+
+    /// The content of a place that does not break off; `off` is the offset from the centre, `at` the position in the field, `k` its texel in
+    /// the row.
+    fn place(
+        &self,
+        off: Vec2,
+        at: Vec2,
+        (grains, k): (&Grains, usize),
+        bruised: Option<(BruiseSpread, Bruise)>,
+        seed: u32,
+    ) -> Place {
         let CrushedZone { ragged, soft, hole, pale, speckle, flake, dust, chips, reach, .. } = *self.crushed;
         let mut place = Place::NONE;
         let distance = off.length();
@@ -115,27 +185,25 @@ impl Shape<'_> {
         if self.is_beyond(distance) {
             return place;
         }
-        let way = off / distance.max(1.0e-3);
-        let grain = |k: u32, size: f32| noise(seed ^ k, at.x / size, at.y / size);
-        let round = |k: u32, times: f32| noise(seed ^ k, way.x * times + 17.0, way.y * times + 31.0);
+        let way = off / distance.max(NEAREST);
         let mut inside = 0.0;
         if let Some((spread, crazed)) = bruised {
             self.add_bruise(&mut place, off, spread, crazed, seed);
         }
         if radii <= widest {
-            let fine = grain(1, self.grain);
-            let edge = 1.0 + ragged * (0.55 * round(2, 1.3) + 0.35 * round(3, 3.7) + 0.2 * fine);
+            let fine = grains.fine[k];
+            let edge = 1.0 + ragged * (0.55 * grains.edge[0][k] + 0.35 * grains.edge[1][k] + 0.2 * fine);
             let outline = (self.radius * edge).max(0.5);
             // An edge one texel wide.
             inside = (outline - distance + 0.5).clamp(0.0, 1.0);
             if inside > 0.0 {
-                let coarse = grain(4, 2.3 * self.grain);
+                let coarse = grains.coarse[k];
                 let rest = (1.0 - distance / outline).clamp(0.0, 1.0);
                 let fade = inside + soft * ((1.5 * rest).min(1.0) - inside);
                 // A broken edge is steep; a soft one has no wall.
                 let bowl = rest.sqrt() + soft * (rest * rest - rest.sqrt());
                 place.height += -self.depth * bowl + fade * self.rough * (0.6 * coarse + 0.4 * fine);
-                let grains = 1.0 - speckle * (0.5 + 0.5 * grain(5, 0.6 * self.grain)).clamp(0.0, 1.0);
+                let grains = 1.0 - speckle * (0.5 + 0.5 * grains.specks[k]).clamp(0.0, 1.0);
                 place.pale = place.pale.max(pale * fade * grains * (1.0 - self.crushed.needles));
                 place.shade += speckle * (0.6 * coarse + 0.3 * fine) * inside * (1.0 - self.crushed.needles);
             }
@@ -146,7 +214,7 @@ impl Shape<'_> {
         if (inside < 1.0 || self.crushed.needles > 0.0) && radii < reach {
             let left = 1.0 - ((radii - 0.8) / (reach - 0.8)).clamp(0.0, 1.0);
             if dust > 0.0 {
-                let cloud = 0.65 + 0.35 * grain(6, 5.0 * self.grain);
+                let cloud = 0.65 + 0.35 * grains.dust[k];
                 let powder = inside * (1.0 - self.crushed.needles);
                 place.pale = place.pale.max(dust * left * left * cloud * (1.0 - powder));
             }
@@ -168,7 +236,8 @@ impl Shape<'_> {
         if let Some(hole) = self.hole {
             self.add_hole(&mut place, hole, off);
         } else if hole > 0.0 && radii <= hole * (1.0 + WIDEST * ragged) + 1.0 {
-            let radius = self.radius * hole * (1.0 + 0.6 * ragged * (round(7, 1.9) + 0.5 * round(8, 4.3)));
+            let bumps = round(seed, way, (7, 1.9)) + 0.5 * round(seed, way, (8, 4.3));
+            let radius = self.radius * hole * (1.0 + 0.6 * ragged * bumps);
             place.dark = (radius - distance + 0.5).clamp(0.0, 1.0);
         }
         place

@@ -396,7 +396,11 @@ fn b5_another_picture_comes_with_its_cracks() {
 fn b5_films_on_large_surfaces_are_drawn_beside_the_frames() {
     let grey = |level: u8| {
         let mut image = blank(UVec2::new(800, 400));
-        image.data.iter_mut().flat_map(|data| data.as_chunks_mut().0).for_each(|texel| *texel = [level, level, level, 255]);
+        image
+            .data
+            .iter_mut()
+            .flat_map(|data| data.as_chunks_mut().0)
+            .for_each(|texel| *texel = [level, level, level, 255]);
         image
     };
     let give = |app: &mut App, entity: Entity, level: u8, in_place: bool| {
