@@ -63,11 +63,12 @@ impl PictureCopies {
         let begun = |copy: &&mut PictureCopy| copy.picture.id() == picture && !copy.data.is_empty();
         let mut begins_again = true;
         for copy in self.copies.iter_mut().filter(begun) {
-            begins_again &= copy.restarts < MAX_RESTARTS;
-            if copy.restarts < MAX_RESTARTS {
-                copy.data.clear();
-                copy.restarts += 1;
+            if copy.restarts >= MAX_RESTARTS {
+                begins_again = false;
+                continue;
             }
+            copy.data.clear();
+            copy.restarts += 1;
         }
         begins_again
     }

@@ -119,13 +119,13 @@ pub(crate) fn draft(
     Ok(read.map(|(base, has_changed)| Reread { pictures: ReadPictures { base, plan }, has_changed }))
 }
 
-/// The pictures of a plan, read, and whether they have changed meanwhile; `None` if that takes some frames more. What is shown `now` is not
-/// what is asked for.
+/// The pictures of a plan, read, and whether they have changed meanwhile; `None` if that takes some frames more. A surface that shows
+/// one that has changed, `known`, wants another.
 fn base(
     world: &mut World,
     plan: &PicturePlan,
     shown: &Shown,
-    now: &Arc<BasePicture>,
+    known: &Arc<BasePicture>,
 ) -> Result<Option<(Arc<BasePicture>, bool)>, CrackError> {
     let key = plan.key(shown);
     let is_small = plan.size.as_usizevec2().element_product() <= MAX_AT_ONCE;
@@ -136,7 +136,7 @@ fn base(
     if let Some(base) = world.resource::<BasePictures>().find(key) {
         return Ok(Some((base, false)));
     }
-    world.resource_scope(|world, mut readings: Mut<Rereadings>| readings.step(world, plan, shown, (key, now)))
+    world.resource_scope(|world, mut readings: Mut<Rereadings>| readings.step(world, plan, shown, (key, known)))
 }
 
 impl Rereadings {
@@ -145,7 +145,7 @@ impl Rereadings {
         world: &mut World,
         plan: &PicturePlan,
         shown: &Shown,
-        (key, before): (BaseKey, &Arc<BasePicture>),
+        (key, known): (BaseKey, &Arc<BasePicture>),
     ) -> Result<Option<(Arc<BasePicture>, bool)>, CrackError> {
         let now = Instant::now();
         let index = self.list.iter().position(|reading| reading.key == key).unwrap_or_else(|| {
@@ -161,7 +161,7 @@ impl Rereadings {
         let images = world.get_resource::<Assets<Image>>().ok_or(CrackError::NoImages)?;
         let reading = &mut list[index];
         reading.asked = now;
-        let is_known = matches!(&reading.stage, Stage::Read(base) if Arc::ptr_eq(base, before));
+        let is_known = matches!(&reading.stage, Stage::Read(base) if Arc::ptr_eq(base, known));
         if is_known || matches!(reading.stage, Stage::Idle) {
             let needed = plan.needed(shown);
             let pictures: Vec<Handle<Image>> = needed.iter().copied().flatten().cloned().collect();

@@ -203,8 +203,8 @@ impl Shape<'_> {
                 // A broken edge is steep; a soft one has no wall.
                 let bowl = rest.sqrt() + soft * (rest * rest - rest.sqrt());
                 place.height += -self.depth * bowl + fade * self.rough * (0.6 * coarse + 0.4 * fine);
-                let grains = 1.0 - speckle * (0.5 + 0.5 * grains.specks[k]).clamp(0.0, 1.0);
-                place.pale = place.pale.max(pale * fade * grains * (1.0 - self.crushed.needles));
+                let specks = 1.0 - speckle * (0.5 + 0.5 * grains.specks[k]).clamp(0.0, 1.0);
+                place.pale = place.pale.max(pale * fade * specks * (1.0 - self.crushed.needles));
                 place.shade += speckle * (0.6 * coarse + 0.3 * fine) * inside * (1.0 - self.crushed.needles);
             }
         }
