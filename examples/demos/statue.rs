@@ -1,7 +1,7 @@
 //! A stone pedestal with a clay jar on it, and a ball of plaster beside it, to shoot at: cracks run over the edges of the box and around the
 //! curves of the others. At last the ball falls to pieces, as a hollow shell, in crumbs and dust, and time runs backwards.
 //!
-//! Click to shoot; B breaks the ball; R lets time run backwards, and forwards again; H heals everything. The camera goes around them.
+//! Click to shoot; W writes a word into the jar, by cracks that run over all of it; B breaks the ball; R lets time run backwards, and forwards again; H heals everything. The camera goes around them.
 //!
 //! Without a display (or with `--headless`) a script plays, and pictures and a GIF are written to `--out`.
 //! Try `--frames 120 --out film`.
@@ -17,9 +17,11 @@ use bevy::{
     render::render_resource::{Extent3d, TextureDimension, TextureFormat},
 };
 use bevy_crack::{
+    Grid,
     math::Rng,
     prelude::*,
     shatter::{BreakAgain, BurstParams, ShatterParams, SizeClasses},
+    voronoi::{FONT, VoronoiParams, draw_text},
 };
 use bevy_crack_demos::{DemoArguments, Script, demo_app, heal_on_h, hit_on_press, play, repeated, with_normals};
 use std::f32::consts::TAU;
@@ -57,7 +59,9 @@ const SHOTS: [(usize, f32, f32, f32); 7] = [
     (0, 0.35, -0.3, 1.5),
 ];
 
-/// Which of the three the ball is.
+/// Which of the three the jar is, and the ball.
+const JAR_NUMBER: usize = 1;
+
 const BALL: usize = 2;
 
 #[derive(Component)]
@@ -85,7 +89,7 @@ fn main() -> AppExit {
     let arguments = DemoArguments::given("A pedestal, a jar and a ball whose cracks run all around them");
     let mut app = demo_app("bevy_crack: statue", &arguments);
     app.add_systems(Startup, setup).add_systems(Update, (go_around, let_dust_settle).chain());
-    play(app, (heal_on_h, break_on_b, turn_time_on_r), play_script)
+    play(app, (heal_on_h, write_on_w, break_on_b, turn_time_on_r), play_script)
 }
 
 fn setup(
@@ -165,7 +169,13 @@ fn setup(
             Transform::from_xyz(-0.3, 0.5 * PEDESTAL, 0.0).with_rotation(turned),
             pedestal,
         ),
-        (turned_on_a_lathe(&JAR, AROUND), clay, Transform::from_xyz(-0.3, PEDESTAL, 0.0), jar),
+        (
+            turned_on_a_lathe(&JAR, AROUND),
+            clay,
+            // The middle of its picture is to the front.
+            Transform::from_xyz(-0.3, PEDESTAL, 0.0).with_rotation(Quat::from_rotation_y(2.55)),
+            jar,
+        ),
         (Sphere::new(0.42).mesh().uv(96, 64), plaster, Transform::from_xyz(0.75, 0.42, -0.35), ball),
     ];
     for (i, (mesh, material, place, surface)) in targets.into_iter().enumerate() {
@@ -300,6 +310,42 @@ fn go_around(time: Res<Time>, mut camera: Query<&mut Transform, With<Camera3d>>)
     }
 }
 
+/// Where the word stands in the jar's picture: its middle and size, of which the picture has 1 each way.
+const WORD: Rect = Rect { min: Vec2::new(0.37, 0.38), max: Vec2::new(0.63, 0.6) };
+
+/// Cracks all over the jar that draw a word on its front.
+fn guided() -> GuidedCracks {
+    const PICTURE: UVec2 = UVec2::new(1024, 512);
+    let mut drawing = Grid::new(PICTURE, 0.0);
+    let size = (WORD.size() * PICTURE.as_vec2()).as_uvec2();
+    if let Some(word) = draw_text(FONT, "FRAGILE", size, f32::INFINITY) {
+        let corner = (WORD.min * PICTURE.as_vec2()).as_usizevec2();
+        for y in 0..word.height() {
+            drawing.row_mut(corner.y + y)[corner.x..][..word.width()].copy_from_slice(word.row(y));
+        }
+    }
+    let guided = GuidedCracks::new(CrackGuide::new(drawing));
+    let params = VoronoiParams { sites: 260, ..guided.params.clone() };
+    let from = WORD.min.with_y(WORD.center().y);
+    GuidedCracks { params, ..guided }.with_appearance(GuidedAppearance::Front { from, seconds: 1.5 })
+}
+
+fn write_on_w(
+    mut commands: Commands,
+    keys: Res<ButtonInput<KeyCode>>,
+    targets: Query<(Entity, &Target, &GlobalTransform)>,
+) {
+    if keys.just_pressed(KeyCode::KeyW) {
+        write_on_jar(&mut commands, &targets);
+    }
+}
+
+fn write_on_jar(commands: &mut Commands, targets: &Query<(Entity, &Target, &GlobalTransform)>) {
+    for (entity, ..) in targets.iter().filter(|(_, target, _)| target.0 == JAR_NUMBER) {
+        commands.entity(entity).insert(guided());
+    }
+}
+
 /// Takes the ball apart.
 fn break_ball(commands: &mut Commands, targets: &Query<(Entity, &Target, &GlobalTransform)>) {
     for (entity, ..) in targets.iter().filter(|(_, target, _)| target.0 == BALL) {
@@ -335,6 +381,9 @@ fn play_script(
     targets: Query<(Entity, &Target, &GlobalTransform)>,
     mut pieces: Query<&mut ShatterCracks>,
 ) {
+    if script.is_at(0.02) {
+        write_on_jar(&mut commands, &targets);
+    }
     if script.is_at(0.55) {
         break_ball(&mut commands, &targets);
     }

@@ -24,6 +24,8 @@ pub struct LaidOut {
     pub chart: Vec<u32>,
     /// The triangle that each texel belongs to, row by row; [`LaidOut::NOTHING`] if to none.
     pub owner: Vec<u32>,
+    /// Where the surface is cut: the edges of the mesh that lie in two places. Both places, each from the same end to the other, texels.
+    pub cuts: Vec<[[Vec2; 2]; 2]>,
 }
 
 impl LaidOut {
@@ -37,6 +39,27 @@ impl LaidOut {
         let owner = self.owner.get(i).filter(|_| texel.x < self.size.x)?;
         (*owner != Self::NOTHING).then_some(*owner as usize)
     }
+}
+
+/// Ends of an edge that are nearer to one another in the plane are one, texels.
+const TOGETHER: f32 = 0.1;
+
+/// The edges that lie in two places.
+fn cuts(shape: &MeshShape, corners: &[Option<[Vec2; 3]>]) -> Vec<[[Vec2; 2]; 2]> {
+    let edge = |triangle: usize, begin: usize| {
+        corners[triangle].map(|corners| [corners[begin], corners[(begin + 1) % corners.len()]])
+    };
+    let edges = (0..shape.len()).flat_map(|triangle| {
+        let across = shape.across(triangle).into_iter().enumerate();
+        across.filter_map(move |(begin, beside)| {
+            let (other, other_begin) = beside?;
+            // Each once.
+            let is_first = (triangle, begin) < (other as usize, usize::from(other_begin));
+            let [to, from] = edge(other as usize, usize::from(other_begin))?;
+            is_first.then_some([edge(triangle, begin)?, [from, to]])
+        })
+    });
+    edges.filter(|[[a, b], [p, q]]| a.distance(*p) > TOGETHER || b.distance(*q) > TOGETHER).collect()
 }
 
 /// A chart and where it lies.
@@ -82,7 +105,8 @@ pub(super) fn pack(
     {
         chart[*triangle] = number;
     }
-    Ok(LaidOut { size, corners, charts: charts.len(), chart, owner })
+    let cuts = cuts(shape, &corners);
+    Ok(LaidOut { size, corners, charts: charts.len(), chart, owner, cuts })
 }
 
 /// Finds places for all parts; returns the size of what is around them.

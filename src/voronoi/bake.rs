@@ -1,7 +1,8 @@
 //! Computes a map step by step: [`VoronoiBake`], [`VoronoiMap`].
 
 use super::{
-    Guide, SiteLayout, StrokeReport, VoronoiError, VoronoiParams,
+    Guide, MapCharts, SiteLayout, StrokeReport, VoronoiError, VoronoiParams,
+    charts::{MapGround, texel},
     lattice::{Lattice, Layer, WALL, edges_across, edges_down},
     level::Level,
     noise::Noise,
@@ -9,7 +10,7 @@ use super::{
     resample::Resampler,
     seams::Seams,
     search::BLOCK,
-    sites::{sites, texel},
+    sites::sites,
     strokes::StrokePairs,
     trace::Tracer,
     widths::Guidance,
@@ -104,6 +105,8 @@ pub struct VoronoiBake {
 pub struct VoronoiMap {
     params: VoronoiParams,
     frame: SurfaceFrame,
+    /// Where all of it is surface there are none.
+    charts: Option<MapCharts>,
     sites: Vec<UVec2>,
     /// Noise, then guides.
     layers: Vec<Layer>,
@@ -140,8 +143,31 @@ impl VoronoiBake {
     /// [`VoronoiError::OutOfRange`] if a parameter is out of its range, [`VoronoiError::Size`] if the size is,
     /// [`VoronoiError::Memory`] if there is no memory for what all steps need.
     pub fn new(params: VoronoiParams, guides: Vec<Guide>, size: UVec2, seed: u64) -> Result<Self, VoronoiError> {
+        Self::over(params, guides, SurfaceFrame::new(size)?, None, seed)
+    }
+
+    /// Starts a map of a surface that is laid out in parts: see [`MapCharts`]. Guides are stretched over all of its picture.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn on_charts(
+        params: VoronoiParams,
+        guides: Vec<Guide>,
+        charts: MapCharts,
+        seed: u64,
+    ) -> Result<Self, VoronoiError> {
+        Self::over(params, guides, *charts.frame(), Some(charts), seed)
+    }
+
+    fn over(
+        params: VoronoiParams,
+        guides: Vec<Guide>,
+        frame: SurfaceFrame,
+        charts: Option<MapCharts>,
+        seed: u64,
+    ) -> Result<Self, VoronoiError> {
         params.validate(&guides)?;
-        let frame = SurfaceFrame::new(size)?;
+        let size = frame.size();
         ask_for(need(&params, guides.len(), size))?;
         let mut noise = Rng::new(seed).stream("noise");
         let noise_seed = u64::from(noise.next_u32()) << 32 | u64::from(noise.next_u32());
@@ -163,6 +189,7 @@ impl VoronoiBake {
             map: VoronoiMap {
                 params,
                 frame,
+                charts,
                 sites: Vec::new(),
                 layers,
                 levels: Vec::new(),
@@ -195,8 +222,11 @@ impl VoronoiBake {
             Stage::Costs { y } => {
                 let end = height.min(y + rows);
                 for y in y..end {
-                    self.map.lattices[0].set_row(y, &self.map.layers);
+                    self.map.set_row(y);
                     self.map.mark_guided(y);
+                }
+                if end == height {
+                    self.map.set_links();
                 }
                 if end < height { Stage::Costs { y: end } } else { Stage::Sites }
             }
@@ -207,8 +237,9 @@ impl VoronoiBake {
                 } else {
                     self.map.strokes = Some(pairs.report());
                     let mut rng = Rng::new(self.seed).stream("sites");
-                    let points = pairs.finish(self.map.frame.extent(), &mut rng);
-                    self.map.sites = points.into_iter().map(|point| texel(&self.map.frame, point)).collect();
+                    let ground = self.map.ground();
+                    let points = pairs.finish(ground, &mut rng).into_iter().filter(|point| ground.has_room(*point));
+                    self.map.sites = points.map(|point| texel(ground.frame, point)).collect();
                     self.first_level()
                 }
             }
@@ -229,14 +260,15 @@ impl VoronoiBake {
                     Stage::Done(Seams::default())
                 }
             }
-            Stage::Seams(mut tracer) => match self.map.levels.last() {
-                Some(level) if tracer.scan(level, rows) => Stage::Seams(tracer),
-                _ => {
+            Stage::Seams(mut tracer) => {
+                if self.map.scan(&mut tracer, rows) {
+                    Stage::Seams(tracer)
+                } else {
                     let (seams, full) = self.map.follow(tracer);
                     self.map.full_cost = Some(full);
                     Stage::Done(seams)
                 }
-            },
+            }
             done @ Stage::Done(_) => done,
         };
         let share = self.share();
@@ -287,11 +319,11 @@ impl VoronoiBake {
     fn lay_sites(&mut self) -> Stage {
         let map = &mut self.map;
         if map.params.layout == SiteLayout::StrokePairs
-            && let Some(pairs) = StrokePairs::new(&map.frame, &map.layers, map.params.sites.min(MAX_SITES) as usize)
+            && let Some(pairs) = StrokePairs::new(map.ground(), &map.layers, map.params.sites.min(MAX_SITES) as usize)
         {
             return Stage::StrokePairs(Box::new(pairs));
         }
-        map.sites = sites(&map.params, &map.frame, self.seed);
+        map.sites = sites(&map.params, map.ground(), self.seed);
         self.first_level()
     }
 
@@ -305,7 +337,7 @@ impl VoronoiBake {
     fn next_level(&mut self) -> Stage {
         let map = &mut self.map;
         let n = map.sites_of(map.levels.len());
-        map.levels.push(Level::new(map.frame.size(), &map.sites[..n], n, !map.levels.is_empty()));
+        map.levels.push(map.level(n, !map.levels.is_empty()));
         Stage::Search
     }
 }
@@ -314,6 +346,35 @@ impl VoronoiMap {
     #[cfg(test)]
     pub(super) fn lattice(&self, level: usize) -> &Lattice {
         &self.lattices[level]
+    }
+
+    const fn ground(&self) -> MapGround<'_> {
+        MapGround { frame: &self.frame, charts: self.charts.as_ref() }
+    }
+
+    /// A search from the first `n` sites that has not begun.
+    fn level(&self, n: usize, has_walls: bool) -> Level {
+        let size = self.frame.size();
+        let mut level = Level::new(size, &self.sites[..n], n, has_walls || self.charts.is_some());
+        if let Some(charts) = &self.charts {
+            level.close_gaps(charts, size);
+        }
+        level
+    }
+
+    /// Computes the edges of row `y` of the first lattice.
+    fn set_row(&mut self, y: usize) {
+        self.lattices[0].set_row(y, &self.layers);
+        if let Some(charts) = &self.charts {
+            charts.wall_row(&mut self.lattices[0], y);
+        }
+    }
+
+    /// Computes the links of the first lattice.
+    fn set_links(&mut self) {
+        if let Some(charts) = &self.charts {
+            self.lattices[0].set_links(charts.links(), &self.layers);
+        }
     }
 
     const fn height(&self) -> usize {
@@ -342,6 +403,9 @@ impl VoronoiMap {
         let width = self.frame.size().x as usize;
         let (mut row, mut below) = (vec![0; width], vec![0; width]);
         if let (Some(level), Some(lattice)) = (self.levels.last(), self.lattices.last_mut()) {
+            if rows.start == 0 {
+                level.wall_links(lattice);
+            }
             for y in rows {
                 level.wall_row(lattice, y, &mut row, &mut below);
             }
@@ -392,16 +456,23 @@ impl VoronoiMap {
         (x < size.x && y < size.y).then(|| y as usize * size.x as usize + x as usize)
     }
 
-    /// The region of a texel: the index of its site. `None` outside, and where there are no sites.
-    #[must_use]
-    pub fn region(&self, x: u32, y: u32) -> Option<u32> {
-        Some(self.levels.last()?.region(self.index(x, y)?))
+    /// The last level, and the number there of a texel that belongs to a region.
+    fn reached(&self, x: u32, y: u32) -> Option<(&Level, usize)> {
+        let (level, i) = (self.levels.last()?, self.index(x, y)?);
+        let is_surface = self.charts.as_ref().is_none_or(|charts| charts.is_surface(UVec2::new(x, y)));
+        (is_surface && level.is_reached(i)).then_some((level, i))
     }
 
-    /// Cost of the shortest path from the site to a texel, in units of β / 256. `None` outside, and where there are no sites.
+    /// The region of a texel: the index of its site. `None` outside, and where no path from a site leads.
+    #[must_use]
+    pub fn region(&self, x: u32, y: u32) -> Option<u32> {
+        self.reached(x, y).map(|(level, i)| level.region(i))
+    }
+
+    /// Cost of the shortest path from the site to a texel, in units of β / 256. `None` outside, and where no path from a site leads.
     #[must_use]
     pub fn cost(&self, x: u32, y: u32) -> Option<u64> {
-        Some(self.levels.last()?.units(self.index(x, y)?))
+        self.reached(x, y).map(|(level, i)| level.units(i))
     }
 
     /// Costs of the edges from a texel to its right and down in the finest level, in units of β / 256; `None` where
@@ -419,13 +490,12 @@ impl VoronoiMap {
     }
 
     fn search_level_again(&mut self, i: usize) {
-        let (level, lattice) = (&mut self.levels[i], &self.lattices[i]);
-        let sites = &self.sites[..level.n_sites()];
-        *level = Level::new(self.frame.size(), sites, sites.len(), level.has_walls());
-        while level.advance(lattice, sites, usize::MAX) {}
+        let (n, has_walls) = (self.levels[i].n_sites(), self.levels[i].has_walls());
+        self.levels[i] = self.level(n, has_walls);
+        while self.levels[i].advance(&self.lattices[i], &self.sites[..n], usize::MAX) {}
     }
 
-    /// The regions of all texels; `None` where there are no sites.
+    /// The regions of all texels; `None` where there are no sites. Those of texels that show nothing of the surface mean nothing.
     #[must_use]
     pub fn regions(&self) -> Option<Grid<u32>> {
         let level = self.levels.last()?;
@@ -445,7 +515,7 @@ impl VoronoiMap {
             weight: layers.iter().map(Layer::weight_in_beta).fold(0.0, f32::max),
             layers,
         };
-        tracer.finish(&self.levels, &self.params, &self.frame, &guides, self.full_cost)
+        tracer.finish(&self.levels, &self.params, self.ground(), &guides, self.full_cost)
     }
 
     /// Makes the most expensive cracks of the current map the widest, as they were when the map was made.
@@ -469,10 +539,8 @@ impl VoronoiMap {
     /// ```
     pub fn rescale_widths(&mut self) {
         self.full_cost = None;
-        if let Some(level) = self.levels.last() {
-            let mut tracer = Tracer::new(self.frame.size());
-            tracer.scan(level, self.height());
-            self.full_cost = Some(self.follow(tracer).1);
+        if !self.levels.is_empty() {
+            self.full_cost = Some(self.traced().1);
         }
     }
 
@@ -482,19 +550,27 @@ impl VoronoiMap {
     /// weights change.
     #[must_use]
     pub fn seams(&self) -> Seams {
-        let mut tracer = Tracer::new(self.frame.size());
-        match self.levels.last() {
-            Some(level) => {
-                tracer.scan(level, self.height());
-                self.follow(tracer).0
-            }
-            None => Seams { extent: self.frame.extent(), ..Seams::default() },
+        if self.levels.is_empty() {
+            return Seams { extent: self.frame.extent(), ..Seams::default() };
         }
+        self.traced().0
+    }
+
+    /// The seams, and the cost of full width.
+    fn traced(&self) -> (Seams, f32) {
+        let mut tracer = Tracer::new(self.frame.size());
+        self.scan(&mut tracer, self.height());
+        self.follow(tracer)
+    }
+
+    /// Has a tracer look for boundaries in some further rows; returns whether there are more.
+    fn scan(&self, tracer: &mut Tracer, rows: usize) -> bool {
+        self.levels.last().is_some_and(|level| tracer.scan(level, self.charts.as_ref(), rows))
     }
 
     /// Changes the weights of the guides and keeps sites and noise (Mould 2005, section 6.1, and eq. 4).
     ///
-    /// Only what can change is computed: the texels whose path used an edge that became more expensive, and those to
+    /// Only what can change is computed (all of it on [`MapCharts`] with links): the texels whose path used an edge that became more expensive, and those to
     /// which a cheaper edge gives a shorter path. The result equals a new map.
     ///
     /// ```
@@ -528,7 +604,8 @@ impl VoronoiMap {
         }
         for i in 0..self.levels.len() {
             let n_changed = if i == 0 { self.change_base() } else { self.change_walls(i) };
-            if n_changed * MOST_CHANGES > self.lattices[i].n_texels() {
+            let has_links = !self.lattices[i].links().is_empty();
+            if has_links || n_changed * MOST_CHANGES > self.lattices[i].n_texels() {
                 self.search_level_again(i);
                 continue;
             }
@@ -544,7 +621,8 @@ impl VoronoiMap {
     fn change_base(&mut self) -> usize {
         let (width, height) = (self.frame.size().x as usize, self.height());
         let blocks = width.div_ceil(BLOCK);
-        let (lattice, layers) = (&mut self.lattices[0], &self.layers[..]);
+        self.set_links();
+        let (lattice, layers, charts) = (&mut self.lattices[0], &self.layers[..], self.charts.as_ref());
         let Some(level) = self.levels.first_mut() else { return 0 };
         let mut n_changed = 0;
         let mut new = [0; BLOCK];
@@ -553,9 +631,15 @@ impl VoronoiMap {
             let x1 = (x0 + BLOCK).min(width);
             let new = &mut new[..x1 - x0];
             edges_across(new, layers, y, x0);
+            if let Some(charts) = charts {
+                charts.wall(new, y, x0, false);
+            }
             n_changed += level.take_over(&mut lattice.across_mut(y)[x0..x1], new, x0, y, false);
             if y + 1 < height {
                 edges_down(new, layers, y, x0);
+                if let Some(charts) = charts {
+                    charts.wall(new, y, x0, true);
+                }
                 n_changed += level.take_over(&mut lattice.down_mut(y)[x0..x1], new, x0, y, true);
             }
         }
@@ -566,6 +650,7 @@ impl VoronoiMap {
     fn change_walls(&mut self, i: usize) -> usize {
         let width = self.frame.size().x as usize;
         let mut new = self.lattices[0].clone();
+        self.levels[i - 1].wall_links(&mut new);
         let (mut row, mut below) = (vec![0; width], vec![0; width]);
         let mut n_changed = 0;
         let lattice = &mut self.lattices[i];
@@ -574,6 +659,7 @@ impl VoronoiMap {
             n_changed += self.levels[i].take_over(lattice.across_mut(y), new.across(y), 0, y, false);
             n_changed += self.levels[i].take_over(lattice.down_mut(y), new.down(y), 0, y, true);
         }
+        core::mem::swap(lattice.links_mut(), new.links_mut());
         n_changed
     }
 }

@@ -41,6 +41,15 @@ pub(super) struct Lattice {
     across: Vec<u16>,
     /// From (x, y) to (x, y + 1); a wall in the last row.
     down: Vec<u16>,
+    /// Edges between texels that are not beside one another.
+    links: Vec<LatticeLink>,
+}
+
+/// An edge between two texels anywhere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct LatticeLink {
+    pub ends: [u32; 2],
+    pub cost: u16,
 }
 
 /// The larger value between neighbours, weighed: `weight * max / 65536`.
@@ -53,7 +62,7 @@ impl Lattice {
     /// Every edge is a wall until [`set_row`](Self::set_row).
     pub(super) fn new(size: UVec2) -> Self {
         let n = size.x as usize * size.y as usize;
-        Self { size, across: vec![WALL; n], down: vec![WALL; n] }
+        Self { size, across: vec![WALL; n], down: vec![WALL; n], links: Vec::new() }
     }
 
     pub(super) const fn size(&self) -> UVec2 {
@@ -92,6 +101,27 @@ impl Lattice {
     #[inline(always)]
     pub(super) fn edges(&self, i: usize) -> (u16, u16) {
         (self.across[i], self.down[i])
+    }
+
+    pub(super) fn links(&self) -> &[LatticeLink] {
+        &self.links
+    }
+
+    pub(super) fn links_mut(&mut self) -> &mut Vec<LatticeLink> {
+        &mut self.links
+    }
+
+    /// Computes the costs of links between these texels from `layers`.
+    pub(super) fn set_links(&mut self, links: &[[u32; 2]], layers: &[Layer]) {
+        let cost = |[a, b]: [u32; 2]| {
+            let of = |layer: &Layer| {
+                let values = layer.values.as_slice();
+                weigh(values[a as usize], values[b as usize], layer.weight)
+            };
+            UNIT + layers.iter().map(of).sum::<u16>()
+        };
+        self.links.clear();
+        self.links.extend(links.iter().map(|ends| LatticeLink { ends: *ends, cost: cost(*ends) }));
     }
 
     /// Computes the edges of row `y` to the right and down from `layers`.

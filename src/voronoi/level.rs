@@ -1,6 +1,7 @@
 //! One generation of regions: [`Level`].
 
 use super::{
+    MapCharts,
     lattice::{Lattice, UNIT, WALL},
     search::{Packed, Search},
 };
@@ -43,6 +44,20 @@ impl Level {
         let mut level = Self { paths, n_sites: 0, walls };
         level.add_sites(sites);
         level
+    }
+
+    /// Texels that show nothing of the surface keep no search waiting.
+    pub(super) fn close_gaps(&mut self, charts: &MapCharts, size: UVec2) {
+        for y in 0..size.y {
+            for x in (0..size.x).filter(|x| !charts.is_surface(UVec2::new(*x, y))) {
+                paths!(&mut self.paths, search => search.close((y * size.x + x) as usize));
+            }
+        }
+    }
+
+    /// Whether a texel belongs to a region.
+    pub(super) fn is_reached(&self, texel: usize) -> bool {
+        paths!(&self.paths, search => search.is_reached(texel))
     }
 
     /// Adds sites after the existing ones.
@@ -127,6 +142,16 @@ impl Level {
     /// Path cost in β.
     pub(super) fn cost(&self, texel: usize) -> f32 {
         self.units(texel) as f32 / f32::from(UNIT)
+    }
+
+    /// Puts walls into the links of `lattice` between the regions of this level.
+    pub(super) fn wall_links(&self, lattice: &mut Lattice) {
+        for link in lattice.links_mut() {
+            let [a, b] = link.ends.map(|end| self.region(end as usize));
+            if a != b {
+                link.cost = WALL;
+            }
+        }
     }
 
     /// Puts walls between the regions of this level into row `y` of `lattice`.

@@ -12,7 +12,8 @@
 //! middle.
 //!
 //! [`VoronoiParams`] and [`Guide`] hold the settings, [`VoronoiBake`] computes the map row by row. [`VoronoiMap`]
-//! holds regions and costs of every texel, [`Seams`] the cracks as lines. [`SeamMotion`] moves them as weights change. Costs are integers (β is 256 units), so the
+//! holds regions and costs of every texel, [`Seams`] the cracks as lines. [`SeamMotion`] moves them as weights change. [`MapCharts`] is a
+//! surface that is no rectangle. Costs are integers (β is 256 units), so the
 //! map is the same on every machine; ties go to the lower site.
 //!
 //! Differs from the paper: a level of cracks divides the regions of the level before exactly, as if crossing an older
@@ -34,6 +35,7 @@
 //! ```
 
 mod bake;
+mod charts;
 mod edges;
 mod front;
 mod ink;
@@ -54,6 +56,7 @@ mod trace;
 mod widths;
 
 pub use bake::{BakeStatus, VoronoiBake, VoronoiMap};
+pub use charts::MapCharts;
 pub use edges::edges;
 pub use front::{FRONT_STEP, Front};
 pub use ink::{ink, lightness};

@@ -204,6 +204,12 @@ pub enum VoronoiError {
     /// A size that a surface cannot have.
     #[error(transparent)]
     Size(#[from] FrameError),
+    /// A link of [`MapCharts`](super::MapCharts) does not join two texels of charts.
+    #[error("link {index} does not join two texels of charts")]
+    Link {
+        /// Its number.
+        index: usize,
+    },
     /// There is no memory for a map of this size.
     #[error(transparent)]
     Memory(#[from] OutOfMemory),

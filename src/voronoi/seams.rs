@@ -6,9 +6,9 @@ use glam::Vec2;
 /// A point where seams end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SeamVertex {
-    /// Position, pattern units. On the border one coordinate is exactly zero or the extent.
+    /// Position, pattern units. On the border of a plain surface one coordinate is exactly zero or the extent.
     pub pos: Vec2,
-    /// Whether it lies on the border of the surface.
+    /// Whether it lies on the border of the surface, or of a chart of [`MapCharts`](super::MapCharts).
     pub on_border: bool,
 }
 

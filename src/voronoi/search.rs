@@ -2,7 +2,7 @@
 //!
 //! Cost and site of a texel are packed into one number, with the cost in the high bits, so that one `min` compares
 //! both and a tie goes to the lower site. Rows are swept down and up: each row takes cheaper paths from the row
-//! before, then propagates them along itself, right and left. The result has the costs of Dijkstra's method, because
+//! before, then propagates them along itself, right and left. After each sweep paths go over the links of the lattice. The result has the costs of Dijkstra's method, because
 //! a row is at rest only if no neighbour offers a cheaper path. Rows are divided into blocks with time stamps, so
 //! that a block at rest beside blocks at rest is skipped.
 
@@ -152,6 +152,16 @@ impl<P: Packed> Search<P> {
         self.stir(texel.x as usize, texel.y as usize);
     }
 
+    /// Keeps paths from a texel that has no edge.
+    pub(super) fn close(&mut self, texel: usize) {
+        self.field[texel] = P::site(0);
+    }
+
+    /// Whether a path has reached a texel.
+    pub(super) fn is_reached(&self, texel: usize) -> bool {
+        self.field[texel] < P::FAR
+    }
+
     /// Marks the block of a texel so that it and its neighbours are visited again.
     fn stir(&mut self, x: usize, y: usize) {
         self.stamps[y * self.blocks + x / BLOCK] = Stamps { changed: self.clock, looked: [0; 2], stirred: true };
@@ -189,6 +199,8 @@ impl<P: Packed> Search<P> {
     ///
     /// A texel whose path used an edge that became more expensive is reset, and with it every texel whose path may
     /// depend on it; the others stay. No texel can depend on itself, because each step has a cost above zero.
+    ///
+    /// The lattice must have no links.
     pub(super) fn reconsider(&mut self, lattice: &Lattice) {
         let w = self.size.x as usize;
         while let Some(suspect) = self.suspects.pop() {
@@ -267,9 +279,27 @@ impl<P: Packed> Search<P> {
             }
             self.upwards = !self.upwards;
             self.sweeps += 1;
+            self.moved |= self.follow_links(lattice);
             self.quiet = if self.moved { 0 } else { self.quiet + 1 };
             self.moved = false;
         }
+    }
+
+    /// Takes cheaper paths over links; returns whether there were any.
+    fn follow_links(&mut self, lattice: &Lattice) -> bool {
+        let mut any = false;
+        for link in lattice.links() {
+            let [a, b] = link.ends.map(|end| end as usize);
+            for (from, to) in [(a, b), (b, a)] {
+                let by = step::<P, true>(self.field[from], link.cost);
+                if by < self.field[to] {
+                    self.field[to] = by;
+                    any = true;
+                    self.stir(to % self.size.x as usize, to / self.size.x as usize);
+                }
+            }
+        }
+        any
     }
 
     /// Sweeps to the end.

@@ -1,10 +1,13 @@
 //! Layouts of sites.
 
-use super::{SiteLayout, VoronoiParams, params::MAX_SITES};
+use super::{
+    SiteLayout, VoronoiParams,
+    charts::{MapGround, texel},
+    params::MAX_SITES,
+};
 use crate::{
     Grid,
     math::{Rng, ops},
-    pattern::SurfaceFrame,
 };
 use glam::{UVec2, Vec2};
 
@@ -14,28 +17,42 @@ const TRIES: u32 = 30;
 /// Factor by which the distance is reduced.
 const CLOSER: f32 = 0.93;
 
-/// The texel of a point, pattern units.
-pub(super) fn texel(frame: &SurfaceFrame, pos: Vec2) -> UVec2 {
-    frame.to_texel(pos).max(Vec2::ZERO).as_uvec2().min(frame.size() - 1)
-}
-
 /// The sites of every layout except [`SiteLayout::StrokePairs`], ordered so that every prefix is such a layout too.
-pub(super) fn sites(params: &VoronoiParams, frame: &SurfaceFrame, seed: u64) -> Vec<UVec2> {
+pub(super) fn sites(params: &VoronoiParams, ground: MapGround<'_>, seed: u64) -> Vec<UVec2> {
     let mut rng = Rng::new(seed).stream("sites");
     let n = params.sites.min(MAX_SITES) as usize;
-    let extent = frame.extent();
+    let extent = ground.frame.extent();
+    let has_room = |point: Vec2| ground.has_room(point);
     let points = match &params.layout {
-        SiteLayout::Uniform => (0..n).map(|_| Vec2::new(rng.unit(), rng.unit()) * extent).collect(),
-        SiteLayout::Even | SiteLayout::StrokePairs => even(n, Vec::new(), extent, &mut rng, |_| true),
-        SiteLayout::Impact { at, focus } => around(n, *at, *focus, extent, &mut rng),
+        SiteLayout::Uniform => {
+            let mut point = || Vec2::new(rng.unit(), rng.unit()) * extent;
+            (0..n).map(|_| first_with_room(&mut point, has_room)).collect()
+        }
+        SiteLayout::Even | SiteLayout::StrokePairs => even(n, Vec::new(), extent, &mut rng, has_room),
+        SiteLayout::Impact { at, focus } => around(n, *at, *focus, ground, &mut rng),
         SiteLayout::Density(density) => {
-            by_density(n, density, extent, &mut rng).unwrap_or_else(|| even(n, Vec::new(), extent, &mut rng, |_| true))
+            by_density(n, density, ground, &mut rng).unwrap_or_else(|| even(n, Vec::new(), extent, &mut rng, has_room))
         }
         SiteLayout::Given(points) => {
             points.iter().copied().filter(|point| point.is_finite()).take(MAX_SITES as usize).collect()
         }
     };
-    points.into_iter().map(|point| texel(frame, point)).collect()
+    points.into_iter().filter(|point| has_room(*point)).map(|point| texel(ground.frame, point)).collect()
+}
+
+/// Points that are drawn until one has room.
+const DRAWS: usize = 64;
+
+/// The first of some points that has room, or the last of them.
+fn first_with_room(mut point: impl FnMut() -> Vec2, has_room: impl Fn(Vec2) -> bool) -> Vec2 {
+    let mut drawn = point();
+    for _ in 1..DRAWS {
+        if has_room(drawn) {
+            break;
+        }
+        drawn = point();
+    }
+    drawn
 }
 
 /// Adds points to `points` until there are `n`, each as far from all others as a few darts can find.
@@ -80,15 +97,16 @@ pub(super) fn even(
     points
 }
 
-fn around(n: usize, at: Vec2, focus: f32, extent: Vec2, rng: &mut Rng) -> Vec<Vec2> {
+fn around(n: usize, at: Vec2, focus: f32, ground: MapGround<'_>, rng: &mut Rng) -> Vec<Vec2> {
+    let extent = ground.frame.extent();
     let at = at.clamp(Vec2::ZERO, extent);
     let reach = at.max(extent - at).length();
     let mut point = || {
         // At least a quarter of the circle lies on the surface.
-        for _ in 0..64 {
+        for _ in 0..DRAWS {
             let radius = reach * ops::powf(rng.unit(), focus);
             let point = at + ops::unit(rng.unit() * std::f32::consts::TAU) * radius;
-            if point.cmpge(Vec2::ZERO).all() && point.cmplt(extent).all() {
+            if point.cmpge(Vec2::ZERO).all() && point.cmplt(extent).all() && ground.has_room(point) {
                 return point;
             }
         }
@@ -98,7 +116,7 @@ fn around(n: usize, at: Vec2, focus: f32, extent: Vec2, rng: &mut Rng) -> Vec<Ve
 }
 
 /// `None` where the density is zero everywhere.
-fn by_density(n: usize, density: &Grid<f32>, extent: Vec2, rng: &mut Rng) -> Option<Vec<Vec2>> {
+fn by_density(n: usize, density: &Grid<f32>, ground: MapGround<'_>, rng: &mut Rng) -> Option<Vec<Vec2>> {
     let most = density.as_slice().iter().copied().filter(|value| value.is_finite()).fold(0.0, f32::max);
     if most <= 0.0 {
         return None;
@@ -114,12 +132,12 @@ fn by_density(n: usize, density: &Grid<f32>, extent: Vec2, rng: &mut Rng) -> Opt
             sum
         })
         .collect();
-    let cell = extent / density.size().as_vec2();
-    let point = |_| {
+    let cell = ground.frame.extent() / density.size().as_vec2();
+    let mut point = || {
         let drawn = (u128::from(u64::from(rng.next_u32()) << 32 | u64::from(rng.next_u32())) * u128::from(sum)) >> 64;
         let i = sums.partition_point(|&sum| u128::from(sum) <= drawn);
         let corner = Vec2::new((i % density.width()) as f32, (i / density.width()) as f32);
         (corner + Vec2::new(rng.unit(), rng.unit())) * cell
     };
-    Some((0..n).map(point).collect())
+    Some((0..n).map(|_| first_with_room(&mut point, |point| ground.has_room(point))).collect())
 }

@@ -1,11 +1,13 @@
 //! The strokes of the guides, and sites on both sides of them.
 
 use super::{
+    MapCharts,
+    charts::MapGround,
     lattice::{Lattice, Layer},
     level::Level,
     sites::even,
 };
-use crate::{Grid, math::Rng, pattern::SurfaceFrame};
+use crate::{Grid, math::Rng};
 use glam::{IVec2, UVec2, Vec2};
 
 /// Strokes are analysed on a lattice of at most this many texels, with a shorter side of at most [`SHORT_SIDE`].
@@ -54,6 +56,8 @@ pub struct StrokeReport {
 pub(super) struct StrokePairs {
     size: UVec2,
     scale: f32,
+    /// The surface with as few texels.
+    charts: Option<MapCharts>,
     ink: Vec<bool>,
     /// Distance to the nearest texel without ink; for texels without ink to the nearest one with ink; texels.
     inside: Vec<f32>,
@@ -80,24 +84,37 @@ const AROUND: [IVec2; 8] = [
 ];
 
 impl StrokePairs {
-    /// Prepares `n` sites over `frame`; `None` where the guides have no strokes.
+    /// Prepares `n` sites; `None` where the guides have no strokes.
     ///
     /// `layers` are noise and guides of the surface, of its own size.
-    pub(super) fn new(frame: &SurfaceFrame, layers: &[Layer], n: usize) -> Option<Self> {
+    pub(super) fn new(MapGround { frame, charts }: MapGround<'_>, layers: &[Layer], n: usize) -> Option<Self> {
         let full = frame.size().as_vec2();
         let shrink = (full.min_element() / SHORT_SIDE).max((full.x * full.y / MOST_TEXELS).sqrt()).max(1.0);
         let size = (full / shrink).ceil().max(Vec2::ONE).as_uvec2();
         let pooled: Vec<Layer> = layers.iter().map(|layer| shrunk(layer, size)).collect();
-        let ink: Vec<bool> = (0..(size.x * size.y) as usize)
-            .map(|i| pooled[1..].iter().any(|layer| layer.values.as_slice()[i] >= INK))
+        let charts = charts.map(|charts| charts.shrunk(size));
+        let is_surface: Vec<bool> = (0..size.x * size.y)
+            .map(|i| charts.as_ref().is_none_or(|charts| charts.is_inside(UVec2::new(i % size.x, i / size.x))))
             .collect();
-        let amount = ink.iter().filter(|&&ink| ink).count() as f32 / ink.len() as f32;
+        let ink: Vec<bool> = (is_surface.iter().enumerate())
+            .map(|(i, is_surface)| *is_surface && pooled[1..].iter().any(|layer| layer.values.as_slice()[i] >= INK))
+            .collect();
+        let surface = is_surface.iter().filter(|is_surface| **is_surface).count();
+        let amount = ink.iter().filter(|&&ink| ink).count() as f32 / surface.max(1) as f32;
         if amount == 0.0 || amount > MOST_INK || n < 4 {
             return None;
         }
         let mut lattice = Lattice::new(size);
         for y in 0..size.y as usize {
             lattice.set_row(y, &pooled);
+            if let Some(charts) = &charts {
+                charts.wall_row(&mut lattice, y);
+            }
+        }
+        let mut level = Level::new(size, &[], n, charts.is_some());
+        if let Some(charts) = &charts {
+            lattice.set_links(charts.links(), &pooled);
+            level.close_gaps(charts, size);
         }
         let not_ink: Vec<bool> = ink.iter().map(|ink| !ink).collect();
         Some(Self {
@@ -108,7 +125,8 @@ impl StrokePairs {
             middle: thin(&ink, size),
             ink,
             lattice,
-            level: Level::new(size, &[], n, false),
+            level,
+            charts,
             sites: Vec::new(),
             most: n,
             budget: (n as f32 * AT_ONCE) as usize,
@@ -137,13 +155,13 @@ impl StrokePairs {
     }
 
     /// All sites, pattern units: first those beside strokes in pairs, then the remaining ones evenly beside the strokes.
-    pub(super) fn finish(self, extent: Vec2, rng: &mut Rng) -> Vec<Vec2> {
+    pub(super) fn finish(self, ground: MapGround<'_>, rng: &mut Rng) -> Vec<Vec2> {
         let points = self.sites.iter().map(|site| (site.as_vec2() + 0.5) / self.scale).collect();
         let beside = |point: Vec2| {
             let at = (point * self.scale).max(Vec2::ZERO).as_uvec2().min(self.size - 1);
-            self.outside[self.index(at)] > GAP + 2.0
+            self.outside[self.index(at)] > GAP + 2.0 && ground.has_room(point)
         };
-        even(self.most, points, extent, rng, beside)
+        even(self.most, points, ground.frame.extent(), rng, beside)
     }
 
     const fn index(&self, at: UVec2) -> usize {
@@ -154,8 +172,10 @@ impl StrokePairs {
         UVec2::new(i % self.size.x, i / self.size.x)
     }
 
+    /// Whether there is ink; `None` beside the surface.
     fn has_ink(&self, at: IVec2) -> Option<bool> {
         let inside = at.min_element() >= 0 && at.cmplt(self.size.as_ivec2()).all();
+        let inside = inside && self.charts.as_ref().is_none_or(|charts| charts.is_inside(at.as_uvec2()));
         inside.then(|| self.ink[self.index(at.as_uvec2())])
     }
 

@@ -1,5 +1,6 @@
 //! The room against slow and plain versions of itself.
 
+mod charts;
 mod seams;
 
 use super::{
@@ -44,6 +45,15 @@ pub(super) fn dijkstra(lattice: &Lattice, sites: &[UVec2]) -> Vec<Option<(u64, u
         }
         if at >= w {
             go(at - w, lattice.edges(at - w).1);
+        }
+        for link in lattice.links() {
+            let [a, b] = link.ends.map(|end| end as usize);
+            if a == at {
+                go(b, link.cost);
+            }
+            if b == at {
+                go(a, link.cost);
+            }
         }
     }
     best

@@ -7,12 +7,14 @@
 //! lines touch only at their ends.
 
 use super::{
+    MapCharts,
+    charts::MapGround,
     level::Level,
     params::VoronoiParams,
     seams::{Seam, SeamVertex, Seams},
     widths::{ASIDE, Cost, Guidance, RUN_OUT, UNEVEN, Way, Widths, dearest, run_out, smooth, without_thorns},
 };
-use crate::pattern::{PathPoint, SurfaceFrame};
+use crate::pattern::PathPoint;
 use glam::{IVec2, UVec2, Vec2};
 
 /// How often the threads are tightened. Once leaves stairs, twenty times smooths away what the noise has made.
@@ -92,7 +94,7 @@ impl Tracer {
     }
 
     /// Searches up to `rows` further rows for boundaries; returns whether there are more.
-    pub(super) fn scan(&mut self, level: &Level, rows: usize) -> bool {
+    pub(super) fn scan(&mut self, level: &Level, charts: Option<&MapCharts>, rows: usize) -> bool {
         let (w, h) = (self.size.x as usize, self.size.y as usize);
         for _ in 0..rows {
             if self.row == h {
@@ -116,6 +118,9 @@ impl Tracer {
             }
             for (edge, pair) in edges.iter_mut().zip(row.windows(2)) {
                 *edge |= if pair[0] == pair[1] { 0 } else { RIGHT };
+            }
+            if let Some(charts) = charts {
+                charts.disjoin(edges, self.row, [RIGHT, DOWN]);
             }
             self.row += 1;
         }
@@ -146,7 +151,10 @@ impl Tracer {
     }
 
     /// The continuation of a boundary that reaches `corner` through `side`.
-    fn corner(&self, level: &Level, corner: IVec2, side: usize) -> Corner {
+    fn corner(&self, level: &Level, charts: Option<&MapCharts>, corner: IVec2, side: usize) -> Corner {
+        if charts.is_some_and(|charts| !charts.is_whole(corner)) {
+            return Corner::End;
+        }
         let mut others = (0..4).filter(|&other| other != side && self.is_boundary(corner, other));
         match (others.next(), others.next(), others.next()) {
             (Some(other), None, None) => Corner::Pass(other),
@@ -169,7 +177,13 @@ impl Tracer {
     }
 
     /// Follows a boundary from `corner` through `side` to its end.
-    fn follow(&mut self, level: &Level, mut corner: IVec2, mut side: usize) -> (Vec<Crossing>, IVec2) {
+    fn follow(
+        &mut self,
+        level: &Level,
+        charts: Option<&MapCharts>,
+        mut corner: IVec2,
+        mut side: usize,
+    ) -> (Vec<Crossing>, IVec2) {
         let mut crossings = Vec::new();
         while let Some((texel, bit)) = self.edge(corner, side)
             && self.edges[texel] & (bit * SEEN) == 0
@@ -180,7 +194,7 @@ impl Tracer {
             let along = if bit == RIGHT { Vec2::X } else { Vec2::Y };
             crossings.push(Crossing { from, along, texel, bit, t: 0.5 });
             corner += SIDES[side];
-            match self.corner(level, corner, (side + 2) % 4) {
+            match self.corner(level, charts, corner, (side + 2) % 4) {
                 Corner::Pass(next) => side = next,
                 Corner::End => break,
             }
@@ -189,13 +203,16 @@ impl Tracer {
     }
 
     /// The lines of all boundaries, after the whole surface has been scanned.
-    fn lines(&mut self, level: &Level) -> (Vec<Joint>, Vec<Line>) {
+    fn lines(&mut self, level: &Level, charts: Option<&MapCharts>) -> (Vec<Joint>, Vec<Line>) {
         let size = self.size.as_ivec2();
         let (mut joints, mut lines) = (Vec::new(), Vec::new());
         let mut joint_at = std::collections::BTreeMap::new();
-        let mut joint = |joints: &mut Vec<Joint>, corner: IVec2| {
-            *joint_at.entry((corner.y, corner.x)).or_insert_with(|| {
-                let on_border = corner.x == 0 || corner.y == 0 || corner.x == size.x || corner.y == size.y;
+        let mut joint = |joints: &mut Vec<Joint>, corner: IVec2, texel: IVec2| {
+            // Lines of different charts have no end in common.
+            let chart = charts.map_or(0, |charts| charts.at(texel));
+            *joint_at.entry((corner.y, corner.x, chart)).or_insert_with(|| {
+                let is_outer = corner.x == 0 || corner.y == 0 || corner.x == size.x || corner.y == size.y;
+                let on_border = is_outer || charts.is_some_and(|charts| !charts.is_whole(corner));
                 joints.push(Joint { corner: corner.as_vec2(), pos: corner.as_vec2(), on_border });
                 joints.len() - 1
             })
@@ -216,11 +233,11 @@ impl Tracer {
                 ];
                 for (bit, corner, side) in ends {
                     let open = self.edges[i] & bit != 0 && self.edges[i] & (bit * SEEN) == 0;
-                    if !open || (!rings && self.corner(level, corner, side) != Corner::End) {
+                    if !open || (!rings && self.corner(level, charts, corner, side) != Corner::End) {
                         continue;
                     }
-                    let (crossings, end) = self.follow(level, corner, side);
-                    let ends = [joint(&mut joints, corner), joint(&mut joints, end)];
+                    let (crossings, end) = self.follow(level, charts, corner, side);
+                    let ends = [corner, end].map(|corner| joint(&mut joints, corner, texel));
                     lines.push(Line { ends, crossings });
                 }
             }
@@ -234,13 +251,14 @@ impl Tracer {
         mut self,
         levels: &[Level],
         params: &VoronoiParams,
-        frame: &SurfaceFrame,
+        ground: MapGround<'_>,
         guides: &Guidance<'_>,
         full: Option<f32>,
     ) -> (Seams, f32) {
+        let MapGround { frame, charts } = ground;
         let mut seams = Seams { extent: frame.extent(), ..Seams::default() };
         let Some(finest) = levels.last() else { return (seams, 1.0) };
-        let (mut joints, mut lines) = self.lines(finest);
+        let (mut joints, mut lines) = self.lines(finest, charts);
         tauten(&mut joints, &mut lines);
         let births: Vec<usize> = lines.iter().map(|line| self.birth(line, levels)).collect();
         let costs: Vec<Vec<Cost>> =

@@ -10,7 +10,7 @@ use bevy::{
     mesh::{Indices, PrimitiveTopology, VertexAttributeValues},
     prelude::*,
 };
-use bevy_crack::{math::Rng, plugin::ShardsError, prelude::*};
+use bevy_crack::{math::Rng, plugin::ShardsError, prelude::*, voronoi::VoronoiParams};
 
 const PLAIN: [u8; 4] = [180, 170, 160, 255];
 
@@ -341,10 +341,167 @@ fn s11_some_meshes_stay_as_they_are() {
     let texture = get::<CrackTextures>(&app, entity).diffuse.expect("a texture");
     let size = app.world().resource::<Assets<Image>>().get(&texture).expect("it").size();
     assert!(size.min_element() >= 3 * 512 && size.max_element() < 2200, "{size}");
-    // What would have its place in the picture comes too late.
-    app.world_mut().entity_mut(entity).insert(GuidedCracks::new(CrackGuide::text("HI")));
+    // What would have its place in the picture comes too late; cracks that are guided go where the picture is.
+    app.world_mut().entity_mut(entity).insert(CrackStrands::default());
     wait_for(&mut app, "an answer", |app| !app.world().resource::<Unbaked>().0.is_empty());
     assert!(matches!(app.world().resource::<Unbaked>().0[..], [CrackError::Bake { .. }]));
+    app.world_mut().entity_mut(entity).remove::<CrackStrands>();
+    app.world_mut().entity_mut(entity).insert(GuidedCracks::new(CrackGuide::text("HI")));
+    wait_for(&mut app, "the bake", |app| get::<BakeProgress>(app, entity).0 == 1.0);
+    assert_eq!(app.world().resource::<Unbaked>().0.len(), 1);
+}
+
+/// Whether some texel near a place, texels, is not plain, for places of a texture.
+fn is_cracked_near(texels: &[u8], size: UVec2, at: Vec2, reach: i32) -> bool {
+    let at = at.as_ivec2();
+    let around = (-reach..=reach).flat_map(|y| (-reach..=reach).map(move |x| at + IVec2::new(x, y)));
+    let on = around.filter(|texel| texel.min_element() >= 0 && texel.cmplt(size.as_ivec2()).all());
+    let texel = |at: IVec2| texels.as_chunks::<4>().0[(at.y as u32 * size.x + at.x as u32) as usize];
+    on.into_iter().any(|at| texel(at) != PLAIN)
+}
+
+/// Where a body is cut, in steps of a texel, from either side: whether there is a crack just here, and one about there on the other side.
+fn at_cuts(app: &App, entity: Entity) -> Vec<[bool; 2]> {
+    let texture = get::<CrackTextures>(app, entity).diffuse.expect("a texture");
+    let size = app.world().resource::<Assets<Image>>().get(&texture).expect("it").size();
+    let texels = texels(app, &texture);
+    let key = |at: Vec3| (at * 1e3).round().as_ivec3().to_array();
+    let mut edges = std::collections::BTreeMap::<_, Vec<[Vec2; 2]>>::new();
+    for (corners, laid) in triangles(app, entity) {
+        for (i, j) in [(0, 1), (1, 2), (2, 0)] {
+            let (mut ends, mut places) = ([key(corners[i]), key(corners[j])], [laid[i], laid[j]]);
+            if ends[0] > ends[1] {
+                ends.reverse();
+                places.reverse();
+            }
+            edges.entry(ends).or_default().push(places);
+        }
+    }
+    let mut all = Vec::new();
+    for places in edges.values() {
+        let [[a, b], [p, q]] = places[..] else { continue };
+        if a.distance(p) < 0.5 && b.distance(q) < 0.5 {
+            continue;
+        }
+        let steps = a.distance(b).max(1.0) as u32;
+        for ((a, b), (p, q)) in [((a, b), (p, q)), ((p, q), (a, b))] {
+            all.extend((0..steps).map(|step| {
+                let share = (step as f32 + 0.5) / steps as f32;
+                let (here, there) = (a.lerp(b, share), p.lerp(q, share));
+                [is_cracked_near(&texels, size, here, 0), is_cracked_near(&texels, size, there, 3)]
+            }));
+        }
+    }
+    all
+}
+
+/// Cracks that are guided run over all of a body: where it is cut to lie flat they go on at the other side, as regions do. A word stands
+/// where its picture has it.
+#[test]
+fn guided_cracks_go_on_where_a_body_is_cut() {
+    let (mut app, material) = bodies(Some(solid(UVec2::new(200, 200), PLAIN)));
+    let meshes = [Mesh::from(Cuboid::new(2.0, 1.0, 1.4)), Sphere::new(1.0).mesh().ico(6).expect("few enough")];
+    for (i, mesh) in meshes.into_iter().enumerate() {
+        let mesh = add(&mut app, mesh);
+        let entity = spawn(&mut app, &mesh, &material, Transform::default());
+        // Thin ones of one width, so that what is seen is where they are.
+        let params = VoronoiParams { width: 0.003, least_width: 0.003, sites: 120, ..VoronoiParams::DEFAULT };
+        app.world_mut().entity_mut(entity).insert(GuidedCracks { params, max_side: 4096, ..default() });
+        wait_for(&mut app, "the bake", |app| get::<BakeProgress>(app, entity).0 == 1.0);
+        settle(&mut app, entity);
+        assert_sound(&app, entity);
+        assert!(get::<Mesh3d>(&app, entity).0 != mesh, "{i}: it is laid out");
+        let cuts = at_cuts(&app, entity);
+        // Against what is elsewhere on the other side. Some run along the cut, on one side of it.
+        let beside = |off: usize| {
+            let all = cuts.iter().enumerate().filter(|(_, [here, _])| *here);
+            all.filter(|(i, _)| cuts[(i + off) % cuts.len()][1]).count()
+        };
+        let here = cuts.iter().filter(|[here, _]| *here).count();
+        let (there, elsewhere) = (beside(0), beside(31));
+        assert!(here > 60 && there * 10 >= here * 7 && there > 2 * elsewhere, "{i}: {here} {there} {elsewhere}");
+        // It goes on living.
+        let nodes = state(&app, entity).nodes;
+        hit(&mut app, CrackHit::local(entity, Vec3::new(0.1, 0.9, 0.2)).with_energy(2.0));
+        settle(&mut app, entity);
+        assert!(state(&app, entity).nodes > nodes);
+        app.world_mut().commands().entity(entity).heal_cracks();
+        settle(&mut app, entity);
+        assert!(get::<Mesh3d>(&app, entity).0 == mesh, "{i}: as it was");
+    }
+    assert!(app.world().resource::<Unbaked>().0.is_empty());
+}
+
+#[derive(Resource, Default)]
+struct Covered(Vec<Option<f32>>);
+
+#[test]
+fn a_word_stands_where_the_picture_of_a_body_has_it() {
+    let (mut app, material) = bodies(Some(solid(UVec2::new(512, 256), PLAIN)));
+    app.init_resource::<Covered>();
+    app.add_observer(|event: On<CrackBaked>, mut covered: ResMut<Covered>| covered.0.push(event.covered));
+    let mesh = Cylinder::new(0.5, 1.0).mesh().resolution(64).without_caps().build();
+    let mesh = add(&mut app, mesh);
+    let own = |uv: Vec2| {
+        let angle = uv.x * core::f32::consts::TAU;
+        Vec3::new(0.5 * angle.cos(), 0.5 - uv.y, 0.5 * angle.sin())
+    };
+    for (i, appearance) in [
+        GuidedAppearance::AtOnce,
+        GuidedAppearance::Front { from: Vec2::new(0.2, 0.5), seconds: 0.2 },
+        GuidedAppearance::Emerge { seconds: 0.2 },
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let entity = spawn(&mut app, &mesh, &material, Transform::default());
+        let guided = GuidedCracks::new(CrackGuide::text("HI")).with_appearance(appearance);
+        app.world_mut().entity_mut(entity).insert(GuidedCracks { max_side: 4096, ..guided });
+        wait_for(&mut app, "the bake", |app| get::<BakeProgress>(app, entity).0 == 1.0);
+        settle(&mut app, entity);
+        assert!(get::<Mesh3d>(&app, entity).0 != mesh, "{i}: it is laid out");
+        let covered = app.world().resource::<Covered>().0[i].expect("there are strokes");
+        assert!(covered > 0.9, "{i}: {covered}");
+        // The broad strokes of the word, as the picture has them: the H from a quarter to the middle, the I beyond it.
+        let texture = get::<CrackTextures>(&app, entity).diffuse.expect("a texture");
+        let size = app.world().resource::<Assets<Image>>().get(&texture).expect("it").size();
+        let texels = texels(&app, &texture);
+        let laid = triangles(&app, entity);
+        let cracked = |uv: Vec2| {
+            let at = own(uv);
+            let near = |(corners, _): &&([Vec3; 3], [Vec2; 3])| {
+                let [a, b, c] = *corners;
+                let normal = (b - a).cross(c - a);
+                let weights = [(b, c), (c, a), (a, b)].map(|(p, q)| (p - at).cross(q - at).dot(normal));
+                weights.iter().all(|weight| *weight >= -1e-4) && (at - a).dot(normal.normalize()).abs() < 0.05
+            };
+            let (corners, places) = laid.iter().find(near).expect("a place on the cylinder");
+            let [a, b, c] = *corners;
+            let normal = (b - a).cross(c - a);
+            let [u, v, w] = [(b, c), (c, a), (a, b)].map(|(p, q)| (p - at).cross(q - at).dot(normal));
+            let place = (places[0] * u + places[1] * v + places[2] * w) / (u + v + w);
+            is_cracked_near(&texels, size, place, 2)
+        };
+        let font = bevy_crack::voronoi::FONT;
+        let word = bevy_crack::voronoi::draw_text(font, "HI", UVec2::new(512, 256), f32::INFINITY).expect("a font");
+        let (mut ink, mut hit) = (0, 0);
+        for y in (4..256).step_by(8) {
+            // The middle of each run of ink.
+            let row = word.row(y);
+            let mut x = 0;
+            while x < row.len() {
+                let run = row[x..].iter().take_while(|ink| **ink > 0.5).count();
+                if (8..64).contains(&run) {
+                    ink += 1;
+                    let uv = Vec2::new((x + run / 2) as f32 + 0.5, y as f32 + 0.5) / Vec2::new(512.0, 256.0);
+                    let around = [-0.012, -0.006, 0.0, 0.006, 0.012];
+                    hit += usize::from(around.into_iter().any(|off| cracked(uv + off * Vec2::X)));
+                }
+                x += run.max(1);
+            }
+        }
+        assert!(ink > 30 && hit * 10 >= ink * 9, "{i}: {hit} of {ink}");
+    }
 }
 
 /// Meshes that nothing can be made of, and those that change: no panic, one warning at the most, nothing is left.

@@ -16,6 +16,10 @@ use std::sync::Arc;
 ///
 /// The cracks take the place of those of an earlier bake. To hits they are older cracks: new ones start from them and, where the preset has
 /// [`arrest`](crate::growth::GrowthParams::arrest), stop at them. Cracks that hits made before are grown again around them, from the same places.
+///
+/// On a 3D mesh that is [laid out](super::CrackUnwrap) they run over all of the body (Mould 2005, section 8): regions go on where it is cut to lie
+/// flat, and guides lie where the mesh shows their part of its picture.
+///
 /// A guide is a picture, dark strokes on light or the other way round, or a text ([`CrackGuide::text`]).
 /// A [`CrackClock`](super::CrackClock) moves them as it moves all cracks. A changed picture keeps them, stretched if its
 /// proportions are others; removing the component keeps them too. Healing takes them away, for good until the component is changed.

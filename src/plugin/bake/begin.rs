@@ -15,7 +15,7 @@ use crate::plugin::surface::unfold::unfold;
 use bevy::prelude::*;
 
 const LAID_OUT: &str =
-    "its mesh is laid out around its first hit: add it before that, or set `CrackSurface::unwrap` to `Never`";
+    "its mesh is laid out around its first hit: add strands before that, or set `CrackSurface::unwrap` to `Never`";
 
 /// All that a bake needs; `None` if its pictures are not there yet.
 pub(super) fn begin(world: &mut World, entity: Entity, bake: &mut Bake) -> Result<Option<Work>, CrackError> {
@@ -24,6 +24,9 @@ pub(super) fn begin(world: &mut World, entity: Entity, bake: &mut Bake) -> Resul
         Baked::Guided => {
             let Some(guided) = world.get::<GuidedCracks>(entity).cloned() else { return Ok(None) };
             guided.validate()?;
+            if active(world, entity).is_none() && !unfold(world, entity) {
+                return Ok(None);
+            }
             (Some(guided), None)
         }
         Baked::Strands => {
@@ -45,7 +48,7 @@ pub(super) fn begin(world: &mut World, entity: Entity, bake: &mut Bake) -> Resul
             (None, Some(CracksOrder::Record(Box::new(record))))
         }
     };
-    if !matches!(bake.kind, Baked::Record)
+    if matches!(bake.kind, Baked::Strands)
         && active(world, entity).is_some_and(|active| active.carrier.unfolding.is_some())
     {
         return Err(CrackError::Bake { reason: LAID_OUT.to_owned() });

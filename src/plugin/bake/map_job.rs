@@ -6,12 +6,13 @@ use crate::pattern::Network;
 use crate::plugin::api::{CrackError, CrackRecord, GuidedAppearance, GuidedCracks};
 use crate::plugin::source::mask;
 use crate::plugin::source::picture::{self, BasePicture, Space};
-use crate::plugin::source::png;
+use crate::plugin::source::png::{self, MAX_SIDE};
+use crate::plugin::source::unfolding::Unfolding;
 use crate::plugin::surface::cracks::Added;
 use crate::plugin::surface::inputs::{BaseAndMask, SurfaceInputs};
 use crate::plugin::surface::motion::Motion;
 use crate::raster::TexelRect;
-use crate::voronoi::{self, Guide, SeamMotion, Seams, VoronoiBake, VoronoiError, VoronoiMap};
+use crate::voronoi::{self, Guide, SeamMotion, Seams, SiteLayout, VoronoiBake, VoronoiError, VoronoiMap};
 use bevy::prelude::*;
 use std::{sync::Arc, vec};
 
@@ -26,6 +27,9 @@ const WIDE_OPENING: u32 = 32;
 
 /// Steps in which cracks move to where they stay.
 const MOTION_STEPS: u32 = 64;
+
+/// Shorter side of text that is drawn over the picture of a mesh that is laid out, texels.
+const TEXT_SIDE: f32 = 1024.0;
 
 /// Shares of the whole that reading the guides and drawing the lines count for in the progress.
 const READ: f32 = 0.1;
@@ -114,10 +118,10 @@ impl MapJob {
                 return Ok(Some(Lines { added: None, record, covered: None, ground: self.ground() }));
             }
         };
+        let failed = |error: VoronoiError| CrackError::Bake { reason: error.to_string() };
         let Some(map) = &mut self.map else {
-            let (params, guides) = (guided.params.clone(), core::mem::take(&mut self.guides));
-            let map = VoronoiBake::new(params, guides, self.size, guided.seed);
-            self.map = Some(map.map_err(|error| CrackError::Bake { reason: error.to_string() })?);
+            let guides = core::mem::take(&mut self.guides);
+            self.map = Some(start(guided, guides, self.size, self.unfolding()).map_err(failed)?);
             return Ok(None);
         };
         if let voronoi::BakeStatus::Working(share) = map.step((SLICE / self.size.x).max(1) as usize) {
@@ -126,9 +130,8 @@ impl MapJob {
         }
         let Some((map, seams)) = self.map.take().map(VoronoiBake::finish) else { return Ok(None) };
         let covered = map.strokes().map(|strokes| strokes.covered);
-        let (seams, motion) =
-            motion(guided, map, seams).map_err(|error| CrackError::Bake { reason: error.to_string() })?;
-        let (network, opening) = lines(&seams, guided.appearance);
+        let (seams, motion) = motion(guided, map, seams).map_err(failed)?;
+        let (network, opening) = lines(&seams, guided.appearance, self.unfolding());
         let added = Some(Added { network, opening, steps: 0, motion });
         Ok(Some(Lines { added, record: None, covered, ground: self.ground() }))
     }
@@ -138,24 +141,66 @@ impl MapJob {
         if let BakeSurface::Read(ground, _) = &self.surface { Some(ground.clone()) } else { None }
     }
 
+    /// The picture of the surface and the part that is shown, once it is read.
+    const fn base(&self) -> Option<(&Arc<BasePicture>, TexelRect)> {
+        match &self.surface {
+            BakeSurface::Known(base, rect) | BakeSurface::Read(BaseAndMask { base, .. }, rect) => Some((base, *rect)),
+            BakeSurface::Raw(_) => None,
+        }
+    }
+
+    /// How its mesh is laid out, if it is.
+    fn unfolding(&self) -> Option<&Unfolding> {
+        self.base().and_then(|(base, _)| base.unfolding()).map(Arc::as_ref)
+    }
+
+    /// A guide over the surface as it is laid out.
     fn read(&self, source: Source) -> Result<Grid<f32>, String> {
+        if matches!(source, Source::Own) {
+            return self.own_edges();
+        }
+        let values = self.read_values(source)?;
+        Ok(match self.unfolding() {
+            Some(unfolding) => unfolding.lay_out(&values, self.size),
+            None => values,
+        })
+    }
+
+    /// The edges of the surface's own picture.
+    fn own_edges(&self) -> Result<Grid<f32>, String> {
+        let (base, rect) = self.base().ok_or("it was not read")?;
+        let rgba = mask::part(&base.diffuse, base.size, rect);
+        let picture = voronoi::lightness(rect.size(), &rgba).ok_or("its size is wrong")?;
+        let mut edges = voronoi::edges(&picture);
+        if let Some(unfolding) = base.unfolding() {
+            // Where a chart ends, its picture does not.
+            let charts = unfolding.charts(rect.size()).map_err(|error| error.to_string())?;
+            for y in 0..edges.height() {
+                for (x, edge) in (0..).zip(edges.row_mut(y)) {
+                    if !charts.is_inside(UVec2::new(x, y as u32)) {
+                        *edge = 0.0;
+                    }
+                }
+            }
+        }
+        Ok(edges)
+    }
+
+    /// A guide over the surface's picture.
+    fn read_values(&self, source: Source) -> Result<Grid<f32>, String> {
         let decoded;
         let image = match source {
             Source::Grid(grid) => return Ok(Arc::unwrap_or_clone(grid)),
             Source::Text(text, font) => {
                 let font = font.as_deref().unwrap_or(voronoi::FONT);
-                let letters = voronoi::draw_text(font, &text, self.size, f32::INFINITY);
+                let size = self.unfolding().map_or(self.size, |unfolding| {
+                    let size = (unfolding.picture * TEXT_SIDE).min(Vec2::splat(MAX_SIDE as f32));
+                    size.round().as_uvec2()
+                });
+                let letters = voronoi::draw_text(font, &text, size, f32::INFINITY);
                 return Ok(letters.ok_or("its font cannot be read")?);
             }
-            Source::Own => {
-                let (base, rect) = match &self.surface {
-                    BakeSurface::Known(base, rect) | BakeSurface::Read(BaseAndMask { base, .. }, rect) => (base, *rect),
-                    BakeSurface::Raw(_) => return Err("it was not read".into()),
-                };
-                let rgba = mask::part(&base.diffuse, base.size, rect);
-                let picture = voronoi::lightness(rect.size(), &rgba).ok_or("its size is wrong")?;
-                return Ok(voronoi::edges(&picture));
-            }
+            Source::Own => return self.own_edges(),
             Source::Image(index) => self.copies.get(index).ok_or("it was not read")?,
             Source::Png(file) => {
                 decoded = png::decode(&file)?;
@@ -166,6 +211,29 @@ impl MapJob {
         let rgba = picture::read(image, Space::Srgb, size).map_err(|error| error.to_string())?;
         Ok(voronoi::ink(size, &rgba).ok_or("its size is wrong")?)
     }
+}
+
+/// A map of the surface, laid out or not.
+fn start(
+    guided: &GuidedCracks,
+    guides: Vec<Guide>,
+    size: UVec2,
+    unfolding: Option<&Unfolding>,
+) -> Result<VoronoiBake, VoronoiError> {
+    let mut params = guided.params.clone();
+    let Some(unfolding) = unfolding else { return VoronoiBake::new(params, guides, size, guided.seed) };
+    // Places in the picture become places where they are laid out.
+    let laid = |texel: Vec2| texel / unfolding.unit;
+    match &mut params.layout {
+        SiteLayout::Impact { at, .. } if at.is_finite() => *at = laid(unfolding.nearest_texel(*at / unfolding.picture)),
+        SiteLayout::Given(points) => {
+            let place = |point: &Vec2| unfolding.texel(*point / unfolding.picture).map(laid);
+            *points = points.iter().take(voronoi::MAX_SITES as usize).filter_map(place).collect();
+        }
+        SiteLayout::Density(density) => *density = unfolding.lay_out(density, size),
+        _ => {}
+    }
+    VoronoiBake::on_charts(params, guides, unfolding.charts(size)?, guided.seed)
 }
 
 /// How the cracks move until they are where they stay, and the seams there.
@@ -188,8 +256,9 @@ fn motion(guided: &GuidedCracks, mut map: VoronoiMap, seams: Seams) -> Result<(S
 }
 
 /// The seams in the order in which they come, and the steps in which each opens.
-fn lines(seams: &Seams, appearance: GuidedAppearance) -> (Network, u32) {
+fn lines(seams: &Seams, appearance: GuidedAppearance, unfolding: Option<&Unfolding>) -> (Network, u32) {
     if let GuidedAppearance::Front { from, .. } = appearance {
+        let from = unfolding.map_or(from, |unfolding| unfolding.nearest_texel(from) / unfolding.layout.size.as_vec2());
         return (seams.network(from * seams.extent), FRONT_OPENING);
     }
     let mut network = seams.network(Vec2::ZERO);

@@ -46,6 +46,11 @@ impl BasePicture {
         Self { has_holes: self.has_holes || unfolding.is_some(), unfolding, ..self }
     }
 
+    /// How the mesh is laid out in it, if it is.
+    pub(crate) const fn unfolding(&self) -> Option<&Arc<Unfolding>> {
+        self.unfolding.as_ref()
+    }
+
     /// Texels for a unit of pattern space, if not as many as the shorter side has.
     pub(crate) fn unit(&self) -> Option<f32> {
         self.unfolding.as_ref().map(|unfolding| unfolding.unit)

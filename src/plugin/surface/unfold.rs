@@ -35,7 +35,6 @@ pub(crate) fn unfold(world: &mut World, entity: Entity) -> bool {
     let has_places = !matches!(surface.mask, CrackMaskSource::Auto | CrackMaskSource::None)
         || surface.density.is_some()
         || surface.resolution != CrackResolution::Picture
-        || world.get::<GuidedCracks>(entity).is_some()
         || world.get::<CrackStrands>(entity).is_some();
     if surface.unwrap == CrackUnwrap::Never || has_places {
         return true;
@@ -60,6 +59,9 @@ pub(crate) fn order(world: &mut World, entity: Entity) -> Result<Option<UnfoldOr
         Some(around) => Some((HitPoint::Local(around), None)),
         None => world.resource::<HitQueue>().first(entity).map(|hit| (hit.at, hit.point)),
     };
+    // What is drawn lies in the middle of its picture.
+    let is_guided = world.get::<GuidedCracks>(entity).is_some();
+    let hit = hit.or_else(|| is_guided.then_some((HitPoint::Uv(Vec2::splat(0.5)), None)));
     let order = UnfoldOrder {
         hit,
         must,
