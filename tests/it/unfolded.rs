@@ -426,7 +426,7 @@ fn guided_cracks_go_on_where_a_body_is_cut() {
         settle(&mut app, entity);
         assert!(state(&app, entity).nodes > nodes);
         app.world_mut().commands().entity(entity).heal_cracks();
-        settle(&mut app, entity);
+        steps(&mut app, 3);
         assert!(get::<Mesh3d>(&app, entity).0 == mesh, "{i}: as it was");
     }
     assert!(app.world().resource::<Unbaked>().0.is_empty());

@@ -253,7 +253,7 @@ mod tests {
             let laid = unfolding.lay_out(&rows, size);
             let mut seen = 0;
             for texel in (0..size.y).flat_map(|y| (0..size.x).map(move |x| UVec2::new(x, y))) {
-                let place = (texel.as_vec2() + 0.5) / size.as_vec2() * unfolding.layout.size.as_vec2();
+                let place = (texel.as_vec2() + 0.5) / (size.as_vec2() / unfolding.layout.size.as_vec2());
                 let value = laid.get(texel.x, texel.y).unwrap_or(f32::NAN);
                 match unfolding.uv(place) {
                     None => assert_eq!(value, 0.0),
