@@ -59,9 +59,10 @@ const SHOTS: [(usize, f32, f32, f32); 7] = [
     (0, 0.35, -0.3, 1.5),
 ];
 
-/// Which of the three the jar is, and the ball.
+/// Which of the three the jar is.
 const JAR_NUMBER: usize = 1;
 
+/// Which of the three the ball is.
 const BALL: usize = 2;
 
 #[derive(Component)]
@@ -310,7 +311,7 @@ fn go_around(time: Res<Time>, mut camera: Query<&mut Transform, With<Camera3d>>)
     }
 }
 
-/// Where the word stands in the jar's picture: its middle and size, of which the picture has 1 each way.
+/// Where the word stands in the jar's picture, texture coordinates.
 const WORD: Rect = Rect { min: Vec2::new(0.37, 0.38), max: Vec2::new(0.63, 0.6) };
 
 /// Cracks all over the jar that draw a word on its front.

@@ -47,7 +47,7 @@ mod pack;
 mod shape;
 
 pub use error::{MAX_CHARTS, MAX_TRIANGLES, UnwrapError};
-pub use pack::{GUTTER, LaidOut};
+pub use pack::{Cut, GUTTER, LaidOut};
 pub use shape::MeshShape;
 
 use chart::{Chart, Start};

@@ -24,8 +24,19 @@ pub struct LaidOut {
     pub chart: Vec<u32>,
     /// The triangle that each texel belongs to, row by row; [`LaidOut::NOTHING`] if to none.
     pub owner: Vec<u32>,
-    /// Where the surface is cut: the edges of the mesh that lie in two places. Both places, each from the same end to the other, texels.
-    pub cuts: Vec<[[Vec2; 2]; 2]>,
+    /// Where the surface is cut: the edges of the mesh that lie in two places.
+    pub cuts: Vec<Cut>,
+    /// Where the surface ends: the edges of one triangle alone, texels.
+    pub borders: Vec<[Vec2; 2]>,
+}
+
+/// An edge of a mesh that lies in two places.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cut {
+    /// The triangles on both sides of it.
+    pub triangles: [usize; 2],
+    /// Where it lies beside each of them, from the same end to the other, texels.
+    pub places: [[Vec2; 2]; 2],
 }
 
 impl LaidOut {
@@ -44,22 +55,29 @@ impl LaidOut {
 /// Ends of an edge that are nearer to one another in the plane are one, texels.
 const TOGETHER: f32 = 0.1;
 
-/// The edges that lie in two places.
-fn cuts(shape: &MeshShape, corners: &[Option<[Vec2; 3]>]) -> Vec<[[Vec2; 2]; 2]> {
-    let edge = |triangle: usize, begin: usize| {
-        corners[triangle].map(|corners| [corners[begin], corners[(begin + 1) % corners.len()]])
-    };
-    let edges = (0..shape.len()).flat_map(|triangle| {
-        let across = shape.across(triangle).into_iter().enumerate();
-        across.filter_map(move |(begin, beside)| {
-            let (other, other_begin) = beside?;
+/// The edges that lie in two places, and those of one triangle alone.
+fn cuts(shape: &MeshShape, corners: &[Option<[Vec2; 3]>]) -> (Vec<Cut>, Vec<[Vec2; 2]>) {
+    let (mut cuts, mut borders) = (Vec::new(), Vec::new());
+    let edge = |[a, b, c]: [Vec2; 3], begin: usize| [[a, b], [b, c], [c, a]][begin];
+    for (triangle, laid) in corners.iter().enumerate() {
+        let Some(laid) = *laid else { continue };
+        for (begin, beside) in shape.across(triangle).into_iter().enumerate() {
+            let place = edge(laid, begin);
+            let other = beside.map(|(other, begin)| (other as usize, usize::from(begin)));
+            let Some((other, from, there)) = other.and_then(|(other, from)| Some((other, from, corners[other]?)))
+            else {
+                borders.push(place);
+                continue;
+            };
+            let [to, from_end] = edge(there, from);
+            let is_together = place[0].distance(from_end) <= TOGETHER && place[1].distance(to) <= TOGETHER;
             // Each once.
-            let is_first = (triangle, begin) < (other as usize, usize::from(other_begin));
-            let [to, from] = edge(other as usize, usize::from(other_begin))?;
-            is_first.then_some([edge(triangle, begin)?, [from, to]])
-        })
-    });
-    edges.filter(|[[a, b], [p, q]]| a.distance(*p) > TOGETHER || b.distance(*q) > TOGETHER).collect()
+            if !is_together && (triangle, begin) < (other, from) {
+                cuts.push(Cut { triangles: [triangle, other], places: [place, [from_end, to]] });
+            }
+        }
+    }
+    (cuts, borders)
 }
 
 /// A chart and where it lies.
@@ -105,8 +123,8 @@ pub(super) fn pack(
     {
         chart[*triangle] = number;
     }
-    let cuts = cuts(shape, &corners);
-    Ok(LaidOut { size, corners, charts: charts.len(), chart, owner, cuts })
+    let (cuts, borders) = cuts(shape, &corners);
+    Ok(LaidOut { size, corners, charts: charts.len(), chart, owner, cuts, borders })
 }
 
 /// Finds places for all parts; returns the size of what is around them.

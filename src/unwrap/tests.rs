@@ -149,7 +149,8 @@ fn a_box_becomes_a_cross_whose_edges_stay_together() {
             assert_eq!((joined, around_first), (10, 4), "{half} {face}: each is seen from both sides");
             // The other seven are cut. Of each, both places are as long as the edge.
             assert_eq!(laid_out.cuts.len(), 7);
-            for [[a, b], [p, q]] in &laid_out.cuts {
+            assert!(laid_out.borders.is_empty());
+            for Cut { places: [[a, b], [p, q]], .. } in &laid_out.cuts {
                 let length = a.distance(*b);
                 assert!((length - p.distance(*q)).abs() < 0.01, "{half} {face}");
                 let is_edge = |axis: usize| (length - 2.0 * 64.0 * half[axis]).abs() < 0.05;

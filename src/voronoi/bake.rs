@@ -15,8 +15,13 @@ use super::{
     trace::Tracer,
     widths::Guidance,
 };
-use crate::{Grid, grid::ask_for, math::Rng, pattern::SurfaceFrame};
-use glam::UVec2;
+use crate::{
+    Grid,
+    grid::ask_for,
+    math::Rng,
+    pattern::{Network, SurfaceFrame},
+};
+use glam::{UVec2, Vec2};
 
 /// The progress of a bake.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,7 +81,7 @@ pub struct VoronoiBake {
 
 /// Regions and path costs of every texel (Mould 2005, section 3).
 ///
-/// It keeps everything that a later change needs: about 12 bytes a texel with one level and one guide, 8 more for
+/// It keeps everything that a later change needs: about 12 bytes a texel with one level and one guide, 5 more on [`MapCharts`], 8 more for
 /// each further level and 2 for each further guide.
 ///
 /// ```
@@ -354,12 +359,7 @@ impl VoronoiMap {
 
     /// A search from the first `n` sites that has not begun.
     fn level(&self, n: usize, has_walls: bool) -> Level {
-        let size = self.frame.size();
-        let mut level = Level::new(size, &self.sites[..n], n, has_walls || self.charts.is_some());
-        if let Some(charts) = &self.charts {
-            level.close_gaps(charts, size);
-        }
-        level
+        Level::new(self.frame.size(), &self.sites[..n], n, has_walls || self.charts.is_some())
     }
 
     /// Computes the edges of row `y` of the first lattice.
@@ -459,8 +459,7 @@ impl VoronoiMap {
     /// The last level, and the number there of a texel that belongs to a region.
     fn reached(&self, x: u32, y: u32) -> Option<(&Level, usize)> {
         let (level, i) = (self.levels.last()?, self.index(x, y)?);
-        let is_surface = self.charts.as_ref().is_none_or(|charts| charts.is_surface(UVec2::new(x, y)));
-        (is_surface && level.is_reached(i)).then_some((level, i))
+        level.is_reached(i).then_some((level, i))
     }
 
     /// The region of a texel: the index of its site. `None` outside, and where no path from a site leads.
@@ -516,6 +515,31 @@ impl VoronoiMap {
             layers,
         };
         tracer.finish(&self.levels, &self.params, self.ground(), &guides, self.full_cost)
+    }
+
+    /// Some seams of the map as a network that has grown from an impact at `from`, pattern units, as [`Seams::network`] does. On [`MapCharts`] the
+    /// front goes over links: in each chart it begins where it comes first, when it comes there.
+    #[must_use]
+    pub fn network(&self, seams: &Seams, from: Vec2) -> Network {
+        let Some(charts) = &self.charts else { return seams.network(from) };
+        let from = if from.is_finite() { from } else { Vec2::ZERO };
+        let size = self.frame.size();
+        let mut lattice = Lattice::new(size);
+        let uniform = Layer { values: Grid::new(size, 0), weight: 0 };
+        (0..self.height()).for_each(|y| {
+            lattice.set_row(y, std::slice::from_ref(&uniform));
+            charts.wall_row(&mut lattice, y);
+        });
+        lattice.set_links(charts.links(), &[uniform]);
+        let start = [texel(&self.frame, from)];
+        let mut ways = Level::new(size, &start, 1, true);
+        while ways.advance(&lattice, &start, usize::MAX) {}
+        let step = 1.0 / (LONGER * self.frame.texels_per_unit());
+        seams.network_by(&|place| {
+            let at = texel(&self.frame, place);
+            let i = at.y as usize * size.x as usize + at.x as usize;
+            if ways.is_reached(i) { ways.cost(i) * step } else { place.distance(from) }
+        })
     }
 
     /// Makes the most expensive cracks of the current map the widest, as they were when the map was made.
@@ -663,6 +687,9 @@ impl VoronoiMap {
         n_changed
     }
 }
+
+/// How much longer ways are from texel to texel than straight ones, in the mean over all directions: 4 / π.
+const LONGER: f32 = 4.0 / std::f32::consts::PI;
 
 /// If more than one edge in this many has changed, a new search is faster.
 const MOST_CHANGES: usize = 8;

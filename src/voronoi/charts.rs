@@ -4,7 +4,7 @@ use super::{
     VoronoiError,
     lattice::{Lattice, WALL},
 };
-use crate::{Grid, pattern::SurfaceFrame};
+use crate::{Grid, OutOfMemory, pattern::SurfaceFrame};
 use glam::{IVec2, UVec2, Vec2};
 
 /// A surface that is laid out in parts, as a mesh is whose charts lie side by side in one picture.
@@ -34,8 +34,33 @@ use glam::{IVec2, UVec2, Vec2};
 pub struct MapCharts {
     frame: SurfaceFrame,
     chart: Grid<u32>,
+    /// For each texel: whether the next ones, to the right and down, are no neighbours.
+    apart: Grid<u8>,
     margin: i32,
     links: Vec<[u32; 2]>,
+}
+
+/// Bits of [`MapCharts::apart`].
+const RIGHT: u8 = 1;
+
+const DOWN: u8 = 2;
+
+/// Which texels are of another chart than the next ones, to the right and down.
+fn apart(chart: &Grid<u32>) -> Result<Grid<u8>, OutOfMemory> {
+    let mut apart = Grid::try_new(chart.size(), 0)?;
+    for y in 0..chart.height() {
+        let row = chart.row(y);
+        let below = if y + 1 < chart.height() { chart.row(y + 1) } else { &[] };
+        let bits = apart.row_mut(y);
+        for (bit, next) in [(RIGHT, row.get(1..).unwrap_or_default()), (DOWN, below)] {
+            for ((bits, a), b) in bits.iter_mut().zip(row).zip(next) {
+                if a != b || *a == MapCharts::NOTHING {
+                    *bits |= bit;
+                }
+            }
+        }
+    }
+    Ok(apart)
 }
 
 /// Where the texels of a map lie.
@@ -84,10 +109,30 @@ impl MapCharts {
         let number = |at: UVec2| at.y * chart.size().x + at.x;
         let links = links.into_iter().map(|ends| ends.map(number)).collect();
         let margin = margin.min(chart.size().max_element()) as i32;
-        Ok(Self { frame, chart, margin, links })
+        Ok(Self { frame, apart: apart(&chart)?, chart, margin, links })
     }
 
-    pub(super) const fn frame(&self) -> &SurfaceFrame {
+    /// The same, these pairs of texels beside one another not being neighbours: where two parts of one chart touch that do not meet on the surface.
+    #[must_use]
+    pub fn with_walls(mut self, walls: impl IntoIterator<Item = [UVec2; 2]>) -> Self {
+        let size = self.frame.size();
+        for [a, b] in walls {
+            let (first, next) = (a.min(b), a.max(b));
+            let bit = match (next - first).to_array() {
+                [1, 0] => RIGHT,
+                [0, 1] => DOWN,
+                _ => continue,
+            };
+            if next.cmplt(size).all() {
+                self.apart.row_mut(first.y as usize)[first.x as usize] |= bit;
+            }
+        }
+        self
+    }
+
+    /// Where it lies in pattern space.
+    #[must_use]
+    pub const fn frame(&self) -> &SurfaceFrame {
         &self.frame
     }
 
@@ -101,11 +146,6 @@ impl MapCharts {
         is_there.then(|| self.chart.get(texel.x as u32, texel.y as u32)).flatten().unwrap_or(Self::NOTHING)
     }
 
-    /// Whether a texel shows some of the surface.
-    pub(super) fn is_surface(&self, texel: UVec2) -> bool {
-        self.chart.get(texel.x, texel.y).is_some_and(|chart| chart != Self::NOTHING)
-    }
-
     /// Whether a texel lies within the border of its chart: not in its margin, nor beside all charts.
     #[must_use]
     pub fn is_inside(&self, texel: UVec2) -> bool {
@@ -114,11 +154,14 @@ impl MapCharts {
         own != Self::NOTHING && around.into_iter().all(|way| self.at(at + self.margin * way) == own)
     }
 
-    /// Whether the four texels that meet in a corner belong to one chart.
+    /// Whether the four texels that meet in a corner are neighbours.
     pub(super) fn is_whole(&self, corner: IVec2) -> bool {
-        let own = self.at(corner);
-        let others = [IVec2::NEG_X, IVec2::NEG_Y, IVec2::NEG_ONE];
-        own != Self::NOTHING && others.into_iter().all(|way| self.at(corner + way) == own)
+        let is_joined = |texel: IVec2, bit: u8| {
+            let bits = (texel.min_element() >= 0).then(|| self.apart.get(texel.x as u32, texel.y as u32)).flatten();
+            bits.is_some_and(|bits| bits & bit == 0)
+        };
+        let (left, above, before) = (corner + IVec2::NEG_X, corner + IVec2::NEG_Y, corner + IVec2::NEG_ONE);
+        is_joined(before, RIGHT) && is_joined(left, RIGHT) && is_joined(before, DOWN) && is_joined(above, DOWN)
     }
 
     /// For texels from `x0` on of row `y`: puts walls where the next one, to the right or `down`, is of another chart.
@@ -147,15 +190,10 @@ impl MapCharts {
         }
     }
 
-    /// For texels from `x0` on of row `y`: whether the next one, to the right or `down`, is of another chart; those that have none are left out.
+    /// For texels from `x0` on of row `y`: whether the next one, to the right or `down`, is no neighbour.
     fn apart(&self, y: usize, x0: usize, down: bool) -> impl Iterator<Item = bool> + '_ {
-        let row = &self.chart.row(y)[x0..];
-        let next = match down {
-            false => row.get(1..).unwrap_or_default(),
-            true if y + 1 < self.chart.height() => &self.chart.row(y + 1)[x0..],
-            true => &[],
-        };
-        row.iter().zip(next).map(|(a, b)| a != b || *a == Self::NOTHING)
+        let bit = if down { DOWN } else { RIGHT };
+        self.apart.row(y)[x0..].iter().map(move |bits| bits & bit != 0)
     }
 
     /// The same surface with fewer texels.
@@ -169,15 +207,32 @@ impl MapCharts {
                 *out = self.chart.get(middle(x, size.x, from.x), middle(y, size.y, from.y)).unwrap_or(Self::NOTHING);
             }
         }
-        let texel = |number: u32| UVec2::new(number % from.x, number / from.x) * size / from;
+        let small = |at: UVec2| at * size / from;
         let number = |at: UVec2| at.y * size.x + at.x;
-        let mut links: Vec<[u32; 2]> = self.links.iter().map(|ends| ends.map(|end| number(texel(end)))).collect();
+        // Not those that would join other charts than before.
+        let is_own = |at: &UVec2| {
+            let to = small(*at);
+            chart.get(to.x, to.y) == self.chart.get(at.x, at.y)
+        };
+        let ends = |ends: &[u32; 2]| ends.map(|end| UVec2::new(end % from.x, end / from.x));
+        let links = self.links.iter().map(ends).filter(|ends| ends.iter().all(is_own));
+        let mut links: Vec<[u32; 2]> = links.map(|ends| ends.map(|at| number(small(at)))).collect();
+        links.retain(|ends| ends[0] != ends[1]);
         links.sort_unstable();
         links.dedup();
-        let is_there = |end: &u32| chart.as_slice()[*end as usize] != Self::NOTHING;
-        links.retain(|ends| ends[0] != ends[1] && ends.iter().all(is_there));
+        let mut parted = apart(&chart).unwrap_or_else(|_| Grid::new(size, 0));
+        for (y, x) in (0..from.y).flat_map(|y| (0..from.x).map(move |x| (y, x))) {
+            let at = UVec2::new(x, y);
+            for (bit, next) in [(RIGHT, at + UVec2::X), (DOWN, at + UVec2::Y)] {
+                let (to, next) = (small(at), small(next.min(from - 1)));
+                if to != next && self.apart.get(x, y).is_some_and(|bits| bits & bit != 0) {
+                    parted.row_mut(to.y as usize)[to.x as usize] |= bit;
+                }
+            }
+        }
         let unit = self.frame.texels_per_unit() * scale;
         let frame = SurfaceFrame::with_unit(size, unit).unwrap_or(self.frame);
-        Self { frame, chart, margin: (self.margin as f32 * scale).round().max(1.0) as i32, links }
+        let margin = (self.margin as f32 * scale).round().max(1.0) as i32;
+        Self { frame, chart, apart: parted, margin, links }
     }
 }

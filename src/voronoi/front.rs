@@ -35,7 +35,7 @@ impl Front {
     #[must_use]
     pub fn new(seams: &Seams, from: Vec2) -> Self {
         let graph = Graph::new(seams);
-        let arrivals = graph.run(from);
+        let arrivals = graph.run(&straight(from));
         let mut reach = 0.0f32;
         for arrival in &arrivals {
             reach = reach.max(arrival.distance);
@@ -105,8 +105,13 @@ impl Seams {
     /// because seams are rough already.
     #[must_use]
     pub fn network(&self, from: Vec2) -> Network {
+        self.network_by(&straight(from))
+    }
+
+    /// The same from anywhere: how far it is to each place, pattern units.
+    pub(super) fn network_by(&self, far: &dyn Fn(Vec2) -> f32) -> Network {
         let graph = Graph::new(self);
-        let arrivals = graph.run(from);
+        let arrivals = graph.run(far);
         let mut order: Vec<u32> = (0..arrivals.len() as u32).collect();
         order.sort_by_key(|&id| arrivals[id as usize].rank);
         let mut index = vec![0; arrivals.len()];
@@ -140,6 +145,12 @@ impl Seams {
         network.links.sort_by_key(|link| (link.birth, link.a, link.b));
         network
     }
+}
+
+/// The straight way from a point; from the corner if it is nowhere.
+fn straight(from: Vec2) -> impl Fn(Vec2) -> f32 {
+    let from = if from.is_finite() { from } else { Vec2::ZERO };
+    move |place| place.distance(from)
 }
 
 /// All points of all seams, vertices first.
@@ -222,8 +233,8 @@ impl Graph {
         &self.beside[self.begins[id as usize] as usize..self.begins[id as usize + 1] as usize]
     }
 
-    /// The point of each connected part that is nearest to `from`.
-    fn starts(&self, from: Vec2) -> Vec<u32> {
+    /// The point of each connected part that is nearest.
+    fn starts(&self, far: &dyn Fn(Vec2) -> f32) -> Vec<u32> {
         let mut seen = vec![false; self.places.len()];
         let mut starts = Vec::new();
         for id in 0..self.places.len() as u32 {
@@ -240,19 +251,19 @@ impl Graph {
                     }
                 }
             }
-            let far = |id: &u32| self.places[*id as usize].distance_squared(from);
-            starts.extend(part.into_iter().min_by(|a, b| far(a).total_cmp(&far(b)).then(a.cmp(b))));
+            let part = part.into_iter().map(|id| (far(self.places[id as usize]), id));
+            let nearest = part.min_by(|(a, first), (b, second)| a.total_cmp(b).then(first.cmp(second)));
+            starts.extend(nearest.map(|(_, id)| id));
         }
         starts
     }
 
     /// Shortest paths along the seams; ties go to the lower number.
-    fn run(&self, from: Vec2) -> Vec<Arrival> {
-        let from = if from.is_finite() { from } else { Vec2::ZERO };
+    fn run(&self, far: &dyn Fn(Vec2) -> f32) -> Vec<Arrival> {
         let mut arrivals = vec![Arrival { distance: f32::INFINITY, parent: None, rank: u32::MAX }; self.places.len()];
         let mut heap = BinaryHeap::new();
-        for id in self.starts(from) {
-            let distance = self.places[id as usize].distance(from);
+        for id in self.starts(far) {
+            let distance = far(self.places[id as usize]);
             arrivals[id as usize].distance = distance;
             // The bits of non-negative floats have the order of the floats.
             heap.push(Reverse((distance.to_bits(), id)));

@@ -1,7 +1,6 @@
 //! One generation of regions: [`Level`].
 
 use super::{
-    MapCharts,
     lattice::{Lattice, UNIT, WALL},
     search::{Packed, Search},
 };
@@ -46,15 +45,6 @@ impl Level {
         level
     }
 
-    /// Texels that show nothing of the surface keep no search waiting.
-    pub(super) fn close_gaps(&mut self, charts: &MapCharts, size: UVec2) {
-        for y in 0..size.y {
-            for x in (0..size.x).filter(|x| !charts.is_surface(UVec2::new(*x, y))) {
-                paths!(&mut self.paths, search => search.close((y * size.x + x) as usize));
-            }
-        }
-    }
-
     /// Whether a texel belongs to a region.
     pub(super) fn is_reached(&self, texel: usize) -> bool {
         paths!(&self.paths, search => search.is_reached(texel))
@@ -90,7 +80,7 @@ impl Level {
         // A cost did not fit: start again with larger numbers.
         if self.n_sites > 0
             && let Paths::Narrow(search) = &mut self.paths
-            && search.overflows()
+            && search.overflows(lattice)
         {
             self.paths = Paths::Wide(Search::new(lattice.size()));
             self.n_sites = 0;

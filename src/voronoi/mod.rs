@@ -13,7 +13,7 @@
 //!
 //! [`VoronoiParams`] and [`Guide`] hold the settings, [`VoronoiBake`] computes the map row by row. [`VoronoiMap`]
 //! holds regions and costs of every texel, [`Seams`] the cracks as lines. [`SeamMotion`] moves them as weights change. [`MapCharts`] is a
-//! surface that is no rectangle. Costs are integers (β is 256 units), so the
+//! surface that is laid out in several charts. Costs are integers (β is 256 units), so the
 //! map is the same on every machine; ties go to the lower site.
 //!
 //! Differs from the paper: a level of cracks divides the regions of the level before exactly, as if crossing an older

@@ -43,7 +43,8 @@ impl SeamMotion {
 
     /// The seams when this share of the way is done, 0..=1; values outside are clamped, and NaN counts as 0.
     ///
-    /// The result depends on the share alone. Only what changes since the last call is computed.
+    /// The result depends on the share alone. Only what changes since the last call is computed, or all of it on
+    /// [`MapCharts`](super::MapCharts) with links.
     ///
     /// # Errors
     /// None: weights between two valid ones are valid. The type is that of [`VoronoiMap::set_gammas`].

@@ -152,11 +152,6 @@ impl<P: Packed> Search<P> {
         self.stir(texel.x as usize, texel.y as usize);
     }
 
-    /// Keeps paths from a texel that has no edge.
-    pub(super) fn close(&mut self, texel: usize) {
-        self.field[texel] = P::site(0);
-    }
-
     /// Whether a path has reached a texel.
     pub(super) fn is_reached(&self, texel: usize) -> bool {
         self.field[texel] < P::FAR
@@ -231,16 +226,32 @@ impl<P: Packed> Search<P> {
         }
     }
 
-    /// Whether, since the last call, a cost became too large for `P`, or a texel cannot be reached.
-    pub(super) fn overflows(&mut self) -> bool {
+    /// Whether, since the last call, a cost became too large for `P`: no path has reached a texel that is joined to one that was reached.
+    pub(super) fn overflows(&mut self, lattice: &Lattice) -> bool {
         let (w, blocks) = (self.size.x as usize, self.blocks);
         let since = std::mem::replace(&mut self.checked, self.clock);
+        let is_cut_off = |i: usize| {
+            let around = [
+                (Some(i + 1), lattice.edges(i).0),
+                (i.checked_sub(1), if i > 0 { lattice.edges(i - 1).0 } else { WALL }),
+                (Some(i + w), lattice.edges(i).1),
+                (i.checked_sub(w), if i >= w { lattice.edges(i - w).1 } else { WALL }),
+            ];
+            around.into_iter().any(|(beside, edge)| {
+                edge != WALL && beside.is_some_and(|beside| self.field.get(beside).is_some_and(|p| *p < P::FAR))
+            })
+        };
         let too_far = |(i, stamps): (usize, &Stamps)| {
             let x0 = i % blocks * BLOCK;
-            let block = i / blocks * w + x0..i / blocks * w + (x0 + BLOCK).min(w);
-            (stamps.changed > since || since == 0) && self.field[block].iter().any(|&p| p >= P::FAR)
+            let mut block = i / blocks * w + x0..i / blocks * w + (x0 + BLOCK).min(w);
+            (stamps.changed > since || since == 0) && block.any(|i| self.field[i] >= P::FAR && is_cut_off(i))
         };
+        let is_reached = |end: u32| self.field[end as usize] < P::FAR;
         self.stamps.iter().enumerate().any(too_far)
+            || lattice
+                .links()
+                .iter()
+                .any(|link| link.cost != WALL && is_reached(link.ends[0]) != is_reached(link.ends[1]))
     }
 
     /// Whether every texel has its cost.

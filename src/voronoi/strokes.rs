@@ -111,10 +111,9 @@ impl StrokePairs {
                 charts.wall_row(&mut lattice, y);
             }
         }
-        let mut level = Level::new(size, &[], n, charts.is_some());
+        let level = Level::new(size, &[], n, charts.is_some());
         if let Some(charts) = &charts {
             lattice.set_links(charts.links(), &pooled);
-            level.close_gaps(charts, size);
         }
         let not_ink: Vec<bool> = ink.iter().map(|ink| !ink).collect();
         Some(Self {

@@ -7,6 +7,7 @@ use crate::{
 use bevy::{
     asset::RenderAssetUsages,
     ecs::system::RunSystemOnce,
+    math::ops,
     mesh::{Indices, PrimitiveTopology, VertexAttributeValues},
     prelude::*,
 };
@@ -432,6 +433,62 @@ fn guided_cracks_go_on_where_a_body_is_cut() {
     assert!(app.world().resource::<Unbaked>().0.is_empty());
 }
 
+/// A mesh is laid out when its picture is there, whose size is that of the layout; and not for cracks that do not come.
+#[test]
+fn bodies_are_laid_out_when_their_picture_is_there() {
+    let (mut app, _) = bodies(None);
+    let mesh = add(&mut app, Mesh::from(Cuboid::new(1.0, 1.0, 1.0)));
+    let size = |app: &App, entity: Entity| {
+        let texture = get::<CrackTextures>(app, entity).diffuse.expect("a texture");
+        app.world().resource::<Assets<Image>>().get(&texture).expect("it").size()
+    };
+    let mut sizes = Vec::new();
+    for (is_late, is_guided) in [(false, true), (true, true), (true, false)] {
+        let picture = app.world().resource::<Assets<Image>>().reserve_handle();
+        let material = StandardMaterial { base_color_texture: Some(picture.clone()), ..default() };
+        let material = add(&mut app, material);
+        let give = |app: &mut App| {
+            let image = solid(UVec2::new(64, 64), PLAIN);
+            app.world_mut().resource_mut::<Assets<Image>>().insert(&picture, image).expect("a handle");
+        };
+        if !is_late {
+            give(&mut app);
+        }
+        let entity = spawn(&mut app, &mesh, &material, Transform::default());
+        if is_guided {
+            app.world_mut().entity_mut(entity).insert(GuidedCracks::default());
+        } else {
+            hit(&mut app, CrackHit::local(entity, Vec3::new(0.5, 0.1, 0.1)));
+        }
+        steps(&mut app, 6);
+        if is_late {
+            assert_eq!(get::<CrackState>(&app, entity).status, CrackStatus::Untouched);
+            give(&mut app);
+        }
+        wait_for(&mut app, "cracks", |app| app.world().get::<CrackTextures>(entity).is_some());
+        sizes.push(size(&app, entity));
+    }
+    assert!(sizes[0].min_element() >= 3 * 64 && sizes[0].max_element() < 5 * 64, "{sizes:?}");
+    assert_eq!(sizes[0], sizes[1]);
+    assert!(sizes[2].element_product().abs_diff(sizes[0].element_product()) < sizes[0].element_product() / 4);
+    // Cracks that are taken back before they come: the first hit lays it out.
+    let material = StandardMaterial { base_color_texture: None, ..default() };
+    let material = add(&mut app, material);
+    let entities = [true, false].map(|is_guided| {
+        let entity = spawn(&mut app, &mesh, &material, Transform::default());
+        if is_guided {
+            app.world_mut().entity_mut(entity).insert(GuidedCracks::new(CrackGuide::new(Handle::<Image>::default())));
+            steps(&mut app, 4);
+            app.world_mut().entity_mut(entity).remove::<GuidedCracks>();
+        }
+        hit(&mut app, CrackHit::local(entity, Vec3::new(0.2, 0.5, -0.3)).with_energy(2.0));
+        settle(&mut app, entity);
+        entity
+    });
+    let [one, other] = entities.map(|entity| triangles(&app, entity));
+    assert!(one == other, "laid out around the hit");
+}
+
 #[derive(Resource, Default)]
 struct Covered(Vec<Option<f32>>);
 
@@ -444,7 +501,8 @@ fn a_word_stands_where_the_picture_of_a_body_has_it() {
     let mesh = add(&mut app, mesh);
     let own = |uv: Vec2| {
         let angle = uv.x * core::f32::consts::TAU;
-        Vec3::new(0.5 * angle.cos(), 0.5 - uv.y, 0.5 * angle.sin())
+        let (sin, cos) = ops::sin_cos(angle);
+        Vec3::new(0.5 * cos, 0.5 - uv.y, 0.5 * sin)
     };
     for (i, appearance) in [
         GuidedAppearance::AtOnce,

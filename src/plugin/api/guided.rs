@@ -17,8 +17,9 @@ use std::sync::Arc;
 /// The cracks take the place of those of an earlier bake. To hits they are older cracks: new ones start from them and, where the preset has
 /// [`arrest`](crate::growth::GrowthParams::arrest), stop at them. Cracks that hits made before are grown again around them, from the same places.
 ///
-/// On a 3D mesh that is [laid out](super::CrackUnwrap) they run over all of the body (Mould 2005, section 8): regions go on where it is cut to lie
-/// flat, and guides lie where the mesh shows their part of its picture.
+/// On a 3D mesh that is [laid out](super::CrackUnwrap) they run over all of the body (Mould 2005, section 8): regions and fronts go on where it is
+/// cut to lie flat, and guides lie where the mesh shows their part of its picture. On a [`CrackGroup`](super::CrackGroup) of meshes that picture is
+/// the one in which its members are laid out.
 ///
 /// A guide is a picture, dark strokes on light or the other way round, or a text ([`CrackGuide::text`]).
 /// A [`CrackClock`](super::CrackClock) moves them as it moves all cracks. A changed picture keeps them, stretched if its
@@ -45,12 +46,15 @@ pub struct GuidedCracks {
     /// The pictures that the cracks follow, at most 64; none (default) = cracks of plain mud or pavement.
     pub guides: Vec<CrackGuide>,
     /// Sites, their layout, levels, noise and widths. Default: [`VoronoiParams::DEFAULT`]; [`new`](Self::new) lays out sites in pairs.
+    ///
+    /// On a body that is laid out, places of the layout of sites are those of its picture, the shorter side being 1. Lengths are those of the
+    /// body: a unit is the side of a cube with as much surface.
     pub params: VoronoiParams,
     /// Seed of the sites and the noise. Default 0.
     pub seed: u64,
     /// How the cracks come when the bake is done. Default: at once.
     pub appearance: GuidedAppearance,
-    /// Longer side of the map, texels; 0 counts as 1; default 1024. The map has the surface's own size if that is smaller; its
+    /// Longer side of the map, texels; 0 counts as 1; default 1024. The map has the surface's own size (that of its layout) if that is smaller; its
     /// cracks are lines, as sharp as the surface's textures in any case. A map takes some 12 bytes a texel.
     pub max_side: u32,
 }
@@ -210,7 +214,7 @@ pub enum GuideSource {
     /// The drawing in a PNG file, which may come from anywhere: more than 8192 texels a side or 256 MiB are refused by its
     /// header. Needs the engine's `png` feature.
     Png(Arc<[u8]>),
-    /// Lines of text, as large as they fit on the surface with a margin of 6 %; see [`draw_text`](crate::voronoi::draw_text).
+    /// Lines of text, as large as they fit on the surface's picture with a margin of 6 %; see [`draw_text`](crate::voronoi::draw_text).
     Text {
         /// The lines.
         text: String,
@@ -304,6 +308,11 @@ impl GuidedAppearance {
             | Self::Morph { seconds } => Some(seconds),
         }
         .filter(|seconds| *seconds > 0.0)
+    }
+
+    /// The point from which cracks run.
+    pub(crate) const fn front(&self) -> Option<Vec2> {
+        if let Self::Front { from, .. } = *self { Some(from) } else { None }
     }
 }
 

@@ -156,8 +156,8 @@ impl Default for CrackSurface {
 /// Such a mesh cracks all over, its cracks running over edges and around curves as if it were flat around the hit: a box is unfolded, a rock is
 /// laid out by distance and direction. Lengths and angles stay as they are on meshes of flat faces (up to 64 of them), and change by no more than
 /// twice on others. What does not lie flat any more, as the far side of a ball, is laid out beside it and cracks too, but no crack of a hit runs
-/// from one part to another. [`GuidedCracks`](crate::plugin::GuidedCracks) do: they are those of the whole body, laid out around the middle of
-/// its picture if it has not been hit. Each needs textures for all of it: a box six times its picture, and about as much for the gaps.
+/// from one part to another. [`GuidedCracks`](crate::plugin::GuidedCracks) do cross the cuts. For them a mesh that has not been hit is laid out
+/// around the middle of its picture. Each needs textures for all of it: a box six times its picture, and about as much for the gaps.
 ///
 /// Never laid out: flat meshes and slabs, those of more than 65,536 triangles, meshes whose surface has a [mask](CrackSurface::mask) of images, a
 /// [density](CrackSurface::density), a [fixed size](CrackResolution::Fixed) or [`CrackStrands`](crate::plugin::CrackStrands), which have their

@@ -55,19 +55,21 @@ pub(super) fn begin(world: &mut World, entity: Entity, bake: &mut Bake) -> Resul
     }
     let known = active(world, entity).and_then(|active| {
         let rect = active.canvas.views.get(active.canvas.view)?.rect;
-        Some(BakeSurface::Known(active.canvas.base.clone(), rect))
+        Some((BakeSurface::Known(active.canvas.base.clone(), rect), active.carrier.shown.diffuse.clone()))
     });
-    let surface = match known {
-        Some(surface) => surface,
+    let (surface, diffuse) = match known {
+        Some(known) => known,
         None => {
             let Some(plan) = Plan::new(world, entity)? else { return Ok(None) };
             let Some(raw) = plan.raw(world, &mut copies)? else { return Ok(None) };
             plan.check_mesh(world, entity)?;
+            let diffuse = plan.shown.diffuse.clone();
             bake.plan = Some(Box::new(plan));
-            BakeSurface::Raw(Box::new(raw))
+            (BakeSurface::Raw(Box::new(raw)), diffuse)
         }
     };
     let images = world.get_resource::<Assets<Image>>().ok_or(CrackError::NoImages)?;
+    let picture = diffuse.and_then(|diffuse| images.get(&diffuse)).map(Image::size);
     let mut sources = Vec::new();
     for (index, guide) in guided.iter().flat_map(|guided| &guided.guides).enumerate() {
         let named = |error: CrackError| CrackError::Guide { index, reason: error.to_string() };
@@ -104,7 +106,7 @@ pub(super) fn begin(world: &mut World, entity: Entity, bake: &mut Bake) -> Resul
     };
     let has_threads = world.resource::<Threads>().pool().is_some();
     let Some(reading) = PictureCopies::new(copies.0, images, has_threads) else { return Ok(None) };
-    Ok(Some(Work::Reading(reading, Box::new(MapJob::new(order, size, surface, sources)))))
+    Ok(Some(Work::Reading(reading, Box::new(MapJob::new(order, size, (surface, picture), sources)))))
 }
 
 /// The size of a map of at most `max_side` texels along its longer side.

@@ -43,6 +43,8 @@ pub(super) struct MapJob {
     /// Copies of the pictures of surface, mask and guides.
     pub(super) copies: Vec<Image>,
     pub(super) surface: BakeSurface,
+    /// Size of the picture of a mesh that is laid out, if it has one.
+    picture: Option<UVec2>,
     pub(super) sources: vec::IntoIter<(Source, f32)>,
     guides: Vec<Guide>,
     map: Option<VoronoiBake>,
@@ -87,9 +89,14 @@ pub(super) struct Lines {
 }
 
 impl MapJob {
-    pub(super) fn new(order: CracksOrder, size: UVec2, surface: BakeSurface, sources: Vec<(Source, f32)>) -> Self {
+    pub(super) fn new(
+        order: CracksOrder,
+        size: UVec2,
+        (surface, picture): (BakeSurface, Option<UVec2>),
+        sources: Vec<(Source, f32)>,
+    ) -> Self {
         let (copies, guides) = (Vec::new(), Vec::with_capacity(sources.len()));
-        Self { order, size, copies, surface, sources: sources.into_iter(), guides, map: None, progress: 0.0 }
+        Self { order, size, copies, surface, picture, sources: sources.into_iter(), guides, map: None, progress: 0.0 }
     }
 
     /// A slice of the work.
@@ -121,7 +128,8 @@ impl MapJob {
         let failed = |error: VoronoiError| CrackError::Bake { reason: error.to_string() };
         let Some(map) = &mut self.map else {
             let guides = core::mem::take(&mut self.guides);
-            self.map = Some(start(guided, guides, self.size, self.unfolding()).map_err(failed)?);
+            let laid_out = self.unfolding().map(|unfolding| (unfolding, self.proportions()));
+            self.map = Some(start(guided, guides, self.size, laid_out).map_err(failed)?);
             return Ok(None);
         };
         if let voronoi::BakeStatus::Working(share) = map.step((SLICE / self.size.x).max(1) as usize) {
@@ -130,8 +138,12 @@ impl MapJob {
         }
         let Some((map, seams)) = self.map.take().map(VoronoiBake::finish) else { return Ok(None) };
         let covered = map.strokes().map(|strokes| strokes.covered);
+        let front = self.unfolding().zip(guided.appearance.front()).map(|(unfolding, from)| {
+            let from = unfolding.nearest_texel(from) / unfolding.layout.size.as_vec2();
+            (map.network(&seams, from * seams.extent), FRONT_OPENING)
+        });
         let (seams, motion) = motion(guided, map, seams).map_err(failed)?;
-        let (network, opening) = lines(&seams, guided.appearance, self.unfolding());
+        let (network, opening) = front.unwrap_or_else(|| lines(&seams, guided.appearance));
         let added = Some(Added { network, opening, steps: 0, motion });
         Ok(Some(Lines { added, record: None, covered, ground: self.ground() }))
     }
@@ -156,14 +168,33 @@ impl MapJob {
 
     /// A guide over the surface as it is laid out.
     fn read(&self, source: Source) -> Result<Grid<f32>, String> {
-        if matches!(source, Source::Own) {
-            return self.own_edges();
+        let values = match source {
+            Source::Own => return self.own_edges(),
+            Source::Grid(values) => Arc::unwrap_or_clone(values),
+            Source::Text(text, font) => self.draw_text(&text, font.as_deref())?,
+            Source::Image(index) => ink(self.copies.get(index).ok_or("it was not read")?)?,
+            Source::Png(file) => ink(&png::decode(&file)?)?,
+        };
+        let Some(unfolding) = self.unfolding() else { return Ok(values) };
+        unfolding.lay_out(&values, self.size).map_err(|error| error.to_string())
+    }
+
+    /// Size of the picture of a mesh that is laid out, the shorter side being 1.
+    fn proportions(&self) -> Vec2 {
+        let is_own = self.unfolding().is_some_and(|unfolding| unfolding.is_own);
+        let own = self.base().filter(|_| is_own).map(|(base, _)| base.size);
+        let size = own.or(self.picture).filter(|size| size.min_element() > 0).unwrap_or(UVec2::ONE).as_vec2();
+        size / size.min_element()
+    }
+
+    fn draw_text(&self, text: &str, font: Option<&[u8]>) -> Result<Grid<f32>, String> {
+        let mut size = self.size;
+        if self.unfolding().is_some() {
+            let proportions = self.proportions();
+            size = (proportions * TEXT_SIDE.min(MAX_SIDE as f32 / proportions.max_element())).round().as_uvec2();
         }
-        let values = self.read_values(source)?;
-        Ok(match self.unfolding() {
-            Some(unfolding) => unfolding.lay_out(&values, self.size),
-            None => values,
-        })
+        let letters = voronoi::draw_text(font.unwrap_or(voronoi::FONT), text, size.max(UVec2::ONE), f32::INFINITY);
+        Ok(letters.ok_or("its font cannot be read")?)
     }
 
     /// The edges of the surface's own picture.
@@ -185,55 +216,41 @@ impl MapJob {
         }
         Ok(edges)
     }
-
-    /// A guide over the surface's picture.
-    fn read_values(&self, source: Source) -> Result<Grid<f32>, String> {
-        let decoded;
-        let image = match source {
-            Source::Grid(grid) => return Ok(Arc::unwrap_or_clone(grid)),
-            Source::Text(text, font) => {
-                let font = font.as_deref().unwrap_or(voronoi::FONT);
-                let size = self.unfolding().map_or(self.size, |unfolding| {
-                    let size = (unfolding.picture * TEXT_SIDE).min(Vec2::splat(MAX_SIDE as f32));
-                    size.round().as_uvec2()
-                });
-                let letters = voronoi::draw_text(font, &text, size, f32::INFINITY);
-                return Ok(letters.ok_or("its font cannot be read")?);
-            }
-            Source::Own => return self.own_edges(),
-            Source::Image(index) => self.copies.get(index).ok_or("it was not read")?,
-            Source::Png(file) => {
-                decoded = png::decode(&file)?;
-                &decoded
-            }
-        };
-        let size = picture::readable_size(image).map_err(|error| error.to_string())?;
-        let rgba = picture::read(image, Space::Srgb, size).map_err(|error| error.to_string())?;
-        Ok(voronoi::ink(size, &rgba).ok_or("its size is wrong")?)
-    }
 }
 
-/// A map of the surface, laid out or not.
+/// The drawing in a picture.
+fn ink(image: &Image) -> Result<Grid<f32>, String> {
+    let size = picture::readable_size(image).map_err(|error| error.to_string())?;
+    let rgba = picture::read(image, Space::Srgb, size).map_err(|error| error.to_string())?;
+    Ok(voronoi::ink(size, &rgba).ok_or("its size is wrong")?)
+}
+
+/// A map of the surface, laid out (with the proportions of its picture) or not.
 fn start(
     guided: &GuidedCracks,
     guides: Vec<Guide>,
     size: UVec2,
-    unfolding: Option<&Unfolding>,
+    laid_out: Option<(&Unfolding, Vec2)>,
 ) -> Result<VoronoiBake, VoronoiError> {
     let mut params = guided.params.clone();
-    let Some(unfolding) = unfolding else { return VoronoiBake::new(params, guides, size, guided.seed) };
+    let Some((unfolding, proportions)) = laid_out else {
+        return VoronoiBake::new(params, guides, size, guided.seed);
+    };
+    let charts = unfolding.charts(size)?;
     // Places in the picture become places where they are laid out.
-    let laid = |texel: Vec2| texel / unfolding.unit;
+    let scale = size.as_vec2() / unfolding.layout.size.as_vec2();
+    let laid = |texel: Vec2| charts.frame().to_pos(texel * scale);
     match &mut params.layout {
-        SiteLayout::Impact { at, .. } if at.is_finite() => *at = laid(unfolding.nearest_texel(*at / unfolding.picture)),
+        SiteLayout::Impact { at, .. } if at.is_finite() => *at = laid(unfolding.nearest_texel(*at / proportions)),
         SiteLayout::Given(points) => {
-            let place = |point: &Vec2| unfolding.texel(*point / unfolding.picture).map(laid);
-            *points = points.iter().take(voronoi::MAX_SITES as usize).filter_map(place).collect();
+            let all = points.iter().filter(|point| point.is_finite()).take(voronoi::MAX_SITES as usize);
+            let uvs: Vec<Vec2> = all.map(|point| *point / proportions).collect();
+            *points = unfolding.texels(&uvs).into_iter().flatten().map(laid).collect();
         }
-        SiteLayout::Density(density) => *density = unfolding.lay_out(density, size),
+        SiteLayout::Density(density) => *density = unfolding.lay_out(density, size)?,
         _ => {}
     }
-    VoronoiBake::on_charts(params, guides, unfolding.charts(size)?, guided.seed)
+    VoronoiBake::on_charts(params, guides, charts, guided.seed)
 }
 
 /// How the cracks move until they are where they stay, and the seams there.
@@ -256,9 +273,8 @@ fn motion(guided: &GuidedCracks, mut map: VoronoiMap, seams: Seams) -> Result<(S
 }
 
 /// The seams in the order in which they come, and the steps in which each opens.
-fn lines(seams: &Seams, appearance: GuidedAppearance, unfolding: Option<&Unfolding>) -> (Network, u32) {
-    if let GuidedAppearance::Front { from, .. } = appearance {
-        let from = unfolding.map_or(from, |unfolding| unfolding.nearest_texel(from) / unfolding.layout.size.as_vec2());
+fn lines(seams: &Seams, appearance: GuidedAppearance) -> (Network, u32) {
+    if let Some(from) = appearance.front() {
         return (seams.network(from * seams.extent), FRONT_OPENING);
     }
     let mut network = seams.network(Vec2::ZERO);
@@ -325,7 +341,7 @@ mod tests {
     fn read(copies: Vec<Image>, source: Source) -> Result<Grid<f32>, String> {
         let base = Arc::new(BasePicture::new(UVec2::ONE, vec![255; 4], None, None));
         let surface = BakeSurface::Known(base, TexelRect::whole(UVec2::ONE));
-        let mut job = MapJob::new(CracksOrder::Record(Box::default()), SIZE, surface, Vec::new());
+        let mut job = MapJob::new(CracksOrder::Record(Box::default()), SIZE, (surface, None), Vec::new());
         job.copies = copies;
         job.read(source)
     }

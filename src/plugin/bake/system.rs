@@ -2,7 +2,7 @@
 
 use super::begin::begin;
 use super::commit::{commit, start_finish};
-use super::work::{Bake, BakeJob, Baked, Bakes, StepResult, Work};
+use super::work::{Bake, BakeJob, Baked, Bakes, StepResult, Work, forget_layout};
 use crate::plugin::api::error::EntityLabel;
 use crate::plugin::api::{BakeProgress, CrackBaked, CrackBudget, CrackError, CrackFailed, CrackRecord};
 use crate::plugin::jobs::background::guarded;
@@ -161,6 +161,7 @@ fn end(world: &mut World, entity: Entity, kind: Baked, result: Result<Option<f32
             world.trigger(CrackBaked { entity, covered });
         }
         Err(error) => {
+            forget_layout(world, entity);
             warn!("the baked cracks of {} are not made: {error}", EntityLabel::of(world, entity));
             with_queue(world, |_, queue, stats| queue.purge(entity, stats));
             world.trigger(CrackFailed { entity, error });

@@ -3,8 +3,10 @@
 use super::finish::{Finish, FinishStep, Finished};
 use super::map_job::{Lines, MAPPED, MapJob};
 use crate::plugin::api::{BakeProgress, CrackError, CrackRecord, CrackStrands, CrackSurface, GuidedCracks};
+use crate::plugin::carrier::kinds;
 use crate::plugin::jobs::copy::PictureCopies;
 use crate::plugin::jobs::stepped::{RunningTask, Step, Stepped};
+use crate::plugin::surface::cracked::has_cracked;
 use crate::plugin::surface::plan::Plan;
 use bevy::{
     ecs::{
@@ -216,17 +218,29 @@ impl BakedComponent for CrackRecord {
     const KIND: Baked = Baked::Record;
 }
 
+/// A mesh that was laid out for a bake that has come to nothing is so around its first hit.
+pub(super) fn forget_layout(world: &mut World, entity: Entity) {
+    if !has_cracked(world, entity)
+        && let Some(kind) = kinds::inspect(world, entity).0
+    {
+        kind.forget_layout(world, entity);
+    }
+}
+
 /// Cancels the bake of a component that goes. The cracks of a bake that is done stay.
 pub(crate) fn cancel_removed<T: BakedComponent>(
     removed: On<Remove, T>,
     mut bakes: ResMut<Bakes>,
     mut progress: Query<&mut BakeProgress>,
+    mut commands: Commands,
 ) {
     let is_of_another = |(baked, bake): &(Entity, Bake)| *baked == removed.entity && bake.kind != T::KIND;
     if bakes.list.iter().any(is_of_another) {
         return;
     }
     bakes.cancel(removed.entity);
+    let entity = removed.entity;
+    commands.queue(move |world: &mut World| forget_layout(world, entity));
     if let Ok(mut progress) = progress.get_mut(removed.entity)
         && progress.0 < 1.0
     {

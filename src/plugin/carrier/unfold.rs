@@ -183,7 +183,7 @@ impl Work {
         let laid = Flattening { shape: &shape, positions: &positions, corners: &corners, around, uvs: &uvs, texels }
             .apply(&self.order)?;
         let Flat { layout, unit, around } = laid;
-        let unfolding = Arc::new(Unfolding::new(self.order.id, layout, unit, around / self.scale, self.picture, uvs));
+        let unfolding = Arc::new(Unfolding::new(self.order.id, layout, unit, around / self.scale, uvs));
         let mesh = flat_mesh(self.mesh, &unfolding.layout)?;
         Some((Box::new(mesh), unfolding))
     }

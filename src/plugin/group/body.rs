@@ -127,13 +127,12 @@ impl BodyWork {
         let flat = flattening.apply(&order);
         let Flat { layout, unit, around } = flat.ok_or_else(|| failed("its members cannot be laid out".into()))?;
         let around = around / self.scale;
-        let to_pictures = Unfolding::new(order.id, layout.clone(), unit, around, None, uvs);
+        let to_pictures = Unfolding::new(order.id, layout.clone(), unit, around, uvs);
         let size = layout.size.as_vec2();
         let own = layout.corners.clone();
         let own =
             |i: usize| own.get(i).copied().flatten().map(|corners: [Vec2; 3]| corners.map(|corner| corner / size));
-        let picture = Some(layout.size);
-        let mut unfolding = Unfolding::new(order.id, layout, unit, around, picture, own);
+        let mut unfolding = Unfolding::new(order.id, layout, unit, around, own);
         unfolding.is_own = true;
         let Joined { owner, triangles, .. } = &joined;
         let (owner, triangles) = (owner.clone(), triangles.clone());

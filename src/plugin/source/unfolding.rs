@@ -1,8 +1,8 @@
 //! [`Unfolding`]: a mesh that is laid out flat, with its picture.
 
-use crate::Grid;
-use crate::unwrap::{GUTTER, LaidOut};
+use crate::unwrap::{Cut, GUTTER, LaidOut};
 use crate::voronoi::{MapCharts, VoronoiError};
+use crate::{Grid, OutOfMemory};
 use bevy::{
     math::{Affine2, Mat2},
     prelude::*,
@@ -20,8 +20,6 @@ pub(crate) struct Unfolding {
     pub(crate) around: Vec3,
     /// Whether the picture is laid out so itself.
     pub(crate) is_own: bool,
-    /// Size of its picture, the shorter side being 1.
-    pub(crate) picture: Vec2,
     /// From texels to the coordinates of the picture, for each triangle.
     to_picture: Vec<Affine2>,
 }
@@ -34,7 +32,6 @@ impl Unfolding {
         layout: LaidOut,
         unit: f32,
         around: Vec3,
-        picture: Option<UVec2>,
         uvs: impl Fn(usize) -> Option<[Vec2; 3]>,
     ) -> Self {
         let to_picture = layout.corners.iter().enumerate().map(|(triangle, corners)| {
@@ -45,9 +42,7 @@ impl Unfolding {
             if map.is_finite() { map } else { Affine2::from_mat2_translation(Mat2::ZERO, p) }
         });
         let to_picture = to_picture.collect();
-        let picture = picture.filter(|size| size.min_element() > 0).unwrap_or(UVec2::ONE).as_vec2();
-        let picture = picture / picture.min_element();
-        Self { id, layout, unit, around, is_own: false, picture, to_picture }
+        Self { id, layout, unit, around, is_own: false, to_picture }
     }
 
     /// Whether a texel shows nothing of the mesh.
@@ -67,21 +62,32 @@ impl Unfolding {
     }
 
     /// Where it shows what its picture has at these texture coordinates, texels; `None` if nowhere, the first place if in several.
-    pub(crate) fn texel(&self, uv: Vec2) -> Option<Vec2> {
-        self.laid().find_map(|([a, b, c], map)| {
-            let place = map.inverse().transform_point2(uv);
-            let sides = [(a, b), (b, c), (c, a)].map(|(from, to)| (to - from).perp_dot(place - from));
-            let is_inside = sides.iter().all(|side| *side <= 0.0) || sides.iter().all(|side| *side >= 0.0);
-            is_inside.then_some(place)
-        })
+    pub(crate) fn texels(&self, uvs: &[Vec2]) -> Vec<Option<Vec2>> {
+        let mut order: Vec<usize> = (0..uvs.len()).collect();
+        order.sort_by(|a, b| uvs[*a].x.total_cmp(&uvs[*b].x));
+        let mut places = vec![None; uvs.len()];
+        for ([a, b, c], map) in self.laid() {
+            let back = map.inverse();
+            let [p, q, r] = [a, b, c].map(|corner| map.transform_point2(corner));
+            let (min, max) = (p.min(q).min(r), p.max(q).max(r));
+            let first = order.partition_point(|i| uvs[*i].x < min.x);
+            let last = order.partition_point(|i| uvs[*i].x <= max.x);
+            for i in order[first..last.max(first)].iter().filter(|i| (min.y..=max.y).contains(&uvs[**i].y)) {
+                let place = back.transform_point2(uvs[*i]);
+                if places[*i].is_none() && is_in([a, b, c], place) {
+                    places[*i] = Some(place);
+                }
+            }
+        }
+        places
     }
 
-    /// The same, or else the middle of the triangle that is nearest to it in its picture.
+    /// The same of one place, or else the middle of the triangle that is nearest to it in its picture.
     pub(crate) fn nearest_texel(&self, uv: Vec2) -> Vec2 {
         let middles = self.laid().map(|([a, b, c], map)| ((a + b + c) / 3.0, map));
         let far = |(middle, map): &(Vec2, &Affine2)| map.transform_point2(*middle).distance_squared(uv);
         let nearest = || middles.min_by(|a, b| far(a).total_cmp(&far(b))).map_or(Vec2::ZERO, |(middle, _)| middle);
-        self.texel(uv).unwrap_or_else(nearest)
+        self.texels(&[uv])[0].unwrap_or_else(nearest)
     }
 
     /// The triangles that lie somewhere, and from there to its picture.
@@ -91,51 +97,29 @@ impl Unfolding {
         all.filter(|(_, map)| map.matrix2.determinant() != 0.0)
     }
 
-    /// The chart of a texel.
-    fn chart(&self, texel: UVec2) -> Option<u32> {
-        self.layout.chart.get(self.layout.owner(texel)?).copied()
-    }
-
-    /// Its charts for a map of `size` texels, and which of its texels are joined where the mesh is cut.
+    /// The chart of each texel at `size` texels.
     pub(crate) fn charts(&self, size: UVec2) -> Result<MapCharts, VoronoiError> {
-        let scale = size.as_vec2() / self.layout.size.as_vec2();
-        let place = |texel: UVec2| ((texel.as_vec2() + 0.5) / scale).as_uvec2();
-        let mut chart = Grid::new(size, MapCharts::NOTHING);
+        let view = View::new(self, size)?;
+        let mut chart = Grid::try_new(size, MapCharts::NOTHING)?;
         for y in 0..size.y {
             for (x, chart) in (0..size.x).zip(chart.row_mut(y as usize)) {
-                *chart = self.chart(place(UVec2::new(x, y))).unwrap_or(MapCharts::NOTHING);
+                let of = view.owner(UVec2::new(x, y)).and_then(|owner| self.layout.chart.get(owner));
+                *chart = of.copied().unwrap_or(MapCharts::NOTHING);
             }
         }
-        let texel = |place: Vec2| (place * scale).max(Vec2::ZERO).as_uvec2().min(size - 1);
-        let joined = self.layout.cuts.iter().flat_map(|[[a, b], [p, q]]| {
-            let length = ((*b - *a) * scale).length().max(((*q - *p) * scale).length());
-            // Two for a texel, so that none is left out.
-            let steps = (2.0 * length).ceil().clamp(1.0, MOST_STEPS);
-            (0..steps as u32).map(move |step| {
-                let share = (step as f32 + 0.5) / steps;
-                [a.lerp(*b, share), p.lerp(*q, share)]
-            })
-        });
-        let mut links: Vec<[u32; 4]> = joined
-            .map(|places| places.map(texel))
-            .filter(|[a, b]| a != b && [a, b].iter().all(|at| chart.get(at.x, at.y) != Some(MapCharts::NOTHING)))
-            .map(|[a, b]| [a.y, a.x, b.y, b.x])
-            .collect();
-        links.sort_unstable();
-        links.dedup();
-        let links = links.into_iter().map(|[ay, ax, by, bx]| [UVec2::new(ax, ay), UVec2::new(bx, by)]).collect();
-        let margin = (GUTTER as f32 * scale.x).round().max(1.0) as u32;
-        MapCharts::new(chart, self.unit * scale.x, margin, links)
+        let margin = (GUTTER as f32 * view.scale.x).round().max(1.0) as u32;
+        let links = view.links(&chart);
+        Ok(MapCharts::new(chart, self.unit * view.scale.x, margin, links)?.with_walls(view.walls()))
     }
 
-    /// Values that lie over its picture, laid out with the mesh at `size` texels.
-    pub(crate) fn lay_out(&self, values: &Grid<f32>, size: UVec2) -> Grid<f32> {
-        let mut out = Grid::new(size, 0.0);
+    /// Values that lie over its picture, laid out with the mesh at `size` texels. What is no number counts as 0.
+    pub(crate) fn lay_out(&self, values: &Grid<f32>, size: UVec2) -> Result<Grid<f32>, OutOfMemory> {
+        let mut out = Grid::try_new(size, 0.0)?;
         if values.size().min_element() == 0 {
-            return out;
+            return Ok(out);
         }
         let scale = size.as_vec2() / self.layout.size.as_vec2();
-        let shrunk = shrunk(values, self.share(values.size(), scale));
+        let shrunk = shrunk(values, self.share(values.size(), scale))?;
         let values = shrunk.as_ref().unwrap_or(values);
         for y in 0..size.y {
             for (x, out) in (0..size.x).zip(out.row_mut(y as usize)) {
@@ -143,7 +127,7 @@ impl Unfolding {
                 *out = uv.map_or(0.0, |uv| between(values, uv));
             }
         }
-        out
+        Ok(out)
     }
 
     /// How many values lie along a texel, in the mean, where the mesh is laid out at this scale.
@@ -171,27 +155,180 @@ impl Unfolding {
     }
 }
 
-/// The most texels that are joined along an edge.
+/// Whether a place lies in a triangle, its border included.
+fn is_in([a, b, c]: [Vec2; 3], place: Vec2) -> bool {
+    let sides = [(a, b), (b, c), (c, a)].map(|(from, to)| (to - from).perp_dot(place - from));
+    sides.iter().all(|side| *side <= 0.0) || sides.iter().all(|side| *side >= 0.0)
+}
+
+/// How far it is from a place to the border of a triangle.
+fn distance([a, b, c]: [Vec2; 3], place: Vec2) -> f32 {
+    let to_side = |(from, to): (Vec2, Vec2)| {
+        let along = to - from;
+        let share = (place - from).dot(along) / along.length_squared().max(f32::MIN_POSITIVE);
+        place.distance(from + share.clamp(0.0, 1.0) * along)
+    };
+    [(a, b), (b, c), (c, a)].map(to_side).into_iter().fold(f32::INFINITY, f32::min)
+}
+
+/// A layout at another number of texels.
+struct View<'a> {
+    layout: &'a LaidOut,
+    size: UVec2,
+    /// Its texels for one of the layout.
+    scale: Vec2,
+    /// Where each texel lies.
+    side: Grid<Side>,
+}
+
+/// Where a texel lies beside the triangle that it belongs to.
+#[derive(Clone, Copy, PartialEq)]
+enum Side {
+    Within,
+    /// A texel beside it at the most, where triangles are small.
+    Near,
+    Beyond,
+}
+
+impl<'a> View<'a> {
+    fn new(unfolding: &'a Unfolding, size: UVec2) -> Result<Self, OutOfMemory> {
+        let layout = &unfolding.layout;
+        let scale = size.as_vec2() / layout.size.as_vec2();
+        let mut view = Self { layout, size, scale, side: Grid::try_new(size, Side::Beyond)? };
+        let near = scale.recip().max_element();
+        for y in 0..size.y {
+            for x in 0..size.x {
+                let texel = UVec2::new(x, y);
+                let Some(corners) = view.owner(texel).and_then(|owner| layout.corners[owner]) else { continue };
+                let place = view.middle(texel);
+                view.side.row_mut(y as usize)[x as usize] = match is_in(corners, place) {
+                    true => Side::Within,
+                    false if distance(corners, place) <= near => Side::Near,
+                    false => Side::Beyond,
+                };
+            }
+        }
+        Ok(view)
+    }
+
+    fn side(&self, texel: UVec2) -> Side {
+        self.side.get(texel.x, texel.y).unwrap_or(Side::Beyond)
+    }
+
+    /// The middle of a texel, in texels of the layout.
+    fn middle(&self, texel: UVec2) -> Vec2 {
+        (texel.as_vec2() + 0.5) / self.scale
+    }
+
+    fn owner(&self, texel: UVec2) -> Option<usize> {
+        self.layout.owner(self.middle(texel).as_uvec2())
+    }
+
+    /// The pairs of texels that meet where the mesh is cut.
+    fn links(&self, chart: &Grid<u32>) -> Vec<[UVec2; 2]> {
+        let texel = |place: Vec2| (place * self.scale).max(Vec2::ZERO).as_uvec2().min(self.size - 1);
+        let mut links = Vec::new();
+        for Cut { triangles, places: [[a, b], [p, q]] } in &self.layout.cuts {
+            let own = triangles.map(|triangle| self.layout.chart.get(triangle).copied());
+            let length = ((*b - *a) * self.scale).length().max(((*q - *p) * self.scale).length());
+            // Two for a texel, so that none is left out.
+            let steps = (2.0 * length).ceil().clamp(1.0, MOST_STEPS);
+            for step in 0..steps as u32 {
+                let share = (step as f32 + 0.5) / steps;
+                let [a, b] = [a.lerp(*b, share), p.lerp(*q, share)].map(texel);
+                if a != b && [a, b].map(|at| chart.get(at.x, at.y)) == own {
+                    links.push([a.y, a.x, b.y, b.x]);
+                }
+            }
+        }
+        links.sort_unstable();
+        links.dedup();
+        links.into_iter().map(|[ay, ax, by, bx]| [UVec2::new(ax, ay), UVec2::new(bx, by)]).collect()
+    }
+
+    /// The pairs of texels that are beside one another in the plane alone: on both sides of an edge that is cut or that ends the surface, or
+    /// beyond the border of parts that do not meet there.
+    fn walls(&self) -> Vec<[UVec2; 2]> {
+        let cuts = self.layout.cuts.iter().flat_map(|cut| cut.places);
+        let mut walls = Vec::new();
+        for edge in cuts.chain(self.layout.borders.iter().copied()) {
+            self.wall_along(edge.map(|end| end * self.scale), &mut walls);
+        }
+        for (y, x) in (0..self.size.y).flat_map(|y| (0..self.size.x).map(move |x| (y, x))) {
+            let at = UVec2::new(x, y);
+            for next in [at + UVec2::X, at + UVec2::Y].into_iter().filter(|next| next.cmplt(self.size).all()) {
+                let is_beyond = [at, next].into_iter().any(|texel| self.side(texel) == Side::Beyond);
+                if is_beyond && !self.are_owners_together(at, next) {
+                    walls.push([at, next]);
+                }
+            }
+        }
+        walls
+    }
+
+    /// Whether the triangles of two texels are one, or touch in the plane.
+    fn are_owners_together(&self, a: UVec2, b: UVec2) -> bool {
+        let (Some(a), Some(b)) = (self.owner(a), self.owner(b)) else { return true };
+        let corners = |triangle: usize| self.layout.corners[triangle].unwrap_or([Vec2::NAN; 3]);
+        let touch = |a: Vec2| corners(b).iter().any(|b| a.distance_squared(*b) < TOUCHING * TOUCHING);
+        a == b || corners(a).into_iter().any(touch)
+    }
+
+    /// Parts the texels on both sides of a line where both show the mesh itself.
+    fn wall_along(&self, [a, b]: [Vec2; 2], walls: &mut Vec<[UVec2; 2]>) {
+        let is_left = |texel: UVec2| (b - a).perp_dot(texel.as_vec2() + 0.5 - a) < 0.0;
+        let length = a.distance(b);
+        let steps = (4.0 * length).ceil().clamp(1.0, MOST_STEPS);
+        let mut last = None;
+        for step in 0..=steps as u32 {
+            let corner = (a.lerp(b, step as f32 / steps) - 0.5).max(Vec2::ZERO).as_uvec2();
+            if last.replace(corner) == Some(corner) || !(corner + 1).cmplt(self.size).all() {
+                continue;
+            }
+            let [right, below, across] = [UVec2::X, UVec2::Y, UVec2::ONE].map(|step| corner + step);
+            for pair in [[corner, right], [corner, below], [right, across], [below, across]] {
+                let [first, second] = pair.map(is_left);
+                if first != second && pair.iter().all(|texel| self.side(*texel) == Side::Within) {
+                    walls.push(pair);
+                }
+            }
+        }
+    }
+}
+
+/// The most steps along an edge.
 const MOST_STEPS: f32 = 1e5;
 
+/// Corners that are nearer to one another are one, texels.
+const TOUCHING: f32 = 0.1;
+
+/// A value, 0 if it is none.
+fn counted(value: f32) -> f32 {
+    if value.is_finite() { value.clamp(0.0, MOST_VALUE) } else { 0.0 }
+}
+
+/// Larger values count as this.
+const MOST_VALUE: f32 = 1e9;
+
 /// Means of as many values as lie along a texel, if that is more than one.
-fn shrunk(values: &Grid<f32>, along: f32) -> Option<Grid<f32>> {
+fn shrunk(values: &Grid<f32>, along: f32) -> Result<Option<Grid<f32>>, OutOfMemory> {
     let from = values.size();
     let step = along.clamp(1.0, from.max_element() as f32) as usize;
     if step < 2 {
-        return None;
+        return Ok(None);
     }
     let size = UVec2::new((from.x as usize).div_ceil(step) as u32, (from.y as usize).div_ceil(step) as u32);
-    let mut out = Grid::new(size, 0.0);
+    let mut out = Grid::try_new(size, 0.0)?;
     for y in 0..size.y as usize {
         let rows = y * step..((y + 1) * step).min(values.height());
         for (x, out) in out.row_mut(y).iter_mut().enumerate() {
             let columns = x * step..((x + 1) * step).min(values.width());
             let count = (rows.len() * columns.len()) as f32;
-            *out = rows.clone().flat_map(|y| &values.row(y)[columns.clone()]).sum::<f32>() / count;
+            let all = rows.clone().flat_map(|y| &values.row(y)[columns.clone()]);
+            *out = all.map(|value| counted(*value)).sum::<f32>() / count;
         }
     }
-    Some(out)
+    Ok(Some(out))
 }
 
 /// The value at texture coordinates, linear between the middles of values. Beyond the picture it is repeated.
@@ -203,7 +340,7 @@ fn between(values: &Grid<f32>, uv: Vec2) -> f32 {
     let (low, share) = (at.floor(), at.fract());
     let [x, y] = low.as_uvec2().to_array();
     let row = |y: u32| {
-        let value = |x: u32| values.get(x, y).unwrap_or(0.0);
+        let value = |x: u32| counted(values.get(x, y).unwrap_or(0.0));
         value(x) + (value((x + 1).min(values.size().x - 1)) - value(x)) * share.x
     };
     row(y) + (row((y + 1).min(values.size().y - 1)) - row(y)) * share.y
@@ -244,13 +381,12 @@ mod tests {
         let unwrap = Unwrap { around, triangle: 0, right, texels: 40.0, most_side: 4096, most_texels: 1 << 22 };
         let layout = unwrap.apply(&shape).expect("it fits");
         let size = layout.size;
-        let unfolding = Unfolding::new(0, layout, 50.0, around, Some(UVec2::new(300, 200)), uvs);
-        assert_eq!(unfolding.picture, Vec2::new(1.5, 1.0));
+        let unfolding = Unfolding::new(0, layout, 50.0, around, uvs);
         let mut rows = Grid::new(UVec2::new(1, 64), 0.0);
         (0..64).for_each(|y| rows.row_mut(y)[0] = (y as f32 + 0.5) / 64.0);
         // Fewer texels than there are values, as many, and half of them.
         for (size, within) in [(size, 0.03), (size / 2, 0.06), (size / 5, 0.15)] {
-            let laid = unfolding.lay_out(&rows, size);
+            let laid = unfolding.lay_out(&rows, size).expect("memory");
             let mut seen = 0;
             for texel in (0..size.y).flat_map(|y| (0..size.x).map(move |x| UVec2::new(x, y))) {
                 let place = (texel.as_vec2() + 0.5) / (size.as_vec2() / unfolding.layout.size.as_vec2());
@@ -267,14 +403,87 @@ mod tests {
             }
             assert!(seen * 3 > size.element_product(), "{seen} of {size}");
         }
-        for uv in [Vec2::new(0.2, 0.7), Vec2::ZERO, Vec2::new(0.5, 0.5), Vec2::new(0.93, 0.11)] {
-            let texel = unfolding.texel(uv).expect("it is there");
+        let uvs = [Vec2::new(0.2, 0.7), Vec2::ZERO, Vec2::new(1.2, 0.5), Vec2::new(0.5, 0.5), Vec2::new(0.93, 0.11)];
+        let texels = unfolding.texels(&uvs);
+        assert_eq!(texels[2], None);
+        for (uv, texel) in uvs.into_iter().zip(texels).filter(|(uv, _)| uv.x <= 1.0) {
+            let texel = texel.expect("it is there");
             assert!(unfolding.uv(texel).is_some_and(|found| found.distance(uv) < 1e-3), "{uv}");
             assert_eq!(unfolding.nearest_texel(uv), texel);
         }
-        assert_eq!(unfolding.texel(Vec2::new(1.2, 0.5)), None);
+        // Values that are none do not spread.
+        let broken = Grid::from_vec(UVec2::new(3, 1), vec![f32::NAN, 0.5, f32::INFINITY]).expect("three");
+        let laid = unfolding.lay_out(&broken, size).expect("memory");
+        assert!(laid.as_slice().iter().all(|value| (0.0..=0.5).contains(value)));
         let beside = unfolding.uv(unfolding.nearest_texel(Vec2::new(9.0, 0.4))).expect("it is on the mesh");
         assert!(beside.x > 0.6, "{beside}");
+    }
+
+    /// A step of an L, whose concave faces come to lie beside others where they do not meet, and one that is so fine that its triangles
+    /// are smaller than texels: what is joined in the map is near on the mesh.
+    #[test]
+    fn what_is_joined_in_the_map_is_near_on_the_mesh() {
+        use crate::unwrap::{MeshShape, Unwrap};
+        use crate::voronoi::{VoronoiBake, VoronoiParams};
+        // The outline of an L, and the same 0.6 higher.
+        let outline = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]].map(Vec2::from);
+        let mut positions: Vec<Vec3> = outline.iter().map(|at| at.extend(0.0)).collect();
+        positions.extend(outline.iter().map(|at| at.extend(0.6)));
+        let cap = [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]];
+        let mut triangles: Vec<[u32; 3]> = cap.iter().map(|[a, b, c]| [*a, *c, *b]).collect();
+        triangles.extend(cap.iter().map(|corners| corners.map(|corner| corner + 6)));
+        for i in 0..6 {
+            let j = (i + 1) % 6;
+            triangles.extend([[i, j, j + 6], [i, j + 6, i + 6]]);
+        }
+        let rock =
+            |i: u32| Vec3::new((i % 41) as f32 * 0.05, (i / 41) as f32 * 0.05, 0.2 * ((i * 7 % 41) as f32 / 41.0));
+        let fine: Vec<Vec3> = (0..41 * 41).map(rock).collect();
+        let quads = (0..40 * 40).map(|i| i % 40 + i / 40 * 41);
+        let of_fine: Vec<[u32; 3]> = quads.flat_map(|i| [[i, i + 1, i + 42], [i, i + 42, i + 41]]).collect();
+        for (positions, triangles, texels, around) in [
+            (positions.clone(), triangles.clone(), 40.0, Vec3::new(0.5, 0.5, 0.6)),
+            (positions, triangles, 40.0, Vec3::new(1.0, 1.5, 0.3)),
+            (fine, of_fine, 9.0, Vec3::new(1.0, 1.0, 0.1)),
+        ] {
+            let shape = MeshShape::new(&positions, &triangles).expect("a mesh");
+            let middle = |i: &usize| triangles[*i].iter().map(|vertex| positions[*vertex as usize]).sum::<Vec3>() / 3.0;
+            let far = |i: &usize| middle(i).distance(around);
+            let triangle = (0..triangles.len()).min_by(|a, b| far(a).total_cmp(&far(b))).expect("one");
+            let unwrap = Unwrap { around, triangle, right: Vec3::X, texels, most_side: 4096, most_texels: 1 << 22 };
+            let layout = unwrap.apply(&shape).expect("it fits");
+            let unfolding = Unfolding::new(0, layout, texels, around, |_| Some([Vec2::ZERO, Vec2::X, Vec2::Y]));
+            for size in [unfolding.layout.size, unfolding.layout.size * 2 / 3] {
+                let view = View::new(&unfolding, size).expect("memory");
+                let on_mesh = |texel: UVec2| {
+                    let owner = view.owner(texel)?;
+                    let [a, b, c] = unfolding.layout.corners[owner]?;
+                    let [p, q, r] = triangles[owner].map(|vertex| positions[vertex as usize]);
+                    let shares = Mat2::from_cols(b - a, c - a).inverse() * (view.middle(texel) - a);
+                    (view.side(texel) == Side::Within).then_some(p + (q - p) * shares.x + (r - p) * shares.y)
+                };
+                let params = VoronoiParams { alpha: 0.0, ..VoronoiParams::DEFAULT };
+                let charts = unfolding.charts(size).expect("charts");
+                let map = VoronoiBake::on_charts(params, Vec::new(), charts, 1).expect("a map").finish().0;
+                let (mut joined, mut within) = (0, 0);
+                for texel in (0..size.y).flat_map(|y| (0..size.x).map(move |x| UVec2::new(x, y))) {
+                    let Some(here) = on_mesh(texel) else { continue };
+                    within += 1;
+                    let (right, down) = map.edges(texel.x, texel.y);
+                    for (edge, next) in [(right, texel + UVec2::X), (down, texel + UVec2::Y)] {
+                        if let (Some(_), Some(there)) = (edge, on_mesh(next)) {
+                            joined += 1;
+                            let apart = here.distance(there) * texels * view.scale.x;
+                            assert!(apart < 2.5, "{texel} and {next} are {apart} texels from one another");
+                        }
+                    }
+                }
+                assert!(within > 200 && joined * 10 > within * 15, "{joined} edges of {within} texels");
+                let reached = (0..size.y).flat_map(|y| (0..size.x).map(move |x| UVec2::new(x, y)));
+                let lost = reached.filter(|at| on_mesh(*at).is_some() && map.region(at.x, at.y).is_none()).count();
+                assert_eq!(lost, 0, "all of it is one surface");
+            }
+        }
     }
 
     #[test]

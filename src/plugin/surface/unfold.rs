@@ -6,11 +6,11 @@ use crate::plugin::api::{
     CrackBudget, CrackError, CrackMaskSource, CrackRecord, CrackResolution, CrackStrands, CrackSurface, CrackUnwrap,
     GuidedCracks, HitPoint,
 };
-use crate::plugin::carrier::kind::UnfoldOrder;
+use crate::plugin::carrier::kind::{Found, UnfoldOrder};
 use crate::plugin::carrier::kinds;
 use crate::plugin::gpu::memory::TextureMemory;
 use crate::plugin::jobs::threads::Threads;
-use crate::plugin::source::preset;
+use crate::plugin::source::{picture, preset};
 use crate::plugin::surface::queue::HitQueue;
 use bevy::{prelude::*, render::renderer::RenderDevice};
 
@@ -26,9 +26,16 @@ pub(crate) struct Unfoldings(u64);
 
 /// Has the mesh of a surface laid out that has not cracked, if that is of use; `false` if that is under way.
 pub(crate) fn unfold(world: &mut World, entity: Entity) -> bool {
-    let (Some(kind), _) = kinds::inspect(world, entity) else { return true };
+    let (Some(kind), found) = kinds::inspect(world, entity) else { return true };
     if let Some(is_ready) = kind.poll_unfold(world, entity) {
         return is_ready;
+    }
+    // How large they are is not known before.
+    let is_on_its_way = |picture| matches!(picture::is_loaded(world, picture), Ok(false));
+    match found {
+        Found::Waiting => return false,
+        Found::Shown(shown) if shown.pictures().any(is_on_its_way) => return false,
+        _ => {}
     }
     let Some(surface) = world.get::<CrackSurface>(entity) else { return true };
     // What is given over the whole of a picture has its place there.
@@ -59,7 +66,7 @@ pub(crate) fn order(world: &mut World, entity: Entity) -> Result<Option<UnfoldOr
         Some(around) => Some((HitPoint::Local(around), None)),
         None => world.resource::<HitQueue>().first(entity).map(|hit| (hit.at, hit.point)),
     };
-    // What is drawn lies in the middle of its picture.
+    // Guides are usually in the middle of its picture.
     let is_guided = world.get::<GuidedCracks>(entity).is_some();
     let hit = hit.or_else(|| is_guided.then_some((HitPoint::Uv(Vec2::splat(0.5)), None)));
     let order = UnfoldOrder {

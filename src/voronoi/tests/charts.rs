@@ -158,6 +158,57 @@ fn cracks_end_at_a_cut_and_go_on_behind_it() {
     assert!(ends > 30, "cracks reach the cut: {ends}");
 }
 
+/// A front comes to the other side of a cut when it has run there, not when it would have come straight through the picture.
+#[test]
+fn fronts_go_over_cuts() {
+    let mut rng = Rng::new(79);
+    let sites: Vec<UVec2> = (0..60).map(|_| UVec2::new(below(&mut rng, WHOLE.x), below(&mut rng, WHOLE.y))).collect();
+    let [(one, whole), (two, cut)] = maps(1, &sites, &Grid::new(WHOLE, 0.0)).map(VoronoiBake::finish);
+    let from = Vec2::new(20.0, 40.0) / 80.0;
+    assert_eq!(one.network(&whole, from), whole.network(from), "a plain surface has the plain front");
+    let network = two.network(&cut, from);
+    let births = |is_other: bool| {
+        let texel = |at: Vec2| at * 80.0;
+        let nodes = network.nodes.iter().filter(move |node| (texel(node.pos).y > 90.0) == is_other);
+        let near_cut = move |at: Vec2| {
+            let column = if is_other { at.x - OTHER.x as f32 } else { CUT as f32 - at.x };
+            column < 6.0
+        };
+        let mut births: Vec<u32> = nodes.filter(|node| near_cut(texel(node.pos))).map(|node| node.birth).collect();
+        births.sort_unstable();
+        births
+    };
+    let (near, beyond) = (births(false), births(true));
+    assert!(near.len() > 5 && beyond.len() > 5);
+    // Across the cut at the nearest place it is 27 texels away, a third of a unit: 33 steps; straight through the picture it is 71.
+    assert!((25..60).contains(&beyond[0]) && beyond[0].abs_diff(near[0]) < 20, "{near:?} {beyond:?}");
+    let straight = cut.network(from);
+    let first = straight.nodes.iter().filter(|node| node.pos.y * 80.0 > 90.0).map(|node| node.birth).min();
+    assert!(first.is_some_and(|first| first > 60), "{first:?}");
+}
+
+/// Two parts of one chart that touch where the surface has no way across.
+#[test]
+fn walls_part_what_is_no_neighbour() {
+    let size = UVec2::new(9, 5);
+    let walls = (0..4).map(|y| [UVec2::new(5, y), UVec2::new(4, y)]);
+    let charts = MapCharts::new(Grid::new(size, 0), 5.0, 0, Vec::new()).unwrap();
+    let beyond = [[UVec2::new(8, 0), UVec2::new(9, 0)], [UVec2::ZERO, UVec2::new(2, 0)]];
+    let charts = charts.with_walls(walls.chain(beyond));
+    let params = VoronoiParams {
+        alpha: 0.0,
+        layout: SiteLayout::Given(vec![Vec2::new(0.9, 0.1), Vec2::new(1.7, 0.9)]),
+        ..VoronoiParams::DEFAULT
+    };
+    let (map, seams) = VoronoiBake::on_charts(params, Vec::new(), charts, 1).unwrap().finish();
+    // From the first site at (4, 0) the way to (5, 0) leads around the wall, and the other site at (8, 4) is nearer.
+    assert_eq!((map.region(4, 0), map.region(5, 0), map.cost(5, 0)), (Some(0), Some(1), Some(7 * 256)));
+    for seam in &seams.seams {
+        let across = |point: &&crate::pattern::PathPoint| point.pos.y < 0.7 && (point.pos.x - 1.0).abs() < 0.05;
+        assert!(!seam.points.iter().any(|point| across(&point)), "no crack along a wall: {seam:?}");
+    }
+}
+
 #[test]
 fn sites_lie_within_their_charts_and_what_none_reaches_has_no_region() {
     // Two charts that are not joined, with a margin of three texels.
