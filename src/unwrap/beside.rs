@@ -49,14 +49,22 @@ pub(super) fn of(all: &[Beside], triangle: usize) -> impl Iterator<Item = &Besid
 }
 
 /// Whether two edges that run opposite ways have more than a point in common.
-fn lie_on_one_another([a, b]: [Vec3; 2], [c, d]: [Vec3; 2]) -> bool {
+fn lie_on_one_another(one: [Vec3; 2], other: [Vec3; 2]) -> bool {
+    common(one, other).is_some()
+}
+
+/// What two edges that run opposite ways have in common, if that is more than a point: both its ends, as shares of the way along the first and
+/// along the other.
+pub(super) fn common([a, b]: [Vec3; 2], [c, d]: [Vec3; 2]) -> Option<[[f32; 2]; 2]> {
     let length = a.distance(b);
     let slack = SLACK * length.max(c.distance(d));
     let along = (b - a) / length;
     let is_off = |at: Vec3| (at - a).reject_from_normalized(along).length_squared() > slack * slack;
     if is_off(c) || is_off(d) {
-        return false;
+        return None;
     }
     let (from, to) = ((d - a).dot(along), (c - a).dot(along));
-    to > from && to.min(length) - from.max(0.0) > slack
+    let ends = [from.max(0.0), to.min(length)];
+    (to > from && ends[1] - ends[0] > slack)
+        .then(|| [ends.map(|at| at / length), ends.map(|at| (to - at) / (to - from))])
 }

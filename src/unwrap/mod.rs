@@ -50,6 +50,7 @@ pub use error::{MAX_CHARTS, MAX_TRIANGLES, UnwrapError};
 pub use pack::{Cut, GUTTER, LaidOut};
 pub use shape::MeshShape;
 
+use beside::Beside;
 use chart::{Chart, Start};
 use glam::Vec3;
 
@@ -89,24 +90,24 @@ impl Unwrap {
         if !shape.has_area(self.triangle) {
             return Err(UnwrapError::Parameter("triangle"));
         }
-        let charts = charts(shape, self)?;
-        pack::pack(shape, &charts, self.texels, (self.most_side, self.most_texels))
+        let beside = if hinge::has_hinges(shape) { beside::find(shape) } else { Vec::new() };
+        let charts = charts(shape, &beside, self)?;
+        pack::pack(shape, &beside, &charts, self.texels, (self.most_side, self.most_texels))
     }
 }
 
-fn charts(shape: &MeshShape, unwrap: &Unwrap) -> Result<Vec<Chart>, UnwrapError> {
+fn charts(shape: &MeshShape, beside: &[Beside], unwrap: &Unwrap) -> Result<Vec<Chart>, UnwrapError> {
     let mut is_free: Vec<bool> = (0..shape.len()).map(|triangle| shape.has_area(triangle)).collect();
     let mut charts = Vec::new();
     let mut start = Some(Start { triangle: unwrap.triangle, point: unwrap.around, right: unwrap.right });
     let points = (!hinge::has_hinges(shape)).then(|| curved::Points::of(shape));
-    let beside = if points.is_none() { beside::find(shape) } else { Vec::new() };
     let mut first_free = 0;
     while let Some(from) = start {
         if charts.len() == MAX_CHARTS {
             return Err(UnwrapError::TooManyCharts);
         }
         let chart = match &points {
-            None => hinge::unfold(shape, &beside, from, &is_free),
+            None => hinge::unfold(shape, beside, from, &is_free),
             Some(points) => curved::lay_out(shape, points, from, &is_free),
         };
         for (triangle, _) in &chart.triangles {

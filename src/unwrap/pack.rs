@@ -1,5 +1,6 @@
 //! Charts side by side in one picture: [`LaidOut`].
 
+use super::beside::{self, Beside};
 use super::chart::{Chart, bounds, cells};
 use super::error::UnwrapError;
 use super::shape::MeshShape;
@@ -24,7 +25,7 @@ pub struct LaidOut {
     pub chart: Vec<u32>,
     /// The triangle that each texel belongs to, row by row; [`LaidOut::NOTHING`] if to none.
     pub owner: Vec<u32>,
-    /// Where the surface is cut: the edges of the mesh that lie in two places.
+    /// Where the surface is cut: the edges of the mesh that lie in two places, or parts of them.
     pub cuts: Vec<Cut>,
     /// Where the surface ends: the edges of one triangle alone, texels.
     pub borders: Vec<[Vec2; 2]>,
@@ -56,28 +57,50 @@ impl LaidOut {
 const TOGETHER: f32 = 0.1;
 
 /// The edges that lie in two places, and those of one triangle alone.
-fn cuts(shape: &MeshShape, corners: &[Option<[Vec2; 3]>]) -> (Vec<Cut>, Vec<[Vec2; 2]>) {
+fn cuts(shape: &MeshShape, beside: &[Beside], corners: &[Option<[Vec2; 3]>]) -> (Vec<Cut>, Vec<[Vec2; 2]>) {
     let (mut cuts, mut borders) = (Vec::new(), Vec::new());
-    let edge = |[a, b, c]: [Vec2; 3], begin: usize| [[a, b], [b, c], [c, a]][begin];
+    let mut cut = |triangles: [usize; 2], places: [[Vec2; 2]; 2]| {
+        let [[a, b], [p, q]] = places;
+        let is_together = a.distance(p) <= TOGETHER && b.distance(q) <= TOGETHER;
+        // Each once.
+        if !is_together && triangles[0] < triangles[1] {
+            cuts.push(Cut { triangles, places });
+        }
+        is_together
+    };
     for (triangle, laid) in corners.iter().enumerate() {
         let Some(laid) = *laid else { continue };
-        for (begin, beside) in shape.across(triangle).into_iter().enumerate() {
+        for (begin, across) in shape.across(triangle).into_iter().enumerate() {
             let place = edge(laid, begin);
-            let other = beside.map(|(other, begin)| (other as usize, usize::from(begin)));
-            let Some((other, from, there)) = other.and_then(|(other, from)| Some((other, from, corners[other]?)))
-            else {
-                borders.push(place);
+            let other = across.and_then(|(other, from)| Some((other as usize, from, corners[other as usize]?)));
+            if let Some((other, from, there)) = other {
+                let [to, from] = edge(there, usize::from(from));
+                cut([triangle, other], [place, [from, to]]);
                 continue;
-            };
-            let [to, from_end] = edge(there, from);
-            let is_together = place[0].distance(from_end) <= TOGETHER && place[1].distance(to) <= TOGETHER;
-            // Each once.
-            if !is_together && (triangle, begin) < (other, from) {
-                cuts.push(Cut { triangles: [triangle, other], places: [place, [from_end, to]] });
+            }
+            // Edges that lie on a part of it.
+            let own = edge(shape.corners(triangle), begin);
+            let parts = beside::of(beside, triangle).filter(|beside| beside.corner == begin);
+            let mut is_joined = false;
+            for (other, there) in parts.filter_map(|beside| Some((beside.other, corners[beside.other]?))) {
+                for from in (0..3).filter(|from| shape.across(other)[*from].is_none()) {
+                    let Some(shares) = beside::common(own, edge(shape.corners(other), from)) else { continue };
+                    let part = |[a, b]: [Vec2; 2], shares: [f32; 2]| shares.map(|share| a.lerp(b, share));
+                    let places = [part(place, shares[0]), part(edge(there, from), shares[1])];
+                    is_joined |= cut([triangle, other], places);
+                }
+            }
+            if !is_joined {
+                borders.push(place);
             }
         }
     }
     (cuts, borders)
+}
+
+/// The edge of a triangle that begins at a corner.
+fn edge<T: Copy>([a, b, c]: [T; 3], begin: usize) -> [T; 2] {
+    [[a, b], [b, c], [c, a]][begin]
 }
 
 /// A chart and where it lies.
@@ -91,6 +114,7 @@ struct Part<'a> {
 /// Lays charts side by side: the first at the top left, the others beside and below it in rows, the highest first.
 pub(super) fn pack(
     shape: &MeshShape,
+    beside: &[Beside],
     charts: &[Chart],
     texels: f32,
     (most_side, most_texels): (u32, u64),
@@ -123,7 +147,7 @@ pub(super) fn pack(
     {
         chart[*triangle] = number;
     }
-    let (cuts, borders) = cuts(shape, &corners);
+    let (cuts, borders) = cuts(shape, beside, &corners);
     Ok(LaidOut { size, corners, charts: charts.len(), chart, owner, cuts, borders })
 }
 

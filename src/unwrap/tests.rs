@@ -160,6 +160,36 @@ fn a_box_becomes_a_cross_whose_edges_stay_together() {
     }
 }
 
+/// A corner of two walls on a floor that is wider than either: of the three edges one is cut, be it only a part of that of the floor.
+#[test]
+fn edges_that_are_one_in_part_are_cut() {
+    let quad = |a: Vec3, right: Vec3, up: Vec3| [a, a + right, a + right + up, a + up];
+    let floor = quad(Vec3::Z * 4.0, Vec3::X * 5.0, Vec3::NEG_Z * 4.0);
+    let back = quad(Vec3::ZERO, Vec3::X * 3.0, Vec3::Y * 3.0);
+    let side = quad(Vec3::Z * 2.0, Vec3::NEG_Z * 2.0, Vec3::Y * 3.0);
+    let mesh = (
+        [floor, back, side].concat(),
+        (0..3).flat_map(|i| [[4 * i, 4 * i + 1, 4 * i + 2], [4 * i, 4 * i + 2, 4 * i + 3]]).collect(),
+    );
+    let mut lengths = Vec::new();
+    for around in [Vec3::new(2.0, 0.0, 2.0), Vec3::new(1.5, 1.5, 0.0), Vec3::new(0.0, 1.5, 1.0)] {
+        let (shape, laid_out) = lay_out(&mesh, around, 20.0);
+        check(&shape, &laid_out, 1.001);
+        let [Cut { triangles, places: [[a, b], [p, q]] }] = laid_out.cuts[..] else {
+            panic!("{around}: {:?}", laid_out.cuts)
+        };
+        assert!(shape.face(triangles[0]) != shape.face(triangles[1]));
+        assert!(
+            (a.distance(b) - p.distance(q)).abs() < 0.01 && (a.distance(p) > 1.0 || b.distance(q) > 1.0),
+            "{around}"
+        );
+        lengths.push((a.distance(b) / 20.0).round());
+    }
+    // Around the floor the walls part; around a wall the other one parts from the floor, or from it.
+    assert_eq!(lengths[0], 3.0);
+    assert!(lengths.iter().all(|length| [2.0, 3.0].contains(length)), "{lengths:?}");
+}
+
 /// Over an edge lengths and angles stay as they are: the straight way in the plane is as long as the shortest one on the box.
 /// Two panels stand on a floor that is as wide as both and a part of the third; the ways over the edge keep their length.
 #[test]
@@ -176,6 +206,8 @@ fn edges_that_are_one_in_part_are_hinges() {
         let (shape, laid_out) = lay_out(&(positions.clone(), triangles.clone()), around, 20.0);
         check(&shape, &laid_out, 1.001);
         assert_eq!(laid_out.charts, 2, "what meets nothing is by itself");
+        // Three sides of the floor, the tops of the panels and both ends, and all of what meets nothing.
+        assert_eq!((laid_out.cuts.len(), laid_out.borders.len()), (0, 12), "{around}");
         // A floor of 4 before walls of 3.
         let place = |triangle: usize, corner: usize| laid_out.corners[triangle].unwrap()[corner];
         let (before, above) = (place(2, 0), place(7, 2));

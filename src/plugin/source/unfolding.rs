@@ -478,9 +478,11 @@ mod tests {
                         }
                     }
                 }
-                assert!(within > 200 && joined * 10 > within * 15, "{joined} edges of {within} texels");
-                let reached = (0..size.y).flat_map(|y| (0..size.x).map(move |x| UVec2::new(x, y)));
-                let lost = reached.filter(|at| on_mesh(*at).is_some() && map.region(at.x, at.y).is_none()).count();
+                let is_fine = texels < 20.0;
+                assert!(is_fine || (within > 1000 && joined * 10 > within * 15), "{joined} edges of {within} texels");
+                let all = (0..size.y).flat_map(|y| (0..size.x).map(move |x| UVec2::new(x, y)));
+                let shown = all.filter(|texel| view.side(*texel) != Side::Beyond);
+                let lost = shown.filter(|texel| map.region(texel.x, texel.y).is_none()).count();
                 assert_eq!(lost, 0, "all of it is one surface");
             }
         }
