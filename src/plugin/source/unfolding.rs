@@ -97,19 +97,12 @@ impl Unfolding {
         all.filter(|(_, map)| map.matrix2.determinant() != 0.0)
     }
 
-    /// The chart of each texel at `size` texels.
+    /// A map's charts at `size` texels, joined where the mesh is cut and parted where it is not one.
     pub(crate) fn charts(&self, size: UVec2) -> Result<MapCharts, VoronoiError> {
         let view = View::new(self, size)?;
-        let mut chart = Grid::try_new(size, MapCharts::NOTHING)?;
-        for y in 0..size.y {
-            for (x, chart) in (0..size.x).zip(chart.row_mut(y as usize)) {
-                let of = view.owner(UVec2::new(x, y)).and_then(|owner| self.layout.chart.get(owner));
-                *chart = of.copied().unwrap_or(MapCharts::NOTHING);
-            }
-        }
-        let margin = (GUTTER as f32 * view.scale.x).round().max(1.0) as u32;
+        let chart = view.charts()?;
         let links = view.links(&chart);
-        Ok(MapCharts::new(chart, self.unit * view.scale.x, margin, links)?.with_walls(view.walls()))
+        Ok(MapCharts::new(chart, self.unit * view.scale.x, view.margin(), links)?.with_walls(view.walls()))
     }
 
     /// Values that lie over its picture, laid out with the mesh at `size` texels. What is no number counts as 0.
@@ -222,6 +215,23 @@ impl<'a> View<'a> {
 
     fn owner(&self, texel: UVec2) -> Option<usize> {
         self.layout.owner(self.middle(texel).as_uvec2())
+    }
+
+    /// The chart of each texel.
+    fn charts(&self) -> Result<Grid<u32>, OutOfMemory> {
+        let mut chart = Grid::try_new(self.size, MapCharts::NOTHING)?;
+        for y in 0..self.size.y {
+            for (x, chart) in (0..self.size.x).zip(chart.row_mut(y as usize)) {
+                let of = self.owner(UVec2::new(x, y)).and_then(|owner| self.layout.chart.get(owner));
+                *chart = of.copied().unwrap_or(MapCharts::NOTHING);
+            }
+        }
+        Ok(chart)
+    }
+
+    /// How far charts go on beyond their borders, texels.
+    fn margin(&self) -> u32 {
+        (GUTTER as f32 * self.scale.x).round().max(1.0) as u32
     }
 
     /// The pairs of texels that meet where the mesh is cut.
