@@ -60,6 +60,9 @@ pub(crate) struct Options {
     /// Weight of the noise
     #[arg(long, default_value_t = 6.0)]
     alpha: f32,
+    /// How much of the weight of the drawings the noise takes away, 0 to 1: how far cracks wander within strokes
+    #[arg(long, default_value_t = VoronoiParams::DEFAULT.guide_noise)]
+    guide_noise: f32,
     /// Width of the widest crack, in shares of the shorter side
     #[arg(long)]
     width: Option<f32>,
@@ -156,8 +159,9 @@ fn params(options: &Options, guides: &[Guide], frame: &SurfaceFrame) -> Result<V
             SiteLayout::Density(guides.first().ok_or("`--layout image` needs a `--guide`")?.image.clone())
         }
     };
-    let &Options { sites, levels, alpha, stroke_width, .. } = options;
-    let mut params = VoronoiParams { sites, layout, levels, alpha, stroke_width, ..VoronoiParams::DEFAULT };
+    let &Options { sites, levels, alpha, guide_noise, stroke_width, .. } = options;
+    let mut params =
+        VoronoiParams { sites, layout, levels, alpha, guide_noise, stroke_width, ..VoronoiParams::DEFAULT };
     if let Some(width) = options.width {
         params.width = width;
         params.least_width = params.least_width.min(width);

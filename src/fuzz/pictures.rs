@@ -110,6 +110,7 @@ fn params(input: &mut Input) -> VoronoiParams {
         least_width: input.mostly(0.0, 0.01, 64),
         taper: input.mostly(0.0, 8.0, 64),
         stroke_width: input.mostly(0.0, 1.0, 64),
+        guide_noise: input.mostly(0.0, 1.0, 64),
     }
 }
 

@@ -7,6 +7,7 @@ use super::{
     level::Level,
     map::VoronoiMap,
     noise::Noise,
+    outline::Outline,
     params::MAX_SITES,
     resample::Resampler,
     seams::Seams,
@@ -65,6 +66,7 @@ enum Stage {
 pub struct VoronoiBake {
     guides: Vec<Guide>,
     resamplers: Vec<Option<Resampler>>,
+    outlines: Vec<Outline>,
     noise: Noise,
     seed: u64,
     map: VoronoiMap,
@@ -72,6 +74,9 @@ pub struct VoronoiBake {
     progress: f32,
     with_seams: bool,
 }
+
+/// The share of [`VoronoiParams::guide_noise`] that acts on the narrowest strokes.
+const NARROW_NOISE: f32 = 0.3;
 
 /// Memory for strokes and for what is small, bytes.
 const SMALL: u64 = 4_000_000;
@@ -125,9 +130,9 @@ impl VoronoiBake {
         ask_for(need(&params, guides.len(), size))?;
         let mut noise = Rng::new(seed).stream("noise");
         let noise_seed = u64::from(noise.next_u32()) << 32 | u64::from(noise.next_u32());
-        let layer = |gamma: f32| {
-            let mut layer = Layer { values: Grid::new(size, 0), weight: 0 };
-            layer.set_weight(gamma / params.beta);
+        let layer = |weight: f32| {
+            let mut layer = Layer { values: Grid::new(size, 0), weight: 0, rough: 0, room: 0.0 };
+            layer.set_weight(weight / params.beta);
             layer
         };
         let layers = std::iter::once(params.alpha).chain(guides.iter().map(|guide| guide.gamma)).map(layer).collect();
@@ -137,6 +142,7 @@ impl VoronoiBake {
         };
         Ok(Self {
             resamplers: guides.iter().map(resampler).collect(),
+            outlines: vec![Outline::default(); guides.len()],
             guides,
             noise: Noise::new(&frame, params.noise_scale, noise_seed),
             seed,
@@ -150,6 +156,7 @@ impl VoronoiBake {
                 lattices: vec![Lattice::new(size)],
                 guided: Vec::new(),
                 strokes: None,
+                width_seed: Rng::new(seed).stream("widths").next_u32(),
                 full_cost: None,
             },
             stage: Stage::Guides { y: 0 },
@@ -171,6 +178,9 @@ impl VoronoiBake {
             Stage::Guides { y } => {
                 let end = height.min(y + rows);
                 (y..end).for_each(|y| self.fill_layers(y));
+                if end == height {
+                    self.roughen();
+                }
                 if end < height { Stage::Guides { y: end } } else { Stage::Costs { y: 0 } }
             }
             Stage::Costs { y } => {
@@ -263,10 +273,21 @@ impl VoronoiBake {
     fn fill_layers(&mut self, y: usize) {
         let Some((noise, guides)) = self.map.layers.split_first_mut() else { return };
         self.noise.fill_row(y, noise.values.row_mut(y));
-        for ((layer, guide), resampler) in guides.iter_mut().zip(&self.guides).zip(&self.resamplers) {
+        let of_guides = self.guides.iter().zip(&self.resamplers).zip(&mut self.outlines);
+        for (layer, ((guide, resampler), outline)) in guides.iter_mut().zip(of_guides) {
             if let Some(resampler) = resampler {
                 resampler.fill_row(&guide.image, y, layer.values.row_mut(y));
+                outline.add_row(&layer.values, y);
             }
+        }
+    }
+
+    /// Has the noise take away from the weights of guides: the less, the narrower their strokes are.
+    fn roughen(&mut self) {
+        let noise = self.map.params.guide_noise;
+        for (layer, outline) in self.map.layers.iter_mut().skip(1).zip(&self.outlines) {
+            layer.room = outline.room();
+            layer.rough = (noise * (NARROW_NOISE + (1.0 - NARROW_NOISE) * layer.room) * 65535.0) as u16;
         }
     }
 

@@ -19,6 +19,10 @@ pub(super) struct Layer {
     pub values: Grid<u16>,
     /// Cost of the value 65535, in units.
     pub weight: u16,
+    /// How much of the weight the noise, which is the first layer, takes away: 65535 for all of it where the noise is highest.
+    pub rough: u16,
+    /// How broad its strokes are: 0 for those that must keep their line to be recognised, 1 for those with room to spare.
+    pub room: f32,
 }
 
 impl Layer {
@@ -26,6 +30,9 @@ impl Layer {
     pub(super) fn weight_in_beta(&self) -> f32 {
         f32::from(self.weight) / f32::from(UNIT)
     }
+
+    /// Largest difference of a weight from the one that it was set to, in β.
+    pub(super) const ROUNDED: f32 = 0.5 / UNIT as f32;
 
     /// A weight given in β.
     pub(super) fn set_weight(&mut self, in_beta: f32) {
@@ -56,6 +63,12 @@ pub(super) struct LatticeLink {
 #[inline(always)]
 fn weigh(a: u16, b: u16, weight: u16) -> u16 {
     ((u32::from(a.max(b)) * u32::from(weight)) >> 16) as u16
+}
+
+/// What is left of a cost where the noise of the two neighbours is `noise`.
+#[inline(always)]
+fn roughen(cost: u16, noise: (u16, u16), rough: u16) -> u16 {
+    ((u32::from(cost) * (65536 - u32::from(weigh(noise.0, noise.1, rough)))) >> 16) as u16
 }
 
 impl Lattice {
@@ -114,9 +127,11 @@ impl Lattice {
     /// Computes the costs of links between these texels from `layers`.
     pub(super) fn set_links(&mut self, links: &[[u32; 2]], layers: &[Layer]) {
         let cost = |[a, b]: [u32; 2]| {
+            let at = |layer: &Layer| (layer.values.as_slice()[a as usize], layer.values.as_slice()[b as usize]);
+            let noise = layers.first().map(at).unwrap_or_default();
             let of = |layer: &Layer| {
-                let values = layer.values.as_slice();
-                weigh(values[a as usize], values[b as usize], layer.weight)
+                let (a, b) = at(layer);
+                roughen(weigh(a, b, layer.weight), noise, layer.rough)
             };
             UNIT + layers.iter().map(of).sum::<u16>()
         };
@@ -139,13 +154,10 @@ impl Lattice {
 pub(super) fn edges_across(out: &mut [u16], layers: &[Layer], y: usize, x0: usize) {
     out.fill(UNIT);
     let x1 = x0 + out.len();
-    for layer in layers {
+    add(out, layers, |layer| {
         let row = layer.values.row(y);
-        let right = &row[(x0 + 1).min(row.len())..(x1 + 1).min(row.len())];
-        for ((edge, &a), &b) in out.iter_mut().zip(&row[x0..x1]).zip(right) {
-            *edge += weigh(a, b, layer.weight);
-        }
-    }
+        [&row[x0..x1], &row[(x0 + 1).min(row.len())..(x1 + 1).min(row.len())]]
+    });
     if layers.first().is_some_and(|layer| x1 == layer.values.width()) {
         out[x1 - x0 - 1] = WALL;
     }
@@ -155,10 +167,21 @@ pub(super) fn edges_across(out: &mut [u16], layers: &[Layer], y: usize, x0: usiz
 pub(super) fn edges_down(out: &mut [u16], layers: &[Layer], y: usize, x0: usize) {
     out.fill(UNIT);
     let x1 = x0 + out.len();
-    for layer in layers {
-        let (row, below) = (&layer.values.row(y)[x0..x1], &layer.values.row(y + 1)[x0..x1]);
-        for ((edge, &a), &b) in out.iter_mut().zip(row).zip(below) {
-            *edge += weigh(a, b, layer.weight);
+    add(out, layers, |layer| [y, y + 1].map(|y| &layer.values.row(y)[x0..x1]));
+}
+
+/// Adds what each layer gives; `rows` are its values at both ends of each edge.
+fn add<'a>(out: &mut [u16], layers: &'a [Layer], rows: impl Fn(&'a Layer) -> [&'a [u16]; 2]) {
+    let Some((noise, guides)) = layers.split_first() else { return };
+    let noises = rows(noise);
+    for ((edge, &a), &b) in out.iter_mut().zip(noises[0]).zip(noises[1]) {
+        *edge += weigh(a, b, noise.weight);
+    }
+    for guide in guides {
+        let [from, to] = rows(guide);
+        let noise = noises[0].iter().zip(noises[1]);
+        for (((edge, &a), &b), (&na, &nb)) in out.iter_mut().zip(from).zip(to).zip(noise) {
+            *edge += roughen(weigh(a, b, guide.weight), (na, nb), guide.rough);
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Regions and costs of every texel: [`VoronoiMap`].
 
 use super::{
-    Guide, MapCharts, StrokeReport, VoronoiError, VoronoiParams,
+    MapCharts, StrokeReport, VoronoiError, VoronoiParams,
     charts::{MapGround, texel},
     lattice::{Lattice, Layer, WALL, edges_across, edges_down},
     level::Level,
@@ -64,6 +64,8 @@ pub struct VoronoiMap {
     /// For each row and block: whether a guide is above zero there.
     pub(super) guided: Vec<bool>,
     pub(super) strokes: Option<StrokeReport>,
+    /// Seed of what varies the widths of cracks away from the guides.
+    pub(super) width_seed: u32,
     /// Path cost at which cracks have full width, in β: that of the most expensive ones when the map was made.
     pub(super) full_cost: Option<f32>,
 }
@@ -229,10 +231,18 @@ impl VoronoiMap {
     /// The seams that a tracer has found, and the cost of full width.
     pub(super) fn follow(&self, tracer: Tracer) -> (Seams, f32) {
         let (noise, layers) = (&self.layers[0], &self.layers[1..]);
+        // In proportion to the weights, so that nothing jumps where another guide becomes the heaviest.
+        let sum: f32 = layers.iter().map(Layer::weight_in_beta).sum();
+        let mean = |of: fn(&Layer) -> f32| {
+            layers.iter().map(|layer| layer.weight_in_beta() * of(layer)).sum::<f32>() / sum.max(1.0e-6)
+        };
         let guides = Guidance {
             noise,
             ground: self.params.alpha / self.params.beta + 1.0,
             weight: layers.iter().map(Layer::weight_in_beta).fold(0.0, f32::max),
+            left: 1.0 - 0.5 * mean(|layer| f32::from(layer.rough)) / 65535.0,
+            room: mean(|layer| layer.room),
+            seed: self.width_seed,
             layers,
         };
         tracer.finish(&self.levels, &self.params, self.ground(), &guides, self.full_cost)
@@ -246,7 +256,7 @@ impl VoronoiMap {
         let from = if from.is_finite() { from } else { Vec2::ZERO };
         let size = self.frame.size();
         let mut lattice = Lattice::new(size);
-        let uniform = Layer { values: Grid::new(size, 0), weight: 0 };
+        let uniform = Layer { values: Grid::new(size, 0), weight: 0, rough: 0, room: 0.0 };
         (0..self.height()).for_each(|y| {
             lattice.set_row(y, std::slice::from_ref(&uniform));
             charts.wall_row(&mut lattice, y);
@@ -337,15 +347,14 @@ impl VoronoiMap {
     /// number of
     /// guides are ignored; guides beyond the number of weights keep theirs.
     pub fn set_gammas(&mut self, gammas: &[f32]) -> Result<(), VoronoiError> {
-        let guides: Vec<Guide> = gammas
-            .iter()
-            .take(self.layers.len() - 1)
-            .map(|&gamma| Guide { gamma, ..Guide::new(Grid::new(UVec2::ZERO, 0.0)) })
-            .collect();
-        self.params.validate(&guides)?;
         let beta = self.params.beta;
-        for (layer, guide) in self.layers[1..].iter_mut().zip(&guides) {
-            layer.set_weight(guide.gamma / beta);
+        // Weights that stay have been rounded, perhaps up.
+        let kept = |layer: &Layer| (layer.weight_in_beta() - Layer::ROUNDED).max(0.0) * beta;
+        let layers = &mut self.layers[1..];
+        let all = gammas.iter().copied().chain(layers.iter().skip(gammas.len()).map(kept)).take(layers.len());
+        self.params.validate_with(all)?;
+        for (layer, gamma) in layers.iter_mut().zip(gammas) {
+            layer.set_weight(gamma / beta);
         }
         for i in 0..self.levels.len() {
             let n_changed = if i == 0 { self.change_base() } else { self.change_walls(i) };

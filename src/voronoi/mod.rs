@@ -35,6 +35,7 @@
 //! ```
 
 mod bake;
+mod chains;
 mod charts;
 mod edges;
 mod front;
@@ -44,6 +45,7 @@ mod level;
 mod map;
 mod motion;
 mod noise;
+mod outline;
 mod params;
 mod resample;
 mod seams;

@@ -28,11 +28,10 @@ pub(super) fn sites(params: &VoronoiParams, ground: MapGround<'_>, seed: u64) ->
             let mut point = || Vec2::new(rng.unit(), rng.unit()) * extent;
             (0..n).map(|_| first_with_room(&mut point, has_room)).collect()
         }
-        SiteLayout::Even | SiteLayout::StrokePairs => even(n, Vec::new(), extent, &mut rng, has_room),
+        SiteLayout::Even | SiteLayout::StrokePairs => even(n, Vec::new(), extent, &mut rng, has_room, |_| 1.0),
         SiteLayout::Impact { at, focus } => around(n, *at, *focus, ground, &mut rng),
-        SiteLayout::Density(density) => {
-            by_density(n, density, ground, &mut rng).unwrap_or_else(|| even(n, Vec::new(), extent, &mut rng, has_room))
-        }
+        SiteLayout::Density(density) => by_density(n, density, ground, &mut rng)
+            .unwrap_or_else(|| even(n, Vec::new(), extent, &mut rng, has_room, |_| 1.0)),
         SiteLayout::Given(points) => {
             points.iter().copied().filter(|point| point.is_finite()).take(MAX_SITES as usize).collect()
         }
@@ -55,13 +54,14 @@ fn first_with_room(mut point: impl FnMut() -> Vec2, has_room: impl Fn(Vec2) -> b
     drawn
 }
 
-/// Adds points to `points` until there are `n`, each as far from all others as a few darts can find.
+/// Adds points to `points` until there are `n`, each as far from all others as a few darts can find, times `spread`.
 pub(super) fn even(
     n: usize,
     mut points: Vec<Vec2>,
     extent: Vec2,
     rng: &mut Rng,
     allowed: impl Fn(Vec2) -> bool,
+    spread: impl Fn(Vec2) -> f32,
 ) -> Vec<Vec2> {
     if n <= points.len() {
         return points;
@@ -79,9 +79,10 @@ pub(super) fn even(
     let mut missed = 0;
     while points.len() < n {
         let dart = Vec2::new(rng.unit(), rng.unit()) * extent;
-        let (low, high) = (cell_of(dart - apart), cell_of(dart + apart));
+        let room = apart * spread(dart);
+        let (low, high) = (cell_of(dart - room), cell_of(dart + room));
         let mut near = (low.y..=high.y).flat_map(|y| (low.x..=high.x).map(move |x| UVec2::new(x, y)));
-        let free = |i: &u32| points[*i as usize].distance_squared(dart) >= apart * apart;
+        let free = |i: &u32| points[*i as usize].distance_squared(dart) >= room * room;
         if (allowed(dart) || apart < 1.0e-4) && near.all(|at| cells[index(at)].iter().all(free)) {
             cells[index(cell_of(dart))].push(points.len() as u32);
             points.push(dart);

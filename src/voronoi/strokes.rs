@@ -7,7 +7,7 @@ use super::{
     level::Level,
     sites::even,
 };
-use crate::{Grid, math::Rng};
+use crate::{Grid, math::Rng, raster::noise};
 use glam::{IVec2, UVec2, Vec2};
 
 /// Strokes are analysed on a lattice of at most this many texels, with a shorter side of at most [`SHORT_SIDE`].
@@ -15,7 +15,7 @@ const MOST_TEXELS: f32 = 640_000.0;
 const SHORT_SIDE: f32 = 400.0;
 
 /// From this value on a guide counts as stroke.
-const INK: u16 = 1 << 15;
+pub(super) const INK: u16 = 1 << 15;
 
 /// Guides whose strokes cover more than this share of the surface do not count as drawings.
 const MOST_INK: f32 = 0.7;
@@ -26,6 +26,10 @@ const IN_ALL: f32 = 0.85;
 
 /// Distance of a site from its stroke, texels.
 const GAP: f32 = 2.5;
+
+/// How much the distance of sites beside the strokes varies, as a share, and over which distance, pattern units.
+const UNEVEN: f32 = 0.35;
+const PATCH: f32 = 0.3;
 
 /// Rounds of closing gaps.
 const ROUNDS: usize = 10;
@@ -91,7 +95,9 @@ impl StrokePairs {
         let full = frame.size().as_vec2();
         let shrink = (full.min_element() / SHORT_SIDE).max((full.x * full.y / MOST_TEXELS).sqrt()).max(1.0);
         let size = (full / shrink).ceil().max(Vec2::ONE).as_uvec2();
-        let pooled: Vec<Layer> = layers.iter().map(|layer| shrunk(layer, size)).collect();
+        let pooled: Vec<Layer> = (layers.iter().enumerate())
+            .map(|(i, layer)| shrunk(layer, size, if i == 0 { |_, next| next } else { u16::max }))
+            .collect();
         let charts = charts.map(|charts| charts.shrunk(size));
         let is_surface: Vec<bool> = (0..size.x * size.y)
             .map(|i| charts.as_ref().is_none_or(|charts| charts.is_inside(UVec2::new(i % size.x, i / size.x))))
@@ -160,7 +166,9 @@ impl StrokePairs {
             let at = (point * self.scale).max(Vec2::ZERO).as_uvec2().min(self.size - 1);
             self.outside[self.index(at)] > GAP + 2.0 && ground.has_room(point)
         };
-        even(self.most, points, ground.frame.extent(), rng, beside)
+        let seed = rng.next_u32();
+        let spread = |point: Vec2| 1.0 + UNEVEN * noise(seed, point.x / PATCH, point.y / PATCH);
+        even(self.most, points, ground.frame.extent(), rng, beside, spread)
     }
 
     const fn index(&self, at: UVec2) -> usize {
@@ -338,8 +346,9 @@ impl StrokePairs {
     }
 }
 
-/// A layer at a lower resolution: the largest value of each block.
-fn shrunk(layer: &Layer, size: UVec2) -> Layer {
+/// A layer at a lower resolution. `pool` has the value so far and the next one of a block: the noise is sampled, as its largest values would not
+/// be like it, and strokes keep their largest values.
+fn shrunk(layer: &Layer, size: UVec2, pool: fn(u16, u16) -> u16) -> Layer {
     let from = layer.values.size();
     let mut values = Grid::new(size, 0u16);
     for y in 0..from.y as usize {
@@ -347,10 +356,10 @@ fn shrunk(layer: &Layer, size: UVec2) -> Layer {
         let row = values.row_mut(to);
         for (x, &value) in (0u64..).zip(layer.values.row(y)) {
             let to = &mut row[(x * u64::from(size.x) / u64::from(from.x)) as usize];
-            *to = (*to).max(value);
+            *to = pool(*to, value);
         }
     }
-    Layer { values, weight: layer.weight }
+    Layer { values, weight: layer.weight, rough: layer.rough, room: layer.room }
 }
 
 /// Distance of each texel to the nearest one that `is_goal`, within 8 % (two passes over a mask of 5 and 7 fifths).

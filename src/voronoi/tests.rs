@@ -91,7 +91,7 @@ fn random_lattice(rng: &mut Rng, size: UVec2, kind: Kind) -> Lattice {
             }
         });
     }
-    let mut layer = Layer { values: Grid::from_vec(size, values).unwrap(), weight: 0 };
+    let mut layer = Layer { values: Grid::from_vec(size, values).unwrap(), weight: 0, rough: 0, room: 0.0 };
     layer.set_weight(if matches!(kind, Kind::Maze) { 250.0 } else { 1.0 + 60.0 * rng.unit() });
     let mut lattice = Lattice::new(size);
     for y in 0..size.y as usize {
@@ -236,12 +236,67 @@ fn changed_weights_give_the_map_that_a_new_one_has() {
             let steps = [[0.1, 28.0], [4.0, 24.0], [28.0, 0.0], [27.0, 0.5], [0.0, 0.0], [0.0, 0.0], [12.0, 30.0]];
             for gammas in steps {
                 map.set_gammas(&gammas).unwrap();
-                let new = made(&params, &guides(gammas), size, n as u64).0;
+                let mut new = made(&params, &guides(gammas), size, n as u64).0;
                 for level in 0..levels as usize {
                     assert!(map.lattice(level) == new.lattice(level), "{size:?} {gammas:?} level {level}");
                 }
                 assert!(values(&map) == values(&new), "{size:?} {gammas:?}");
+                map.rescale_widths();
+                new.rescale_widths();
+                assert!(map.seams() == new.seams(), "{size:?} {gammas:?}");
             }
+        }
+    }
+}
+
+/// Weights that stay count too: each alone is allowed, their sum is more than an edge can cost.
+#[test]
+fn weights_that_stay_have_a_share_of_what_is_allowed() {
+    let ink = Grid::from_vec(UVec2::ONE, vec![1.0]).unwrap();
+    let guides = [0.0, 240.0].map(|gamma| Guide { image: ink.clone(), gamma });
+    let mut map = made(&VoronoiParams::DEFAULT, &guides, [30, 20], 1).0;
+    let before = values(&map);
+    let error = map.set_gammas(&[240.0]).unwrap_err();
+    assert!(matches!(error, VoronoiError::OutOfRange { field: "gamma", .. }), "{error}");
+    assert!(values(&map) == before);
+    // What is at the very limit may stay there; weights beyond the number of guides are ignored.
+    let most = 254.0 - 1.0 - 6.0;
+    map.set_gammas(&[0.3, most - 0.3, f32::NAN]).unwrap();
+    map.set_gammas(&[0.3]).unwrap();
+}
+
+/// A link costs what an edge between the same texels costs, and without noise on guides that is eq. 2 of the paper.
+#[test]
+fn links_cost_what_edges_cost() {
+    let size = UVec2::new(40, 3);
+    let mut rng = Rng::new(8);
+    for rough in [0, 20_000, u16::MAX] {
+        let layers: Vec<Layer> = [0, rough, rough / 2]
+            .map(|rough| {
+                let values = (0..size.x * size.y).map(|_| rng.next_u32() as u16).collect();
+                let weight = 1 + (rng.next_u32() % 9_000) as u16;
+                Layer { values: Grid::from_vec(size, values).unwrap(), weight, rough, room: 0.0 }
+            })
+            .into();
+        let mut lattice = Lattice::new(size);
+        (0..3).for_each(|y| lattice.set_row(y, &layers));
+        let ends: Vec<[u32; 2]> = (0..79).filter(|i| i % 40 != 39).flat_map(|i| [[i, i + 1], [i, i + 40]]).collect();
+        lattice.set_links(&ends, &layers);
+        for (link, [a, b]) in lattice.links().iter().zip(ends) {
+            let (across, down) = lattice.edges(a as usize);
+            assert_eq!(link.cost, if b == a + 1 { across } else { down });
+            let largest = |layer: &Layer| {
+                let values = layer.values.as_slice();
+                f64::from(values[a as usize].max(values[b as usize])) / 65536.0
+            };
+            let noise = largest(&layers[0]);
+            let part = |layer: &Layer| {
+                f64::from(layer.weight) * largest(layer) * (1.0 - f64::from(layer.rough) / 65536.0 * noise)
+            };
+            let want = 256.0 + layers.iter().map(part).sum::<f64>();
+            assert!((f64::from(link.cost) - want).abs() < 6.0, "{} of {want}", link.cost);
+            let plain = |layer: &Layer| (f64::from(layer.weight) * largest(layer)) as u16;
+            assert!(rough > 0 || link.cost == 256 + layers.iter().map(plain).sum::<u16>());
         }
     }
 }

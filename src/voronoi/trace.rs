@@ -8,13 +8,14 @@
 
 use super::{
     MapCharts,
+    chains::Strip,
     charts::MapGround,
     level::Level,
     params::VoronoiParams,
     seams::{Seam, SeamVertex, Seams},
-    widths::{ASIDE, Cost, Guidance, RUN_OUT, UNEVEN, Way, Widths, dearest, run_out, smooth, without_thorns},
+    widths::{ASIDE, Cost, FILLED, Guidance, RUN_OUT, UNEVEN, Way, Widths, dearest, run_out, smooth, without_thorns},
 };
-use crate::pattern::PathPoint;
+use crate::pattern::{PathPoint, SurfaceFrame};
 use glam::{IVec2, UVec2, Vec2};
 
 /// How often the threads are tightened. Once leaves stairs, twenty times smooths away what the noise has made.
@@ -261,11 +262,16 @@ impl Tracer {
         let (mut joints, mut lines) = self.lines(finest, charts);
         tauten(&mut joints, &mut lines);
         let births: Vec<usize> = lines.iter().map(|line| self.birth(line, levels)).collect();
+        let mut strips: Vec<Strip> =
+            lines.iter().zip(&births).map(|(line, &birth)| self.strip(line, &levels[birth], guides)).collect();
+        let vertices: Vec<Vec2> = joints.iter().map(|joint| joint.pos).collect();
+        without_thorns(&mut strips, &vertices, guides);
         let costs: Vec<Vec<Cost>> =
-            lines.iter().zip(&births).map(|(line, &birth)| self.costs(line, &levels[birth], guides)).collect();
+            lines.iter().zip(&strips).map(|(line, strip)| self.costs(line, strip, guides, frame)).collect();
+        drop(strips);
         let full = full.unwrap_or_else(|| dearest(&costs));
         let (least, gain) = (params.least_width, params.width - params.least_width);
-        let of_stroke = params.stroke_width / frame.texels_per_unit();
+        let of_stroke = params.stroke_width * guides.by_room(FILLED) / frame.texels_per_unit();
         let widths = Widths { least, gain, taper: params.taper, full, of_stroke };
         let mut ways: Vec<Way> = (lines.iter().zip(&costs))
             .map(|(line, costs)| {
@@ -283,7 +289,7 @@ impl Tracer {
             .collect();
         if !guides.layers.is_empty() {
             let on_border: Vec<bool> = joints.iter().map(|joint| joint.on_border).collect();
-            run_out(&mut ways, &on_border, RUN_OUT / frame.texels_per_unit());
+            run_out(&mut ways, &on_border, guides.by_room(RUN_OUT) / frame.texels_per_unit());
         }
         let to_seam = |((line, way), birth): ((&Line, &Way), usize)| {
             let first = line.crossings.first()?;
@@ -321,22 +327,29 @@ impl Tracer {
         levels.iter().position(|level| level.region(a) != level.region(b)).unwrap_or(0)
     }
 
-    /// Path costs along a line.
-    fn costs(&self, line: &Line, level: &Level, guides: &Guidance<'_>) -> Vec<Cost> {
-        let cost = |crossing: &Crossing| self.beside(crossing).map(|texel| level.cost(texel)).iter().sum::<f32>() * 0.5;
-        let mut costs: Vec<f32> = line.crossings.iter().map(cost).collect();
+    /// A line with path costs along it, reduced away from the guides.
+    fn strip(&self, line: &Line, level: &Level, guides: &Guidance<'_>) -> Strip {
+        let mean =
+            |crossing: &Crossing, of: &dyn Fn(usize) -> f32| self.beside(crossing).map(of).iter().sum::<f32>() * 0.5;
+        let mut costs: Vec<f32> =
+            line.crossings.iter().map(|crossing| mean(crossing, &|texel| level.cost(texel))).collect();
         smooth(&mut costs);
-        let costs = without_thorns(&costs, guides);
-        let share = guides.share();
-        let weigh = |(cost, crossing): (f32, &Crossing)| {
-            let [a, b] = self.beside(crossing).map(|texel| guides.at(texel));
-            let inside = 0.5 * (a + b);
+        let inside: Vec<f32> =
+            line.crossings.iter().map(|crossing| mean(crossing, &|texel| guides.at(texel))).collect();
+        let aside = ASIDE * guides.share();
+        costs.iter_mut().zip(&inside).for_each(|(cost, inside)| *cost *= 1.0 - aside * (1.0 - inside));
+        Strip { ends: line.ends, places: line.crossings.iter().map(Crossing::pos).collect(), costs, inside }
+    }
+
+    /// What the widths along a line depend on.
+    fn costs(&self, line: &Line, strip: &Strip, guides: &Guidance<'_>, frame: &SurfaceFrame) -> Vec<Cost> {
+        let weigh = |((&cost, inside), crossing): ((&f32, &f32), &Crossing)| {
             let noise = self.beside(crossing).map(|texel| guides.noise_at(texel)).iter().sum::<f32>();
-            let uneven = 1.0 + UNEVEN * (noise - 1.0);
-            let stroke = 2.0 * inside * guides.texels(cost);
-            Cost { cost: cost * (1.0 - ASIDE * share * (1.0 - inside)), stroke, uneven }
+            let uneven = 1.0 + guides.by_room(UNEVEN) * (noise - 1.0);
+            let faint = guides.faint(frame.to_pos(crossing.pos()), *inside);
+            Cost { cost: faint * cost, stroke: 2.0 * inside * guides.texels(cost), uneven }
         };
-        costs.into_iter().zip(&line.crossings).map(weigh).collect()
+        strip.costs.iter().zip(&strip.inside).zip(&line.crossings).map(weigh).collect()
     }
 }
 

@@ -1,7 +1,10 @@
 //! Widths of cracks along the boundaries: from path costs and from the strokes that they follow.
 
-use super::lattice::Layer;
-use crate::math::ops;
+use super::{
+    chains::{Member, Strip, chains},
+    lattice::Layer,
+};
+use crate::{math::ops, raster::noise};
 use glam::Vec2;
 use std::collections::VecDeque;
 
@@ -22,6 +25,12 @@ pub(super) struct Guidance<'a> {
     pub ground: f32,
     /// The weight of the heaviest guide, in β.
     pub weight: f32,
+    /// What the noise leaves of it in the mean, 0..=1.
+    pub left: f32,
+    /// How much room the strokes of that guide have, 0..=1: see [`Layer::room`].
+    pub room: f32,
+    /// Seed of what varies the widths away from the guides.
+    pub seed: u32,
     /// The guides.
     pub layers: &'a [Layer],
     /// The noise.
@@ -29,15 +38,30 @@ pub(super) struct Guidance<'a> {
 }
 
 impl Guidance<'_> {
-    /// The guides' share of the cost of the most expensive edge, 0..1.
+    /// The guides' share of the cost of an edge in a stroke where the noise is middling, 0..1.
     pub(super) fn share(&self) -> f32 {
-        self.weight / (self.ground + self.weight)
+        self.left * self.weight / (self.ground + self.left * self.weight)
     }
 
     /// The number of texels of stroke that a path of this cost crosses. The cost on the way to the stroke counts as
     /// well, but is small if there is a site beside the stroke.
     pub(super) fn texels(&self, cost: f32) -> f32 {
-        cost * self.share() / (self.ground + self.weight)
+        cost * self.share() / (self.ground + self.left * self.weight)
+    }
+
+    /// A value between one for narrow and one for broad strokes.
+    pub(super) fn by_room(&self, [narrow, broad]: [f32; 2]) -> f32 {
+        narrow + (broad - narrow) * self.room
+    }
+
+    /// The factor of costs away from the guides at `place`, pattern units; 1 in strokes, and where there are no guides.
+    pub(super) fn faint(&self, place: Vec2, inside: f32) -> f32 {
+        if self.layers.is_empty() {
+            return 1.0;
+        }
+        let place = place / FAINT_OVER;
+        let less = (0.6 - noise(self.seed, place.x, place.y)).max(0.0);
+        1.0 - FAINT * self.share() * (1.0 - inside.min(1.0)) * less
     }
 
     /// The noise at a texel, 0..=1.
@@ -56,45 +80,112 @@ impl Guidance<'_> {
 /// those that draw the picture; with 1 only the picture is visible.
 pub(super) const ASIDE: f32 = 0.55;
 
-/// Cracks along a stroke that are shorter than twice this part of half its width stay thin. With 1 cracks that enter
-/// from the side look like thorns on the letters; with 2 the cross-bars of small letters disappear.
-const THORN: f32 = 1.6;
+/// Cracks along a stroke that are shorter than twice this part of half its width stay thin, in narrow strokes and in broad
+/// ones. With less, cracks that enter from the side look like thorns on the letters; with more, the cross-bars of small
+/// letters disappear.
+const THORN: [f32; 2] = [1.15, 2.4];
 
-/// Removes the rise of the costs where a crack enters a stroke from the side, and where it runs into the corners at
-/// the end of a stroke. Cracks along the middle of a stroke keep their costs.
+/// Removes the rise of the costs where a crack enters a stroke from the side, and where one of the two cracks at the
+/// end of a stroke runs into a corner of it; the other one goes on from the stroke. Cracks along the middle of a stroke
+/// keep their costs.
 ///
-/// This is the opening of mathematical morphology: peaks shorter than the width of the stroke are removed.
-pub(super) fn without_thorns(costs: &[f32], guides: &Guidance<'_>) -> Vec<f32> {
-    let most = costs.iter().copied().fold(0.0, f32::max);
-    let reach = (THORN * guides.texels(most)) as usize;
-    let negative = |costs: Vec<f32>| costs.into_iter().map(|cost| -cost).collect::<Vec<f32>>();
-    negative(least_within(&negative(least_within(costs, reach)), reach))
+/// This is the opening of mathematical morphology along chains of lines: peaks shorter than the width of the stroke are
+/// removed.
+pub(super) fn without_thorns(strips: &mut [Strip], vertices: &[Vec2], guides: &Guidance<'_>) {
+    // At each vertex the reach that befits the most expensive line.
+    let mut reach = vec![0.0f32; vertices.len()];
+    for strip in &*strips {
+        let most = strip.costs.iter().copied().fold(0.0, f32::max);
+        let own = guides.by_room(THORN) * guides.texels(most);
+        strip.ends.iter().for_each(|&end| reach[end] = reach[end].max(own));
+    }
+    if reach.iter().all(|reach| *reach < 1.0) {
+        return;
+    }
+    let of = |strip: &Strip| strip.ends.iter().map(|&end| reach[end]).fold(0.0, f32::max);
+    for chain in chains(strips, vertices, &reach) {
+        // Where strokes of other widths begin, another part of the chain begins.
+        let alike = |a: &Member, b: &Member| {
+            let (a, b) = (of(&strips[a.0]), of(&strips[b.0]));
+            a.max(b) <= 2.0 * a.min(b)
+        };
+        let parts: Vec<&[Member]> = chain.chunk_by(alike).collect();
+        for part in parts {
+            let reach = part.iter().map(|&(i, _)| of(&strips[i])).fold(0.0, f32::max);
+            open(strips, part, reach);
+        }
+    }
 }
 
-/// The minimum within `reach` of each value.
-fn least_within(values: &[f32], reach: usize) -> Vec<f32> {
+/// Opens the costs along lines that follow one another.
+fn open(strips: &mut [Strip], part: &[Member], reach: f32) {
+    let (mut places, mut costs) = (Vec::new(), Vec::new());
+    for &(i, reversed) in part {
+        let strip = &strips[i];
+        if reversed {
+            places.extend(strip.places.iter().rev());
+            costs.extend(strip.costs.iter().rev());
+        } else {
+            places.extend(&strip.places);
+            costs.extend(&strip.costs);
+        }
+    }
+    let far = distances(&places);
+    let negative = |costs: Vec<f32>| costs.into_iter().map(|cost| -cost).collect::<Vec<f32>>();
+    let opened = negative(least_within(&far, &negative(least_within(&far, &costs, reach)), reach));
+    let mut rest = &opened[..];
+    for &(i, reversed) in part {
+        let costs = &mut strips[i].costs;
+        let (own, others) = rest.split_at(costs.len());
+        costs.copy_from_slice(own);
+        if reversed {
+            costs.reverse();
+        }
+        rest = others;
+    }
+}
+
+/// The distance of each place along their line.
+fn distances(places: &[Vec2]) -> Vec<f32> {
+    let mut far = 0.0;
+    let mut before = places.first().copied().unwrap_or_default();
+    let next = |place: &Vec2| {
+        far += before.distance(*place);
+        before = *place;
+        far
+    };
+    places.iter().map(next).collect()
+}
+
+/// The minimum of all values within `reach` of each; `far` is where they are, ascending.
+fn least_within(far: &[f32], values: &[f32], reach: f32) -> Vec<f32> {
     // Values that no later one is below, in order.
     let mut ahead = VecDeque::new();
     let mut next = 0;
     let least = |i: usize| {
-        while next < values.len().min(i + reach + 1) {
+        while next < values.len() && far[next] <= far[i] + reach {
             while ahead.back().is_some_and(|&last: &usize| values[last] >= values[next]) {
                 ahead.pop_back();
             }
             ahead.push_back(next);
             next += 1;
         }
-        while ahead.front().is_some_and(|&first| first + reach < i) {
+        while ahead.front().is_some_and(|&first| far[first] < far[i] - reach) {
             ahead.pop_front();
         }
-        ahead.front().map_or(0.0, |&first| values[first])
+        ahead.front().map_or(values[i], |&first| values[first])
     };
     (0..values.len()).map(least).collect()
 }
 
-/// How much the noise varies the width of cracks in strokes, as a share of their width. With 0 they look cut, with
-/// 0.7 small letters are unreadable.
-pub(super) const UNEVEN: f32 = 0.3;
+/// How much the noise varies the width of cracks in strokes, as a share of their width, in narrow strokes and in broad ones.
+/// With 0 they look cut, with 0.7 small letters are unreadable.
+pub(super) const UNEVEN: [f32; 2] = [0.3, 0.55];
+
+/// How much the costs of cracks away from the guides are reduced in places so that those are fainter, as a share, and over which distance, pattern
+/// units.
+const FAINT: f32 = 0.45;
+const FAINT_OVER: f32 = 0.14;
 
 /// Largest width of a crack in a stroke, relative to full width. With 1 short words with large letters are less
 /// readable; without a limit the middles of broad areas are too wide.
@@ -145,9 +236,13 @@ impl Way {
     }
 }
 
-/// Largest widening of a crack per texel, where there are guides: strokes end in points that continue as thin cracks.
-/// With more they look cut, with less short strokes disappear.
-pub(super) const RUN_OUT: f32 = 0.22;
+/// Largest widening of a crack per texel where there are guides, in narrow strokes and in broad ones: strokes end in points that continue as
+/// thin cracks. With more they look cut, with less short strokes disappear.
+pub(super) const RUN_OUT: [f32; 2] = [0.26, 0.26];
+
+/// How much of [`VoronoiParams::stroke_width`](super::VoronoiParams::stroke_width) cracks have in narrow strokes and in broad ones: as wide as in
+/// small letters, cracks in large ones look as if they were painted.
+pub(super) const FILLED: [f32; 2] = [1.0, 0.7];
 
 /// Tapers wide cracks where they do not continue: none is wider at a vertex than the second widest there, and none
 /// widens by more than `slope` per texel.

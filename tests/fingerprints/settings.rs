@@ -673,6 +673,7 @@ fn map(print: &mut Print, rng: &mut Rng) -> Made<()> {
         least_width: 0.2 * width,
         taper: rng.range(0.0, 4.0),
         stroke_width: maybe(rng, 0.2, 1.0),
+        guide_noise: maybe(rng, 0.0, 1.0),
     };
     let guides = vec![Guide { image: word, gamma: 20.0 }, Guide { image: drawn, gamma: rng.range(0.0, 9.0) }];
     let mut bake = VoronoiBake::new(params, guides, size, rng.next_u32().into())?;

@@ -22,7 +22,7 @@ fn with_links_costs_and_regions_equal_dijkstra() {
                 let mut lattice = random_lattice(&mut rng, size, kind);
                 let links: Vec<[u32; 2]> = (0..n_links).map(|_| [below(&mut rng, n), below(&mut rng, n)]).collect();
                 let noise: Vec<u16> = (0..n).map(|_| (rng.next_u32() >> 16) as u16).collect();
-                let mut layer = Layer { values: Grid::from_vec(size, noise).unwrap(), weight: 0 };
+                let mut layer = Layer { values: Grid::from_vec(size, noise).unwrap(), weight: 0, rough: 0, room: 0.0 };
                 layer.set_weight(30.0 * rng.unit());
                 lattice.set_links(&links, &[layer]);
                 let sites: Vec<_> =
@@ -79,7 +79,13 @@ fn maps(levels: u32, sites: &[UVec2], guide: &Grid<f32>) -> [VoronoiBake; 2] {
     }
     let params = |sites: Vec<UVec2>| {
         let places = sites.into_iter().map(|site| (site.as_vec2() + 0.5) / 80.0).collect();
-        VoronoiParams { alpha: 0.0, levels, layout: SiteLayout::Given(places), ..VoronoiParams::DEFAULT }
+        VoronoiParams {
+            alpha: 0.0,
+            guide_noise: 0.0,
+            levels,
+            layout: SiteLayout::Given(places),
+            ..VoronoiParams::DEFAULT
+        }
     };
     let whole = VoronoiBake::new(params(sites.to_vec()), vec![Guide::new(guide.clone())], WHOLE, 1);
     let moved = sites.iter().map(|site| moved(*site)).collect();

@@ -203,3 +203,59 @@ fn strokes_run_out() {
         }
     }
 }
+
+/// A bar of this width and length at an angle.
+fn bar(size: f32, width: f32, length: f32, angle: f32) -> Grid<f32> {
+    let along = crate::math::ops::unit(angle);
+    let mut image = Grid::new(UVec2::splat(size as u32), 0.0);
+    for y in 0..size as usize {
+        for (x, value) in image.row_mut(y).iter_mut().enumerate() {
+            let off = Vec2::new(x as f32, y as f32) + 0.5 - 0.5 * size;
+            let is_in = off.dot(along).abs() < 0.5 * length && off.perp_dot(along).abs() < 0.5 * width;
+            *value = if is_in { 1.0 } else { 0.0 };
+        }
+    }
+    image
+}
+
+/// Cracks that meet a broad stroke do not widen in it: no forks at its ends, no thorns on its sides, apart from the one crack that goes on at an
+/// end.
+#[test]
+fn one_crack_goes_on_where_strokes_end() {
+    const SIDE: f32 = 400.0;
+    let mut rng = Rng::new(5);
+    let (mut n_aside, mut n_thorns) = (0, 0);
+    for seed in 0..24 {
+        let (width, angle) = (rng.range(32.0, 44.0), rng.range(0.0, std::f32::consts::PI));
+        let image = bar(SIDE, width, 200.0, angle);
+        let params = VoronoiParams { layout: SiteLayout::StrokePairs, ..VoronoiParams::DEFAULT };
+        let (_, seams) = made(&params, &[Guide::new(image.clone())], [400, 400], seed);
+        let has_ink = |pos: Vec2| image.get(pos.x as u32, pos.y as u32) == Some(1.0);
+        // For each vertex in the ink: the widest place of each crack in the ink, and how wide it is where it leaves it, texels.
+        let mut widths = vec![Vec::new(); seams.vertices.len()];
+        for seam in &seams.seams {
+            let mut points: Vec<_> = seam.points.iter().map(|point| (point.pos * SIDE, point.width * SIDE)).collect();
+            for vertex in [seam.from, seam.to] {
+                let out = points.iter().position(|(pos, _)| !has_ink(*pos));
+                let inside = &points[..out.unwrap_or(points.len())];
+                let widest = inside.iter().map(|(_, width)| *width).fold(0.0, f32::max);
+                // Cracks that stay in the ink are parts of the stroke.
+                widths[vertex as usize].push((widest, out.map(|out| points[out].1)));
+                points.reverse();
+            }
+        }
+        for (vertex, widths) in seams.vertices.iter().zip(&mut widths) {
+            widths.sort_by(|a, b| b.0.total_cmp(&a.0));
+            if let [(first, _), _, others @ ..] = &widths[..]
+                && has_ink(vertex.pos * SIDE)
+                && *first > 0.2 * width
+            {
+                let others = others.iter().filter_map(|&(inside, outside)| Some(inside - outside?));
+                n_aside += others.clone().count();
+                n_thorns += others.filter(|more| *more > 0.03 * width).count();
+            }
+        }
+    }
+    // If each crack had the width that its own path cost gives, it would be more than one in five.
+    assert!(n_aside > 200 && 12 * n_thorns < n_aside, "{n_thorns} of {n_aside}");
+}
