@@ -349,7 +349,9 @@ pub(super) mod tests {
             let guided = |app: &mut App, entity: Entity| {
                 let guide = CrackGuide::new(Grid::new(UVec2::new(3, 1), 0.5));
                 app.world_mut().entity_mut(entity).insert(GuidedCracks::new(guide));
-                app.update();
+                frames_until(app, "the bake", |app| {
+                    app.world().get::<BakeProgress>(entity).is_some_and(|progress| progress.0 == 1.0)
+                });
             };
             let back = |app: &mut App, entity: Entity| {
                 let clock = CrackClock { seek: Some(0.3), ..CrackClock::speed(0.0) };
