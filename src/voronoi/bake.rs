@@ -131,7 +131,7 @@ impl VoronoiBake {
         let mut noise = Rng::new(seed).stream("noise");
         let noise_seed = u64::from(noise.next_u32()) << 32 | u64::from(noise.next_u32());
         let layer = |weight: f32| {
-            let mut layer = Layer { values: Grid::new(size, 0), weight: 0, rough: 0, room: 0.0 };
+            let mut layer = Layer::new(Grid::new(size, 0));
             layer.set_weight(weight / params.beta);
             layer
         };
@@ -179,7 +179,7 @@ impl VoronoiBake {
                 let end = height.min(y + rows);
                 (y..end).for_each(|y| self.fill_layers(y));
                 if end == height {
-                    self.roughen();
+                    self.lessen_weights();
                 }
                 if end < height { Stage::Guides { y: end } } else { Stage::Costs { y: 0 } }
             }
@@ -283,11 +283,11 @@ impl VoronoiBake {
     }
 
     /// Has the noise take away from the weights of guides: the less, the narrower their strokes are.
-    fn roughen(&mut self) {
+    fn lessen_weights(&mut self) {
         let noise = self.map.params.guide_noise;
         for (layer, outline) in self.map.layers.iter_mut().skip(1).zip(&self.outlines) {
-            layer.room = outline.room();
-            layer.rough = (noise * (NARROW_NOISE + (1.0 - NARROW_NOISE) * layer.room) * 65535.0) as u16;
+            layer.breadth = outline.breadth();
+            layer.noise_share = (noise * (NARROW_NOISE + (1.0 - NARROW_NOISE) * layer.breadth) * 65535.0) as u16;
         }
     }
 

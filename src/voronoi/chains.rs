@@ -5,8 +5,8 @@
 
 use glam::Vec2;
 
-/// A line between two vertices, as chains see it.
-pub(super) struct Strip {
+/// A line between two vertices with path costs along it.
+pub(super) struct LineCosts {
     pub(super) ends: [usize; 2],
     /// Positions, texels, without those of the vertices.
     pub(super) places: Vec<Vec2>,
@@ -16,29 +16,21 @@ pub(super) struct Strip {
     pub(super) inside: Vec<f32>,
 }
 
-impl Strip {
-    /// Distances along the line from its first or last place, texels, and the indices of the places.
-    fn distances_from(&self, end: usize) -> impl Iterator<Item = (f32, usize)> {
-        let n = self.places.len();
-        let index = move |k: usize| if end == 0 { k } else { n - 1 - k };
-        let mut far = 0.0;
-        (0..n).map(move |k| {
-            if k > 0 {
-                far += self.places[index(k)].distance(self.places[index(k - 1)]);
-            }
-            (far, index(k))
-        })
-    }
-
-    /// Mean cost within `reach` of an end, and the direction there from `vertex`.
+impl LineCosts {
+    /// Mean cost within `reach` of the first or last place along the line, texels, and the direction there from `vertex`.
     fn beginning(&self, end: usize, vertex: Vec2, reach: f32) -> (f32, Vec2) {
-        let (mut sum, mut n, mut last) = (0.0, 0.0f32, vertex);
-        for (_, i) in self.distances_from(end).take_while(|(far, _)| *far <= reach) {
+        let (mut far, mut sum, mut n, mut last) = (0.0, 0.0, 0.0f32, None::<Vec2>);
+        for k in 0..self.places.len() {
+            let i = if end == 0 { k } else { self.places.len() - 1 - k };
+            far += last.map_or(0.0, |last| last.distance(self.places[i]));
+            if far > reach {
+                break;
+            }
             sum += self.costs[i];
             n += 1.0;
-            last = self.places[i];
+            last = Some(self.places[i]);
         }
-        (sum / n.max(1.0), (last - vertex).normalize_or_zero())
+        (sum / n.max(1.0), (last.unwrap_or(vertex) - vertex).normalize_or_zero())
     }
 }
 
@@ -46,26 +38,26 @@ impl Strip {
 pub(super) type Member = (usize, bool);
 
 /// Joins lines to chains; each line is in one of them. `reach` is how far lines are looked at from each vertex, texels.
-pub(super) fn chains(strips: &[Strip], vertices: &[Vec2], reach: &[f32]) -> Vec<Vec<Member>> {
+pub(super) fn chains(lines: &[LineCosts], vertices: &[Vec2], reach: &[f32]) -> Vec<Vec<Member>> {
     let mut at_vertex = vec![Vec::new(); vertices.len()];
-    for (i, strip) in strips.iter().enumerate() {
-        for (end, &vertex) in strip.ends.iter().enumerate() {
+    for (i, line) in lines.iter().enumerate() {
+        for (end, &vertex) in line.ends.iter().enumerate() {
             at_vertex[vertex].push((i, end));
         }
     }
     // For each end of each line the end that goes on from it.
-    let mut next: Vec<[Option<(usize, usize)>; 2]> = vec![[None; 2]; strips.len()];
+    let mut next: Vec<[Option<(usize, usize)>; 2]> = vec![[None; 2]; lines.len()];
     for ((ends, vertex), reach) in at_vertex.iter().zip(vertices).zip(reach) {
-        if let Some((a, b)) = straightest(strips, ends, *vertex, *reach) {
+        if let Some((a, b)) = straightest(lines, ends, *vertex, *reach) {
             next[a.0][a.1] = Some(b);
             next[b.0][b.1] = Some(a);
         }
     }
-    let mut seen = vec![false; strips.len()];
+    let mut seen = vec![false; lines.len()];
     let mut all = Vec::new();
     // Chains with two ends, then rings.
     for rings in [false, true] {
-        for first in 0..strips.len() {
+        for first in 0..lines.len() {
             let Some(end) = (0..2).find(|end| rings || next[first][*end].is_none()) else { continue };
             let mut chain = Vec::new();
             let mut here = Some((first, end));
@@ -86,12 +78,12 @@ pub(super) fn chains(strips: &[Strip], vertices: &[Vec2], reach: &[f32]) -> Vec<
 
 /// The two ends at a vertex that are one crack: expensive ones, in a line.
 fn straightest(
-    strips: &[Strip],
+    lines: &[LineCosts],
     ends: &[(usize, usize)],
     vertex: Vec2,
     reach: f32,
 ) -> Option<((usize, usize), (usize, usize))> {
-    let of: Vec<(f32, Vec2)> = ends.iter().map(|&(line, end)| strips[line].beginning(end, vertex, reach)).collect();
+    let of: Vec<(f32, Vec2)> = ends.iter().map(|&(line, end)| lines[line].beginning(end, vertex, reach)).collect();
     let most = of.iter().map(|(cost, _)| *cost).fold(1.0e-6, f32::max);
     let mut best = (f32::MIN, None);
     for i in 0..of.len() {
@@ -111,10 +103,10 @@ mod tests {
     use super::*;
     use crate::math::{Rng, ops};
 
-    fn line(ends: [usize; 2], vertices: &[Vec2], cost: f32) -> Strip {
+    fn line(ends: [usize; 2], vertices: &[Vec2], cost: f32) -> LineCosts {
         let [from, to] = ends.map(|end| vertices[end]);
         let places: Vec<Vec2> = (1..10).map(|i| from.lerp(to, i as f32 / 10.0)).collect();
-        Strip { ends, costs: vec![cost; places.len()], inside: vec![1.0; places.len()], places }
+        LineCosts { ends, costs: vec![cost; places.len()], inside: vec![1.0; places.len()], places }
     }
 
     /// A stroke that bends a little at each vertex, cheap lines at its sides, and two of them at its end.
@@ -123,8 +115,8 @@ mod tests {
         let vertices = [[0.0, 0.0], [20.0, 1.0], [40.0, -1.0], [21.0, 20.0], [39.0, -20.0], [58.0, 8.0], [52.0, -18.0]];
         let vertices = vertices.map(Vec2::from_array);
         let lines = [([1, 0], 9.0), ([1, 2], 8.0), ([3, 1], 1.0), ([2, 4], 1.0), ([2, 5], 2.0), ([6, 2], 1.9)];
-        let strips: Vec<Strip> = lines.into_iter().map(|(ends, cost)| line(ends, &vertices, cost)).collect();
-        let mut all = chains(&strips, &vertices, &[12.0; 7]);
+        let lines: Vec<LineCosts> = lines.into_iter().map(|(ends, cost)| line(ends, &vertices, cost)).collect();
+        let mut all = chains(&lines, &vertices, &[12.0; 7]);
         all.sort_by_key(Vec::len);
         let stroke = all.pop().unwrap();
         let forward = [(0, true), (1, false), (4, false)];
@@ -141,17 +133,18 @@ mod tests {
             let vertices: Vec<Vec2> = (0..1 + n / 3).map(|_| 90.0 * Vec2::new(rng.unit(), rng.unit())).collect();
             let mut end = || (rng.next_u32() as usize) % vertices.len();
             let ends: Vec<[usize; 2]> = (0..n).map(|_| [end(), end()]).collect();
-            let mut strips: Vec<Strip> = ends.into_iter().map(|ends| line(ends, &vertices, 1.0 + rng.unit())).collect();
+            let mut lines: Vec<LineCosts> =
+                ends.into_iter().map(|ends| line(ends, &vertices, 1.0 + rng.unit())).collect();
             let ring: Vec<Vec2> = (0..12).map(|i| 20.0 * ops::unit(i as f32 / 2.0)).collect();
-            strips.push(Strip { ends: [0, 0], costs: vec![1.0; 12], inside: vec![0.0; 12], places: ring });
-            strips.push(Strip { ends: [0, 0], costs: Vec::new(), inside: Vec::new(), places: Vec::new() });
-            let all = chains(&strips, &vertices, &vec![5.0; vertices.len()]);
+            lines.push(LineCosts { ends: [0, 0], costs: vec![1.0; 12], inside: vec![0.0; 12], places: ring });
+            lines.push(LineCosts { ends: [0, 0], costs: Vec::new(), inside: Vec::new(), places: Vec::new() });
+            let all = chains(&lines, &vertices, &vec![5.0; vertices.len()]);
             let mut seen: Vec<usize> = all.iter().flatten().map(|(i, _)| *i).collect();
             seen.sort_unstable();
-            assert!(seen.into_iter().eq(0..strips.len()));
+            assert!(seen.into_iter().eq(0..lines.len()));
             for pair in all.iter().flat_map(|chain| chain.windows(2)) {
                 let [(a, a_reversed), (b, b_reversed)] = [pair[0], pair[1]];
-                assert_eq!(strips[a].ends[usize::from(!a_reversed)], strips[b].ends[usize::from(b_reversed)]);
+                assert_eq!(lines[a].ends[usize::from(!a_reversed)], lines[b].ends[usize::from(b_reversed)]);
             }
         }
     }

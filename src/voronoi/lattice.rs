@@ -20,12 +20,17 @@ pub(super) struct Layer {
     /// Cost of the value 65535, in units.
     pub weight: u16,
     /// How much of the weight the noise, which is the first layer, takes away: 65535 for all of it where the noise is highest.
-    pub rough: u16,
-    /// How broad its strokes are: 0 for those that must keep their line to be recognised, 1 for those with room to spare.
-    pub room: f32,
+    pub noise_share: u16,
+    /// How broad its strokes are: 0 for those in which cracks must not wander, so that they are recognised, 1 for those in which they may.
+    pub breadth: f32,
 }
 
 impl Layer {
+    /// A layer without weight.
+    pub(super) const fn new(values: Grid<u16>) -> Self {
+        Self { values, weight: 0, noise_share: 0, breadth: 0.0 }
+    }
+
     /// The weight in β.
     pub(super) fn weight_in_beta(&self) -> f32 {
         f32::from(self.weight) / f32::from(UNIT)
@@ -67,8 +72,8 @@ fn weigh(a: u16, b: u16, weight: u16) -> u16 {
 
 /// What is left of a cost where the noise of the two neighbours is `noise`.
 #[inline(always)]
-fn roughen(cost: u16, noise: (u16, u16), rough: u16) -> u16 {
-    ((u32::from(cost) * (65536 - u32::from(weigh(noise.0, noise.1, rough)))) >> 16) as u16
+fn lessen(cost: u16, noise: (u16, u16), noise_share: u16) -> u16 {
+    ((u32::from(cost) * (65536 - u32::from(weigh(noise.0, noise.1, noise_share)))) >> 16) as u16
 }
 
 impl Lattice {
@@ -131,7 +136,7 @@ impl Lattice {
             let noise = layers.first().map(at).unwrap_or_default();
             let of = |layer: &Layer| {
                 let (a, b) = at(layer);
-                roughen(weigh(a, b, layer.weight), noise, layer.rough)
+                lessen(weigh(a, b, layer.weight), noise, layer.noise_share)
             };
             UNIT + layers.iter().map(of).sum::<u16>()
         };
@@ -181,7 +186,7 @@ fn add<'a>(out: &mut [u16], layers: &'a [Layer], rows: impl Fn(&'a Layer) -> [&'
         let [from, to] = rows(guide);
         let noise = noises[0].iter().zip(noises[1]);
         for (((edge, &a), &b), (&na, &nb)) in out.iter_mut().zip(from).zip(to).zip(noise) {
-            *edge += roughen(weigh(a, b, guide.weight), (na, nb), guide.rough);
+            *edge += lessen(weigh(a, b, guide.weight), (na, nb), guide.noise_share);
         }
     }
 }

@@ -240,8 +240,8 @@ impl VoronoiMap {
             noise,
             ground: self.params.alpha / self.params.beta + 1.0,
             weight: layers.iter().map(Layer::weight_in_beta).fold(0.0, f32::max),
-            left: 1.0 - 0.5 * mean(|layer| f32::from(layer.rough)) / 65535.0,
-            room: mean(|layer| layer.room),
+            left: 1.0 - 0.5 * mean(|layer| f32::from(layer.noise_share)) / 65535.0,
+            breadth: mean(|layer| layer.breadth),
             seed: self.width_seed,
             layers,
         };
@@ -256,7 +256,7 @@ impl VoronoiMap {
         let from = if from.is_finite() { from } else { Vec2::ZERO };
         let size = self.frame.size();
         let mut lattice = Lattice::new(size);
-        let uniform = Layer { values: Grid::new(size, 0), weight: 0, rough: 0, room: 0.0 };
+        let uniform = Layer::new(Grid::new(size, 0));
         (0..self.height()).for_each(|y| {
             lattice.set_row(y, std::slice::from_ref(&uniform));
             charts.wall_row(&mut lattice, y);
@@ -343,7 +343,7 @@ impl VoronoiMap {
     /// ```
     ///
     /// # Errors
-    /// [`VoronoiError::OutOfRange`] if a weight is out of its range; the map does not change then. Weights beyond the
+    /// [`VoronoiError::OutOfRange`] if a weight is out of its range, which depends on all of them; the map does not change then. Weights beyond the
     /// number of
     /// guides are ignored; guides beyond the number of weights keep theirs.
     pub fn set_gammas(&mut self, gammas: &[f32]) -> Result<(), VoronoiError> {

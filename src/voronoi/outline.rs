@@ -3,7 +3,7 @@
 use super::strokes::INK;
 use crate::Grid;
 
-/// Strokes of this mean width have no room for cracks that wander, and those of the second one all that they need; texels.
+/// Mean widths of strokes that are narrow and of those that are broad, texels. Small letters with narrow strokes cannot be read if cracks wander.
 const WIDTHS: [f32; 2] = [18.0, 32.0];
 
 /// Mean steps along the axes for each texel of an outline, over all directions: 4 / π.
@@ -32,8 +32,8 @@ impl Outline {
         2.0 * self.area as f32 * STEPS / self.steps.max(1) as f32
     }
 
-    /// How much room there is in the strokes for cracks that wander, 0..=1.
-    pub(super) fn room(&self) -> f32 {
+    /// How broad the strokes are: 0 if cracks must not wander in them, 1 if they may.
+    pub(super) fn breadth(&self) -> f32 {
         let [narrow, broad] = WIDTHS;
         ((self.width() - narrow) / (broad - narrow)).clamp(0.0, 1.0)
     }
@@ -63,7 +63,7 @@ mod tests {
         // A disc of radius r: 2 pi r^2 / 2 pi r.
         let disc = of(UVec2::splat(200), &|x, y| (x - 100.0).hypot(y - 100.0) < 60.0);
         assert!((disc.width() / 60.0 - 1.0).abs() < 0.02, "{}", disc.width());
-        assert_eq!((Outline::default().width(), Outline::default().room()), (0.0, 0.0));
-        assert_eq!(disc.room(), 1.0);
+        assert_eq!((Outline::default().width(), Outline::default().breadth()), (0.0, 0.0));
+        assert_eq!(disc.breadth(), 1.0);
     }
 }

@@ -79,10 +79,10 @@ pub(super) fn even(
     let mut missed = 0;
     while points.len() < n {
         let dart = Vec2::new(rng.unit(), rng.unit()) * extent;
-        let room = apart * spread(dart);
-        let (low, high) = (cell_of(dart - room), cell_of(dart + room));
+        let least = apart * spread(dart);
+        let (low, high) = (cell_of(dart - least), cell_of(dart + least));
         let mut near = (low.y..=high.y).flat_map(|y| (low.x..=high.x).map(move |x| UVec2::new(x, y)));
-        let free = |i: &u32| points[*i as usize].distance_squared(dart) >= room * room;
+        let free = |i: &u32| points[*i as usize].distance_squared(dart) >= least * least;
         if (allowed(dart) || apart < 1.0e-4) && near.all(|at| cells[index(at)].iter().all(free)) {
             cells[index(cell_of(dart))].push(points.len() as u32);
             points.push(dart);

@@ -359,7 +359,7 @@ fn shrunk(layer: &Layer, size: UVec2, pool: fn(u16, u16) -> u16) -> Layer {
             *to = pool(*to, value);
         }
     }
-    Layer { values, weight: layer.weight, rough: layer.rough, room: layer.room }
+    Layer { values, ..*layer }
 }
 
 /// Distance of each texel to the nearest one that `is_goal`, within 8 % (two passes over a mask of 5 and 7 fifths).

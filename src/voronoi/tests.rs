@@ -91,7 +91,7 @@ fn random_lattice(rng: &mut Rng, size: UVec2, kind: Kind) -> Lattice {
             }
         });
     }
-    let mut layer = Layer { values: Grid::from_vec(size, values).unwrap(), weight: 0, rough: 0, room: 0.0 };
+    let mut layer = Layer::new(Grid::from_vec(size, values).unwrap());
     layer.set_weight(if matches!(kind, Kind::Maze) { 250.0 } else { 1.0 + 60.0 * rng.unit() });
     let mut lattice = Lattice::new(size);
     for y in 0..size.y as usize {
@@ -270,12 +270,12 @@ fn weights_that_stay_have_a_share_of_what_is_allowed() {
 fn links_cost_what_edges_cost() {
     let size = UVec2::new(40, 3);
     let mut rng = Rng::new(8);
-    for rough in [0, 20_000, u16::MAX] {
-        let layers: Vec<Layer> = [0, rough, rough / 2]
-            .map(|rough| {
+    for share in [0, 20_000, u16::MAX] {
+        let layers: Vec<Layer> = [0, share, share / 2]
+            .map(|noise_share| {
                 let values = (0..size.x * size.y).map(|_| rng.next_u32() as u16).collect();
                 let weight = 1 + (rng.next_u32() % 9_000) as u16;
-                Layer { values: Grid::from_vec(size, values).unwrap(), weight, rough, room: 0.0 }
+                Layer { weight, noise_share, ..Layer::new(Grid::from_vec(size, values).unwrap()) }
             })
             .into();
         let mut lattice = Lattice::new(size);
@@ -291,12 +291,12 @@ fn links_cost_what_edges_cost() {
             };
             let noise = largest(&layers[0]);
             let part = |layer: &Layer| {
-                f64::from(layer.weight) * largest(layer) * (1.0 - f64::from(layer.rough) / 65536.0 * noise)
+                f64::from(layer.weight) * largest(layer) * (1.0 - f64::from(layer.noise_share) / 65536.0 * noise)
             };
             let want = 256.0 + layers.iter().map(part).sum::<f64>();
             assert!((f64::from(link.cost) - want).abs() < 6.0, "{} of {want}", link.cost);
             let plain = |layer: &Layer| (f64::from(layer.weight) * largest(layer)) as u16;
-            assert!(rough > 0 || link.cost == 256 + layers.iter().map(plain).sum::<u16>());
+            assert!(share > 0 || link.cost == 256 + layers.iter().map(plain).sum::<u16>());
         }
     }
 }

@@ -8,7 +8,7 @@
 
 use super::{
     MapCharts,
-    chains::Strip,
+    chains::LineCosts,
     charts::MapGround,
     level::Level,
     params::VoronoiParams,
@@ -262,16 +262,16 @@ impl Tracer {
         let (mut joints, mut lines) = self.lines(finest, charts);
         tauten(&mut joints, &mut lines);
         let births: Vec<usize> = lines.iter().map(|line| self.birth(line, levels)).collect();
-        let mut strips: Vec<Strip> =
-            lines.iter().zip(&births).map(|(line, &birth)| self.strip(line, &levels[birth], guides)).collect();
+        let mut along: Vec<LineCosts> =
+            lines.iter().zip(&births).map(|(line, &birth)| self.costs_along(line, &levels[birth], guides)).collect();
         let vertices: Vec<Vec2> = joints.iter().map(|joint| joint.pos).collect();
-        without_thorns(&mut strips, &vertices, guides);
+        without_thorns(&mut along, &vertices, guides);
         let costs: Vec<Vec<Cost>> =
-            lines.iter().zip(&strips).map(|(line, strip)| self.costs(line, strip, guides, frame)).collect();
-        drop(strips);
+            lines.iter().zip(&along).map(|(line, along)| self.costs(line, along, guides, frame)).collect();
+        drop(along);
         let full = full.unwrap_or_else(|| dearest(&costs));
         let (least, gain) = (params.least_width, params.width - params.least_width);
-        let of_stroke = params.stroke_width * guides.by_room(FILLED) / frame.texels_per_unit();
+        let of_stroke = params.stroke_width * guides.by_breadth(FILLED) / frame.texels_per_unit();
         let widths = Widths { least, gain, taper: params.taper, full, of_stroke };
         let mut ways: Vec<Way> = (lines.iter().zip(&costs))
             .map(|(line, costs)| {
@@ -289,7 +289,7 @@ impl Tracer {
             .collect();
         if !guides.layers.is_empty() {
             let on_border: Vec<bool> = joints.iter().map(|joint| joint.on_border).collect();
-            run_out(&mut ways, &on_border, guides.by_room(RUN_OUT) / frame.texels_per_unit());
+            run_out(&mut ways, &on_border, RUN_OUT / frame.texels_per_unit());
         }
         let to_seam = |((line, way), birth): ((&Line, &Way), usize)| {
             let first = line.crossings.first()?;
@@ -328,7 +328,7 @@ impl Tracer {
     }
 
     /// A line with path costs along it, reduced away from the guides.
-    fn strip(&self, line: &Line, level: &Level, guides: &Guidance<'_>) -> Strip {
+    fn costs_along(&self, line: &Line, level: &Level, guides: &Guidance<'_>) -> LineCosts {
         let mean =
             |crossing: &Crossing, of: &dyn Fn(usize) -> f32| self.beside(crossing).map(of).iter().sum::<f32>() * 0.5;
         let mut costs: Vec<f32> =
@@ -338,18 +338,18 @@ impl Tracer {
             line.crossings.iter().map(|crossing| mean(crossing, &|texel| guides.at(texel))).collect();
         let aside = ASIDE * guides.share();
         costs.iter_mut().zip(&inside).for_each(|(cost, inside)| *cost *= 1.0 - aside * (1.0 - inside));
-        Strip { ends: line.ends, places: line.crossings.iter().map(Crossing::pos).collect(), costs, inside }
+        LineCosts { ends: line.ends, places: line.crossings.iter().map(Crossing::pos).collect(), costs, inside }
     }
 
     /// What the widths along a line depend on.
-    fn costs(&self, line: &Line, strip: &Strip, guides: &Guidance<'_>, frame: &SurfaceFrame) -> Vec<Cost> {
+    fn costs(&self, line: &Line, along: &LineCosts, guides: &Guidance<'_>, frame: &SurfaceFrame) -> Vec<Cost> {
         let weigh = |((&cost, inside), crossing): ((&f32, &f32), &Crossing)| {
             let noise = self.beside(crossing).map(|texel| guides.noise_at(texel)).iter().sum::<f32>();
-            let uneven = 1.0 + guides.by_room(UNEVEN) * (noise - 1.0);
+            let uneven = 1.0 + guides.by_breadth(UNEVEN) * (noise - 1.0);
             let faint = guides.faint(frame.to_pos(crossing.pos()), *inside);
             Cost { cost: faint * cost, stroke: 2.0 * inside * guides.texels(cost), uneven }
         };
-        strip.costs.iter().zip(&strip.inside).zip(&line.crossings).map(weigh).collect()
+        along.costs.iter().zip(&along.inside).zip(&line.crossings).map(weigh).collect()
     }
 }
 

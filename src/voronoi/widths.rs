@@ -1,7 +1,7 @@
 //! Widths of cracks along the boundaries: from path costs and from the strokes that they follow.
 
 use super::{
-    chains::{Member, Strip, chains},
+    chains::{LineCosts, Member, chains},
     lattice::Layer,
 };
 use crate::{math::ops, raster::noise};
@@ -25,10 +25,10 @@ pub(super) struct Guidance<'a> {
     pub ground: f32,
     /// The weight of the heaviest guide, in β.
     pub weight: f32,
-    /// What the noise leaves of it in the mean, 0..=1.
+    /// What the noise leaves of the weights, 0..=1: the mean of all guides, by their weights.
     pub left: f32,
-    /// How much room the strokes of that guide have, 0..=1: see [`Layer::room`].
-    pub room: f32,
+    /// [`Layer::breadth`] of the strokes: the mean of all guides, by their weights.
+    pub breadth: f32,
     /// Seed of what varies the widths away from the guides.
     pub seed: u32,
     /// The guides.
@@ -50,8 +50,8 @@ impl Guidance<'_> {
     }
 
     /// A value between one for narrow and one for broad strokes.
-    pub(super) fn by_room(&self, [narrow, broad]: [f32; 2]) -> f32 {
-        narrow + (broad - narrow) * self.room
+    pub(super) fn by_breadth(&self, [narrow, broad]: [f32; 2]) -> f32 {
+        narrow + (broad - narrow) * self.breadth
     }
 
     /// The factor of costs away from the guides at `place`, pattern units; 1 in strokes, and where there are no guides.
@@ -91,43 +91,43 @@ const THORN: [f32; 2] = [1.15, 2.4];
 ///
 /// This is the opening of mathematical morphology along chains of lines: peaks shorter than the width of the stroke are
 /// removed.
-pub(super) fn without_thorns(strips: &mut [Strip], vertices: &[Vec2], guides: &Guidance<'_>) {
+pub(super) fn without_thorns(lines: &mut [LineCosts], vertices: &[Vec2], guides: &Guidance<'_>) {
     // At each vertex the reach that befits the most expensive line.
     let mut reach = vec![0.0f32; vertices.len()];
-    for strip in &*strips {
-        let most = strip.costs.iter().copied().fold(0.0, f32::max);
-        let own = guides.by_room(THORN) * guides.texels(most);
-        strip.ends.iter().for_each(|&end| reach[end] = reach[end].max(own));
+    for line in &*lines {
+        let most = line.costs.iter().copied().fold(0.0, f32::max);
+        let own = guides.by_breadth(THORN) * guides.texels(most);
+        line.ends.iter().for_each(|&end| reach[end] = reach[end].max(own));
     }
     if reach.iter().all(|reach| *reach < 1.0) {
         return;
     }
-    let of = |strip: &Strip| strip.ends.iter().map(|&end| reach[end]).fold(0.0, f32::max);
-    for chain in chains(strips, vertices, &reach) {
+    let of = |line: &LineCosts| line.ends.iter().map(|&end| reach[end]).fold(0.0, f32::max);
+    for chain in chains(lines, vertices, &reach) {
         // Where strokes of other widths begin, another part of the chain begins.
         let alike = |a: &Member, b: &Member| {
-            let (a, b) = (of(&strips[a.0]), of(&strips[b.0]));
+            let (a, b) = (of(&lines[a.0]), of(&lines[b.0]));
             a.max(b) <= 2.0 * a.min(b)
         };
         let parts: Vec<&[Member]> = chain.chunk_by(alike).collect();
         for part in parts {
-            let reach = part.iter().map(|&(i, _)| of(&strips[i])).fold(0.0, f32::max);
-            open(strips, part, reach);
+            let reach = part.iter().map(|&(i, _)| of(&lines[i])).fold(0.0, f32::max);
+            open(lines, part, reach);
         }
     }
 }
 
 /// Opens the costs along lines that follow one another.
-fn open(strips: &mut [Strip], part: &[Member], reach: f32) {
+fn open(lines: &mut [LineCosts], part: &[Member], reach: f32) {
     let (mut places, mut costs) = (Vec::new(), Vec::new());
     for &(i, reversed) in part {
-        let strip = &strips[i];
+        let line = &lines[i];
         if reversed {
-            places.extend(strip.places.iter().rev());
-            costs.extend(strip.costs.iter().rev());
+            places.extend(line.places.iter().rev());
+            costs.extend(line.costs.iter().rev());
         } else {
-            places.extend(&strip.places);
-            costs.extend(&strip.costs);
+            places.extend(&line.places);
+            costs.extend(&line.costs);
         }
     }
     let far = distances(&places);
@@ -135,7 +135,7 @@ fn open(strips: &mut [Strip], part: &[Member], reach: f32) {
     let opened = negative(least_within(&far, &negative(least_within(&far, &costs, reach)), reach));
     let mut rest = &opened[..];
     for &(i, reversed) in part {
-        let costs = &mut strips[i].costs;
+        let costs = &mut lines[i].costs;
         let (own, others) = rest.split_at(costs.len());
         costs.copy_from_slice(own);
         if reversed {
@@ -236,9 +236,9 @@ impl Way {
     }
 }
 
-/// Largest widening of a crack per texel where there are guides, in narrow strokes and in broad ones: strokes end in points that continue as
-/// thin cracks. With more they look cut, with less short strokes disappear.
-pub(super) const RUN_OUT: [f32; 2] = [0.26, 0.26];
+/// Largest widening of a crack per texel, where there are guides: strokes end in points that continue as thin cracks.
+/// With more they look cut, with less short strokes disappear.
+pub(super) const RUN_OUT: f32 = 0.26;
 
 /// How much of [`VoronoiParams::stroke_width`](super::VoronoiParams::stroke_width) cracks have in narrow strokes and in broad ones: as wide as in
 /// small letters, cracks in large ones look as if they were painted.

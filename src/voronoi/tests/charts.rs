@@ -22,7 +22,7 @@ fn with_links_costs_and_regions_equal_dijkstra() {
                 let mut lattice = random_lattice(&mut rng, size, kind);
                 let links: Vec<[u32; 2]> = (0..n_links).map(|_| [below(&mut rng, n), below(&mut rng, n)]).collect();
                 let noise: Vec<u16> = (0..n).map(|_| (rng.next_u32() >> 16) as u16).collect();
-                let mut layer = Layer { values: Grid::from_vec(size, noise).unwrap(), weight: 0, rough: 0, room: 0.0 };
+                let mut layer = Layer::new(Grid::from_vec(size, noise).unwrap());
                 layer.set_weight(30.0 * rng.unit());
                 lattice.set_links(&links, &[layer]);
                 let sites: Vec<_> =
