@@ -92,7 +92,7 @@ impl CrackPreset {
             variety: 0.15,
             ..GrowthParams::DEFAULT
         },
-        profile: Profile { wall: 0.35, ragged: 0.0022, ..Profile::DEFAULT },
+        profile: Profile { wall: 0.35, ragged: 0.0022, chipped: 0.009, rubble: 0.4, ..Profile::DEFAULT },
         look: Look::CONCRETE,
         steps_per_second: 60.0,
         follows_lines: false,
@@ -137,6 +137,8 @@ impl CrackPreset {
             rim_depth: 0.0,
             faintest: 0.0,
             ragged: 0.0012,
+            chipped: 0.006,
+            rubble: 0.3,
             ..Profile::DEFAULT
         },
         look: Look::PLASTER,
@@ -557,7 +559,8 @@ impl CrackPreset {
         let full_width = (self.profile.full_width * by).clamp(0.0001, 1.0);
         let rim_width = (self.profile.rim_width * by).clamp(0.0, 0.2);
         let ragged = (self.profile.ragged * by).clamp(0.0, 0.05);
-        let profile = Profile { full_width, rim_width, ragged, ..self.profile };
+        let chipped = (self.profile.chipped * by).clamp(0.0, 0.05);
+        let profile = Profile { full_width, rim_width, ragged, chipped, ..self.profile };
         let crushed = self.look.crushed.map(|crushed| crushed.scaled(by));
         let veil = self.look.veil.map(|veil| veil.scaled(by));
         let cel = self.look.cel.map(|cel| cel.scaled(by));

@@ -40,7 +40,7 @@ struct Studio {
 
 impl Studio {
     fn new(size: UVec2, seed: u64) -> Done<Self> {
-        Ok(Self { seed, frame: SurfaceFrame::new(size)?, base: base_picture(None, size)? })
+        Ok(Self { seed, frame: SurfaceFrame::new(size)?, base: base_picture(None, "concrete", size)? })
     }
 
     fn word(&self, text: &str) -> Done<Guide> {

@@ -379,7 +379,7 @@ fn primitives(studio: &Studio, out: &std::path::Path) -> Done<()> {
     let start = [StrandStart::new(line[0])];
     let strands = studio.strands(&setting.params, Directions::Along { line, hold: 0.1 }, &start)?;
     let network = strands.network(&Material::Asphalt.primitives())?;
-    let [diffuse, _] = studio.painted(&network, &setting, &base_picture(None, studio.frame.size())?)?;
+    let [diffuse, _] = studio.painted(&network, &setting, &base_picture(None, "concrete", studio.frame.size())?)?;
     panels.push(diffuse);
     Ok(sheet(&[panels]).save(out.join("nets_and_a_drawn_line.png"))?)
 }

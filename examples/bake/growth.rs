@@ -2,13 +2,12 @@
 
 use crate::{
     blend::write_blended,
-    maps::write_maps,
+    maps::{preset, write_maps},
     own::own_picture,
     painting::{fitted, paint},
     pictures::read_picture,
 };
 use bevy_crack::{
-    CrackPreset,
     growth::{CrackGrowth, HitOutcome},
     paint::{BaseTexels, Look, LookTable, PaintTargets, paint_glow, paint_into},
     pattern::{CrackMask, LinkKind, Moment, NO_PARENT, Network, SurfaceFrame},
@@ -94,11 +93,10 @@ pub(crate) fn setting(text: &str) -> Result<(String, String), String> {
 
 /// Writes the textures, and returns the network and the cracked picture.
 pub(crate) fn bake(options: &Options) -> Result<(Network, RgbaImage), Box<dyn Error>> {
-    let mut preset = CrackPreset::named(&options.preset)
-        .ok_or_else(|| format!("no preset `{}`; there are {}", options.preset, CrackPreset::NAMES.join(", ")))?;
+    let mut preset = preset(&options.preset)?;
     #[cfg(feature = "serde")]
     if let Some(file) = &options.file {
-        preset = CrackPreset::from_ron(&fs::read_to_string(file)?)?;
+        preset = bevy_crack::CrackPreset::from_ron(&fs::read_to_string(file)?)?;
     }
     for (name, value) in &options.set {
         preset.growth.set(name, value)?;

@@ -3,13 +3,14 @@
 use crate::{
     growth::size,
     ink::{ink, lightness},
-    maps::{Paint, base_picture, write_maps},
-    ocr::{PROFILE, deep},
+    maps::{Paint, base_picture, preset, write_maps},
+    ocr::deep,
     pictures::read_picture,
 };
 use bevy_crack::{
-    pattern::{NO_PARENT, SurfaceFrame},
-    raster::DepthField,
+    paint::LookTable,
+    pattern::{Moment, NO_PARENT, SurfaceFrame, Timeline},
+    raster::{DepthField, LayerPlan},
     voronoi::{
         FONT, Front, Guide, SeamMotion, Seams, SiteLayout, VoronoiBake, VoronoiMap, VoronoiParams, draw_text, edges,
     },
@@ -69,17 +70,23 @@ pub(crate) struct Options {
     /// Least width of a crack in a stroke, in shares of the stroke's
     #[arg(long, default_value_t = VoronoiParams::DEFAULT.stroke_width)]
     stroke_width: f32,
+    /// How far cracks deviate in small kinks, in shares of the shorter side
+    #[arg(long, default_value_t = VoronoiParams::DEFAULT.roughness)]
+    roughness: f32,
     /// Width and height in texels
     #[arg(long, value_parser = size, default_value = "400x400")]
     size: UVec2,
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// The picture to crack; by default plain concrete
+    /// The picture to crack; by default the one that suits the preset
     #[arg(long)]
     base: Option<PathBuf>,
-    /// concrete, plaster, groove, frosted or toon; dark or bright: the plain modulation of the paper
+    /// The material: its cross-section, look and picture
     #[arg(long, default_value = "concrete")]
-    look: String,
+    preset: String,
+    /// Another look; dark or bright: the plain modulation of the paper
+    #[arg(long)]
+    look: Option<String>,
     /// Also frames of an animation, and an animated GIF
     #[arg(long, value_enum)]
     animate: Option<Animation>,
@@ -159,9 +166,9 @@ fn params(options: &Options, guides: &[Guide], frame: &SurfaceFrame) -> Result<V
             SiteLayout::Density(guides.first().ok_or("`--layout image` needs a `--guide`")?.image.clone())
         }
     };
-    let &Options { sites, levels, alpha, guide_noise, stroke_width, .. } = options;
+    let &Options { sites, levels, alpha, guide_noise, stroke_width, roughness, .. } = options;
     let mut params =
-        VoronoiParams { sites, layout, levels, alpha, guide_noise, stroke_width, ..VoronoiParams::DEFAULT };
+        VoronoiParams { sites, layout, levels, alpha, guide_noise, stroke_width, roughness, ..VoronoiParams::DEFAULT };
     if let Some(width) = options.width {
         params.width = width;
         params.least_width = params.least_width.min(width);
@@ -171,22 +178,30 @@ fn params(options: &Options, guides: &[Guide], frame: &SurfaceFrame) -> Result<V
 
 pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
     let frame = SurfaceFrame::new(options.size)?;
+    let preset = preset(&options.preset)?;
+    let profile = &preset.profile;
     let guides = guides(options)?;
     let params = params(options, &guides, &frame)?;
+    let at = frame.uv_to_pos(options.at);
     let gammas: Vec<f32> = guides.iter().map(|guide| guide.gamma).collect();
     let clock = Instant::now();
     let (mut map, seams) = VoronoiBake::new(params, guides, options.size, options.seed)?.finish();
     let baked = clock.elapsed();
 
+    let paint = match &options.look {
+        Some(look) => Paint::new(look, &frame)?,
+        None => Paint::Look(Box::new(LookTable::new(&preset.look, frame.texels_per_unit())?)),
+    };
+    let base = base_picture(options.base.as_deref(), &options.preset, options.size)?;
     let mut field = DepthField::new(frame);
-    seams.stamp(&mut field, &PROFILE);
-    let base = base_picture(options.base.as_deref(), options.size)?;
-    let paint = Paint::new(&options.look, &frame)?;
+    let layers = if options.look.is_none() { preset.look.layer(options.seed) } else { LayerPlan::default() };
+    field.set_layers(layers.clone());
+    seams.stamp(&mut field, profile);
+    show_plates(&mut field, &seams, at);
     write_maps(&options.out, &paint.paint(&base, &field)?, &field, &[])?;
     // The cracks that draw alone, black on white.
     deep(&field).ok_or("mask size")?.save(options.out.join("deep.png"))?;
     regions(&map).save(options.out.join("regions.png"))?;
-    let at = frame.uv_to_pos(options.at);
     fs::write(options.out.join("network.json"), serde_json::to_string(&describe(&seams, at))?)?;
 
     let (strokes, n_sites) = (map.strokes(), map.sites().len());
@@ -203,11 +218,19 @@ pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
             (Animation::Width | Animation::Front, _) => None,
         };
         animate(options, &base, &paint, |t, field| {
-            match &mut motion {
-                Some(motion) => motion.at(t)?.stamp(field, &PROFILE),
-                None if animation == Animation::Width => seams.stamp_share(field, &PROFILE, t),
-                None => seams.stamp_front(field, &PROFILE, &front, t * front.reach()),
+            field.set_layers(layers.clone());
+            let seams = match &mut motion {
+                Some(motion) => &motion.at(t)?,
+                None => &seams,
             };
+            match animation {
+                Animation::Width => seams.stamp_share(field, profile, t),
+                Animation::Front => seams.stamp_front(field, profile, &front, t * front.reach()),
+                Animation::Gamma | Animation::Morph => seams.stamp(field, profile),
+            }
+            if t >= 1.0 {
+                show_plates(field, seams, at);
+            }
             Ok(())
         })?;
     }
@@ -222,6 +245,11 @@ pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
         options.out.display()
     );
     Ok(())
+}
+
+/// Shows the plates between cracks that are all there, if the look has any.
+fn show_plates(field: &mut DepthField, seams: &Seams, at: Vec2) {
+    field.show_layers(&seams.network(at), &Timeline::default(), Moment::after(u32::MAX), &mut Vec::new());
 }
 
 /// Writes the frames at times 0..=1 that `stamp` draws.

@@ -6,6 +6,7 @@ use crate::{
     pictures::read_picture,
 };
 use bevy_crack::{
+    CrackPreset,
     paint::{Look, LookTable, Modulation, modulate},
     pattern::SurfaceFrame,
     raster::DepthField,
@@ -14,9 +15,15 @@ use glam::UVec2;
 use image::{GrayImage, ImageBuffer, Luma, RgbaImage};
 use std::{error::Error, fs, path::Path};
 
-/// The picture at `path`, or concrete, stretched to `size`.
-pub(crate) fn base_picture(path: Option<&Path>, size: UVec2) -> Result<RgbaImage, Box<dyn Error>> {
-    let own = own_picture("concrete");
+/// The preset of this name.
+pub(crate) fn preset(name: &str) -> Result<CrackPreset, Box<dyn Error>> {
+    let names = || format!("no preset `{name}`; there are {}", CrackPreset::NAMES.join(", "));
+    Ok(CrackPreset::named(name).ok_or_else(names)?)
+}
+
+/// The picture at `path`, or the one that suits a preset, stretched to `size`.
+pub(crate) fn base_picture(path: Option<&Path>, preset: &str, size: UVec2) -> Result<RgbaImage, Box<dyn Error>> {
+    let own = own_picture(preset);
     Ok(fitted(read_picture(path.unwrap_or(&own))?, size))
 }
 

@@ -111,6 +111,7 @@ fn params(input: &mut Input) -> VoronoiParams {
         taper: input.mostly(0.0, 8.0, 64),
         stroke_width: input.mostly(0.0, 1.0, 64),
         guide_noise: input.mostly(0.0, 1.0, 64),
+        roughness: input.mostly(0.0, 0.02, 64),
     }
 }
 

@@ -75,7 +75,9 @@ mod tests {
             let path = SegmentPath::straight(point(), point());
             let rim_width = if rng.unit() < 0.5 { 0.0 } else { 0.03 };
             let ragged = if rng.unit() < 0.5 { 0.0 } else { 0.02 };
-            let profile = Profile { wall: rng.unit(), rim_width, rim_depth: rng.unit(), ragged, ..Profile::DEFAULT };
+            let (wall, rim_depth) = (rng.unit(), rng.unit());
+            let (chipped, rubble) = if rng.unit() < 0.5 { (0.0, 0.0) } else { (0.02, 0.5) };
+            let profile = Profile { wall, rim_width, rim_depth, ragged, chipped, rubble, ..Profile::DEFAULT };
             stamp_path(&mut field, &profile, &path);
         }
         field

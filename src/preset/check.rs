@@ -84,6 +84,8 @@ impl CrackPreset {
             ("profile.rim_depth", profile.rim_depth, 0.0..=1.0),
             ("profile.faintest", profile.faintest, 0.0..=1.0),
             ("profile.ragged", profile.ragged, 0.0..=0.05),
+            ("profile.chipped", profile.chipped, 0.0..=0.05),
+            ("profile.rubble", profile.rubble, 0.0..=1.0),
             ("steps_per_second", self.steps_per_second, 0.0..=10_000.0),
         ] {
             within(name, value, &range)?;

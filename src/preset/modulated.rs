@@ -50,7 +50,8 @@ impl CrackPreset {
             let away = 0.35 * t + 0.65 * t * t;
             ColorStop { depth: 1.0 - away, color: tone, cover: ops::exp(-away * rim_width / fade) }
         };
-        let profile = Profile { rim_width, rim_depth: 1.0, wall: 0.0, even_walls: false, ragged: 0.0, ..self.profile };
+        let Profile { depth, full_width, faintest, .. } = self.profile;
+        let profile = Profile { depth, full_width, faintest, rim_width, rim_depth: 1.0, wall: 0.0, ..Profile::DEFAULT };
         let look = Look {
             ramp: Cow::Owned((0..STOPS).map(stop).collect()),
             tint: 0.0,

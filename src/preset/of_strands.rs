@@ -105,7 +105,7 @@ impl CrackPreset {
             variety: 0.15,
             ..GrowthParams::DEFAULT
         },
-        profile: Profile { wall: 0.5, ragged: 0.003, ..Profile::DEFAULT },
+        profile: Profile { wall: 0.5, ragged: 0.003, chipped: 0.006, rubble: 0.3, ..Profile::DEFAULT },
         look: Look::SAND,
         steps_per_second: 40.0,
         follows_lines: false,

@@ -4,13 +4,13 @@ use crate::math::hash_unit;
 use std::sync::OnceLock;
 
 /// Side of a tile, texels. Every cell size divides it, so that tiles join.
-const SIDE: usize = 192;
+pub(super) const SIDE: usize = 192;
 
 /// Length of a stored row: a block that starts in a row ends in it.
-const ROW: usize = SIDE + 8;
+pub(super) const ROW: usize = SIDE + 8;
 
 /// Distances between kinks, texels.
-const CELLS: [usize; 9] = [2, 3, 4, 6, 8, 12, 16, 24, 32];
+pub(super) const CELLS: [usize; 9] = [2, 3, 4, 6, 8, 12, 16, 24, 32];
 
 /// Distance between kinks, in units of the largest deviation.
 const SPACING: f32 = 3.4;

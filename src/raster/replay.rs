@@ -483,8 +483,8 @@ impl Replay {
             }
         };
         // An uneven edge deviates by less than the half width. The edge of a stamp is one texel wide; one more for rounding.
-        let ragged = self.profile.ragged.max(0.0).min(radius);
-        let reach = (radius + self.profile.rim_width.max(0.0) + ragged) * field.frame.texels_per_unit() + 2.5;
+        let [ragged, chipped] = [self.profile.ragged, self.profile.chipped].map(|most| most.max(0.0).min(radius));
+        let reach = (radius + self.profile.rim_width.max(0.0) + ragged + chipped) * field.frame.texels_per_unit() + 2.5;
         let hang = match (part.what, &field.layer.veil) {
             (What::Segment(_), Some(veil)) => veil.hang(),
             _ => (Vec2::ZERO, Vec2::ZERO),
@@ -544,11 +544,13 @@ mod tests {
 
     /// Edges that deviate by many texels are taken back with their cracks.
     #[test]
-    fn ragged_edges_are_taken_back() {
-        for (seed, unit) in [(1, 1500.0), (2, 2048.0), (3, 2048.0)] {
+    fn ragged_and_chipped_edges_are_taken_back() {
+        for (seed, unit, chipped) in
+            [(1, 1500.0, 0.0), (2, 2048.0, 0.0), (3, 2048.0, 0.0), (1, 1500.0, 0.02), (2, 2048.0, 0.012)]
+        {
             let frame = SurfaceFrame::with_unit(UVec2::new(420, 300), unit).unwrap();
             let params = GrowthParams { line_width: 0.03, max_width: 0.04, reach: 0.15, ..GrowthParams::DEFAULT };
-            let profile = Profile { ragged: 0.012, ..Profile::DEFAULT };
+            let profile = Profile { ragged: 0.012, chipped, rubble: 0.5, ..Profile::DEFAULT };
             let mut growth = CrackGrowth::new(params, frame.extent(), seed).unwrap();
             growth.hit(0.5 * frame.extent(), 1.0);
             while growth.step().grew() {}

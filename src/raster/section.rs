@@ -1,6 +1,6 @@
 //! The cross-section of a crack in texels, for the stamps; `raster/stamp.rs` has the formula.
 
-use super::{Profile, ragged};
+use super::{Profile, chipped, ragged};
 
 /// Half widths are clamped to this many texels, far above the diagonal of the largest surface.
 pub(super) const MAX_RADIUS: f32 = 1.0e6;
@@ -51,10 +51,24 @@ pub(super) struct Section {
     deviation: f32,
     /// Shares of that deviation by texel, see [`ragged::at`]; empty if edges are smooth.
     pub(super) tile: &'static [i8],
+    /// How far pieces have come off the edges at most, texels, and the shares of it by texel; empty if none have.
+    chipped: f32,
+    pub(super) pieces: &'static [i8],
+    /// How high stones lie, for one step of their tile.
+    rubble: f32,
+    pub(super) stones: &'static [i8],
 }
 
 /// Largest deviation of an edge, as a share of the half width above half a texel.
 const DEVIATION: f32 = 0.6;
+
+/// Half width from which on pieces come off, texels, and by how much further for each texel above it.
+const UNCHIPPED: f32 = 1.5;
+const CHIPPED: f32 = 0.8;
+
+/// Depth where pieces have come off whole, as a share of that of the crack, and depth of the steps that others leave.
+const GONE: f32 = 0.5;
+const STEP: f32 = 0.14;
 
 /// Largest such share at which a wider line is nowhere less deep. `wall` is the share of the half width that slopes. A wider line has a longer
 /// slope, and an edge that deviates further: both make it less deep at a place that stays as far from its middle.
@@ -76,6 +90,8 @@ pub(super) struct Cut {
     pub(super) rim_depth: f32,
     /// Deviation of the edge for one step of the tile.
     pub(super) swing: f32,
+    /// How far pieces have come off for one step of their tile.
+    pub(super) gap: f32,
 }
 
 impl Section {
@@ -84,6 +100,9 @@ impl Section {
         let rim = clamped(profile.rim_width * texels_per_unit, MAX_RADIUS);
         let ragged = clamped(profile.ragged * texels_per_unit, MAX_RADIUS);
         let wall = if profile.even_walls { 1.0 } else { clamped(profile.wall, 1.0) };
+        let chipped = if profile.even_walls { 0.0 } else { clamped(profile.chipped * texels_per_unit, MAX_RADIUS) };
+        let rubble = if profile.even_walls { 0.0 } else { clamped(profile.rubble, 1.0) };
+        let tiles = (chipped > 0.0 || rubble > 0.0).then(|| chipped::tiles(chipped));
         Self {
             depth: clamped(profile.depth, 1.0),
             least: if profile.even_walls { 2.0 / full_width } else { 0.4 },
@@ -97,7 +116,11 @@ impl Section {
             rim_least: 1.0,
             ragged,
             deviation: deviation(wall),
-            tile: if ragged > 0.0 { ragged::tile(ragged) } else { &[] },
+            tile: if ragged > 0.0 || tiles.is_some() { ragged::tile(ragged) } else { &[] },
+            chipped,
+            pieces: tiles.map_or(&[], |[pieces, _]| pieces),
+            rubble: rubble * (1.0 / 127.0),
+            stones: tiles.map_or(&[], |[_, stones]| stones),
         }
     }
 
@@ -124,6 +147,10 @@ impl Section {
             ragged: 0.0,
             deviation: DEVIATION,
             tile: &[],
+            chipped: 0.0,
+            pieces: &[],
+            rubble: 0.0,
+            stones: &[],
         }
     }
 
@@ -139,6 +166,7 @@ impl Section {
             scale: 65535.0 * min(self.strength * r, 1.0),
             rim_depth: self.rim_depth * min(self.rim_least + self.rim_gain * r, 1.0),
             swing: self.swing(r) * (1.0 / 127.0),
+            gap: self.gap(r) * (1.0 / 127.0),
         }
     }
 
@@ -148,10 +176,27 @@ impl Section {
         min(self.ragged, self.deviation * max(r - 0.5, 0.0))
     }
 
+    /// The depth without rim at this distance from the centre line. `piece` and `stone` are the steps of their tiles there: a piece below zero
+    /// has come off whole, one above has left a shallow step.
+    #[inline(always)]
+    pub(super) fn deep(&self, cut: &Cut, distance: f32, piece: f32, stone: f32) -> f32 {
+        let peak = min(cut.peak, self.depth * (1.0 - self.rubble * stone));
+        let (gone, left) = (cut.gap * max(-piece, 0.0), cut.gap * max(piece, 0.0));
+        let upright = GONE * min(gone, 1.0) * clamp01(cut.reach + gone - distance);
+        let core = peak * max(clamp01((cut.reach - distance) * cut.inv_wall), upright);
+        max(core, self.depth * STEP * min(left, 1.0) * clamp01(cut.reach + left - distance))
+    }
+
+    /// How far pieces have come off the edge at most, at half width `r`.
+    #[inline(always)]
+    fn gap(&self, r: f32) -> f32 {
+        min(self.chipped, CHIPPED * max(r - UNCHIPPED, 0.0))
+    }
+
     /// Distance from the centre line beyond which nothing is drawn.
     pub(super) fn reach(&self, r: f32) -> f32 {
         let rim = if self.rim_depth > 0.0 { r + self.rim } else { 0.0 };
-        max(max(r, 0.5) + 0.5, rim) + self.swing(r)
+        max(max(r, 0.5) + 0.5 + self.gap(r), rim) + self.swing(r)
     }
 }
 
@@ -167,14 +212,16 @@ mod tests {
         for case in 0..4000 {
             let full_width = rng.range(0.001, 0.2);
             let even_walls = case % 4 == 0;
-            let profile =
-                Profile { wall: rng.unit(), ragged: 0.02 * rng.unit(), full_width, even_walls, ..Profile::DEFAULT };
+            let [ragged, chipped] = [0.02, 0.02].map(|most| most * rng.unit());
+            let (wall, rubble) = (rng.unit(), rng.unit());
+            let profile = Profile { wall, ragged, chipped, rubble, full_width, even_walls, ..Profile::DEFAULT };
             let section = Section::new(&profile, rng.range(1.0, 400.0));
             let (deviates, far) = (rng.range(-1.0, 1.0), rng.range(0.0, 8.0));
+            let mut one_of = |values: [f32; 4]| values[rng.next_u32() as usize % 4];
+            let (piece, stone) = (one_of([-127.0, -60.0, 0.0, 127.0]), one_of([0.0, 0.0, 50.0, 127.0]));
             let deep = |r: f32| {
                 let cut = section.cut(r);
-                let core = (cut.reach - far - 127.0 * cut.swing * deviates) * cut.inv_wall;
-                cut.peak * core.clamp(0.0, 1.0) * cut.scale
+                section.deep(&cut, far + 127.0 * cut.swing * deviates, piece, stone) * cut.scale
             };
             let mut before = 0.0;
             for step in 0..200 {

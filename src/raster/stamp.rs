@@ -20,6 +20,17 @@
 //! With ragged edges `d` is increased by `min(ragged, 0.6 max(r - 1/2, 0))` times a random value in `-1..=1` of the
 //! texel.
 //!
+//! Pieces come off the edges of wide lines. Each has a share of the largest reach. Where one has come off whole, and where it has left a step,
+//! there is
+//!
+//! ```text
+//! gap   = share * min(chipped, 0.8 max(r - 3/2, 0))
+//! whole = 0.5 * peak(r) * min(gap, 1) * clamp(r + 1/2 + gap - d, 0, 1)
+//! step  = 0.14 * depth * min(gap, 1) * clamp(r + 1/2 + gap - d, 0, 1)
+//! ```
+//!
+//! And where a stone lies, `peak` is at most `depth * (1 - rubble * stone)`. Shares and heights of stones are those of the texel.
+//!
 //! If a [plan](super::LayerPlan) says so, a line has only a share of that depth, by the light that it catches, and
 //! narrow lines have a fainter rim.
 //!
@@ -210,13 +221,16 @@ impl Capsule {
         vectorized(
             #[inline(always)]
             || match (self.r_gain != 0.0, section.rim_depth > 0.0) {
-                _ if !section.tile.is_empty() => {
-                    self.stamp_rows::<REPORT, true, true, true>(field, section, rect, changed);
+                _ if !section.pieces.is_empty() => {
+                    self.stamp_rows::<REPORT, true, true, true, true>(field, section, rect, changed);
                 }
-                (false, false) => self.stamp_rows::<REPORT, false, false, false>(field, section, rect, changed),
-                (false, true) => self.stamp_rows::<REPORT, false, true, false>(field, section, rect, changed),
-                (true, false) => self.stamp_rows::<REPORT, true, false, false>(field, section, rect, changed),
-                (true, true) => self.stamp_rows::<REPORT, true, true, false>(field, section, rect, changed),
+                _ if !section.tile.is_empty() => {
+                    self.stamp_rows::<REPORT, true, true, true, false>(field, section, rect, changed);
+                }
+                (false, false) => self.stamp_rows::<REPORT, false, false, false, false>(field, section, rect, changed),
+                (false, true) => self.stamp_rows::<REPORT, false, true, false, false>(field, section, rect, changed),
+                (true, false) => self.stamp_rows::<REPORT, true, false, false, false>(field, section, rect, changed),
+                (true, true) => self.stamp_rows::<REPORT, true, true, false, false>(field, section, rect, changed),
             },
         );
         rect
@@ -225,7 +239,7 @@ impl Capsule {
     /// Stamps row by row: blocks of [`LANES`] texels and at most one of half as many. A block may exceed `rect`: the
     /// values there are zero.
     #[inline(always)]
-    fn stamp_rows<const REPORT: bool, const TAPER: bool, const RIM: bool, const RAGGED: bool>(
+    fn stamp_rows<const REPORT: bool, const TAPER: bool, const RIM: bool, const RAGGED: bool, const CHIPPED: bool>(
         &self,
         field: &mut DepthField,
         section: &Section,
@@ -238,7 +252,7 @@ impl Capsule {
         let width = field.depth.width();
         let blocks = (rect.size().x as usize).div_ceil(LANES);
         if blocks <= FEW_BLOCKS && blocks * LANES <= width {
-            self.stamp_blocks::<REPORT, TAPER, RIM, RAGGED>(field, section, rect, blocks, changed);
+            self.stamp_blocks::<REPORT, TAPER, RIM, RAGGED, CHIPPED>(field, section, rect, blocks, changed);
             return;
         }
         let mut band = TexelRect::default();
@@ -271,15 +285,26 @@ impl Capsule {
             };
             let (blocks, rest) = field.depth.row_mut(y as usize)[x0..end].as_chunks_mut::<LANES>();
             for block in blocks {
-                add(x0, self.stamp_block::<LANES, TAPER, RIM, RAGGED>(block, section, (x0, y as usize), dy));
+                add(x0, self.stamp_block::<LANES, TAPER, RIM, RAGGED, CHIPPED>(block, section, (x0, y as usize), dy));
                 x0 += LANES;
             }
             if let Ok(block) = <&mut [u16; LANES / 2]>::try_from(&mut *rest) {
-                add(x0, self.stamp_block::<{ LANES / 2 }, TAPER, RIM, RAGGED>(block, section, (x0, y as usize), dy));
+                add(
+                    x0,
+                    self.stamp_block::<{ LANES / 2 }, TAPER, RIM, RAGGED, CHIPPED>(
+                        block,
+                        section,
+                        (x0, y as usize),
+                        dy,
+                    ),
+                );
             } else if !rest.is_empty() {
                 let mut block = [0; LANES];
                 block[..rest.len()].copy_from_slice(rest);
-                add(x0, self.stamp_block::<LANES, TAPER, RIM, RAGGED>(&mut block, section, (x0, y as usize), dy));
+                add(
+                    x0,
+                    self.stamp_block::<LANES, TAPER, RIM, RAGGED, CHIPPED>(&mut block, section, (x0, y as usize), dy),
+                );
                 rest.copy_from_slice(&block[..rest.len()]);
             }
             if REPORT && span.start < span.end {
@@ -297,7 +322,7 @@ impl Capsule {
 
     /// The same number of blocks in every row: for few blocks the branches are predictable then.
     #[inline(always)]
-    fn stamp_blocks<const REPORT: bool, const TAPER: bool, const RIM: bool, const RAGGED: bool>(
+    fn stamp_blocks<const REPORT: bool, const TAPER: bool, const RIM: bool, const RAGGED: bool, const CHIPPED: bool>(
         &self,
         field: &mut DepthField,
         section: &Section,
@@ -317,7 +342,8 @@ impl Capsule {
                 let mut change = 0;
                 for (k, block) in row.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
                     let at = (x0 + k * LANES, y as usize);
-                    change |= self.stamp_block::<LANES, TAPER, RIM, RAGGED>(block, section, at, dy) << (k * LANES);
+                    change |=
+                        self.stamp_block::<LANES, TAPER, RIM, RAGGED, CHIPPED>(block, section, at, dy) << (k * LANES);
                 }
                 columns |= change;
                 rows |= u32::from(change != 0) << i;
@@ -333,7 +359,7 @@ impl Capsule {
 
     /// Returns the changed texels, one bit each.
     #[inline(always)]
-    fn stamp_block<const N: usize, const TAPER: bool, const RIM: bool, const RAGGED: bool>(
+    fn stamp_block<const N: usize, const TAPER: bool, const RIM: bool, const RAGGED: bool, const CHIPPED: bool>(
         &self,
         block: &mut [u16; N],
         section: &Section,
@@ -344,6 +370,11 @@ impl Capsule {
         let mut uneven = [0.0; N];
         if RAGGED {
             uneven.iter_mut().zip(ragged::at(section.tile, x, y)).for_each(|(to, step)| *to = f32::from(*step));
+        }
+        let (mut pieces, mut stones) = ([0.0; N], [0.0; N]);
+        if CHIPPED {
+            pieces.iter_mut().zip(ragged::at(section.pieces, x, y)).for_each(|(to, step)| *to = f32::from(*step));
+            stones.iter_mut().zip(ragged::at(section.stones, x, y)).for_each(|(to, step)| *to = f32::from(*step));
         }
         let x = x as f32;
         let mut values = [0.0; N];
@@ -356,7 +387,11 @@ impl Capsule {
             if RAGGED {
                 distance += cut.swing * uneven[i];
             }
-            let mut value = cut.peak * clamp01((cut.reach - distance) * cut.inv_wall);
+            let mut value = if CHIPPED {
+                section.deep(&cut, distance, pieces[i], stones[i])
+            } else {
+                cut.peak * clamp01((cut.reach - distance) * cut.inv_wall)
+            };
             if RIM {
                 value = max(value, cut.rim_depth * clamp01((cut.rim_reach - distance) * section.inv_rim));
             }

@@ -10,6 +10,7 @@ use super::{
     outline::Outline,
     params::MAX_SITES,
     resample::Resampler,
+    rough::Roughness,
     seams::Seams,
     sites::sites,
     strokes::StrokePairs,
@@ -84,8 +85,9 @@ const SMALL: u64 = 4_000_000;
 /// The most memory that a bake holds at a time, bytes; by measurement where it depends on how the regions lie.
 fn need(params: &VoronoiParams, guides: usize, size: UVec2) -> u64 {
     let texels = u64::from(size.x) * u64::from(size.y);
-    // Noise and guides; edges and paths of each level; paths that are found anew with larger numbers; edges of regions.
-    let of_texel = 2 * (1 + guides as u64) + 13 * u64::from(params.levels) + 5;
+    // Noise and guides; edges and paths of each level; paths that are found anew with larger numbers; edges of regions; what
+    // makes lines rough.
+    let of_texel = 2 * (1 + guides as u64) + 13 * u64::from(params.levels) + 8;
     // Seams are the longer the more regions there are.
     let sites = match &params.layout {
         SiteLayout::Given(points) => points.len() as u64,
@@ -135,6 +137,7 @@ impl VoronoiBake {
             layer.set_weight(weight / params.beta);
             layer
         };
+        let rough_seed = Rng::new(seed).stream("roughness").next_u32().into();
         let layers = std::iter::once(params.alpha).chain(guides.iter().map(|guide| guide.gamma)).map(layer).collect();
         let resampler = |guide: &Guide| {
             let from = guide.image.size();
@@ -147,6 +150,7 @@ impl VoronoiBake {
             noise: Noise::new(&frame, params.noise_scale, noise_seed),
             seed,
             map: VoronoiMap {
+                rough: Roughness::new(params.roughness, &frame, charts.as_ref(), rough_seed)?,
                 params,
                 frame,
                 charts,

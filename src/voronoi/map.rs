@@ -6,6 +6,7 @@ use super::{
     lattice::{Lattice, Layer, WALL, edges_across, edges_down},
     level::Level,
     params::MAX_LEVELS,
+    rough::Roughness,
     seams::Seams,
     search::BLOCK,
     trace::Tracer,
@@ -25,7 +26,7 @@ const MOST_CHANGES: usize = 8;
 
 /// Regions and path costs of every texel (Mould 2005, section 3).
 ///
-/// It keeps everything that a later change needs: about 12 bytes a texel with one level and one guide, 5 more on [`MapCharts`], 8 more for
+/// It keeps everything that a later change needs: about 12 bytes a texel with one level and one guide, 7 more on [`MapCharts`], 8 more for
 /// each further level and 2 for each further guide.
 ///
 /// ```
@@ -66,6 +67,8 @@ pub struct VoronoiMap {
     pub(super) strokes: Option<StrokeReport>,
     /// Seed of what varies the widths of cracks away from the guides.
     pub(super) width_seed: u32,
+    /// What makes its lines rough.
+    pub(super) rough: Roughness,
     /// Path cost at which cracks have full width, in β: that of the most expensive ones when the map was made.
     pub(super) full_cost: Option<f32>,
 }
@@ -245,7 +248,7 @@ impl VoronoiMap {
             seed: self.width_seed,
             layers,
         };
-        tracer.finish(&self.levels, &self.params, self.ground(), &guides, self.full_cost)
+        tracer.finish(&self.levels, &self.params, self.ground(), (&guides, &self.rough), self.full_cost)
     }
 
     /// These seams of the map as a network that has grown from an impact at `from`, pattern units, as [`Seams::network`] does. On [`MapCharts`] the
@@ -299,7 +302,8 @@ impl VoronoiMap {
         }
     }
 
-    /// The boundaries of the regions.
+    /// The boundaries of the regions, with [`roughness`](VoronoiParams::roughness): [`regions`](Self::regions) and [`strokes`](Self::strokes) are as
+    /// they are without it.
     ///
     /// The cost that corresponds to full width stays that of the map when it was made, so that widths do not jump as
     /// weights change.

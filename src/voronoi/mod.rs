@@ -48,6 +48,7 @@ mod noise;
 mod outline;
 mod params;
 mod resample;
+mod rough;
 mod seams;
 mod search;
 mod sites;

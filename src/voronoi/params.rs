@@ -109,11 +109,12 @@ pub struct VoronoiParams {
     /// Width of the widest cracks, pattern units, 0..=0.2; default 0.014. They are wider in broad strokes of guides,
     /// see [`stroke_width`](Self::stroke_width).
     pub width: f32,
-    /// Width of the thinnest cracks, pattern units, 0..=[`width`](Self::width); default 0.0015.
+    /// Width of the thinnest cracks, pattern units, 0..=[`width`](Self::width); default 0.0015. If there are guides the cracks beside them are thinner in
+    /// some places, down to an eighth of it.
     pub least_width: f32,
     /// How cracks taper: their width is proportional to this power of the path cost from the sites (section 3.2), up
     /// to full width where the cost is highest. 0..=8; default 2. 0 makes all cracks equally wide. If there are guides the cracks beside
-    /// them count as cheaper, in some places more than in others.
+    /// them count as cheaper, in some places more than in others, and some of those that leave broad strokes are wider, as their branches.
     pub taper: f32,
     /// Minimum width of a crack along the middle of a guide's stroke, as a share of the stroke's own width; 0..=1,
     /// default 0.45; at most about twice [`width`](Self::width). Where strokes have a mean width of more than 18 texels of the map it is less, down to
@@ -122,6 +123,10 @@ pub struct VoronoiParams {
     /// With it large letters have wide cracks, and thin parts of a letter do not disappear. 0 = as in the paper, the
     /// width of all cracks depends only on the path cost.
     pub stroke_width: f32,
+    /// How far cracks deviate from the boundaries of the regions, in small kinks. Pattern units, 0..=0.02; default 0.005. 0 = cracks run along the
+    /// boundaries, as smooth as the noise makes them. Cracks that meet deviate together. Where strokes have a mean width below 32 texels of the map all
+    /// of it is less, down to a tenth at 18.
+    pub roughness: f32,
 }
 
 impl VoronoiParams {
@@ -138,6 +143,7 @@ impl VoronoiParams {
         least_width: 0.0015,
         taper: 2.0,
         stroke_width: 0.45,
+        roughness: 0.005,
     };
 
     /// Checks every parameter, and the weights of `guides`, against their ranges.
@@ -168,6 +174,7 @@ impl VoronoiParams {
             ("least_width", self.least_width, 0.0, self.width),
             ("taper", self.taper, 0.0, 8.0),
             ("stroke_width", self.stroke_width, 0.0, 1.0),
+            ("roughness", self.roughness, 0.0, 0.02),
             ("layout.focus", focus, 1.0, 8.0),
             ("layout.at", at, 0.0, 0.0),
         ];

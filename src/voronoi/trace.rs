@@ -3,8 +3,8 @@
 //! A boundary runs between two neighbouring texels of different regions. Its line crosses the straight connection of
 //! their centres, at first in the middle. The squares between four texel centres link the crossings to lines and
 //! contain the points where three or four lines meet. Then every crossing slides along its connection towards the
-//! middle of its neighbours, as if the line were a taut thread. No point ever leaves its connection or its square, so
-//! lines touch only at their ends.
+//! middle of its neighbours, as if the line were a taut thread. No point leaves its connection or its square, so
+//! lines touch only at their ends. At last all of them are bent in small kinks ([`Roughness`]), in such a way that they still do.
 
 use super::{
     MapCharts,
@@ -12,8 +12,11 @@ use super::{
     charts::MapGround,
     level::Level,
     params::VoronoiParams,
+    rough::Roughness,
     seams::{Seam, SeamVertex, Seams},
-    widths::{ASIDE, Cost, FILLED, Guidance, RUN_OUT, UNEVEN, Way, Widths, dearest, run_out, smooth, without_thorns},
+    widths::{
+        ASIDE, Cost, FILLED, Guidance, RUN_OUT, UNEVEN, Way, Widths, branch, dearest, run_out, smooth, without_thorns,
+    },
 };
 use crate::pattern::{PathPoint, SurfaceFrame};
 use glam::{IVec2, UVec2, Vec2};
@@ -24,9 +27,10 @@ const ROUNDS: usize = 6;
 /// Smallest distance of a crossing from a texel centre, texels.
 const MARGIN: f32 = 0.12;
 
-/// Largest distance of points from the line that replaces them, texels. Two lines keep `MARGIN * sqrt(2)` = 0.17
-/// apart.
+/// Largest distance of points from the line that replaces them, texels, and where lines have kinks: two lines keep `MARGIN * sqrt(2)` = 0.17
+/// apart, and kinks bring them closer.
 const TOLERANCE: f32 = 0.08;
+const TOLERANCE_IN_KINKS: f32 = 0.03;
 
 /// The sides of a corner of four texels, in the order north, east, south, west.
 const SIDES: [IVec2; 4] = [IVec2::new(0, -1), IVec2::new(1, 0), IVec2::new(0, 1), IVec2::new(-1, 0)];
@@ -253,7 +257,7 @@ impl Tracer {
         levels: &[Level],
         params: &VoronoiParams,
         ground: MapGround<'_>,
-        guides: &Guidance<'_>,
+        (guides, rough): (&Guidance<'_>, &Roughness),
         full: Option<f32>,
     ) -> (Seams, f32) {
         let MapGround { frame, charts } = ground;
@@ -273,46 +277,60 @@ impl Tracer {
         let (least, gain) = (params.least_width, params.width - params.least_width);
         let of_stroke = params.stroke_width * guides.by_breadth(FILLED) / frame.texels_per_unit();
         let widths = Widths { least, gain, taper: params.taper, full, of_stroke };
+        let deviation = guides.deviation();
+        let tolerance = if params.roughness > 0.0 { TOLERANCE_IN_KINKS } else { TOLERANCE };
+        let moved = |place: Vec2| rough.moved(place, deviation);
         let mut ways: Vec<Way> = (lines.iter().zip(&costs))
             .map(|(line, costs)| {
                 let ends = line.ends.map(|end| joints[end].pos);
                 let crossings = line.crossings.iter().map(Crossing::pos);
                 // A vertex has the cost of the crossing beside it.
-                let of = |i: usize| costs.get(i).map_or(0.0, |cost| widths.of(*cost));
                 let last = costs.len().saturating_sub(1);
+                let beside = || std::iter::once(0).chain(0..costs.len()).chain([last]).filter_map(|i| costs.get(i));
                 Way {
                     ends: line.ends,
-                    places: std::iter::once(ends[0]).chain(crossings).chain([ends[1]]).collect(),
-                    widths: std::iter::once(0).chain(0..costs.len()).chain([last]).map(of).collect(),
+                    places: std::iter::once(ends[0]).chain(crossings).chain([ends[1]]).map(moved).collect(),
+                    widths: beside().map(|cost| widths.of(*cost)).collect(),
+                    inside: beside().map(|cost| cost.inside).collect(),
                 }
             })
             .collect();
         if !guides.layers.is_empty() {
             let on_border: Vec<bool> = joints.iter().map(|joint| joint.on_border).collect();
             run_out(&mut ways, &on_border, RUN_OUT / frame.texels_per_unit());
+            let regions: Vec<_> = lines.iter().map(|line| self.regions(line, finest, &joints)).collect();
+            branch(&mut ways, &regions, &on_border, frame.texels_per_unit(), guides);
         }
         let to_seam = |((line, way), birth): ((&Line, &Way), usize)| {
-            let first = line.crossings.first()?;
             let point = |i: usize| PathPoint { pos: frame.to_pos(way.places[i]), width: way.widths[i] };
-            // Which of the first crossing's texels is on the left as one leaves the first vertex; left is where y is
-            // smaller if x increases.
-            let [a, b] = self.beside(first);
-            let heading = first.pos() - joints[line.ends[0]].corner;
-            let a_is_left = heading.perp_dot(first.from - first.pos()) < 0.0;
-            let (left, right) = if a_is_left { (a, b) } else { (b, a) };
+            line.crossings.first()?;
+            let [left, right] = self.regions(line, finest, &joints);
             Some(Seam {
                 from: line.ends[0] as u32,
                 to: line.ends[1] as u32,
-                left: finest.region(left),
-                right: finest.region(right),
+                left,
+                right,
                 level: birth as u32,
-                points: simplify(&way.places).into_iter().map(point).collect(),
+                points: simplify(&way.places, tolerance).into_iter().map(point).collect(),
             })
         };
         seams.seams = lines.iter().zip(&ways).zip(births).filter_map(to_seam).collect();
-        let vertex = |joint: &Joint| SeamVertex { pos: frame.to_pos(joint.pos), on_border: joint.on_border };
+        let vertex = |joint: &Joint| SeamVertex { pos: frame.to_pos(moved(joint.pos)), on_border: joint.on_border };
         seams.vertices = joints.iter().map(vertex).collect();
         (seams, full)
+    }
+
+    /// A texel on the left and one on the right of a line as one leaves its first vertex; left is where y is smaller if x increases.
+    fn sides(&self, line: &Line, joints: &[Joint]) -> Option<[usize; 2]> {
+        let first = line.crossings.first()?;
+        let [a, b] = self.beside(first);
+        let heading = first.pos() - joints[line.ends[0]].corner;
+        Some(if heading.perp_dot(first.from - first.pos()) < 0.0 { [a, b] } else { [b, a] })
+    }
+
+    /// The regions on the left and on the right of a line.
+    fn regions(&self, line: &Line, finest: &Level, joints: &[Joint]) -> [u32; 2] {
+        self.sides(line, joints).map_or([0; 2], |sides| sides.map(|texel| finest.region(texel)))
     }
 
     /// The texels on either side of a crossing.
@@ -346,8 +364,8 @@ impl Tracer {
         let weigh = |((&cost, inside), crossing): ((&f32, &f32), &Crossing)| {
             let noise = self.beside(crossing).map(|texel| guides.noise_at(texel)).iter().sum::<f32>();
             let uneven = 1.0 + guides.by_breadth(UNEVEN) * (noise - 1.0);
-            let faint = guides.faint(frame.to_pos(crossing.pos()), *inside);
-            Cost { cost: faint * cost, stroke: 2.0 * inside * guides.texels(cost), uneven }
+            let beside = guides.beside(frame.to_pos(crossing.pos()), *inside);
+            Cost { cost, stroke: 2.0 * inside * guides.texels(cost), uneven, beside, inside: inside.min(1.0) }
         };
         along.costs.iter().zip(&along.inside).zip(&line.crossings).map(weigh).collect()
     }
@@ -392,7 +410,7 @@ fn tauten(joints: &mut [Joint], lines: &mut [Line]) {
 
 /// Indices of the points that are needed for the line (Douglas and Peucker 1973). The pieces at both ends stay,
 /// because lines are close to each other there.
-fn simplify(points: &[Vec2]) -> Vec<usize> {
+fn simplify(points: &[Vec2], tolerance: f32) -> Vec<usize> {
     let n = points.len();
     if n < 5 {
         return (0..n).collect();
@@ -411,7 +429,7 @@ fn simplify(points: &[Vec2]) -> Vec<usize> {
         };
         let worst =
             (a + 1..b).map(|i| (off(i), i)).fold((0.0, 0), |best, next| if next.0 > best.0 { next } else { best });
-        if worst.0 > TOLERANCE * TOLERANCE {
+        if worst.0 > tolerance * tolerance {
             keep[worst.1] = true;
             stack.push((a, worst.1));
             stack.push((worst.1, b));

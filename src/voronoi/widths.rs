@@ -4,9 +4,12 @@ use super::{
     chains::{LineCosts, Member, chains},
     lattice::Layer,
 };
-use crate::{math::ops, raster::noise};
+use crate::{
+    math::{hash_unit, ops},
+    raster::noise,
+};
 use glam::Vec2;
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 
 /// The inputs of the width of a crack at one of its crossings.
 #[derive(Clone, Copy)]
@@ -17,6 +20,10 @@ pub(super) struct Cost {
     pub(super) stroke: f32,
     /// Random factor of the width in a stroke.
     pub(super) uneven: f32,
+    /// Factor of the width beside strokes.
+    pub(super) beside: f32,
+    /// How far it lies in a stroke, 0..=1.
+    pub(super) inside: f32,
 }
 
 /// The properties of the guides that widths depend on.
@@ -54,14 +61,24 @@ impl Guidance<'_> {
         narrow + (broad - narrow) * self.breadth
     }
 
-    /// The factor of costs away from the guides at `place`, pattern units; 1 in strokes, and where there are no guides.
-    pub(super) fn faint(&self, place: Vec2, inside: f32) -> f32 {
+    /// How much of [`VoronoiParams::roughness`](super::VoronoiParams::roughness) lines have.
+    pub(super) fn deviation(&self) -> f32 {
+        1.0 + (self.by_breadth(DEVIATION) - 1.0) * self.guided()
+    }
+
+    /// How far the guides count, 0..=1.
+    fn guided(&self) -> f32 {
+        (self.share() / GUIDED).min(1.0)
+    }
+
+    /// The factor of widths away from the guides at `place`, pattern units; 1 in strokes, and where there are no guides.
+    pub(super) fn beside(&self, place: Vec2, inside: f32) -> f32 {
         if self.layers.is_empty() {
             return 1.0;
         }
-        let place = place / FAINT_OVER;
-        let less = (0.6 - noise(self.seed, place.x, place.y)).max(0.0);
-        1.0 - FAINT * self.share() * (1.0 - inside.min(1.0)) * less
+        let [wide, small] = BESIDE_OVER.map(|over| noise(self.seed, place.x / over, place.y / over));
+        let drawn = (0.8 - wide - 0.4 * small).clamp(BESIDE, 1.0);
+        1.0 + (drawn - 1.0) * self.share() * (1.0 - inside.min(1.0))
     }
 
     /// The noise at a texel, 0..=1.
@@ -180,12 +197,11 @@ fn least_within(far: &[f32], values: &[f32], reach: f32) -> Vec<f32> {
 
 /// How much the noise varies the width of cracks in strokes, as a share of their width, in narrow strokes and in broad ones.
 /// With 0 they look cut, with 0.7 small letters are unreadable.
-pub(super) const UNEVEN: [f32; 2] = [0.3, 0.55];
+pub(super) const UNEVEN: [f32; 2] = [0.3, 0.6];
 
-/// How much the costs of cracks away from the guides are reduced in places so that those are fainter, as a share, and over which distance, pattern
-/// units.
-const FAINT: f32 = 0.45;
-const FAINT_OVER: f32 = 0.14;
+/// Smallest factor of the widths of cracks beside strokes, and over which distances it varies, pattern units.
+const BESIDE: f32 = 0.12;
+const BESIDE_OVER: [f32; 2] = [0.33, 0.1];
 
 /// Largest width of a crack in a stroke, relative to full width. With 1 short words with large letters are less
 /// readable; without a limit the middles of broad areas are too wide.
@@ -203,8 +219,8 @@ pub(super) struct Widths {
 }
 
 impl Widths {
-    pub(super) fn of(&self, Cost { cost, stroke, uneven }: Cost) -> f32 {
-        let width = self.least + self.gain * ops::powf((cost / self.full).min(1.0), self.taper);
+    pub(super) fn of(&self, Cost { cost, stroke, uneven, beside, .. }: Cost) -> f32 {
+        let width = beside * self.least + self.gain * ops::powf((cost * beside / self.full).min(1.0), self.taper);
         width.max((self.of_stroke * stroke).min(MOST * (self.least + self.gain)) * uneven)
     }
 }
@@ -216,9 +232,25 @@ pub(super) struct Way {
     pub(super) places: Vec<Vec2>,
     /// Widths, pattern units.
     pub(super) widths: Vec<f32>,
+    /// How far the places lie in strokes, 0..=1.
+    pub(super) inside: Vec<f32>,
 }
 
 impl Way {
+    /// The places from one end (0 or 1) on: their indices, and how far they are along it, texels.
+    fn along(&self, end: usize) -> Vec<(usize, f32)> {
+        let n = self.places.len();
+        let at = |k: usize| if end == 0 { k } else { n - 1 - k };
+        let mut far = 0.0;
+        let step = |k: usize| {
+            if k > 0 {
+                far += self.places[at(k)].distance(self.places[at(k - 1)]);
+            }
+            (at(k), far)
+        };
+        (0..n).map(step).collect()
+    }
+
     /// Limits the widening to `slope` per texel. Returns whether it has become thinner anywhere.
     fn run_out(&mut self, slope: f32) -> bool {
         let n = self.widths.len();
@@ -239,6 +271,12 @@ impl Way {
 /// Largest widening of a crack per texel, where there are guides: strokes end in points that continue as thin cracks.
 /// With more they look cut, with less short strokes disappear.
 pub(super) const RUN_OUT: f32 = 0.26;
+
+/// The share of the guides from which on they count wholly.
+const GUIDED: f32 = 0.6;
+
+/// How much of the roughness lines have where strokes are narrow and where they are broad.
+const DEVIATION: [f32; 2] = [0.1, 1.0];
 
 /// How much of [`VoronoiParams::stroke_width`](super::VoronoiParams::stroke_width) cracks have in narrow strokes and in broad ones: as wide as in
 /// small letters, cracks in large ones look as if they were painted.
@@ -277,6 +315,183 @@ pub(super) fn run_out(ways: &mut [Way], on_border: &[bool], slope: f32) {
         }
         if !is_thinner {
             break;
+        }
+    }
+}
+
+/// Share of the cracks that leave broad strokes as branches; below 0 there are none, because small letters would be unreadable.
+const BRANCHES: [f32; 2] = [-0.25, 0.45];
+
+/// Range of their widths where they leave it, relative to that of the stroke.
+const BRANCH_WIDTH: [f32; 2] = [0.22, 0.5];
+
+/// Cracks that are wider than this where they leave a stroke are parts of it, in shares of its width.
+const THIN: f32 = 0.3;
+
+/// Range of the distances over which they become as thin as other cracks, pattern units. If they are short, they look like thorns.
+const BRANCH_LENGTH: [f32; 2] = [0.1, 0.36];
+
+/// Over this distance from a stroke the other cracks that leave it are thinner, and by which factor where they leave it: they would look like the legs
+/// of an insect. Pattern units.
+const APART: f32 = 0.07;
+const APART_WIDTH: f32 = 0.1;
+
+/// How far this holds where strokes are narrow and where they are broad; below 0 as at 0.
+const BROAD: [f32; 2] = [-0.25, 1.0];
+
+/// How straight a branch must go on at a vertex, as the cosine of the turn, and over how many vertices it goes at most.
+const STRAIGHT: f32 = 0.3;
+const MOST_VERTICES: usize = 8;
+
+/// Ways and their ends, as those who run along them meet them.
+struct Branching<'a> {
+    ways: &'a [Way],
+    /// The ends at each vertex: number of the way and which end.
+    ends: Vec<Vec<(usize, usize)>>,
+    /// The two widest ways at each vertex: their widths there, and their means. Where a stroke runs out, the second mean is small.
+    widest: [Vec<[f32; 2]>; 2],
+}
+
+impl<'a> Branching<'a> {
+    fn new(ways: &'a [Way], vertices: usize) -> Self {
+        let mut ends = vec![Vec::new(); vertices];
+        let mut widest = [vec![[0.0f32; 2]; vertices], vec![[0.0f32; 2]; vertices]];
+        for (i, way) in ways.iter().enumerate() {
+            let mean = way.widths.iter().sum::<f32>() / way.widths.len().max(1) as f32;
+            for (side, &end) in way.ends.iter().enumerate() {
+                ends[end].push((i, side));
+                let own = if side == 0 { way.widths.first() } else { way.widths.last() };
+                for (widest, width) in widest.iter_mut().zip([own.copied().unwrap_or(0.0), mean]) {
+                    let [first, second] = widest[end];
+                    widest[end] = [first.max(width), second.max(width.min(first))];
+                }
+            }
+        }
+        Self { ways, ends, widest }
+    }
+
+    /// Width of the stroke that goes on through a vertex.
+    fn wide(&self, vertex: usize) -> f32 {
+        let [there, mean] = &self.widest;
+        there[vertex][1].min(mean[vertex][1])
+    }
+
+    /// The direction in which a way leaves an end.
+    fn heading(&self, (way, side): (usize, usize)) -> Vec2 {
+        let places = &self.ways[way].places;
+        let far = (places.len() / 2).min(8);
+        let [from, to] = if side == 0 { [0, far] } else { [places.len() - 1, places.len() - 1 - far] };
+        (places[to] - places[from]).normalize_or_zero()
+    }
+
+    /// How thin a way is at an end, in shares of `wide`.
+    fn thin(&self, (way, side): (usize, usize), wide: f32) -> f32 {
+        let widths = &self.ways[way].widths;
+        let own = if side == 0 { widths.first() } else { widths.last() };
+        own.map_or(1.0, |own| own / wide)
+    }
+
+    /// The ends at which a crack of `most` texels from `start` on enters the ways that it runs along, and their whole length.
+    fn run(&self, start: (usize, usize), wide: f32, most: f32) -> (Vec<(usize, usize)>, f32) {
+        let (mut along, mut length) = (vec![start], 0.0);
+        while let Some(&(way, side)) = along.last() {
+            length += self.ways[way].along(side).last().map_or(0.0, |last| last.1);
+            let out = (way, 1 - side);
+            let heading = -self.heading(out);
+            let vertex = self.ways[way].ends[1 - side];
+            let straight = |end: &(usize, usize)| self.heading(*end).dot(heading);
+            let others = self.ends[vertex].iter().filter(|end| **end != out && self.thin(**end, wide) < THIN);
+            let next = others.copied().max_by(|a, b| straight(a).total_cmp(&straight(b)));
+            match next.filter(|next| straight(next) > STRAIGHT && length < most && along.len() < MOST_VERTICES) {
+                Some(next) => along.push(next),
+                None => break,
+            }
+        }
+        (along, length)
+    }
+}
+
+/// A crack that leaves a stroke and may be widened.
+struct Branch {
+    /// The earlier, the smaller.
+    rank: f32,
+    /// The regions beside its first way.
+    regions: [u32; 2],
+    along: Vec<(usize, usize)>,
+    /// Its width where it leaves the stroke, pattern units, and its length, texels.
+    start: f32,
+    over: f32,
+}
+
+/// Widens some of the thin cracks that leave wide ones, towards these, and makes the others thinner there: at most one is wider beside each region. Which they are, and how wide and long, depends on
+/// the regions that they part, so that they mostly stay the same while weights change; they widen with the weights of the guides. `regions` are those
+/// on the left and on the right of each way.
+pub(super) fn branch(
+    ways: &mut [Way],
+    regions: &[[u32; 2]],
+    on_border: &[bool],
+    texels_per_unit: f32,
+    guides: &Guidance<'_>,
+) {
+    let share = guides.by_breadth(BRANCHES);
+    let apart = guides.by_breadth(BROAD).max(0.0) * guides.guided();
+    let least = BRANCH_LENGTH[0] * texels_per_unit;
+    let degree = |value: f32, none: f32, all: f32| ((value - none) / (all - none)).clamp(0.0, 1.0);
+    let branching = Branching::new(ways, on_border.len());
+    let (mut branches, mut leaving) = (Vec::new(), Vec::new());
+    for (i, (way, &regions)) in ways.iter().zip(regions).enumerate() {
+        for (side, end) in way.ends.into_iter().enumerate() {
+            let [left, right] = regions;
+            // The same whichever way round it was followed.
+            let is_back = (left > right) != (side == 1);
+            let pair = u64::from(left.min(right)) << 32 | u64::from(left.max(right));
+            let seed = u64::from(guides.seed) << 8 | u64::from(is_back) << 4;
+            let drawn = |of: u64| hash_unit(seed | of, pair);
+            let between = |[least, most]: [f32; 2], of: u64| least + (most - least) * drawn(of);
+            let wide = branching.wide(end);
+            let rank = drawn(1);
+            if on_border[end] || wide <= 0.0 {
+                continue;
+            }
+            let is_thin = degree(branching.thin((i, side), wide), THIN, 0.7 * THIN);
+            leaving.push((i, side, is_thin * apart));
+            if rank >= share {
+                continue;
+            }
+            let most = between(BRANCH_LENGTH, 0) * texels_per_unit;
+            let (along, length) = branching.run((i, side), wide, most);
+            let over = most.min(length);
+            let grown = degree(share - rank, 0.0, 0.1) * degree(over, least, 1.2 * least) * guides.guided();
+            let start = wide * between(BRANCH_WIDTH, 2) * is_thin * grown;
+            if start > 0.0 {
+                branches.push(Branch { rank, regions, along, start, over });
+            }
+        }
+    }
+    for (way, side, share) in leaving {
+        let along = ways[way].along(side);
+        let over = along.last().map_or(0.0, |last| last.1).min(APART * texels_per_unit).max(1.0e-3);
+        let Way { widths, inside, .. } = &mut ways[way];
+        for (k, far) in along {
+            let near = 1.0 - (far / over).min(1.0);
+            widths[k] *= 1.0 - (1.0 - APART_WIDTH) * share * near * (1.0 - inside[k]);
+        }
+    }
+    branches.sort_by(|a, b| a.rank.total_cmp(&b.rank));
+    let mut taken = BTreeSet::new();
+    for Branch { regions, along, start, over, .. } in branches {
+        if regions.iter().any(|region| taken.contains(region)) {
+            continue;
+        }
+        taken.extend(regions);
+        let mut before = 0.0;
+        for (way, side) in along {
+            let along = ways[way].along(side);
+            for &(k, far) in &along {
+                let width = start * (1.0 - (before + far) / over);
+                ways[way].widths[k] = ways[way].widths[k].max(width);
+            }
+            before += along.last().map_or(0.0, |last| last.1);
         }
     }
 }

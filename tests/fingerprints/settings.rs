@@ -176,6 +176,8 @@ fn strokes(print: &mut Print, rng: &mut Rng) -> Made<()> {
         faintest: maybe(rng, 0.2, 1.0),
         even_walls: coin(rng),
         ragged: maybe(rng, 0.002, 0.02),
+        chipped: maybe(rng, 0.002, 0.02),
+        rubble: maybe(rng, 0.0, 1.0),
     };
     let veil = Veil {
         reach: rng.range(0.02, 0.2),
@@ -674,6 +676,7 @@ fn map(print: &mut Print, rng: &mut Rng) -> Made<()> {
         taper: rng.range(0.0, 4.0),
         stroke_width: maybe(rng, 0.2, 1.0),
         guide_noise: maybe(rng, 0.0, 1.0),
+        roughness: maybe(rng, 0.0, 0.02),
     };
     let guides = vec![Guide { image: word, gamma: 20.0 }, Guide { image: drawn, gamma: rng.range(0.0, 9.0) }];
     let mut bake = VoronoiBake::new(params, guides, size, rng.next_u32().into())?;

@@ -1,5 +1,6 @@
 //! Stamps against the formula, texel by texel.
 
+use super::super::chipped;
 use super::*;
 use crate::{math::Rng, pattern::Network};
 
@@ -28,6 +29,8 @@ fn random_profile(rng: &mut Rng) -> Profile {
         faintest: if below(rng, 2) == 0 { 0.0 } else { rng.unit() },
         even_walls: below(rng, 4) == 0,
         ragged: if below(rng, 2) == 0 { 0.0 } else { 0.05 * rng.unit() },
+        chipped: if below(rng, 2) == 0 { 0.0 } else { 0.05 * rng.unit() },
+        rubble: if below(rng, 2) == 0 { 0.0 } else { rng.unit() },
     }
 }
 
@@ -61,7 +64,22 @@ fn reference(field: &DepthField, profile: &Profile, path: &SegmentPath, x: u32, 
         if profile.even_walls { (1.0 + r) * 2.0 / (full * unit) } else { (0.4 + 0.6 * width / full).clamp(0.4, 1.0) };
     let (peak, shown) = (f64::from(profile.depth) * share.min(1.0), r.max(0.5));
     let wall = if profile.even_walls { 1.0 } else { f64::from(profile.wall) };
-    let core = peak * ((shown + 0.5 - d) / (1.0 + wall * shown)).clamp(0.0, 1.0);
+    let chipped = if profile.even_walls { 0.0 } else { f64::from(profile.chipped) * unit };
+    let rubble = if profile.even_walls { 0.0 } else { f64::from(profile.rubble) };
+    let [piece, stone] = match chipped > 0.0 || rubble > 0.0 {
+        true => {
+            chipped::tiles(chipped as f32).map(|tile| f64::from(ragged::at(tile, x as usize, y as usize)[0]) / 127.0)
+        }
+        false => [0.0; 2],
+    };
+    let gap = chipped.min(0.8 * (r - 1.5).max(0.0));
+    let peak = peak.min(f64::from(profile.depth) * (1.0 - rubble * stone));
+    let gone = gap * (-piece).max(0.0);
+    let upright = 0.5 * gone.min(1.0) * (shown + 0.5 + gone - d).clamp(0.0, 1.0);
+    let core = peak * ((shown + 0.5 - d) / (1.0 + wall * shown)).clamp(0.0, 1.0).max(upright);
+    let left = gap * piece.max(0.0);
+    let step = f64::from(profile.depth) * 0.14 * left.min(1.0) * (shown + 0.5 + left - d).clamp(0.0, 1.0);
+    let core = core.max(step);
     let rim = f64::from(profile.rim_width) * unit;
     let edge = if rim > 0.0 { ((r + rim - d) / rim.max(1.0)).clamp(0.0, 1.0) } else { 0.0 };
     let strength = (2.0 * r / (1.0 - f64::from(profile.faintest)).max(1.0e-3)).min(1.0);
@@ -178,15 +196,17 @@ fn the_loop_for_even_widths_gives_the_bits_of_the_tapered_one() {
     for _ in 0..200 {
         let mut general = field([80, 61]);
         let mut special = general.clone();
-        let section =
-            Section::new(&Profile { ragged: 0.0, ..random_profile(&mut rng) }, general.frame.texels_per_unit());
+        let section = Section::new(
+            &Profile { ragged: 0.0, chipped: 0.0, rubble: 0.0, ..random_profile(&mut rng) },
+            general.frame.texels_per_unit(),
+        );
         let points = random_piece(&mut rng, &general).points().to_vec();
         let to = PathPoint { width: points[0].width, ..points[1] };
         let Some(capsule) = Capsule::clipped(&general.frame, general.depth.size(), &section, points[0], to) else {
             continue;
         };
         let rect = capsule.stamp::<false>(&mut special, &section, &mut |_| {});
-        capsule.stamp_rows::<false, true, true, false>(&mut general, &section, rect, &mut |_| {});
+        capsule.stamp_rows::<false, true, true, false, false>(&mut general, &section, rect, &mut |_| {});
         assert_eq!(general, special);
     }
 }
@@ -200,9 +220,11 @@ fn wild_numbers_neither_hang_nor_panic() {
         let mut field = field([33, 17]);
         let mut point = || PathPoint { pos: Vec2::new(pick(), pick()), width: pick() };
         let path = SegmentPath::straight(point(), point());
-        let [depth, full_width, wall, rim_width, rim_depth, faintest, ragged] = std::array::from_fn(|_| pick());
+        let [depth, full_width, wall, rim_width, rim_depth, faintest, ragged, chipped, rubble] =
+            std::array::from_fn(|_| pick());
         let even_walls = depth > 0.0;
-        let profile = Profile { depth, full_width, wall, rim_width, rim_depth, faintest, even_walls, ragged };
+        let profile =
+            Profile { depth, full_width, wall, rim_width, rim_depth, faintest, even_walls, ragged, chipped, rubble };
         stamp_path(&mut field, &profile, &path);
         stamp_dot(&mut field, Vec2::new(pick(), pick()), pick(), pick());
     }
