@@ -428,7 +428,7 @@ mod tests {
             // However long a frame takes.
             app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(2)));
             app.world_mut().resource_mut::<Threads>().are_missing = no_threads;
-            let image = app.world_mut().resource_mut::<Assets<Image>>().add(blank(UVec2::new(300, 200)));
+            let image = app.world_mut().resource_mut::<Assets<Image>>().add(blank(UVec2::new(390, 260)));
             let guided = GuidedCracks::new(CrackGuide::new(Grid::new(UVec2::new(3, 1), 0.5)))
                 .with_appearance(GuidedAppearance::Widen { seconds: 0.05 });
             let entity = app.world_mut().spawn((Sprite::from_image(image), CrackSurface::default(), guided)).id();
