@@ -13,8 +13,8 @@ const ENTIRE: f32 = 0.65;
 const LEAST: f32 = 0.3;
 const WHOLE: f32 = 0.6;
 
-/// Distance over which the sides of a piece rise, texels.
-const SIDES: f32 = 2.0;
+/// Distance over which the sides of a piece rise, as a share of a cell: so slowly (one texel a texel) that each piece begins at the edge of the crack.
+const SIDES: f32 = 2.0 / SPACING;
 
 /// Size of stones in units of that of pieces, share of the ground without any, and where a stone ends, in units of the distance between stones.
 const STONE: f32 = 0.67;
@@ -51,9 +51,8 @@ fn made(index: usize) -> [Box<[i8]>; 2] {
     let piece = |x: usize, y: usize| {
         let (piece, _, border) = nearest(PIECES, cell, x, y);
         let drawn = hash_unit(PIECES ^ 1, piece) - ENTIRE;
-        // Less and less over the last texels to the next one, so that its sides are smooth.
-        let border = (border * cell as f32 / SIDES).min(1.0);
-        let reach = if drawn < 0.0 { 0.0 } else { border * (LEAST + (1.0 - LEAST) * drawn / (1.0 - ENTIRE)) };
+        let reach = if drawn < 0.0 { 0.0 } else { LEAST + (1.0 - LEAST) * drawn / (1.0 - ENTIRE) };
+        let reach = reach * (border / SIDES).min(1.0);
         if hash_unit(PIECES ^ 2, piece) < WHOLE { -reach } else { reach }
     };
     let stone = |x: usize, y: usize| {
@@ -108,9 +107,9 @@ mod tests {
                 assert!((0..=127).contains(&stone), "{stone}");
                 none += usize::from(piece == 0);
                 whole += usize::from(piece < 0);
-                // From one piece to the next through nothing.
+                // From one piece to the next through nothing, and no steeper than a texel a texel where the largest reach is `cell / SPACING`.
                 let step = (piece - at(pieces, x + 1, y)).abs();
-                assert!(step <= 130, "a step of {step} at {x} {y}");
+                assert!(step as f32 <= 127.0 * SPACING / cell as f32 * 1.3 + 2.0, "a step of {step} at {x} {y}");
                 bare += usize::from(stone == 0);
                 steepest = steepest.max((stone - at(stones, x, y + 1)).abs());
             }

@@ -6,7 +6,7 @@ use bevy_crack::{
     growth::{CrackGrowth, GrowthParams, MarkerLayout, StartLayout, Venation},
     math::{Rng, ops},
     paint::{Cel, Facets, Look},
-    pattern::{CellTracker, CrackMask, Moment, SurfaceFrame},
+    pattern::{CellTracker, CrackMask, Moment, PathPoint, SegmentPath, SurfaceFrame},
     raster::{
         CrushedZone, DepthField, DirtyTiles, Profile, Replay, ReplayChanges, TexelRect, Veil, crack_distance,
         stamp_path,
@@ -202,6 +202,12 @@ fn strokes(print: &mut Print, rng: &mut Rng) -> Made<()> {
     for path in growth.network().segments().filter_map(|segment| growth.network().path(segment)) {
         let rect = stamp_path(&mut field, &profile, &path);
         rectangles(print, &[rect]);
+    }
+    // Wide enough that pieces have come off.
+    for _ in 0..3 {
+        let mut point = || PathPoint { pos: place(rng, frame.extent()), width: rng.range(0.03, 0.2) };
+        let path = SegmentPath::straight(point(), point());
+        rectangles(print, &[stamp_path(&mut field, &profile, &path)]);
     }
     print.numbers(crack_distance(&field, 9000, 20).as_slice().iter().copied());
     painted_field(print, &look, field, 8)
