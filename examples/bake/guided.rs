@@ -4,7 +4,7 @@ use crate::{
     growth::size,
     ink::{ink, lightness},
     maps::{Paint, base_picture, preset, write_maps},
-    ocr::deep,
+    ocr::{PROFILE, deep},
     pictures::read_picture,
 };
 use bevy_crack::{
@@ -200,7 +200,9 @@ pub(crate) fn bake(options: &Options) -> Result<(), Box<dyn Error>> {
     show_plates(&mut field, &seams, at);
     write_maps(&options.out, &paint.paint(&base, &field)?, &field, &[])?;
     // The cracks that draw alone, black on white.
-    deep(&field).ok_or("mask size")?.save(options.out.join("deep.png"))?;
+    let mut plain = DepthField::new(frame);
+    seams.stamp(&mut plain, &PROFILE);
+    deep(&plain).ok_or("mask size")?.save(options.out.join("deep.png"))?;
     regions(&map).save(options.out.join("regions.png"))?;
     fs::write(options.out.join("network.json"), serde_json::to_string(&describe(&seams, at))?)?;
 

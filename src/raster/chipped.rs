@@ -28,12 +28,23 @@ const STONES: u64 = 0x5703;
 /// The tiles of each cell size, as soon as they are needed.
 static TILES: [OnceLock<[Box<[i8]>; 2]>; CELLS.len()] = [const { OnceLock::new() }; CELLS.len()];
 
-/// The tiles for pieces of up to `most` texels, to be read with [`ragged::at`](super::ragged::at). The first has how far pieces reach, -127..=127: those
-/// below zero have come off whole, 0 = none has. The second has how high stones lie, 0..=127.
-pub(super) fn tiles(most: f32) -> [&'static [i8]; 2] {
+/// Pieces and stones.
+#[derive(Clone, Copy)]
+pub(super) struct Tiles {
+    /// How far pieces reach, -127..=127: those below zero have come off whole, 0 = none has. To be read with [`ragged::at`](super::ragged::at).
+    pub(super) pieces: &'static [i8],
+    /// How high stones lie, 0..=127.
+    pub(super) stones: &'static [i8],
+    /// The largest reach of a piece, texels: with more some would not begin at the edge of the crack.
+    pub(super) most: f32,
+}
+
+/// The tiles for pieces of up to about `most` texels.
+pub(super) fn tiles(most: f32) -> Tiles {
     let index = fitting(SPACING * most);
     let [pieces, stones] = TILES[index].get_or_init(|| made(index));
-    [pieces, stones]
+    let largest = CELLS[index] as f32 / SPACING;
+    Tiles { pieces, stones, most: if most < largest { most } else { largest } }
 }
 
 /// The largest cell size of at most `wanted` texels.
@@ -96,7 +107,8 @@ mod tests {
     #[test]
     fn pieces_and_stones_have_their_shares_and_sizes() {
         for (most, cell) in [(0.0, 2), (2.0, 6), (3.0, 8), (6.0, 16), (1.0e6, 32), (f32::NAN, 2)] {
-            let [pieces, stones] = tiles(most);
+            let Tiles { pieces, stones, most: reach } = tiles(most);
+            assert!(most.is_nan() || reach <= most && reach >= 0.55 * most.min(9.0), "{reach} of {most}");
             assert_eq!(CELLS[fitting(SPACING * most)], cell);
             let at = |tile, x, y| i32::from(ragged::at(tile, x, y)[0]);
             let (mut none, mut whole, mut bare, mut steepest) = (0, 0, 0, 0);
@@ -107,9 +119,11 @@ mod tests {
                 assert!((0..=127).contains(&stone), "{stone}");
                 none += usize::from(piece == 0);
                 whole += usize::from(piece < 0);
-                // From one piece to the next through nothing, and no steeper than a texel a texel where the largest reach is `cell / SPACING`.
-                let step = (piece - at(pieces, x + 1, y)).abs();
-                assert!(step as f32 <= 127.0 * SPACING / cell as f32 * 1.3 + 2.0, "a step of {step} at {x} {y}");
+                // From one piece to the next through nothing, and no steeper than a texel a texel, so that none is apart from the edge.
+                for next in [at(pieces, x + 1, y), at(pieces, x, y + 1)] {
+                    let step = (piece - next).abs() as f32 / 127.0 * cell as f32 / SPACING;
+                    assert!(step < 1.45, "a step of {step} texels at {x} {y}");
+                }
                 bare += usize::from(stone == 0);
                 steepest = steepest.max((stone - at(stones, x, y + 1)).abs());
             }

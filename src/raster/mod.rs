@@ -322,10 +322,10 @@ pub struct Profile {
     /// Narrow cracks deviate less, by up to 60 % of their half width, and 33 % if all of it is [`wall`](Self::wall).
     /// Pattern units, 0..=0.05; default 0.
     pub ragged: f32,
-    /// How far pieces have come off the edges of wide cracks, at most: some whole, some leave a shallow step. Pieces are up to three times as long as
-    /// this along the crack, and at most 32 texels. Narrow cracks have smaller ones, or none. It has no effect with [`even_walls`](Self::even_walls). Pattern units, 0..=0.05; default 0.
+    /// How far pieces have come off the edges of wide cracks, at most: some whole, some leave a shallow step. Pieces are about three times as long as
+    /// this along the crack. They come off by at most 9 texels, and less from narrow cracks. It has no effect with [`even_walls`](Self::even_walls). Pattern units, 0..=0.05; default 0.
     pub chipped: f32,
-    /// How high stones lie in deep cracks, as a share of [`depth`](Self::depth). They are twice as large as [`chipped`](Self::chipped), and at least 2 texels. It has no effect with [`even_walls`](Self::even_walls). Range 0..=1; default 0.
+    /// How high stones lie in deep cracks, as a share of [`depth`](Self::depth). They are about twice as large as [`chipped`](Self::chipped), 2 to 16 texels. It has no effect with [`even_walls`](Self::even_walls). Range 0..=1; default 0.
     pub rubble: f32,
 }
 

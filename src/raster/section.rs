@@ -117,10 +117,10 @@ impl Section {
             ragged,
             deviation: deviation(wall),
             tile: if ragged > 0.0 || tiles.is_some() { ragged::tile(ragged) } else { &[] },
-            chipped,
-            pieces: tiles.map_or(&[], |[pieces, _]| pieces),
+            chipped: tiles.map_or(0.0, |tiles| tiles.most),
+            pieces: tiles.map_or(&[], |tiles| tiles.pieces),
             rubble: rubble * (1.0 / 127.0),
-            stones: tiles.map_or(&[], |[_, stones]| stones),
+            stones: tiles.map_or(&[], |tiles| tiles.stones),
         }
     }
 
@@ -185,6 +185,11 @@ impl Section {
         let upright = GONE * min(gone, 1.0) * clamp01(cut.reach + gone - distance);
         let core = peak * max(clamp01((cut.reach - distance) * cut.inv_wall), upright);
         max(core, self.depth * STEP * min(left, 1.0) * clamp01(cut.reach + left - distance))
+    }
+
+    /// Whether a line of up to this half width can have pieces that have come off, or stones. Where it cannot, its cross-section is the plain one.
+    pub(super) fn is_chipped(&self, r: f32) -> bool {
+        !self.pieces.is_empty() && (r > UNCHIPPED || self.cut(r).peak > self.depth * (1.0 - 127.0 * self.rubble))
     }
 
     /// How far pieces have come off the edge at most, at half width `r`.

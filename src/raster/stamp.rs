@@ -221,7 +221,7 @@ impl Capsule {
         vectorized(
             #[inline(always)]
             || match (self.r_gain != 0.0, section.rim_depth > 0.0) {
-                _ if !section.pieces.is_empty() => {
+                _ if section.is_chipped(max(self.r_from, self.r_from + self.r_gain)) => {
                     self.stamp_rows::<REPORT, true, true, true, true>(field, section, rect, changed);
                 }
                 _ if !section.tile.is_empty() => {

@@ -110,14 +110,14 @@ pub struct VoronoiParams {
     /// see [`stroke_width`](Self::stroke_width).
     pub width: f32,
     /// Width of the thinnest cracks, pattern units, 0..=[`width`](Self::width); default 0.0015. If there are guides the cracks beside them are thinner in
-    /// some places, down to an eighth of it.
+    /// some places, down to an eighth of it, and a tenth of that where they meet a broad stroke.
     pub least_width: f32,
     /// How cracks taper: their width is proportional to this power of the path cost from the sites (section 3.2), up
-    /// to full width where the cost is highest. 0..=8; default 2. 0 makes all cracks equally wide. If there are guides the cracks beside
+    /// to full width where the cost is highest. 0..=8; default 2. 0 makes all cracks equally wide if there are no guides. If there are, the cracks beside
     /// them count as cheaper, in some places more than in others, and some of those that leave broad strokes are wider, as their branches.
     pub taper: f32,
     /// Minimum width of a crack along the middle of a guide's stroke, as a share of the stroke's own width; 0..=1,
-    /// default 0.45; at most about twice [`width`](Self::width). Where strokes have a mean width of more than 18 texels of the map it is less, down to
+    /// default 0.45; at most about twice [`width`](Self::width), three times where the noise makes it wider. Where strokes have a mean width of more than 18 texels of the map it is less, down to
     /// 0.7 of it at 32.
     ///
     /// With it large letters have wide cracks, and thin parts of a letter do not disappear. 0 = as in the paper, the

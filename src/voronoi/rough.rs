@@ -15,6 +15,9 @@ const FINEST: f32 = 3.0;
 /// they stay where they are.
 const FADE: f32 = 8.0;
 
+/// Over this distance from the border of a chart what varies with the place in the picture fades, texels: beyond the cut it is another place.
+const PICTURE_FADE: f32 = 12.0;
+
 /// How far each place of a map deviates from where it is.
 #[derive(Clone, Debug)]
 pub(super) struct Roughness {
@@ -70,14 +73,14 @@ impl Roughness {
         seed: u64,
     ) -> Result<Self, OutOfMemory> {
         let (most, size) = (roughness * frame.texels_per_unit(), frame.size().as_vec2());
+        let reach = ((FADE * most).max(PICTURE_FADE) as u16).saturating_add(2);
+        let border = charts.map(|charts| charts.far_from_border(reach)).transpose()?;
         if most <= 0.0 {
-            return Ok(Self { most: 0.0, kinks: Vec::new(), size, border: None });
+            return Ok(Self { most: 0.0, kinks: Vec::new(), size, border });
         }
         let kinks = (0..).zip(KINKS).filter(|(_, (cell, _))| cell * most >= FINEST);
         let kinks =
             kinks.map(|(i, (cell, share))| Kinks::new(size, cell * most, share, seed.wrapping_add(2 * i))).collect();
-        let border =
-            charts.map(|charts| charts.far_from_border(((FADE * most) as u16).saturating_add(2))).transpose()?;
         Ok(Self { most, kinks, size, border })
     }
 
@@ -90,10 +93,25 @@ impl Roughness {
         place + share * self.most * self.kinks.iter().map(|kinks| kinks.at(place)).sum::<Vec2>()
     }
 
+    /// How much of what varies with the place in the picture there is, 0..=1: less beside the borders of charts.
+    pub(super) fn of_picture(&self, place: Vec2) -> f32 {
+        self.far_from_cut(place).map_or(1.0, |far| (far / PICTURE_FADE).min(1.0))
+    }
+
+    /// Whether places deviate at all.
+    pub(super) fn has_kinks(&self) -> bool {
+        !self.kinks.is_empty()
+    }
+
     /// The distance to the border.
     fn far(&self, place: Vec2) -> f32 {
         let outer = place.min(self.size - place).min_element().max(0.0);
-        let Some(border) = &self.border else { return outer };
+        self.far_from_cut(place).map_or(outer, |far| outer.min(far))
+    }
+
+    /// The distance to the border of the chart, if there are charts.
+    fn far_from_cut(&self, place: Vec2) -> Option<f32> {
+        let border = self.border.as_ref()?;
         // Linear between the middles of texels.
         let at = (place - 0.5).max(Vec2::ZERO);
         let (first, part) = (at.as_uvec2(), at.fract());
@@ -104,7 +122,7 @@ impl Roughness {
         };
         let top = far(0, 0) + (far(1, 0) - far(0, 0)) * part.x;
         let low = far(0, 1) + (far(1, 1) - far(0, 1)) * part.x;
-        outer.min(top + (low - top) * part.y)
+        Some(top + (low - top) * part.y)
     }
 }
 

@@ -4,7 +4,7 @@
 //! their centres, at first in the middle. The squares between four texel centres link the crossings to lines and
 //! contain the points where three or four lines meet. Then every crossing slides along its connection towards the
 //! middle of its neighbours, as if the line were a taut thread. No point leaves its connection or its square, so
-//! lines touch only at their ends. At last all of them are bent in small kinks ([`Roughness`]), in such a way that they still do.
+//! lines touch only at their ends. At last all of them are bent in small kinks ([`Roughness`]), which keeps the order of all places.
 
 use super::{
     MapCharts,
@@ -271,15 +271,16 @@ impl Tracer {
         let vertices: Vec<Vec2> = joints.iter().map(|joint| joint.pos).collect();
         without_thorns(&mut along, &vertices, guides);
         let costs: Vec<Vec<Cost>> =
-            lines.iter().zip(&along).map(|(line, along)| self.costs(line, along, guides, frame)).collect();
+            lines.iter().zip(&along).map(|(line, along)| self.costs(line, along, (guides, rough), frame)).collect();
         drop(along);
         let full = full.unwrap_or_else(|| dearest(&costs));
         let (least, gain) = (params.least_width, params.width - params.least_width);
         let of_stroke = params.stroke_width * guides.by_breadth(FILLED) / frame.texels_per_unit();
         let widths = Widths { least, gain, taper: params.taper, full, of_stroke };
         let deviation = guides.deviation();
-        let tolerance = if params.roughness > 0.0 { TOLERANCE_IN_KINKS } else { TOLERANCE };
+        let tolerance = if rough.has_kinks() && deviation > 0.0 { TOLERANCE_IN_KINKS } else { TOLERANCE };
         let moved = |place: Vec2| rough.moved(place, deviation);
+        let regions: Vec<_> = lines.iter().map(|line| self.regions(line, finest, &joints)).collect();
         let mut ways: Vec<Way> = (lines.iter().zip(&costs))
             .map(|(line, costs)| {
                 let ends = line.ends.map(|end| joints[end].pos);
@@ -298,13 +299,11 @@ impl Tracer {
         if !guides.layers.is_empty() {
             let on_border: Vec<bool> = joints.iter().map(|joint| joint.on_border).collect();
             run_out(&mut ways, &on_border, RUN_OUT / frame.texels_per_unit());
-            let regions: Vec<_> = lines.iter().map(|line| self.regions(line, finest, &joints)).collect();
             branch(&mut ways, &regions, &on_border, frame.texels_per_unit(), guides);
         }
-        let to_seam = |((line, way), birth): ((&Line, &Way), usize)| {
-            let point = |i: usize| PathPoint { pos: frame.to_pos(way.places[i]), width: way.widths[i] };
+        let to_seam = |(((line, way), birth), [left, right]): (((&Line, &Way), usize), [u32; 2])| {
             line.crossings.first()?;
-            let [left, right] = self.regions(line, finest, &joints);
+            let point = |i: usize| PathPoint { pos: frame.to_pos(way.places[i]), width: way.widths[i] };
             Some(Seam {
                 from: line.ends[0] as u32,
                 to: line.ends[1] as u32,
@@ -314,7 +313,7 @@ impl Tracer {
                 points: simplify(&way.places, tolerance).into_iter().map(point).collect(),
             })
         };
-        seams.seams = lines.iter().zip(&ways).zip(births).filter_map(to_seam).collect();
+        seams.seams = lines.iter().zip(&ways).zip(births).zip(regions).filter_map(to_seam).collect();
         let vertex = |joint: &Joint| SeamVertex { pos: frame.to_pos(moved(joint.pos)), on_border: joint.on_border };
         seams.vertices = joints.iter().map(vertex).collect();
         (seams, full)
@@ -360,11 +359,18 @@ impl Tracer {
     }
 
     /// What the widths along a line depend on.
-    fn costs(&self, line: &Line, along: &LineCosts, guides: &Guidance<'_>, frame: &SurfaceFrame) -> Vec<Cost> {
+    fn costs(
+        &self,
+        line: &Line,
+        along: &LineCosts,
+        (guides, rough): (&Guidance<'_>, &Roughness),
+        frame: &SurfaceFrame,
+    ) -> Vec<Cost> {
         let weigh = |((&cost, inside), crossing): ((&f32, &f32), &Crossing)| {
             let noise = self.beside(crossing).map(|texel| guides.noise_at(texel)).iter().sum::<f32>();
             let uneven = 1.0 + guides.by_breadth(UNEVEN) * (noise - 1.0);
-            let beside = guides.beside(frame.to_pos(crossing.pos()), *inside);
+            let at = crossing.pos();
+            let beside = 1.0 + (guides.beside(frame.to_pos(at), *inside) - 1.0) * rough.of_picture(at);
             Cost { cost, stroke: 2.0 * inside * guides.texels(cost), uneven, beside, inside: inside.min(1.0) }
         };
         along.costs.iter().zip(&along.inside).zip(&line.crossings).map(weigh).collect()

@@ -9,7 +9,7 @@ use crate::{
     raster::noise,
 };
 use glam::Vec2;
-use std::collections::{BTreeSet, VecDeque};
+use std::collections::{BTreeMap, VecDeque};
 
 /// The inputs of the width of a crack at one of its crossings.
 #[derive(Clone, Copy)]
@@ -348,7 +348,7 @@ struct Branching<'a> {
     ways: &'a [Way],
     /// The ends at each vertex: number of the way and which end.
     ends: Vec<Vec<(usize, usize)>>,
-    /// The two widest ways at each vertex: their widths there, and their means. Where a stroke runs out, the second mean is small.
+    /// The two widest ways in strokes at each vertex: their widths there, and their means. Where a stroke runs out, the second mean is small.
     widest: [Vec<[f32; 2]>; 2],
 }
 
@@ -360,8 +360,9 @@ impl<'a> Branching<'a> {
             let mean = way.widths.iter().sum::<f32>() / way.widths.len().max(1) as f32;
             for (side, &end) in way.ends.iter().enumerate() {
                 ends[end].push((i, side));
-                let own = if side == 0 { way.widths.first() } else { way.widths.last() };
-                for (widest, width) in widest.iter_mut().zip([own.copied().unwrap_or(0.0), mean]) {
+                let at = |of: &[f32]| if side == 0 { of.first() } else { of.last() }.copied().unwrap_or(0.0);
+                let inside = at(&way.inside);
+                for (widest, width) in widest.iter_mut().zip([inside * at(&way.widths), inside * mean]) {
                     let [first, second] = widest[end];
                     widest[end] = [first.max(width), second.max(width.min(first))];
                 }
@@ -402,7 +403,13 @@ impl<'a> Branching<'a> {
             let straight = |end: &(usize, usize)| self.heading(*end).dot(heading);
             let others = self.ends[vertex].iter().filter(|end| **end != out && self.thin(**end, wide) < THIN);
             let next = others.copied().max_by(|a, b| straight(a).total_cmp(&straight(b)));
-            match next.filter(|next| straight(next) > STRAIGHT && length < most && along.len() < MOST_VERTICES) {
+            // Not on beyond another stroke, nor in a circle.
+            let goes_on = |next: &(usize, usize)| {
+                straight(next) > STRAIGHT
+                    && self.wide(vertex) < THIN * wide
+                    && along.iter().all(|(way, _)| *way != next.0)
+            };
+            match next.filter(|next| length < most && along.len() < MOST_VERTICES && goes_on(next)) {
                 Some(next) => along.push(next),
                 None => break,
             }
@@ -421,11 +428,13 @@ struct Branch {
     /// Its width where it leaves the stroke, pattern units, and its length, texels.
     start: f32,
     over: f32,
+    /// How far it has grown, 0..=1.
+    grown: f32,
 }
 
-/// Widens some of the thin cracks that leave wide ones, towards these, and makes the others thinner there: at most one is wider beside each region. Which they are, and how wide and long, depends on
-/// the regions that they part, so that they mostly stay the same while weights change; they widen with the weights of the guides. `regions` are those
-/// on the left and on the right of each way.
+/// Widens some of the thin cracks that leave strokes, towards these, and makes the others thinner there: at most one is wider beside each region. Which
+/// they are, and how wide and long, depends on the regions that they part, so that they mostly stay the same while weights change; they widen with the
+/// weights of the guides. `regions` are those on the left and on the right of each way.
 pub(super) fn branch(
     ways: &mut [Way],
     regions: &[[u32; 2]],
@@ -454,6 +463,9 @@ pub(super) fn branch(
                 continue;
             }
             let is_thin = degree(branching.thin((i, side), wide), THIN, 0.7 * THIN);
+            if is_thin == 0.0 {
+                continue;
+            }
             leaving.push((i, side, is_thin * apart));
             if rank >= share {
                 continue;
@@ -461,10 +473,9 @@ pub(super) fn branch(
             let most = between(BRANCH_LENGTH, 0) * texels_per_unit;
             let (along, length) = branching.run((i, side), wide, most);
             let over = most.min(length);
-            let grown = degree(share - rank, 0.0, 0.1) * degree(over, least, 1.2 * least) * guides.guided();
-            let start = wide * between(BRANCH_WIDTH, 2) * is_thin * grown;
-            if start > 0.0 {
-                branches.push(Branch { rank, regions, along, start, over });
+            let grown = degree(share - rank, 0.0, 0.1) * degree(over, least, 1.2 * least) * is_thin * guides.guided();
+            if grown > 0.0 {
+                branches.push(Branch { rank, regions, along, start: wide * between(BRANCH_WIDTH, 2), over, grown });
             }
         }
     }
@@ -478,12 +489,16 @@ pub(super) fn branch(
         }
     }
     branches.sort_by(|a, b| a.rank.total_cmp(&b.rank));
-    let mut taken = BTreeSet::new();
-    for Branch { regions, along, start, over, .. } in branches {
-        if regions.iter().any(|region| taken.contains(region)) {
+    // How far the branches beside each region have grown: what is left of it is for others.
+    let mut taken = BTreeMap::new();
+    for Branch { regions, along, start, over, grown, .. } in branches {
+        let left = regions.iter().map(|region| 1.0 - taken.get(region).copied().unwrap_or(0.0)).fold(1.0, f32::min);
+        let grown = grown * left;
+        if grown <= 0.0 {
             continue;
         }
-        taken.extend(regions);
+        regions.into_iter().for_each(|region| *taken.entry(region).or_insert(0.0f32) += grown);
+        let start = start * grown;
         let mut before = 0.0;
         for (way, side) in along {
             let along = ways[way].along(side);

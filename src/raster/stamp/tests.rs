@@ -64,11 +64,13 @@ fn reference(field: &DepthField, profile: &Profile, path: &SegmentPath, x: u32, 
         if profile.even_walls { (1.0 + r) * 2.0 / (full * unit) } else { (0.4 + 0.6 * width / full).clamp(0.4, 1.0) };
     let (peak, shown) = (f64::from(profile.depth) * share.min(1.0), r.max(0.5));
     let wall = if profile.even_walls { 1.0 } else { f64::from(profile.wall) };
-    let chipped = if profile.even_walls { 0.0 } else { f64::from(profile.chipped) * unit };
+    let mut chipped = if profile.even_walls { 0.0 } else { f64::from(profile.chipped) * unit };
     let rubble = if profile.even_walls { 0.0 } else { f64::from(profile.rubble) };
     let [piece, stone] = match chipped > 0.0 || rubble > 0.0 {
         true => {
-            chipped::tiles(chipped as f32).map(|tile| f64::from(ragged::at(tile, x as usize, y as usize)[0]) / 127.0)
+            let tiles = chipped::tiles(chipped as f32);
+            chipped = tiles.most.into();
+            [tiles.pieces, tiles.stones].map(|tile| f64::from(ragged::at(tile, x as usize, y as usize)[0]) / 127.0)
         }
         false => [0.0; 2],
     };

@@ -263,3 +263,42 @@ fn one_crack_goes_on_where_strokes_end() {
     // If each crack had the width that its own path cost gives, it would be more than one in five.
     assert!(n_aside > 200 && 12 * n_thorns < n_aside, "{n_thorns} of {n_aside}");
 }
+
+/// Some cracks that leave a broad stroke are branches, which get thinner away from it, rarely more than one beside a region. A narrow stroke has none: few cracks are as wide by their own path cost.
+#[test]
+fn broad_strokes_have_branches() {
+    const SIDE: f32 = 400.0;
+    let (mut found, mut n_crowded) = ([0, 0], 0);
+    for seed in 0..12 {
+        for (width, found) in [40.0, 17.0].into_iter().zip(&mut found) {
+            let image = bar(SIDE, width, 260.0, 0.3 * seed as f32);
+            let params = VoronoiParams { layout: SiteLayout::StrokePairs, ..VoronoiParams::DEFAULT };
+            let (_, seams) = made(&params, &[Guide::new(image.clone())], [400, 400], seed);
+            let has_ink = |pos: Vec2| image.get((pos.x * SIDE) as u32, (pos.y * SIDE) as u32) == Some(1.0);
+            let mut beside = BTreeMap::new();
+            for seam in &seams.seams {
+                let is_in = |vertex: u32| has_ink(seams.vertices[vertex as usize].pos);
+                // From the stroke outward.
+                let mut points = seam.points.clone();
+                match (is_in(seam.from), is_in(seam.to)) {
+                    (true, false) => {}
+                    (false, true) => points.reverse(),
+                    _ => continue,
+                }
+                let outside: Vec<_> = points.iter().skip_while(|point| has_ink(point.pos)).collect();
+                // Far enough from the end of the stroke, where one crack goes on.
+                let off = (points[0].pos - 0.5).dot(crate::math::ops::unit(0.3 * seed as f32)).abs();
+                let Some(first) = outside.first() else { continue };
+                let thinnest = outside.iter().map(|point| point.width).fold(first.width, f32::min);
+                if off * SIDE < 90.0 && first.width > 2.0 * params.least_width && thinnest < 0.6 * first.width {
+                    *found += 1;
+                    *beside.entry(seam.left).or_insert(0) += 1;
+                    *beside.entry(seam.right).or_insert(0) += 1;
+                }
+            }
+            n_crowded += beside.values().filter(|count| **count > 1).count();
+        }
+    }
+    assert!(found[0] >= 12 && 4 * found[1] <= found[0], "{found:?}");
+    assert!(8 * n_crowded <= found[0], "{n_crowded} of {found:?}");
+}
