@@ -35,6 +35,7 @@
 //! ```
 
 mod bake;
+mod branches;
 mod chains;
 mod charts;
 mod edges;

@@ -8,15 +8,14 @@
 
 use super::{
     MapCharts,
+    branches::branch,
     chains::LineCosts,
     charts::MapGround,
     level::Level,
     params::VoronoiParams,
     rough::Roughness,
     seams::{Seam, SeamVertex, Seams},
-    widths::{
-        ASIDE, Cost, FILLED, Guidance, RUN_OUT, UNEVEN, Way, Widths, branch, dearest, run_out, smooth, without_thorns,
-    },
+    widths::{ASIDE, Cost, FILLED, Guidance, RUN_OUT, UNEVEN, Way, Widths, dearest, run_out, smooth, without_thorns},
 };
 use crate::pattern::{PathPoint, SurfaceFrame};
 use glam::{IVec2, UVec2, Vec2};
