@@ -103,7 +103,9 @@ fn paints(c: &mut Criterion) {
     let square = |side: u32| TexelRect { min: UVec2::splat(1000), max: UVec2::splat(1000 + side) };
     let Ok(look) = LookTable::new(&Look::GROOVE, 2048.0) else { return };
     let uneven = Look { uneven_glint: Look::CONCRETE.uneven_glint, ..Look::GROOVE };
+    let cast = Look { cast: Look::CONCRETE.cast, relief: Look::CONCRETE.relief, ..uneven.clone() };
     let Ok(uneven) = LookTable::new(&uneven, 2048.0) else { return };
+    let Ok(cast) = LookTable::new(&cast, 2048.0) else { return };
     let Ok(glass) = LookTable::new(&Look::FROSTED, 2048.0) else { return };
     for (area, rect) in [("2048^2", whole), ("64^2", square(64)), ("16^2", square(16))] {
         group.throughput(Throughput::Elements(rect.area()));
@@ -123,6 +125,8 @@ fn paints(c: &mut Criterion) {
             ("diffuse groove, all touched", &relief, &look),
             ("diffuse groove, cracks", &cracks, &look),
             ("diffuse unevenly lit groove, all touched", &relief, &uneven),
+            ("diffuse groove with cast shadows, all touched", &relief, &cast),
+            ("diffuse groove with cast shadows, cracks", &cracks, &cast),
             ("diffuse unevenly lit groove, cracks", &cracks, &uneven),
             ("diffuse frosted, cracks", &cracks, &glass),
         ] {

@@ -92,7 +92,7 @@ impl CrackPreset {
             variety: 0.15,
             ..GrowthParams::DEFAULT
         },
-        profile: Profile { wall: 0.35, ragged: 0.0022, chipped: 0.009, rubble: 0.4, ..Profile::DEFAULT },
+        profile: Profile { wall: 0.7, ragged: 0.0022, chipped: 0.009, rubble: 0.4, ..Profile::DEFAULT },
         look: Look::CONCRETE,
         steps_per_second: 60.0,
         follows_lines: false,

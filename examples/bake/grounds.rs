@@ -1,6 +1,6 @@
 //! Pictures of grounds for strands: asphalt, marble, sand, and what else there is in `assets/textures`.
 
-use crate::{own::own_picture, painting::fitted, pictures::read_picture};
+use crate::{own::own_picture, painting::covering, pictures::read_picture};
 use bevy_crack::math::{Rng, ops};
 use glam::{UVec2, Vec2};
 use image::{Rgba, RgbaImage};
@@ -13,7 +13,7 @@ pub(crate) fn ground(name: &str, size: UVec2) -> Result<RgbaImage, Box<dyn Error
         "asphalt" => asphalt(size),
         "marble" => marble(size),
         "sand" => sand(size),
-        _ => fitted(read_picture(&own_picture(name))?, size),
+        _ => covering(read_picture(&own_picture(name))?, size),
     })
 }
 

@@ -4,7 +4,7 @@ use crate::{
     blend::write_blended,
     maps::{preset, write_maps},
     own::own_picture,
-    painting::{fitted, paint},
+    painting::{covering, fitted, paint},
     pictures::read_picture,
 };
 use bevy_crack::{
@@ -112,7 +112,8 @@ pub(crate) fn bake(options: &Options) -> Result<(Network, RgbaImage), Box<dyn Er
     };
     let size = options.size.or(picture.as_ref().map(|p| p.dimensions().into())).unwrap_or(UVec2::splat(512));
     let base = match picture {
-        Some(picture) => fitted(picture, size),
+        Some(picture) if options.base.is_some() => fitted(picture, size),
+        Some(picture) => covering(picture, size),
         None => RgbaImage::from_pixel(size.x, size.y, Rgba([150, 150, 146, 255])),
     };
 

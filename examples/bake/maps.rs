@@ -2,7 +2,7 @@
 
 use crate::{
     own::own_picture,
-    painting::{fitted, paint},
+    painting::{covering, fitted, paint},
     pictures::read_picture,
 };
 use bevy_crack::{
@@ -21,10 +21,12 @@ pub(crate) fn preset(name: &str) -> Result<CrackPreset, Box<dyn Error>> {
     Ok(CrackPreset::named(name).ok_or_else(names)?)
 }
 
-/// The picture at `path`, or the one that suits a preset, stretched to `size`.
+/// The picture at `path` stretched to `size`, or the one that suits a preset, not stretched.
 pub(crate) fn base_picture(path: Option<&Path>, preset: &str, size: UVec2) -> Result<RgbaImage, Box<dyn Error>> {
-    let own = own_picture(preset);
-    Ok(fitted(read_picture(path.unwrap_or(&own))?, size))
+    match path {
+        Some(path) => Ok(fitted(read_picture(path)?, size)),
+        None => Ok(covering(read_picture(&own_picture(preset))?, size)),
+    }
 }
 
 /// How cracks are shown.

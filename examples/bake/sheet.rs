@@ -2,7 +2,7 @@
 
 use crate::{
     own::{exhibit, own_picture},
-    painting::{fitted, paint},
+    painting::{covering, paint},
     pictures::read_picture,
 };
 use bevy_crack::{
@@ -61,8 +61,8 @@ pub(crate) fn draw(names: &[&str], seed: u64, side: u32) -> Result<RgbaImage, Bo
 fn moments(preset: &CrackPreset, name: &str, seed: u64, side: u32) -> Result<Vec<RgbaImage>, Box<dyn Error>> {
     // Painted twice as large: cracks are finer than texels.
     let (small, side) = (side, UVec2::splat(2 * side));
-    let base = fitted(read_picture(&own_picture(name))?, side);
-    let behind = fitted(read_picture(&own_picture("clay"))?, side);
+    let base = covering(read_picture(&own_picture(name))?, side);
+    let behind = covering(read_picture(&own_picture("clay"))?, side);
     let mask = if preset.follows_lines { CrackMask::from_picture(side, base.as_raw())? } else { CrackMask::default() };
     let mask = Arc::new(mask);
     let frame = SurfaceFrame::new(side)?;

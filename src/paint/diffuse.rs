@@ -6,13 +6,23 @@ use super::{
     patch::{BLOCK, Patch},
     rows::{Rgba, channel, round},
 };
-use crate::raster::{TexelRect, noise_row};
+use crate::{
+    Grid,
+    raster::{TexelRect, noise_row},
+};
 use glam::{Mat4, UVec2};
+use std::f32::consts::FRAC_1_SQRT_2;
 
 /// Largest brightening of a wall that faces the light: the highlight for a gloss of 1, in sRGB levels, and a share of
 /// the colour below. Found by eye on glass (the first) and concrete (the second).
 const HIGHLIGHT: f32 = 110.0;
 const SHADING: f32 = 0.75;
+
+/// With cast shadows, the light on a wall for each step of its depth: it is the wall that is lit, down to where shadows begin, and not the edge above.
+const INNER: f32 = 2.5 / 65535.0;
+
+/// And how much of their light there is on crushed material, which is rough.
+const CRUSHED: f32 = 0.55;
 
 /// How much of the picture is visible in a hole.
 const HOLE: f32 = 0.10;
@@ -23,6 +33,8 @@ pub(super) struct Frame<'a> {
     pub(super) stride: usize,
     pub(super) origin: UVec2,
     pub(super) size: UVec2,
+    /// The depths of the whole field.
+    pub(super) depths: &'a Grid<u16>,
 }
 
 impl Frame<'_> {
@@ -222,7 +234,7 @@ impl Block<'_> {
         at: UVec2,
     ) -> [u32; BLOCK] {
         // Channel by channel, so that each loop works on many texels at once.
-        let mut over = self.over::<ROOM, RICH>(look, extras, at);
+        let mut over = self.over::<ROOM, RICH>(frame, look, extras, at);
         let mut under = self.picture(frame, look, at);
         let facets = if RICH { self.plates(frame, extras, at, &mut under) } else { [0.0; BLOCK] };
         if look.tint > 0.0 {
@@ -254,15 +266,28 @@ impl Block<'_> {
                 painted[i] = self.base[i] & 0xFF00_0000;
             }
             // Light from the upper left, on a normal whose y points down. The response flattens out on steep walls.
-            let light = (self.x[i] + self.y[i]) * self.inv_len[i] * (-std::f32::consts::FRAC_1_SQRT_2 * look.glint);
+            let light = (self.x[i] + self.y[i]) * self.inv_len[i] * (-FRAC_1_SQRT_2 * look.glint);
             facing[i] = light / (1.0 + light.abs());
             // Nothing is lit in a hole.
             if RICH {
                 facing[i] *= 1.0 - dark[i];
             }
         }
-        if look.uneven_glint > 0.0 && facing.iter().any(|facing| *facing > 0.0) {
+        if RICH
+            && look.cast.is_some()
+            && let Some((extras, place)) = extras
+        {
+            for (i, facing) in facing.iter_mut().enumerate() {
+                *facing *= 1.0 - (1.0 - CRUSHED) * f32::from(extras.spot(place + i).pale) * (1.0 / 255.0);
+            }
+        }
+        if (look.uneven_glint > 0.0 || look.cast.is_some()) && facing.iter().any(|facing| *facing > 0.0) {
             let mut share = lit_shares(look, at);
+            if look.cast.is_some() {
+                for (share, &depth) in share.iter_mut().zip(self.depth) {
+                    *share *= (f32::from(depth) * INNER).min(1.0);
+                }
+            }
             // Crushed stone is lit as it lies.
             if RICH && let Some((extras, place)) = extras {
                 for (i, share) in share.iter_mut().enumerate() {
@@ -299,6 +324,7 @@ impl Block<'_> {
     #[inline(always)]
     fn over<const ROOM: usize, const RICH: bool>(
         &self,
+        frame: &Frame<'_>,
         look: &LookTable,
         extras: Option<(&Extras<'_, ROOM>, usize)>,
         at: UVec2,
@@ -343,9 +369,14 @@ impl Block<'_> {
             return over;
         }
         let mut depth = *self.depth;
-        if look.shadow > 0.0 {
+        if let Some(cast) = &look.cast {
+            if depth != [0; BLOCK] {
+                let facing = std::array::from_fn(|i| -(self.x[i] + self.y[i]) * self.inv_len[i] * FRAC_1_SQRT_2);
+                cast.shade(frame.depths, at, &facing, look.shadow, &mut depth);
+            }
+        } else if look.shadow > 0.0 {
             for (i, depth) in depth.iter_mut().enumerate() {
-                let away = (self.x[i] + self.y[i]) * self.inv_len[i] * std::f32::consts::FRAC_1_SQRT_2;
+                let away = (self.x[i] + self.y[i]) * self.inv_len[i] * FRAC_1_SQRT_2;
                 let deeper = f32::from(*depth) * (1.0 + look.shadow * away);
                 *depth = if deeper < 65535.0 { deeper as i32 as u16 } else { u16::MAX };
             }

@@ -72,6 +72,9 @@ pub struct Look {
     /// How much less deep a crack looks where its wall faces the light, and how much deeper on the other side: the
     /// colour is that of a depth changed by up to this share, depending on the slope. 0..=1; default 0.
     pub shadow: f32,
+    /// Length of the shadows that the edges of cracks cast on their walls and floors, in units of those of cracks as deep as [`relief`](Self::relief)
+    /// says, in light from the upper left. [`shadow`](Self::shadow) is how dark they are. 0..=4; default 0: walls are dark by their slope.
+    pub cast: f32,
     /// How much the cover varies along a crack (glass, ice): up to this share of it is removed. 0..=1; default 0.
     pub sparkle: f32,
     /// How much fainter cracks are that do not catch the light, depending on their direction and slowly varying along
@@ -180,6 +183,7 @@ impl Look {
         uneven_glint: 0.0,
         gloss: 0.0,
         shadow: 0.0,
+        cast: 0.0,
         grain: 0.12,
         sparkle: 0.0,
         directionality: 0.0,
@@ -288,6 +292,7 @@ impl Look {
         within("uneven_glint", self.uneven_glint, 0.0..=1.0, unit)?;
         within("gloss", self.gloss, 0.0..=4.0, "0..=4")?;
         within("shadow", self.shadow, 0.0..=1.0, unit)?;
+        within("cast", self.cast, 0.0..=4.0, "0..=4")?;
         within("sparkle", self.sparkle, 0.0..=1.0, unit)?;
         within("directionality", self.directionality, 0.0..=1.0, unit)?;
         within("full_rim", self.full_rim, 0.0..=1.0, unit)?;

@@ -183,10 +183,10 @@ impl Look {
     /// Concrete: grey-brown cracks, and a spalled crater with paler aggregate, crumbs and dust.
     pub const CONCRETE: Self = Self {
         ramp: Cow::Borrowed(&[
-            stop(0.08, [0.60, 0.57, 0.54], 0.0),
-            stop(0.30, [0.42, 0.38, 0.345], 0.85),
-            stop(0.70, [0.27, 0.24, 0.21], 0.97),
-            stop(1.0, [0.15, 0.13, 0.112], 1.0),
+            stop(0.08, [0.60, 0.575, 0.55], 0.0),
+            stop(0.30, [0.42, 0.39, 0.36], 0.85),
+            stop(0.70, [0.26, 0.24, 0.22], 0.97),
+            stop(1.0, [0.13, 0.117, 0.105], 1.0),
         ]),
         crushed: Some(CrushedZone {
             radius: 0.040,
@@ -211,9 +211,10 @@ impl Look {
             stones: 0.7,
             ..CrushedZone::DEFAULT
         }),
-        glint: 0.6,
-        uneven_glint: 0.92,
-        shadow: 0.5,
+        glint: 2.0,
+        uneven_glint: 0.65,
+        shadow: 1.0,
+        cast: 1.6,
         relief: 0.009,
         ..Self::GROOVE
     };
@@ -249,7 +250,8 @@ impl Look {
         }),
         glint: 0.8,
         uneven_glint: 0.9,
-        shadow: 0.5,
+        shadow: 0.9,
+        cast: 1.4,
         relief: 0.008,
         grain: 0.2,
         ..Self::GROOVE
@@ -285,7 +287,8 @@ impl Look {
         }),
         glint: 0.9,
         uneven_glint: 0.85,
-        shadow: 0.3,
+        shadow: 0.6,
+        cast: 1.6,
         relief: 0.004,
         grain: 0.05,
         ..Self::GROOVE
@@ -321,7 +324,8 @@ impl Look {
         }),
         glint: 1.1,
         uneven_glint: 0.7,
-        shadow: 0.5,
+        shadow: 0.9,
+        cast: 0.8,
         relief: 0.022,
         grain: 0.25,
         ..Self::GROOVE
@@ -335,9 +339,10 @@ impl Look {
             stop(1.0, [0.22, 0.19, 0.16], 0.97),
         ]),
         relief: 0.006,
-        glint: 0.45,
-        uneven_glint: 0.92,
-        shadow: 0.5,
+        glint: 0.7,
+        uneven_glint: 0.8,
+        shadow: 0.9,
+        cast: 1.6,
         crushed: Some(CrushedZone {
             radius: 0.036,
             ragged: 0.6,
@@ -395,9 +400,10 @@ impl Look {
             jag: 0.0018,
             ..CrushedZone::DEFAULT
         }),
-        glint: 0.5,
+        glint: 1.0,
         uneven_glint: 0.9,
-        shadow: 0.8,
+        shadow: 0.9,
+        cast: 1.4,
         facets: Some(Facets { tone: 0.10, tilt: 0.05, shift: 2.0, fade: 0.2, ..Facets::DEFAULT }),
         ..Self::GROOVE
     };
@@ -449,9 +455,10 @@ impl Look {
             stop(0.55, [0.50, 0.42, 0.34], 0.92),
             stop(1.0, [0.20, 0.155, 0.12], 1.0),
         ]),
-        glint: 0.5,
+        glint: 1.2,
         uneven_glint: 0.9,
-        shadow: 0.7,
+        shadow: 0.9,
+        cast: 1.2,
         relief: 0.007,
         curl: 0.05,
         curl_depth: 0.08,
@@ -494,9 +501,10 @@ impl Look {
             stop(0.82, [0.16, 0.12, 0.09], 1.0),
             stop(1.0, [0.11, 0.08, 0.06], 1.0),
         ]),
-        glint: 0.8,
+        glint: 1.2,
         uneven_glint: 0.9,
-        shadow: 0.8,
+        shadow: 0.9,
+        cast: 0.8,
         relief: 0.024,
         curl: 0.08,
         curl_depth: 0.08,

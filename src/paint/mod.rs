@@ -37,6 +37,7 @@
 //! ```
 
 pub mod analogy;
+mod cast;
 mod cel;
 mod diffuse;
 mod extras;

@@ -1,6 +1,7 @@
 //! [`LookTable`]: a look prepared for painting.
 
 use super::{
+    cast::Cast,
     cel::Strokes,
     facets::Facets,
     look::{ColorStop, Look},
@@ -8,8 +9,8 @@ use super::{
     range::{LookError, within},
     shades::Shades,
 };
-use crate::{blend::NormalBlending, pattern::MAX_SIDE};
-use glam::Vec4;
+use crate::{blend::NormalBlending, pattern::MAX_SIDE, raster::TexelRect};
+use glam::{UVec2, Vec4};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
 /// Bumps per pattern unit of the noise that varies the cover along cracks.
@@ -47,6 +48,8 @@ pub struct LookTable {
     pub(super) glint_scale: f32,
     pub(super) gloss: f32,
     pub(super) shadow: f32,
+    /// Shadows of edges.
+    pub(super) cast: Option<Cast>,
     pub(super) sparkle: f32,
     /// Bumps of the sparkle noise per texel.
     pub(super) sparkle_scale: f32,
@@ -154,6 +157,7 @@ impl LookTable {
             glint_scale: GLINTS / texels_per_unit,
             gloss,
             shadow,
+            cast: Cast::new(look.cast * look.relief * texels_per_unit),
             sparkle,
             sparkle_scale: SPARKLES / texels_per_unit,
             curve: look.curve(),
@@ -175,6 +179,19 @@ impl LookTable {
                 Shades::Steps(steps) => Some(steps),
             },
         })
+    }
+
+    /// The texels, of a field of `size`, that may look different as soon as depths in `rect` do: normals depend on the texels around their own, and
+    /// where cracks [cast shadows](Look::cast) the colours of those to the right and below do.
+    #[must_use]
+    pub fn affected(&self, rect: TexelRect, size: UVec2) -> TexelRect {
+        let mut grown = rect.grow(1, size);
+        if let Some(cast) = &self.cast
+            && !grown.is_empty()
+        {
+            grown.max = rect.max.saturating_add(UVec2::splat(cast.steps.max(1))).min(size);
+        }
+        grown
     }
 
     /// Whether cracks emit light.

@@ -25,7 +25,7 @@ fn noise_bytes(rng: &mut Rng, n: usize) -> Vec<u8> {
     (0..n).map(|_| rng.next_u32() as u8).collect()
 }
 
-fn looks() -> [Look; 4] {
+fn looks() -> [Look; 5] {
     let wild = Look {
         glint: 4.0,
         uneven_glint: 1.0,
@@ -38,7 +38,8 @@ fn looks() -> [Look; 4] {
         opaque: true,
         ..Look::GROOVE
     };
-    [Look::GROOVE, Look::FROSTED, Look::TOON, wild]
+    let cast = Look { cast: 4.0, shadow: 1.0, glint: 4.0, relief: 0.1, ..Look::GROOVE };
+    [Look::GROOVE, Look::FROSTED, Look::TOON, wild, cast]
 }
 
 fn table(look: &Look, field: &DepthField) -> LookTable {
@@ -121,7 +122,7 @@ fn dirty_painting_equals_full_painting() {
     for (i, size) in sizes.into_iter().enumerate() {
         let mut field = field(size.into());
         let size = UVec2::from(size);
-        let look = table(&looks()[i % 4], &field);
+        let look = table(&looks()[i % 5], &field);
         // The image is the field, or an atlas around it, or cuts the field off.
         let origin = if i % 3 == 0 { UVec2::ZERO } else { UVec2::new(below(&mut rng, 9), below(&mut rng, 9)) };
         let room = if i % 3 == 2 { origin + size - size.min(UVec2::splat(7)) + 1 } else { origin + size + 5 };
@@ -136,7 +137,7 @@ fn dirty_painting_equals_full_painting() {
             }
             for _ in 0..=below(&mut rng, 3) {
                 let changed = random_stamp(&mut rng, &mut field);
-                changed.iter().for_each(|rect| dirty.mark(rect.grow(1, size)));
+                changed.iter().for_each(|rect| dirty.mark(look.affected(*rect, size)));
             }
             rects.clear();
             dirty.take_rects(&mut rects);
@@ -447,10 +448,10 @@ fn presets_painted_where_they_change_equal_the_whole_at_any_time() {
                 _ => Moment::nearest(moment.steps() + end * 0.04 * f64::from(rng.unit())),
             };
             replay.show(&mut field, network, timeline, moment, &mut redrawn);
-            redrawn.changed.iter().for_each(|rect| dirty.mark(rect.grow(1, size)));
+            let look = table(&preset.look, &field);
+            redrawn.changed.iter().for_each(|rect| dirty.mark(look.affected(*rect, size)));
             rects.clear();
             dirty.take_rects(&mut rects);
-            let look = table(&preset.look, &field);
             canvas.paint_all(&field, &look, &rects, UVec2::ZERO, &mut painted);
             if step % 3 == 0 || step > 36 {
                 let anew = drawn(&preset, &growth, frame, moment);
@@ -493,7 +494,7 @@ fn presets_that_grow_painted_where_they_change_equal_the_whole() {
             }
             let timeline = growth.timeline();
             field.show_layers(growth.network(), timeline, Moment::after(timeline.end()), &mut rects);
-            rects.drain(..).for_each(|rect| dirty.mark(rect.grow(1, size)));
+            rects.drain(..).for_each(|rect| dirty.mark(look.affected(rect, size)));
             dirty.take_rects(&mut rects);
             canvas.paint_all(&field, &look, &rects, UVec2::ZERO, &mut painted);
             rects.clear();

@@ -159,7 +159,7 @@ fn paint_over(
     depth_out.take_if(|out| out.len() < texels || base.depth.is_some_and(|base| base.len() < texels));
 
     let mut job = Job {
-        frame: Frame { base: diffuse, stride: base.size.x as usize, origin, size: visible },
+        frame: Frame { base: diffuse, stride: base.size.x as usize, origin, size: visible, depths: &field.depth },
         field,
         look,
         shown,

@@ -216,10 +216,10 @@ impl FrameJob {
 
     /// Finds out what is to be painted.
     fn plan(&mut self) -> Vec<TexelRect> {
-        let Self { redrawn, touched, dirty, field, .. } = self;
+        let Self { redrawn, touched, dirty, field, look, .. } = self;
         touched.follow(redrawn);
         let size = field.frame.size();
-        redrawn.changed.iter().for_each(|rect| dirty.mark(rect.grow(1, size)));
+        redrawn.changed.iter().for_each(|rect| dirty.mark(look.affected(*rect, size)));
         self.changed.clear();
         dirty.take_rects(&mut self.changed);
         let mut rects = Vec::new();

@@ -46,7 +46,10 @@ impl Sketch {
     pub(super) fn draw(mut self, lines: &[Vec<Vec2>], base: &BasePicture) -> Drawn {
         let size = self.field.frame.size();
         let mut dirty = DirtyTiles::new(size);
-        stamp_hairlines(&mut self.field, &self.profile, self.width, lines, |rect| dirty.mark(rect.grow(1, size)));
+        let look = &self.look;
+        stamp_hairlines(&mut self.field, &self.profile, self.width, lines, |rect| {
+            dirty.mark(look.affected(rect, size))
+        });
         let mut rects = Vec::new();
         dirty.take_rects(&mut rects);
         rects.iter_mut().for_each(|rect| *rect = rect.intersect(TexelRect::whole(self.view.size())));

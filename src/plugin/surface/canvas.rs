@@ -54,8 +54,7 @@ impl Canvas {
 
     /// Marks texels of a field of `size` as changed, in all views.
     pub(crate) fn mark(&mut self, rect: TexelRect, size: UVec2) {
-        // A normal depends on the texels around it.
-        self.mark_normals(rect.grow(1, size));
+        self.mark_normals(self.look.affected(rect, size));
         self.note_depths(&[rect]);
     }
 

@@ -1,0 +1,185 @@
+//! Shadows that the edges of cracks cast on their walls and floors.
+
+use super::patch::BLOCK;
+use crate::Grid;
+use glam::UVec2;
+
+/// How far light falls by for each texel of its way: it comes from the upper left, 39 degrees above the surface.
+const FALL: f32 = 0.8;
+
+/// The most steps of a way. Cracks that are deeper cast no longer shadows.
+const MOST_STEPS: u32 = 16;
+
+/// Ways to the light, texels of a step, and how much of it comes from there: it is no point, so shadows have soft ends, and cracks that run
+/// towards it have some too.
+const WAYS: [([u32; 2], f32); 3] = [([1, 1], 0.2), ([1, 0], 0.4), ([0, 1], 0.4)];
+
+/// Height over which a shadow ends, texels.
+const SOFT: f32 = 1.5;
+
+/// Cracks are at least so many texels deep: in a coarse picture their shadows are shorter than a texel.
+const LEAST: f32 = 3.0;
+
+/// Depth from which on light makes a wall as light as it can, inverse.
+const WALL: f32 = 3.0;
+
+/// Shadows for one height of cracks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Cast {
+    /// Height of one step of depth, texels.
+    height: f32,
+    /// Steps of the longest way.
+    pub(super) steps: u32,
+}
+
+impl Cast {
+    /// For cracks that are about `deep` texels deep at most; `None` for zero.
+    pub(super) fn new(deep: f32) -> Option<Self> {
+        let deep = if deep > 0.0 { deep.max(LEAST) } else { 0.0 };
+        let steps = (deep / FALL).ceil().min(MOST_STEPS as f32) as u32;
+        (steps > 0).then_some(Self { height: deep / 65535.0, steps })
+    }
+
+    /// Makes the depths of a block deeper where shadows are cast on them, and less deep where light reaches a wall, by up to this share. `facing` is how
+    /// far walls face the light, 0..=1. Grounds of cracks do not become less deep, nor do fine cracks, which have no wall that is seen.
+    #[inline(always)]
+    pub(super) fn shade(
+        &self,
+        depths: &Grid<u16>,
+        at: UVec2,
+        facing: &[f32; BLOCK],
+        strength: f32,
+        block: &mut [u16; BLOCK],
+    ) {
+        let shades = self.shades(depths, block, at);
+        for i in 0..BLOCK {
+            let depth = f32::from(block[i]);
+            let share = depth * (1.0 / 65535.0);
+            let away = 2.0 * shades[i] - 1.0;
+            let lit = (share * WALL).min(1.0) * (1.0 - share * share * share) * (2.0 * facing[i]).clamp(0.0, 1.0);
+            let by = if away < 0.0 { away * lit } else { away };
+            let deeper = depth * (1.0 + strength * by);
+            block[i] = if deeper < 65535.0 { deeper as i32 as u16 } else { u16::MAX };
+        }
+    }
+
+    /// The share of light at each texel from `at` on that does not reach it.
+    #[inline(always)]
+    fn shades(&self, depths: &Grid<u16>, own: &[u16; BLOCK], at: UVec2) -> [f32; BLOCK] {
+        let mut deepest = 0;
+        for &depth in own {
+            deepest = deepest.max(depth);
+        }
+        let most = f32::from(deepest) * self.height;
+        let own = own.map(|depth| f32::from(depth) * self.height);
+        let mut shades = [0.0; BLOCK];
+        for ([right, down], share) in WAYS {
+            let fall = FALL * if right == down { std::f32::consts::SQRT_2 } else { 1.0 };
+            let mut above = [-SOFT; BLOCK];
+            for step in 1..=self.steps {
+                // From here on nothing can be above the light.
+                let fallen = fall * step as f32;
+                if most - fallen <= -0.5 * SOFT {
+                    break;
+                }
+                let there = depths_at(depths, at, [right * step, down * step]);
+                for i in 0..BLOCK {
+                    let over = own[i] - f32::from(there[i]) * self.height - fallen;
+                    above[i] = if over > above[i] { over } else { above[i] };
+                }
+            }
+            for i in 0..BLOCK {
+                let shade = (above[i] * (1.0 / SOFT) + 0.5).clamp(0.0, 1.0);
+                shades[i] += share * shade;
+            }
+        }
+        shades
+    }
+}
+
+/// The depths of a block so many texels to the left and above; those of the border beyond it.
+#[inline(always)]
+fn depths_at(depths: &Grid<u16>, at: UVec2, [left, up]: [u32; 2]) -> [u16; BLOCK] {
+    let row = depths.row(at.y.saturating_sub(up) as usize);
+    if let Some(from) = at.x.checked_sub(left)
+        && let Some(block) = row[from as usize..].first_chunk()
+    {
+        return *block;
+    }
+    std::array::from_fn(|i| {
+        let x = (at.x as usize + i).saturating_sub(left as usize).min(row.len() - 1);
+        row[x]
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Rng;
+
+    /// The share of light that does not reach a texel, texel by texel.
+    fn shade(depths: &Grid<u16>, deep: f64, [x, y]: [i64; 2]) -> f64 {
+        let at = |x: i64, y: i64| {
+            let inside = |at: i64, size: usize| at.clamp(0, size as i64 - 1) as usize;
+            f64::from(depths.row(inside(y, depths.height()))[inside(x, depths.width())]) / 65535.0 * deep
+        };
+        let mut sum = 0.0;
+        for ([right, down], share) in [([1, 1], 0.2), ([1, 0], 0.4), ([0, 1], 0.4)] {
+            let fall = 0.8 * f64::from(right * right + down * down).sqrt();
+            let steps = (deep / 0.8).ceil().min(16.0) as i64;
+            let over = |step: i64| {
+                let there = at(x - step * i64::from(right), y - step * i64::from(down));
+                at(x, y) - there - step as f64 * fall
+            };
+            let most = (1..=steps).map(over).fold(-1.5, f64::max);
+            sum += share * (most / 1.5 + 0.5).clamp(0.0, 1.0);
+        }
+        sum
+    }
+
+    #[test]
+    fn shadows_are_those_of_each_way_to_the_light() {
+        let mut rng = Rng::new(41);
+        for case in 0..300 {
+            let size = UVec2::new(1 + rng.next_u32() % 40, 1 + rng.next_u32() % 30);
+            let mut depths = Grid::new(size, 0);
+            for _ in 0..rng.next_u32() % 6 {
+                let [from, to] = [0, 1].map(|_| UVec2::new(rng.next_u32() % size.x, rng.next_u32() % size.y));
+                let depth = rng.next_u32() as u16;
+                for y in from.min(to).y..=from.max(to).y {
+                    depths.row_mut(y as usize)[from.min(to).x as usize..=from.max(to).x as usize].fill(depth);
+                }
+            }
+            let deep = rng.range(3.0, 30.0);
+            let Some(cast) = Cast::new(deep) else { continue };
+            for y in 0..size.y {
+                for x in (0..size.x).step_by(BLOCK) {
+                    let n = BLOCK.min((size.x - x) as usize);
+                    let mut own = [0; BLOCK];
+                    own[..n].copy_from_slice(&depths.row(y as usize)[x as usize..x as usize + n]);
+                    let shades = cast.shades(&depths, &own, UVec2::new(x, y));
+                    for (i, found) in (0..).zip(&shades[..n]) {
+                        let wanted = shade(&depths, deep.into(), [i64::from(x) + i, y.into()]);
+                        assert!((f64::from(*found) - wanted).abs() < 1.0e-4, "case {case}: {found}, not {wanted}");
+                    }
+                }
+            }
+        }
+    }
+
+    /// In a slot across the light the side towards it is dark, and the other one is lit if it is wide.
+    #[test]
+    fn the_far_side_of_a_wide_slot_is_lit() {
+        let mut depths = Grid::new(UVec2::new(60, 3), 0);
+        depths.as_mut_slice().fill(0);
+        (0..3).for_each(|y| depths.row_mut(y)[10..50].fill(u16::MAX));
+        let cast = Cast::new(8.0).unwrap();
+        let shades =
+            |x: u32| cast.shades(&depths, depths.row(1)[x as usize..].first_chunk().unwrap(), UVec2::new(x, 1));
+        // Light from above comes along the slot.
+        assert_eq!(shades(10)[0], 0.6);
+        assert_eq!(shades(40), [0.0; BLOCK]);
+        assert!(Cast::new(0.0).is_none() && Cast::new(f32::NAN).is_none());
+        assert_eq!(Cast::new(f32::INFINITY).map(|cast| cast.steps), Some(MOST_STEPS));
+    }
+}
