@@ -7,12 +7,14 @@ use glam::UVec2;
 /// How far light falls by for each texel of its way: it comes from the upper left, 39 degrees above the surface.
 const FALL: f32 = 0.8;
 
-/// The most steps of a way. Cracks that are deeper cast no longer shadows.
-const MOST_STEPS: u32 = 16;
+/// The two ways to the light, texels of a step: it is no point, so that shadows have soft ends, and cracks that run towards it have some too.
+const WAYS: [[u32; 2]; 2] = [[2, 1], [1, 2]];
 
-/// Ways to the light, texels of a step, and how much of it comes from there: it is no point, so shadows have soft ends, and cracks that run
-/// towards it have some too.
-const WAYS: [([u32; 2], f32); 3] = [([1, 1], 0.2), ([1, 0], 0.4), ([0, 1], 0.4)];
+/// Length of a step, texels.
+const STEP: f32 = 2.236_068;
+
+/// The steps after which there is a look at the depth. Beyond the last one cracks cast no shadow.
+const LOOKS: [u16; 6] = [1, 2, 3, 4, 6, 8];
 
 /// Height over which a shadow ends, texels.
 const SOFT: f32 = 1.5;
@@ -20,24 +22,30 @@ const SOFT: f32 = 1.5;
 /// Cracks are at least so many texels deep: in a coarse picture their shadows are shorter than a texel.
 const LEAST: f32 = 3.0;
 
+/// And at most so many.
+const MOST: f32 = 1.0e4;
+
 /// Depth from which on light makes a wall as light as it can, inverse.
 const WALL: f32 = 3.0;
 
 /// Shadows for one height of cracks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Cast {
-    /// Height of one step of depth, texels.
+    /// Height of two steps of depth, texels.
     height: f32,
-    /// Steps of the longest way.
-    pub(super) steps: u32,
+    /// How far light falls by in a step, in units of that height.
+    fall: u16,
+    /// How far shadows reach to the right and down, texels.
+    pub(super) reach: u32,
 }
 
 impl Cast {
     /// For cracks that are about `deep` texels deep at most; `None` for zero.
     pub(super) fn new(deep: f32) -> Option<Self> {
-        let deep = if deep > 0.0 { deep.max(LEAST) } else { 0.0 };
-        let steps = (deep / FALL).ceil().min(MOST_STEPS as f32) as u32;
-        (steps > 0).then_some(Self { height: deep / 65535.0, steps })
+        let deep = if deep > 0.0 { deep.clamp(LEAST, MOST) } else { return None };
+        let height = deep / 32767.5;
+        let steps = LOOKS.iter().rev().find(|steps| f32::from(**steps - 1) * STEP * FALL <= deep).unwrap_or(&1);
+        Some(Self { height, fall: (FALL * STEP / height).round() as u16, reach: 2 * u32::from(*steps) })
     }
 
     /// Makes the depths of a block deeper where shadows are cast on them, and less deep where light reaches a wall, by up to this share. `facing` is how
@@ -70,27 +78,25 @@ impl Cast {
         for &depth in own {
             deepest = deepest.max(depth);
         }
-        let most = f32::from(deepest) * self.height;
-        let own = own.map(|depth| f32::from(depth) * self.height);
+        // Higher than that nothing can be above the light. Half of each depth leaves room for sums.
+        let end = deepest / 2 + (0.5 * SOFT / self.height) as u16;
         let mut shades = [0.0; BLOCK];
-        for ([right, down], share) in WAYS {
-            let fall = FALL * if right == down { std::f32::consts::SQRT_2 } else { 1.0 };
-            let mut above = [-SOFT; BLOCK];
-            for step in 1..=self.steps {
-                // From here on nothing can be above the light.
-                let fallen = fall * step as f32;
-                if most - fallen <= -0.5 * SOFT {
+        for [right, down] in WAYS {
+            // The highest of all, as seen along the light.
+            let mut highest = [u16::MAX; BLOCK];
+            for steps in LOOKS {
+                let fallen = self.fall.saturating_mul(steps);
+                if fallen >= end || 2 * u32::from(steps) > self.reach {
                     break;
                 }
-                let there = depths_at(depths, at, [right * step, down * step]);
+                let there = depths_at(depths, at, [right * u32::from(steps), down * u32::from(steps)]);
                 for i in 0..BLOCK {
-                    let over = own[i] - f32::from(there[i]) * self.height - fallen;
-                    above[i] = if over > above[i] { over } else { above[i] };
+                    highest[i] = highest[i].min((there[i] / 2).saturating_add(fallen));
                 }
             }
             for i in 0..BLOCK {
-                let shade = (above[i] * (1.0 / SOFT) + 0.5).clamp(0.0, 1.0);
-                shades[i] += share * shade;
+                let above = f32::from(own[i] / 2) - f32::from(highest[i]);
+                shades[i] += 0.5 * (above * (self.height / SOFT) + 0.5).clamp(0.0, 1.0);
             }
         }
         shades
@@ -124,15 +130,11 @@ mod tests {
             f64::from(depths.row(inside(y, depths.height()))[inside(x, depths.width())]) / 65535.0 * deep
         };
         let mut sum = 0.0;
-        for ([right, down], share) in [([1, 1], 0.2), ([1, 0], 0.4), ([0, 1], 0.4)] {
-            let fall = 0.8 * f64::from(right * right + down * down).sqrt();
-            let steps = (deep / 0.8).ceil().min(16.0) as i64;
-            let over = |step: i64| {
-                let there = at(x - step * i64::from(right), y - step * i64::from(down));
-                at(x, y) - there - step as f64 * fall
-            };
-            let most = (1..=steps).map(over).fold(-1.5, f64::max);
-            sum += share * (most / 1.5 + 0.5).clamp(0.0, 1.0);
+        for [right, down] in [[2, 1], [1, 2]] {
+            let over =
+                |steps: i64| at(x, y) - at(x - steps * right, y - steps * down) - 0.8 * 5.0_f64.sqrt() * steps as f64;
+            let most = [1, 2, 3, 4, 6, 8].into_iter().map(over).fold(f64::NEG_INFINITY, f64::max);
+            sum += 0.5 * (most / 1.5 + 0.5).clamp(0.0, 1.0);
         }
         sum
     }
@@ -160,7 +162,7 @@ mod tests {
                     let shades = cast.shades(&depths, &own, UVec2::new(x, y));
                     for (i, found) in (0..).zip(&shades[..n]) {
                         let wanted = shade(&depths, deep.into(), [i64::from(x) + i, y.into()]);
-                        assert!((f64::from(*found) - wanted).abs() < 1.0e-4, "case {case}: {found}, not {wanted}");
+                        assert!((f64::from(*found) - wanted).abs() < 3.0e-3, "case {case}: {found}, not {wanted}");
                     }
                 }
             }
@@ -176,10 +178,8 @@ mod tests {
         let cast = Cast::new(8.0).unwrap();
         let shades =
             |x: u32| cast.shades(&depths, depths.row(1)[x as usize..].first_chunk().unwrap(), UVec2::new(x, 1));
-        // Light from above comes along the slot.
-        assert_eq!(shades(10)[0], 0.6);
-        assert_eq!(shades(40), [0.0; BLOCK]);
+        assert_eq!((shades(10)[0], shades(40)), (1.0, [0.0; BLOCK]));
         assert!(Cast::new(0.0).is_none() && Cast::new(f32::NAN).is_none());
-        assert_eq!(Cast::new(f32::INFINITY).map(|cast| cast.steps), Some(MOST_STEPS));
+        assert_eq!(Cast::new(f32::INFINITY).map(|cast| cast.reach), Some(16));
     }
 }

@@ -8,7 +8,7 @@ use super::{
 };
 use crate::{
     Grid,
-    raster::{TexelRect, noise_row},
+    raster::{Spot, TexelRect, noise_row},
 };
 use glam::{Mat4, UVec2};
 use std::f32::consts::FRAC_1_SQRT_2;
@@ -18,10 +18,10 @@ use std::f32::consts::FRAC_1_SQRT_2;
 const HIGHLIGHT: f32 = 110.0;
 const SHADING: f32 = 0.75;
 
-/// With cast shadows, the light on a wall for each step of its depth: it is the wall that is lit, down to where shadows begin, and not the edge above.
+/// With cast shadows, the light on a wall for each step of its depth: it is the wall that is lit, and not the edge above.
 const INNER: f32 = 2.5 / 65535.0;
 
-/// And how much of their light there is on crushed material, which is rough.
+/// And the least light on crushed material.
 const CRUSHED: f32 = 0.55;
 
 /// How much of the picture is visible in a hole.
@@ -273,21 +273,20 @@ impl Block<'_> {
                 facing[i] *= 1.0 - dark[i];
             }
         }
-        if RICH
-            && look.cast.is_some()
-            && let Some((extras, place)) = extras
-        {
+        if look.cast.is_some() {
             for (i, facing) in facing.iter_mut().enumerate() {
-                *facing *= 1.0 - (1.0 - CRUSHED) * f32::from(extras.spot(place + i).pale) * (1.0 / 255.0);
+                let mut share = (f32::from(self.depth[i]) * INNER).min(1.0);
+                if RICH
+                    && let Some((extras, place)) = extras
+                    && extras.spot(place + i) != Spot::default()
+                {
+                    share = share.max(CRUSHED);
+                }
+                *facing *= share;
             }
         }
-        if (look.uneven_glint > 0.0 || look.cast.is_some()) && facing.iter().any(|facing| *facing > 0.0) {
+        if look.uneven_glint > 0.0 && facing.iter().any(|facing| *facing > 0.0) {
             let mut share = lit_shares(look, at);
-            if look.cast.is_some() {
-                for (share, &depth) in share.iter_mut().zip(self.depth) {
-                    *share *= (f32::from(depth) * INNER).min(1.0);
-                }
-            }
             // Crushed stone is lit as it lies.
             if RICH && let Some((extras, place)) = extras {
                 for (i, share) in share.iter_mut().enumerate() {

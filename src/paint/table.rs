@@ -189,7 +189,7 @@ impl LookTable {
         if let Some(cast) = &self.cast
             && !grown.is_empty()
         {
-            grown.max = rect.max.saturating_add(UVec2::splat(cast.steps.max(1))).min(size);
+            grown.max = rect.max.saturating_add(UVec2::splat(cast.reach)).min(size);
         }
         grown
     }
