@@ -445,11 +445,12 @@ fn growing_rects() -> Vec<Vec<Vec<TexelRect>>> {
         growth.hit(Vec2::splat(0.5), 1.0);
         let (mut field, mut dirty) = (DepthField::new(frame), DirtyTiles::new(size));
         let (mut changed, mut frames) = (Vec::new(), Vec::new());
+        let look = LookTable::new(&preset.look, frame.texels_per_unit()).expect("it is valid");
         for _ in 0..FRAMES + 2 {
             growth.step();
             growth.take_changed(&mut changed);
             for path in changed.drain(..).filter_map(|segment| growth.network().path(segment)) {
-                stamp_path_with(&mut field, &preset.profile, &path, &mut |rect| dirty.mark(rect.grow(1, size)));
+                stamp_path_with(&mut field, &preset.profile, &path, &mut |rect| dirty.mark(look.affected(rect, size)));
             }
             let mut rects = Vec::new();
             dirty.take_rects(&mut rects);

@@ -93,7 +93,7 @@ mod tests {
                 let (diffuse, normal, depth) = (bytes(4 * n), bytes(4 * n), bytes(n));
                 let normal = (seed % 2 == 0).then_some(&*normal);
                 let base = BaseTexels { size: UVec2::new(150, 97), diffuse: &diffuse, normal, depth: Some(&depth) };
-                let look = &[Look::GROOVE, Look::FROSTED, Look::TOON][seed as usize % 3];
+                let look = &[Look::GROOVE, Look::FROSTED, Look::TOON, Look::CONCRETE][seed as usize % 4];
                 let normals =
                     [NormalBlending::Plain, NormalBlending::Whiteout, NormalBlending::Poisson][seed as usize / 3 % 3];
                 let look = LookTable::new(&Look { normals, ..look.clone() }, 97.0).unwrap();

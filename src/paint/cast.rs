@@ -13,8 +13,8 @@ const WAYS: [[u32; 2]; 2] = [[2, 1], [1, 2]];
 /// Length of a step, texels.
 const STEP: f32 = 2.236_068;
 
-/// The steps after which there is a look at the depth. Beyond the last one cracks cast no shadow.
-const LOOKS: [u16; 6] = [1, 2, 3, 4, 6, 8];
+/// The steps after which there is a look at the depth.
+const SAMPLED_STEPS: [u16; 10] = [1, 2, 3, 4, 6, 8, 11, 16, 22, 32];
 
 /// Height over which a shadow ends, texels.
 const SOFT: f32 = 1.5;
@@ -22,13 +22,13 @@ const SOFT: f32 = 1.5;
 /// Cracks are at least so many texels deep: in a coarse picture their shadows are shorter than a texel.
 const LEAST: f32 = 3.0;
 
-/// And at most so many.
-const MOST: f32 = 1.0e4;
+/// And at most so many, so that no shadow is longer than the last of the steps.
+const MOST: f32 = 57.0;
 
-/// Depth from which on light makes a wall as light as it can, inverse.
+/// One over the depth from which on a wall is lit as much as it can be; one that is less deep belongs to a fine crack.
 const WALL: f32 = 3.0;
 
-/// Shadows for one height of cracks.
+/// Shadows of cracks of one height.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Cast {
     /// Height of two steps of depth, texels.
@@ -44,14 +44,14 @@ impl Cast {
     pub(super) fn new(deep: f32) -> Option<Self> {
         let deep = if deep > 0.0 { deep.clamp(LEAST, MOST) } else { return None };
         let height = deep / 32767.5;
-        let steps = LOOKS.iter().rev().find(|steps| f32::from(**steps - 1) * STEP * FALL <= deep).unwrap_or(&1);
+        let steps = SAMPLED_STEPS.iter().rev().find(|steps| f32::from(**steps - 1) * STEP * FALL <= deep).unwrap_or(&1);
         Some(Self { height, fall: (FALL * STEP / height).round() as u16, reach: 2 * u32::from(*steps) })
     }
 
     /// Makes the depths of a block deeper where shadows are cast on them, and less deep where light reaches a wall, by up to this share. `facing` is how
     /// far walls face the light, 0..=1. Grounds of cracks do not become less deep, nor do fine cracks, which have no wall that is seen.
     #[inline(always)]
-    pub(super) fn shade(
+    pub(super) fn adjust_depths(
         &self,
         depths: &Grid<u16>,
         at: UVec2,
@@ -59,7 +59,7 @@ impl Cast {
         strength: f32,
         block: &mut [u16; BLOCK],
     ) {
-        let shades = self.shades(depths, block, at);
+        let shades = self.blocked_light(depths, block, at);
         for i in 0..BLOCK {
             let depth = f32::from(block[i]);
             let share = depth * (1.0 / 65535.0);
@@ -73,18 +73,18 @@ impl Cast {
 
     /// The share of light at each texel from `at` on that does not reach it.
     #[inline(always)]
-    fn shades(&self, depths: &Grid<u16>, own: &[u16; BLOCK], at: UVec2) -> [f32; BLOCK] {
+    fn blocked_light(&self, depths: &Grid<u16>, own: &[u16; BLOCK], at: UVec2) -> [f32; BLOCK] {
         let mut deepest = 0;
         for &depth in own {
             deepest = deepest.max(depth);
         }
-        // Higher than that nothing can be above the light. Half of each depth leaves room for sums.
-        let end = deepest / 2 + (0.5 * SOFT / self.height) as u16;
+        // From there on no texel of the block is in a shadow. Half of each depth leaves room for sums.
+        let end = deepest / 2 + (0.5 * SOFT / self.height) as u16 + 2;
         let mut shades = [0.0; BLOCK];
         for [right, down] in WAYS {
             // The highest of all, as seen along the light.
             let mut highest = [u16::MAX; BLOCK];
-            for steps in LOOKS {
+            for steps in SAMPLED_STEPS {
                 let fallen = self.fall.saturating_mul(steps);
                 if fallen >= end || 2 * u32::from(steps) > self.reach {
                     break;
@@ -133,7 +133,7 @@ mod tests {
         for [right, down] in [[2, 1], [1, 2]] {
             let over =
                 |steps: i64| at(x, y) - at(x - steps * right, y - steps * down) - 0.8 * 5.0_f64.sqrt() * steps as f64;
-            let most = [1, 2, 3, 4, 6, 8].into_iter().map(over).fold(f64::NEG_INFINITY, f64::max);
+            let most = [1, 2, 3, 4, 6, 8, 11, 16, 22, 32].into_iter().map(over).fold(f64::NEG_INFINITY, f64::max);
             sum += 0.5 * (most / 1.5 + 0.5).clamp(0.0, 1.0);
         }
         sum
@@ -152,14 +152,14 @@ mod tests {
                     depths.row_mut(y as usize)[from.min(to).x as usize..=from.max(to).x as usize].fill(depth);
                 }
             }
-            let deep = rng.range(3.0, 30.0);
+            let deep = rng.range(3.0, 57.0);
             let Some(cast) = Cast::new(deep) else { continue };
             for y in 0..size.y {
                 for x in (0..size.x).step_by(BLOCK) {
                     let n = BLOCK.min((size.x - x) as usize);
                     let mut own = [0; BLOCK];
                     own[..n].copy_from_slice(&depths.row(y as usize)[x as usize..x as usize + n]);
-                    let shades = cast.shades(&depths, &own, UVec2::new(x, y));
+                    let shades = cast.blocked_light(&depths, &own, UVec2::new(x, y));
                     for (i, found) in (0..).zip(&shades[..n]) {
                         let wanted = shade(&depths, deep.into(), [i64::from(x) + i, y.into()]);
                         assert!((f64::from(*found) - wanted).abs() < 3.0e-3, "case {case}: {found}, not {wanted}");
@@ -177,9 +177,9 @@ mod tests {
         (0..3).for_each(|y| depths.row_mut(y)[10..50].fill(u16::MAX));
         let cast = Cast::new(8.0).unwrap();
         let shades =
-            |x: u32| cast.shades(&depths, depths.row(1)[x as usize..].first_chunk().unwrap(), UVec2::new(x, 1));
+            |x: u32| cast.blocked_light(&depths, depths.row(1)[x as usize..].first_chunk().unwrap(), UVec2::new(x, 1));
         assert_eq!((shades(10)[0], shades(40)), (1.0, [0.0; BLOCK]));
         assert!(Cast::new(0.0).is_none() && Cast::new(f32::NAN).is_none());
-        assert_eq!(Cast::new(f32::INFINITY).map(|cast| cast.reach), Some(16));
+        assert_eq!(Cast::new(f32::INFINITY).map(|cast| cast.reach), Some(64));
     }
 }

@@ -371,7 +371,7 @@ impl Block<'_> {
         if let Some(cast) = &look.cast {
             if depth != [0; BLOCK] {
                 let facing = std::array::from_fn(|i| -(self.x[i] + self.y[i]) * self.inv_len[i] * FRAC_1_SQRT_2);
-                cast.shade(frame.depths, at, &facing, look.shadow, &mut depth);
+                cast.adjust_depths(frame.depths, at, &facing, look.shadow, &mut depth);
             }
         } else if look.shadow > 0.0 {
             for (i, depth) in depth.iter_mut().enumerate() {

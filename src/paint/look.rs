@@ -70,10 +70,13 @@ pub struct Look {
     /// default 0.
     pub gloss: f32,
     /// How much less deep a crack looks where its wall faces the light, and how much deeper on the other side: the
-    /// colour is that of a depth changed by up to this share, depending on the slope. 0..=1; default 0.
+    /// colour is that of a depth changed by up to this share, depending on the slope or, with [`cast`](Self::cast), on the shadows. 0..=1; default 0.
     pub shadow: f32,
-    /// Length of the shadows that the edges of cracks cast on their walls and floors, in units of those of cracks as deep as [`relief`](Self::relief)
-    /// says, in light from the upper left. [`shadow`](Self::shadow) is how dark they are. 0..=4; default 0: walls are dark by their slope.
+    /// How deep cracks count for the shadows that their edges cast on their walls and floors, as a multiple of [`relief`](Self::relief), but at least 3 and at
+    /// most 57 texels. Light comes from the upper left, and the walls inside cracks are lit, not their rims. [`shadow`](Self::shadow) is how dark shadows
+    /// are. 0..=4; default 0 = no shadows are cast.
+    ///
+    /// There are none without `shadow` and with [`cel`](Self::cel).
     pub cast: f32,
     /// How much the cover varies along a crack (glass, ice): up to this share of it is removed. 0..=1; default 0.
     pub sparkle: f32,

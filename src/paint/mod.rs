@@ -1,7 +1,8 @@
 //! Paints diffuse, normal and depth texels from a base picture and a depth field.
 //!
-//! Every painted texel depends only on the base picture, the depth field in the 3 x 3 texels around it, and the other
-//! layers of the field at the texel itself (the closed cell it lies in, crushed zones, veils). So a dirty rectangle
+//! Every painted texel depends only on the base picture, the depth field in the 3 x 3 texels around it (with
+//! [cast shadows](Look::cast) also to the left and above, see [`LookTable::affected`]), and the other layers of the field
+//! at the texel itself (the closed cell it lies in, crushed zones, veils). So a dirty rectangle
 //! painted alone equals the same part of a full repaint, bit for bit. Where the field is untouched, the painted texel
 //! is the base texel.
 //!

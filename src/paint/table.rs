@@ -157,7 +157,9 @@ impl LookTable {
             glint_scale: GLINTS / texels_per_unit,
             gloss,
             shadow,
-            cast: Cast::new(look.cast * look.relief * texels_per_unit),
+            cast: (shadow > 0.0 && look.cel.is_none())
+                .then(|| Cast::new(look.cast * look.relief * texels_per_unit))
+                .flatten(),
             sparkle,
             sparkle_scale: SPARKLES / texels_per_unit,
             curve: look.curve(),
@@ -263,6 +265,7 @@ mod tests {
             assert_eq!(refused(&Look { sparkle: bad, ..Look::GROOVE }), Some("sparkle"));
             assert_eq!(refused(&Look { directionality: bad, ..Look::GROOVE }), Some("directionality"));
             assert_eq!(refused(&Look { shadow: bad, ..Look::GROOVE }), Some("shadow"));
+            assert_eq!(refused(&Look { cast: bad, ..Look::GROOVE }), Some("cast"));
             assert_eq!(refused(&Look { full_rim: bad, ..Look::GROOVE }), Some("full_rim"));
             assert_eq!(refused(&Look { curl: bad, ..Look::GROOVE }), Some("curl"));
             assert_eq!(refused(&Look { curl_depth: bad, ..Look::GROOVE }), Some("curl_depth"));

@@ -2,8 +2,8 @@
 //!
 //! A rectangle is painted in patches. If the depth field is untouched in a patch, the base is copied. Else the slopes
 //! of the whole patch are computed at once and used for diffuse and normal. Diffuse is painted in blocks, and
-//! untouched blocks are copied. Patches and blocks affect only the speed: every texel depends on its own 3 x 3 depths
-//! and on the base. Sums of integers that cannot overflow use wrapping addition, because an overflow check per texel
+//! untouched blocks are copied. Patches and blocks affect only the speed: every texel depends on its own 3 x 3 depths,
+//! on those that cast shadows on it, and on the base. Sums of integers that cannot overflow use wrapping addition, because an overflow check per texel
 //! would cost more than the sum.
 
 use super::{

@@ -15,7 +15,7 @@ pub(super) const CELLS: [usize; 9] = [2, 3, 4, 6, 8, 12, 16, 24, 32];
 /// Distance between kinks, in units of the largest deviation.
 const SPACING: f32 = 6.0;
 
-/// Share of the wide kinks; the others are half as far apart.
+/// Share of the wide kinks; the others are half as far apart, but at least two texels.
 const WIDE: f32 = 0.8;
 
 /// Salt of the draws. Frozen: a seed must give the same result in every version.

@@ -13,7 +13,7 @@ use glam::UVec2;
 /// assert_eq!(a.union(b), rect(2, 2, 12, 10));
 /// assert_eq!(a.intersect(b), rect(6, 4, 2, 2));
 /// assert!(a.intersect(rect(20, 2, 4, 4)).is_empty());
-/// // A normal depends on the texels around its own, so a little more is to be painted, within the picture.
+/// // Within the picture.
 /// assert_eq!(b.grow(3, [16, 16].into()), rect(3, 1, 13, 14));
 /// assert_eq!(TexelRect::whole([16, 16].into()), rect(0, 0, 16, 16));
 /// ```

@@ -5,6 +5,7 @@ use bevy::{prelude::*, time::TimeUpdateStrategy};
 use bevy_crack::{math::Rng, prelude::*};
 use std::time::Duration;
 
+/// So large that even the tips of cracks are seen.
 const SIZE: UVec2 = UVec2::new(144, 120);
 
 #[derive(Resource, Default)]

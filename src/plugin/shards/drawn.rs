@@ -48,7 +48,7 @@ impl Sketch {
         let mut dirty = DirtyTiles::new(size);
         let look = &self.look;
         stamp_hairlines(&mut self.field, &self.profile, self.width, lines, |rect| {
-            dirty.mark(look.affected(rect, size))
+            dirty.mark(look.affected(rect, size));
         });
         let mut rects = Vec::new();
         dirty.take_rects(&mut rects);
