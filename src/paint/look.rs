@@ -74,9 +74,9 @@ pub struct Look {
     pub shadow: f32,
     /// How deep cracks count for the shadows that their edges cast on their walls and floors, as a multiple of [`relief`](Self::relief), but at least 3 and at
     /// most 57 texels. Light comes from the upper left, and the walls inside cracks are lit, not their rims. [`shadow`](Self::shadow) is how dark shadows
-    /// are. 0..=4; default 0 = no shadows are cast.
+    /// are. 0..=4; default 0.
     ///
-    /// There are none without `shadow` and with [`cel`](Self::cel).
+    /// No shadows are cast with 0, without `shadow`, and with [`cel`](Self::cel).
     pub cast: f32,
     /// How much the cover varies along a crack (glass, ice): up to this share of it is removed. 0..=1; default 0.
     pub sparkle: f32,
