@@ -103,7 +103,8 @@ fn paints(c: &mut Criterion) {
     let square = |side: u32| TexelRect { min: UVec2::splat(1000), max: UVec2::splat(1000 + side) };
     let Ok(look) = LookTable::new(&Look::GROOVE, 2048.0) else { return };
     let uneven = Look { uneven_glint: Look::CONCRETE.uneven_glint, ..Look::GROOVE };
-    let cast = Look { cast: Look::CONCRETE.cast, relief: Look::CONCRETE.relief, ..uneven.clone() };
+    let lit = Look::CONCRETE;
+    let cast = Look { cast: lit.cast, shadow: lit.shadow, relief: lit.relief, ..uneven.clone() };
     let Ok(uneven) = LookTable::new(&uneven, 2048.0) else { return };
     let Ok(cast) = LookTable::new(&cast, 2048.0) else { return };
     let Ok(glass) = LookTable::new(&Look::FROSTED, 2048.0) else { return };
