@@ -183,8 +183,21 @@ impl LookTable {
         })
     }
 
-    /// The texels, of a field of `size`, that may look different as soon as depths in `rect` do: normals depend on the texels around their own, and
-    /// where cracks [cast shadows](Look::cast) the colours of those to the right and below do.
+    /// The texels that may look different as soon as depths in `rect` do, both in texels of a field of `size`: normals depend on the texels around
+    /// their own, and where cracks [cast shadows](Look::cast), colours of up to 64 texels to the right and below do.
+    ///
+    /// ```
+    /// use bevy_crack::{
+    ///     paint::{Look, LookTable},
+    ///     raster::TexelRect,
+    /// };
+    ///
+    /// let rect = TexelRect { min: [40, 40].into(), max: [44, 42].into() };
+    /// let affected = |look: &Look| Ok(LookTable::new(look, 512.0)?.affected(rect, [512, 512].into()));
+    /// assert_eq!(affected(&Look::GROOVE)?, TexelRect { min: [39, 39].into(), max: [45, 43].into() });
+    /// assert_eq!(affected(&Look::CONCRETE)?, TexelRect { min: [39, 39].into(), max: [52, 50].into() });
+    /// # Ok::<(), bevy_crack::paint::LookError>(())
+    /// ```
     #[must_use]
     pub fn affected(&self, rect: TexelRect, size: UVec2) -> TexelRect {
         let mut grown = rect.grow(1, size);
