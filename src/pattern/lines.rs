@@ -1,5 +1,7 @@
-//! Finds the lines of a picture: areas that are lighter (or darker) than both their sides, over a length.
+//! Finds the lines of a picture: areas that are lighter (or darker, or more or less colourful) than both their sides, over
+//! a length.
 
+use super::mask::lightness;
 use crate::{
     Grid,
     math::{ops, vectorized},
@@ -34,35 +36,83 @@ const CLEAR: f32 = 1.7;
 /// Length of the shortest line that counts, as a share of the shorter side.
 const LENGTH: f32 = 0.25;
 
+/// A line of another colour must stand out this many times as clearly as one of another lightness.
+const COLOR: f32 = 1.2;
+
+/// What a texel must have of a colour for [`colorfulness`] to be 0.5 rather than noise of dark texels, 0..=1.
+const DARK: f32 = 0.1;
+
 /// The lines of a picture of `size` texels as values of 0..=1, at a lower resolution if the picture is large; `None`
 /// if it has none.
-pub(super) fn find(size: UVec2, lightness: impl Fn(usize) -> f32) -> Option<Grid<f32>> {
-    let picture = Padded::new(size, lightness);
-    let mut responses = [vec![0.0_f32; picture.texels()], vec![0.0; picture.texels()]];
-    for width in WIDTHS {
-        let blurred = picture.blurred(0.4 * width);
-        vectorized(
-            #[inline(always)]
-            || respond(&blurred, width, &mut responses),
-        );
+///
+/// Bricks cast shadows on their mortar, so that its joints have dark lines beside the light ones: there the colour is
+/// clearer than the lightness.
+pub(super) fn find(size: UVec2, rgba: &[u8]) -> Option<Grid<f32>> {
+    let texels = rgba.as_chunks::<4>().0;
+    let light = Lines::new(size, |index| lightness(&texels[index]));
+    let is_grey = texels.iter().all(|texel| texel[0] == texel[1] && texel[1] == texel[2]);
+    if is_grey {
+        return light.long();
     }
-    // A texture without lines has as many light responses as dark ones. So the weaker kind gives the level of noise.
-    let [light, dark] = &responses;
-    let (lines, noise) = if top(light, 0.01) >= top(dark, 0.01) { (light, dark) } else { (dark, light) };
-    let low = top(noise, NOISE).max(FAINTEST);
-    let kept = long_ones(picture.size, lines, low, CLEAR * low);
-    // As wide as the lines themselves: the filter responds beside them too, but less.
-    let mut inside: Vec<f32> = kept.iter().zip(lines).filter_map(|(&kept, &line)| kept.then_some(line)).collect();
-    if inside.is_empty() {
-        return None;
-    }
-    let strong = nth(&mut inside, 0.1);
-    let (zero, one) = (low.max(0.25 * strong), (CLEAR * low).max(0.6 * strong));
-    let value = |(&kept, &line): (&bool, &f32)| if kept { ((line - zero) / (one - zero)).clamp(0.0, 1.0) } else { 0.0 };
-    Grid::from_vec(picture.size, kept.iter().zip(lines).map(value).collect())
+    let colored = Lines::new(size, |index| colorfulness(texels[index]));
+    let clearer = if colored.clearness() > COLOR * light.clearness() { colored } else { light };
+    clearer.long()
 }
 
-/// Lightness with a mirrored margin.
+/// How much colour a texel has, for its lightness: 0 for grey; the same in shadow and in light.
+fn colorfulness([r, g, b, _]: [u8; 4]) -> f32 {
+    let (most, least) = (r.max(g).max(b), r.min(g).min(b));
+    f32::from(most - least) / (f32::from(most) + 255.0 * DARK)
+}
+
+/// How strongly each texel responds to the filters for the clearer kind of line.
+struct Lines {
+    size: UVec2,
+    responses: Vec<f32>,
+    /// The response of noise.
+    low: f32,
+}
+
+impl Lines {
+    fn new(size: UVec2, value: impl Fn(usize) -> f32) -> Self {
+        let picture = Padded::new(size, value);
+        let mut responses = [vec![0.0_f32; picture.texels()], vec![0.0; picture.texels()]];
+        for width in WIDTHS {
+            let blurred = picture.blurred(0.4 * width);
+            vectorized(
+                #[inline(always)]
+                || respond(&blurred, width, &mut responses),
+            );
+        }
+        // A texture without lines has as many light responses as dark ones. So the weaker kind gives the level of noise.
+        let [light, dark] = responses;
+        let (responses, noise) = if top(&light, 0.01) >= top(&dark, 0.01) { (light, dark) } else { (dark, light) };
+        Self { size: picture.size, responses, low: top(&noise, NOISE).max(FAINTEST) }
+    }
+
+    /// How far the strongest lines exceed noise.
+    fn clearness(&self) -> f32 {
+        top(&self.responses, 0.01) / self.low
+    }
+
+    /// The long lines.
+    fn long(&self) -> Option<Grid<f32>> {
+        let (lines, low) = (&self.responses, self.low);
+        let kept = long_ones(self.size, lines, low, CLEAR * low);
+        // As wide as the lines themselves: the filter responds beside them too, but less.
+        let mut inside: Vec<f32> = kept.iter().zip(lines).filter_map(|(&kept, &line)| kept.then_some(line)).collect();
+        if inside.is_empty() {
+            return None;
+        }
+        let strong = nth(&mut inside, 0.1);
+        let (zero, one) = (low.max(0.25 * strong), (CLEAR * low).max(0.6 * strong));
+        let value =
+            |(&kept, &line): (&bool, &f32)| if kept { ((line - zero) / (one - zero)).clamp(0.0, 1.0) } else { 0.0 };
+        Grid::from_vec(self.size, kept.iter().zip(lines).map(value).collect())
+    }
+}
+
+/// Values of a picture with a mirrored margin.
 struct Padded {
     /// Without the margin.
     size: UVec2,
@@ -73,7 +123,7 @@ struct Padded {
 
 impl Padded {
     /// The picture, averaged to a shorter side of [`SIDE`] where it is larger.
-    fn new(size: UVec2, lightness: impl Fn(usize) -> f32) -> Self {
+    fn new(size: UVec2, value: impl Fn(usize) -> f32) -> Self {
         let side = size.min_element();
         let small = if side <= SIDE {
             size
@@ -95,7 +145,7 @@ impl Padded {
             for x in 0..small.x {
                 let (columns, rows) = (span(x, small.x, size.x), span(y, small.y, size.y));
                 let count = columns.len() * rows.len();
-                let sum: f32 = rows.flat_map(|y| columns.clone().map(move |x| y * width + x)).map(&lightness).sum();
+                let sum: f32 = rows.flat_map(|y| columns.clone().map(move |x| y * width + x)).map(&value).sum();
                 texels.push(sum / count as f32);
             }
         }

@@ -71,11 +71,12 @@ impl<'a> Branching<'a> {
         (places[to] - places[from]).normalize_or_zero()
     }
 
-    /// How thin a way is at an end, in shares of `wide`.
+    /// How thin a way is at an end, in shares of `wide`. It counts as no wider than twice its mean: what leaves a stroke sideways is wide only within it.
     fn thin(&self, (way, side): (usize, usize), wide: f32) -> f32 {
         let widths = &self.ways[way].widths;
         let own = if side == 0 { widths.first() } else { widths.last() };
-        own.map_or(1.0, |own| own / wide)
+        let mean = widths.iter().sum::<f32>() / widths.len().max(1) as f32;
+        own.map_or(1.0, |own| own.min(2.0 * mean) / wide)
     }
 
     /// The ends at which a crack of `most` texels from `start` on enters the ways that it runs along, and their whole length.
@@ -168,10 +169,9 @@ pub(super) fn branch(
     for (way, side, share) in leaving {
         let along = ways[way].along(side);
         let over = along.last().map_or(0.0, |last| last.1).min(APART * texels_per_unit).max(1.0e-3);
-        let Way { widths, inside, .. } = &mut ways[way];
         for (k, far) in along {
             let near = 1.0 - (far / over).min(1.0);
-            widths[k] *= 1.0 - (1.0 - APART_WIDTH) * share * near * (1.0 - inside[k]);
+            ways[way].widths[k] *= 1.0 - (1.0 - APART_WIDTH) * share * near;
         }
     }
     branches.sort_by(|a, b| a.rank.total_cmp(&b.rank));

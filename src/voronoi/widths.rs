@@ -17,6 +17,8 @@ pub(super) struct Cost {
     pub(super) stroke: f32,
     /// Random factor of the width in a stroke.
     pub(super) uneven: f32,
+    /// Random factor of the width that it has by its cost alone, in a stroke.
+    pub(super) narrowed: f32,
     /// Factor of the width beside strokes.
     pub(super) beside: f32,
     /// How far it lies in a stroke, 0..=1.
@@ -194,7 +196,13 @@ fn least_within(far: &[f32], values: &[f32], reach: f32) -> Vec<f32> {
 
 /// How much the noise varies the width of cracks in strokes, as a share of their width, in narrow strokes and in broad ones.
 /// With 0 they look cut, with 0.7 small letters are unreadable.
-pub(super) const UNEVEN: [f32; 2] = [0.3, 0.6];
+pub(super) const UNEVEN: [f32; 2] = [0.2, 0.6];
+
+/// The same for the width that they have by their cost alone.
+pub(super) const NARROWED: [f32; 2] = [-0.6, 0.5];
+
+/// The noise at which they are narrowest and widest; it is rarely beyond.
+pub(super) const FAIR: [f32; 2] = [0.36, 0.58];
 
 /// Smallest factor of the widths of cracks beside strokes, and over which distances it varies, pattern units.
 const BESIDE: f32 = 0.12;
@@ -202,7 +210,7 @@ const BESIDE_OVER: [f32; 2] = [0.33, 0.1];
 
 /// Largest width of a crack in a stroke, relative to full width. With 1 short words with large letters are less
 /// readable; without a limit the middles of broad areas are too wide.
-const MOST: f32 = 2.0;
+const MOST: f32 = 2.6;
 
 /// Path cost to width (Mould 2005, section 3.2: "the further the site, the wider").
 pub(super) struct Widths {
@@ -216,8 +224,9 @@ pub(super) struct Widths {
 }
 
 impl Widths {
-    pub(super) fn of(&self, Cost { cost, stroke, uneven, beside, .. }: Cost) -> f32 {
+    pub(super) fn of(&self, Cost { cost, stroke, uneven, narrowed, beside, .. }: Cost) -> f32 {
         let width = beside * self.least + self.gain * ops::powf((cost * beside / self.full).min(1.0), self.taper);
+        let width = width * narrowed;
         width.max((self.of_stroke * stroke).min(MOST * (self.least + self.gain)) * uneven)
     }
 }
@@ -277,7 +286,7 @@ const DEVIATION: [f32; 2] = [0.1, 1.0];
 
 /// How much of [`VoronoiParams::stroke_width`](super::VoronoiParams::stroke_width) cracks have in narrow strokes and in broad ones: as wide as in
 /// small letters, cracks in large ones look as if they were painted.
-pub(super) const FILLED: [f32; 2] = [1.0, 0.7];
+pub(super) const FILLED: [f32; 2] = [1.0, 0.95];
 
 /// Tapers wide cracks where they do not continue: none is wider at a vertex than the second widest there, and none
 /// widens by more than `slope` per texel.

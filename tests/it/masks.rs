@@ -168,9 +168,58 @@ fn joints_of_either_kind_are_found_and_edges_are_none() {
     }
 }
 
+/// Bricks cast shadows on their mortar: its joints have a light line and a dark one, side by side, so that neither stands out. What
+/// tells them from bricks is that they have less colour, or more. In grey there is nothing to tell.
+#[test]
+fn joints_in_the_shadow_of_bricks_are_found_by_their_colour() {
+    let wall = |[brick, joint]: [[f32; 3]; 2], is_grey: bool| {
+        let mut rng = Rng::new(5);
+        RgbaImage::from_fn(256, 256, |x, y| {
+            let (x, y) = (x + 2, y + 2);
+            let shift = if (y / 32) % 2 == 0 { 0 } else { 32 };
+            let (across, down) = ((x + shift) % 64, y % 32);
+            let is_joint = across < 4 || down < 4;
+            // One side is in the sun, the other in shadow; bricks are all alike but for their grain.
+            let is_lit = if down < 4 { down < 2 } else { across < 2 };
+            let light = if !is_joint {
+                1.0
+            } else if is_lit {
+                1.3
+            } else {
+                0.7
+            };
+            let light = light * rng.range(0.94, 1.06) * 255.0;
+            let [r, g, b] = if is_joint { joint } else { brick }.map(|v| (v * light) as u8);
+            let grey = ((u16::from(r) + 2 * u16::from(g) + u16::from(b)) / 4) as u8;
+            image::Rgba(if is_grey { [grey, grey, grey, 255] } else { [r, g, b, 255] })
+        })
+    };
+    // As light as one another.
+    let (red, grey) = ([0.6, 0.35, 0.3], [0.4; 3]);
+    for colors in [[red, grey], [grey, red]] {
+        let layer = weak(&wall(colors, false)).expect("joints");
+        let mask = CrackMask { weak: Some(layer), ..CrackMask::default() };
+        let share = |is: &dyn Fn(u32, u32) -> bool| {
+            let places = (0..256 * 256).map(|i| (i % 256, i / 256)).filter(|&(x, y)| is(x, y));
+            let at = |(x, y): (u32, u32)| Vec2::new(x as f32 + 0.5, y as f32 + 0.5) / 256.0;
+            let values: Vec<f32> = places.map(|place| mask.weak_at(at(place))).collect();
+            values.iter().filter(|value| **value > 0.5).count() as f32 / values.len() as f32
+        };
+        let from_head = |x: u32, y: u32| {
+            let across = (x + 2 + if ((y + 2) / 32) % 2 == 0 { 0 } else { 32 }) % 64;
+            across.abs_diff(2).min(66 - across)
+        };
+        let from_bed = |y: u32| ((y + 2) % 32).abs_diff(2).min(34 - (y + 2) % 32);
+        let found = share(&|x, y| from_bed(y) < 2 || from_head(x, y) < 2);
+        let astray = share(&|x, y| from_bed(y) > 5 && from_head(x, y) > 5);
+        assert!(found > 0.9 && astray < 0.01, "{colors:?}: {found} of the joints, {astray} of the bricks");
+        assert!(weak(&wall(colors, true)).is_none(), "{colors:?}: there is nothing to tell in grey");
+    }
+}
+
 #[test]
 fn pictures_without_joints_have_no_lines() {
-    for name in ["concrete_fine.png", "clay.png"] {
+    for name in ["concrete_fine.png", "clay.png", "mud.png", "plaster.png", "asphalt.png"] {
         assert!(weak(&texture(name)).is_none(), "{name}");
     }
     for size in [1, 2, 3, 40] {
