@@ -176,7 +176,7 @@ fn joints_in_the_shadow_of_bricks_are_found_by_their_colour() {
         let mut rng = Rng::new(5);
         RgbaImage::from_fn(256, 256, |x, y| {
             let (x, y) = (x + 2, y + 2);
-            let shift = if (y / 32) % 2 == 0 { 0 } else { 32 };
+            let shift = if y % 64 < 32 { 0 } else { 32 };
             let (across, down) = ((x + shift) % 64, y % 32);
             let is_joint = across < 4 || down < 4;
             // One side is in the sun, the other in shadow; bricks are all alike but for their grain.
@@ -206,7 +206,7 @@ fn joints_in_the_shadow_of_bricks_are_found_by_their_colour() {
             values.iter().filter(|value| **value > 0.5).count() as f32 / values.len() as f32
         };
         let from_head = |x: u32, y: u32| {
-            let across = (x + 2 + if ((y + 2) / 32) % 2 == 0 { 0 } else { 32 }) % 64;
+            let across = (x + 2 + if (y + 2) % 64 < 32 { 0 } else { 32 }) % 64;
             across.abs_diff(2).min(66 - across)
         };
         let from_bed = |y: u32| ((y + 2) % 32).abs_diff(2).min(34 - (y + 2) % 32);
