@@ -36,80 +36,59 @@ const CLEAR: f32 = 1.7;
 /// Length of the shortest line that counts, as a share of the shorter side.
 const LENGTH: f32 = 0.25;
 
-/// A line of another colour must stand out this many times as clearly as one of another lightness.
-const COLOR: f32 = 1.2;
+/// Lines of another colour must cover this many times as much as those of another lightness.
+const COLOR: f32 = 1.5;
 
-/// What a texel must have of a colour for [`colorfulness`] to be 0.5 rather than noise of dark texels, 0..=1.
+/// Added to the divisor of [`colorfulness`], so that noise in dark texels does not count as colour, 0..=1.
 const DARK: f32 = 0.1;
 
 /// The lines of a picture of `size` texels as values of 0..=1, at a lower resolution if the picture is large; `None`
 /// if it has none.
 ///
-/// Bricks cast shadows on their mortar, so that its joints have dark lines beside the light ones: there the colour is
-/// clearer than the lightness.
+/// Bricks cast shadows on their mortar, so that its joints have dark lines beside the light ones, and neither stand out: there
+/// the colour tells more than the lightness.
 pub(super) fn find(size: UVec2, rgba: &[u8]) -> Option<Grid<f32>> {
     let texels = rgba.as_chunks::<4>().0;
-    let light = Lines::new(size, |index| lightness(&texels[index]));
-    let is_grey = texels.iter().all(|texel| texel[0] == texel[1] && texel[1] == texel[2]);
-    if is_grey {
-        return light.long();
+    let light = lines_of(&Padded::new(size, |index| [lightness(&texels[index])], |[mean]| mean));
+    if texels.iter().all(|texel| texel[0] == texel[1] && texel[1] == texel[2]) {
+        return light;
     }
-    let colored = Lines::new(size, |index| colorfulness(texels[index]));
-    let clearer = if colored.clearness() > COLOR * light.clearness() { colored } else { light };
-    clearer.long()
+    // From the mean colour, as photographs that were saved with losses have specks of other colours.
+    let colored = lines_of(&Padded::new(size, |index| texels[index].map(f32::from), colorfulness));
+    let covered = |lines: &Option<Grid<f32>>| lines.as_ref().map_or(0.0, |lines| lines.as_slice().iter().sum::<f32>());
+    if covered(&colored) > COLOR * covered(&light) { colored } else { light }
 }
 
-/// How much colour a texel has, for its lightness: 0 for grey; the same in shadow and in light.
-fn colorfulness([r, g, b, _]: [u8; 4]) -> f32 {
+/// How much colour a texel has, for its lightness: 0 for grey, and little less in shadow than in light.
+fn colorfulness([r, g, b, _]: [f32; 4]) -> f32 {
     let (most, least) = (r.max(g).max(b), r.min(g).min(b));
-    f32::from(most - least) / (f32::from(most) + 255.0 * DARK)
+    (most - least) / (most + 255.0 * DARK)
 }
 
-/// How strongly each texel responds to the filters for the clearer kind of line.
-struct Lines {
-    size: UVec2,
-    responses: Vec<f32>,
-    /// The response of noise.
-    low: f32,
-}
-
-impl Lines {
-    fn new(size: UVec2, value: impl Fn(usize) -> f32) -> Self {
-        let picture = Padded::new(size, value);
-        let mut responses = [vec![0.0_f32; picture.texels()], vec![0.0; picture.texels()]];
-        for width in WIDTHS {
-            let blurred = picture.blurred(0.4 * width);
-            vectorized(
-                #[inline(always)]
-                || respond(&blurred, width, &mut responses),
-            );
-        }
-        // A texture without lines has as many light responses as dark ones. So the weaker kind gives the level of noise.
-        let [light, dark] = responses;
-        let (responses, noise) = if top(&light, 0.01) >= top(&dark, 0.01) { (light, dark) } else { (dark, light) };
-        Self { size: picture.size, responses, low: top(&noise, NOISE).max(FAINTEST) }
+/// The long lines of a picture.
+fn lines_of(picture: &Padded) -> Option<Grid<f32>> {
+    let mut responses = [vec![0.0_f32; picture.texels()], vec![0.0; picture.texels()]];
+    for width in WIDTHS {
+        let blurred = picture.blurred(0.4 * width);
+        vectorized(
+            #[inline(always)]
+            || respond(&blurred, width, &mut responses),
+        );
     }
-
-    /// How far the strongest lines exceed noise.
-    fn clearness(&self) -> f32 {
-        top(&self.responses, 0.01) / self.low
+    // A texture without lines has as many light responses as dark ones. So the weaker kind gives the level of noise.
+    let [light, dark] = &responses;
+    let (lines, noise) = if top(light, 0.01) >= top(dark, 0.01) { (light, dark) } else { (dark, light) };
+    let low = top(noise, NOISE).max(FAINTEST);
+    let kept = long_ones(picture.size, lines, low, CLEAR * low);
+    // As wide as the lines themselves: the filter responds beside them too, but less.
+    let mut inside: Vec<f32> = kept.iter().zip(lines).filter_map(|(&kept, &line)| kept.then_some(line)).collect();
+    if inside.is_empty() {
+        return None;
     }
-
-    /// The long lines.
-    fn long(&self) -> Option<Grid<f32>> {
-        let (lines, low) = (&self.responses, self.low);
-        let kept = long_ones(self.size, lines, low, CLEAR * low);
-        // As wide as the lines themselves: the filter responds beside them too, but less.
-        let mut inside: Vec<f32> = kept.iter().zip(lines).filter_map(|(&kept, &line)| kept.then_some(line)).collect();
-        if inside.is_empty() {
-            return None;
-        }
-        let strong = nth(&mut inside, 0.1);
-        let (zero, one) = (low.max(0.25 * strong), (CLEAR * low).max(0.6 * strong));
-        let value =
-            |(&kept, &line): (&bool, &f32)| if kept { ((line - zero) / (one - zero)).clamp(0.0, 1.0) } else { 0.0 };
-        Grid::from_vec(self.size, kept.iter().zip(lines).map(value).collect())
-    }
+    let strong = nth(&mut inside, 0.1);
+    let (zero, one) = (low.max(0.25 * strong), (CLEAR * low).max(0.6 * strong));
+    let value = |(&kept, &line): (&bool, &f32)| if kept { ((line - zero) / (one - zero)).clamp(0.0, 1.0) } else { 0.0 };
+    Grid::from_vec(picture.size, kept.iter().zip(lines).map(value).collect())
 }
 
 /// Values of a picture with a mirrored margin.
@@ -122,8 +101,8 @@ struct Padded {
 }
 
 impl Padded {
-    /// The picture, averaged to a shorter side of [`SIDE`] where it is larger.
-    fn new(size: UVec2, value: impl Fn(usize) -> f32) -> Self {
+    /// The picture, averaged to a shorter side of [`SIDE`] where it is larger: what `value` makes of the mean of what `texel` reads.
+    fn new<const N: usize>(size: UVec2, texel: impl Fn(usize) -> [f32; N], value: impl Fn([f32; N]) -> f32) -> Self {
         let side = size.min_element();
         let small = if side <= SIDE {
             size
@@ -145,8 +124,11 @@ impl Padded {
             for x in 0..small.x {
                 let (columns, rows) = (span(x, small.x, size.x), span(y, small.y, size.y));
                 let count = columns.len() * rows.len();
-                let sum: f32 = rows.flat_map(|y| columns.clone().map(move |x| y * width + x)).map(&value).sum();
-                texels.push(sum / count as f32);
+                let mut sum = [0.0; N];
+                for read in rows.flat_map(|y| columns.clone().map(move |x| y * width + x)).map(&texel) {
+                    sum.iter_mut().zip(read).for_each(|(sum, read)| *sum += read);
+                }
+                texels.push(value(sum.map(|sum| sum / count as f32)));
             }
         }
         let (columns, rows) = (small.x as usize, small.y as usize);

@@ -110,12 +110,12 @@ impl CrackMask {
     /// The lines of a picture: mortar, joints of tiles and planks, painted lines, old cracks.
     ///
     /// A line is lighter (or darker) than the picture on *both* its sides, over a length; an edge alone is not a
-    /// line. Where colour tells more, as between red bricks and grey mortar in the bricks' shadow, a line has less colour
-    /// (or more) than both its sides. Each picture has lines of one kind, whichever stands out most. A texture without
+    /// line. Or it has less colour (or more) than both its sides, as mortar in the shadow of red bricks. Each picture has
+    /// lines of one kind: by colour only if these cover half as much again as those by lightness. A texture without
     /// joints has as many light lines as dark ones. So only responses of the stronger kind count that exceed the
     /// strongest few of the weaker kind. The result is `None` if no long line is left. Lines are searched for at a
-    /// shorter side of 256 texels, at widths of 1 to 8 of them; this takes about 30 ms, twice that for
-    /// pictures with colours.
+    /// shorter side of 256 texels, at widths of 1 to 8 of them; this takes about 30 ms, and twice that if the picture
+    /// has colours.
     ///
     /// # Errors
     /// [`MaskError`] if there are not four bytes per texel, or a side is 0 or above [`MAX_SIDE`](super::MAX_SIDE).

@@ -51,12 +51,12 @@ impl CrackPreset {
                 strands: StrandParams {
                     frequency: 5.0,
                     child_frequency: 8.0,
-                    rotation: 0.26,
-                    inertia: 0.5,
+                    rotation: 0.16,
+                    inertia: 0.8,
                     children: 2,
                     length: 0.4,
                     branch_cost: 0.1,
-                    child_length: 0.5,
+                    child_length: 0.4,
                     ..StrandParams::MARBLE
                 },
             },
@@ -67,7 +67,7 @@ impl CrackPreset {
             max_width: 0.0055,
             tip_taper: 10.0,
             unevenness: 0.6,
-            roughness: 0.12,
+            roughness: 0.2,
             arrest: 0.015,
             variety: 0.15,
             ..GrowthParams::DEFAULT
@@ -78,7 +78,7 @@ impl CrackPreset {
         follows_lines: false,
     };
 
-    /// Sand: wide, rugged gaps in dry ground that hardly turn. They are [strands](crate::strands).
+    /// Sand: furrows with slumped sides that hardly turn. They are [strands](crate::strands).
     pub const SAND: Self = Self {
         growth: GrowthParams {
             step_length: 0.02,
@@ -101,13 +101,13 @@ impl CrackPreset {
             murray: 2.0,
             max_width: 0.03,
             tip_taper: 10.0,
-            unevenness: 0.5,
-            roughness: 0.06,
+            unevenness: 0.2,
+            roughness: 0.02,
             arrest: 0.03,
             variety: 0.15,
             ..GrowthParams::DEFAULT
         },
-        profile: Profile { wall: 1.0, ragged: 0.0012, rubble: 0.1, ..Profile::DEFAULT },
+        profile: Profile { wall: 1.0, ragged: 0.0006, rubble: 0.1, ..Profile::DEFAULT },
         look: Look::SAND,
         steps_per_second: 40.0,
         follows_lines: false,

@@ -11,8 +11,9 @@ const BRANCHES: [f32; 2] = [-0.25, 0.45];
 /// Range of their widths where they leave it, relative to that of the stroke.
 const BRANCH_WIDTH: [f32; 2] = [0.22, 0.5];
 
-/// Cracks that are wider than this where they leave a stroke are parts of it, in shares of its width.
+/// Cracks that are wider than this where they leave a stroke, and at this distance from its middle, are parts of it. Both in shares of its width.
 const THIN: f32 = 0.3;
+const BEYOND: f32 = 2.0;
 
 /// Range of the distances over which they become as thin as other cracks, pattern units. If they are short, they look like thorns.
 const BRANCH_LENGTH: [f32; 2] = [0.1, 0.36];
@@ -32,6 +33,7 @@ const MOST_VERTICES: usize = 8;
 /// Ways and their ends, as those who run along them meet them.
 struct Branching<'a> {
     ways: &'a [Way],
+    texels_per_unit: f32,
     /// The ends at each vertex: number of the way and which end.
     ends: Vec<Vec<(usize, usize)>>,
     /// The two widest ways in strokes at each vertex: their widths there, and their means. Where a stroke runs out, the second mean is small.
@@ -39,7 +41,7 @@ struct Branching<'a> {
 }
 
 impl<'a> Branching<'a> {
-    fn new(ways: &'a [Way], vertices: usize) -> Self {
+    fn new(ways: &'a [Way], vertices: usize, texels_per_unit: f32) -> Self {
         let mut ends = vec![Vec::new(); vertices];
         let mut widest = [vec![[0.0f32; 2]; vertices], vec![[0.0f32; 2]; vertices]];
         for (i, way) in ways.iter().enumerate() {
@@ -54,7 +56,7 @@ impl<'a> Branching<'a> {
                 }
             }
         }
-        Self { ways, ends, widest }
+        Self { ways, texels_per_unit, ends, widest }
     }
 
     /// Width of the stroke that goes on through a vertex.
@@ -71,12 +73,14 @@ impl<'a> Branching<'a> {
         (places[to] - places[from]).normalize_or_zero()
     }
 
-    /// How thin a way is at an end, in shares of `wide`. It counts as no wider than twice its mean: what leaves a stroke sideways is wide only within it.
+    /// How thin a way is at an end, in shares of the width `wide` of the stroke there: what leaves a stroke sideways is wide only within it.
     fn thin(&self, (way, side): (usize, usize), wide: f32) -> f32 {
-        let widths = &self.ways[way].widths;
-        let own = if side == 0 { widths.first() } else { widths.last() };
-        let mean = widths.iter().sum::<f32>() / widths.len().max(1) as f32;
-        own.map_or(1.0, |own| own.min(2.0 * mean) / wide)
+        let way = &self.ways[way];
+        let beyond = BEYOND * wide * self.texels_per_unit;
+        let along = way.along(side);
+        let out = along.iter().find(|(_, far)| *far >= beyond).or(along.last());
+        let own = along.first().into_iter().chain(out).map(|&(k, _)| way.widths[k]).fold(f32::INFINITY, f32::min);
+        if own.is_finite() { own / wide } else { 1.0 }
     }
 
     /// The ends at which a crack of `most` texels from `start` on enters the ways that it runs along, and their whole length.
@@ -133,7 +137,7 @@ pub(super) fn branch(
     let apart = guides.by_breadth(BROAD).max(0.0) * guides.guided();
     let least = BRANCH_LENGTH[0] * texels_per_unit;
     let degree = |value: f32, none: f32, all: f32| ((value - none) / (all - none)).clamp(0.0, 1.0);
-    let branching = Branching::new(ways, on_border.len());
+    let branching = Branching::new(ways, on_border.len(), texels_per_unit);
     let (mut branches, mut leaving) = (Vec::new(), Vec::new());
     for (i, (way, &regions)) in ways.iter().zip(regions).enumerate() {
         for (side, end) in way.ends.into_iter().enumerate() {

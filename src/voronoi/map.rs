@@ -233,14 +233,13 @@ impl VoronoiMap {
 
     /// The seams that a tracer has found, and the cost of full width.
     pub(super) fn follow(&self, tracer: Tracer) -> (Seams, f32) {
-        let (noise, layers) = (&self.layers[0], &self.layers[1..]);
+        let layers = &self.layers[1..];
         // In proportion to the weights, so that nothing jumps where another guide becomes the heaviest.
         let sum: f32 = layers.iter().map(Layer::weight_in_beta).sum();
         let mean = |of: fn(&Layer) -> f32| {
             layers.iter().map(|layer| layer.weight_in_beta() * of(layer)).sum::<f32>() / sum.max(1.0e-6)
         };
         let guides = Guidance {
-            noise,
             ground: self.params.alpha / self.params.beta + 1.0,
             weight: layers.iter().map(Layer::weight_in_beta).fold(0.0, f32::max),
             left: 1.0 - 0.5 * mean(|layer| f32::from(layer.noise_share)) / 65535.0,

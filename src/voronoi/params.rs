@@ -117,11 +117,11 @@ pub struct VoronoiParams {
     /// them count as cheaper, in some places more than in others, and some of those that leave broad strokes are wider, as their branches.
     pub taper: f32,
     /// Minimum width of a crack along the middle of a guide's stroke, as a share of the stroke's own width; 0..=1,
-    /// default 0.45; at most about twice [`width`](Self::width), three times where the noise makes it wider. Where strokes have a mean width of more than 18 texels of the map it is less, down to
-    /// 0.7 of it at 32.
+    /// default 0.45; at most 2.6 times [`width`](Self::width). Where strokes have a mean width of more than 18 texels of the map it is less in places,
+    /// from 32 on down to 0.4 of it.
     ///
-    /// With it large letters have wide cracks, and thin parts of a letter do not disappear. 0 = as in the paper, the
-    /// width of all cracks depends only on the path cost.
+    /// With it large letters have wide cracks, and thin parts of a letter do not disappear. 0 = the width of all cracks depends on the path cost, as in the
+    /// paper, and cracks in broad strokes are down to half as wide in places.
     pub stroke_width: f32,
     /// How far cracks deviate from the boundaries of the regions, in small kinks. Pattern units, 0..=0.02; default 0.005. 0 = cracks run along the
     /// boundaries, as smooth as the noise makes them. Cracks that meet deviate together. Where strokes have a mean width below 32 texels of the map all

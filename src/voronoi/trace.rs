@@ -16,8 +16,7 @@ use super::{
     rough::Roughness,
     seams::{Seam, SeamVertex, Seams},
     widths::{
-        ASIDE, Cost, FAIR, FILLED, Guidance, NARROWED, RUN_OUT, UNEVEN, Way, Widths, dearest, run_out, smooth,
-        without_thorns,
+        ASIDE, Cost, FILLED, Guidance, NARROWED, RUN_OUT, UNEVEN, Way, Widths, dearest, run_out, smooth, without_thorns,
     },
 };
 use crate::pattern::{PathPoint, SurfaceFrame};
@@ -369,12 +368,12 @@ impl Tracer {
         frame: &SurfaceFrame,
     ) -> Vec<Cost> {
         let weigh = |((&cost, inside), crossing): ((&f32, &f32), &Crossing)| {
-            let noise = self.beside(crossing).map(|texel| guides.noise_at(texel)).iter().sum::<f32>();
-            let thin = 1.0 - ((noise - FAIR[0]) / (FAIR[1] - FAIR[0])).clamp(0.0, 1.0);
+            let at = crossing.pos();
+            let (place, of_picture) = (frame.to_pos(at), rough.of_picture(at));
+            let thin = guides.thin(place) * of_picture;
             let uneven = 1.0 - guides.by_breadth(UNEVEN) * thin;
             let narrowed = 1.0 - guides.by_breadth(NARROWED).max(0.0) * thin * inside.min(1.0);
-            let at = crossing.pos();
-            let beside = 1.0 + (guides.beside(frame.to_pos(at), *inside) - 1.0) * rough.of_picture(at);
+            let beside = 1.0 + (guides.beside(place, *inside) - 1.0) * of_picture;
             Cost { cost, stroke: 2.0 * inside * guides.texels(cost), uneven, narrowed, beside, inside: inside.min(1.0) }
         };
         along.costs.iter().zip(&along.inside).zip(&line.crossings).map(weigh).collect()

@@ -39,8 +39,6 @@ pub(super) struct Guidance<'a> {
     pub seed: u32,
     /// The guides.
     pub layers: &'a [Layer],
-    /// The noise.
-    pub noise: &'a Layer,
 }
 
 impl Guidance<'_> {
@@ -80,9 +78,10 @@ impl Guidance<'_> {
         1.0 + (drawn - 1.0) * self.share() * (1.0 - inside.min(1.0))
     }
 
-    /// The noise at a texel, 0..=1.
-    pub(super) fn noise_at(&self, texel: usize) -> f32 {
-        f32::from(self.noise.values.as_slice()[texel]) / 65535.0
+    /// How thin cracks in strokes are at `place`, pattern units: 0 = as wide as they can be, 1 = as thin.
+    pub(super) fn thin(&self, place: Vec2) -> f32 {
+        let [wide, small] = THIN_OVER.map(|over| noise(self.seed ^ THIN_SEED, place.x / over, place.y / over));
+        (0.5 + 0.9 * wide + 0.4 * small).clamp(0.0, 1.0)
     }
 
     /// The largest value of a guide at a texel, 0..=1, weighted by the guides' weights.
@@ -194,15 +193,16 @@ fn least_within(far: &[f32], values: &[f32], reach: f32) -> Vec<f32> {
     (0..values.len()).map(least).collect()
 }
 
-/// How much the noise varies the width of cracks in strokes, as a share of their width, in narrow strokes and in broad ones.
-/// With 0 they look cut, with 0.7 small letters are unreadable.
-pub(super) const UNEVEN: [f32; 2] = [0.2, 0.6];
+/// How much thinner cracks in strokes are in places, as a share of the width that they have by the stroke, in narrow strokes and in broad ones.
+/// With 0 they look cut, in narrow strokes with 0.2 some small letters are unreadable.
+pub(super) const UNEVEN: [f32; 2] = [0.0, 0.6];
 
-/// The same for the width that they have by their cost alone.
+/// The same for the width that they have by their cost; below 0 as at 0.
 pub(super) const NARROWED: [f32; 2] = [-0.6, 0.5];
 
-/// The noise at which they are narrowest and widest; it is rarely beyond.
-pub(super) const FAIR: [f32; 2] = [0.36, 0.58];
+/// Over which distances cracks in strokes become thinner and wider, pattern units, and the seed of it.
+const THIN_OVER: [f32; 2] = [0.14, 0.045];
+const THIN_SEED: u32 = 0x51A7_0E4D;
 
 /// Smallest factor of the widths of cracks beside strokes, and over which distances it varies, pattern units.
 const BESIDE: f32 = 0.12;
@@ -284,8 +284,8 @@ const GUIDED: f32 = 0.6;
 /// How much of the roughness lines have where strokes are narrow and where they are broad.
 const DEVIATION: [f32; 2] = [0.1, 1.0];
 
-/// How much of [`VoronoiParams::stroke_width`](super::VoronoiParams::stroke_width) cracks have in narrow strokes and in broad ones: as wide as in
-/// small letters, cracks in large ones look as if they were painted.
+/// How much of [`VoronoiParams::stroke_width`](super::VoronoiParams::stroke_width) cracks have in narrow strokes and in broad ones, where they are
+/// widest.
 pub(super) const FILLED: [f32; 2] = [1.0, 0.95];
 
 /// Tapers wide cracks where they do not continue: none is wider at a vertex than the second widest there, and none

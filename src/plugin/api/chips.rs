@@ -16,7 +16,7 @@ use bevy::prelude::*;
 /// flight and are despawned then.
 ///
 /// Looks need a [crushed zone](crate::paint::Look::crushed) with
-/// [terraces](crate::raster::CrushedZone::terraces): those of concrete, asphalt, plaster, brick, clay and mud have one.
+/// [terraces](crate::raster::CrushedZone::terraces): those of concrete, asphalt, marble, plaster, brick, clay and mud have one.
 /// Of a box or a curved mesh, chips come off where it is hit, not over an edge; they show its texture as it is then. None
 /// come off a body that is not laid out.
 ///
