@@ -45,7 +45,7 @@ const DARK: f32 = 0.1;
 /// The lines of a picture of `size` texels as values of 0..=1, at a lower resolution if the picture is large; `None`
 /// if it has none.
 ///
-/// Bricks cast shadows on their mortar, so that its joints have dark lines beside the light ones, and neither stand out: there
+/// Bricks cast shadows on their mortar, so that its joints have dark lines beside the light ones, and neither stands out: there
 /// the colour tells more than the lightness.
 pub(super) fn find(size: UVec2, rgba: &[u8]) -> Option<Grid<f32>> {
     let texels = rgba.as_chunks::<4>().0;
