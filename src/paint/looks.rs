@@ -317,7 +317,6 @@ impl Look {
             chips: 0.05,
             reach: 2.6,
             tint: 0.8,
-            bare: 1.0,
             ..CrushedZone::DEFAULT
         }),
         glint: 1.0,

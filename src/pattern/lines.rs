@@ -1,7 +1,6 @@
 //! Finds the lines of a picture: areas that are lighter (or darker, or more or less colourful) than both their sides, over
 //! a length.
 
-use super::mask::lightness;
 use crate::{
     Grid,
     math::{ops, vectorized},
@@ -49,7 +48,7 @@ const DARK: f32 = 0.1;
 /// the colour tells more than the lightness.
 pub(super) fn find(size: UVec2, rgba: &[u8]) -> Option<Grid<f32>> {
     let texels = rgba.as_chunks::<4>().0;
-    let light = lines_of(&Padded::new(size, |index| [lightness(&texels[index])], |[mean]| mean));
+    let light = lines_of(&Padded::new(size, |index| [lightness(texels[index])], |[mean]| mean));
     if texels.iter().all(|texel| texel[0] == texel[1] && texel[1] == texel[2]) {
         return light;
     }
@@ -57,6 +56,11 @@ pub(super) fn find(size: UVec2, rgba: &[u8]) -> Option<Grid<f32>> {
     let colored = lines_of(&Padded::new(size, |index| texels[index].map(f32::from), colorfulness));
     let covered = |lines: &Option<Grid<f32>>| lines.as_ref().map_or(0.0, |lines| lines.as_slice().iter().sum::<f32>());
     if covered(&colored) > COLOR * covered(&light) { colored } else { light }
+}
+
+/// Lightness of a texel as stored, 0..=1.
+pub(crate) fn lightness([r, g, b, _]: [u8; 4]) -> f32 {
+    f32::from(u16::from(r) + 2 * u16::from(g) + u16::from(b)) / (4.0 * 255.0)
 }
 
 /// How much colour a texel has, for its lightness: 0 for grey, and little less in shadow than in light.

@@ -1,6 +1,6 @@
 //! [`CrackMask`]: where cracks prefer to run, avoid to run, and never run.
 
-use super::lines;
+use super::lines::{self, lightness};
 use crate::Grid;
 use glam::{UVec2, Vec2};
 
@@ -67,7 +67,9 @@ impl CrackMask {
     pub fn layer(size: UVec2, texels: &[u8]) -> Result<Grid<f32>, MaskError> {
         let values = match bytes_per_texel(size, texels)? {
             1 => texels.iter().map(|&texel| f32::from(texel) / 255.0).collect(),
-            _ => texels.as_chunks::<4>().0.iter().map(|texel| lightness(texel) * f32::from(texel[3]) / 255.0).collect(),
+            _ => {
+                texels.as_chunks::<4>().0.iter().map(|&texel| lightness(texel) * f32::from(texel[3]) / 255.0).collect()
+            }
         };
         grid(size, values, texels)
     }
@@ -241,12 +243,6 @@ fn bilinear(layer: &Grid<f32>, uv: Vec2) -> f32 {
         mix(value(low.x, high.y), value(high.x, high.y), share.x),
     );
     mix(top, bottom, share.y)
-}
-
-/// Lightness of a texel as stored, 0..=1.
-pub(super) fn lightness(texel: &[u8]) -> f32 {
-    let [r, g, b, ..] = texel else { return 0.0 };
-    f32::from(u16::from(*r) + 2 * u16::from(*g) + u16::from(*b)) / (4.0 * 255.0)
 }
 
 fn bytes_per_texel(size: UVec2, texels: &[u8]) -> Result<usize, MaskError> {

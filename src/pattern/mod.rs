@@ -26,6 +26,7 @@ mod timeline;
 pub(crate) use cells::Closing;
 pub use cells::{CORNERS, Cell, CellTracker};
 pub use frame::{FrameError, MAX_ASPECT, MAX_SIDE, SurfaceFrame};
+pub(crate) use lines::lightness;
 pub use mask::{CrackMask, MaskError};
 pub use network::{Link, LinkKind, NO_IMPACT, NO_PARENT, Network, Node, SegmentId};
 pub use path::{MAX_PATH_POINTS, PathPoint, SegmentPath};

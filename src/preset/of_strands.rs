@@ -53,7 +53,6 @@ impl CrackPreset {
                     child_frequency: 8.0,
                     rotation: 0.16,
                     inertia: 0.8,
-                    children: 2,
                     length: 0.4,
                     branch_cost: 0.1,
                     child_length: 0.4,

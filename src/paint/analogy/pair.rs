@@ -1,7 +1,10 @@
 //! [`AnalogyPair`]: a photograph of a cracked material and the guide that tells where its cracks are.
 
 use super::{error::AnalogyError, flatten::flatten};
-use crate::{Grid, pattern::CrackMask};
+use crate::{
+    Grid,
+    pattern::{self, CrackMask},
+};
 use glam::UVec2;
 
 /// Shortest side of a photograph, texels.
@@ -89,8 +92,7 @@ impl AnalogyPair {
         if !(0.0..=1.0).contains(&lightness) {
             return Err(AnalogyError::OutOfRange { name: "lightness", value: lightness, min: 0.0, max: 1.0 });
         }
-        let light = |[r, g, b, _]: &[u8; 4]| f32::from(u16::from(*r) + 2 * u16::from(*g) + u16::from(*b)) / 1020.0;
-        let is_crack = |texel| if light(texel) < lightness { 1.0 } else { 0.0 };
+        let is_crack = |&texel: &[u8; 4]| if pattern::lightness(texel) < lightness { 1.0 } else { 0.0 };
         let cracks = rgba.as_chunks::<4>().0.iter().map(is_crack).collect();
         let misfit = AnalogyError::PictureSize { width: size.x, height: size.y, bytes: rgba.len() };
         Self::new(size, rgba, Grid::from_vec(size, cracks).ok_or(misfit)?)
