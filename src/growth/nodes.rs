@@ -69,6 +69,46 @@ impl NodeGrid {
         }
     }
 
+    /// Marks the cell of `pos`; `marked` has one entry per cell, or none.
+    pub(super) fn mark_cell(&self, pos: Vec2, marked: &mut Vec<bool>) {
+        marked.resize(self.head.len(), false);
+        let cell = self.cell_at(pos);
+        marked[(cell.y * self.cells.x + cell.x) as usize] = true;
+    }
+
+    /// The nodes within `radius` of places in marked cells, and others near them, by index; and the share of the cells that they lie in.
+    /// `None` if that is more than `most`.
+    pub(super) fn near_cells(&self, mut marked: Vec<bool>, radius: f32, most: f32) -> Option<(Vec<u32>, f32)> {
+        marked.resize(self.head.len(), false);
+        // A little more, for rounding.
+        let (width, reach) = (self.cells.x as usize, (radius * self.per_unit + 0.01).ceil().as_uvec2());
+        let mut line = Vec::new();
+        for row in marked.chunks_exact_mut(width) {
+            line.clear();
+            line.extend_from_slice(row);
+            widen(&line, reach.x as usize, |x| row[x] = true);
+        }
+        for x in 0..width {
+            line.clear();
+            line.extend(marked.iter().skip(x).step_by(width));
+            widen(&line, reach.y as usize, |y| marked[y * width + x] = true);
+        }
+        let share = marked.iter().filter(|is_marked| **is_marked).count() as f32 / marked.len() as f32;
+        if share > most {
+            return None;
+        }
+        let mut nodes = Vec::new();
+        for (&head, _) in self.head.iter().zip(marked).filter(|(_, is_marked)| *is_marked) {
+            let mut node = head;
+            while node != NONE {
+                nodes.push(node);
+                node = self.next[node as usize];
+            }
+        }
+        nodes.sort_unstable();
+        Some((nodes, share))
+    }
+
     /// Whether the predicate holds for a node within `radius` of `pos`, given its index and squared distance.
     pub(super) fn any(&self, pos: Vec2, radius: f32, mut is_so: impl FnMut(u32, f32) -> bool) -> bool {
         let (low, high) = (self.cell_at(pos - radius), self.cell_at(pos + radius));
@@ -90,5 +130,50 @@ impl NodeGrid {
     /// Whether a node lies within `distance` of `pos`.
     pub(super) fn any_within(&self, pos: Vec2, distance: f32) -> bool {
         self.any(pos, distance, |_, _| true)
+    }
+}
+
+/// Calls `mark` with each place of a line that is not marked, but less than `reach` + 1 from one that is.
+fn widen(line: &[bool], reach: usize, mut mark: impl FnMut(usize)) {
+    let mut end = 0;
+    for at in (0..line.len()).filter(|at| line[*at]) {
+        let until = line.len().min(at + reach + 1);
+        (end.max(at.saturating_sub(reach))..until).filter(|near| !line[*near]).for_each(&mut mark);
+        end = until;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Rng;
+
+    /// The nodes near marked cells are all those within the radius of a place there, in order, each once; where they are everywhere, there are none.
+    #[test]
+    fn nodes_near_cells_are_all_that_are_near_places() {
+        let mut rng = Rng::new(12);
+        let (mut picked, mut refused) = (0, 0);
+        for round in 0..300 {
+            let extent = Vec2::new(rng.range(0.2, 3.0), rng.range(0.2, 3.0));
+            let mut draw = |extent: Vec2| Vec2::new(rng.unit(), rng.unit()) * extent;
+            let at: Vec<Vec2> = (0..400).map(|_| draw(extent)).collect();
+            let corner = draw(0.8 * extent);
+            let places: Vec<Vec2> = (0..12).map(|_| corner + draw(0.2 * extent)).collect();
+            let mut grid = NodeGrid::new(extent, rng.range(0.005, 0.4));
+            at.iter().for_each(|pos| grid.push(*pos));
+            let (radius, mut marked) = (rng.range(0.001, 0.3), Vec::new());
+            places.iter().for_each(|pos| grid.mark_cell(*pos, &mut marked));
+            let Some((near, share)) = grid.near_cells(marked, radius, 0.5) else {
+                refused += 1;
+                continue;
+            };
+            picked += 1;
+            assert!(share > 0.0 && share <= 0.5 && near.is_sorted_by(|a, b| a < b), "round {round}");
+            for (node, pos) in (0..).zip(&at) {
+                let is_near = places.iter().any(|place| place.distance(*pos) <= radius);
+                assert!(!is_near || near.binary_search(&node).is_ok(), "round {round}: node {node} is left out");
+            }
+        }
+        assert!(picked > 60 && refused > 20, "{picked} {refused}");
     }
 }

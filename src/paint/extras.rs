@@ -68,7 +68,7 @@ impl<'a, const ROOM: usize> Extras<'a, ROOM> {
             color: settings.map_or([0.0; 3], |all| all.color.map(|channel| 255.0 * channel * (1.0 - all.tint))),
             tint: settings.map_or(0.0, |all| all.tint),
             shades: settings.is_some_and(|all| all.broken),
-            bare: settings.map_or(0.0, |all| if all.broken { all.bare } else { 0.0 }),
+            bare: settings.map_or(0.0, |all| if all.broken || all.rim > 0.0 { all.bare } else { 0.0 }),
             // With ledges, the cracks go on over the upper ones.
             hides: settings.map_or(0.0, |all| if all.terraces > 2 { HIDDEN_BELOW_LEDGES } else { HIDDEN }.recip()),
             has_walls: settings.is_some_and(|all| !all.broken && all.hole > 0.0 && all.edge > 0.0),

@@ -76,12 +76,12 @@ mod tests {
         growth::CrackGrowth,
         math::Rng,
         paint::{BaseTexels, LookTable, PaintTargets, paint_into},
-        pattern::SurfaceFrame,
+        pattern::{Moment, SurfaceFrame},
         raster::{DepthField, Profile, TexelRect, stamp_path},
     };
     use glam::UVec2;
 
-    /// The diffuse texels of a cracked picture of this preset, in rectangles of some size, and the picture.
+    /// The diffuse texels of a picture of this preset after a hit, with all that it crushes, in rectangles of some size, and the picture.
     fn cracked(preset: &CrackPreset, shades: Shades, part: u32) -> (Vec<Rgba>, Vec<Rgba>) {
         let size = UVec2::splat(96);
         let mut field = DepthField::new(SurfaceFrame::new(size).unwrap());
@@ -95,6 +95,9 @@ mod tests {
         for segment in growth.network().segments() {
             stamp_path(&mut field, &profile, &growth.network().path(segment).unwrap());
         }
+        field.set_layers(preset.look.layer(5));
+        let moment = Moment::after(growth.timeline().end());
+        field.show_layers(growth.network(), growth.timeline(), moment, &mut Vec::new());
         let mut rng = Rng::new(3);
         let picture = (0..size.element_product()).flat_map(|_| {
             let tone = 90 + (rng.next_u32() % 60) as u8;
@@ -130,7 +133,7 @@ mod tests {
                         let share = k.max(0.5) / f32::from(steps);
                         (0..3).all(|c| (f32::from(base[c]) * share).round().min(255.0) as u8 == painted[c])
                     };
-                    assert!((0..=3 * u32::from(steps)).any(|k| is_shade(k as f32)), "{name}: {base:?} {painted:?}");
+                    assert!((0..=6 * u32::from(steps)).any(|k| is_shade(k as f32)), "{name}: {base:?} {painted:?}");
                     n_changed += u32::from(painted != base);
                 }
                 assert!(n_changed > 20 || steps == 1, "{name}: {n_changed} texels of {steps} steps");

@@ -325,6 +325,7 @@ mod tests {
             assert_eq!(crushed(CrushedZone { bare: bad, ..CrushedZone::DEFAULT }), Some("crushed.bare"));
             assert_eq!(crushed(CrushedZone { jag: bad, ..CrushedZone::DEFAULT }), Some("crushed.jag"));
             assert_eq!(crushed(CrushedZone { stones: bad, ..CrushedZone::DEFAULT }), Some("crushed.stones"));
+            assert_eq!(crushed(CrushedZone { rim: bad, ..CrushedZone::DEFAULT }), Some("crushed.rim"));
             assert_eq!(crushed(CrushedZone { tint: bad, ..CrushedZone::DEFAULT }), Some("crushed.tint"));
             assert_eq!(crushed(CrushedZone { basin: bad, ..CrushedZone::DEFAULT }), Some("crushed.basin"));
             assert_eq!(crushed(CrushedZone { fall: bad, ..CrushedZone::DEFAULT }), Some("crushed.fall"));

@@ -39,7 +39,7 @@ impl CrackPreset {
         follows_lines: false,
     };
 
-    /// Marble: fine, sharp cracks with many kinks, that divide like lightning. They are [strands](crate::strands).
+    /// Marble: fine, sharp cracks with small kinks, that run out straight and divide a few times. They are [strands](crate::strands).
     pub const MARBLE: Self = Self {
         growth: GrowthParams {
             step_length: 0.006,
@@ -49,13 +49,16 @@ impl CrackPreset {
             markers: MarkerLayout::Strands {
                 count: 5,
                 strands: StrandParams {
-                    frequency: 5.0,
-                    child_frequency: 8.0,
-                    rotation: 0.16,
-                    inertia: 0.8,
-                    length: 0.4,
-                    branch_cost: 0.1,
-                    child_length: 0.4,
+                    frequency: 4.0,
+                    child_frequency: 4.0,
+                    rotation: 0.14,
+                    inertia: 0.85,
+                    length: 0.42,
+                    depth: 2,
+                    children: 1,
+                    branch_cost: 0.12,
+                    child_length: 0.5,
+                    spread: 0.03,
                     ..StrandParams::MARBLE
                 },
             },
@@ -77,7 +80,7 @@ impl CrackPreset {
         follows_lines: false,
     };
 
-    /// Sand: furrows with slumped sides that hardly turn. They are [strands](crate::strands).
+    /// Sand: a bowl with a raised rim at the hit, and cracks in the crust around it that hardly turn. They are [strands](crate::strands).
     pub const SAND: Self = Self {
         growth: GrowthParams {
             step_length: 0.02,
@@ -85,9 +88,9 @@ impl CrackPreset {
             crack_radius: 0.05,
             num_iterations: 2000,
             markers: MarkerLayout::Strands {
-                count: 6,
+                count: 5,
                 strands: StrandParams {
-                    length: 0.34,
+                    length: 0.16,
                     branch_cost: 0.12,
                     child_length: 0.5,
                     repulsion: 0.04,
@@ -95,10 +98,10 @@ impl CrackPreset {
                 },
             },
             reach: 0.34,
-            line_width: 0.003,
-            line_growth: 0.75,
+            line_width: 0.0022,
+            line_growth: 0.6,
             murray: 2.0,
-            max_width: 0.03,
+            max_width: 0.012,
             tip_taper: 10.0,
             unevenness: 0.2,
             roughness: 0.02,

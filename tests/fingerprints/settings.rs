@@ -126,6 +126,7 @@ fn zones(print: &mut Print, rng: &mut Rng) -> Made<()> {
         }
         _ => {
             zone.flake = maybe(rng, 1.5, 4.0);
+            zone.rim = maybe(rng, 0.1, 1.0);
             zone.bubbles = if coin(rng) { whole(rng, 4, 16) } else { 0 };
         }
     }

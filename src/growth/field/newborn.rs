@@ -24,6 +24,21 @@ pub(super) struct Settling {
     pub(super) homes: Vec<u32>,
     /// The next free index of each cell.
     pub(super) next: Vec<u32>,
+    /// Which cells of nodes have a marker, if it is worth knowing.
+    pub(super) marked: Vec<bool>,
+    /// The nodes that visit their markers, if they are picked.
+    pub(super) picked: Option<Picked>,
+}
+
+/// The nodes that visit their markers: others would find none.
+#[derive(Clone, Debug)]
+pub(super) struct Picked {
+    /// By index.
+    pub(super) nodes: Vec<u32>,
+    /// The node from which on all visit: those that have come since.
+    pub(super) end: u32,
+    /// Share of the field that they lie in.
+    pub(super) share: f32,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -42,6 +57,18 @@ pub(super) enum Phase {
 }
 
 impl Settling {
+    /// Number of nodes that visit their markers, of so many.
+    pub(super) fn visits(&self, nodes: usize) -> usize {
+        self.picked.as_ref().map_or(nodes, |picked| picked.nodes.len() + nodes - picked.end as usize)
+    }
+
+    /// The node that is the `k`th to visit its markers.
+    pub(super) fn visitor(&self, k: usize) -> u32 {
+        self.picked.as_ref().map_or(k as u32, |Picked { nodes, end, .. }| {
+            nodes.get(k).copied().unwrap_or_else(|| end + (k - nodes.len()) as u32)
+        })
+    }
+
     /// Number of markers that are only stored here.
     pub(super) fn in_hand(&self) -> usize {
         if self.phase == Phase::Count { self.all.len() } else { 0 }

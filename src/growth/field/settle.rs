@@ -2,7 +2,7 @@
 
 use super::{
     ANY_IMPACT, DEAD, LANES, MarkerField, NO_NODE, get_ready,
-    newborn::{Newborn, Phase, Settling},
+    newborn::{Newborn, Phase, Picked, Settling},
 };
 use crate::{
     growth::{cursor::Cursor, nodes::NodeGrid},
@@ -14,6 +14,10 @@ use glam::UVec2;
 /// much as moving one.
 const VISIT: u32 = 8;
 const LOOKS: f32 = 8.0;
+
+/// With fewer nodes, or more than this share of the field near markers, it is not worth picking those that visit.
+const FEWEST: usize = 512;
+const MOST_NEAR: f32 = 0.25;
 
 impl MarkerField {
     /// Settles the new markers: removes the dead, sorts all into cells, and lets every node take those to which it is
@@ -50,17 +54,22 @@ impl MarkerField {
 
     /// Works on a phase up to the limit of the slice. Returns whether it is complete.
     fn pass(&mut self, settling: &mut Settling, cursor: &mut Cursor, nodes: &[Node], grid: &NodeGrid) -> bool {
-        let Settling { all, homes, next, .. } = settling;
         let count = match settling.phase {
             Phase::Gather => self.x.len(),
-            Phase::Count | Phase::Place => all.len(),
+            Phase::Count | Phase::Place => settling.all.len(),
             Phase::Recall => self.relations.as_ref().map_or(0, |_| self.x.len() - LANES),
-            Phase::Visit => nodes.len(),
+            Phase::Visit => settling.visits(nodes.len()),
         } as u64;
-        let cost = if settling.phase == Phase::Visit { self.visit_cost() } else { 1 };
+        let share = settling.picked.as_ref().map_or(1.0, |picked| picked.share);
+        let cost = if settling.phase == Phase::Visit { self.visit_cost(share) } else { 1 };
         let slice = cursor.slice(count, cost);
         let slice = slice.start as usize..slice.end as usize;
         let is_over = cursor.is_at(count);
+        if settling.phase == Phase::Visit {
+            slice.for_each(|k| self.visit(settling.visitor(k), nodes, grid));
+            return is_over;
+        }
+        let Settling { all, homes, next, marked, picked, .. } = settling;
         match settling.phase {
             Phase::Gather => {
                 all.extend(slice.filter(|&i| self.near_sq[i] > DEAD).map(|i| self.marker_at(i)));
@@ -99,6 +108,13 @@ impl MarkerField {
                     (self.x[i], self.y[i], self.id[i], self.owner[i]) = (pos.x, pos.y, id, owner);
                     self.given_up[i] = given_up;
                     self.near_sq[i] = self.near_sq[i].min(near_sq);
+                    if nodes.len() >= FEWEST {
+                        grid.mark_cell(pos, marked);
+                    }
+                }
+                if is_over && nodes.len() >= FEWEST {
+                    let near = grid.near_cells(std::mem::take(marked), self.radius, MOST_NEAR);
+                    *picked = near.map(|(near, share)| Picked { nodes: near, end: nodes.len() as u32, share });
                 }
             }
             Phase::Recall => {
@@ -110,16 +126,17 @@ impl MarkerField {
                     }
                 }
             }
-            Phase::Visit => slice.for_each(|index| self.visit(index as u32, nodes, grid)),
+            Phase::Visit => {}
         }
         is_over
     }
 
-    /// Average cost of a node that visits the markers around it: many hits put their markers on top of each other.
-    fn visit_cost(&self) -> u32 {
+    /// Average cost of a node that visits the markers around it, which lie in this share of the field: many hits put their markers on top of
+    /// each other.
+    fn visit_cost(&self, share_of_field: f32) -> u32 {
         let around = (2.0 * self.radius * self.per_unit + 1.0).min(self.cells.as_vec2());
-        let share = around.element_product() / self.cells.as_vec2().element_product();
-        VISIT + (share * self.x.len() as f32 / LOOKS) as u32
+        let share = around.element_product() / (share_of_field * self.cells.as_vec2().element_product());
+        VISIT + (share.min(1.0) * self.x.len() as f32 / LOOKS) as u32
     }
 
     /// Chooses cells of half the radius, with a few markers each.

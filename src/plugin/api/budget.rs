@@ -37,7 +37,8 @@ use core::time::Duration;
 pub struct CrackBudget {
     /// Time for hits, growth and painting in one frame, milliseconds, however many threads grow and paint; default 2. Up to a quarter of it
     /// counts as spent on what runs between them. What is left over waits for the next frame; at least one hit, one step and one surface
-    /// are done in each, of a hit that makes many markers a part of them. Where more cracks grow than there is time for, all of them grow more slowly. NaN and values below zero count
+    /// are done in each. Of a hit that makes many markers this may be a part of them. Of a surface it may be a part of what is to be painted: it
+    /// grows on when the next frames have painted the rest. Where more cracks grow than there is time for, all of them grow more slowly. NaN and values below zero count
     /// as 0.
     ///
     /// With a second or more nothing that a frame shows is put off: for recordings, whose frames may take any time.

@@ -91,6 +91,7 @@ impl AsyncWork {
         let hair = active.hair();
         let Active { cracks, drawing, canvas, playhead, .. } = &mut *active;
         let Some(view) = canvas.views.get_mut(canvas.view) else { return };
+        view.join_rest();
         let (growth, field, profile) = (&cracks.growth, &mut drawing.field, drawing.profile);
         let timeline = self
             .timeline
@@ -357,8 +358,7 @@ pub(crate) fn play_async(
                     queues.mark_blending(entity, &mut active.turn);
                 }
             }
-            let is_stale = active.canvas.views.get(active.canvas.view).is_some_and(|view| !view.dirty.is_empty());
-            let is_stale = is_stale || shows_stale(active);
+            let is_stale = active.is_to_paint() || shows_stale(active);
             let is_wanted = active.is_behind() || is_stale;
             // Frames show cracks that were not baked, unless all of them are to be made again.
             work.is_asked &= is_wanted;

@@ -66,7 +66,8 @@ pub(crate) fn grow_surfaces(
                 // Every frame makes one step, whatever waits.
                 let is_first = (i, k) == (0, 0);
                 if is_first || !timer.is_over() {
-                    job.has_grown = Some((is_first || !job.active.turn.is_late) && job.active.step_if_due());
+                    let is_free = !job.active.is_partly_painted() && (is_first || !job.active.turn.is_late);
+                    job.has_grown = Some(is_free && job.active.step_if_due());
                 }
             }
         });
@@ -87,6 +88,7 @@ pub(crate) fn grow_surfaces(
                 idle.push(entity);
             }
             let is_news = has_grown || active.is_behind() || (!active.turn.is_growing && active.turn.is_open);
+            active.turn.has_news |= is_news;
             if is_news && !active.turn.is_dirty {
                 active.turn.is_dirty = true;
                 dirty.push_back(entity);

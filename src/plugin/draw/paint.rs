@@ -9,11 +9,11 @@ use crate::plugin::gpu::textures;
 use crate::plugin::gpu::uploads::Uploads;
 use crate::plugin::jobs::frame_time::{FrameClock, Timer, par_for_each};
 use crate::plugin::surface::active::Active;
-use crate::plugin::surface::canvas::Canvas;
+use crate::plugin::surface::canvas::{Canvas, View};
 use crate::plugin::surface::cracked::{CrackedSurfaces, batch};
 use crate::plugin::surface::queues::Queues;
 use crate::plugin::surface::stamp::{Scratch, stamp};
-use crate::raster::TexelRect;
+use crate::raster::{DirtyTiles, TexelRect};
 use bevy::{ecs::system::NonSendMarker, platform::time::Instant, prelude::*};
 use std::{
     sync::atomic::{AtomicU64, Ordering},
@@ -29,6 +29,9 @@ const SHARE: usize = 4;
 /// Tiles of what hits have crushed that a surface draws in a frame at the most, however much time there is.
 const CRUSHED: usize = 8;
 
+/// Texels that are painted without a look at the time, at least: so many in each frame.
+const SLICE: u32 = 16_384;
+
 /// A surface that is being painted.
 struct PaintJob<'a> {
     entity: Entity,
@@ -36,10 +39,24 @@ struct PaintJob<'a> {
     texels: Texels,
     /// What was shown before, if it has a playback.
     before: Option<Moment>,
-    is_painted: bool,
+    painted: Painted,
 }
 
-/// Paints what has changed, some surfaces at once, at least one, until the budget is spent.
+/// How far the painting of a surface has come in a frame.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Painted {
+    /// Its turn has not come.
+    Nothing,
+    /// There was no time for all of it.
+    Partly,
+    /// All of what has grown since.
+    Wholly,
+    /// The rest of what earlier frames had no time for, but not what has come since.
+    Earlier,
+}
+
+/// Paints what has changed, some surfaces at once, at least a part of one, until the budget is spent. What is left of a surface is painted in
+/// the next frames, before anything else of it changes.
 ///
 /// A surface has its cracks, base and textures to itself, so that it does not matter which thread paints it.
 pub(crate) fn paint_surfaces(
@@ -83,10 +100,15 @@ pub(crate) fn paint_surfaces(
                 }
             });
         });
-        for PaintJob { entity, active, texels, before, is_painted } in jobs {
+        for PaintJob { entity, active, texels, before, painted } in jobs {
             texels.put_back(&active.canvas.textures, &mut images);
-            if !is_painted {
+            if matches!(painted, Painted::Nothing | Painted::Partly) {
                 left.push(entity);
+                continue;
+            }
+            if painted == Painted::Earlier && (active.turn.has_news || active.drawing.field.is_behind()) {
+                active.turn.is_late = false;
+                behind.push(entity);
                 continue;
             }
             report_painted(active, entity, before, &mut states, &mut commands);
@@ -118,15 +140,30 @@ impl<'a> PaintJob<'a> {
     fn new(entity: Entity, active: &'a mut Active, images: &mut Assets<Image>) -> Self {
         let before = active.playhead.playback.as_ref().map(|playback| playback.shown);
         let texels = Texels::take(&active.canvas.textures, images);
-        Self { entity, active, texels, before, is_painted: false }
+        Self { entity, active, texels, before, painted: Painted::Nothing }
     }
 
     fn paint(&mut self, scratch: &mut Scratch, packer: &mut Packer, most_crushed: usize, timer: &Timer) {
-        stamp(self.active, scratch);
-        crush(self.active, scratch, most_crushed, timer);
-        self.texels.paint(self.active, packer, &mut scratch.rects);
-        self.active.cracks.cells.update(self.active.cracks.growth.network());
-        self.is_painted = true;
+        // Without a limit nothing is put off.
+        let may_wait = most_crushed < usize::MAX && self.active.may_be_partly_painted();
+        let goes_on = may_wait && self.active.is_partly_painted();
+        if !goes_on {
+            self.active.turn.has_news = false;
+            stamp(self.active, scratch);
+            crush(self.active, scratch, most_crushed, timer);
+            self.active.cracks.cells.update(self.active.cracks.growth.network());
+        }
+        self.painted = Painted::Wholly;
+        let Some(view) = self.active.canvas.views.get_mut(self.active.canvas.view) else { return };
+        if !may_wait {
+            view.join_rest();
+        }
+        self.texels.paint(self.active, packer, &mut scratch.rects, || may_wait && timer.is_over());
+        if self.active.is_partly_painted() {
+            self.painted = Painted::Partly;
+        } else if goes_on {
+            self.painted = Painted::Earlier;
+        }
     }
 }
 
@@ -143,8 +180,11 @@ fn crush(active: &mut Active, scratch: &mut Scratch, most: usize, timer: &Timer)
 pub(crate) fn paint_now(world: &mut World, active: &mut Active) {
     world.resource_scope(|world, mut images: Mut<Assets<Image>>| {
         let mut texels = Texels::take(&active.canvas.textures, &mut images);
+        active.canvas.views.get_mut(active.canvas.view).map(View::join_rest);
         world.resource_mut::<Uploads>().pack(1, |packers| {
-            packers.iter_mut().for_each(|packer| texels.paint(active, packer, &mut Vec::new()));
+            for packer in packers {
+                texels.paint(active, packer, &mut Vec::new(), || false);
+            }
         });
         texels.put_back(&active.canvas.textures, &mut images);
     });
@@ -167,22 +207,61 @@ impl Texels {
         }
     }
 
-    /// Paints the dirty texels of the view that is shown and asks for their upload.
-    fn paint(&mut self, active: &mut Active, packer: &mut Packer, rects: &mut Vec<TexelRect>) {
+    /// Paints the dirty texels of the view that is shown and asks for their upload, those first that are left over. What there is no time for is
+    /// left over again.
+    fn paint(
+        &mut self,
+        active: &mut Active,
+        packer: &mut Packer,
+        rects: &mut Vec<TexelRect>,
+        is_over: impl Fn() -> bool,
+    ) {
         let size = active.canvas.base.size;
         let Some(view) = active.canvas.views.get_mut(active.canvas.view) else { return };
-        view.dirty.take_rects(rects);
-        if rects.is_empty() {
-            return;
+        if view.rest.is_empty() {
+            view.dirty.take_rects(rects);
+        } else {
+            view.rest.take_rects(rects);
         }
         let origin = view.rect.min;
         let shown = TexelRect::whole(view.rect.size());
         rects.iter_mut().for_each(|rect| *rect = rect.intersect(shown));
         rects.retain(|rect| !rect.is_empty());
+        // Taken from the end.
+        rects.reverse();
+        let (mut slice, mut texels) = (Vec::new(), 0);
+        while let Some(rect) = rects.pop() {
+            let (now, later) = split(rect, SLICE - texels);
+            rects.extend(later);
+            slice.push(now);
+            texels += now.size().element_product();
+            if texels < SLICE && !rects.is_empty() {
+                continue;
+            }
+            self.paint_rects(active, packer, &slice, (size, origin));
+            slice.clear();
+            texels = 0;
+            if is_over() {
+                break;
+            }
+        }
+        if let Some(view) = active.canvas.views.get_mut(active.canvas.view) {
+            rects.drain(..).for_each(|rect| view.rest.mark(rect));
+        }
+    }
+
+    /// Paints some rectangles of the field, whose top left is at `origin` of an image of `size`.
+    fn paint_rects(
+        &mut self,
+        active: &Active,
+        packer: &mut Packer,
+        rects: &[TexelRect],
+        (size, origin): (UVec2, UVec2),
+    ) {
         let texels = self.0.each_mut().map(Option::as_deref_mut);
         let Canvas { base, analogy, look, .. } = &active.canvas;
         textures::paint(base, analogy.as_deref(), &active.drawing.field, look, rects, origin, texels);
-        for rect in rects.drain(..) {
+        for &rect in rects {
             if let (Some(holes), [Some(diffuse), ..]) = (&active.drawing.cutouts, &mut self.0) {
                 holes.cut_out(diffuse, size, origin, rect);
             }
@@ -192,5 +271,93 @@ impl Texels {
             let pictures = pictures.map(|((texture, data), kind)| Some((texture?.id(), data?, kind.texel())));
             packer.push(pictures, size, rect);
         }
+    }
+}
+
+/// The first rows of a rectangle with at least so many texels, or all of them, and the rest.
+fn split(rect: TexelRect, texels: u32) -> (TexelRect, Option<TexelRect>) {
+    let rows = texels.div_ceil(rect.size().x.max(1)).next_multiple_of(DirtyTiles::TILE);
+    let line = rect.min.y.saturating_add(rows);
+    if line >= rect.max.y {
+        return (rect, None);
+    }
+    let max = UVec2::new(rect.max.x, line);
+    (TexelRect { max, ..rect }, Some(TexelRect { min: UVec2::new(rect.min.x, line), ..rect }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::CrackPreset;
+    use crate::plugin::headless::{app, blank, shown};
+    use crate::plugin::prelude::*;
+    use crate::plugin::surface::cracked::active;
+    use bevy::time::TimeUpdateStrategy;
+
+    /// Texels that are still to be painted.
+    fn unpainted(app: &App, entity: Entity) -> u64 {
+        let mut rects = Vec::new();
+        for view in active(app.world(), entity).iter().flat_map(|active| &active.canvas.views) {
+            view.dirty.clone().take_rects(&mut rects);
+            view.rest.clone().take_rects(&mut rects);
+        }
+        rects.iter().map(TexelRect::area).sum()
+    }
+
+    /// Rectangles are split into rows of whole tiles, and nothing is lost.
+    #[test]
+    fn rectangles_are_split_without_rest() {
+        for (size, texels) in [([1, 1], 1), ([8, 8], 8192), ([512, 512], 8192), ([9000, 70], 8192), ([3, 5000], 100)] {
+            let whole = TexelRect { min: UVec2::new(16, 24), max: UVec2::from(size) + UVec2::new(16, 24) };
+            let (mut rest, mut parts) = (Some(whole), Vec::new());
+            while let Some(rect) = rest {
+                let (part, later) = split(rect, texels);
+                assert!(later.is_none_or(|later| later.min.y == part.max.y && later.max == whole.max));
+                let is_enough = later.is_none() || part.area() >= u64::from(texels);
+                assert!(is_enough && part.area() <= u64::from(texels + 8 * part.size().x), "{part:?}");
+                parts.push(part);
+                rest = later;
+            }
+            assert_eq!(parts.iter().map(TexelRect::area).sum::<u64>(), whole.area(), "{size:?}");
+        }
+    }
+
+    /// With no time at all a large surface is painted in parts, over some frames, in which it does not grow. What it shows in the end is what frames
+    /// without a limit show.
+    #[test]
+    fn large_surfaces_are_painted_in_parts() {
+        let play = |milliseconds: f32| {
+            let mut app = app(CrackBudget { milliseconds, ..default() });
+            app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(50)));
+            let image = app.world_mut().resource_mut::<Assets<Image>>().add(blank(UVec2::splat(600)));
+            let surface = CrackSurface::new(CrackPreset::CLAY).with_seed(4);
+            let entity = app.world_mut().spawn((Sprite::from_image(image), surface)).id();
+            app.world_mut().trigger(CrackHit::uv(entity, Vec2::splat(0.4)).with_energy(2.0));
+            let mut parts = 0;
+            for frame in 0.. {
+                let before = active(app.world(), entity).map(|active| {
+                    (active.is_partly_painted(), active.cracks.growth.steps_made(), unpainted(&app, entity))
+                });
+                app.update();
+                if let (Some((true, steps, texels)), Some(now)) = (before, active(app.world(), entity)) {
+                    parts += 1;
+                    assert_eq!(now.cracks.growth.steps_made(), steps, "it grows in frame {frame}");
+                    assert!(unpainted(&app, entity) < texels, "nothing was painted in frame {frame}");
+                }
+                let state = app.world().get::<CrackState>(entity);
+                if state.is_some_and(|state| state.status == CrackStatus::Done) {
+                    break;
+                }
+                assert!(frame < 20_000, "it never ends");
+            }
+            (0..4).for_each(|_| app.update());
+            assert_eq!(unpainted(&app, entity), 0);
+            (parts, shown(&app, entity))
+        };
+        let (parts, at_once) = play(1e6);
+        assert_eq!(parts, 0);
+        let (parts, in_parts) = play(0.0);
+        assert!(parts > 20, "only {parts} frames had a part to paint");
+        assert!(at_once == in_parts);
     }
 }

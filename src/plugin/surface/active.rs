@@ -62,6 +62,8 @@ pub(crate) struct Turn {
     pub(crate) is_held: bool,
     /// Whether a frame had no time to paint it: its growth waits for that.
     pub(crate) is_late: bool,
+    /// Whether something has changed since it was put into that queue, other than by being stamped.
+    pub(crate) has_news: bool,
     /// Whether its end has not been reported yet.
     pub(crate) is_open: bool,
     /// Whether it is in the queue of those whose normals are to be blended.
@@ -144,6 +146,25 @@ impl Active {
     /// Marks texels of the field as changed, in all views.
     pub(crate) fn mark(&mut self, rect: TexelRect) {
         self.canvas.mark(rect, self.drawing.field.frame.size());
+    }
+
+    /// Whether there are texels to paint where it is seen.
+    pub(crate) fn is_to_paint(&self) -> bool {
+        let view = self.canvas.views.get(self.canvas.view);
+        view.is_some_and(|view| !(view.dirty.is_empty() && view.rest.is_empty()))
+    }
+
+    /// Whether frames had no time to paint all of what has grown: it does not grow until they have.
+    pub(crate) fn is_partly_painted(&self) -> bool {
+        self.canvas.views.get(self.canvas.view).is_some_and(|view| !view.rest.is_empty())
+    }
+
+    /// Whether the next frames may paint what this one has no time for: cracks that grow. Whatever else changes is shown at once.
+    pub(crate) fn may_be_partly_painted(&self) -> bool {
+        let Turn { is_held, is_to_shatter, .. } = self.turn;
+        let has_other_changes = self.canvas.views.get(self.canvas.view).is_none_or(|view| !view.dirty.is_empty());
+        let is_plain = self.playhead.playback.is_none() && self.canvas.analogy.is_none() && !self.drawing.is_stale;
+        is_plain && self.cracks.growth.is_growing() && !is_held && !is_to_shatter && !has_other_changes
     }
 
     /// Marks the whole field as changed, in all views.

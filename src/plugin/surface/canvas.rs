@@ -44,6 +44,17 @@ pub(crate) struct View {
     pub(crate) rect: TexelRect,
     /// What is stamped into the field but not painted here yet, in texels of the field.
     pub(crate) dirty: DirtyTiles,
+    /// The same of what has grown, which frames had no time to paint. Nothing else is stamped until they have.
+    pub(crate) rest: DirtyTiles,
+}
+
+impl View {
+    /// Paints what is left over together with what has changed since.
+    pub(crate) fn join_rest(&mut self) {
+        let mut rects = Vec::new();
+        self.rest.take_rects(&mut rects);
+        rects.into_iter().for_each(|rect| self.dirty.mark(rect));
+    }
 }
 
 impl Canvas {
@@ -80,7 +91,7 @@ impl Canvas {
             if self.views.len() >= MAX_VIEWS {
                 self.views.remove(0);
             }
-            self.views.push(View { rect, dirty });
+            self.views.push(View { rect, dirty, rest: DirtyTiles::new(size) });
             self.revision += 1;
             self.views.len() - 1
         });

@@ -48,6 +48,7 @@ impl Queues {
 
     /// Has a surface painted.
     pub(crate) fn mark_dirty(&mut self, entity: Entity, turn: &mut Turn) {
+        turn.has_news = true;
         if !core::mem::replace(&mut turn.is_dirty, true) {
             self.dirty.push_back(entity);
         }

@@ -36,8 +36,8 @@ pub struct CrushedZone {
     /// Distance to which dust and crumbs extend, radii. 1..=8; default 2.5.
     pub reach: f32,
     /// Whether the zone is broken along straight chords into plates, with angular chips that cast shadows. Else its
-    /// outline and floor look crushed to powder. If `true`, [`soft`](Self::soft), [`hole`](Self::hole) and
-    /// [`flake`](Self::flake) have no effect. Default false.
+    /// outline and floor look crushed to powder. If `true`, [`soft`](Self::soft), [`hole`](Self::hole),
+    /// [`flake`](Self::flake) and [`rim`](Self::rim) have no effect. Default false.
     pub broken: bool,
     /// Radius of the deeper hollow in the middle of a [`broken`](Self::broken) zone, as a share of the radius; it has
     /// more than half of the depth. 0..=1; default 0 = a flat floor.
@@ -77,8 +77,8 @@ pub struct CrushedZone {
     /// Width of the broken edge around the hole, as a share of the hole. The hole has straight sides then and is less
     /// dark towards the edge. 0..=4; default 0 = none.
     pub edge: f32,
-    /// How much cracks are hidden on the floor of a [`broken`](Self::broken) zone: the material that they ran through
-    /// is gone. 0..=1; default 0.
+    /// How much cracks are hidden on the floor of a [`broken`](Self::broken) zone, or of one with a [`rim`](Self::rim): the material that they ran
+    /// through is gone. 0..=1; default 0.
     pub bare: f32,
     /// How far the edge of a [`broken`](Self::broken) zone deviates from its chords, as in crumbling material. With
     /// it the wall has an uneven slope, and pieces are longer one way. Pattern units, 0..=0.05; default 0 = clean
@@ -87,6 +87,11 @@ pub struct CrushedZone {
     /// Share of the floor of a [`broken`](Self::broken) zone that consists of rounded stones of several sizes in
     /// finer material (the aggregate of concrete); else it has one grain size. 0..=1; default 0.
     pub stones: f32,
+    /// Height of the material that is thrown up around a zone that is not [`broken`](Self::broken), as a share of the depth, in rays that are higher and
+    /// lower (loose material: sand, snow). It falls to nothing within [`reach`](Self::reach), at about 0.8 radii from the edge at the latest. With it the zone is
+    /// a round bowl, whatever [`soft`](Self::soft) is, as steep at all energies: it is so deep at energy 1, and its depth grows as its radius does; a depth map shows the
+    /// deepest of it as deep as at energy 1. 0..=1; default 0 = none.
+    pub rim: f32,
 }
 
 impl CrushedZone {
@@ -122,6 +127,7 @@ impl CrushedZone {
         bare: 0.0,
         jag: 0.0,
         stones: 0.0,
+        rim: 0.0,
     };
 
     /// The first field that is out of its range or not finite: its name, value and range.
@@ -158,6 +164,7 @@ impl CrushedZone {
             ("crushed.bare", self.bare, 0.0..=1.0, "0..=1"),
             ("crushed.jag", self.jag, 0.0..=0.05, "0..=0.05"),
             ("crushed.stones", self.stones, 0.0..=1.0, "0..=1"),
+            ("crushed.rim", self.rim, 0.0..=1.0, "0..=1"),
         ];
         let is_bad = |(_, value, range, _): &(_, f32, std::ops::RangeInclusive<f32>, _)| !range.contains(value);
         fields.into_iter().find(is_bad).map(|(name, value, _, range)| (name, value, range))

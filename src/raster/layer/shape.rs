@@ -29,6 +29,8 @@ pub(super) struct Shape<'a> {
     pub(super) crushed: &'a CrushedZone,
     pub(super) radius: f32,
     pub(super) depth: f32,
+    /// Its radius, in units of that at energy 1.
+    pub(super) enlarged: f32,
     pub(super) rough: f32,
     pub(super) grain: f32,
     pub(super) jag: f32,
@@ -103,6 +105,7 @@ impl<'a> Shape<'a> {
             crushed,
             radius,
             depth,
+            enlarged: radius / (crushed.radius * unit).max(1.0e-3),
             rough: crushed.rough * unit,
             grain: grain(crushed, unit),
             jag: crushed.jag * unit,

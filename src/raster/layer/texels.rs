@@ -6,7 +6,7 @@ use super::{
     noise::noise,
     outline::WIDEST,
     row::{Row, TexelRow, WIDE, ZEROS, span},
-    shape::{BruiseSpread, Place, Shape},
+    shape::{BruiseSpread, Place, Shape, TO_LIGHT},
     spot::{SLOPE_UNIT, Spot, TILE, Tile},
 };
 use crate::{math::vectorized, raster::TexelRect};
@@ -16,6 +16,28 @@ use glam::{UVec2, Vec2};
 /// Bumps around an outline: what they are drawn from, and how many there are.
 const WIDE_BUMPS: (u32, f32) = (2, 1.3);
 const FINE_BUMPS: (u32, f32) = (3, 3.7);
+const FINE_RAYS: (u32, f32) = (12, 5.5);
+
+/// How far loose material is thrown up beyond the edge of a zone, in its radii.
+const THROWN: f32 = 0.7;
+
+/// How round the edge of a bowl of loose material is, as a share of its depth, and where the crest of its rim is, in shares of the distance of the edge:
+/// beyond that it does not go up any more.
+const ROUND: f32 = 0.16;
+const CREST: f32 = 1.08;
+
+/// How far the edge of such a bowl deviates at most, at a raggedness of 1.
+const BUMPS: f32 = 0.9;
+
+/// How much darker and how much brighter loose material is for each unit of its slope away from the light and towards it.
+const IN_SHADE: f32 = 0.4;
+const IN_LIGHT: f32 = 0.1;
+
+/// How much the height of a rim varies around it.
+const RAYS: f32 = 0.8;
+
+/// Distance on either side over which its slope is measured, in the same shares.
+const NEAR: f32 = 0.03;
 
 /// Least distance at which a place has a direction, texels.
 const NEAREST: f32 = 1.0e-3;
@@ -26,6 +48,12 @@ fn round(seed: u32, way: Vec2, (k, times): (u32, f32)) -> f32 {
     noise(seed ^ k, way.x * times + 17.0, way.y * times + 31.0)
 }
 
+/// A smooth step from 0 to 1.
+fn smooth(t: f32) -> f32 {
+    let t = t.clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}
+
 /// Noise along a row of a zone that does not break off: its floor, its edge, and the dust around it.
 struct Grains {
     fine: Row,
@@ -33,10 +61,11 @@ struct Grains {
     specks: Row,
     edge: [Row; 2],
     dust: Row,
+    rays: Row,
 }
 
 impl Grains {
-    const NONE: Self = Self { fine: ZEROS, coarse: ZEROS, specks: ZEROS, edge: [ZEROS; 2], dust: ZEROS };
+    const NONE: Self = Self { fine: ZEROS, coarse: ZEROS, specks: ZEROS, edge: [ZEROS; 2], dust: ZEROS, rays: ZEROS };
 }
 
 impl Shape<'_> {
@@ -66,6 +95,7 @@ impl Shape<'_> {
             }
         }
         let corner = (rect.min - corner).as_usizevec2();
+        let deepest = if self.crushed.rim > 0.0 { self.depth * self.enlarged } else { self.depth };
         for y in 0..size.y {
             for x in 0..size.x {
                 let at = (y + 1) * WIDE + x + 1;
@@ -74,7 +104,7 @@ impl Shape<'_> {
                     (slope * SLOPE_UNIT).clamp(-32_000.0, 32_000.0) as i16
                 };
                 let Place { height, pale, shade, dark, pit } = places[at];
-                let deep = if self.depth > 0.0 { -height / self.depth } else { 0.0 };
+                let deep = if deepest > 0.0 { -height / deepest } else { 0.0 };
                 let spot = Spot {
                     // Nothing is lit in a hole.
                     slope: if dark > 0.5 { [0; 2] } else { [slope(1), slope(WIDE)] },
@@ -142,8 +172,8 @@ impl Shape<'_> {
 
     /// Noise along some texels of a row.
     fn grains(&self, row: TexelRow, texels: &Range<usize>, seed: u32) -> Grains {
-        let CrushedZone { ragged, dust, .. } = *self.crushed;
-        let inside = span(texels.clone(), |k| row.off(k).length() / self.radius.max(0.5) <= 1.0 + WIDEST * ragged);
+        let CrushedZone { dust, .. } = *self.crushed;
+        let inside = span(texels.clone(), |k| row.off(k).length() / self.radius.max(0.5) <= self.outside_rim());
         let mut found = Grains::NONE;
         vectorized(
             #[inline(always)]
@@ -159,12 +189,48 @@ impl Shape<'_> {
                 let [wide, fine] = &mut found.edge;
                 row.fill(wide, &inside, |at| round(seed, way(at), WIDE_BUMPS));
                 row.fill(fine, &inside, |at| round(seed, way(at), FINE_BUMPS));
+                if self.crushed.rim > 0.0 {
+                    row.fill(&mut found.rays, &inside, |at| round(seed, way(at), FINE_RAYS));
+                }
                 if dust > 0.0 {
                     row.fill(&mut found.dust, texels, |at| grain(at, 6, 5.0 * self.grain));
                 }
             },
         );
         found
+    }
+
+    /// Distance beyond which there is no zone and no rim around it, only dust and crumbs; radii.
+    fn outside_rim(&self) -> f32 {
+        let CrushedZone { ragged, rim, .. } = *self.crushed;
+        let widest = 1.0 + WIDEST * ragged;
+        if rim > 0.0 { widest.max(CREST * (1.0 + BUMPS * ragged) + THROWN) } else { widest }
+    }
+
+    /// How far a rim goes beyond its crest, where the edge is so many radii away; radii. It ends within reach.
+    fn rim_width(&self, edge: f32) -> f32 {
+        THROWN.min(self.crushed.reach - CREST * edge).max(0.0)
+    }
+
+    /// How much of what was thrown up lies at a distance beyond the crest, in shares of the distance of the edge: 1 = all, up to the crest.
+    fn thrown_there(&self, share: f32, edge: f32) -> f32 {
+        1.0 - smooth((share - CREST) * edge / self.rim_width(edge).max(NEAREST))
+    }
+
+    /// Height of a bowl of loose material with a rim around it at a distance from the hit, in shares of the distance of the edge in that direction, which is `edge`
+    /// radii away. The slopes are the same at all energies: loose material is never steeper.
+    fn bowl_with_rim(&self, share: f32, edge: f32) -> f32 {
+        let square = 1.0 - share * share;
+        let sunk = if square > ROUND {
+            square
+        } else {
+            let rest = (square + ROUND).max(0.0);
+            rest * rest / (4.0 * ROUND)
+        };
+        // Where the zone ends early there is less of the rim.
+        let high = self.crushed.rim * self.rim_width(edge) / THROWN;
+        let thrown = if share < CREST { smooth(share / CREST) } else { self.thrown_there(share, edge) };
+        self.depth * self.enlarged * (high * thrown - sunk)
     }
 
     /// The content of a place that does not break off; `off` is the offset from the centre, `at` the position in the field, `k` its texel in
@@ -181,7 +247,6 @@ impl Shape<'_> {
         let mut place = Place::NONE;
         let distance = off.length();
         let radii = distance / self.radius.max(0.5);
-        let widest = 1.0 + WIDEST * ragged;
         if self.is_beyond(distance) {
             return place;
         }
@@ -190,7 +255,7 @@ impl Shape<'_> {
         if let Some((spread, crazed)) = bruised {
             self.add_bruise(&mut place, off, spread, crazed, seed);
         }
-        if radii <= widest {
+        if radii <= self.outside_rim() {
             let fine = grains.fine[k];
             let edge = 1.0 + ragged * (0.55 * grains.edge[0][k] + 0.35 * grains.edge[1][k] + 0.2 * fine);
             let outline = (self.radius * edge).max(0.5);
@@ -202,11 +267,27 @@ impl Shape<'_> {
                 let fade = inside + soft * ((1.5 * rest).min(1.0) - inside);
                 // A broken edge is steep; a soft one has no wall.
                 let bowl = rest.sqrt() + soft * (rest * rest - rest.sqrt());
-                place.height += -self.depth * bowl + fade * self.rough * (0.6 * coarse + 0.4 * fine);
+                let sunk = if self.crushed.rim > 0.0 { 0.0 } else { self.depth * bowl };
+                place.height += -sunk + fade * self.rough * (0.6 * coarse + 0.4 * fine);
                 let specks = 1.0 - speckle * (0.5 + 0.5 * grains.specks[k]).clamp(0.0, 1.0);
                 place.pale = place.pale.max(pale * fade * specks * (1.0 - self.crushed.needles));
                 place.shade += speckle * (0.6 * coarse + 0.3 * fine) * inside * (1.0 - self.crushed.needles);
             }
+        }
+        if self.crushed.rim > 0.0 && radii <= self.outside_rim() {
+            let bumps = (0.55 * grains.edge[0][k] + 0.35 * grains.edge[1][k]).clamp(-BUMPS, BUMPS);
+            let edge = (1.0 + ragged * bumps).max(0.5);
+            let share = radii / edge;
+            // More of it lies where more was thrown, in rays.
+            let rays = 1.0 + RAYS * grains.rays[k] * smooth(2.0 * share - 1.0);
+            place.height += rays * self.bowl_with_rim(share, edge);
+            // It shows the light, and covers what it lies on.
+            let [low, high] = [-NEAR, NEAR].map(|by| self.bowl_with_rim(share + by, edge));
+            let rise = (high - low) / (2.0 * NEAR * edge * self.radius.max(0.5));
+            let cover = self.thrown_there(share, edge) * (1.0 - self.crushed.needles);
+            place.pale = place.pale.max(pale * cover * rays.min(1.0));
+            let light = -rise * way.dot(TO_LIGHT) * cover;
+            place.shade += if light < 0.0 { IN_SHADE * light } else { IN_LIGHT * light };
         }
         if flake > 1.0 {
             self.add_flake(&mut place, way, radii, seed);
@@ -241,5 +322,51 @@ impl Shape<'_> {
             place.dark = (radius - distance + 0.5).clamp(0.0, 1.0);
         }
         place
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{math::Rng, pattern::NO_BRICKS, raster::layer::shape::Pieces};
+
+    /// Loose material is deepest at the hit, rises to a rim, falls to nothing within reach, without a step, and is as steep at all energies.
+    #[test]
+    fn loose_material_forms_a_bowl_with_a_rim() {
+        let mut rng = Rng::new(6);
+        for seed in 0..200 {
+            let crushed = CrushedZone {
+                rim: rng.range(0.05, 1.0),
+                reach: rng.range(1.0, 4.0),
+                ragged: rng.unit(),
+                ..CrushedZone::DEFAULT
+            };
+            let (unit, enlarged) = (512.0, rng.range(0.5, 4.0));
+            let radius = crushed.radius * unit * enlarged;
+            let pieces = Pieces::new(&crushed, unit, radius, seed, &NO_BRICKS);
+            let shape = Shape::near(&crushed, unit, radius, &pieces, [Vec2::splat(-9.0), Vec2::splat(9.0)]);
+            let (edge, deep) = (rng.range(0.5, 1.9), crushed.depth * unit * enlarged);
+            let heights: Vec<f32> = (0..=2000).map(|k| shape.bowl_with_rim(k as f32 * 1.0e-3 * 4.0, edge)).collect();
+            assert!((heights[0] + deep).abs() < 1.0e-3 * deep, "seed {seed}: {} of {deep}", heights[0]);
+            let highest = (0..=2000).max_by(|a, b| heights[*a].total_cmp(&heights[*b])).unwrap();
+            assert!(heights[..=highest].is_sorted(), "seed {seed}: it goes down before the rim");
+            assert!(heights[highest..].iter().rev().is_sorted(), "seed {seed}: it goes up beyond the rim");
+            assert!(heights[highest] <= crushed.rim * deep * 1.001, "seed {seed}: the rim is too high");
+            // The bowl alone goes a little beyond its edge.
+            let end = crushed.reach.max(CREST * edge);
+            let at = |radii: f32| (radii / edge * 250.0).ceil() as usize;
+            assert!(
+                heights[at(end)..].iter().all(|height| height.abs() < 1.0e-3 * deep),
+                "seed {seed}: it does not end"
+            );
+            let outside = shape.outside_rim().max(CREST * edge);
+            let is_drawn =
+                edge > 1.0 + BUMPS * crushed.ragged || heights[at(outside)..].iter().all(|height| *height == 0.0);
+            assert!(is_drawn, "seed {seed}: it is cut off");
+            let steepest = heights.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(0.0, f32::max);
+            // A parabola falls by 2 at its edge, a smooth step by 1.5 in its middle.
+            let most = 2.2 * deep + crushed.rim * deep * 1.5 * (edge / THROWN).max(1.0 / CREST);
+            assert!(steepest <= most * 0.004 * 1.01, "seed {seed}: a step of {steepest}");
+        }
     }
 }

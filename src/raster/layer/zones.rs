@@ -400,7 +400,8 @@ mod tests {
             let mut rng = Rng::new(seed);
             let timeline = timeline(&mut rng);
             let all = timeline.strikes();
-            let crushed = CrushedZone { broken: seed % 2 == 0, radius: 0.06, ..CrushedZone::DEFAULT };
+            let rim = if seed % 4 == 1 { 0.5 } else { 0.0 };
+            let crushed = CrushedZone { broken: seed % 2 == 0, radius: 0.06, rim, ..CrushedZone::DEFAULT };
             let mut field = CrushedField::new(&crushed, frame, seed);
             let mut shown = Grid::new(frame.size(), Spot::NONE);
             for _ in 0..80 {
