@@ -69,9 +69,13 @@ impl NodeGrid {
         }
     }
 
-    /// Marks the cell of `pos`; `marked` has one entry per cell, or none.
-    pub(super) fn mark_cell(&self, pos: Vec2, marked: &mut Vec<bool>) {
-        marked.resize(self.head.len(), false);
+    /// One entry per cell.
+    pub(super) fn unmarked(&self) -> Vec<bool> {
+        vec![false; self.head.len()]
+    }
+
+    /// Marks the cell of `pos`; `marked` has one entry per cell.
+    pub(super) fn mark_cell(&self, pos: Vec2, marked: &mut [bool]) {
         let cell = self.cell_at(pos);
         marked[(cell.y * self.cells.x + cell.x) as usize] = true;
     }
@@ -79,7 +83,6 @@ impl NodeGrid {
     /// The nodes within `radius` of places in marked cells, and others near them, by index; and the share of the cells that they lie in.
     /// `None` if that is more than `most`.
     pub(super) fn near_cells(&self, mut marked: Vec<bool>, radius: f32, most: f32) -> Option<(Vec<u32>, f32)> {
-        marked.resize(self.head.len(), false);
         // A little more, for rounding.
         let (width, reach) = (self.cells.x as usize, (radius * self.per_unit + 0.01).ceil().as_uvec2());
         let mut line = Vec::new();
@@ -161,7 +164,7 @@ mod tests {
             let places: Vec<Vec2> = (0..12).map(|_| corner + draw(0.2 * extent)).collect();
             let mut grid = NodeGrid::new(extent, rng.range(0.005, 0.4));
             at.iter().for_each(|pos| grid.push(*pos));
-            let (radius, mut marked) = (rng.range(0.001, 0.3), Vec::new());
+            let (radius, mut marked) = (rng.range(0.001, 0.3), grid.unmarked());
             places.iter().for_each(|pos| grid.mark_cell(*pos, &mut marked));
             let Some((near, share)) = grid.near_cells(marked, radius, 0.5) else {
                 refused += 1;

@@ -97,6 +97,9 @@ impl MarkerField {
                     }
                     next.clone_from(&self.first);
                     self.make_places(all.len());
+                    if nodes.len() >= FEWEST {
+                        *marked = grid.unmarked();
+                    }
                 }
             }
             // The markers of a cell stay in order.
@@ -108,11 +111,11 @@ impl MarkerField {
                     (self.x[i], self.y[i], self.id[i], self.owner[i]) = (pos.x, pos.y, id, owner);
                     self.given_up[i] = given_up;
                     self.near_sq[i] = self.near_sq[i].min(near_sq);
-                    if nodes.len() >= FEWEST {
+                    if !marked.is_empty() {
                         grid.mark_cell(pos, marked);
                     }
                 }
-                if is_over && nodes.len() >= FEWEST {
+                if is_over && !marked.is_empty() {
                     let near = grid.near_cells(std::mem::take(marked), self.radius, MOST_NEAR);
                     *picked = near.map(|(near, share)| Picked { nodes: near, end: nodes.len() as u32, share });
                 }
