@@ -6,7 +6,7 @@ use super::{
     slopes::{Slopes, bounded, normal_of, slope_of},
     solve::check,
 };
-use crate::{Grid, raster::TexelRect};
+use crate::{Grid, math::smooth, raster::TexelRect};
 use glam::UVec2;
 
 /// A rectangle of heights that is to be blended into a normal map.
@@ -103,7 +103,7 @@ fn inside(size: UVec2, x: usize, y: usize) -> f32 {
     let from_border = |at: usize, side: u32| (at as f32 + 0.5).min(side as f32 - at as f32 - 0.5);
     let nearest = from_border(x, size.x).min(from_border(y, size.y));
     let share = (nearest / PASSAGE.min(0.5 * size.min_element() as f32)).min(1.0);
-    share * share * (3.0 - 2.0 * share)
+    smooth(share)
 }
 
 /// The slope of the sum of the horizontal parts of two unit normals, over the product of the vertical ones.

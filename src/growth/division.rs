@@ -6,7 +6,7 @@ use super::{
     params::{GrowthParams, Venation},
 };
 use crate::{
-    math::{hash_unit, ops},
+    math::{hash_unit, ops, smooth},
     pattern::NO_PARENT,
 };
 use glam::Vec2;
@@ -221,7 +221,7 @@ impl GrowthParams {
 /// 0 where everything is loaded equally, rising to 1 a little beyond the rim.
 pub(super) fn towards_rim(from_hit: f32, rim: f32) -> f32 {
     let share = ((from_hit / rim.max(1e-6) - THINS) / (1.1 - THINS)).clamp(0.0, 1.0);
-    share * share * (3.0 - 2.0 * share)
+    smooth(share)
 }
 
 /// The loaded radius of a hit in a direction, at most `reach`: an irregular shape that differs for every hit.

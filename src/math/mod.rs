@@ -14,3 +14,9 @@ pub(crate) mod whole;
 pub use rng::Rng;
 pub(crate) use rng::{hash_unit, mix};
 pub(crate) use simd::vectorized;
+
+/// 0 at 0 and 1 at 1, level at both ends; `share` is in 0..=1.
+#[inline(always)]
+pub(crate) fn smooth(share: f32) -> f32 {
+    share * share * (3.0 - 2.0 * share)
+}

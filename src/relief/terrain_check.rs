@@ -1,7 +1,7 @@
 //! What heights are accepted: [`check_heights`].
 
 use super::error::ReliefError;
-use crate::{Grid, pattern::MAX_SIDE};
+use crate::{Grid, math::smooth, pattern::MAX_SIDE};
 
 /// Largest height, pattern units.
 const MOST_HEIGHT: f32 = 1e6;
@@ -29,5 +29,5 @@ pub(super) fn check_row(row: &[f32], y: usize) -> Result<(), ReliefError> {
 pub(super) fn smoothstep(from: f32, to: f32, value: f32) -> f32 {
     let width = to - from;
     let share = ((value - from) / if width.abs() < 1e-6 { 1e-6 } else { width }).clamp(0.0, 1.0);
-    share * share * (3.0 - 2.0 * share)
+    smooth(share)
 }

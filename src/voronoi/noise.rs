@@ -1,7 +1,7 @@
 //! The noise that makes cracks irregular: [`Noise`].
 
 use crate::{
-    math::{hash_unit, vectorized},
+    math::{hash_unit, smooth, vectorized},
     pattern::SurfaceFrame,
 };
 
@@ -36,10 +36,6 @@ struct Octave {
     above: Vec<f32>,
     below: Vec<f32>,
     cell_row: Option<u32>,
-}
-
-fn smooth(t: f32) -> f32 {
-    t * t * (3.0 - 2.0 * t)
 }
 
 impl Noise {

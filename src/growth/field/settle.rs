@@ -65,10 +65,6 @@ impl MarkerField {
         let slice = cursor.slice(count, cost);
         let slice = slice.start as usize..slice.end as usize;
         let is_over = cursor.is_at(count);
-        if settling.phase == Phase::Visit {
-            slice.for_each(|k| self.visit(settling.visitor(k), nodes, grid));
-            return is_over;
-        }
         let Settling { all, homes, next, marked, picked, .. } = settling;
         match settling.phase {
             Phase::Gather => {
@@ -129,7 +125,7 @@ impl MarkerField {
                     }
                 }
             }
-            Phase::Visit => {}
+            Phase::Visit => slice.for_each(|k| self.visit(settling.visitor(k), nodes, grid)),
         }
         is_over
     }

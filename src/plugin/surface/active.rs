@@ -62,7 +62,7 @@ pub(crate) struct Turn {
     pub(crate) is_held: bool,
     /// Whether a frame had no time to paint it: its growth waits for that.
     pub(crate) is_late: bool,
-    /// Whether something has changed since it was put into that queue, other than by being stamped.
+    /// Whether anything has changed since its cracks were last stamped.
     pub(crate) has_news: bool,
     /// Whether its end has not been reported yet.
     pub(crate) is_open: bool,

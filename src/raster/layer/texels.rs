@@ -9,7 +9,10 @@ use super::{
     shape::{BruiseSpread, Place, Shape, TO_LIGHT},
     spot::{SLOPE_UNIT, Spot, TILE, Tile},
 };
-use crate::{math::vectorized, raster::TexelRect};
+use crate::{
+    math::{smooth, vectorized},
+    raster::TexelRect,
+};
 use core::ops::Range;
 use glam::{UVec2, Vec2};
 
@@ -46,12 +49,6 @@ const NEAREST: f32 = 1.0e-3;
 #[inline(always)]
 fn round(seed: u32, way: Vec2, (k, times): (u32, f32)) -> f32 {
     noise(seed ^ k, way.x * times + 17.0, way.y * times + 31.0)
-}
-
-/// A smooth step from 0 to 1.
-fn smooth(t: f32) -> f32 {
-    let t = t.clamp(0.0, 1.0);
-    t * t * (3.0 - 2.0 * t)
 }
 
 /// Noise along a row of a zone that does not break off: its floor, its edge, and the dust around it.
@@ -214,7 +211,7 @@ impl Shape<'_> {
 
     /// How much of what was thrown up lies at a distance beyond the crest, in shares of the distance of the edge: 1 = all, up to the crest.
     fn thrown_there(&self, share: f32, edge: f32) -> f32 {
-        1.0 - smooth((share - CREST) * edge / self.rim_width(edge).max(NEAREST))
+        1.0 - smooth(((share - CREST) * edge / self.rim_width(edge).max(NEAREST)).clamp(0.0, 1.0))
     }
 
     /// Height of a bowl of loose material with a rim around it at a distance from the hit, in shares of the distance of the edge in that direction, which is `edge`
@@ -229,7 +226,7 @@ impl Shape<'_> {
         };
         // Where the zone ends early there is less of the rim.
         let high = self.crushed.rim * self.rim_width(edge) / THROWN;
-        let thrown = if share < CREST { smooth(share / CREST) } else { self.thrown_there(share, edge) };
+        let thrown = if share < CREST { smooth((share / CREST).max(0.0)) } else { self.thrown_there(share, edge) };
         self.depth * self.enlarged * (high * thrown - sunk)
     }
 
@@ -279,7 +276,7 @@ impl Shape<'_> {
             let edge = (1.0 + ragged * bumps).max(0.5);
             let share = radii / edge;
             // More of it lies where more was thrown, in rays.
-            let rays = 1.0 + RAYS * grains.rays[k] * smooth(2.0 * share - 1.0);
+            let rays = 1.0 + RAYS * grains.rays[k] * smooth((2.0 * share - 1.0).clamp(0.0, 1.0));
             place.height += rays * self.bowl_with_rim(share, edge);
             // It shows the light, and covers what it lies on.
             let [low, high] = [-NEAR, NEAR].map(|by| self.bowl_with_rim(share + by, edge));
