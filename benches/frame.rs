@@ -449,10 +449,11 @@ fn growing_rects() -> Vec<Vec<Vec<TexelRect>>> {
         for _ in 0..FRAMES + 2 {
             growth.step();
             growth.take_changed(&mut changed);
-            for path in changed.drain(..).filter_map(|segment| growth.network().path(segment)) {
-                stamp_path_with(&mut field, &preset.profile, &path, &mut |rect| dirty.mark(look.affected(rect, size)));
-            }
             let mut rects = Vec::new();
+            for path in changed.drain(..).filter_map(|segment| growth.network().path(segment)) {
+                stamp_path_with(&mut field, &preset.profile, &path, &mut |rect| rects.push(rect));
+            }
+            rects.drain(..).for_each(|rect| dirty.mark(look.affected(rect, &field.depth)));
             dirty.take_rects(&mut rects);
             frames.push(rects);
         }

@@ -44,6 +44,17 @@ impl Changes {
         }
     }
 
+    /// Moves the oldest segments, `most` of them at the most, to another list.
+    pub(super) fn take(&mut self, most: usize, changed: &mut Vec<SegmentId>) {
+        let count = most.min(self.list.len());
+        for segment in self.list.drain(..count) {
+            if let SegmentId::Branch(node) = segment {
+                self.tree[node as usize].is_listed = false;
+            }
+            changed.push(segment);
+        }
+    }
+
     pub(super) fn push_node(&mut self, parent: u32) {
         let node = self.tree.len() as u32;
         let sibling = match self.tree.get_mut(parent as usize) {

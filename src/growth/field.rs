@@ -60,6 +60,8 @@ pub(super) struct MarkerField {
     owner: Vec<u32>,
     /// How often the marker was given up.
     given_up: Vec<u8>,
+    /// The nodes before this one have been shown to all settled markers.
+    shown: u32,
     /// Per node: its ray; may be shorter than the number of nodes.
     pub(super) ray_of: Vec<u32>,
     /// Closed venation: the nodes that each marker attracts in addition to the nearest.
@@ -97,6 +99,7 @@ impl MarkerField {
             id: Vec::new(),
             owner: Vec::new(),
             given_up: Vec::new(),
+            shown: 0,
             ray_of: Vec::new(),
             relations: (params.venation == Venation::Closed).then(|| Relations::new(params)),
             newborn: Vec::new(),
@@ -118,6 +121,7 @@ impl MarkerField {
         let divides = params.venation == Venation::Subdivision;
         self.divides &= divides;
         let mut living = self.take_living();
+        self.shown = 0;
         self.radius = params.crack_radius;
         self.kill_sq = kill_sq(params);
         self.divides = divides;
@@ -169,7 +173,7 @@ impl MarkerField {
         living
     }
 
-    /// A settled marker as an unsettled one.
+    /// A settled marker as one that looks for its node.
     fn marker_at(&self, i: usize) -> Newborn {
         Newborn {
             pos: Vec2::new(self.x[i], self.y[i]),
@@ -177,7 +181,23 @@ impl MarkerField {
             owner: self.owner[i],
             given_up: self.given_up[i],
             near_sq: if self.divides { self.near_sq[i] } else { f32::INFINITY },
+            node: NO_NODE,
+            is_known: false,
         }
+    }
+
+    /// A settled marker that keeps its node, if it would find the same again.
+    fn kept_marker_at(&self, i: usize) -> Newborn {
+        let (node, near_sq) = (self.node[i], self.near_sq[i]);
+        let is_known = match node {
+            // A marker that was given up looks at all nodes again.
+            NO_NODE => self.given_up[i] == 0 && near_sq == self.radius * self.radius,
+            _ => node < self.shown,
+        };
+        // A node may not be on its ray yet when it is shown.
+        let is_plain = !self.divides && self.relations.is_none() && self.ray_of.is_empty();
+        let marker = self.marker_at(i);
+        if is_known && is_plain { Newborn { near_sq, node, is_known, ..marker } } else { marker }
     }
 
     /// Removes all settled markers.
@@ -196,7 +216,8 @@ impl MarkerField {
 
     pub(super) fn add(&mut self, pos: Vec2, owner: u32, relieved: f32) {
         let near_sq = relieved.max(0.0) * relieved;
-        self.newborn.push(Newborn { pos, id: self.next, owner, given_up: 0, near_sq });
+        let (id, node) = (self.next, NO_NODE);
+        self.newborn.push(Newborn { pos, id, owner, given_up: 0, near_sq, node, is_known: false });
         self.next += 1;
         self.made = self.made.saturating_add(1);
         if let Some(relations) = &mut self.relations {
@@ -232,6 +253,9 @@ impl MarkerField {
     /// Must be called in the order of the nodes' indices: at equal distance the lower index keeps the marker.
     pub(super) fn visit(&mut self, index: u32, nodes: &[Node], grid: &NodeGrid) {
         let node = &nodes[index as usize];
+        if index == self.shown {
+            self.shown += 1;
+        }
         for (from, to) in self.rows(node.pos, self.radius) {
             let (from, to) = (self.first[from] as usize, self.first[to] as usize);
             // Whole lanes, even beyond the cells: markers that are not taken do not change, and there is padding.

@@ -27,7 +27,7 @@ impl CrackGrowth {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn add_cracks(&mut self, cracks: &Network, opening: u32) -> u32 {
-        self.finish_layout();
+        self.finish();
         let Some(last) = cracks.nodes.iter().map(|node| node.birth).chain(cracks.links.iter().map(|l| l.birth)).max()
         else {
             return 0;

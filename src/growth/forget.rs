@@ -34,7 +34,7 @@ impl CrackGrowth {
     /// # Ok::<(), bevy_crack::growth::ParamError>(())
     /// ```
     pub fn remove_oldest(&mut self, keep: u32) -> u32 {
-        self.finish_layout();
+        self.finish();
         let first = self.network.nodes.len().saturating_sub(keep as usize);
         if first == 0 {
             return 0;

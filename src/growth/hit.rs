@@ -29,7 +29,7 @@ impl CrackGrowth {
     /// [`HitOutcome::Rejected`].
     pub fn hit(&mut self, pos: Vec2, energy: f32) -> HitOutcome {
         let outcome = self.begin_hit(pos, energy);
-        self.finish_layout();
+        self.finish();
         outcome
     }
 
@@ -50,7 +50,7 @@ impl CrackGrowth {
     /// # Ok::<(), bevy_crack::growth::ParamError>(())
     /// ```
     pub fn begin_hit(&mut self, pos: Vec2, energy: f32) -> HitOutcome {
-        self.finish_layout();
+        self.finish();
         let outcome = self.apply_hit(pos, energy);
         self.record.hit(pos, energy, &outcome);
         outcome

@@ -142,8 +142,9 @@ impl CrackGrowth {
         self.layout.is_some() || !self.orders.is_empty()
     }
 
-    /// Lays out the remaining markers, and settles them if settling has begun.
-    pub(super) fn finish_layout(&mut self) {
+    /// Completes a step that was begun, lays out the remaining markers, and settles them if settling has begun.
+    pub(super) fn finish(&mut self) {
+        self.finish_step();
         while self.continue_hit(1 << 16) {}
         if self.field.is_settling() {
             self.field.settle(&self.network.nodes, &self.nodes);

@@ -27,3 +27,18 @@ pub(super) struct Pull {
     /// The direction in which nothing can grow from the node: its markers on that side are given up.
     pub(super) stopped: Option<Vec2>,
 }
+
+/// A step that is made in part.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Part {
+    /// The first node that it adds.
+    pub(super) first: u32,
+    /// How many nodes it may add.
+    pub(super) room: usize,
+    /// Whether all nodes that are pulled have grown. Then the new ones look for markers.
+    pub(super) has_grown: bool,
+    /// How many of the former have grown, or the next of the latter.
+    pub(super) at: usize,
+    /// Whether markers are to be given up.
+    pub(super) any_stopped: bool,
+}

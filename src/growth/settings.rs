@@ -23,7 +23,7 @@ impl CrackGrowth {
     /// Sets where the markers of later hits may be: a probability 0..=1 over the whole surface, at any resolution,
     /// sampled at the nearest cell. `None` = everywhere. Values that are not finite count as 0.
     pub fn set_density(&mut self, density: Option<Grid<f32>>) {
-        self.finish_layout();
+        self.finish();
         self.density = density.filter(|grid| grid.size().min_element() > 0);
     }
 
@@ -40,7 +40,7 @@ impl CrackGrowth {
     /// enters a forbidden texel. A hit on a forbidden texel is [rejected](super::Rejected::Forbidden). Existing
     /// cracks stay as they are.
     pub fn set_mask(&mut self, mask: impl Into<Arc<CrackMask>>) {
-        self.finish_layout();
+        self.finish();
         self.mask = mask.into();
         self.update_arrest();
         self.update_masonry();
@@ -76,7 +76,7 @@ impl CrackGrowth {
     /// [`ParamError::OutOfRange`] if a parameter is out of its range; nothing changes then.
     pub fn set_params(&mut self, params: GrowthParams) -> Result<(), ParamError> {
         params.validate()?;
-        self.finish_layout();
+        self.finish();
         let params = params.varied(self.seed);
         self.field.set_params(&params);
         self.widths.set_params(&params);

@@ -12,7 +12,7 @@ use super::{
     nodes::NodeGrid,
     params::{GrowthParams, MarkerLayout, ParamError},
     past::Record,
-    pull::Pull,
+    pull::{Part, Pull},
     rays::Rays,
     strand_paths::{Order, StrandPaths},
     width::Widths,
@@ -108,6 +108,8 @@ pub struct CrackGrowth {
     pub(super) masonry: Option<Arc<Masonry>>,
     pub(super) steps: u32,
     pub(super) steps_left: u32,
+    /// The step that is under way.
+    pub(super) part: Option<Part>,
     /// What has happened so far.
     pub(super) record: Record,
     /// Number of cracks started by nucleation, and of markers that were tried for it.
@@ -171,6 +173,7 @@ impl CrackGrowth {
             masonry: None,
             steps: 0,
             steps_left: 0,
+            part: None,
             record: Record::default(),
             nucleated: 0,
             tried: 0,
@@ -218,7 +221,7 @@ impl CrackGrowth {
     /// Whether another step may grow something.
     #[must_use]
     pub const fn is_growing(&self) -> bool {
-        self.steps_left > 0
+        self.steps_left > 0 || self.part.is_some()
     }
 
     /// Nodes and segments so far.
@@ -253,12 +256,14 @@ impl CrackGrowth {
 
     /// Appends the segments that are new or wider since the last call, each once, and clears the list.
     pub fn take_changed(&mut self, changed: &mut Vec<SegmentId>) {
-        for segment in self.changes.list.drain(..) {
-            if let SegmentId::Branch(node) = segment {
-                self.changes.tree[node as usize].is_listed = false;
-            }
-            changed.push(segment);
-        }
+        self.changes.take(usize::MAX, changed);
+    }
+
+    /// Like [`take_changed`](Self::take_changed), but no more than `most` of the oldest; returns whether any are left.
+    #[cfg(feature = "bevy")]
+    pub(crate) fn take_some_changed(&mut self, most: usize, changed: &mut Vec<SegmentId>) -> bool {
+        self.changes.take(most, changed);
+        !self.changes.list.is_empty()
     }
 
     /// Appends the positions of markers created since the last call, if `draw_markers` is set.

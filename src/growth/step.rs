@@ -5,7 +5,7 @@ use super::{
     divide::Candidate,
     draws,
     params::StartLayout,
-    pull::{NO_PULL, Pull},
+    pull::{NO_PULL, Part, Pull},
     state::CrackGrowth,
 };
 use crate::{math::mix, pattern::NO_PARENT};
@@ -37,77 +37,163 @@ impl CrackGrowth {
     /// closest marker, on it if that is nearer than `D`. So every new node serves a marker, and growth ends within
     /// [`GrowthParams::most_nodes`](super::GrowthParams::most_nodes). A node beyond the border, or closer to it than
     /// the kill distance in its direction, is placed on it.
+    ///
+    /// Completes a step that was [begun](Self::continue_step) and makes no other.
     pub fn step(&mut self) -> StepReport {
-        self.finish_layout();
-        self.new_nodes = 0..0;
-        if self.is_growing() {
-            self.record.step();
+        loop {
+            if let Some(report) = self.continue_step(u32::MAX) {
+                return report;
+            }
         }
+    }
+
+    /// Makes a part of a [`step`](Self::step), with up to about `nodes` nodes, so that the step of a surface with many cracks can be spread
+    /// over several frames. Returns the report once all of the step is made. 0 counts as 1.
+    ///
+    /// The cracks do not depend on the parts. In between, nodes of the step are in the network, but not all, nor are their widths final. All
+    /// other methods that change the growth complete the step first.
+    ///
+    /// Steps of cracks that divide domains, and of strands, are made in one part.
+    ///
+    /// ```
+    /// use bevy_crack::growth::{CrackGrowth, GrowthParams};
+    ///
+    /// let mut growth = CrackGrowth::new(GrowthParams::DEFAULT, [1.0, 1.0].into(), 7)?;
+    /// (0..9).for_each(|i| _ = growth.hit([0.1 * i as f32 + 0.1, 0.5].into(), 1.0));
+    /// let mut parts = 1;
+    /// while growth.continue_step(4).is_none() {
+    ///     parts += 1;
+    /// }
+    /// assert!(parts > 3);
+    /// # Ok::<(), bevy_crack::growth::ParamError>(())
+    /// ```
+    pub fn continue_step(&mut self, nodes: u32) -> Option<StepReport> {
+        if self.part.is_none() {
+            self.finish();
+            self.new_nodes = 0..0;
+            if self.is_growing() {
+                self.record.step();
+            }
+        }
+        let mut left = nodes.max(1);
         // A tip that has just turned to meet a crack may be all that moves, and it has no new node yet.
         let mut found = Vec::new();
-        while self.steps_left > 0 && self.new_nodes.is_empty() && self.orders.is_empty() {
-            self.make_step(&mut found);
+        while self.part.is_some() || (self.steps_left > 0 && self.new_nodes.is_empty() && self.orders.is_empty()) {
+            if !self.make_step(&mut found, &mut left) {
+                return None;
+            }
         }
         if self.steps_left == 0 && self.arrest.is_some() {
             self.show_hits();
         }
-        StepReport { born: self.new_nodes.len() as u32, lays_out_more: !self.orders.is_empty() }
+        Some(StepReport { born: self.new_nodes.len() as u32, lays_out_more: !self.orders.is_empty() })
     }
 
-    fn make_step(&mut self, found: &mut Vec<Candidate>) {
-        self.steps_left -= 1;
-        self.field.settle(&self.network.nodes, &self.nodes);
-        if self.divides() {
-            self.divide(found);
-            return;
+    /// Whether a step was [begun](Self::continue_step) and is not complete.
+    #[must_use]
+    pub const fn is_in_step(&self) -> bool {
+        self.part.is_some()
+    }
+
+    /// Completes a step that was begun.
+    pub(crate) fn finish_step(&mut self) {
+        if self.is_in_step() {
+            self.step();
         }
-        if self.params.strands().is_some() {
-            self.advance_strands();
-            return;
-        }
-        self.gather_pulls();
-        self.aim();
-        let first = self.network.nodes.len() as u32;
-        let room = self.room();
-        // Nodes that are added when growth has ended get their own step of the timeline.
-        self.timeline.begin(self.steps.saturating_add(1));
-        if !self.pulls.is_empty() || self.is_running() {
-            self.steps = self.steps.saturating_add(1);
-        }
-        let mut any_stopped = false;
-        if self.arrest.is_some() {
-            any_stopped = self.advance_all();
-        } else {
-            for i in 0..self.order.len() {
-                let (node, slot) = self.order[i];
-                if !self.pulls[slot as usize].serves {
-                    self.pulls[slot as usize].stopped = Some(self.to_closest(node, slot));
-                    any_stopped = true;
-                } else if i < room {
-                    let (parent, child) = (self.network.nodes[node as usize], self.pulls[slot as usize].child);
-                    self.add_thin_node(child, node, parent.generation.saturating_add(1), parent.impact, 1.0);
+    }
+
+    /// Makes a step, or the rest of one, with up to `left` nodes. Returns whether it is complete.
+    fn make_step(&mut self, found: &mut Vec<Candidate>, left: &mut u32) -> bool {
+        let mut part = match self.part.take() {
+            Some(part) => part,
+            None => {
+                self.steps_left -= 1;
+                self.field.settle(&self.network.nodes, &self.nodes);
+                if self.divides() {
+                    self.divide(found);
+                    return true;
                 }
+                if self.params.strands().is_some() {
+                    self.advance_strands();
+                    return true;
+                }
+                self.begin_step()
             }
-            self.end_pulls(any_stopped);
-            self.widen_with(|widths, nodes, widened| widths.push(nodes, first, widened));
+        };
+        if !part.has_grown {
+            self.grow_some(&mut part, left);
+            if part.at < self.order.len() {
+                self.part = Some(part);
+                return false;
+            }
+            self.end_growing(&part);
+            (part.at, part.has_grown) = (part.first as usize, true);
         }
-        self.pulls.clear();
-        if self.params.nucleation > 0.0 {
-            self.nucleate();
+        let last = self.network.nodes.len();
+        let end = last.min(part.at.saturating_add(*left as usize));
+        for node in part.at..end {
+            self.field.visit(node as u32, &self.network.nodes, &self.nodes);
         }
-        self.advance_rays(first);
-        let last = self.network.nodes.len() as u32;
-        self.new_nodes = first..last;
-        for node in first..last {
-            self.field.visit(node, &self.network.nodes, &self.nodes);
+        *left -= (end - part.at) as u32;
+        part.at = end;
+        if end < last {
+            self.part = Some(part);
+            return false;
         }
+        self.new_nodes = part.first..last as u32;
         self.join_newborn();
-        if first == last && !any_stopped && !self.is_running() {
+        if self.new_nodes.is_empty() && !part.any_stopped && !self.is_running() {
             self.steps_left = 0;
         }
         if self.steps_left == 0 {
             self.widen_with(|widths, nodes, widened| widths.settle(nodes, widened));
         }
+        true
+    }
+
+    /// Finds out which nodes grow, and where to.
+    fn begin_step(&mut self) -> Part {
+        self.gather_pulls();
+        self.aim();
+        // Nodes that are added when growth has ended get their own step of the timeline.
+        self.timeline.begin(self.steps.saturating_add(1));
+        if !self.pulls.is_empty() || self.is_running() {
+            self.steps = self.steps.saturating_add(1);
+        }
+        let first = self.network.nodes.len() as u32;
+        Part { first, room: self.room(), at: 0, has_grown: false, any_stopped: false }
+    }
+
+    /// Grows from the next nodes that are pulled.
+    fn grow_some(&mut self, part: &mut Part, left: &mut u32) {
+        let end = self.order.len().min(part.at.saturating_add(*left as usize));
+        for i in part.at..end {
+            let (node, slot) = self.order[i];
+            let stopped = if self.arrest.is_some() {
+                self.grow_apart(node, slot)
+            } else {
+                self.grow_freely(node, slot, i < part.room)
+            };
+            self.pulls[slot as usize].stopped = stopped;
+            part.any_stopped |= stopped.is_some();
+        }
+        *left -= (end - part.at) as u32;
+        part.at = end;
+    }
+
+    /// After all nodes have grown: markers that were given up, and what grows without markers.
+    fn end_growing(&mut self, part: &Part) {
+        self.end_pulls(part.any_stopped);
+        if self.arrest.is_some() {
+            self.advance_runners();
+        } else {
+            self.widen_with(|widths, nodes, widened| widths.push(nodes, part.first, widened));
+        }
+        self.pulls.clear();
+        if self.params.nucleation > 0.0 {
+            self.nucleate();
+        }
+        self.advance_rays(part.first);
     }
 
     /// Whether a tip is moving to a goal.
@@ -115,49 +201,49 @@ impl CrackGrowth {
         self.rays.is_running() || self.arrest.as_ref().is_some_and(Arrest::is_running)
     }
 
-    /// Grows from every node that is pulled, unless older cracks are in the way; then from the tips that are moving
-    /// to a crack. Returns whether a marker was given up: the other markers may pull in another direction then.
-    fn advance_all(&mut self) -> bool {
-        let mut any_stopped = false;
-        for i in 0..self.order.len() {
-            let (node, slot) = self.order[i];
-            let is_sealed = self.arrest.as_ref().is_some_and(|arrest| arrest.is_sealed(node));
-            let stopped = if is_sealed {
-                Some(Vec2::ZERO)
-            } else if !self.pulls[slot as usize].serves {
-                Some(self.to_closest(node, slot))
-            } else {
-                let born = self.network.nodes.len();
-                let Pull { child, course, side, .. } = self.pulls[slot as usize];
-                let advanced = self.advance(node, child);
-                if (self.params.grain > 0.0 || self.params.zigzag > 0.0 || self.masonry.is_some())
-                    && self.network.nodes.get(born).is_some_and(|born| born.pos == child)
-                {
-                    self.courses[born] = course;
-                }
-                match advanced {
-                    Advance::Grown => {
-                        if let Some(side) = side {
-                            let from = self.network.nodes[node as usize].pos;
-                            let branch = self.extend(node, side, false);
-                            // Its course combines the branch and the previous course, so that it goes around the
-                            // bricks.
-                            if let Some(branch) = branch.filter(|_| self.masonry.is_some()) {
-                                let way = (side - from).normalize_or_zero();
-                                self.courses[branch as usize] = (way + course).normalize_or(way);
-                            }
-                        }
-                        None
-                    }
-                    Advance::Stopped(direction) => Some(direction),
-                }
-            };
-            self.pulls[slot as usize].stopped = stopped;
-            any_stopped |= stopped.is_some();
+    /// Grows from a node, whatever cracks are in the way. Returns the direction in which it gives up markers: the others may pull in another direction
+    /// then.
+    fn grow_freely(&mut self, node: u32, slot: u32, has_room: bool) -> Option<Vec2> {
+        let Pull { serves, child, .. } = self.pulls[slot as usize];
+        if !serves {
+            return Some(self.to_closest(node, slot));
         }
-        self.end_pulls(any_stopped);
-        self.advance_runners();
-        any_stopped
+        if has_room {
+            let parent = self.network.nodes[node as usize];
+            self.add_thin_node(child, node, parent.generation.saturating_add(1), parent.impact, 1.0);
+        }
+        None
+    }
+
+    /// Grows from a node unless older cracks are in the way; returns the same.
+    fn grow_apart(&mut self, node: u32, slot: u32) -> Option<Vec2> {
+        if self.arrest.as_ref().is_some_and(|arrest| arrest.is_sealed(node)) {
+            return Some(Vec2::ZERO);
+        }
+        let Pull { child, course, side, serves, .. } = self.pulls[slot as usize];
+        if !serves {
+            return Some(self.to_closest(node, slot));
+        }
+        let born = self.network.nodes.len();
+        let advanced = self.advance(node, child);
+        if (self.params.grain > 0.0 || self.params.zigzag > 0.0 || self.masonry.is_some())
+            && self.network.nodes.get(born).is_some_and(|born| born.pos == child)
+        {
+            self.courses[born] = course;
+        }
+        if let Advance::Stopped(direction) = advanced {
+            return Some(direction);
+        }
+        if let Some(side) = side {
+            let from = self.network.nodes[node as usize].pos;
+            let branch = self.extend(node, side, false);
+            // Its course combines the branch and the previous course, so that it goes around the bricks.
+            if let Some(branch) = branch.filter(|_| self.masonry.is_some()) {
+                let way = (side - from).normalize_or_zero();
+                self.courses[branch as usize] = (way + course).normalize_or(way);
+            }
+        }
+        None
     }
 
     /// The direction from a node to the closest marker that pulls it.

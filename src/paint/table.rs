@@ -9,7 +9,7 @@ use super::{
     range::{LookError, within},
     shades::Shades,
 };
-use crate::{blend::NormalBlending, pattern::MAX_SIDE, raster::TexelRect};
+use crate::{Grid, blend::NormalBlending, pattern::MAX_SIDE, raster::TexelRect};
 use glam::{UVec2, Vec4};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
@@ -183,28 +183,44 @@ impl LookTable {
         })
     }
 
-    /// The texels that may look different as soon as depths in `rect` do, both in texels of a field of `size`: normals depend on the texels around
-    /// their own, and where cracks [cast shadows](Look::cast), colours of up to 64 texels to the right and below do.
+    /// The texels that may look different after `depths` of a field have changed in `rect`: normals depend on the texels around their own, and where
+    /// cracks [cast shadows](Look::cast), so do the colours of cracks up to 64 texels to the right and below.
     ///
     /// ```
     /// use bevy_crack::{
+    ///     Grid,
     ///     paint::{Look, LookTable},
     ///     raster::TexelRect,
     /// };
     ///
+    /// let mut depths = Grid::new([512, 512].into(), 0);
     /// let rect = TexelRect { min: [40, 40].into(), max: [44, 42].into() };
-    /// let affected = |look: &Look| Ok(LookTable::new(look, 512.0)?.affected(rect, [512, 512].into()));
-    /// assert_eq!(affected(&Look::GROOVE)?, TexelRect { min: [39, 39].into(), max: [45, 43].into() });
-    /// assert_eq!(affected(&Look::CONCRETE)?, TexelRect { min: [39, 39].into(), max: [52, 50].into() });
+    /// let around = TexelRect { min: [39, 39].into(), max: [45, 43].into() };
+    /// let [groove, concrete] = [Look::GROOVE, Look::CONCRETE].map(|look| LookTable::new(&look, 512.0));
+    /// let (groove, concrete) = (groove?, concrete?);
+    /// assert_eq!(groove.affected(rect, &depths), around);
+    /// assert_eq!(concrete.affected(rect, &depths), around);
+    /// // Another crack may lie in the shadow of what has changed.
+    /// depths.row_mut(46)[48] = 9000;
+    /// assert_eq!(groove.affected(rect, &depths), around);
+    /// assert_eq!(concrete.affected(rect, &depths), TexelRect { max: [49, 47].into(), ..around });
     /// # Ok::<(), bevy_crack::paint::LookError>(())
     /// ```
     #[must_use]
-    pub fn affected(&self, rect: TexelRect, size: UVec2) -> TexelRect {
-        let mut grown = rect.grow(1, size);
+    pub fn affected(&self, rect: TexelRect, depths: &Grid<u16>) -> TexelRect {
+        let mut grown = rect.grow(1, depths.size());
         if let Some(cast) = &self.cast
             && !grown.is_empty()
         {
-            grown.max = rect.max.saturating_add(UVec2::splat(cast.reach)).min(size);
+            let end = rect.max.saturating_add(UVec2::splat(cast.reach)).min(depths.size());
+            for y in rect.min.y..end.y {
+                // The texels of the row that are not affected yet.
+                let start = if y < grown.max.y { grown.max.x.min(end.x) } else { rect.min.x };
+                let row = &depths.row(y as usize)[start as usize..end.x as usize];
+                if let Some(last) = row.iter().rposition(|&depth| depth != 0) {
+                    grown.max = grown.max.max(UVec2::new(start + last as u32 + 1, y + 1));
+                }
+            }
         }
         grown
     }

@@ -138,7 +138,7 @@ fn dirty_painting_equals_full_painting() {
             }
             for _ in 0..=below(&mut rng, 3) {
                 let changed = random_stamp(&mut rng, &mut field);
-                changed.iter().for_each(|rect| dirty.mark(look.affected(*rect, size)));
+                changed.iter().for_each(|rect| dirty.mark(look.affected(*rect, &field.depth)));
             }
             rects.clear();
             dirty.take_rects(&mut rects);
@@ -450,7 +450,7 @@ fn presets_painted_where_they_change_equal_the_whole_at_any_time() {
             };
             replay.show(&mut field, network, timeline, moment, &mut redrawn);
             let look = table(&preset.look, &field);
-            redrawn.changed.iter().for_each(|rect| dirty.mark(look.affected(*rect, size)));
+            redrawn.changed.iter().for_each(|rect| dirty.mark(look.affected(*rect, &field.depth)));
             rects.clear();
             dirty.take_rects(&mut rects);
             canvas.paint_all(&field, &look, &rects, UVec2::ZERO, &mut painted);
@@ -495,7 +495,7 @@ fn presets_that_grow_painted_where_they_change_equal_the_whole() {
             }
             let timeline = growth.timeline();
             field.show_layers(growth.network(), timeline, Moment::after(timeline.end()), &mut rects);
-            rects.drain(..).for_each(|rect| dirty.mark(look.affected(rect, size)));
+            rects.drain(..).for_each(|rect| dirty.mark(look.affected(rect, &field.depth)));
             dirty.take_rects(&mut rects);
             canvas.paint_all(&field, &look, &rects, UVec2::ZERO, &mut painted);
             rects.clear();

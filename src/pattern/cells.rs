@@ -181,12 +181,23 @@ impl CellTracker {
     /// part that closes its first cell it is a few times the whole network.
     pub fn update(&mut self, network: &Network) -> Range<u32> {
         let first = self.cells.len() as u32;
+        self.update_some(network, usize::MAX);
+        first..self.cells.len() as u32
+    }
+
+    /// The same with `most` nodes and links at the most; returns whether none are left.
+    pub(crate) fn update_some(&mut self, network: &Network, most: usize) -> bool {
         if self.cells.is_empty() {
-            return 0..0;
+            return true;
         }
         let (nodes, links) = (network.nodes(), network.links());
+        let mut left = most;
         // In the order in which they were added, so that it does not matter how often this is called.
         while self.vertex_of.len() < nodes.len() || self.links < links.len() {
+            if left == 0 {
+                return false;
+            }
+            left -= 1;
             let i = self.vertex_of.len();
             if let Some(link) = links.get(self.links)
                 && nodes.get(i).is_none_or(|node| link.birth < node.birth && (link.a.max(link.b) as usize) < i)
@@ -201,7 +212,7 @@ impl CellTracker {
         let mut touched = std::mem::take(&mut self.touched);
         touched.drain(..).for_each(|cell| self.measure(cell));
         self.touched = touched;
-        first..self.cells.len() as u32
+        true
     }
 
     /// Like [`update`](Self::update), in the order of a timeline, whose steps are used as births: hits in the middle

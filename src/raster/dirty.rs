@@ -101,7 +101,7 @@ impl DirtyTiles {
 
     /// Unmarks everything.
     pub fn clear(&mut self) {
-        self.drain(|_, _| {});
+        self.drain(usize::MAX, |_, _| {});
         self.marks.clear();
     }
 
@@ -111,11 +111,16 @@ impl DirtyTiles {
     ///
     /// An unmarked tile is covered only where an additional rectangle would cost more than the tile.
     pub fn take_rects(&mut self, rects: &mut Vec<TexelRect>) {
+        self.take_some_rects(usize::MAX, rects);
+    }
+
+    /// The same for the first rows of tiles in which `least` tiles are marked: they are found sooner than all.
+    pub(crate) fn take_some_rects(&mut self, least: usize, rects: &mut Vec<TexelRect>) {
         if self.is_empty() {
             return;
         }
         let mut tiles = Vec::with_capacity(FEW);
-        self.drain(|x, y| tiles.push(UVec2::new(x, y)));
+        self.drain(least, |x, y| tiles.push(UVec2::new(x, y)));
         let first = rects.len();
         cover(&mut tiles, 0, rects);
         for rect in &mut rects[first..] {
@@ -127,24 +132,28 @@ impl DirtyTiles {
                 *rect = marked.fold(TexelRect::default(), TexelRect::union);
             }
         }
-        self.marks.clear();
+        if self.is_empty() {
+            self.marks.clear();
+        }
     }
 
-    /// Unmarks everything and calls `visit` with column and row of every marked tile, row by row.
-    fn drain(&mut self, mut visit: impl FnMut(u32, u32)) {
-        if !self.marked {
-            return;
-        }
-        self.marked = false;
-        let words = self.words_per_row();
+    /// Calls `visit` with column and row of every marked tile, row by row, and unmarks it, until that were `least` at the end of a row.
+    fn drain(&mut self, least: usize, mut visit: impl FnMut(u32, u32)) {
+        let (words, mut count) = (self.words_per_row(), 0);
         for (i, row_bits) in self.rows.iter_mut().enumerate() {
-            for_each_bit(std::mem::take(row_bits), |bit| {
-                let row = i * WORD + bit;
+            while *row_bits != 0 {
+                if count >= least {
+                    return;
+                }
+                let row = i * WORD + row_bits.trailing_zeros() as usize;
+                *row_bits &= *row_bits - 1;
                 for (word, tiles) in self.tiles[row * words..(row + 1) * words].iter_mut().enumerate() {
+                    count += tiles.count_ones() as usize;
                     for_each_bit(std::mem::take(tiles), |bit| visit((word * WORD + bit) as u32, row as u32));
                 }
-            });
+            }
         }
+        self.marked = false;
     }
 }
 
@@ -313,6 +322,19 @@ mod tests {
             assert_eq!(dirty.is_empty(), empty);
             let mut again = dirty.clone();
             let (mut rects, mut repeated) = (Vec::new(), Vec::new());
+            // Every third time in parts, which are found in the order of their rows.
+            while round % 3 == 1 && !again.is_empty() {
+                let first = repeated.len();
+                again.take_some_rects(1 + below(&mut rng, 50) as usize, &mut repeated);
+                assert!(repeated.len() > first, "nothing in a part");
+                let highest = |rects: &[TexelRect]| rects.iter().map(|rect| rect.min.y / DirtyTiles::TILE).min();
+                let lowest = |rects: &[TexelRect]| rects.iter().map(|rect| (rect.max.y - 1) / DirtyTiles::TILE).max();
+                assert!(lowest(&repeated[..first]) < highest(&repeated[first..]) || first == 0);
+            }
+            if round % 3 == 1 {
+                (rects, repeated) = (repeated.clone(), repeated);
+                dirty.clear();
+            }
             dirty.take_rects(&mut rects);
             again.take_rects(&mut repeated);
             assert_eq!(rects, repeated);

@@ -12,6 +12,10 @@ pub(super) struct Newborn {
     pub(super) given_up: u8,
     /// Squared distance of the nearest known crack, or the limit of the search.
     pub(super) near_sq: f32,
+    /// The node that attracts it, if that is known.
+    pub(super) node: u32,
+    /// Whether it is: then none of the nodes that have been shown to the field is nearer.
+    pub(super) is_known: bool,
 }
 
 /// The progress of settling new markers.
@@ -35,7 +39,7 @@ pub(super) struct Settling {
 pub(super) struct Picked {
     /// By index.
     pub(super) nodes: Vec<u32>,
-    /// The node from which on all visit: those that have come since.
+    /// The node from which on all visit: they have been shown to no marker.
     pub(super) end: u32,
     /// Share of the field that they lie in.
     pub(super) share: f32,

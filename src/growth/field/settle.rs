@@ -68,7 +68,7 @@ impl MarkerField {
         let Settling { all, homes, next, marked, picked, .. } = settling;
         match settling.phase {
             Phase::Gather => {
-                all.extend(slice.filter(|&i| self.near_sq[i] > DEAD).map(|i| self.marker_at(i)));
+                all.extend(slice.filter(|&i| self.near_sq[i] > DEAD).map(|i| self.kept_marker_at(i)));
                 if is_over {
                     self.clear();
                     if all.is_empty() {
@@ -101,19 +101,28 @@ impl MarkerField {
             // The markers of a cell stay in order.
             Phase::Place => {
                 for i in slice {
-                    let (Newborn { pos, id, owner, given_up, near_sq }, slot) = (all[i], &mut next[homes[i] as usize]);
+                    let Newborn { pos, id, owner, given_up, near_sq, node, is_known } = all[i];
+                    let slot = &mut next[homes[i] as usize];
                     let i = *slot as usize;
                     *slot += 1;
                     (self.x[i], self.y[i], self.id[i], self.owner[i]) = (pos.x, pos.y, id, owner);
                     self.given_up[i] = given_up;
                     self.near_sq[i] = self.near_sq[i].min(near_sq);
-                    if !marked.is_empty() {
+                    if node != NO_NODE {
+                        self.node[i] = node;
+                        self.active.push(i as u32);
+                    }
+                    if !is_known && !marked.is_empty() {
                         grid.mark_cell(pos, marked);
                     }
                 }
                 if is_over && !marked.is_empty() {
                     let near = grid.near_cells(std::mem::take(marked), self.radius, MOST_NEAR);
-                    *picked = near.map(|(near, share)| Picked { nodes: near, end: nodes.len() as u32, share });
+                    let end = self.shown;
+                    *picked = near.map(|(mut nodes, share)| {
+                        nodes.truncate(nodes.partition_point(|node| *node < end));
+                        Picked { nodes, end, share }
+                    });
                 }
             }
             Phase::Recall => {

@@ -1,6 +1,7 @@
 //! Growths that go on with other parameters.
 
 use super::*;
+use crate::{growth::field::ANY_IMPACT, pattern::Node};
 use std::collections::BTreeMap;
 
 fn grown_out(growth: &mut CrackGrowth) {
@@ -127,4 +128,25 @@ fn markers_look_again_for_other_cracks() {
             assert!(assert_known(&mut growth, 0.1) > 20, "seed {seed}, {steps} steps");
         }
     }
+}
+
+/// After each of many hits on a large surface every marker knows the nearest of the nodes that may take it, whether it looked for it again or not.
+#[test]
+fn markers_know_the_nearest_node_after_each_hit() {
+    let extent = Vec2::new(2.0, 1.5);
+    let mut growth = CrackGrowth::new(CrackPreset::CONCRETE.scaled(0.12).growth, extent, 5).unwrap();
+    let (mut rng, mut known, mut waiting) = (Rng::new(9), 0, 0);
+    for _ in 0..60 {
+        growth.hit(Vec2::new(rng.unit(), rng.unit()) * extent, 0.5);
+        growth.field.settle(&growth.network.nodes, &growth.nodes);
+        let limit = growth.params.crack_radius.powi(2);
+        growth.field.each_living(|pos, near_sq, owner| {
+            let takes = |node: &&Node| owner == ANY_IMPACT || owner == node.impact;
+            let own = growth.network.nodes.iter().filter(takes).map(|node| node.pos.distance_squared(pos));
+            assert_eq!(near_sq, own.fold(limit, f32::min), "{pos}");
+            *if near_sq < limit { &mut known } else { &mut waiting } += 1;
+        });
+        (0..1 + rng.next_u32() % 8).for_each(|_| _ = growth.step());
+    }
+    assert!(growth.network.nodes.len() > 3000 && known > 5000 && waiting > 1000, "{known} {waiting}");
 }

@@ -5,9 +5,10 @@ use crate::{
     CrackPreset, Grid,
     growth::{CrackGrowth, GrowthParams, MarkerCounts, MarkerLayout, StepReport},
     math::{Rng, hash_unit, mix},
-    pattern::CrackMask,
+    pattern::{CrackMask, SegmentId},
 };
 use glam::Vec2;
+use std::collections::HashMap;
 
 /// Places, then numbers of markers.
 fn markers(growth: &CrackGrowth) -> (Vec<[u32; 2]>, [u32; 4]) {
@@ -183,4 +184,60 @@ fn slices_of_nothing_end() {
             assert_eq!(fingerprint(&at_once), fingerprint(&in_slices));
         }
     }
+}
+
+/// Widths of the points of each segment.
+fn widths_of(growth: &CrackGrowth, segment: SegmentId) -> Option<Vec<u32>> {
+    let path = growth.network().path(segment)?;
+    Some(path.points().iter().map(|point| point.width.to_bits()).collect())
+}
+
+/// Steps made in parts of any size are steps, and whatever else is asked of the growth completes them first. What is drawn between two parts is
+/// drawn again if it changes after that.
+#[test]
+fn steps_in_parts_are_the_same() {
+    let (mut parts, mut stepped, mut interrupted) = (0, 0, 0);
+    for case in 0..300u64 {
+        let mut rng = Rng::new(case).stream("parts");
+        let mut at_once = CrackGrowth::new(random_params(&mut rng, true), random_extent(&mut rng), case).unwrap();
+        let mut in_parts = at_once.clone();
+        let (mut drawn, mut changed) = (HashMap::new(), Vec::new());
+        for _ in 0..4 {
+            let pos = Vec2::new(rng.unit(), rng.unit()) * at_once.network().extent();
+            let energy = 2.0 * rng.unit();
+            assert_eq!(at_once.hit(pos, energy), in_parts.hit(pos, energy), "case {case}");
+            for _ in 0..rng.next_u32() % 30 {
+                let report = at_once.step();
+                let most = rng.next_u32() % if rng.unit() < 0.5 { 3 } else { 20 };
+                let made = (0..most).find_map(|_| {
+                    parts += 1;
+                    let made = in_parts.continue_step(rng.next_u32() % 12);
+                    in_parts.take_changed(&mut changed);
+                    drawn.extend(changed.drain(..).map(|segment| (segment, widths_of(&in_parts, segment))));
+                    made
+                });
+                let is_in_step = in_parts.is_in_step();
+                assert!(!is_in_step || (made.is_none() && in_parts.is_growing()), "case {case}");
+                if is_in_step && rng.unit() < 0.5 {
+                    interrupted += 1;
+                    in_parts.set_density(None);
+                    at_once.set_density(None);
+                } else {
+                    stepped += u32::from(is_in_step);
+                    assert_eq!(made.unwrap_or_else(|| in_parts.step()), report, "case {case}");
+                }
+                assert!(!in_parts.is_in_step());
+                assert_eq!(at_once.new_nodes(), in_parts.new_nodes(), "case {case}");
+            }
+            assert_eq!(fingerprint(&at_once), fingerprint(&in_parts), "case {case}");
+        }
+        assert_eq!(at_once.timeline().end(), in_parts.timeline().end(), "case {case}");
+        in_parts.take_changed(&mut changed);
+        drawn.extend(changed.drain(..).map(|segment| (segment, widths_of(&in_parts, segment))));
+        for node in 0..in_parts.network().nodes().len() as u32 {
+            let widths = widths_of(&in_parts, SegmentId::Branch(node));
+            assert_eq!(drawn.get(&SegmentId::Branch(node)).cloned().flatten(), widths, "case {case}, node {node}");
+        }
+    }
+    assert!(parts > 10_000 && stepped > 250 && interrupted > 250, "{parts} parts, {stepped} and {interrupted} steps");
 }

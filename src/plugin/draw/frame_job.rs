@@ -218,8 +218,7 @@ impl FrameJob {
     fn plan(&mut self) -> Vec<TexelRect> {
         let Self { redrawn, touched, dirty, field, look, .. } = self;
         touched.follow(redrawn);
-        let size = field.frame.size();
-        redrawn.changed.iter().for_each(|rect| dirty.mark(look.affected(*rect, size)));
+        redrawn.changed.iter().for_each(|rect| dirty.mark(look.affected(*rect, &field.depth)));
         self.changed.clear();
         dirty.take_rects(&mut self.changed);
         let mut rects = Vec::new();
@@ -235,7 +234,7 @@ impl FrameJob {
                     Some(kind.texels(&self.base, self.has_mips))
                 });
                 self.back = Some(Back { texels, behind: Vec::new() });
-                rects.push(TexelRect::whole(size));
+                rects.push(TexelRect::whole(field.frame.size()));
             }
         }
         let shown = TexelRect::whole(self.rect.size());

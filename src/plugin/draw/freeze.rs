@@ -48,10 +48,10 @@ pub(crate) fn has_to_wait(world: &mut World, entity: Entity, lands: impl FnOnce(
     !has_room
 }
 
-/// Makes room for a hit: a surface that is full forgets all but the newest half of its nodes.
-pub(crate) fn freeze_if_full(active: &mut Active) {
+/// Makes room for a hit: a surface that is full forgets all but the newest half of its nodes. Returns whether it has.
+pub(crate) fn freeze_if_full(active: &mut Active) -> bool {
     if !is_full(active) {
-        return;
+        return false;
     }
     let keep = kept(active);
     let left = active.freezing.take().and_then(|freezing| freezing.left(&active.cracks, &active.drawing));
@@ -78,6 +78,7 @@ pub(crate) fn freeze_if_full(active: &mut Active) {
     active.cracks.cells_reported = active.cracks.cells.cells().len();
     active.cracks.tips_from = active.cracks.tips_from.saturating_sub(gone as usize);
     active.fell_at = (active.fell_at.0.saturating_sub(gone as usize), active.cracks.cells_reported);
+    true
 }
 
 #[cfg(all(test, feature = "2d"))]

@@ -28,6 +28,8 @@ struct GrowJob<'a> {
     active: &'a mut Active,
     /// Whether it has grown; `None` = its turn has not come.
     has_grown: Option<bool>,
+    /// Whether an earlier frame has begun a step.
+    was_in_step: bool,
 }
 
 /// Makes the steps that are due, some surfaces at once, one step each in turn, until none is due or the budget is spent. Those that wait to be
@@ -59,7 +61,8 @@ pub(crate) fn grow_surfaces(
     let (mut left, mut idle) = (Vec::new(), Vec::new());
     while left.is_empty() && !growing.is_empty() {
         let mut jobs = batch(&mut surfaces, growing, |entity, active| {
-            active.turn.is_growing.then_some(GrowJob { entity, active, has_grown: None })
+            let was_in_step = active.cracks.growth.is_in_step();
+            active.turn.is_growing.then_some(GrowJob { entity, active, has_grown: None, was_in_step })
         });
         par_for_each(jobs.chunks_mut(SHARE).enumerate(), |(i, jobs)| {
             for (k, job) in jobs.iter_mut().enumerate() {
@@ -67,27 +70,32 @@ pub(crate) fn grow_surfaces(
                 let is_first = (i, k) == (0, 0);
                 if is_first || !timer.is_over() {
                     let is_free = !job.active.is_partly_painted() && (is_first || !job.active.turn.is_late);
-                    job.has_grown = Some(is_free && job.active.step_if_due());
+                    job.has_grown = Some(is_free && job.active.step_if_due(|| timer.is_over()));
                 }
             }
         });
-        for GrowJob { entity, active, has_grown } in jobs {
+        for GrowJob { entity, active, has_grown, was_in_step } in jobs {
             let Some(has_grown) = has_grown else {
                 left.push(entity);
                 continue;
             };
+            // Whole steps are shown, and hits land, before the next one begins.
+            let waits = active.turn.is_late || active.is_partly_painted() || (was_in_step && has_grown);
             if active.is_at_rest() {
                 active.turn.is_growing = false;
                 active.playhead.due = 0.0;
                 if active.has_closed() {
                     commands.trigger(CracksClosed { entity });
                 }
-            } else if active.is_due() && !active.turn.is_late {
+            } else if active.is_due() && !waits {
                 growing.push_back(entity);
             } else {
                 idle.push(entity);
             }
-            let is_news = has_grown || active.is_behind() || (!active.turn.is_growing && active.turn.is_open);
+            let is_news = has_grown
+                || active.turn.has_news
+                || active.is_behind()
+                || (!active.turn.is_growing && active.turn.is_open);
             active.turn.has_news |= is_news;
             if is_news && !active.turn.is_dirty {
                 active.turn.is_dirty = true;

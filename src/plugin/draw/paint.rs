@@ -11,8 +11,9 @@ use crate::plugin::jobs::frame_time::{FrameClock, Timer, par_for_each};
 use crate::plugin::surface::active::Active;
 use crate::plugin::surface::canvas::{Canvas, View};
 use crate::plugin::surface::cracked::{CrackedSurfaces, batch};
+use crate::plugin::surface::cracks::Cracks;
 use crate::plugin::surface::queues::Queues;
-use crate::plugin::surface::stamp::{Scratch, stamp};
+use crate::plugin::surface::stamp::{Scratch, stamp_some};
 use crate::raster::{DirtyTiles, TexelRect};
 use bevy::{ecs::system::NonSendMarker, platform::time::Instant, prelude::*};
 use std::{
@@ -21,7 +22,7 @@ use std::{
 };
 
 /// Share of the frame's budget after which nothing more is painted: the rest is for what is under way then, and for reporting it.
-const BUDGET_SHARE: f32 = 0.9;
+const BUDGET_SHARE: f32 = 0.8;
 
 /// Surfaces that one thread paints, one after the other: fewer are not worth another thread.
 const SHARE: usize = 4;
@@ -30,7 +31,13 @@ const SHARE: usize = 4;
 const CRUSHED: usize = 8;
 
 /// Texels that are painted without a look at the time, at least: so many in each frame.
-const SLICE: u32 = 16_384;
+const SLICE: u32 = 4096;
+
+/// Nodes that are looked at between two looks at the time.
+const NODES: usize = 256;
+
+/// Tiles of them that are made into rectangles at once, where not all may be painted in a frame.
+const BAND: usize = 512;
 
 /// A surface that is being painted.
 struct PaintJob<'a> {
@@ -146,19 +153,34 @@ impl<'a> PaintJob<'a> {
     fn paint(&mut self, scratch: &mut Scratch, packer: &mut Packer, most_crushed: usize, timer: &Timer) {
         // Without a limit nothing is put off.
         let may_wait = most_crushed < usize::MAX && self.active.may_be_partly_painted();
-        let goes_on = may_wait && self.active.is_partly_painted();
+        if !may_wait {
+            self.active.cracks.growth.finish_step();
+        }
+        let goes_on = may_wait && self.active.is_partly_painted() && !self.active.turn.is_stamping;
         if !goes_on {
             self.active.turn.has_news = false;
-            stamp(self.active, scratch);
+            if !stamp_some(self.active, scratch, || may_wait && timer.is_over()) {
+                self.painted = Painted::Partly;
+                return;
+            }
             crush(self.active, scratch, most_crushed, timer);
-            self.active.cracks.cells.update(self.active.cracks.growth.network());
+            let Cracks { growth, cells, .. } = &mut self.active.cracks;
+            // Cells close in the order of whole steps.
+            while !growth.is_in_step() && !cells.update_some(growth.network(), NODES) {
+                if may_wait && timer.is_over() {
+                    self.active.turn.is_stamping = true;
+                    self.painted = Painted::Partly;
+                    return;
+                }
+            }
         }
         self.painted = Painted::Wholly;
         let Some(view) = self.active.canvas.views.get_mut(self.active.canvas.view) else { return };
         if !may_wait {
             view.join_rest();
         }
-        self.texels.paint(self.active, packer, &mut scratch.rects, || may_wait && timer.is_over());
+        let tiles = if may_wait { BAND } else { usize::MAX };
+        self.texels.paint(self.active, packer, &mut scratch.rects, (tiles, || may_wait && timer.is_over()));
         if self.active.is_partly_painted() {
             self.painted = Painted::Partly;
         } else if goes_on {
@@ -172,7 +194,7 @@ fn crush(active: &mut Active, scratch: &mut Scratch, most: usize, timer: &Timer)
     if active.drawing.field.is_behind() {
         let is_over = |drawn: usize| drawn == most || timer.is_over();
         (1..).find(|drawn| !active.drawing.field.crush(1, &mut scratch.rects) || is_over(*drawn));
-        scratch.rects.drain(..).for_each(|rect| active.mark(rect));
+        scratch.rects.drain(..).for_each(|rect| active.mark_grown(rect));
     }
 }
 
@@ -183,7 +205,7 @@ pub(crate) fn paint_now(world: &mut World, active: &mut Active) {
         active.canvas.views.get_mut(active.canvas.view).map(View::join_rest);
         world.resource_mut::<Uploads>().pack(1, |packers| {
             for packer in packers {
-                texels.paint(active, packer, &mut Vec::new(), || false);
+                texels.paint(active, packer, &mut Vec::new(), (usize::MAX, || false));
             }
         });
         texels.put_back(&active.canvas.textures, &mut images);
@@ -207,34 +229,37 @@ impl Texels {
         }
     }
 
-    /// Paints the dirty texels of the view that is shown and asks for their upload, those first that are left over. What there is no time for is
-    /// left over again.
+    /// Paints the dirty texels of the view that is shown and asks for their upload, those first that are left over, about so many tiles of them after the
+    /// others. What there is no time for is left over again.
     fn paint(
         &mut self,
         active: &mut Active,
         packer: &mut Packer,
         rects: &mut Vec<TexelRect>,
-        is_over: impl Fn() -> bool,
+        (tiles, is_over): (usize, impl Fn() -> bool),
     ) {
         let size = active.canvas.base.size;
-        let Some(view) = active.canvas.views.get_mut(active.canvas.view) else { return };
+        let index = active.canvas.view;
+        let Some(view) = active.canvas.views.get_mut(index) else { return };
+        let (origin, shown) = (view.rect.min, TexelRect::whole(view.rect.size()));
         if view.rest.is_empty() {
-            view.dirty.take_rects(rects);
-        } else {
-            view.rest.take_rects(rects);
+            core::mem::swap(&mut view.rest, &mut view.dirty);
         }
-        let origin = view.rect.min;
-        let shown = TexelRect::whole(view.rect.size());
-        rects.iter_mut().for_each(|rect| *rect = rect.intersect(shown));
-        rects.retain(|rect| !rect.is_empty());
-        // Taken from the end.
-        rects.reverse();
         let (mut slice, mut texels) = (Vec::new(), 0);
-        while let Some(rect) = rects.pop() {
+        while let Some(view) = active.canvas.views.get_mut(index) {
+            if rects.is_empty() {
+                view.rest.take_some_rects(tiles, rects);
+                rects.iter_mut().for_each(|rect| *rect = rect.intersect(shown));
+                // Taken from the end.
+                rects.reverse();
+            }
+            let Some(rect) = rects.pop() else { break };
             let (now, later) = split(rect, SLICE - texels);
             rects.extend(later);
-            slice.push(now);
-            texels += now.size().element_product();
+            if !now.is_empty() {
+                slice.push(now);
+                texels += now.size().element_product();
+            }
             if texels < SLICE && !rects.is_empty() {
                 continue;
             }
@@ -245,7 +270,7 @@ impl Texels {
                 break;
             }
         }
-        if let Some(view) = active.canvas.views.get_mut(active.canvas.view) {
+        if let Some(view) = active.canvas.views.get_mut(index) {
             rects.drain(..).for_each(|rect| view.rest.mark(rect));
         }
     }
@@ -336,13 +361,14 @@ mod tests {
             let mut parts = 0;
             for frame in 0.. {
                 let before = active(app.world(), entity).map(|active| {
-                    (active.is_partly_painted(), active.cracks.growth.steps_made(), unpainted(&app, entity))
+                    let steps = active.cracks.growth.steps_made();
+                    (active.is_partly_painted(), steps, active.turn.is_stamping, unpainted(&app, entity))
                 });
                 app.update();
-                if let (Some((true, steps, texels)), Some(now)) = (before, active(app.world(), entity)) {
+                if let (Some((true, steps, is_stamping, texels)), Some(now)) = (before, active(app.world(), entity)) {
                     parts += 1;
                     assert_eq!(now.cracks.growth.steps_made(), steps, "it grows in frame {frame}");
-                    assert!(unpainted(&app, entity) < texels, "nothing was painted in frame {frame}");
+                    assert!(is_stamping || unpainted(&app, entity) < texels, "nothing was painted in frame {frame}");
                 }
                 let state = app.world().get::<CrackState>(entity);
                 if state.is_some_and(|state| state.status == CrackStatus::Done) {

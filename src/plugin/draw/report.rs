@@ -16,7 +16,9 @@ pub(crate) fn report_painted(
     (active.turn.is_dirty, active.turn.is_late) = (false, false);
     active.drawing.painted += 1;
     let is_done = active.turn.is_open && active.is_complete();
-    report_cells(active, entity, commands);
+    if !active.turn.is_stamping {
+        report_cells(active, entity, commands);
+    }
     if let Ok(mut state) = states.get_mut(entity) {
         write_state(active, &mut state, before, is_done);
     }

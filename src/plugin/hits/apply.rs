@@ -95,9 +95,13 @@ pub(crate) fn apply_hits(world: &mut World) {
     world.resource_mut::<FrameClock>().stop(&timer);
 }
 
-/// Goes on with the markers of a surface that have no places yet; `None` if all have, `false` if they are being laid out, which comes first.
+/// Goes on with the markers of a surface that have no places yet; `None` if all have, `false` if others go on with it first: a step is under way, or markers
+/// are being laid out.
 fn prepare_some(world: &mut World, entity: Entity) -> Option<bool> {
     let active = active_mut(world, entity)?;
+    if active.cracks.growth.is_in_step() {
+        return Some(false);
+    }
     active.cracks.growth.is_preparing().then(|| {
         let has_places = !active.turn.is_laying_out;
         if has_places {
@@ -242,7 +246,10 @@ fn apply(world: &mut World, entity: Entity, hit: QueuedHit, timer: &Timer) -> Re
     let has_chips = world.get::<CrackChips>(entity).is_some();
     let active = active_mut(world, entity).ok_or(GONE)?;
     let pos = uv * active.cracks.growth.network().extent();
-    freeze_if_full(active);
+    if freeze_if_full(active) {
+        with_queues(world, entity, |queues, turn| queues.mark_dirty(entity, turn));
+    }
+    let active = active_mut(world, entity).ok_or(GONE)?;
     let outcome = active.cracks.growth.begin_hit(pos, hit.energy);
     let mut is_left = active.cracks.growth.continue_hit(SLICE);
     while is_left && !timer.is_over() {

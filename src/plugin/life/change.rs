@@ -201,6 +201,7 @@ fn update_preset(
         return Ok(());
     }
     let look = look(&preset, active.drawing.field.frame, active.canvas.base.is_nearest)?;
+    active.cracks.growth.finish_step();
     recall(world, entity, active);
     if preset.growth != active.preset.growth {
         let outcome = active.cracks.growth.set_params(preset.growth.clone());

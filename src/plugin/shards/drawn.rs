@@ -44,13 +44,10 @@ impl Sketch {
 
     /// Draws lines and paints what they change.
     pub(super) fn draw(mut self, lines: &[Vec<Vec2>], base: &BasePicture) -> Drawn {
-        let size = self.field.frame.size();
-        let mut dirty = DirtyTiles::new(size);
-        let look = &self.look;
-        stamp_hairlines(&mut self.field, &self.profile, self.width, lines, |rect| {
-            dirty.mark(look.affected(rect, size));
-        });
         let mut rects = Vec::new();
+        stamp_hairlines(&mut self.field, &self.profile, self.width, lines, |rect| rects.push(rect));
+        let mut dirty = DirtyTiles::new(self.field.frame.size());
+        rects.drain(..).for_each(|rect| dirty.mark(self.look.affected(rect, &self.field.depth)));
         dirty.take_rects(&mut rects);
         rects.iter_mut().for_each(|rect| *rect = rect.intersect(TexelRect::whole(self.view.size())));
         rects.retain(|rect| !rect.is_empty());

@@ -20,6 +20,7 @@ use crate::plugin::jobs::background::{BackgroundJob, PATIENCE};
 use crate::plugin::jobs::deferred::hold;
 use crate::plugin::surface::active::Active;
 use crate::plugin::surface::cutouts::{Holes, Span, cut_span};
+use crate::plugin::surface::queues::Queues;
 use crate::plugin::surface::{cracked, warm};
 use crate::raster::TexelRect;
 use crate::shatter::RimLook;
@@ -81,6 +82,10 @@ fn attend(
     let is_first = queue.requests.iter().all(|other| other.entity != entity);
     let is_shattering = world.get::<Pieces>(entity).is_some_and(Pieces::is_waiting);
     active.turn.is_to_shatter = true;
+    if active.cracks.growth.is_in_step() {
+        active.cracks.growth.finish_step();
+        world.resource_mut::<Queues>().mark_dirty(entity, &mut active.turn);
+    }
     // The shards are to show what the surface will.
     if active.turn.is_dirty || is_shattering || !is_first {
         queue.requests.push(request);

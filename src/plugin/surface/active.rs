@@ -64,6 +64,8 @@ pub(crate) struct Turn {
     pub(crate) is_late: bool,
     /// Whether anything has changed since its cracks were last stamped.
     pub(crate) has_news: bool,
+    /// Whether a frame had no time to stamp all that has grown.
+    pub(crate) is_stamping: bool,
     /// Whether its end has not been reported yet.
     pub(crate) is_open: bool,
     /// Whether it is in the queue of those whose normals are to be blended.
@@ -145,7 +147,12 @@ impl Active {
 
     /// Marks texels of the field as changed, in all views.
     pub(crate) fn mark(&mut self, rect: TexelRect) {
-        self.canvas.mark(rect, self.drawing.field.frame.size());
+        self.canvas.mark(rect, &self.drawing.field.depth);
+    }
+
+    /// Marks texels that have changed because cracks have grown, which may be painted over several frames.
+    pub(crate) fn mark_grown(&mut self, rect: TexelRect) {
+        self.canvas.mark_grown(rect, &self.drawing.field.depth);
     }
 
     /// Whether there are texels to paint where it is seen.
@@ -154,17 +161,18 @@ impl Active {
         view.is_some_and(|view| !(view.dirty.is_empty() && view.rest.is_empty()))
     }
 
-    /// Whether frames had no time to paint all of what has grown: it does not grow until they have.
+    /// Whether frames had no time to stamp and paint all of what has grown: it does not grow until they have.
     pub(crate) fn is_partly_painted(&self) -> bool {
-        self.canvas.views.get(self.canvas.view).is_some_and(|view| !view.rest.is_empty())
+        self.turn.is_stamping || self.canvas.views.get(self.canvas.view).is_some_and(|view| !view.rest.is_empty())
     }
 
-    /// Whether the next frames may paint what this one has no time for: cracks that grow. Whatever else changes is shown at once.
+    /// Whether the next frames may paint what this one has no time for: cracks that grow. The first of them are shown at once, and whatever else changes.
     pub(crate) fn may_be_partly_painted(&self) -> bool {
         let Turn { is_held, is_to_shatter, .. } = self.turn;
         let has_other_changes = self.canvas.views.get(self.canvas.view).is_none_or(|view| !view.dirty.is_empty());
         let is_plain = self.playhead.playback.is_none() && self.canvas.analogy.is_none() && !self.drawing.is_stale;
-        is_plain && self.cracks.growth.is_growing() && !is_held && !is_to_shatter && !has_other_changes
+        let has_shown_any = self.cracks.tips_from > 0;
+        is_plain && has_shown_any && self.turn.is_open && !is_held && !is_to_shatter && !has_other_changes
     }
 
     /// Marks the whole field as changed, in all views.

@@ -1,5 +1,6 @@
 //! [`Canvas`]: what cracks are painted on.
 
+use crate::Grid;
 use crate::paint::LookTable;
 use crate::plugin::api::textures::CrackTextures;
 use crate::plugin::source::analogy::AnalogyPicture;
@@ -44,13 +45,16 @@ pub(crate) struct View {
     pub(crate) rect: TexelRect,
     /// What is stamped into the field but not painted here yet, in texels of the field.
     pub(crate) dirty: DirtyTiles,
-    /// The same of what has grown, which frames had no time to paint. Nothing else is stamped until they have.
+    /// The same of what has grown: frames may have no time to paint all of it. Nothing else is stamped until they have.
     pub(crate) rest: DirtyTiles,
 }
 
 impl View {
     /// Paints what is left over together with what has changed since.
     pub(crate) fn join_rest(&mut self) {
+        if self.dirty.is_empty() {
+            core::mem::swap(&mut self.dirty, &mut self.rest);
+        }
         let mut rects = Vec::new();
         self.rest.take_rects(&mut rects);
         rects.into_iter().for_each(|rect| self.dirty.mark(rect));
@@ -63,9 +67,18 @@ impl Canvas {
         self.views.get(self.view).map(|view| view.rect)
     }
 
-    /// Marks texels of a field of `size` as changed, in all views.
-    pub(crate) fn mark(&mut self, rect: TexelRect, size: UVec2) {
-        self.mark_normals(self.look.affected(rect, size));
+    /// Marks texels of a field with these depths as changed, in all views.
+    pub(crate) fn mark(&mut self, rect: TexelRect, depths: &Grid<u16>) {
+        self.mark_normals(self.look.affected(rect, depths));
+        self.note_depths(&[rect]);
+    }
+
+    /// The same for what has grown: in the view that is shown it may wait.
+    pub(crate) fn mark_grown(&mut self, rect: TexelRect, depths: &Grid<u16>) {
+        let affected = self.look.affected(rect, depths);
+        for (index, view) in self.views.iter_mut().enumerate() {
+            if index == self.view { &mut view.rest } else { &mut view.dirty }.mark(affected);
+        }
         self.note_depths(&[rect]);
     }
 

@@ -64,6 +64,7 @@ impl Work {
 /// On a picture of other proportions the same hits, in the same places, make other cracks: grown as far as they are. By a task, if that
 /// takes longer than a frame has, unless it is to be `at_once`.
 pub(crate) fn regrow(active: &mut Active, inputs: Regrowth, at_once: bool) -> Result<OnAnother, CrackError> {
+    active.cracks.growth.finish_step();
     let before = active.regrowing.take();
     if active.cracks.growth.network().extent() == inputs.frame.extent() {
         return Ok(OnAnother::Same);

@@ -1,6 +1,7 @@
 //! From networks to depths: what is stamped into the field of a surface.
 
 use super::active::Active;
+use super::drawing::Drawing;
 use super::stamp_network::stamp_all;
 use super::tile_set::Touched;
 use crate::pattern::{Moment, PathPoint, SegmentId, SegmentPath};
@@ -18,14 +19,24 @@ pub(crate) struct Scratch {
     pub(crate) rects: Vec<TexelRect>,
 }
 
+/// Segments that are stamped between two looks at the frame's clock.
+const SLICE: usize = 64;
+
 /// Stamps what has grown since the last time into the field, or whatever is to be shown, but for what hits have crushed.
 pub(crate) fn stamp(active: &mut Active, scratch: &mut Scratch) {
+    active.cracks.growth.finish_step();
+    stamp_some(active, scratch, || false);
+}
+
+/// The same for as much of what has grown as there is time for, a part of a step as well; returns whether that is all.
+pub(crate) fn stamp_some(active: &mut Active, scratch: &mut Scratch, is_over: impl Fn() -> bool) -> bool {
+    active.turn.is_stamping = false;
     if active.drawing.is_stale {
         stamp_anew(active);
     }
     let moment = active.moment();
     if stamp_motion(active, moment) {
-        return;
+        return true;
     }
     if let Some(playback) = &mut active.playhead.playback {
         let (growth, redrawn) = (&active.cracks.growth, &mut scratch.redrawn);
@@ -36,25 +47,37 @@ pub(crate) fn stamp(active: &mut Active, scratch: &mut Scratch) {
         if !redrawn.changed.is_empty() {
             active.stamp_carried();
         }
-        return;
+        return true;
     }
-    active.cracks.growth.take_changed(&mut scratch.segments);
-    for segment in scratch.segments.drain(..) {
-        if let Some(path) = active.cracks.growth.network().path(segment) {
-            let changed = &mut |rect| scratch.rects.push(rect);
-            let rect = stamp_path_with(&mut active.drawing.field, &active.drawing.profile, &path, changed);
-            active.drawing.touched.mark(rect);
+    loop {
+        active.turn.is_stamping = active.cracks.growth.take_some_changed(SLICE, &mut scratch.segments);
+        let Drawing { field, profile, touched, .. } = &mut active.drawing;
+        for segment in scratch.segments.drain(..) {
+            if let Some(path) = active.cracks.growth.network().path(segment) {
+                touched.mark(stamp_path_with(field, profile, &path, &mut |rect| scratch.rects.push(rect)));
+            }
+        }
+        if !active.turn.is_stamping {
+            break;
+        }
+        scratch.rects.drain(..).for_each(|rect| active.mark_grown(rect));
+        if is_over() {
+            return false;
         }
     }
-    let timeline = active.cracks.growth.timeline();
-    active.drawing.field.begin_layer(active.cracks.growth.network(), timeline, moment, &mut scratch.rects);
-    scratch.rects.drain(..).for_each(|rect| active.mark(rect));
+    let growth = &active.cracks.growth;
+    // Plates close in the order of whole steps.
+    if !growth.is_in_step() {
+        active.drawing.field.begin_layer(growth.network(), growth.timeline(), moment, &mut scratch.rects);
+    }
+    scratch.rects.drain(..).for_each(|rect| active.mark_grown(rect));
     active.cracks.growth.take_markers(&mut scratch.markers);
     let radius = active.cracks.growth.params().line_width;
     for marker in scratch.markers.drain(..) {
         let rect = stamp_dot(&mut active.drawing.field, marker, radius, DOT_DEPTH);
-        active.mark(rect);
+        active.mark_grown(rect);
     }
+    true
 }
 
 /// Draws a moment of cracks that move in place of what is in the field; returns whether they do.
@@ -84,6 +107,7 @@ impl Active {
 /// Clears the field and stamps the whole network again; at another time than the end that is left to the next
 /// painting.
 pub(crate) fn stamp_anew(active: &mut Active) {
+    active.cracks.growth.finish_step();
     let frame = active.drawing.field.frame;
     active.drawing.redrawn += 1;
     active.drawing.is_stale = false;

@@ -20,6 +20,9 @@ const MAX_LATE: f64 = 4.0;
 /// Markers that are settled between two looks at the frame's clock.
 pub(crate) const SLICE: u32 = 8192;
 
+/// Nodes that grow between two looks at it.
+const NODES: u32 = 128;
+
 /// The most steps a second that baked cracks appear in.
 const MOST_STEPS: f64 = 1e6;
 
@@ -80,7 +83,7 @@ impl Active {
     pub(crate) fn is_complete(&self) -> bool {
         let end = Moment::after(self.cracks.growth.timeline().end());
         let is_shown = self.playhead.playback.as_ref().is_none_or(|playback| playback.shown == end);
-        !self.cracks.growth.is_growing() && is_shown && !self.drawing.field.is_behind()
+        !self.cracks.growth.is_growing() && is_shown && !self.turn.is_stamping && !self.drawing.field.is_behind()
     }
 
     /// Lets time pass.
@@ -110,7 +113,7 @@ impl Active {
         }
     }
 
-    /// Whether a step of growth is due.
+    /// Whether a step of growth is due, or under way.
     pub(crate) fn is_due(&self) -> bool {
         let is_due = match (self.ruler(), &self.playhead.playback) {
             (Ruler::Speed(_) | Ruler::Appearing(_), Some(playback)) => playback.want > self.end(),
@@ -118,17 +121,29 @@ impl Active {
             _ => self.playhead.due >= 1.0,
         };
         let is_free = !self.turn.is_laying_out && !self.turn.is_held && self.freezing.is_none();
-        is_due && is_free && self.cracks.growth.is_growing()
+        is_free && (is_due && self.cracks.growth.is_growing() || self.cracks.growth.is_in_step())
     }
 
     /// Makes a step of growth if one is due and its preparations are done, which may need more than one turn: markers of the last hits are
-    /// settled, more strands of them are laid out.
-    pub(crate) fn step_if_due(&mut self) -> bool {
-        if !self.is_due() || !self.cracks.growth.prepare_step(SLICE) {
+    /// settled, more strands of them are laid out. What there is no time for is left to the next turn. Returns whether all of a step was made.
+    pub(crate) fn step_if_due(&mut self, is_over: impl Fn() -> bool) -> bool {
+        if !self.is_due() {
             return false;
         }
-        self.playhead.due = (self.playhead.due - 1.0).max(0.0);
-        self.cracks.growth.step();
+        if !self.cracks.growth.is_in_step() {
+            if !self.cracks.growth.prepare_step(SLICE) {
+                return false;
+            }
+            self.playhead.due = (self.playhead.due - 1.0).max(0.0);
+        }
+        // A playback shows whole steps.
+        let nodes = if self.playhead.playback.is_none() { NODES } else { u32::MAX };
+        while self.cracks.growth.continue_step(nodes).is_none() {
+            self.turn.has_news = true;
+            if is_over() {
+                return false;
+            }
+        }
         true
     }
 
@@ -151,8 +166,17 @@ impl Active {
         self.playhead.closing.is_some() && self.is_at_rest()
     }
 
+    /// All of its cracks will be drawn in another way.
+    fn stop_stamping(&mut self) {
+        if core::mem::take(&mut self.turn.is_stamping) {
+            self.cracks.cells.update(self.cracks.growth.network());
+        }
+    }
+
     /// Makes times other than the end possible.
     fn open_playback(&mut self) -> &mut Playback {
+        self.cracks.growth.finish_step();
+        self.stop_stamping();
         if self.drawing.frozen.take().is_some() {
             stamp_anew(self);
             self.mark_all();
@@ -206,6 +230,7 @@ impl Active {
     /// Shows a network that has taken the place of another, as it was made to be shown `first`: without a clock, and with
     /// `seconds`, it appears within them. Returns the playback of the other one.
     pub(crate) fn show_made(&mut self, replay: Option<(Replay, Moment)>, seconds: Option<f32>) -> Option<Playback> {
+        self.stop_stamping();
         self.playhead.closing = None;
         self.drawing.frozen = None;
         self.playhead.appearing = seconds.map(|seconds| (self.end() / f64::from(seconds)).min(MOST_STEPS));
