@@ -93,7 +93,7 @@ pub(crate) fn grow_surfaces(
                 idle.push(entity);
             }
             let is_news = has_grown
-                || active.turn.has_news
+                || active.cracks.growth.is_in_step()
                 || active.is_behind()
                 || (!active.turn.is_growing && active.turn.is_open);
             active.turn.has_news |= is_news;

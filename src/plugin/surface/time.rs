@@ -139,7 +139,6 @@ impl Active {
         // A playback shows whole steps.
         let nodes = if self.playhead.playback.is_none() { NODES } else { u32::MAX };
         while self.cracks.growth.continue_step(nodes).is_none() {
-            self.turn.has_news = true;
             if is_over() {
                 return false;
             }
@@ -175,6 +174,7 @@ impl Active {
 
     /// Makes times other than the end possible.
     fn open_playback(&mut self) -> &mut Playback {
+        let has_drawn_all = !self.cracks.growth.is_in_step();
         self.cracks.growth.finish_step();
         self.stop_stamping();
         if self.drawing.frozen.take().is_some() {
@@ -187,7 +187,7 @@ impl Active {
             // A growth without steps has left no trace yet.
             replay: if end == 0 { Replay::new(size, profile) } else { Replay::stale(size, profile) },
             want: f64::from(end),
-            shown: Moment::after(end),
+            shown: if has_drawn_all { Moment::after(end) } else { Moment::START },
         })
     }
 
