@@ -41,7 +41,7 @@ impl CrackGrowth {
     /// Returns whether some are left. For [strands](super::MarkerLayout::Strands) about a quarter as many points are laid out. 0 counts
     /// as 1.
     ///
-    /// The positions of markers do not depend on the slices. All other methods complete the layout first.
+    /// The positions of markers do not depend on the slices. All other methods that change the growth complete the layout first.
     pub fn continue_hit(&mut self, places: u32) -> bool {
         if self.try_strands(places) {
             return true;

@@ -37,7 +37,7 @@ pub(super) struct Part {
     pub(super) room: usize,
     /// Whether all nodes that are pulled have grown. Then the new ones look for markers.
     pub(super) has_grown: bool,
-    /// How many of the former have grown, or the next of the latter.
+    /// How many nodes that are pulled have grown; once all have, the next new node that looks for markers.
     pub(super) at: usize,
     /// Whether markers are to be given up.
     pub(super) any_stopped: bool,

@@ -218,7 +218,7 @@ impl CrackGrowth {
         }
     }
 
-    /// Whether another step may grow something.
+    /// Whether another step may grow something, or [one](Self::continue_step) is under way.
     #[must_use]
     pub const fn is_growing(&self) -> bool {
         self.steps_left > 0 || self.part.is_some()

@@ -30,13 +30,13 @@ const SHARE: usize = 4;
 /// Tiles of what hits have crushed that a surface draws in a frame at the most, however much time there is.
 const CRUSHED: usize = 8;
 
-/// Texels that are painted without a look at the time, at least: so many in each frame.
+/// Texels that are painted between two looks at the frame's clock: so many at least, once painting has begun.
 const SLICE: u32 = 4096;
 
-/// Nodes that are looked at between two looks at the time.
+/// Nodes and links that are searched for closed cells between two looks at it.
 const NODES: usize = 256;
 
-/// Tiles of them that are made into rectangles at once, where not all may be painted in a frame.
+/// Dirty tiles that are made into rectangles at once, where a frame may not paint all of them.
 const BAND: usize = 512;
 
 /// A surface that is being painted.
@@ -229,8 +229,8 @@ impl Texels {
         }
     }
 
-    /// Paints the dirty texels of the view that is shown and asks for their upload, those first that are left over, about so many tiles of them after the
-    /// others. What there is no time for is left over again.
+    /// Paints the dirty texels of the view that is shown and asks for their upload, those first that are left over. `tiles` is about how many dirty tiles
+    /// are made into rectangles at once. What there is no time for is left over again.
     fn paint(
         &mut self,
         active: &mut Active,
