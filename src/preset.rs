@@ -92,7 +92,7 @@ impl CrackPreset {
             variety: 0.15,
             ..GrowthParams::DEFAULT
         },
-        profile: Profile { wall: 0.7, ragged: 0.0022, chipped: 0.009, rubble: 0.4, ..Profile::DEFAULT },
+        profile: Profile { wall: 0.7, ragged: 0.0022, chipped: 0.009, rubble: 0.4, edge: 0.4, ..Profile::DEFAULT },
         look: Look::CONCRETE,
         steps_per_second: 60.0,
         follows_lines: false,
@@ -132,13 +132,14 @@ impl CrackPreset {
         profile: Profile {
             depth: 1.0,
             full_width: 0.012,
-            wall: 0.4,
+            wall: 0.7,
             rim_width: 0.0,
             rim_depth: 0.0,
             faintest: 0.0,
             ragged: 0.0012,
             chipped: 0.006,
             rubble: 0.3,
+            edge: 0.4,
             ..Profile::DEFAULT
         },
         look: Look::PLASTER,
@@ -411,6 +412,7 @@ impl CrackPreset {
             rim_depth: 0.08,
             faintest: 0.0,
             ragged: 0.0034,
+            edge: 0.4,
             ..Profile::DEFAULT
         },
         look: Look::MUD,

@@ -259,6 +259,12 @@ impl CrackGrowth {
         self.changes.take(usize::MAX, changed);
     }
 
+    /// Whether anything is left that [`take_changed`](Self::take_changed) or [`take_markers`](Self::take_markers) would give.
+    #[cfg(feature = "bevy")]
+    pub(crate) fn has_changed(&self) -> bool {
+        !self.changes.list.is_empty() || !self.shown_markers.is_empty()
+    }
+
     /// Like [`take_changed`](Self::take_changed), but no more than `most` of the oldest; returns whether any are left.
     #[cfg(feature = "bevy")]
     pub(crate) fn take_some_changed(&mut self, most: usize, changed: &mut Vec<SegmentId>) -> bool {

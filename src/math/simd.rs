@@ -75,9 +75,9 @@ mod tests {
             let path = SegmentPath::straight(point(), point());
             let rim_width = if rng.unit() < 0.5 { 0.0 } else { 0.03 };
             let ragged = if rng.unit() < 0.5 { 0.0 } else { 0.02 };
-            let (wall, rim_depth) = (rng.unit(), rng.unit());
+            let [wall, rim_depth, edge] = [0; 3].map(|_| rng.unit());
             let (chipped, rubble) = if rng.unit() < 0.5 { (0.0, 0.0) } else { (0.02, 0.5) };
-            let profile = Profile { wall, rim_width, rim_depth, ragged, chipped, rubble, ..Profile::DEFAULT };
+            let profile = Profile { wall, rim_width, rim_depth, ragged, chipped, rubble, edge, ..Profile::DEFAULT };
             stamp_path(&mut field, &profile, &path);
         }
         field

@@ -206,7 +206,7 @@ impl Look {
             flakes: 2,
             tint: 0.75,
             fall: 0.5,
-            bare: 0.92,
+            bare: 1.0,
             jag: 0.003,
             stones: 0.7,
             ..CrushedZone::DEFAULT
@@ -243,7 +243,7 @@ impl Look {
             terraces: 3,
             tint: 0.7,
             fall: 0.4,
-            bare: 0.85,
+            bare: 1.0,
             jag: 0.003,
             stones: 1.0,
             ..CrushedZone::DEFAULT
@@ -261,19 +261,19 @@ impl Look {
     pub const MARBLE: Self = Self {
         ramp: Cow::Borrowed(&[
             stop(0.15, [0.72, 0.71, 0.69], 0.20),
-            stop(0.50, [0.38, 0.365, 0.345], 0.90),
+            stop(0.50, [0.32, 0.31, 0.30], 0.92),
             stop(1.0, [0.14, 0.13, 0.12], 1.0),
         ]),
         crushed: Some(CrushedZone {
             radius: 0.04,
             ragged: 0.6,
-            depth: 0.013,
+            depth: 0.011,
             rough: 0.003,
             grain: 0.005,
-            color: [0.97, 0.965, 0.955],
+            color: [0.92, 0.915, 0.905],
             pale: 0.9,
             speckle: 0.2,
-            dust: 0.5,
+            dust: 0.25,
             chips: 0.5,
             reach: 2.8,
             broken: true,
@@ -282,11 +282,11 @@ impl Look {
             flakes: 2,
             tint: 0.15,
             fall: 0.6,
-            bare: 0.85,
+            bare: 1.0,
             jag: 0.002,
             ..CrushedZone::DEFAULT
         }),
-        glint: 0.9,
+        glint: 0.75,
         uneven_glint: 0.85,
         shadow: 0.6,
         cast: 1.6,
@@ -295,7 +295,7 @@ impl Look {
         ..Self::GROOVE
     };
 
-    /// Sand: cracks whose sides have slumped, and a bowl with a raised rim at the hit.
+    /// Sand: a bowl with a raised rim at the hit, clods around it, and cracks whose sides have slumped.
     pub const SAND: Self = Self {
         ramp: Cow::Borrowed(&[
             stop(0.10, [0.97, 0.94, 0.90], 0.05),
@@ -304,18 +304,18 @@ impl Look {
             stop(1.0, [0.40, 0.325, 0.26], 0.97),
         ]),
         crushed: Some(CrushedZone {
-            radius: 0.065,
-            ragged: 0.3,
+            radius: 0.06,
+            ragged: 0.2,
             soft: 1.0,
-            depth: 0.045,
-            rim: 0.45,
-            rough: 0.002,
-            grain: 0.006,
+            depth: 0.025,
+            rim: 0.85,
+            rough: 0.0012,
+            grain: 0.0024,
             color: [0.80, 0.68, 0.50],
             pale: 0.95,
             speckle: 0.12,
             dust: 0.3,
-            chips: 0.0,
+            chips: 0.6,
             reach: 2.6,
             tint: 0.9,
             bare: 1.0,
@@ -360,7 +360,7 @@ impl Look {
             flakes: 3,
             tint: 0.5,
             fall: 0.85,
-            bare: 0.9,
+            bare: 1.0,
             jag: 0.0018,
             stones: 0.25,
             ..CrushedZone::DEFAULT
@@ -384,8 +384,8 @@ impl Look {
             rough: 0.006,
             grain: 0.005,
             color: [0.67, 0.43, 0.33],
-            pale: 0.9,
-            speckle: 0.5,
+            pale: 1.0,
+            speckle: 0.6,
             dust: 0.4,
             chips: 0.5,
             reach: 3.0,
@@ -393,9 +393,9 @@ impl Look {
             basin: 0.3,
             terraces: 2,
             flakes: 3,
-            tint: 0.5,
+            tint: 0.35,
             fall: 0.8,
-            bare: 0.75,
+            bare: 1.0,
             jag: 0.0018,
             ..CrushedZone::DEFAULT
         }),
@@ -481,7 +481,7 @@ impl Look {
             flakes: 1,
             tint: 0.6,
             fall: 0.5,
-            bare: 0.9,
+            bare: 1.0,
             jag: 0.003,
             stones: 0.25,
             ..CrushedZone::DEFAULT
@@ -495,7 +495,7 @@ impl Look {
         ramp: Cow::Borrowed(&[
             stop(0.085, [0.85, 0.79, 0.72], 0.02),
             stop(0.20, [0.70, 0.645, 0.58], 0.45),
-            stop(0.40, [0.46, 0.40, 0.34], 0.94),
+            stop(0.40, [0.46, 0.41, 0.355], 0.94),
             stop(0.60, [0.28, 0.23, 0.185], 0.98),
             stop(0.82, [0.16, 0.12, 0.09], 1.0),
             stop(1.0, [0.11, 0.08, 0.06], 1.0),
@@ -527,7 +527,7 @@ impl Look {
             flakes: 1,
             tint: 0.7,
             fall: 0.5,
-            bare: 0.95,
+            bare: 1.0,
             jag: 0.004,
             stones: 0.15,
             ..CrushedZone::DEFAULT
@@ -575,7 +575,7 @@ impl Look {
             broken: true,
             flakes: 1,
             tint: 0.35,
-            bare: 0.95,
+            bare: 1.0,
             jag: 0.0,
             ..CrushedZone::DEFAULT
         }),

@@ -86,6 +86,7 @@ impl CrackPreset {
             ("profile.ragged", profile.ragged, 0.0..=0.05),
             ("profile.chipped", profile.chipped, 0.0..=0.05),
             ("profile.rubble", profile.rubble, 0.0..=1.0),
+            ("profile.edge", profile.edge, 0.0..=1.0),
             ("steps_per_second", self.steps_per_second, 0.0..=10_000.0),
         ] {
             within(name, value, &range)?;

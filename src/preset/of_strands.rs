@@ -33,7 +33,7 @@ impl CrackPreset {
             variety: 0.15,
             ..GrowthParams::DEFAULT
         },
-        profile: Profile { wall: 0.4, ragged: 0.002, ..Profile::DEFAULT },
+        profile: Profile { wall: 0.4, ragged: 0.002, edge: 0.5, ..Profile::DEFAULT },
         look: Look::ASPHALT,
         steps_per_second: 60.0,
         follows_lines: false,
@@ -74,13 +74,14 @@ impl CrackPreset {
             variety: 0.15,
             ..GrowthParams::DEFAULT
         },
-        profile: Profile { wall: 0.3, ragged: 0.0008, ..Profile::DEFAULT },
+        profile: Profile { wall: 0.3, ragged: 0.0008, edge: 0.4, ..Profile::DEFAULT },
         look: Look::MARBLE,
         steps_per_second: 80.0,
         follows_lines: false,
     };
 
-    /// Sand: a bowl with a raised rim at the hit, and cracks in the crust around it that hardly turn. They are [strands](crate::strands).
+    /// Sand: a bowl with a raised rim at the hit, and clods that were thrown out. Its cracks are [strands](crate::strands) that are hardly seen: loose
+    /// ground does not split.
     pub const SAND: Self = Self {
         growth: GrowthParams {
             step_length: 0.02,
@@ -109,7 +110,7 @@ impl CrackPreset {
             variety: 0.15,
             ..GrowthParams::DEFAULT
         },
-        profile: Profile { wall: 1.0, ragged: 0.0006, rubble: 0.1, ..Profile::DEFAULT },
+        profile: Profile { depth: 0.15, wall: 1.0, ragged: 0.0006, rubble: 0.1, ..Profile::DEFAULT },
         look: Look::SAND,
         steps_per_second: 40.0,
         follows_lines: false,

@@ -327,6 +327,9 @@ pub struct Profile {
     pub chipped: f32,
     /// How high stones lie in deep cracks, as a share of [`depth`](Self::depth). They are about twice as large as [`chipped`](Self::chipped), 2 to 16 texels. It has no effect with [`even_walls`](Self::even_walls). Range 0..=1; default 0.
     pub rubble: f32,
+    /// How much of the depth of wide cracks is an upright edge, above the [`wall`](Self::wall): where they broke apart. It begins at a width of 5
+    /// texels and is all there from 12 on. It has no effect with [`even_walls`](Self::even_walls). Range 0..=1; default 0.
+    pub edge: f32,
 }
 
 impl Profile {
@@ -342,6 +345,7 @@ impl Profile {
         ragged: 0.0,
         chipped: 0.0,
         rubble: 0.0,
+        edge: 0.0,
     };
 }
 

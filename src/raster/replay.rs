@@ -550,7 +550,7 @@ mod tests {
         {
             let frame = SurfaceFrame::with_unit(UVec2::new(420, 300), unit).unwrap();
             let params = GrowthParams { line_width: 0.03, max_width: 0.04, reach: 0.15, ..GrowthParams::DEFAULT };
-            let profile = Profile { ragged: 0.012, chipped, rubble: 0.5, ..Profile::DEFAULT };
+            let profile = Profile { ragged: 0.012, chipped, rubble: 0.5, edge: 0.5, ..Profile::DEFAULT };
             let mut growth = CrackGrowth::new(params, frame.extent(), seed).unwrap();
             growth.hit(0.5 * frame.extent(), 1.0);
             while growth.step().grew() {}

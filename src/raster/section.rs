@@ -37,6 +37,8 @@ pub(super) struct Section {
     /// Increase of that share per texel of half width.
     gain: f32,
     wall: f32,
+    /// Share of the depth of wide cracks that lies at their edge.
+    edge: f32,
     rim: f32,
     pub(super) rim_depth: f32,
     pub(super) inv_rim: f32,
@@ -62,6 +64,9 @@ pub(super) struct Section {
 /// Largest deviation of an edge, as a share of the half width above half a texel.
 const DEVIATION: f32 = 0.6;
 
+/// Half widths at which edges begin to be upright, and from which on they are wholly so, texels.
+const UPRIGHT: [f32; 2] = [2.5, 6.0];
+
 /// Half width from which on pieces come off, texels, and by how much further for each texel above it.
 const UNCHIPPED: f32 = 1.5;
 const CHIPPED: f32 = 0.8;
@@ -83,6 +88,9 @@ pub(super) struct Cut {
     /// Distance at which the core ends.
     pub(super) reach: f32,
     pub(super) inv_wall: f32,
+    /// Share of the depth at the edge, and what the walls have of it.
+    pub(super) edge: f32,
+    pub(super) slope: f32,
     /// Distance at which the rim ends.
     pub(super) rim_reach: f32,
     /// 65535, less for lines thinner than a texel.
@@ -92,6 +100,15 @@ pub(super) struct Cut {
     pub(super) swing: f32,
     /// How far pieces have come off for one step of their tile.
     pub(super) gap: f32,
+}
+
+impl Cut {
+    /// The share of the peak at this distance from the centre line.
+    #[inline(always)]
+    pub(super) fn share(&self, distance: f32) -> f32 {
+        let within = self.reach - distance;
+        self.edge * clamp01(within) + self.slope * clamp01(within * self.inv_wall)
+    }
 }
 
 impl Section {
@@ -108,6 +125,7 @@ impl Section {
             least: if profile.even_walls { 2.0 / full_width } else { 0.4 },
             gain: if profile.even_walls { 2.0 } else { 1.2 } / full_width,
             wall,
+            edge: if profile.even_walls { 0.0 } else { clamped(profile.edge, 1.0) },
             rim,
             rim_depth: if rim > 0.0 { clamped(profile.rim_depth, 1.0) } else { 0.0 },
             inv_rim: 1.0 / max(rim, 1.0),
@@ -138,6 +156,7 @@ impl Section {
             least: 0.4,
             gain: MAX_RADIUS,
             wall: 0.0,
+            edge: 0.0,
             rim: 0.0,
             rim_depth: 0.0,
             inv_rim: 1.0,
@@ -158,10 +177,13 @@ impl Section {
     #[inline(always)]
     pub(super) fn cut(&self, r: f32) -> Cut {
         let core = max(r, 0.5);
+        let edge = self.edge * clamp01((core - UPRIGHT[0]) * (1.0 / (UPRIGHT[1] - UPRIGHT[0])));
         Cut {
             peak: self.depth * min(self.least + self.gain * r, 1.0),
             reach: core + 0.5,
             inv_wall: 1.0 / (1.0 + self.wall * core),
+            edge,
+            slope: 1.0 - edge,
             rim_reach: r + self.rim,
             scale: 65535.0 * min(self.strength * r, 1.0),
             rim_depth: self.rim_depth * min(self.rim_least + self.rim_gain * r, 1.0),
@@ -183,7 +205,7 @@ impl Section {
         let peak = min(cut.peak, self.depth * (1.0 - self.rubble * stone));
         let (gone, left) = (cut.gap * max(-piece, 0.0), cut.gap * max(piece, 0.0));
         let upright = GONE * min(gone, 1.0) * clamp01(cut.reach + gone - distance);
-        let core = peak * max(clamp01((cut.reach - distance) * cut.inv_wall), upright);
+        let core = peak * max(cut.share(distance), upright);
         max(core, self.depth * STEP * min(left, 1.0) * clamp01(cut.reach + left - distance))
     }
 
@@ -218,8 +240,8 @@ mod tests {
             let full_width = rng.range(0.001, 0.2);
             let even_walls = case % 4 == 0;
             let [ragged, chipped] = [0.02, 0.02].map(|most| most * rng.unit());
-            let (wall, rubble) = (rng.unit(), rng.unit());
-            let profile = Profile { wall, ragged, chipped, rubble, full_width, even_walls, ..Profile::DEFAULT };
+            let [wall, rubble, edge] = [0; 3].map(|_| rng.unit());
+            let profile = Profile { wall, ragged, chipped, rubble, edge, full_width, even_walls, ..Profile::DEFAULT };
             let section = Section::new(&profile, rng.range(1.0, 400.0));
             let (deviates, far) = (rng.range(-1.0, 1.0), rng.range(0.0, 8.0));
             let mut one_of = |values: [f32; 4]| values[rng.next_u32() as usize % 4];

@@ -4,13 +4,15 @@
 //! nearest point of that line give the depth (both in texels):
 //!
 //! ```text
-//! core = peak(r) * clamp((r + 1/2 - d) / (1 + wall * r), 0, 1)
+//! core = peak(r) * mix(clamp((r + 1/2 - d) / (1 + wall * r), 0, 1), clamp(r + 1/2 - d, 0, 1), edge(r))
 //! rim  = rim_depth * clamp((r + rim - d) / max(rim, 1), 0, 1)
 //! depth = max(core, rim) * min(2 r / (1 - faintest), 1)
 //! ```
 //!
 //! `peak(r)` rises with `r` from 40 % of the depth to all of it at the full width. With even walls it is `(1 + r) /
 //! full` and `wall` is 1, so that depth measures the distance to the edge in texels.
+//!
+//! `edge(r)` is zero up to a half width of 2.5 texels and all of `edge` from 6 on.
 //!
 //! The core is a slot with an edge one texel wide (`wall` 0) up to a V (`wall` 1). Lines thinner than a texel keep
 //! the cross-section of one texel (`r` = 1/2 in `core`) and only get fainter, by the last factor: a line 0.3 texels
@@ -390,7 +392,7 @@ impl Capsule {
             let mut value = if CHIPPED {
                 section.deep(&cut, distance, pieces[i], stones[i])
             } else {
-                cut.peak * clamp01((cut.reach - distance) * cut.inv_wall)
+                cut.peak * cut.share(distance)
             };
             if RIM {
                 value = max(value, cut.rim_depth * clamp01((cut.rim_reach - distance) * section.inv_rim));

@@ -179,6 +179,7 @@ fn strokes(print: &mut Print, rng: &mut Rng) -> Made<()> {
         ragged: maybe(rng, 0.002, 0.02),
         chipped: maybe(rng, 0.002, 0.02),
         rubble: maybe(rng, 0.0, 1.0),
+        edge: maybe(rng, 0.1, 1.0),
     };
     let veil = Veil {
         reach: rng.range(0.02, 0.2),

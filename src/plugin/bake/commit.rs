@@ -17,6 +17,7 @@ use crate::plugin::surface::inputs::BaseAndMask;
 use crate::plugin::surface::plan::Plan;
 use crate::plugin::surface::prepare::MAX_UPLOAD_FRAMES;
 use crate::plugin::surface::queues::Queues;
+use crate::plugin::surface::shared::Shared;
 use crate::plugin::surface::time::First;
 use bevy::{prelude::*, render::renderer::RenderDevice};
 
@@ -186,7 +187,7 @@ fn replace(world: &mut World, entity: Entity, kind: Baked, mut active: Box<Activ
     // Steps that it has grown since are made up for.
     active.playhead.due += f64::from(active.cracks.growth.steps_made().saturating_sub(order.seen.steps));
     let before = (
-        core::mem::replace(&mut active.cracks.growth, growth),
+        core::mem::replace(&mut active.cracks.growth, Shared::new(growth)),
         core::mem::replace(&mut active.cracks.cells, cells),
         core::mem::replace(&mut active.drawing.field, field),
         core::mem::replace(&mut active.drawing.touched, touched),

@@ -10,6 +10,7 @@ use crate::plugin::surface::cracks::Cracks;
 use crate::plugin::surface::drawing::{Drawing, Frozen};
 use crate::plugin::surface::freezing::{Freezing, Left};
 use crate::plugin::surface::queues::Queues;
+use crate::plugin::surface::shared::Shared;
 use crate::plugin::surface::stamp::{Scratch, stamp};
 use bevy::prelude::*;
 
@@ -17,6 +18,13 @@ use bevy::prelude::*;
 fn is_full(active: &Active) -> bool {
     let growth = &active.cracks.growth;
     active.playhead.playback.is_none() && growth.nodes_left() < growth.params().max_nodes.div_ceil(4)
+}
+
+/// Whether all that has grown has been drawn, and nothing of the next step is being prepared: no frame changes the cracks then.
+fn stands_still(active: &Active) -> bool {
+    let turn = &active.turn;
+    let is_at_work = turn.is_dirty || turn.is_stamping || turn.is_laying_out || turn.is_to_shatter;
+    !is_at_work && !active.cracks.growth.is_preparing()
 }
 
 /// How many nodes a surface keeps: the newest half of them.
@@ -39,7 +47,7 @@ pub(crate) fn has_to_wait(world: &mut World, entity: Entity, lands: impl FnOnce(
     }
     let has_room = active_mut(world, entity).is_none_or(|active| {
         let known = active.freezing.take();
-        let freezing = Freezing::go_on(known, &active.cracks, &active.drawing, kept(active));
+        let freezing = Freezing::go_on(known, &active.cracks, &active.drawing, kept(active), stands_still(active));
         active.freezing.insert(Box::new(freezing)).is_done()
     });
     if !has_room {
@@ -65,7 +73,7 @@ pub(crate) fn freeze_if_full(active: &mut Active) -> bool {
             // All of it has been drawn.
             left.take_changed(&mut Vec::new());
             left.take_markers(&mut Vec::new());
-            drop_in_background(core::mem::replace(growth, left));
+            drop_in_background(core::mem::replace(growth, Shared::new(left)));
             Frozen::of(frozen.take(), forgotten, field, cells)
         }
         None => Frozen::after(frozen.take(), growth, keep, field, cells),

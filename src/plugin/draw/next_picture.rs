@@ -107,7 +107,7 @@ impl NextInputs {
 
     fn job(&self, active: &Active, regrown: Option<&Regrown>) -> Box<FrameJob> {
         let Regrowth { preset, base, rect, frame, seed, mask, .. } = &self.growth;
-        let growth = regrown.map_or(&active.cracks.growth, |regrown| &regrown.growth);
+        let growth = regrown.map_or(&*active.cracks.growth, |regrown| &regrown.growth);
         let is_played = active.playhead.playback.is_some();
         let moment = if is_played { active.moment() } else { Moment::after(growth.timeline().end()) };
         let is_anew = !self.keeps_field(active);
@@ -203,7 +203,7 @@ pub(crate) fn make(
         OnAnother::Grown(regrown) => Some(*regrown),
         OnAnother::Wait => return Ok(None),
     };
-    let growth = regrown.as_ref().map_or(&active.cracks.growth, |regrown| &regrown.growth);
+    let growth = regrown.as_ref().map_or(&*active.cracks.growth, |regrown| &regrown.growth);
     let is_for_frame = !may_wait || is_unlimited || !is_much(growth, inputs.growth.frame.size());
     let next = next_of(world, entity).filter(|next| !is_for_frame && next.restarts <= MAX_RESTARTS);
     let Some(mut next) = next else { return Ok(Some(NextShown { inputs, regrown, drawn: None })) };

@@ -154,7 +154,7 @@ impl<'a> PaintJob<'a> {
         // Without a limit nothing is put off.
         let may_wait = most_crushed < usize::MAX && self.active.may_be_partly_painted();
         if !may_wait {
-            self.active.cracks.growth.finish_step();
+            self.active.cracks.finish_step();
         }
         let goes_on = may_wait && self.active.is_partly_painted() && !self.active.turn.is_stamping;
         if !goes_on {

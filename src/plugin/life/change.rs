@@ -24,6 +24,7 @@ use crate::plugin::surface::prepare::fail;
 use crate::plugin::surface::queues::Queues;
 use crate::plugin::surface::regrow::{Regrown, Regrowth};
 use crate::plugin::surface::reread::draft;
+use crate::plugin::surface::shared::Shared;
 use crate::plugin::surface::stamp::stamp_anew;
 use crate::plugin::surface::time::SLICE;
 use crate::raster::DepthField;
@@ -367,7 +368,7 @@ fn show_picture(
         active.cracks.cells = CellTracker::new(frame.extent());
         active.cracks.cells.update(growth.network());
         active.cracks.cells_reported = active.cracks.cells.cells().len();
-        active.cracks.growth = growth;
+        active.cracks.growth = Shared::new(growth);
     }
     let density = draft.base.density(draft.plan.rect, active.surface.alpha_mask);
     active.cracks.growth.set_density(density);

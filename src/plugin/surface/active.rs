@@ -192,7 +192,8 @@ impl Active {
 
     /// Keeps what grows from now on out of the holes of the picture and of shards.
     pub(crate) fn avoid_holes(&mut self) {
-        self.cracks.growth.set_density(self.density());
+        let density = self.density();
+        self.cracks.growth.set_density(density);
     }
 
     /// Where cracks may go: not over holes.

@@ -1,13 +1,14 @@
 //! [`Cracks`]: the cracks of a surface.
 
 use super::motion::{Motion, MotionFrame};
+use super::shared::Shared;
 use crate::growth::{CrackGrowth, GrowthParams};
 use crate::pattern::{CellTracker, Moment, Network};
 use bevy::prelude::*;
 
 /// The cracks of a surface, and what was reported of them.
 pub(crate) struct Cracks {
-    pub(crate) growth: CrackGrowth,
+    pub(crate) growth: Shared<CrackGrowth>,
     pub(crate) cells: CellTracker,
     /// Cells whose closing has been reported, with the one that is there from the start.
     pub(crate) cells_reported: usize,
@@ -62,8 +63,16 @@ pub(crate) struct LastHit {
 }
 
 impl Cracks {
+    /// Completes a step that is under way. Growth that no step is under way in may be read by a task, and is not touched.
+    pub(crate) fn finish_step(&mut self) {
+        if self.growth.is_in_step() {
+            self.growth.finish_step();
+        }
+    }
+
     pub(crate) fn new(growth: CrackGrowth) -> Self {
         let cells = CellTracker::new(growth.network().extent());
+        let growth = Shared::new(growth);
         Self { growth, cells, cells_reported: 1, added: None, hits: 0, last_hit: None, unchipped: 0, tips_from: 0 }
     }
 }

@@ -15,6 +15,8 @@ pub(crate) struct Freezing {
 }
 
 enum Stage {
+    /// Waits since then for the cracks to stand still: a task reads them, and a frame that changed them meanwhile would have to copy them.
+    Waiting(Instant),
     /// By a task, since then.
     Running(BackgroundJob<Work, Option<Box<Left>>>, Instant),
     /// `None` if the task has failed.
@@ -22,7 +24,7 @@ enum Stage {
 }
 
 struct Work {
-    growth: CrackGrowth,
+    growth: Arc<CrackGrowth>,
     keep: u32,
     has_plates: bool,
     /// The size of the picture that is kept, if there is none yet.
@@ -65,28 +67,34 @@ impl Seen {
 }
 
 impl Freezing {
-    /// Goes on, or begins (again) if nothing is `known` of these cracks.
-    pub(crate) fn go_on(known: Option<Box<Self>>, cracks: &Cracks, drawing: &Drawing, keep: u32) -> Self {
+    /// Goes on, or begins (again) if nothing is `known` of these cracks. Its task begins when they stand still.
+    pub(crate) fn go_on(
+        known: Option<Box<Self>>,
+        cracks: &Cracks,
+        drawing: &Drawing,
+        keep: u32,
+        stands_still: bool,
+    ) -> Self {
         let seen = Seen::of(cracks, drawing);
         let known = known.filter(|freezing| freezing.seen == seen);
-        let stage = known.map_or_else(
-            || {
-                let work = Work {
-                    growth: cracks.growth.clone(),
-                    keep,
-                    has_plates: drawing.field.has_plates(),
-                    size: drawing.frozen.is_none().then(|| drawing.field.frame.size()),
-                };
-                Stage::Running(BackgroundJob::start(work, Work::forget), Instant::now())
-            },
-            |known| known.stage,
-        );
+        let mut stage = known.map_or_else(|| Stage::Waiting(Instant::now()), |known| known.stage);
+        if let Stage::Waiting(since) = stage
+            && (stands_still || since.elapsed() >= PATIENCE)
+        {
+            let work = Work {
+                growth: cracks.growth.share(),
+                keep,
+                has_plates: drawing.field.has_plates(),
+                size: drawing.frozen.is_none().then(|| drawing.field.frame.size()),
+            };
+            stage = Stage::Running(BackgroundJob::start(work, Work::forget), Instant::now());
+        }
         let stage = match stage {
             Stage::Running(mut job, since) => match job.take_if_done(since.elapsed() >= PATIENCE) {
                 Some(left) => Stage::Done(left),
                 None => Stage::Running(job, since),
             },
-            done @ Stage::Done(_) => done,
+            other => other,
         };
         Self { seen, stage }
     }
@@ -106,10 +114,11 @@ impl Freezing {
 }
 
 impl Work {
-    fn forget(mut self) -> Option<Box<Left>> {
+    fn forget(self) -> Option<Box<Left>> {
         guarded(|| {
-            let forgotten = Forgotten::of(&mut self.growth, self.keep, self.has_plates, self.size);
-            Ok(Box::new(Left { growth: self.growth, forgotten }))
+            let mut growth = Arc::unwrap_or_clone(self.growth);
+            let forgotten = Forgotten::of(&mut growth, self.keep, self.has_plates, self.size);
+            Ok(Box::new(Left { growth, forgotten }))
         })
         .ok()
     }

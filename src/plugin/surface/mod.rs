@@ -25,6 +25,7 @@ pub(crate) mod queue;
 pub(crate) mod queues;
 pub(crate) mod regrow;
 pub(crate) mod reread;
+pub(crate) mod shared;
 pub(crate) mod stamp;
 pub(crate) mod stamp_network;
 pub(crate) mod tile_set;

@@ -24,7 +24,7 @@ const SLICE: usize = 64;
 
 /// Stamps what has grown since the last time into the field, or whatever is to be shown, but for what hits have crushed.
 pub(crate) fn stamp(active: &mut Active, scratch: &mut Scratch) {
-    active.cracks.growth.finish_step();
+    active.cracks.finish_step();
     stamp_some(active, scratch, || false);
 }
 
@@ -49,8 +49,10 @@ pub(crate) fn stamp_some(active: &mut Active, scratch: &mut Scratch, is_over: im
         }
         return true;
     }
+    // A task may read what has not changed.
+    let has_changed = active.cracks.growth.has_changed();
     loop {
-        active.turn.is_stamping = active.cracks.growth.take_some_changed(SLICE, &mut scratch.segments);
+        active.turn.is_stamping = has_changed && active.cracks.growth.take_some_changed(SLICE, &mut scratch.segments);
         let Drawing { field, profile, touched, .. } = &mut active.drawing;
         for segment in scratch.segments.drain(..) {
             if let Some(path) = active.cracks.growth.network().path(segment) {
@@ -71,7 +73,9 @@ pub(crate) fn stamp_some(active: &mut Active, scratch: &mut Scratch, is_over: im
         active.drawing.field.begin_layer(growth.network(), growth.timeline(), moment, &mut scratch.rects);
     }
     scratch.rects.drain(..).for_each(|rect| active.mark_grown(rect));
-    active.cracks.growth.take_markers(&mut scratch.markers);
+    if has_changed {
+        active.cracks.growth.take_markers(&mut scratch.markers);
+    }
     let radius = active.cracks.growth.params().line_width;
     for marker in scratch.markers.drain(..) {
         let rect = stamp_dot(&mut active.drawing.field, marker, radius, DOT_DEPTH);
@@ -107,7 +111,7 @@ impl Active {
 /// Clears the field and stamps the whole network again; at another time than the end that is left to the next
 /// painting.
 pub(crate) fn stamp_anew(active: &mut Active) {
-    active.cracks.growth.finish_step();
+    active.cracks.finish_step();
     let frame = active.drawing.field.frame;
     active.drawing.redrawn += 1;
     active.drawing.is_stale = false;

@@ -20,7 +20,7 @@ use glam::Vec2;
 const SHELF: f32 = 0.5;
 
 /// The same where there are several steps down.
-const EDGE: f32 = 0.31;
+const EDGE: f32 = 0.42;
 
 /// Share of that depth which is gained on the way to the middle.
 const BOWL: f32 = 0.4;
@@ -64,7 +64,7 @@ impl ChipLight {
     const PLAIN: Self = Self { length: 0.35, shade: SHADE, tone: 0.0, sides: 0.0, pale: 0.3 };
 
     /// Lumps that show where they broke.
-    const FRESH: Self = Self { length: 0.5, shade: 1.2 * SHADE, tone: 0.12, sides: 0.5, pale: 0.6 };
+    const FRESH: Self = Self { length: 0.42, shade: 1.7 * SHADE, tone: 0.2, sides: 0.6, pale: 0.6 };
 }
 
 /// Texels over which a hard shadow ends.
@@ -462,7 +462,9 @@ impl Shape<'_> {
         }
         let inside = (within + 0.5).clamp(0.0, 1.0);
         if inside < 1.0 && *ink <= 0.0 {
-            let shadow = (outline.within(off + TO_LIGHT * (light.length * size)) + 0.5).clamp(0.0, 1.0);
+            // It is darkest beside the chip.
+            let shadow = outline.within(off + TO_LIGHT * (light.length * size)) + 0.5;
+            let shadow = (shadow / (0.7 * light.length * size).max(1.0)).clamp(0.0, 1.0);
             place.dark = place.dark.max(light.shade * shadow * (1.0 - inside));
         }
         if inside > 0.0 {

@@ -31,7 +31,8 @@ pub struct CrushedZone {
     pub flake: f32,
     /// How much dust covers the surroundings; it falls to nothing at [`reach`](Self::reach). 0..=1; default 0.2.
     pub dust: f32,
-    /// How many crumbs lie around the zone, up to [`reach`](Self::reach); 0..=1; default 0.3.
+    /// How many crumbs lie around the zone, up to [`reach`](Self::reach); with a [`rim`](Self::rim) they are clods of up to two grains in radius.
+    /// 0..=1; default 0.3.
     pub chips: f32,
     /// Distance to which dust and crumbs extend, radii. 1..=8; default 2.5.
     pub reach: f32,

@@ -46,6 +46,12 @@ pub(super) const CHIP_FACE: u32 = 0x67;
 /// Crumbs; the next numbers are those of one crumb.
 pub(super) const CRUMBS: u32 = 0x80;
 
+/// Clods of loose material; the next numbers are those of one clod.
+pub(super) const CLODS: u32 = 0x1C0;
+
+/// Outlines of clods.
+pub(super) const CLOD_OUTLINE: u32 = 0x1D0;
+
 /// Sizes and positions of the pieces that break off.
 pub(super) const PIECES: u32 = 0x0B0E;
 

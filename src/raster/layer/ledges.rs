@@ -19,8 +19,8 @@ pub(super) const LEDGE_SHADE: f32 = 0.35;
 pub(super) const LEDGE_LIT: f32 = 0.25;
 
 /// How much of the light on the edge is in patches, and its strength.
-const PATCHES: f32 = 0.75;
-const EDGE_LIT: f32 = 1.4;
+const PATCHES: f32 = 0.5;
+const EDGE_LIT: f32 = 2.0;
 
 /// How much darker it is at the bottom: for the ledges above a place, and for its distance from the edge.
 const BELOW_LEDGES: f32 = 0.36;
@@ -33,7 +33,7 @@ const AWAY: f32 = 0.45;
 const DARKENS: [f32; 2] = [-0.25, 0.7];
 
 /// How much brighter than the surface a place is at most.
-pub(super) const BRIGHTEST: f32 = 0.4;
+pub(super) const BRIGHTEST: f32 = 0.6;
 
 /// Most cover of the dust around a crater, and how much brighter than the surface it is.
 const MOST_DUST: f32 = 0.6;

@@ -14,6 +14,9 @@ use glam::Vec2;
 /// Direction to the light: the upper left.
 pub(super) const TO_LIGHT: Vec2 = Vec2::new(-std::f32::consts::FRAC_1_SQRT_2, -std::f32::consts::FRAC_1_SQRT_2);
 
+/// Share of the clods of loose material that lie in the bowl, of those beside it.
+const IN_BOWL: f32 = 0.2;
+
 /// The pieces of a crushed zone, wherever they are drawn.
 #[derive(Debug)]
 pub(super) struct Pieces {
@@ -236,5 +239,42 @@ impl<'a> Shape<'a> {
             place.pale = place.pale.max(pale * inside);
             place.shade += (0.9 * draw(27) - 0.55) * inside;
         }
+    }
+
+    /// How much of the dust and the crumbs around a hit is left at a distance from it, radii.
+    pub(super) fn left_at(&self, radii: f32) -> f32 {
+        1.0 - ((radii - 0.8) / (self.crushed.reach - 0.8)).clamp(0.0, 1.0)
+    }
+
+    /// A clod of loose material in some of the squares of a lattice, with its shadow; `off` is the offset of the place from the hit.
+    pub(super) fn add_clod(&self, place: &mut Place, off: Vec2, at: Vec2, seed: u32) {
+        let side = 10.0 * self.grain;
+        let ((left, x), (top, y)) = (floor(at.x / side), floor(at.y / side));
+        let draw = |k: u32| (hash(seed ^ (draws::CLODS + k), x, y) >> 8) as i32 as f32 * (1.0 / 16_777_216.0);
+        let radius = self.grain * (0.7 + 1.4 * draw(1) * draw(2));
+        let middle = (Vec2::new(left, top) + 0.5) * side
+            + (Vec2::new(draw(3), draw(4)) - 0.5) * (side - 3.8 * radius - 1.4).max(0.0);
+        // By its middle, so that it is there as a whole.
+        let distance = (off + middle - at).length();
+        let left = self.left_at(distance / self.radius.max(0.5));
+        // Most of what falls back into the bowl is buried.
+        let many = self.crushed.chips * if distance < 0.95 * self.radius { IN_BOWL } else { 1.0 };
+        if draw(0) >= many * left * left || distance + 2.0 * radius > self.crushed.reach * self.radius {
+            return;
+        }
+        let turn = Vec2::new(draw(5) - 0.5, draw(6) - 0.5).normalize_or(Vec2::X);
+        // Its outline is longer one way, and uneven.
+        let inside = |off: Vec2| {
+            let size = 0.9 * radius;
+            let bump = noise(seed ^ draws::CLOD_OUTLINE, (middle.x + off.x) / size, (middle.y + off.y) / size);
+            1.0 - Vec2::new(off.dot(turn), 1.3 * off.perp_dot(turn)).length() / (radius * (1.0 + 0.35 * bump))
+        };
+        let cover = |inside: f32| (inside * radius + 0.5).clamp(0.0, 1.0);
+        let off = at - middle;
+        let (here, above) = (inside(off), inside(off + TO_LIGHT * (0.75 * radius)));
+        let shadow = cover(above) * (1.0 - cover(here));
+        place.height += 1.1 * radius * here.max(0.0).sqrt();
+        place.pale = place.pale.max(self.crushed.pale * cover(here).max(shadow));
+        place.shade += (0.2 * draw(7) - 0.12) * cover(here) - 0.45 * shadow;
     }
 }

@@ -26,15 +26,15 @@ const THROWN: f32 = 0.7;
 
 /// How round the edge of a bowl of loose material is, as a share of its depth, and where the crest of its rim is, in shares of the distance of the edge:
 /// beyond that it does not go up any more.
-const ROUND: f32 = 0.16;
+const ROUND: f32 = 0.05;
 const CREST: f32 = 1.08;
 
 /// How far the edge of such a bowl deviates at most, at a raggedness of 1.
 const BUMPS: f32 = 0.9;
 
 /// How much darker and how much brighter loose material is for each unit of its slope away from the light and towards it.
-const IN_SHADE: f32 = 0.4;
-const IN_LIGHT: f32 = 0.1;
+const IN_SHADE: f32 = 0.5;
+const IN_LIGHT: f32 = 0.14;
 
 /// How much the height of a rim varies around it.
 const RAYS: f32 = 0.8;
@@ -289,14 +289,19 @@ impl Shape<'_> {
         if flake > 1.0 {
             self.add_flake(&mut place, way, radii, seed);
         }
+        if self.crushed.rim > 0.0 {
+            self.add_clod(&mut place, off, at, seed);
+        }
         if (inside < 1.0 || self.crushed.needles > 0.0) && radii < reach {
-            let left = 1.0 - ((radii - 0.8) / (reach - 0.8)).clamp(0.0, 1.0);
+            let left = self.left_at(radii);
             if dust > 0.0 {
                 let cloud = 0.65 + 0.35 * grains.dust[k];
                 let powder = inside * (1.0 - self.crushed.needles);
                 place.pale = place.pale.max(dust * left * left * cloud * (1.0 - powder));
             }
-            self.add_crumb(&mut place, at, chips * left * left, seed);
+            if self.crushed.rim <= 0.0 {
+                self.add_crumb(&mut place, at, chips * left * left, seed);
+            }
         }
         for &(middle, radius) in &self.bubbles {
             let (off, out) = (off - middle, off.distance(middle));
@@ -365,5 +370,35 @@ mod tests {
             let most = 2.2 * deep + crushed.rim * deep * 1.5 * (edge / THROWN).max(1.0 / CREST);
             assert!(steepest <= most * 0.004 * 1.01, "seed {seed}: a step of {steepest}");
         }
+    }
+
+    /// Clods and their shadows lie within the squares of their lattice, so that none is cut off.
+    #[test]
+    fn clods_are_whole() {
+        let mut rng = Rng::new(7);
+        let mut many = 0;
+        for seed in 0..200 {
+            let crushed =
+                CrushedZone { rim: 0.5, chips: 1.0, reach: 8.0, grain: rng.range(0.001, 0.02), ..CrushedZone::DEFAULT };
+            let (unit, radius) = (512.0, 60.0);
+            let pieces = Pieces::new(&crushed, unit, radius, seed, &NO_BRICKS);
+            let shape = Shape::near(&crushed, unit, radius, &pieces, [Vec2::splat(-9.0), Vec2::splat(9.0)]);
+            let centre = Vec2::new(rng.range(0.0, 90.0), rng.range(0.0, 90.0));
+            let clod_at = |at: Vec2| {
+                let mut place = Place::NONE;
+                shape.add_clod(&mut place, at - centre, at, seed);
+                place.height.abs() + place.shade.abs() + place.pale
+            };
+            let side = 10.0 * shape.grain;
+            for _ in 0..200 {
+                let along = rng.range(-80.0, 80.0);
+                let across = side * (rng.range(-80.0, 80.0) / side).round() + rng.range(-1.0e-3, 1.0e-3);
+                for at in [Vec2::new(along, across), Vec2::new(across, along)] {
+                    assert_eq!(clod_at(at), 0.0, "seed {seed} at {at}");
+                }
+                many += usize::from(clod_at(Vec2::new(along, rng.range(-80.0, 80.0))) > 0.0);
+            }
+        }
+        assert!(many > 200, "{many} places have a clod");
     }
 }

@@ -31,6 +31,7 @@ fn random_profile(rng: &mut Rng) -> Profile {
         ragged: if below(rng, 2) == 0 { 0.0 } else { 0.05 * rng.unit() },
         chipped: if below(rng, 2) == 0 { 0.0 } else { 0.05 * rng.unit() },
         rubble: if below(rng, 2) == 0 { 0.0 } else { rng.unit() },
+        edge: if below(rng, 2) == 0 { 0.0 } else { rng.unit() },
     }
 }
 
@@ -78,7 +79,10 @@ fn reference(field: &DepthField, profile: &Profile, path: &SegmentPath, x: u32, 
     let peak = peak.min(f64::from(profile.depth) * (1.0 - rubble * stone));
     let gone = gap * (-piece).max(0.0);
     let upright = 0.5 * gone.min(1.0) * (shown + 0.5 + gone - d).clamp(0.0, 1.0);
-    let core = peak * ((shown + 0.5 - d) / (1.0 + wall * shown)).clamp(0.0, 1.0).max(upright);
+    let at_edge =
+        if profile.even_walls { 0.0 } else { f64::from(profile.edge) * ((shown - 2.5) / 3.5).clamp(0.0, 1.0) };
+    let sloping = (1.0 - at_edge) * ((shown + 0.5 - d) / (1.0 + wall * shown)).clamp(0.0, 1.0);
+    let core = peak * (sloping + at_edge * (shown + 0.5 - d).clamp(0.0, 1.0)).max(upright);
     let left = gap * piece.max(0.0);
     let step = f64::from(profile.depth) * 0.14 * left.min(1.0) * (shown + 0.5 + left - d).clamp(0.0, 1.0);
     let core = core.max(step);
@@ -222,11 +226,22 @@ fn wild_numbers_neither_hang_nor_panic() {
         let mut field = field([33, 17]);
         let mut point = || PathPoint { pos: Vec2::new(pick(), pick()), width: pick() };
         let path = SegmentPath::straight(point(), point());
-        let [depth, full_width, wall, rim_width, rim_depth, faintest, ragged, chipped, rubble] =
+        let [depth, full_width, wall, rim_width, rim_depth, faintest, ragged, chipped, rubble, edge] =
             std::array::from_fn(|_| pick());
         let even_walls = depth > 0.0;
-        let profile =
-            Profile { depth, full_width, wall, rim_width, rim_depth, faintest, even_walls, ragged, chipped, rubble };
+        let profile = Profile {
+            depth,
+            full_width,
+            wall,
+            rim_width,
+            rim_depth,
+            faintest,
+            even_walls,
+            ragged,
+            chipped,
+            rubble,
+            edge,
+        };
         stamp_path(&mut field, &profile, &path);
         stamp_dot(&mut field, Vec2::new(pick(), pick()), pick(), pick());
     }
