@@ -63,16 +63,16 @@ pub(crate) struct LastHit {
 }
 
 impl Cracks {
-    /// Completes a step that is under way. Growth that no step is under way in may be read by a task, and is not touched.
-    pub(crate) fn finish_step(&mut self) {
-        if self.growth.is_in_step() {
-            self.growth.finish_step();
-        }
-    }
-
     pub(crate) fn new(growth: CrackGrowth) -> Self {
         let cells = CellTracker::new(growth.network().extent());
         let growth = Shared::new(growth);
         Self { growth, cells, cells_reported: 1, added: None, hits: 0, last_hit: None, unchipped: 0, tips_from: 0 }
+    }
+
+    /// Completes a step that is under way. If none is, the growth is not even touched: a task may be reading it.
+    pub(crate) fn finish_step(&mut self) {
+        if self.growth.is_in_step() {
+            self.growth.finish_step();
+        }
     }
 }

@@ -49,7 +49,7 @@ pub(crate) fn stamp_some(active: &mut Active, scratch: &mut Scratch, is_over: im
         }
         return true;
     }
-    // A task may read what has not changed.
+    // Without changes the growth is not even touched: a task may be reading it.
     let has_changed = active.cracks.growth.has_changed();
     loop {
         active.turn.is_stamping = has_changed && active.cracks.growth.take_some_changed(SLICE, &mut scratch.segments);

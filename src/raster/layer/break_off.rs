@@ -462,7 +462,7 @@ impl Shape<'_> {
         }
         let inside = (within + 0.5).clamp(0.0, 1.0);
         if inside < 1.0 && *ink <= 0.0 {
-            // It is darkest beside the chip.
+            // Darkest beside the chip, and soft further out.
             let shadow = outline.within(off + TO_LIGHT * (light.length * size)) + 0.5;
             let shadow = (shadow / (0.7 * light.length * size).max(1.0)).clamp(0.0, 1.0);
             place.dark = place.dark.max(light.shade * shadow * (1.0 - inside));

@@ -14,7 +14,7 @@ use glam::Vec2;
 /// Direction to the light: the upper left.
 pub(super) const TO_LIGHT: Vec2 = Vec2::new(-std::f32::consts::FRAC_1_SQRT_2, -std::f32::consts::FRAC_1_SQRT_2);
 
-/// Share of the clods of loose material that lie in the bowl, of those beside it.
+/// How many clods of loose material lie in the bowl, as a share of those beside it.
 const IN_BOWL: f32 = 0.2;
 
 /// The pieces of a crushed zone, wherever they are drawn.
@@ -251,10 +251,13 @@ impl<'a> Shape<'a> {
         let side = 10.0 * self.grain;
         let ((left, x), (top, y)) = (floor(at.x / side), floor(at.y / side));
         let draw = |k: u32| (hash(seed ^ (draws::CLODS + k), x, y) >> 8) as i32 as f32 * (1.0 / 16_777_216.0);
+        if draw(0) >= self.crushed.chips {
+            return;
+        }
         let radius = self.grain * (0.7 + 1.4 * draw(1) * draw(2));
         let middle = (Vec2::new(left, top) + 0.5) * side
             + (Vec2::new(draw(3), draw(4)) - 0.5) * (side - 3.8 * radius - 1.4).max(0.0);
-        // By its middle, so that it is there as a whole.
+        // The distance of its middle tells whether it is there, so that it is there as a whole.
         let distance = (off + middle - at).length();
         let left = self.left_at(distance / self.radius.max(0.5));
         // Most of what falls back into the bowl is buried.
