@@ -14,6 +14,7 @@ use crate::{
     math::{hash_unit, mix, ops},
     pattern::{NO_PARENT, Node},
 };
+use core::ops::Range;
 use glam::Vec2;
 
 /// Cosine of the largest angle between a ray and a marker that attracts it: 20 degrees.
@@ -97,14 +98,18 @@ impl CrackGrowth {
         (course + course.perp() * (self.params.wander * stray)).normalize_or_zero()
     }
 
-    /// Collects `S(c)` of every node, and the order of the nodes.
-    pub(super) fn gather_pulls(&mut self) {
+    /// Before pulls are collected.
+    pub(super) fn begin_pulls(&mut self) {
         self.field.grow_older();
         self.field.sweep();
+        self.ways.clear();
+    }
+
+    /// Collects `S(c)` of every node that some markers pull.
+    pub(super) fn gather_pulls(&mut self, markers: Range<usize>) {
         let sight = self.sight();
         let Self { field, network, impacts, pulls, ways, courses, pull_of, changes, .. } = self;
-        ways.clear();
-        field.each_pull(&network.nodes, |index, node, distance_sq| {
+        field.each_pull(markers, &network.nodes, |index, node, distance_sq| {
             let slot = &mut pull_of[node as usize];
             if *slot == NO_PULL {
                 *slot = pulls.len() as u32;
@@ -145,19 +150,21 @@ impl CrackGrowth {
                 (pull.closest, pull.closest_sq, pull.closest_id) = (index, distance_sq, marker.id);
             }
         });
+    }
+
+    /// Once all pulls are collected: the order of the nodes.
+    pub(super) fn order_pulls(&mut self) {
         self.order.clear();
         self.order.extend((0u32..).zip(&self.pulls).map(|(slot, pull)| (pull.node, slot)));
         self.order.sort_unstable();
     }
 
-    /// Computes the position of every child.
-    pub(super) fn aim(&mut self) {
+    /// Computes the positions of some children.
+    pub(super) fn aim(&mut self, some: Range<usize>) {
         let extent = self.network.extent();
         let (length, kill) = (self.params.step_length, self.params.kill_distance);
-        let next = self.network.nodes.len() as u64;
-        // A crack does not turn back: markers that it cannot serve in its direction are left to others.
-        let keeps_on = self.arrest.is_some() && (self.params.inertia > 0.0 || self.has_rays() || !self.mask.is_empty());
-        for (child, &(_, slot)) in (next..).zip(&self.order) {
+        let next = (self.network.nodes.len() + some.start) as u64;
+        for (child, &(_, slot)) in (next..).zip(self.order.get(some).unwrap_or_default()) {
             let pull = self.pulls[slot as usize];
             let from = self.network.nodes[pull.node as usize].pos;
             let before = self.courses[pull.node as usize];
@@ -197,8 +204,13 @@ impl CrackGrowth {
             (pull.course, pull.heading, pull.fork) = (course, heading, fork);
             pull.child = up_to_border(from, direction, length, kill, extent);
         }
+    }
+
+    /// Finds out for some markers whether the children serve them.
+    pub(super) fn serve(&mut self, markers: Range<usize>) {
+        let (length, kill) = (self.params.step_length, self.params.kill_distance);
         let Self { field, network, pulls, pull_of, .. } = self;
-        field.each_pull(&network.nodes, |index, node, distance_sq| {
+        field.each_pull(markers, &network.nodes, |index, node, distance_sq| {
             let pull = &mut pulls[pull_of[node as usize] as usize];
             if !pull.serves {
                 let left_sq = field.marker(index).pos.distance_squared(pull.child);
@@ -212,6 +224,13 @@ impl CrackGrowth {
                     (angle - pull.fork).abs() <= FOR_FORK && distance_sq > 4.0 * length * length;
             }
         });
+    }
+
+    /// Once all children and whom they serve are known: side branches, and children that serve nobody.
+    pub(super) fn end_aiming(&mut self) {
+        let (extent, length) = (self.network.extent(), self.params.step_length);
+        // A crack does not turn back: markers that it cannot serve in its direction are left to others.
+        let keeps_on = self.arrest.is_some() && (self.params.inertia > 0.0 || self.has_rays() || !self.mask.is_empty());
         for pull in &mut self.pulls {
             let side = match pull.has_markers {
                 [true, true] => hash_unit(self.seed ^ draws::FORK_SIDE, u64::from(pull.node)) < 0.5,

@@ -16,6 +16,7 @@ use super::{
     rays::RAY,
 };
 use crate::pattern::Node;
+use core::ops::Range;
 use glam::{UVec2, Vec2};
 
 /// Squared distance of a removed marker to its node: no distance is below it.
@@ -361,17 +362,23 @@ impl MarkerField {
         }
     }
 
-    /// Calls `visit` with each marker that attracts a node, that node, and their squared distance.
+    /// Number of markers that attract nodes.
+    pub(super) const fn pulls(&self) -> usize {
+        self.active.len()
+    }
+
+    /// Calls `visit` with each of some markers that attract a node, that node, and their squared distance.
     #[inline]
-    pub(super) fn each_pull(&self, nodes: &[Node], mut visit: impl FnMut(u32, u32, f32)) {
+    pub(super) fn each_pull(&self, some: Range<usize>, nodes: &[Node], mut visit: impl FnMut(u32, u32, f32)) {
+        let active = self.active.get(some).unwrap_or_default();
         match &self.relations {
             None => {
-                for &index in &self.active {
+                for &index in active {
                     visit(index, self.node[index as usize], self.near_sq[index as usize]);
                 }
             }
             Some(relations) => {
-                for &index in &self.active {
+                for &index in active {
                     let i = index as usize;
                     for &node in relations.neighbours(self.id[i]) {
                         visit(index, node, distance_sq(self.x[i], self.y[i], nodes[node as usize].pos));

@@ -28,17 +28,31 @@ pub(super) struct Pull {
     pub(super) stopped: Option<Vec2>,
 }
 
+/// What a step does, one after the other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Stage {
+    /// Adds up how markers pull nodes.
+    Gathering,
+    /// Finds out where the nodes that are pulled grow to.
+    Aiming,
+    /// Finds out whom that serves.
+    Serving,
+    /// These nodes grow.
+    Growing,
+    /// The new nodes look for markers.
+    Visiting,
+}
+
 /// A step that is made in part.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Part {
+    pub(super) stage: Stage,
+    /// The next marker or node of the stage.
+    pub(super) at: usize,
     /// The first node that it adds.
     pub(super) first: u32,
     /// How many nodes it may add.
     pub(super) room: usize,
-    /// Whether all nodes that are pulled have grown. Then the new ones look for markers.
-    pub(super) has_grown: bool,
-    /// How many nodes that are pulled have grown; once all have, the next new node that looks for markers.
-    pub(super) at: usize,
     /// Whether markers are to be given up.
     pub(super) any_stopped: bool,
 }

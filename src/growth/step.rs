@@ -5,11 +5,15 @@ use super::{
     divide::Candidate,
     draws,
     params::StartLayout,
-    pull::{NO_PULL, Part, Pull},
+    pull::{NO_PULL, Part, Pull, Stage},
     state::CrackGrowth,
 };
 use crate::{math::mix, pattern::NO_PARENT};
+use core::ops::Range;
 use glam::Vec2;
+
+/// Markers of a part of a step that count as one node.
+const MARKERS: usize = 8;
 
 /// The result of one step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,8 +51,8 @@ impl CrackGrowth {
         }
     }
 
-    /// Makes a part of a [`step`](Self::step), with up to about `nodes` nodes, so that the step of a surface with many cracks can be spread
-    /// over several frames. Returns the report once all of the step is made. 0 counts as 1.
+    /// Makes a part of a [`step`](Self::step), with up to about `nodes` nodes or 8 times as many markers, so that the step of a surface with
+    /// many cracks can be spread over several frames. Returns the report once all of the step is made. 0 counts as 1.
     ///
     /// The cracks do not depend on the parts. In between, nodes of the step are in the network, but not all, nor are their widths final. All
     /// other methods that change the growth complete the step first.
@@ -120,27 +124,15 @@ impl CrackGrowth {
                 self.begin_step()
             }
         };
-        if !part.has_grown {
-            self.grow_some(&mut part, left);
-            if part.at < self.order.len() {
+        loop {
+            if !self.make_some(&mut part, left) {
                 self.part = Some(part);
                 return false;
             }
-            self.end_growing(&part);
-            (part.at, part.has_grown) = (part.first as usize, true);
+            let Some(next) = self.end_stage(&part) else { break };
+            (part.stage, part.at) = next;
         }
-        let last = self.network.nodes.len();
-        let end = last.min(part.at.saturating_add(*left as usize));
-        for node in part.at..end {
-            self.field.visit(node as u32, &self.network.nodes, &self.nodes);
-        }
-        *left -= (end - part.at) as u32;
-        part.at = end;
-        if end < last {
-            self.part = Some(part);
-            return false;
-        }
-        self.new_nodes = part.first..last as u32;
+        self.new_nodes = part.first..self.network.nodes.len() as u32;
         self.join_newborn();
         if self.new_nodes.is_empty() && !part.any_stopped && !self.is_running() {
             self.steps_left = 0;
@@ -151,23 +143,66 @@ impl CrackGrowth {
         true
     }
 
-    /// Finds out which nodes grow, and where to.
+    /// Makes some of a stage of a step, with up to `left` nodes. Returns whether it is complete.
+    fn make_some(&mut self, part: &mut Part, left: &mut u32) -> bool {
+        let (last, each) = match part.stage {
+            Stage::Gathering | Stage::Serving => (self.field.pulls(), MARKERS),
+            Stage::Aiming | Stage::Growing => (self.order.len(), 1),
+            Stage::Visiting => (self.network.nodes.len(), 1),
+        };
+        let end = last.min(part.at.saturating_add((*left as usize).saturating_mul(each)));
+        let some = part.at..end;
+        *left -= some.len().div_ceil(each) as u32;
+        part.at = end;
+        match part.stage {
+            Stage::Gathering => self.gather_pulls(some),
+            Stage::Aiming => self.aim(some),
+            Stage::Serving => self.serve(some),
+            Stage::Growing => self.grow_some(part, some),
+            Stage::Visiting => some.for_each(|node| self.field.visit(node as u32, &self.network.nodes, &self.nodes)),
+        }
+        end == last
+    }
+
+    /// Ends a stage that is complete; returns the next one, and where it begins.
+    fn end_stage(&mut self, part: &Part) -> Option<(Stage, usize)> {
+        Some(match part.stage {
+            Stage::Gathering => {
+                self.order_pulls();
+                (Stage::Aiming, 0)
+            }
+            Stage::Aiming => (Stage::Serving, 0),
+            Stage::Serving => {
+                self.end_aiming();
+                self.count_step();
+                (Stage::Growing, 0)
+            }
+            Stage::Growing => {
+                self.end_growing(part);
+                (Stage::Visiting, part.first as usize)
+            }
+            Stage::Visiting => return None,
+        })
+    }
+
     fn begin_step(&mut self) -> Part {
-        self.gather_pulls();
-        self.aim();
+        self.begin_pulls();
+        let first = self.network.nodes.len() as u32;
+        Part { stage: Stage::Gathering, at: 0, first, room: self.room(), any_stopped: false }
+    }
+
+    /// Counts the step, before its first node.
+    fn count_step(&mut self) {
         // Nodes that are added when growth has ended get their own step of the timeline.
         self.timeline.begin(self.steps.saturating_add(1));
         if !self.pulls.is_empty() || self.is_running() {
             self.steps = self.steps.saturating_add(1);
         }
-        let first = self.network.nodes.len() as u32;
-        Part { first, room: self.room(), at: 0, has_grown: false, any_stopped: false }
     }
 
-    /// Grows from the next nodes that are pulled.
-    fn grow_some(&mut self, part: &mut Part, left: &mut u32) {
-        let end = self.order.len().min(part.at.saturating_add(*left as usize));
-        for i in part.at..end {
+    /// Grows from some of the nodes that are pulled.
+    fn grow_some(&mut self, part: &mut Part, some: Range<usize>) {
+        for i in some {
             let (node, slot) = self.order[i];
             let stopped = if self.arrest.is_some() {
                 self.grow_apart(node, slot)
@@ -177,8 +212,6 @@ impl CrackGrowth {
             self.pulls[slot as usize].stopped = stopped;
             part.any_stopped |= stopped.is_some();
         }
-        *left -= (end - part.at) as u32;
-        part.at = end;
     }
 
     /// After all nodes have grown: markers that were given up, and what grows without markers.
@@ -257,7 +290,7 @@ impl CrackGrowth {
         if any_stopped {
             let Self { field, network, pulls, pull_of, .. } = self;
             let mut given_up = Vec::new();
-            field.each_pull(&network.nodes, |index, node, _| {
+            field.each_pull(0..field.pulls(), &network.nodes, |index, node, _| {
                 let pull = &pulls[pull_of[node as usize] as usize];
                 if let Some(direction) = pull.stopped {
                     let way = field.marker(index).pos - network.nodes[node as usize].pos;

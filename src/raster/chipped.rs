@@ -53,50 +53,64 @@ fn fitting(wanted: f32) -> usize {
 }
 
 fn made(index: usize) -> [Box<[i8]>; 2] {
-    let cell = CELLS[index];
-    let small = CELLS[fitting(STONE * cell as f32)];
+    let (pieces, stones) =
+        (Places::new(PIECES, CELLS[index]), Places::new(STONES, CELLS[fitting(STONE * CELLS[index] as f32)]));
     let tile = |of: &dyn Fn(usize, usize) -> f32| {
         let row = |y: usize| (0..ROW).map(move |x| (127.0 * of(x % SIDE, y)) as i8);
         (0..SIDE).flat_map(row).collect()
     };
     let piece = |x: usize, y: usize| {
-        let (piece, _, border) = nearest(PIECES, cell, x, y);
+        let (piece, _, border) = pieces.nearest(x, y);
         let drawn = hash_unit(PIECES ^ 1, piece) - ENTIRE;
         let reach = if drawn < 0.0 { 0.0 } else { LEAST + (1.0 - LEAST) * drawn / (1.0 - ENTIRE) };
         let reach = reach * (border / SIDES).min(1.0);
         if hash_unit(PIECES ^ 2, piece) < WHOLE { -reach } else { reach }
     };
     let stone = |x: usize, y: usize| {
-        let (stone, far, _) = nearest(STONES, small, x, y);
+        let (stone, far, _) = stones.nearest(x, y);
         let drawn = hash_unit(STONES ^ 1, stone) - BARE;
         if drawn < 0.0 { 0.0 } else { drawn / (1.0 - BARE) * (END - far).clamp(0.0, 1.0) }
     };
     [tile(&piece), tile(&stone)]
 }
 
-/// The nearest of random places, one in each cell, its distance, and by how much the next one is further; in cells. What repeats with the tile
-/// has one number.
-fn nearest(salt: u64, cell: usize, x: usize, y: usize) -> (u64, f32, f32) {
-    let count = SIDE / cell;
-    let (column, row) = (x / cell, y / cell);
-    let [at_x, at_y] = [x, y].map(|texel| (texel as f32 + 0.5) / cell as f32);
-    let (mut best, mut second) = ((0, f32::INFINITY), f32::INFINITY);
-    // From the cell before to the one after, both ways.
-    for (right, down) in (0..9).map(|i| (i % 3, i / 3)) {
-        let number = ((row + down + count - 1) % count * count + (column + right + count - 1) % count) as u64;
-        let place = |before: usize, axis: u64| {
-            before as f32 - 1.0 + 0.1 + 0.8 * hash_unit(salt + 8 * cell as u64 + axis, number)
-        };
-        let (dx, dy) = (place(column + right, 0) - at_x, place(row + down, 1) - at_y);
-        let far = dx * dx + dy * dy;
-        if far < best.1 {
-            (best, second) = ((number, far), best.1);
-        } else if far < second {
-            second = far;
-        }
+/// Random places, one in each cell.
+struct Places {
+    /// Texels.
+    cell: usize,
+    /// How far they lie to the right and down in their cells, row by row; in cells.
+    within: Vec<[f32; 2]>,
+}
+
+impl Places {
+    fn new(salt: u64, cell: usize) -> Self {
+        let count = (SIDE / cell) as u64;
+        let place = |number| [0, 1].map(|axis| 0.8 * hash_unit(salt + 8 * cell as u64 + axis, number));
+        Self { cell, within: (0..count * count).map(place).collect() }
     }
-    let far = best.1.sqrt();
-    (best.0, far, second.sqrt() - far)
+
+    /// The nearest place to a texel, its distance, and by how much the next one is further; in cells. What repeats with the tile has one number.
+    fn nearest(&self, x: usize, y: usize) -> (u64, f32, f32) {
+        let (cell, count) = (self.cell, SIDE / self.cell);
+        let (column, row) = (x / cell, y / cell);
+        let [at_x, at_y] = [x, y].map(|texel| (texel as f32 + 0.5) / cell as f32);
+        let (mut best, mut second) = ((0, f32::INFINITY), f32::INFINITY);
+        // From the cell before to the one after, both ways.
+        for (right, down) in (0..9).map(|i| (i % 3, i / 3)) {
+            let number = (row + down + count - 1) % count * count + (column + right + count - 1) % count;
+            let [to_right, further_down] = self.within[number];
+            let place = |before: usize, within: f32| before as f32 - 1.0 + 0.1 + within;
+            let (dx, dy) = (place(column + right, to_right) - at_x, place(row + down, further_down) - at_y);
+            let far = dx * dx + dy * dy;
+            if far < best.1 {
+                (best, second) = ((number as u64, far), best.1);
+            } else if far < second {
+                second = far;
+            }
+        }
+        let far = best.1.sqrt();
+        (best.0, far, second.sqrt() - far)
+    }
 }
 
 #[cfg(test)]

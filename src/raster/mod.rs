@@ -46,6 +46,8 @@ pub(crate) use layer::{CrushedField, Layer, PIT_STEPS, Plate, SLOPE_UNIT, Spot, 
 pub use layer::{CrushedZone, LayerPlan, Veil};
 pub use rect::TexelRect;
 pub use replay::{DOT_DEPTH, Replay, ReplayChanges};
+#[cfg(feature = "bevy")]
+pub(crate) use stamp::make_tables;
 pub use stamp::{stamp_dot, stamp_path, stamp_path_with};
 
 use crate::{
@@ -203,10 +205,10 @@ impl DepthField {
         self.layer.follow(timeline, moment);
     }
 
-    /// Draws at most `tiles` tiles of 32 x 32 texels of the crushed zones, from each hit outward. Returns whether any
-    /// are left.
-    pub(crate) fn crush(&mut self, tiles: usize, changed: &mut Vec<TexelRect>) -> bool {
-        let is_left = self.layer.crush(tiles, self.forbidden.as_ref(), changed);
+    /// Draws at most so many parts of crushed zones, each of one hit on one tile of 32 x 32 texels, from each hit outward. Returns whether
+    /// any are left.
+    pub(crate) fn crush(&mut self, parts: usize, changed: &mut Vec<TexelRect>) -> bool {
+        let is_left = self.layer.crush(parts, self.forbidden.as_ref(), changed);
         changed.retain(|rect| !rect.is_empty());
         is_left
     }

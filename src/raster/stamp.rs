@@ -92,6 +92,12 @@ pub fn stamp_path_with(
     stamp_pieces::<true>(field, profile, path, changed)
 }
 
+/// Makes the tables that stamps with a profile look into, which the first one would make otherwise.
+#[cfg(feature = "bevy")]
+pub(crate) fn make_tables(profile: &Profile, frame: SurfaceFrame) {
+    Section::new(profile, frame.texels_per_unit());
+}
+
 /// Stamps a path; calls `changed` if `REPORT`.
 fn stamp_pieces<const REPORT: bool>(
     field: &mut DepthField,

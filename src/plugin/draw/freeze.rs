@@ -48,7 +48,8 @@ pub(crate) fn has_to_wait(world: &mut World, entity: Entity, lands: impl FnOnce(
     let has_room = active_mut(world, entity).is_none_or(|active| {
         let known = active.freezing.take();
         let freezing = Freezing::go_on(known, &active.cracks, &active.drawing, kept(active), stands_still(active));
-        active.freezing.insert(Box::new(freezing)).is_done()
+        // What is left to stamp, and cells, are for the frames before.
+        active.freezing.insert(Box::new(freezing)).is_done() && !active.turn.is_stamping
     });
     if !has_room {
         world.resource_mut::<Queues>().freezing.insert(entity);

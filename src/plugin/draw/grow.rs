@@ -8,7 +8,7 @@ use crate::plugin::surface::queues::Queues;
 use bevy::{ecs::system::NonSendMarker, prelude::*};
 
 /// Share of the frame's budget after which no further step is made.
-const BUDGET_SHARE: f32 = 0.7;
+const BUDGET_SHARE: f32 = 0.6;
 
 /// Surfaces whose steps one thread makes, one after the other: fewer are not worth another thread.
 const SHARE: usize = 16;

@@ -22,19 +22,19 @@ use std::{
 };
 
 /// Share of the frame's budget after which nothing more is painted: the rest is for what is under way then, and for reporting it.
-const BUDGET_SHARE: f32 = 0.8;
+const BUDGET_SHARE: f32 = 0.7;
 
 /// Surfaces that one thread paints, one after the other: fewer are not worth another thread.
 const SHARE: usize = 4;
 
-/// Tiles of what hits have crushed that a surface draws in a frame at the most, however much time there is.
+/// Parts of what hits have crushed, of one hit on one tile each, that a surface draws in a frame at the most, however much time there is.
 const CRUSHED: usize = 8;
 
 /// Texels that are painted between two looks at the frame's clock: so many at least, once painting has begun.
-const SLICE: u32 = 4096;
+const SLICE: u32 = 2048;
 
 /// Nodes and links that are searched for closed cells between two looks at it.
-const NODES: usize = 256;
+const NODES: usize = 64;
 
 /// Dirty tiles that are made into rectangles at once, where a frame may not paint all of them.
 const BAND: usize = 512;

@@ -1,6 +1,6 @@
 //! [`SurfaceInputs`]: what a surface is read from, by any thread.
 
-use super::frame::{frame, look};
+use super::frame::{frame, look, profile};
 use super::picture_plan::PicturePlan;
 use crate::CrackPreset;
 use crate::OutOfMemory;
@@ -10,7 +10,7 @@ use crate::pattern::CrackMask;
 use crate::plugin::api::{CrackError, CrackSurface};
 use crate::plugin::source::mask::{self, MaskKey};
 use crate::plugin::source::picture::BasePicture;
-use crate::raster::{DepthField, TexelRect};
+use crate::raster::{DepthField, TexelRect, make_tables};
 use bevy::prelude::*;
 use std::sync::Arc;
 
@@ -106,6 +106,7 @@ impl BlankSurface {
         let mut field = DepthField::try_new(frame).map_err(out_of_memory)?;
         field.set_forbidden(mask);
         field.set_layers(preset.look.layer(surface.seed));
+        make_tables(&profile(preset, base.is_nearest), frame);
         Ok(Self { growth, field, look })
     }
 }

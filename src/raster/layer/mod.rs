@@ -152,9 +152,9 @@ impl Layer {
         }
     }
 
-    /// Draws at most `tiles` tiles of the crushed zones. Returns whether any are left.
-    pub(super) fn crush(&mut self, tiles: usize, forbidden: Option<&Grid<bool>>, changed: &mut Vec<TexelRect>) -> bool {
-        self.crushed.as_mut().is_some_and(|crushed| crushed.draw_some(tiles, forbidden, changed))
+    /// Draws at most so many parts of crushed zones, of one hit on one tile each. Returns whether any are left.
+    pub(super) fn crush(&mut self, parts: usize, forbidden: Option<&Grid<bool>>, changed: &mut Vec<TexelRect>) -> bool {
+        self.crushed.as_mut().is_some_and(|crushed| crushed.draw_some(parts, forbidden, changed))
     }
 
     /// Whether tiles are left to draw.

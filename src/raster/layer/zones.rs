@@ -90,6 +90,8 @@ pub(crate) struct CrushedField {
     waiting: VecDeque<Waiting>,
     /// Which tiles are to be redrawn completely.
     is_anew: Vec<bool>,
+    /// The one that is being redrawn.
+    redrawn: Option<Redrawn>,
     /// Distance beside a plate at which its side is visible, texels.
     beyond: u32,
     /// What was drawn last, until nothing waits.
@@ -110,6 +112,15 @@ struct Waiting {
     tile: UVec2,
     /// The impact that is to be added to it; `None` = the whole tile is to be redrawn.
     impact: Option<u32>,
+}
+
+/// A tile that is being redrawn: what it showed before stays until it is complete.
+#[derive(Clone, Debug)]
+struct Redrawn {
+    tile: UVec2,
+    /// Impacts that are still to be drawn, the last one first.
+    left: Vec<u32>,
+    texels: Option<Box<Tile>>,
 }
 
 /// Compares what is shown, not the state of the work.
@@ -133,6 +144,7 @@ impl CrushedField {
             used: 0,
             waiting: VecDeque::new(),
             is_anew: vec![false; count.element_product() as usize],
+            redrawn: None,
             beyond: 0,
             known: Vec::new(),
         }
@@ -156,6 +168,10 @@ impl CrushedField {
     pub(super) fn follow(&mut self, strikes: &[Strike], all: &[Strike]) {
         if self.shown == strikes.len() || self.crushed.radius <= 0.0 {
             return;
+        }
+        // A tile that is being redrawn begins again.
+        if let Some(Redrawn { tile, .. }) = self.redrawn.take() {
+            self.waiting.push_front(Waiting { tile, impact: None });
         }
         // Tiles of impacts that have changed are redrawn; new impacts are added to what is there.
         let (mut anew, mut new) = (Vec::new(), Vec::new());
@@ -198,11 +214,11 @@ impl CrushedField {
 
     /// Whether tiles are left to draw.
     pub(super) fn is_behind(&self) -> bool {
-        !self.waiting.is_empty()
+        !self.waiting.is_empty() || self.redrawn.is_some()
     }
 
-    /// Draws at most `tiles` tiles; appends the rectangles of the texels that may have changed. Returns whether any
-    /// are left.
+    /// Draws at most the parts of `most` zones that lie on one tile each; appends the rectangles of the texels that may have changed. Returns
+    /// whether any are left.
     ///
     /// When none is left the result depends only on the hits, not on the slices.
     pub(super) fn draw_some(
@@ -212,26 +228,53 @@ impl CrushedField {
         changed: &mut Vec<TexelRect>,
     ) -> bool {
         for _ in 0..most {
+            if self.redraw_some(forbidden, changed) {
+                continue;
+            }
             let Some(Waiting { tile, impact }) = self.waiting.pop_front() else { break };
-            let texels = self.texels_of(tile);
             let Some(impact) = impact else {
-                let slot = (tile.y * self.columns + tile.x) as usize;
-                self.is_anew[slot] = false;
-                self.used -= usize::from(self.tiles[slot].take().is_some());
-                let zones: Vec<u32> = self.on(tile).take(MOST).collect();
-                zones.into_iter().for_each(|index| self.draw(index, tile, forbidden));
-                changed.push(texels);
+                let mut left: Vec<u32> = self.on(tile).take(MOST).collect();
+                left.reverse();
+                self.redrawn = Some(Redrawn { tile, left, texels: None });
+                self.redraw_some(forbidden, changed);
                 continue;
             };
             if let Some(Some(zone)) = self.zones.get(impact as usize) {
-                changed.push(texels.intersect(zone.bounds));
-                self.draw(impact, tile, forbidden);
+                changed.push(self.texels_of(tile).intersect(zone.bounds));
+                let slot = self.slot(tile);
+                let before = self.tiles[slot].take();
+                self.used -= usize::from(before.is_some());
+                let now = self.draw(impact, tile, before, forbidden);
+                self.used += usize::from(now.is_some());
+                self.tiles[slot] = now;
             }
         }
         if !self.is_behind() {
             self.known = Vec::new();
         }
         self.is_behind()
+    }
+
+    /// Draws the next zone of the tile that is being redrawn, if there is one. It is shown with its last zone.
+    fn redraw_some(&mut self, forbidden: Option<&Grid<bool>>, changed: &mut Vec<TexelRect>) -> bool {
+        let Some(Redrawn { tile, mut left, mut texels }) = self.redrawn.take() else { return false };
+        if let Some(index) = left.pop() {
+            texels = self.draw(index, tile, texels, forbidden);
+        }
+        if !left.is_empty() {
+            self.redrawn = Some(Redrawn { tile, left, texels });
+            return true;
+        }
+        let slot = self.slot(tile);
+        self.is_anew[slot] = false;
+        self.used += usize::from(texels.is_some());
+        self.used -= usize::from(std::mem::replace(&mut self.tiles[slot], texels).is_some());
+        changed.push(self.texels_of(tile));
+        true
+    }
+
+    const fn slot(&self, tile: UVec2) -> usize {
+        (tile.y * self.columns + tile.x) as usize
     }
 
     fn texels_of(&self, tile: UVec2) -> TexelRect {
@@ -284,23 +327,27 @@ impl CrushedField {
         self.crushed.radius * self.frame.texels_per_unit() * energy.sqrt()
     }
 
-    /// Draws the zone of an impact over a tile, if it touches it.
-    fn draw(&mut self, index: u32, tile: UVec2, forbidden: Option<&Grid<bool>>) {
-        let Some(Some(zone)) = self.zones.get(index as usize).copied() else { return };
+    /// Draws the zone of an impact over what a tile shows, if it touches it.
+    fn draw(
+        &mut self,
+        index: u32,
+        tile: UVec2,
+        before: Option<Box<Tile>>,
+        forbidden: Option<&Grid<bool>>,
+    ) -> Option<Box<Tile>> {
+        let Some(Some(zone)) = self.zones.get(index as usize).copied() else { return before };
         let corner = tile * TILE;
         let rect = TexelRect { min: corner, max: (corner + TILE).min(self.frame.size()) }.intersect(zone.bounds);
         if rect.is_empty() {
-            return;
+            return before;
         }
         let (radius, seed, unit) = (self.radius(zone.energy), self.seed_of(index), self.frame.texels_per_unit());
         let pieces = self.pieces_of(index, &zone);
-        let slot = &mut self.tiles[(tile.y * self.columns + tile.x) as usize];
-        self.used += usize::from(slot.is_none());
-        let texels = slot.get_or_insert_with(|| Box::new([Spot::NONE; (TILE * TILE) as usize]));
+        let mut texels = before.unwrap_or_else(|| Box::new([Spot::NONE; (TILE * TILE) as usize]));
         let near = [rect.min, rect.max].map(|corner| corner.as_vec2() - zone.pos);
         let shape = Shape::near(&self.crushed, unit, radius, &pieces, near);
-        shape.draw(texels, zone.pos, seed, rect, corner);
-        let Some(forbidden) = forbidden else { return };
+        shape.draw(&mut texels, zone.pos, seed, rect, corner);
+        let Some(forbidden) = forbidden else { return Some(texels) };
         for y in rect.min.y..rect.max.y {
             for x in rect.min.x..rect.max.x {
                 if forbidden.get(x, y) == Some(true) {
@@ -308,6 +355,7 @@ impl CrushedField {
                 }
             }
         }
+        Some(texels)
     }
 
     /// The pieces of the zone of an impact, which are kept until all of it is drawn.
