@@ -486,6 +486,56 @@ mod tests {
         }
     }
 
+    /// A tile with many zones, one of which changes, shows them as they were until all of them are drawn, a few in each slice.
+    #[test]
+    fn tiles_are_redrawn_at_once_however_small_the_slices() {
+        let frame = SurfaceFrame::new(UVec2::splat(96)).unwrap();
+        let crushed = CrushedZone { broken: true, radius: 0.2, ..CrushedZone::DEFAULT };
+        let mut timeline = Timeline::default();
+        for impact in 0..6 {
+            timeline.strike(impact, (Vec2::splat(0.3 + 0.08 * impact as f32), NO_BRICKS), 0.0, 1.0);
+        }
+        let shown = |field: &CrushedField| {
+            let mut texels = Grid::new(frame.size(), Spot::NONE);
+            copy(field, &[TexelRect::whole(frame.size())], &mut texels);
+            texels
+        };
+        let mut field = CrushedField::new(&crushed, frame, 3);
+        let mut follow = |timeline: &Timeline, most: usize| {
+            field.follow(timeline.strikes(), timeline.strikes());
+            field.draw_some(most, None, &mut Vec::new());
+            (shown(&field), field.is_behind())
+        };
+        let (before, _) = follow(&timeline, usize::MAX);
+        timeline.strike(2, (Vec2::splat(0.46), NO_BRICKS), 1.0, 3.0);
+        let mut at_once = CrushedField::new(&crushed, frame, 3);
+        at_once.follow(timeline.strikes(), timeline.strikes());
+        at_once.draw_some(usize::MAX, None, &mut Vec::new());
+        let after = shown(&at_once);
+        let (mut slices, mut mixed) = (0, 0);
+        loop {
+            let (now, is_behind) = follow(&timeline, 1);
+            slices += 1;
+            for corner in tiles_of(&TexelRect::whole(frame.size())).map(|tile| tile * TILE) {
+                let is_like = |other: &Grid<Spot>| {
+                    (corner.y..corner.y + TILE).all(|y| {
+                        let row = |grid: &Grid<Spot>| {
+                            grid.row(y as usize)[corner.x as usize..(corner.x + TILE) as usize].to_vec()
+                        };
+                        row(&now) == row(other)
+                    })
+                };
+                assert!(is_like(&before) || is_like(&after), "slice {slices}: {corner} is half drawn");
+                mixed += u32::from(!is_like(&after));
+            }
+            if !is_behind {
+                assert!(now == after);
+                break;
+            }
+        }
+        assert!(slices > 30 && mixed > slices, "{slices} {mixed}");
+    }
+
     #[test]
     fn it_is_drawn_from_the_hit_outward() {
         let frame = SurfaceFrame::new(UVec2::splat(512)).unwrap();
