@@ -54,8 +54,9 @@ impl CrackGrowth {
     /// Makes a part of a [`step`](Self::step), with up to about `nodes` nodes or 8 times as many markers, so that the step of a surface with
     /// many cracks can be spread over several frames. Returns the report once all of the step is made. 0 counts as 1.
     ///
-    /// The cracks do not depend on the parts. In between, nodes of the step are in the network, but not all, nor are their widths final. All
-    /// other methods that change the growth complete the step first.
+    /// The cracks do not depend on the parts. In between, none or some of the nodes of the step are in the network, their widths are not final,
+    /// and [`steps`](Self::steps) and the end of the timeline may not count it yet; [`steps_made`](Self::steps_made) does. All other methods
+    /// that change the growth complete the step first.
     ///
     /// Steps of cracks that divide domains, and of strands, are made in one part.
     ///

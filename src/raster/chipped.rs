@@ -78,7 +78,7 @@ fn made(index: usize) -> [Box<[i8]>; 2] {
 struct Places {
     /// Texels.
     cell: usize,
-    /// How far they lie to the right and down in their cells, row by row; in cells.
+    /// How far they lie to the right and down in their cells, row by row; in cells, less the margin, which is added last: these are the same bits.
     within: Vec<[f32; 2]>,
 }
 

@@ -32,8 +32,8 @@ fn kept(active: &Active) -> u32 {
     active.cracks.growth.params().max_nodes / 2
 }
 
-/// Whether the hit has to wait for room: what is to be frozen is being drawn again, or a task works out what is left. `lands` tells whether
-/// the hit will not be refused.
+/// Whether the hit has to wait for room: what is to be frozen is being drawn again, a task works out what is left, or what has grown is not all
+/// drawn. `lands` tells whether the hit will not be refused.
 pub(crate) fn has_to_wait(world: &mut World, entity: Entity, lands: impl FnOnce(&mut World) -> bool) -> bool {
     if !active(world, entity).is_some_and(is_full) {
         return false;
@@ -48,8 +48,9 @@ pub(crate) fn has_to_wait(world: &mut World, entity: Entity, lands: impl FnOnce(
     let has_room = active_mut(world, entity).is_none_or(|active| {
         let known = active.freezing.take();
         let freezing = Freezing::go_on(known, &active.cracks, &active.drawing, kept(active), stands_still(active));
-        // What is left to stamp, and cells, are for the frames before.
-        active.freezing.insert(Box::new(freezing)).is_done() && !active.turn.is_stamping
+        // The next frames stamp what is left, and search it for cells, before the hit comes.
+        let is_stamping = active.turn.is_stamping || (active.turn.is_dirty && active.cracks.growth.has_changed());
+        active.freezing.insert(Box::new(freezing)).is_done() && !is_stamping
     });
     if !has_room {
         world.resource_mut::<Queues>().freezing.insert(entity);

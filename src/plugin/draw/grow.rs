@@ -93,7 +93,7 @@ pub(crate) fn grow_surfaces(
                 idle.push(entity);
             }
             let is_news = has_grown
-                || active.cracks.growth.is_in_step()
+                || (active.cracks.growth.is_in_step() && active.cracks.growth.has_changed())
                 || active.is_behind()
                 || (!active.turn.is_growing && active.turn.is_open);
             active.turn.has_news |= is_news;

@@ -189,7 +189,7 @@ impl<'a> PaintJob<'a> {
     }
 }
 
-/// Draws some of what hits have crushed: a tile at least if any is left, and no more than `most`.
+/// Draws some of what hits have crushed: a part at least if any is left, and no more than `most`.
 fn crush(active: &mut Active, scratch: &mut Scratch, most: usize, timer: &Timer) {
     if active.drawing.field.is_behind() {
         let is_over = |drawn: usize| drawn == most || timer.is_over();

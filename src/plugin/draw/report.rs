@@ -62,9 +62,12 @@ fn write_state(active: &mut Active, state: &mut CrackState, before: Option<Momen
     state.cells = closed + cells.partition_point(|cell| cell.birth <= moment.whole()) as u32;
     state.time = moment.steps() as f32;
     state.end = active.cracks.growth.timeline().end() as f32;
-    state.tips.clear();
     if is_done {
         state.status = CrackStatus::Done;
+    }
+    // Those of the last frame in which any grew.
+    if active.is_complete() || before.is_some() || nodes.len() != active.cracks.tips_from {
+        state.tips.clear();
     }
     if active.is_complete() {
         // No crack is on its way.
@@ -83,7 +86,7 @@ fn write_state(active: &mut Active, state: &mut CrackState, before: Option<Momen
             let uv = active.drawing.field.frame.pos_to_uv(tip);
             Some(CrackTip { uv, direction: now.normalize_or_zero(), length: length.max(0.0) })
         }));
-    } else {
+    } else if nodes.len() != active.cracks.tips_from {
         let first = active.cracks.tips_from.max(nodes.len().saturating_sub(CrackState::MAX_TIPS)).min(nodes.len());
         state.tips.extend(nodes[first..].iter().filter(|node| node.parent != NO_PARENT).map(|node| {
             let way = node.pos - nodes[node.parent as usize].pos;

@@ -169,10 +169,6 @@ impl CrushedField {
         if self.shown == strikes.len() || self.crushed.radius <= 0.0 {
             return;
         }
-        // A tile that is being redrawn begins again.
-        if let Some(Redrawn { tile, .. }) = self.redrawn.take() {
-            self.waiting.push_front(Waiting { tile, impact: None });
-        }
         // Tiles of impacts that have changed are redrawn; new impacts are added to what is there.
         let (mut anew, mut new) = (Vec::new(), Vec::new());
         while self.shown > strikes.len() {
@@ -189,6 +185,16 @@ impl CrushedField {
                 new.push(strike.impact);
             }
         }
+        let mut redrawn = self.redrawn.take();
+        // A tile that is being redrawn begins again if any of its zones is another, or one comes to it.
+        let has_changed = |redrawn: &mut Redrawn| {
+            let comes = |index: &u32| self.on(redrawn.tile).any(|on| on == *index) && self.counts(*index, redrawn.tile);
+            anew.contains(&redrawn.tile) || new.iter().any(comes)
+        };
+        if let Some(Redrawn { tile, .. }) = redrawn.take_if(has_changed) {
+            self.waiting.push_front(Waiting { tile, impact: None });
+        }
+        self.redrawn = redrawn;
         anew.sort_unstable_by_key(|tile| (tile.y, tile.x));
         let columns = self.columns;
         let slot = |tile: UVec2| (tile.y * columns + tile.x) as usize;
@@ -507,6 +513,7 @@ mod tests {
             (shown(&field), field.is_behind())
         };
         let (before, _) = follow(&timeline, usize::MAX);
+        let mut elsewhere = 6;
         timeline.strike(2, (Vec2::splat(0.46), NO_BRICKS), 1.0, 3.0);
         let mut at_once = CrushedField::new(&crushed, frame, 3);
         at_once.follow(timeline.strikes(), timeline.strikes());
@@ -514,6 +521,9 @@ mod tests {
         let after = shown(&at_once);
         let (mut slices, mut mixed) = (0, 0);
         loop {
+            // Hits that crush nothing more there do not hold it up.
+            timeline.strike(elsewhere, (Vec2::splat(9.0), NO_BRICKS), 0.0, 1.0);
+            elsewhere += 1;
             let (now, is_behind) = follow(&timeline, 1);
             slices += 1;
             for corner in tiles_of(&TexelRect::whole(frame.size())).map(|tile| tile * TILE) {
